@@ -1,0 +1,124 @@
+//! What a detector is: outline, layers, electrodes, and how it is measured.
+
+mod preset;
+
+/// A detection layer with its electrodes and the circuit that measures it.
+///
+/// Coordinates: x and y from the middle of the outline's bounding box, z up from the electrode side; metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Detector {
+    /// Preset or file name, for people.
+    pub name: String,
+    /// Edge of the layer.
+    pub outline: Outline,
+    /// Bottom (electrode side) first.
+    pub layers: Vec<Layer>,
+    /// In the order of the channels.
+    pub electrodes: Vec<Electrode>,
+    /// Contact impedance between pad and layer, in ohm square metres (ohm m2).
+    pub contact_impedance_ohm_m2: f64,
+    /// Voltage of the driving layer (V).
+    pub drive_v: f64,
+    /// Resistance of the multiplexer's closed switch (ohm).
+    pub on_resistance_ohm: f64,
+    /// How the voltages become numbers.
+    pub adc: Adc,
+}
+
+/// Closed polygons, without repeating the first corner (m).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Outer edge, counter-clockwise.
+    pub outer: Vec<[f64; 2]>,
+    /// Holes, clockwise.
+    pub holes: Vec<Vec<[f64; 2]>>,
+}
+
+/// One layer; its conductivity runs exponentially from bottom to top, as in eq. (11) of the paper.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layer {
+    /// Thickness (m).
+    pub thickness_m: f64,
+    /// Conductivity at its bottom (S/m).
+    pub bottom_s_per_m: f64,
+    /// Conductivity at its top (S/m).
+    pub top_s_per_m: f64,
+}
+
+/// A round pad under the layer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Electrode {
+    /// Centre, x (m).
+    pub x_m: f64,
+    /// Centre, y (m).
+    pub y_m: f64,
+    /// Radius (m).
+    pub radius_m: f64,
+}
+
+/// The analogue-to-digital converter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adc {
+    /// Bits of one conversion.
+    pub bits: u8,
+    /// Voltage that code `2^bits` would stand for (V).
+    pub full_scale_v: f64,
+    /// Standard deviation of a conversion's noise, in codes (LSB).
+    pub noise_lsb: f64,
+}
+
+impl Detector {
+    /// Thickness of all layers together (m).
+    pub fn thickness_m(&self) -> f64 {
+        self.layers.iter().map(|layer| layer.thickness_m).sum()
+    }
+
+    /// Conductivity integrated over the thickness (S per square): the natural unit of contact conductance.
+    pub fn sheet_conductance_s(&self) -> f64 {
+        self.layers.iter().map(Layer::sheet_conductance_s).sum()
+    }
+}
+
+impl Layer {
+    /// A layer of one conductivity.
+    pub fn uniform(thickness_m: f64, conductivity_s_per_m: f64) -> Self {
+        Self { thickness_m, bottom_s_per_m: conductivity_s_per_m, top_s_per_m: conductivity_s_per_m }
+    }
+
+    /// Integral of the conductivity over the thickness (S): thickness times the logarithmic mean of bottom and top.
+    pub fn sheet_conductance_s(&self) -> f64 {
+        let ratio = self.top_s_per_m / self.bottom_s_per_m;
+        let log = ratio.ln();
+        // Near 1 the quotient (ratio - 1) / ln(ratio) loses its digits; its series does not.
+        let mean = if log.abs() < 1e-4 { 1.0 + log / 2.0 + log * log / 6.0 } else { (ratio - 1.0) / log };
+        self.thickness_m * self.bottom_s_per_m * mean
+    }
+}
+
+impl Outline {
+    /// A rectangle about the origin (m).
+    pub fn rectangle(width_m: f64, height_m: f64) -> Self {
+        let (x, y) = (width_m / 2.0, height_m / 2.0);
+        Self { outer: vec![[-x, -y], [x, -y], [x, y], [-x, y]], holes: Vec::new() }
+    }
+
+    /// Width and height (m) if this is a rectangle about the origin, else `None`.
+    pub fn as_rectangle(&self) -> Option<[f64; 2]> {
+        let [x, y] = *self.outer.get(2)?;
+        (*self == Self::rectangle(2.0 * x, 2.0 * y)).then_some([2.0 * x, 2.0 * y])
+    }
+
+    /// Corners of the bounding box: smallest and largest x and y (m).
+    pub fn bounds(&self) -> [[f64; 2]; 2] {
+        self.outer.iter().fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], corner| {
+            [[low[0].min(corner[0]), low[1].min(corner[1])], [high[0].max(corner[0]), high[1].max(corner[1])]]
+        })
+    }
+}
+
+impl Default for Adc {
+    /// The ESP32's, at its widest range.
+    fn default() -> Self {
+        Self { bits: 12, full_scale_v: 3.3, noise_lsb: 1.5 }
+    }
+}

@@ -1,0 +1,58 @@
+//! Detectors of the paper, by name.
+
+use super::{Adc, Detector, Electrode, Layer, Outline};
+
+/// Conductivity of the paper's sample A (S/m).
+const SAMPLE_A_S_PER_M: f64 = 0.2273;
+
+/// Name, width, height, thickness (m), columns and rows of electrodes, their diameter (m).
+type Row = (&'static str, f64, f64, f64, usize, usize, f64);
+
+const ROWS: [Row; 7] = [
+    ("square-60", 0.060, 0.060, 0.005, 4, 4, 0.004),
+    ("square-50", 0.050, 0.050, 0.005, 4, 4, 0.003),
+    ("square-150", 0.150, 0.150, 0.010, 4, 4, 0.004),
+    ("strip-13x60", 0.013, 0.060, 0.003, 2, 8, 0.004),
+    ("display-140x70", 0.140, 0.070, 0.003, 8, 4, 0.004),
+    ("pad-257x182", 0.257, 0.182, 0.005, 8, 4, 0.004),
+    ("fingertip-10", 0.010, 0.010, 0.0005, 4, 4, 0.001),
+];
+
+impl Detector {
+    /// Name of the default preset.
+    pub const DEFAULT: &str = "square-60";
+
+    /// Names of all presets.
+    pub fn preset_names() -> impl Iterator<Item = &'static str> {
+        ROWS.iter().map(|row| row.0)
+    }
+
+    /// A detector of the paper in sample A, or `None` if there is none of that name.
+    pub fn preset(name: &str) -> Option<Self> {
+        let &(name, width_m, height_m, thickness_m, columns, rows, diameter_m) =
+            ROWS.iter().find(|row| row.0 == name)?;
+        Some(Self {
+            name: name.to_owned(),
+            outline: Outline::rectangle(width_m, height_m),
+            layers: vec![Layer::uniform(thickness_m, SAMPLE_A_S_PER_M)],
+            electrodes: electrode_grid(width_m, height_m, columns, rows, diameter_m / 2.0),
+            contact_impedance_ohm_m2: 1e-5,
+            drive_v: 2.0,
+            on_resistance_ohm: 4.0,
+            adc: Adc::default(),
+        })
+    }
+}
+
+/// A cell-centred grid, x running fastest: pitch = side / number of electrodes on that side.
+pub fn electrode_grid(width_m: f64, height_m: f64, columns: usize, rows: usize, radius_m: f64) -> Vec<Electrode> {
+    let place = |side_m: f64, index: usize, count: usize| side_m * ((index as f64 + 0.5) / count as f64 - 0.5);
+    (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| (column, row)))
+        .map(|(column, row)| Electrode {
+            x_m: place(width_m, column, columns),
+            y_m: place(height_m, row, rows),
+            radius_m,
+        })
+        .collect()
+}

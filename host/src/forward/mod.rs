@@ -1,0 +1,80 @@
+//! From contacts to readings.
+//!
+//! A [`ForwardModel`] gives the electrode impedance matrix `Z` of a detector for any contacts, and the fields that make
+//! the linear theory. What follows from those is the same for every model and lives here, once.
+
+use nalgebra::DMatrix;
+
+use crate::detector::Detector;
+use crate::readings::Readings;
+use crate::scene::Contact;
+
+/// A model of a detector.
+pub trait ForwardModel: Send + Sync {
+    /// Name on the command line: `shell` or `slab`.
+    fn name(&self) -> &'static str;
+
+    /// What it models.
+    fn detector(&self) -> &Detector;
+
+    /// The impedance matrix `Z` (ohm): `Z[(i, j)]` is the potential of electrode `i` for 1 A into electrode `j`, with the
+    /// driving layer as reference. Symmetric.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if a contact is not on the detector or no contact conducts.
+    fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError>;
+
+    /// Places of the image that this model is inverted on.
+    fn image_mesh(&self) -> &ImageMesh;
+
+    /// Neumann fields of the bare detector at the image's nodes (ohm): `nodes x electrodes`, `N(e, x)` up to a constant
+    /// that is the same for all `e` and `x`; electrodes as floating equipotential pads.
+    fn fields_ohm(&self) -> &DMatrix<f64>;
+
+    /// The same fields at the electrodes themselves (ohm): `electrodes x electrodes`, symmetric, same constant.
+    fn electrode_fields_ohm(&self) -> &DMatrix<f64>;
+}
+
+/// Nodes of an image of contact conductance and the triangles between them.
+#[derive(Clone, Debug, Default)]
+pub struct ImageMesh {
+    /// Positions (m).
+    pub nodes_m: Vec<[f64; 2]>,
+    /// Corners of each triangle, counter-clockwise.
+    pub triangles: Vec<[u32; 3]>,
+    /// Area that belongs to each node (m2); they add up to the detector's.
+    pub node_areas_m2: Vec<f64>,
+}
+
+/// Why a model cannot answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ForwardError {
+    /// A contact outside, or with a radius or conductance that is not a positive number.
+    #[error("contact {index} ({what}): contacts need a place on the detector, a radius and a conductance above zero")]
+    Contact {
+        /// Its place in the list, from 0.
+        index: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// No contact: `Z` would be infinite.
+    #[error("no contact conducts, so the impedance to the driving layer is infinite")]
+    NoContact,
+    /// The model cannot be made for this detector.
+    #[error("detector {detector}: {what}")]
+    Detector {
+        /// Its name.
+        detector: String,
+        /// What is wrong and what is allowed.
+        what: String,
+    },
+}
+
+/// Readings of a frame from the impedance matrix (V): `V[g][e] = Vcc (1 - Z[e][g] / (Z[g][g] + R_on))`.
+///
+/// An electrode draws no current when it is read, so grounding `g` through `R_on` is a current `-Vcc / (Z[g][g] + R_on)` into it.
+pub fn readings_v(impedance_ohm: &DMatrix<f64>, detector: &Detector) -> Readings {
+    Readings::from_fn(impedance_ohm.nrows(), |g, e| {
+        detector.drive_v * (1.0 - impedance_ohm[(e, g)] / (impedance_ohm[(g, g)] + detector.on_resistance_ohm))
+    })
+}

@@ -1,0 +1,3 @@
+//! The `tactomo` program.
+
+fn main() {}

@@ -1,0 +1,56 @@
+//! From readings back to touch: one file a method, one trait.
+
+use crate::readings::Readings;
+
+/// A method that reads touch from the readings of a frame.
+pub trait Solver: Send {
+    /// Name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// What the readings, less the readings at rest, say of the contacts.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError>;
+}
+
+/// What a solver found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Solution {
+    /// Contact conductance at each node of the model's image mesh (S), if the method makes an image.
+    pub image_s: Option<Vec<f32>>,
+    /// Contacts found.
+    pub contacts: Vec<FoundContact>,
+}
+
+/// One contact found.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct FoundContact {
+    /// Centre, x (m).
+    pub x_m: f64,
+    /// Centre, y (m).
+    pub y_m: f64,
+    /// Conductance (S).
+    pub conductance_s: f64,
+}
+
+/// Why a solver cannot answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Readings of another number of electrodes.
+    #[error("readings of {found} electrodes, but the detector has {expected}")]
+    Electrodes {
+        /// In the readings.
+        found: usize,
+        /// In the detector.
+        expected: usize,
+    },
+    /// A reading that is not a number.
+    #[error("the reading of electrode {e} with electrode {g} grounded is not a finite number")]
+    NotFinite {
+        /// Grounded electrode.
+        g: usize,
+        /// Electrode read.
+        e: usize,
+    },
+}

@@ -1,0 +1,183 @@
+//! Wire bytes to messages.
+
+use heapless::Vec;
+
+use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
+use crate::message::{BoardMessage, Command, Kind, Log};
+use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_WIRE, VERSION};
+
+/// Why bytes between two zeros are not a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    /// Not a packet: noise, boot text, half a packet, or one with a flipped bit.
+    #[error("not a whole packet")]
+    Corrupt,
+    /// A whole packet in another version of the protocol.
+    #[error("the peer speaks version {0} of the protocol, this side version {VERSION}")]
+    Version(u8),
+    /// A whole packet whose body breaks this version's rules.
+    #[error("a whole packet with a body that this version does not know")]
+    Body,
+}
+
+/// What a receiver has met since it was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Messages received.
+    pub messages: u64,
+    /// Stretches of bytes between two zeros that were not a message.
+    pub corrupt: u64,
+    /// Bytes in those stretches.
+    pub dropped_bytes: u64,
+}
+
+/// Finds packets in a stream of bytes; holds the one that is under way, `N` bytes at most.
+#[derive(Debug)]
+pub struct Receiver<const N: usize> {
+    held: Vec<u8, N>,
+    /// Bytes of the stretch under way that did not fit, so it cannot be a packet.
+    lost: usize,
+    counters: Counters,
+}
+
+/// The host's receiver.
+pub type BoardReceiver = Receiver<MAX_WIRE>;
+/// The board's receiver.
+pub type CommandReceiver = Receiver<MAX_COMMAND>;
+
+impl<const N: usize> Default for Receiver<N> {
+    fn default() -> Self {
+        Self { held: Vec::new(), lost: 0, counters: Counters::default() }
+    }
+}
+
+impl<const N: usize> Receiver<N> {
+    /// What was received and dropped so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    fn next_with<M>(
+        &mut self,
+        input: &mut &[u8],
+        parse: impl Fn(&[u8]) -> Result<M, DecodeError>,
+    ) -> Option<Result<M, DecodeError>> {
+        loop {
+            let Some(end) = input.iter().position(|byte| *byte == 0) else {
+                self.hold(input);
+                *input = &[];
+                return None;
+            };
+            let (stretch, rest) = (&input[..end], &input[end + 1..]);
+            *input = rest;
+            let length = self.held.len() + self.lost + stretch.len();
+            if length == 0 {
+                continue; // Zeros in a row separate nothing.
+            }
+            let packet = if self.held.is_empty() && self.lost == 0 {
+                unstuff::<N, M>(stretch, &parse)
+            } else {
+                self.hold(stretch);
+                if self.lost == 0 { unstuff::<N, M>(&self.held, &parse) } else { Err(DecodeError::Corrupt) }
+            };
+            self.held.clear();
+            self.lost = 0;
+            self.count(&packet, length);
+            return Some(packet);
+        }
+    }
+
+    /// Keeps bytes of a stretch that is still open, or notes that it is too long for a packet.
+    fn hold(&mut self, bytes: &[u8]) {
+        if self.lost > 0 || self.held.extend_from_slice(bytes).is_err() {
+            self.lost += bytes.len();
+        }
+    }
+
+    fn count<M>(&mut self, packet: &Result<M, DecodeError>, length: usize) {
+        match packet {
+            Ok(_) => self.counters.messages += 1,
+            Err(_) => {
+                self.counters.corrupt += 1;
+                self.counters.dropped_bytes += length as u64;
+            }
+        }
+    }
+}
+
+impl BoardReceiver {
+    /// Takes bytes from the front of `input` up to the end of the next packet or stretch of junk; `None` when `input` is
+    /// used up.
+    pub fn next(&mut self, input: &mut &[u8]) -> Option<Result<BoardMessage, DecodeError>> {
+        self.next_with(input, board_message)
+    }
+}
+
+impl CommandReceiver {
+    /// Takes bytes from the front of `input` up to the end of the next packet or stretch of junk; `None` when `input` is
+    /// used up.
+    pub fn next(&mut self, input: &mut &[u8]) -> Option<Result<Command, DecodeError>> {
+        self.next_with(input, command)
+    }
+}
+
+/// Undoes COBS and hands the packet to `parse`.
+fn unstuff<const N: usize, M>(
+    stretch: &[u8],
+    parse: impl Fn(&[u8]) -> Result<M, DecodeError>,
+) -> Result<M, DecodeError> {
+    let mut packet = [0; N];
+    let report = cobs::decode(stretch, &mut packet).map_err(|_| DecodeError::Corrupt)?;
+    parse(&packet[..report.frame_size()])
+}
+
+/// Checks CRC and version; returns the kind's bits and the body.
+fn open(packet: &[u8]) -> Result<(u8, &[u8]), DecodeError> {
+    let (content, crc) = packet.split_last_chunk::<CRC_BYTES>().ok_or(DecodeError::Corrupt)?;
+    let (head, body) = content.split_first().ok_or(DecodeError::Corrupt)?;
+    if CRC.checksum(content) != u32::from_le_bytes(*crc) {
+        return Err(DecodeError::Corrupt);
+    }
+    if head >> 4 != VERSION {
+        return Err(DecodeError::Version(head >> 4));
+    }
+    Ok((head & 15, body))
+}
+
+fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
+    let (kind, body) = open(packet)?;
+    Ok(match Kind::from_bits(kind).ok_or(DecodeError::Body)? {
+        Kind::Hello => BoardMessage::Hello(from_postcard(body)?),
+        Kind::Frame => BoardMessage::Frame(frame(body)?),
+        Kind::Log => BoardMessage::Log(Log(Vec::from_slice(body).map_err(|_| DecodeError::Body)?)),
+        Kind::Fault => BoardMessage::Fault(from_postcard(body)?),
+        Kind::Command => return Err(DecodeError::Body),
+    })
+}
+
+fn command(packet: &[u8]) -> Result<Command, DecodeError> {
+    match open(packet)? {
+        (kind, body) if kind == Kind::Command as u8 => from_postcard(body),
+        _ => Err(DecodeError::Body),
+    }
+}
+
+/// The whole of `body`, nothing left over.
+fn from_postcard<'a, T: serde::Deserialize<'a>>(body: &'a [u8]) -> Result<T, DecodeError> {
+    match postcard::take_from_bytes(body) {
+        Ok((value, [])) => Ok(value),
+        _ => Err(DecodeError::Body),
+    }
+}
+
+fn frame(body: &[u8]) -> Result<Frame, DecodeError> {
+    let (head, packed) = body.split_first_chunk::<HEAD_BYTES>().ok_or(DecodeError::Body)?;
+    let (head, width) = FrameHead::from_bytes(*head);
+    let electrodes = frame::electrodes(width, packed.len()).ok_or(DecodeError::Body)?;
+    let readings = frame::unpack(packed, width, electrodes * electrodes).ok_or(DecodeError::Body)?;
+    // The width is that of the largest reading, so that a frame has one form only.
+    if frame::width(&readings) != width {
+        return Err(DecodeError::Body);
+    }
+    Ok(Frame { head, readings })
+}

@@ -1,0 +1,129 @@
+//! A frame's body: a fixed head of eight bytes, then the readings packed at the width of the largest.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 2 | sequence number, little-endian, wraps |
+//! | 4 | board time at the start of the scan in microseconds, little-endian, wraps |
+//! | 1 | [status bits](Status) |
+//! | 1 | width of a reading in bits less one (low four), fraction bits (high four) |
+//! | rest | readings, row by row (`g * electrodes + e`), least significant bit first, no gaps; the last byte is filled with zeros |
+//!
+//! The electrode count follows from the length, which for each width fits one count only.
+//! A frame of 16 x 16 readings of 12 bits takes at most 400 bytes on the wire.
+
+use heapless::Vec;
+
+use crate::{MAX_ELECTRODES, MAX_READINGS, MIN_ELECTRODES};
+
+/// Bytes before the packed readings.
+pub const HEAD_BYTES: usize = 8;
+
+/// One scan: `readings[g * electrodes + e]` is electrode `e` while `g` is grounded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Everything but the readings.
+    pub head: FrameHead,
+    /// Row by row; a unit is `adc_full_scale / 2^(adc_bits + fraction_bits)`.
+    pub readings: Vec<u16, MAX_READINGS>,
+}
+
+/// Everything of a frame but its readings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameHead {
+    /// Number of the scan, modulo 65536; scans that were dropped for want of room on the link count.
+    pub sequence: u16,
+    /// Board time at the start of the scan, in microseconds (us), modulo 2^32.
+    pub time_us: u32,
+    /// What happened during the scan.
+    pub status: Status,
+    /// Bits below one ADC code that averaging has won: 0 to 15.
+    pub fraction_bits: u8,
+}
+
+/// Status bits of a scan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Status(pub u8);
+
+impl Status {
+    /// A conversion was at the end of the ADC's scale.
+    pub const SATURATED: Self = Self(1);
+    /// A conversion did not finish in time; its reading is zero.
+    pub const TIMED_OUT: Self = Self(2);
+
+    /// Whether all bits of `other` are set.
+    pub fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// Sets the bits of `other`.
+    pub fn insert(&mut self, other: Self) {
+        self.0 |= other.0;
+    }
+}
+
+impl FrameHead {
+    /// The head as bytes, for readings of `width` bits.
+    pub(crate) fn to_bytes(self, width: u32) -> [u8; HEAD_BYTES] {
+        let [s0, s1] = self.sequence.to_le_bytes();
+        let [t0, t1, t2, t3] = self.time_us.to_le_bytes();
+        let shape = (width - 1) as u8 | self.fraction_bits << 4;
+        [s0, s1, t0, t1, t2, t3, self.status.0, shape]
+    }
+
+    /// The head and the width of a reading in bits.
+    pub(crate) fn from_bytes([s0, s1, t0, t1, t2, t3, status, shape]: [u8; HEAD_BYTES]) -> (Self, u32) {
+        let head = Self {
+            sequence: u16::from_le_bytes([s0, s1]),
+            time_us: u32::from_le_bytes([t0, t1, t2, t3]),
+            status: Status(status),
+            fraction_bits: shape >> 4,
+        };
+        (head, u32::from(shape & 15) + 1)
+    }
+}
+
+/// Bits that the largest reading needs, at least one.
+pub(crate) fn width(readings: &[u16]) -> u32 {
+    let all = readings.iter().fold(1, |bits, reading| bits | reading);
+    u16::BITS - all.leading_zeros()
+}
+
+/// Electrode count whose readings of `width` bits fill exactly `bytes`, if there is one.
+pub(crate) fn electrodes(width: u32, bytes: usize) -> Option<usize> {
+    (MIN_ELECTRODES..=MAX_ELECTRODES).find(|n| (n * n * width as usize).div_ceil(8) == bytes)
+}
+
+/// Hands the readings packed at `width` bits to `put`, byte by byte.
+pub(crate) fn pack(readings: &[u16], width: u32, mut put: impl FnMut(u8)) {
+    let (mut bits, mut held) = (0u32, 0);
+    for &reading in readings {
+        bits |= u32::from(reading) << held;
+        held += width;
+        while held >= 8 {
+            put(bits as u8);
+            bits >>= 8;
+            held -= 8;
+        }
+    }
+    if held > 0 {
+        put(bits as u8);
+    }
+}
+
+/// Unpacks `count` readings of `width` bits; `None` if the spare bits at the end are not zero.
+pub(crate) fn unpack(packed: &[u8], width: u32, count: usize) -> Option<Vec<u16, MAX_READINGS>> {
+    let mask = (1u32 << width) - 1;
+    let (mut bits, mut held) = (0u32, 0);
+    let mut bytes = packed.iter();
+    let mut readings = Vec::new();
+    for _ in 0..count {
+        while held < width {
+            bits |= u32::from(*bytes.next()?) << held;
+            held += 8;
+        }
+        readings.push((bits & mask) as u16).ok()?;
+        bits >>= width;
+        held -= width;
+    }
+    (bits == 0).then_some(readings)
+}
