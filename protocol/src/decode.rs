@@ -57,7 +57,7 @@ impl<const N: usize> Receiver<N> {
         self.counters
     }
 
-    fn next_with<M>(
+    fn receive_with<M>(
         &mut self,
         input: &mut &[u8],
         parse: impl Fn(&[u8]) -> Result<M, DecodeError>,
@@ -108,16 +108,16 @@ impl<const N: usize> Receiver<N> {
 impl BoardReceiver {
     /// Takes bytes from the front of `input` up to the end of the next packet or stretch of junk; `None` when `input` is
     /// used up.
-    pub fn next(&mut self, input: &mut &[u8]) -> Option<Result<BoardMessage, DecodeError>> {
-        self.next_with(input, board_message)
+    pub fn receive(&mut self, input: &mut &[u8]) -> Option<Result<BoardMessage, DecodeError>> {
+        self.receive_with(input, board_message)
     }
 }
 
 impl CommandReceiver {
     /// Takes bytes from the front of `input` up to the end of the next packet or stretch of junk; `None` when `input` is
     /// used up.
-    pub fn next(&mut self, input: &mut &[u8]) -> Option<Result<Command, DecodeError>> {
-        self.next_with(input, command)
+    pub fn receive(&mut self, input: &mut &[u8]) -> Option<Result<Command, DecodeError>> {
+        self.receive_with(input, command)
     }
 }
 

@@ -59,7 +59,9 @@ mod tests {
         let length = encode_frame(head, &readings, &mut out).unwrap();
         assert!(length <= 400, "{length}");
         let mut input = &out[..length];
-        let BoardMessage::Frame(frame) = BoardReceiver::default().next(&mut input).unwrap().unwrap() else { panic!() };
+        let BoardMessage::Frame(frame) = BoardReceiver::default().receive(&mut input).unwrap().unwrap() else {
+            panic!()
+        };
         assert_eq!(frame.head, head);
         assert_eq!(frame.readings, readings);
     }
