@@ -5,6 +5,7 @@
 //! beside them. `forward` knows nothing of `solve`, `solve` nothing of serial ports or web pages. Units are SI, and in the
 //! names.
 
+pub mod case;
 pub mod detector;
 pub mod forward;
 pub mod readings;

@@ -17,8 +17,9 @@ pub trait Solver: Send {
 /// What a solver found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Solution {
-    /// Contact conductance at each node of the model's image mesh (S), if the method makes an image.
-    pub image_s: Option<Vec<f32>>,
+    /// Contact conductance per area at each node of the model's image mesh (S/m2), if the method makes an image. A density,
+    /// so that it does not change where the mesh is finer; times the nodes' areas, it is conductance (S).
+    pub image_s_per_m2: Option<Vec<f32>>,
     /// Contacts found.
     pub contacts: Vec<FoundContact>,
 }
