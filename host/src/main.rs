@@ -1,3 +1,25 @@
 //! The `tactomo` program.
+//!
+//! Machine output goes to stdout, everything else to stderr. Exit codes: 0 done, 1 failed, 2 used wrongly.
 
-fn main() {}
+mod commands;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    let cli = commands::Cli::parse();
+    print_log_on_stderr();
+    match commands::run(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn print_log_on_stderr() {
+    tracing_subscriber::fmt().with_writer(std::io::stderr).with_target(false).without_time().init();
+}

@@ -1,0 +1,25 @@
+//! The commands, one file each: its arguments and what it does.
+
+mod ports;
+
+use clap::{Parser, Subcommand};
+
+/// Live pictures of touch from a tomographic tactile sensor, and its simulator.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Ports(ports::Args),
+}
+
+/// Runs the command that was asked for.
+pub fn run(cli: Cli) -> anyhow::Result<()> {
+    match cli.command {
+        Command::Ports(args) => ports::run(args),
+    }
+}
