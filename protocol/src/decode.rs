@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Command, Kind, Log};
-use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_WIRE, VERSION};
+use crate::{CRC, CRC_BYTES, Hello, MAX_COMMAND, MAX_WIRE, VERSION, cobs};
 
 /// Why bytes between two zeros are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -13,10 +13,10 @@ pub enum DecodeError {
     #[error("not a whole packet")]
     Corrupt,
     /// A whole packet in another version of the protocol.
-    #[error("the peer speaks version {0} of the protocol, this side version {VERSION}")]
+    #[error("the peer speaks version {0} of the protocol, this side version {VERSION}: update the older of the two")]
     Version(u8),
     /// A whole packet whose body breaks this version's rules.
-    #[error("a whole packet with a body that this version does not know")]
+    #[error("a whole packet that version {VERSION} of the protocol does not know")]
     Body,
 }
 
@@ -62,29 +62,29 @@ impl<const N: usize> Receiver<N> {
         input: &mut &[u8],
         parse: impl Fn(&[u8]) -> Result<M, DecodeError>,
     ) -> Option<Result<M, DecodeError>> {
-        loop {
-            let Some(end) = input.iter().position(|byte| *byte == 0) else {
-                self.hold(input);
-                *input = &[];
-                return None;
-            };
-            let (stretch, rest) = (&input[..end], &input[end + 1..]);
-            *input = rest;
-            let length = self.held.len() + self.lost + stretch.len();
-            if length == 0 {
-                continue; // Zeros in a row separate nothing.
+        while let Some(end) = memchr::memchr(0, input) {
+            self.hold(&input[..end]);
+            *input = &input[end + 1..];
+            let length = self.held.len() + self.lost;
+            // Zeros in a row separate nothing.
+            if length > 0 {
+                let message = self.unstuffed().and_then(parse);
+                self.held.clear();
+                self.lost = 0;
+                self.count(&message, length);
+                return Some(message);
             }
-            let packet = if self.held.is_empty() && self.lost == 0 {
-                unstuff::<N, M>(stretch, &parse)
-            } else {
-                self.hold(stretch);
-                if self.lost == 0 { unstuff::<N, M>(&self.held, &parse) } else { Err(DecodeError::Corrupt) }
-            };
-            self.held.clear();
-            self.lost = 0;
-            self.count(&packet, length);
-            return Some(packet);
         }
+        self.hold(input);
+        *input = &[];
+        None
+    }
+
+    /// The packet in the stretch that just ended.
+    fn unstuffed(&mut self) -> Result<&[u8], DecodeError> {
+        let stretch = if self.lost == 0 { &mut self.held[..] } else { &mut [] };
+        let length = cobs::unstuff(stretch).ok_or(DecodeError::Corrupt)?;
+        Ok(&stretch[..length])
     }
 
     /// Keeps bytes of a stretch that is still open, or notes that it is too long for a packet.
@@ -121,16 +121,6 @@ impl CommandReceiver {
     }
 }
 
-/// Undoes COBS and hands the packet to `parse`.
-fn unstuff<const N: usize, M>(
-    stretch: &[u8],
-    parse: impl Fn(&[u8]) -> Result<M, DecodeError>,
-) -> Result<M, DecodeError> {
-    let mut packet = [0; N];
-    let report = cobs::decode(stretch, &mut packet).map_err(|_| DecodeError::Corrupt)?;
-    parse(&packet[..report.frame_size()])
-}
-
 /// Checks CRC and version; returns the kind's bits and the body.
 fn open(packet: &[u8]) -> Result<(u8, &[u8]), DecodeError> {
     let (content, crc) = packet.split_last_chunk::<CRC_BYTES>().ok_or(DecodeError::Corrupt)?;
@@ -147,12 +137,16 @@ fn open(packet: &[u8]) -> Result<(u8, &[u8]), DecodeError> {
 fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
     let (kind, body) = open(packet)?;
     Ok(match Kind::from_bits(kind).ok_or(DecodeError::Body)? {
-        Kind::Hello => BoardMessage::Hello(from_postcard(body)?),
+        Kind::Hello => BoardMessage::Hello(hello(body)?),
         Kind::Frame => BoardMessage::Frame(frame(body)?),
         Kind::Log => BoardMessage::Log(Log(Vec::from_slice(body).map_err(|_| DecodeError::Body)?)),
         Kind::Fault => BoardMessage::Fault(from_postcard(body)?),
         Kind::Command => return Err(DecodeError::Body),
     })
+}
+
+fn hello(body: &[u8]) -> Result<Hello, DecodeError> {
+    from_postcard(body).and_then(|hello: Hello| if hello.is_valid() { Ok(hello) } else { Err(DecodeError::Body) })
 }
 
 fn command(packet: &[u8]) -> Result<Command, DecodeError> {
@@ -175,9 +169,5 @@ fn frame(body: &[u8]) -> Result<Frame, DecodeError> {
     let (head, width) = FrameHead::from_bytes(*head);
     let electrodes = frame::electrodes(width, packed.len()).ok_or(DecodeError::Body)?;
     let readings = frame::unpack(packed, width, electrodes * electrodes).ok_or(DecodeError::Body)?;
-    // The width is that of the largest reading, so that a frame has one form only.
-    if frame::width(&readings) != width {
-        return Err(DecodeError::Body);
-    }
     Ok(Frame { head, readings })
 }

@@ -1,13 +1,16 @@
 //! Messages to wire bytes.
+//!
+//! A packet is laid out at the back of the output, closed with its checksum, and stuffed towards the front: three passes,
+//! no second buffer. An output of [`wire_bytes`] of the packet's length always suffices, and [`MAX_WIRE`](crate::MAX_WIRE)
+//! for any message.
 
-use cobs::CobsEncoder;
 use serde::Serialize;
 
-use crate::frame::{self, FrameHead};
+use crate::frame::{self, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Command, Kind};
-use crate::{CRC, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, VERSION};
+use crate::{CRC, CRC_BYTES, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, VERSION, cobs, wire_bytes};
 
-/// Longest postcard body: a [`Fault`](crate::Fault) with the longest text, with room to spare.
+/// Longest postcard body with room to spare; a [`Fault`](crate::Fault) with the longest text takes 98 bytes.
 const MAX_BODY: usize = 128;
 
 /// A message that cannot be sent.
@@ -19,9 +22,15 @@ pub enum EncodeError {
     /// The readings are not the square of 4 to 32 electrodes.
     #[error("{0} readings are not the square of 4 to 32 electrodes")]
     ReadingCount(usize),
+    /// More than 15 fraction bits.
+    #[error("{0} fraction bits, but a frame has room for 15 at most")]
+    FractionBits(u8),
     /// More than [`MAX_LOG`] bytes of log in one packet.
     #[error("{0} bytes of log do not fit one packet")]
     LogLength(usize),
+    /// A [`Hello`](crate::Hello) that [is not valid](crate::Hello::is_valid).
+    #[error("a value of Hello is out of range")]
+    Hello,
 }
 
 /// Encodes a board's message into `out`, the closing zero included; returns its length in bytes.
@@ -30,6 +39,7 @@ pub enum EncodeError {
 /// [`EncodeError`] if `out` is too short or the message breaks a limit of the protocol.
 pub fn encode_board(message: &BoardMessage, out: &mut [u8]) -> Result<usize, EncodeError> {
     match message {
+        BoardMessage::Hello(hello) if !hello.is_valid() => Err(EncodeError::Hello),
         BoardMessage::Hello(hello) => encode_body(Kind::Hello, hello, out),
         BoardMessage::Frame(frame) => encode_frame(frame.head, &frame.readings, out),
         BoardMessage::Log(log) => encode_log(&log.0, out),
@@ -48,15 +58,20 @@ pub fn encode_command(command: &Command, out: &mut [u8]) -> Result<usize, Encode
 /// Encodes a frame into `out` straight from its readings; returns its length in bytes.
 ///
 /// # Errors
-/// [`EncodeError`] if `out` is too short or the readings are not a square.
+/// [`EncodeError`] if `out` is too short, the readings are not a square, or there are too many fraction bits.
 pub fn encode_frame(head: FrameHead, readings: &[u16], out: &mut [u8]) -> Result<usize, EncodeError> {
     if !(MIN_ELECTRODES..=MAX_ELECTRODES).any(|n| n * n == readings.len()) {
         return Err(EncodeError::ReadingCount(readings.len()));
     }
+    if head.fraction_bits > 15 {
+        return Err(EncodeError::FractionBits(head.fraction_bits));
+    }
     let width = frame::width(readings);
-    write(Kind::Frame, out, |packet| {
-        packet.put(&head.to_bytes(width));
-        frame::pack(readings, width, |byte| packet.put(&[byte]));
+    let length = HEAD_BYTES + frame::packed_bytes(width, readings.len());
+    write(Kind::Frame, length, out, |body| {
+        let (start, packed) = body.split_at_mut(HEAD_BYTES);
+        start.copy_from_slice(&head.to_bytes(width));
+        frame::pack(readings, width, packed);
     })
 }
 
@@ -68,46 +83,25 @@ pub fn encode_log(bytes: &[u8], out: &mut [u8]) -> Result<usize, EncodeError> {
     if bytes.len() > MAX_LOG {
         return Err(EncodeError::LogLength(bytes.len()));
     }
-    write(Kind::Log, out, |packet| packet.put(bytes))
+    write(Kind::Log, bytes.len(), out, |body| body.copy_from_slice(bytes))
 }
 
 fn encode_body(kind: Kind, body: &impl Serialize, out: &mut [u8]) -> Result<usize, EncodeError> {
     let mut buffer = [0; MAX_BODY];
-    let body = postcard::to_slice(body, &mut buffer).map_err(|_| EncodeError::Full)?;
-    write(kind, out, |packet| packet.put(body))
+    let bytes = postcard::to_slice(body, &mut buffer).map_err(|_| EncodeError::Full)?;
+    write(kind, bytes.len(), out, |body| body.copy_from_slice(bytes))
 }
 
-/// Writes a whole packet, whose body `fill` puts; returns its length in bytes, the closing zero included.
-fn write(kind: Kind, out: &mut [u8], fill: impl FnOnce(&mut Packet)) -> Result<usize, EncodeError> {
-    let mut packet = Packet { cobs: CobsEncoder::new(out), crc: CRC.digest(), fits: true };
-    packet.put(&[VERSION << 4 | kind as u8]);
-    fill(&mut packet);
-    let length = packet.finish()?;
-    *out.get_mut(length).ok_or(EncodeError::Full)? = 0;
+/// Writes a whole packet, whose `body` bytes `fill` writes; returns its length in bytes, the closing zero included.
+fn write(kind: Kind, body: usize, out: &mut [u8], fill: impl FnOnce(&mut [u8])) -> Result<usize, EncodeError> {
+    let packet = 1 + body + CRC_BYTES;
+    let out = out.get_mut(..wire_bytes(packet)).ok_or(EncodeError::Full)?;
+    let start = cobs::overhead(packet);
+    let (content, crc) = out[start..start + packet].split_at_mut(1 + body);
+    content[0] = VERSION << 4 | kind as u8;
+    fill(&mut content[1..]);
+    crc.copy_from_slice(&CRC.checksum(content).to_le_bytes());
+    let length = cobs::stuff(&mut out[..start + packet], start);
+    out[length] = 0;
     Ok(length + 1)
-}
-
-/// A packet being written: COBS and CRC on the fly, so that no second buffer is needed.
-struct Packet<'a> {
-    cobs: CobsEncoder<'a>,
-    crc: crc::Digest<'static, u32>,
-    fits: bool,
-}
-
-impl Packet<'_> {
-    fn put(&mut self, bytes: &[u8]) {
-        self.crc.update(bytes);
-        self.push(bytes);
-    }
-
-    fn push(&mut self, bytes: &[u8]) {
-        self.fits = self.fits && self.cobs.push(bytes).is_ok();
-    }
-
-    /// Adds the checksum; returns the length in bytes without the closing zero.
-    fn finish(mut self) -> Result<usize, EncodeError> {
-        let crc = self.crc.clone().finalize().to_le_bytes();
-        self.push(&crc);
-        if self.fits { Ok(self.cobs.finalize()) } else { Err(EncodeError::Full) }
-    }
 }

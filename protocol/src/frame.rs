@@ -88,29 +88,35 @@ pub(crate) fn width(readings: &[u16]) -> u32 {
     u16::BITS - all.leading_zeros()
 }
 
+/// Bytes that `count` readings of `width` bits take.
+pub(crate) fn packed_bytes(width: u32, count: usize) -> usize {
+    (count * width as usize).div_ceil(8)
+}
+
 /// Electrode count whose readings of `width` bits fill exactly `bytes`, if there is one.
 pub(crate) fn electrodes(width: u32, bytes: usize) -> Option<usize> {
-    (MIN_ELECTRODES..=MAX_ELECTRODES).find(|n| (n * n * width as usize).div_ceil(8) == bytes)
+    (MIN_ELECTRODES..=MAX_ELECTRODES).find(|n| packed_bytes(width, n * n) == bytes)
 }
 
-/// Hands the readings packed at `width` bits to `put`, byte by byte.
-pub(crate) fn pack(readings: &[u16], width: u32, mut put: impl FnMut(u8)) {
+/// Packs the readings at `width` bits into `packed`, which has just room for them.
+pub(crate) fn pack(readings: &[u16], width: u32, packed: &mut [u8]) {
+    let mut readings = readings.iter();
     let (mut bits, mut held) = (0u32, 0);
-    for &reading in readings {
-        bits |= u32::from(reading) << held;
-        held += width;
-        while held >= 8 {
-            put(bits as u8);
-            bits >>= 8;
-            held -= 8;
+    for byte in packed {
+        while held < 8
+            && let Some(&reading) = readings.next()
+        {
+            bits |= u32::from(reading) << held;
+            held += width;
         }
-    }
-    if held > 0 {
-        put(bits as u8);
+        *byte = bits as u8;
+        bits >>= 8;
+        held = held.saturating_sub(8);
     }
 }
 
-/// Unpacks `count` readings of `width` bits; `None` if the spare bits at the end are not zero.
+/// Unpacks `count` readings of `width` bits; `None` unless this is the one form that [`pack`] gives them: the width is that
+/// of the largest, the spare bits at the end are zero.
 pub(crate) fn unpack(packed: &[u8], width: u32, count: usize) -> Option<Vec<u16, MAX_READINGS>> {
     let mask = (1u32 << width) - 1;
     let (mut bits, mut held) = (0u32, 0);
@@ -125,5 +131,5 @@ pub(crate) fn unpack(packed: &[u8], width: u32, count: usize) -> Option<Vec<u16,
         bits >>= width;
         held -= width;
     }
-    (bits == 0).then_some(readings)
+    (bits == 0 && self::width(&readings) == width).then_some(readings)
 }

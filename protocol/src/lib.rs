@@ -13,6 +13,10 @@
 //! and to refuse it by name instead of misreading it.
 #![no_std]
 
+#[cfg(test)]
+extern crate std;
+
+mod cobs;
 pub mod decode;
 pub mod encode;
 pub mod frame;
@@ -42,10 +46,16 @@ pub const CRC_BYTES: usize = 4;
 
 /// Wire bytes of a packet of `packet` bytes: COBS overhead and the closing zero included, in the worst case.
 pub const fn wire_bytes(packet: usize) -> usize {
-    packet + packet / 254 + 2
+    packet + cobs::overhead(packet) + 1
 }
 
-pub(crate) static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+/// A table of 1 kB, or of 16 kB that is several times as fast.
+#[cfg(not(feature = "fast-crc"))]
+type CrcTable = crc::Table<1>;
+#[cfg(feature = "fast-crc")]
+type CrcTable = crc::Table<16>;
+
+static CRC: crc::Crc<u32, CrcTable> = crc::Crc::<u32, CrcTable>::new(&crc::CRC_32_ISO_HDLC);
 
 #[cfg(test)]
 mod tests {

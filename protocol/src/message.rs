@@ -4,6 +4,7 @@ use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
 use crate::frame::Frame;
+use crate::{MAX_ELECTRODES, MIN_ELECTRODES};
 
 /// Most defmt bytes in one [`Log`] packet.
 pub const MAX_LOG: usize = 64;
@@ -61,6 +62,18 @@ pub struct Hello {
     pub drive_mv: u16,
     /// Settings in force.
     pub settings: Settings,
+}
+
+impl Hello {
+    /// Whether the values are within the protocol's limits: 4 to 32 electrodes, 1 to 16 bits, voltages above zero,
+    /// [settings](Settings::is_valid) that a board may take.
+    pub fn is_valid(&self) -> bool {
+        (MIN_ELECTRODES..=MAX_ELECTRODES).contains(&usize::from(self.electrodes))
+            && (1..=16).contains(&self.adc_bits)
+            && self.adc_full_scale_mv > 0
+            && self.drive_mv > 0
+            && self.settings.is_valid()
+    }
 }
 
 /// Settings of the scan.
