@@ -1,6 +1,10 @@
 //! The detector of the simulated board: a scene that moves by itself, the physics that answers to it, and its measurement.
 
+mod scene;
+
 use crate::readings::Readings;
+
+pub use scene::Scene;
 
 /// What the simulated board measures.
 pub trait Physics: Send {
