@@ -1,2 +1,35 @@
 //! The scan, the uplink and the command loop of a tomographic tactile sensor board, over embedded-hal.
+//!
+//! A board crate brings four parts and hands them to [`Board`]:
+//!
+//! | part | trait | what it stands for |
+//! |---|---|---|
+//! | multiplexer | [`Mux`] | grounds an electrode; [`mux`] has the ADG726 in both of its wirings |
+//! | converter | [`Sampler`] | one bounded conversion of an electrode's voltage |
+//! | serial line | [`Serial`] | a UART or USB port that never waits |
+//! | chip | [`Chip`] | clock, delay, watchdog, log bytes |
+//!
+//! ```ignore
+//! let mut board = Board16::new(Parts { mux, sampler, serial, chip }, IDENTITY)?;
+//! board.report(Fault::Reset(reason));
+//! let error = board.run(); // comes back only if a pin of the multiplexer fails
+//! ```
+//!
+//! Guarantees: no allocation, no floating point, no wait without a bound. Sending overlaps sampling: bytes are pushed between
+//! conversions, as many as the line takes at that moment, so a slow host never delays the scan. A frame that finds no room is
+//! dropped, and the gap shows in the sequence numbers. A [`Board16`] takes less than 2.5 kB of RAM.
 #![no_std]
+
+mod board;
+#[cfg(feature = "defmt")]
+pub mod log;
+pub mod mux;
+mod pace;
+mod parts;
+pub mod scan;
+pub mod uplink;
+
+pub use board::{Activity, Board, Board16, Board32, Identity, NewBoardError};
+pub use mux::Mux;
+pub use parts::{Chip, Parts, Sampler, Serial, TimedOut};
+pub use scan::Adc;

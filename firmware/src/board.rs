@@ -1,0 +1,277 @@
+//! The command loop: what a board does from its reset on.
+
+use heapless::String;
+use tactomo_protocol::{
+    BoardMessage, Command, CommandReceiver, DecodeError, Fault, Hello, MAX_ELECTRODES, MIN_ELECTRODES, Settings, frame,
+    wire_bytes,
+};
+
+use crate::pace::Pace;
+use crate::scan::{Bench, Scan, Scanned};
+use crate::uplink::Uplink;
+use crate::{Adc, Chip, Mux, Parts, Sampler, Serial};
+
+/// Bytes that one step takes from the line at most, so that a flood does not hold up the scan.
+const RECEIVED_A_STEP: usize = 64;
+
+/// Longest packet of a frame of `electrodes` on the wire, in bytes.
+pub const fn frame_bytes(electrodes: usize) -> usize {
+    wire_bytes(1 + frame::HEAD_BYTES + 2 * electrodes * electrodes + tactomo_protocol::CRC_BYTES)
+}
+
+/// A board with room for 16 electrodes.
+pub type Board16<M, S, L, C> = Board<M, S, L, C, 256, { frame_bytes(16) }>;
+/// A board with room for 32 electrodes.
+pub type Board32<M, S, L, C> = Board<M, S, L, C, 1024, { frame_bytes(32) }>;
+
+/// What a board says about itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Identity<'a> {
+    /// Version of the board's firmware; the first 24 bytes are told.
+    pub firmware_version: &'a str,
+    /// Name of the board, such as `esp32`; the first 24 bytes are told.
+    pub board: &'a str,
+    /// Electrodes scanned.
+    pub electrodes: u8,
+    /// What the converter gives.
+    pub adc: Adc,
+    /// Voltage of the driving layer (mV).
+    pub drive_mv: u16,
+}
+
+/// A board that cannot be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NewBoardError {
+    /// The protocol carries 4 to 32 electrodes, and the readings need room.
+    #[error("{0} electrodes: a board scans {MIN_ELECTRODES} to {MAX_ELECTRODES}, as far as its type has room")]
+    Electrodes(u8),
+    /// A reading has 16 bits.
+    #[error("a converter of {0} bits: 1 to 16 fit")]
+    AdcBits(u8),
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activity {
+    /// Nothing to scan until the host says so.
+    Idle,
+    /// Nothing to scan before this board time (us): the frame-rate cap.
+    Waiting {
+        /// Board time at which the next frame is due (us).
+        until_us: u64,
+    },
+    /// One row of a scan.
+    Row,
+    /// The last row of a scan: its frame is on its way.
+    Frame,
+}
+
+/// A board: its parts, the scan, the uplink, and the state that commands change.
+#[derive(Debug)]
+pub struct Board<M, S, L, C, const READINGS: usize, const WIRE: usize> {
+    parts: Parts<M, S, L, C>,
+    adc: Adc,
+    hello: Hello,
+    receiver: CommandReceiver,
+    scan: Scan<READINGS>,
+    uplink: Uplink<WIRE>,
+    pace: Pace,
+    sequence: u16,
+    streaming: bool,
+    /// Whether the host knows that the converter is stuck.
+    stuck_told: bool,
+    /// What went wrong before the reset, until a host has surely heard of it.
+    boot_fault: Option<Fault>,
+}
+
+impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: usize>
+    Board<M, S, L, C, READINGS, WIRE>
+{
+    /// A board that will say Hello and wait for commands.
+    ///
+    /// # Errors
+    /// [`NewBoardError`] if the identity does not fit the protocol or this type's room.
+    pub fn new(parts: Parts<M, S, L, C>, identity: Identity) -> Result<Self, NewBoardError> {
+        let electrodes = NewBoardError::Electrodes(identity.electrodes);
+        if usize::from(identity.electrodes) < MIN_ELECTRODES || WIRE < frame_bytes(usize::from(identity.electrodes)) {
+            return Err(electrodes);
+        }
+        if !(1..=16).contains(&identity.adc.bits) {
+            return Err(NewBoardError::AdcBits(identity.adc.bits));
+        }
+        let mut board = Self {
+            parts,
+            adc: identity.adc,
+            hello: hello(&identity),
+            receiver: CommandReceiver::default(),
+            scan: Scan::new(identity.electrodes).ok_or(electrodes)?,
+            uplink: Uplink::default(),
+            pace: Pace::default(),
+            sequence: 0,
+            streaming: false,
+            stuck_told: false,
+            boot_fault: None,
+        };
+        board.say_hello();
+        Ok(board)
+    }
+
+    /// Tells the host what went wrong before the reset. A host that was not listening yet hears it again after its first
+    /// [`Command::Hello`].
+    pub fn report(&mut self, fault: Fault) {
+        self.fault(fault.clone());
+        self.boot_fault = Some(fault);
+    }
+
+    /// Runs until a pin of the multiplexer fails: forever, where pins are infallible.
+    pub fn run(&mut self) -> M::Error {
+        loop {
+            if let Err(error) = self.step() {
+                return error;
+            }
+        }
+    }
+
+    /// Handles what was received and scans one row, if one is due. Takes one settle time and one row of conversions at most.
+    ///
+    /// # Errors
+    /// If a pin of the multiplexer cannot be driven.
+    pub fn step(&mut self) -> Result<Activity, M::Error> {
+        self.parts.chip.feed_watchdog();
+        self.receive();
+        let activity = self.scan_if_due();
+        self.uplink.poll(&mut self.parts.serial, &mut self.parts.chip);
+        activity
+    }
+
+    /// The parts, to look at.
+    pub fn parts(&self) -> &Parts<M, S, L, C> {
+        &self.parts
+    }
+
+    /// The parts, to take apart after use.
+    pub fn into_parts(self) -> Parts<M, S, L, C> {
+        self.parts
+    }
+
+    fn receive(&mut self) {
+        let mut bytes = [0; RECEIVED_A_STEP];
+        let count = self.parts.serial.pull(&mut bytes);
+        let mut input = bytes.get(..count).unwrap_or_default();
+        while let Some(command) = self.receiver.next(&mut input) {
+            match command {
+                Ok(command) => self.obey(command),
+                Err(DecodeError::Version(version)) => self.fault(Fault::UnknownVersion(version)),
+                // Noise is dropped; a body that this version does not know cannot be answered.
+                Err(DecodeError::Corrupt | DecodeError::Body) => {}
+            }
+        }
+    }
+
+    fn obey(&mut self, command: Command) {
+        let boot_fault = self.boot_fault.take();
+        match command {
+            Command::Hello => {
+                self.say_hello();
+                boot_fault.into_iter().for_each(|fault| self.fault(fault));
+            }
+            Command::Start => self.start(),
+            Command::Stop => self.stop(),
+            Command::Configure(settings) if settings.is_valid() => self.configure(settings),
+            Command::Configure(_) => self.fault(Fault::BadSettings),
+        }
+    }
+
+    fn start(&mut self) {
+        if !self.streaming {
+            self.streaming = true;
+            self.stuck_told = false;
+            self.restart_pace();
+        }
+    }
+
+    /// Ends the stream; up to two frames that are already on their way may follow.
+    fn stop(&mut self) {
+        self.streaming = false;
+        self.scan.abandon();
+    }
+
+    /// Takes the settings over; the scan under way, begun under the old ones, is abandoned without a number.
+    fn configure(&mut self, settings: Settings) {
+        self.hello.settings = settings;
+        self.scan.abandon();
+        self.restart_pace();
+        self.say_hello();
+    }
+
+    fn restart_pace(&mut self) {
+        let now_us = self.parts.chip.now_us();
+        self.pace.reset(now_us);
+    }
+
+    fn scan_if_due(&mut self) -> Result<Activity, M::Error> {
+        if !self.streaming {
+            return Ok(Activity::Idle);
+        }
+        if !self.scan.is_under_way() {
+            let now_us = self.parts.chip.now_us();
+            let until_us = self.pace.next_us();
+            if now_us < until_us {
+                return Ok(Activity::Waiting { until_us });
+            }
+            self.pace.begin(now_us, self.hello.settings.max_frames_per_s);
+        }
+        self.scan_row()
+    }
+
+    fn scan_row(&mut self) -> Result<Activity, M::Error> {
+        let Self { parts, scan, uplink, .. } = self;
+        let Parts { mux, sampler, serial, chip } = parts;
+        let mut bench = Bench { mux, sampler, chip, adc: self.adc, settings: self.hello.settings };
+        match scan.row(&mut bench, |chip| uplink.poll(serial, chip))? {
+            None => Ok(Activity::Row),
+            Some(scanned) => {
+                self.send(scanned);
+                Ok(Activity::Frame)
+            }
+        }
+    }
+
+    fn send(&mut self, scanned: Scanned) {
+        if scanned.stuck && !self.stuck_told {
+            self.fault(Fault::AdcStuck);
+        }
+        self.stuck_told = scanned.stuck;
+        let fraction_bits = self.adc.fraction_bits(self.hello.settings.average_log2);
+        // A frame that is dropped for it shows as a gap in the numbers.
+        self.uplink.frame(scanned.head(self.sequence, fraction_bits), self.scan.readings());
+        self.sequence = self.sequence.wrapping_add(1);
+    }
+
+    fn say_hello(&mut self) {
+        self.uplink.message(&BoardMessage::Hello(self.hello.clone()));
+    }
+
+    fn fault(&mut self, fault: Fault) {
+        self.uplink.message(&BoardMessage::Fault(fault));
+    }
+}
+
+fn hello(identity: &Identity) -> Hello {
+    Hello {
+        firmware_version: cut(identity.firmware_version),
+        board: cut(identity.board),
+        electrodes: identity.electrodes,
+        adc_bits: identity.adc.bits,
+        adc_full_scale_mv: identity.adc.full_scale_mv,
+        drive_mv: identity.drive_mv,
+        settings: Settings::default(),
+    }
+}
+
+/// As much of `text` as fits.
+fn cut<const N: usize>(text: &str) -> String<N> {
+    let mut short = String::new();
+    let _ = text.chars().try_for_each(|letter| short.push(letter));
+    short
+}

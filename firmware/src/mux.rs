@@ -1,0 +1,166 @@
+//! The ADG726: two 16-channel switches (halves A and B) on common address lines, with a latch for each half.
+//!
+//! From its data sheet (Analog Devices, ADG726/ADG732): with WR and a half's chip select (CSA, CSB) low, that half follows the
+//! address lines; it keeps what it had once WR or its chip select is high. EN is active low and is latched along with the
+//! address. A change of address breaks before it makes, so two electrodes are never joined. All its times are shorter than
+//! two writes to a GPIO register of the chips used here, so that only [`Latched::select`] needs a wait of its own, for the
+//! analogue side. The ADG732 (one switch, 32 channels, five lines) works as [`Transparent`] does.
+
+use embedded_hal::digital::OutputPin;
+
+/// Time from a new address to the new switch's conduction (ns), at most, at 3 V and over temperature.
+pub const TRANSITION_NS: u32 = 50;
+/// Time for which no switch conducts when the address changes (ns), at least.
+pub const BREAK_BEFORE_MAKE_NS: u32 = 1;
+/// Shortest low pulse of WR that latches an address (ns).
+pub const WRITE_PULSE_NS: u32 = 10;
+/// Time that the address and EN are stable before WR rises (ns), at least.
+pub const ADDRESS_SETUP_NS: u32 = 5;
+
+/// Brings electrodes to ground, and where there is one ADC input only, to that.
+pub trait Mux {
+    /// Error of the pins.
+    type Error;
+
+    /// Wait between [`select`](Self::select) and the first conversion, in nanoseconds (ns).
+    const SELECT_SETTLE_NS: u32;
+
+    /// Grounds `electrode` and lets go of the one grounded before.
+    ///
+    /// # Errors
+    /// If a pin cannot be driven.
+    fn ground(&mut self, electrode: u8) -> Result<(), Self::Error>;
+
+    /// Brings `electrode` to the ADC.
+    ///
+    /// # Errors
+    /// If a pin cannot be driven.
+    fn select(&mut self, electrode: u8) -> Result<(), Self::Error>;
+}
+
+/// Address lines A0 (first) and up, driven one after the other. An electrode beyond them wraps.
+#[derive(Debug)]
+struct Address<P, const LINES: usize>([P; LINES]);
+
+impl<P: OutputPin, const LINES: usize> Address<P, LINES> {
+    fn set(&mut self, electrode: u8) -> Result<(), P::Error> {
+        let bits = usize::from(electrode);
+        self.0.iter_mut().enumerate().try_for_each(|(line, pin)| pin.set_state((bits >> line & 1 == 1).into()))
+    }
+}
+
+/// WR, CSA, CSB and EN tied low, so that the address lines act at once: four GPIOs ground an electrode, and every electrode has
+/// an ADC input of its own.
+#[derive(Debug)]
+pub struct Transparent<P, const LINES: usize = 4>(Address<P, LINES>);
+
+impl<P: OutputPin, const LINES: usize> Transparent<P, LINES> {
+    /// A multiplexer on the address lines A0, A1, A2, A3 (and A4 of an ADG732).
+    pub fn new(address: [P; LINES]) -> Self {
+        Self(Address(address))
+    }
+}
+
+impl<P: OutputPin, const LINES: usize> Mux for Transparent<P, LINES> {
+    type Error = P::Error;
+    const SELECT_SETTLE_NS: u32 = 0;
+
+    fn ground(&mut self, electrode: u8) -> Result<(), P::Error> {
+        self.0.set(electrode)
+    }
+
+    /// Nothing to do: every electrode has an ADC input of its own.
+    fn select(&mut self, _electrode: u8) -> Result<(), P::Error> {
+        Ok(())
+    }
+}
+
+/// Half A (drain DA at 0 V) grounds an electrode, half B (drain DB at the one ADC input) brings an electrode to the converter;
+/// both halves' sources go to the same 16 electrodes.
+#[derive(Debug)]
+pub struct Latched<P> {
+    address: Address<P, 4>,
+    lines: LatchLines<P>,
+}
+
+/// The lines that latch an address, all active low.
+#[derive(Debug)]
+pub struct LatchLines<P> {
+    /// Write.
+    pub wr: P,
+    /// Chip select of half A.
+    pub csa: P,
+    /// Chip select of half B.
+    pub csb: P,
+}
+
+impl<P: OutputPin> Latched<P> {
+    /// A multiplexer on the address lines A0 to A3 and the lines of its latches, which are driven high (idle).
+    ///
+    /// # Errors
+    /// If a pin cannot be driven.
+    pub fn new(address: [P; 4], mut lines: LatchLines<P>) -> Result<Self, P::Error> {
+        lines.wr.set_high()?;
+        lines.csa.set_high()?;
+        lines.csb.set_high()?;
+        Ok(Self { address: Address(address), lines })
+    }
+}
+
+/// Passes the address on to the half whose chip select is `select`: the latch opens only while the address is at rest.
+fn latch<P: OutputPin>(wr: &mut P, select: &mut P) -> Result<(), P::Error> {
+    select.set_low()?;
+    wr.set_low()?;
+    wr.set_high()?;
+    select.set_high()
+}
+
+impl<P: OutputPin> Mux for Latched<P> {
+    type Error = P::Error;
+    /// The ADC input and half B hold about 150 pF, which a pad of up to 1 kilohm charges to half an LSB of 12 bits (9 time
+    /// constants) in 1.4 us.
+    const SELECT_SETTLE_NS: u32 = 2_000;
+
+    fn ground(&mut self, electrode: u8) -> Result<(), P::Error> {
+        self.address.set(electrode)?;
+        latch(&mut self.lines.wr, &mut self.lines.csa)
+    }
+
+    fn select(&mut self, electrode: u8) -> Result<(), P::Error> {
+        self.address.set(electrode)?;
+        latch(&mut self.lines.wr, &mut self.lines.csb)
+    }
+}
+
+/// A multiplexer whose EN (active low) has a pin: all switches stay open from the reset until the first scan, so that the
+/// detector cannot pull on inputs that the chip reads at its start.
+#[derive(Debug)]
+pub struct Enabled<M, P> {
+    mux: M,
+    enable: P,
+}
+
+impl<P: OutputPin, M: Mux<Error = P::Error>> Enabled<M, P> {
+    /// Drives EN high (off) until the first electrode is grounded.
+    ///
+    /// # Errors
+    /// If the pin cannot be driven.
+    pub fn new(mux: M, mut enable: P) -> Result<Self, P::Error> {
+        enable.set_high()?;
+        Ok(Self { mux, enable })
+    }
+}
+
+impl<P: OutputPin, M: Mux<Error = P::Error>> Mux for Enabled<M, P> {
+    type Error = P::Error;
+    const SELECT_SETTLE_NS: u32 = M::SELECT_SETTLE_NS;
+
+    fn ground(&mut self, electrode: u8) -> Result<(), P::Error> {
+        self.enable.set_low()?;
+        self.mux.ground(electrode)
+    }
+
+    fn select(&mut self, electrode: u8) -> Result<(), P::Error> {
+        self.mux.select(electrode)
+    }
+}

@@ -1,0 +1,180 @@
+//! The way to the host: packets wait here, and go out as the line takes them.
+//!
+//! Answers and faults go first, then frames; a packet of log may go between two frames. Of frames that wait, only the newest is
+//! kept: when the line is slow the host gets fewer frames, but fresh ones.
+
+use heapless::Deque;
+use tactomo_protocol::{BoardMessage, FrameHead, MAX_LOG, encode_board, encode_frame, encode_log, wire_bytes};
+
+use crate::{Chip, Serial};
+
+/// Bytes of answers and faults that can wait: four of the longest.
+const CONTROL_BYTES: usize = 512;
+/// Longest answer or fault on the wire.
+const CONTROL_PACKET: usize = 128;
+/// Longest packet of log on the wire.
+const LOG_PACKET: usize = wire_bytes(1 + MAX_LOG + 4);
+/// Packets that one [`Uplink::poll`] begins at most, so that it ends on any line.
+const PACKETS_A_POLL: usize = 4;
+
+/// A wire packet.
+#[derive(Debug)]
+struct Packet<const N: usize> {
+    bytes: [u8; N],
+    length: usize,
+}
+
+impl<const N: usize> Packet<N> {
+    const EMPTY: Self = Self { bytes: [0; N], length: 0 };
+
+    fn from(&self, begin: usize) -> &[u8] {
+        self.bytes.get(begin..self.length).unwrap_or_default()
+    }
+}
+
+/// What is being sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sending {
+    Nothing,
+    Control,
+    Frame,
+    Log,
+}
+
+/// Packets on their way to the host; a frame takes `WIRE` bytes at most.
+#[derive(Debug)]
+pub struct Uplink<const WIRE: usize> {
+    /// Whole packets, each with its closing zero.
+    control: Deque<u8, CONTROL_BYTES>,
+    /// One being sent or free, one being filled or waiting; `outgoing` says which is which.
+    frames: [Packet<WIRE>; 2],
+    outgoing: usize,
+    frame_waits: bool,
+    log: Packet<LOG_PACKET>,
+    sending: Sending,
+    /// Bytes of the frame or log under way that are gone.
+    gone: usize,
+    /// Whether the last packet was a frame, so that the log has its turn.
+    after_frame: bool,
+}
+
+impl<const WIRE: usize> Default for Uplink<WIRE> {
+    /// Begins with a lone zero, which cuts off whatever the boot loader said on the line.
+    fn default() -> Self {
+        let mut control = Deque::new();
+        // There is room in an empty queue.
+        let _ = control.push_back(0);
+        Self {
+            control,
+            frames: [Packet::EMPTY; 2],
+            outgoing: 0,
+            frame_waits: false,
+            log: Packet::EMPTY,
+            sending: Sending::Nothing,
+            gone: 0,
+            after_frame: false,
+        }
+    }
+}
+
+impl<const WIRE: usize> Uplink<WIRE> {
+    /// Queues an answer or a fault; returns whether there was room. Without it the message is lost: the host has left more than
+    /// four of them unread.
+    pub fn message(&mut self, message: &BoardMessage) -> bool {
+        let mut packet = [0; CONTROL_PACKET];
+        let Ok(length) = encode_board(message, &mut packet) else { return false };
+        let fits = self.control.storage_capacity() - self.control.len() >= length;
+        if fits {
+            self.control.extend(packet.into_iter().take(length));
+        }
+        fits
+    }
+
+    /// Queues a frame in the place of one that still waits; returns whether nothing was dropped for it.
+    pub fn frame(&mut self, head: FrameHead, readings: &[u16]) -> bool {
+        let free = !core::mem::take(&mut self.frame_waits);
+        let packet = &mut self.frames[1 - self.outgoing];
+        match encode_frame(head, readings, &mut packet.bytes) {
+            Ok(length) => packet.length = length,
+            Err(_) => return false,
+        }
+        self.frame_waits = true;
+        free
+    }
+
+    /// Pushes as many bytes as `serial` takes at this moment; never waits. Log bytes come from `chip`.
+    pub fn poll(&mut self, serial: &mut impl Serial, chip: &mut impl Chip) {
+        for _ in 0..PACKETS_A_POLL {
+            if self.sending == Sending::Nothing {
+                self.begin(chip);
+            }
+            if self.sending == Sending::Nothing || !self.push(serial) {
+                return;
+            }
+        }
+    }
+
+    /// Chooses what goes next.
+    fn begin(&mut self, chip: &mut impl Chip) {
+        self.gone = 0;
+        self.sending = if !self.control.is_empty() {
+            Sending::Control
+        } else if (self.after_frame || !self.frame_waits) && self.fill_log(chip) {
+            Sending::Log
+        } else if self.frame_waits {
+            self.frame_waits = false;
+            self.outgoing = 1 - self.outgoing;
+            Sending::Frame
+        } else {
+            Sending::Nothing
+        };
+        self.after_frame = self.sending == Sending::Frame;
+    }
+
+    fn fill_log(&mut self, chip: &mut impl Chip) -> bool {
+        let mut bytes = [0; MAX_LOG];
+        let count = chip.pull_log(&mut bytes).min(MAX_LOG);
+        let Some(bytes) = bytes.get(..count).filter(|bytes| !bytes.is_empty()) else { return false };
+        self.log.length = encode_log(bytes, &mut self.log.bytes).unwrap_or(0);
+        true
+    }
+
+    /// Pushes the rest of the packet under way; returns whether the line took all of it.
+    fn push(&mut self, serial: &mut impl Serial) -> bool {
+        let done = match self.sending {
+            Sending::Nothing => true,
+            Sending::Control => self.push_control(serial),
+            Sending::Frame => push_from(&self.frames[self.outgoing], &mut self.gone, serial),
+            Sending::Log => push_from(&self.log, &mut self.gone, serial),
+        };
+        if done {
+            self.sending = Sending::Nothing;
+        }
+        done
+    }
+
+    /// Pushes answers and faults up to the end of the first packet, or of the queue's first piece of memory.
+    fn push_control(&mut self, serial: &mut impl Serial) -> bool {
+        loop {
+            let (bytes, _) = self.control.as_slices();
+            let length = bytes.iter().position(|byte| *byte == 0).map_or(bytes.len(), |zero| zero + 1);
+            let Some(bytes) = bytes.get(..length).filter(|bytes| !bytes.is_empty()) else { return true };
+            let ends = bytes.ends_with(&[0]);
+            let taken = serial.push(bytes).min(length);
+            for _ in 0..taken {
+                self.control.pop_front();
+            }
+            if taken < length || ends {
+                return taken == length;
+            }
+        }
+    }
+}
+
+/// Pushes what is left of `packet`; returns whether the line took all of it.
+fn push_from<const N: usize>(packet: &Packet<N>, gone: &mut usize, serial: &mut impl Serial) -> bool {
+    let rest = packet.from(*gone);
+    let taken = serial.push(rest).min(rest.len());
+    *gone += taken;
+    taken == rest.len()
+}
