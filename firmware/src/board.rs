@@ -158,7 +158,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         let mut bytes = [0; RECEIVED_A_STEP];
         let count = self.parts.serial.pull(&mut bytes);
         let mut input = bytes.get(..count).unwrap_or_default();
-        while let Some(command) = self.receiver.next(&mut input) {
+        while let Some(command) = self.receiver.receive(&mut input) {
             match command {
                 Ok(command) => self.obey(command),
                 Err(DecodeError::Version(version)) => self.fault(Fault::UnknownVersion(version)),
