@@ -3,6 +3,8 @@
 //! A [`ForwardModel`] gives the electrode impedance matrix `Z` of a detector for any contacts, and the fields that make
 //! the linear theory. What follows from those is the same for every model and lives here, once.
 
+pub mod shell;
+
 use nalgebra::DMatrix;
 
 use crate::detector::Detector;

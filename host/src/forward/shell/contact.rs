@@ -1,0 +1,70 @@
+//! Discs of contact on a mesh.
+
+use super::geometry;
+use super::mesh::Mesh;
+use crate::forward::ForwardError;
+use crate::scene::Contact;
+
+/// Corners of the polygon that stands for a disc, which has the disc's area.
+const CORNERS: usize = 64;
+
+/// Conductance that each node gets (S): the integral of its shape function over the discs, times their conductance per area.
+///
+/// Exact for a polygon of [`CORNERS`] corners: a linear function's integral over a part is its value at the part's centroid.
+/// So a disc's conductance and its centre are kept, whatever the mesh. A part beyond the edge touches nothing.
+pub fn node_conductances_s(mesh: &Mesh, contacts: &[Contact]) -> Result<Vec<(usize, f64)>, ForwardError> {
+    let mut conductances_s = vec![0.0; mesh.nodes_m.len()];
+    for (index, contact) in contacts.iter().enumerate() {
+        check(contact).map_err(|what| ForwardError::Contact { index, what: what.to_owned() })?;
+        if !add_disc(mesh, contact, &mut conductances_s) {
+            return Err(ForwardError::Contact { index, what: "it is off the detector".to_owned() });
+        }
+    }
+    Ok(conductances_s.into_iter().enumerate().filter(|&(_, conductance_s)| conductance_s > 0.0).collect())
+}
+
+fn check(contact: &Contact) -> Result<(), &'static str> {
+    let numbers = [contact.x_m, contact.y_m, contact.radius_m, contact.conductance_s];
+    if numbers.iter().any(|number| !number.is_finite()) {
+        return Err("it has a value that is not a finite number");
+    }
+    if contact.radius_m <= 0.0 {
+        return Err("its radius is not above zero");
+    }
+    if contact.conductance_s <= 0.0 {
+        return Err("its conductance is not above zero");
+    }
+    Ok(())
+}
+
+/// Adds one disc; whether it touches the detector at all.
+fn add_disc(mesh: &Mesh, contact: &Contact, conductances_s: &mut [f64]) -> bool {
+    let disc = geometry::disc([contact.x_m, contact.y_m], contact.radius_m, CORNERS);
+    let density_s_per_m2 = contact.conductance_s / geometry::area(&disc);
+    let mut touches = false;
+    for &triangle in &mesh.triangles {
+        let corners = mesh.corners(triangle);
+        if is_far(corners, contact) {
+            continue;
+        }
+        let Some((area_m2, centroid)) = geometry::area_and_centroid(&geometry::clip(&disc, corners)) else { continue };
+        let [a, b, c] = corners;
+        let twice_m2 = geometry::cross(a, b, c);
+        let shares =
+            [geometry::cross(b, c, centroid), geometry::cross(c, a, centroid), geometry::cross(a, b, centroid)];
+        for (node, share) in triangle.into_iter().zip(shares) {
+            conductances_s[node as usize] += density_s_per_m2 * area_m2 * share / twice_m2;
+        }
+        touches = true;
+    }
+    touches
+}
+
+/// Whether the bounding boxes of triangle and disc are apart.
+fn is_far(corners: [[f64; 2]; 3], contact: &Contact) -> bool {
+    let reach_m = 1.01 * contact.radius_m;
+    [(0, contact.x_m), (1, contact.y_m)].into_iter().any(|(axis, middle)| {
+        corners.iter().all(|corner| corner[axis] > middle + reach_m)
+            || corners.iter().all(|corner| corner[axis] < middle - reach_m)
+    })
+}

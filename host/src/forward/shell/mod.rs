@@ -1,0 +1,156 @@
+//! The thin shell: a detector as a sheet of triangles with its electrodes in the plane.
+//!
+//! `-div(s grad phi) + c (phi - Vcc) = 0` with the sheet conductance `s` and contact conductance `c` per area; on a pad the
+//! complete electrode model, `(phi - U) / z_e`. The current through a thick layer is not in it: see the documentation of the
+//! physics for what that costs.
+
+mod contact;
+pub(crate) mod geometry;
+mod mesh;
+mod system;
+#[cfg(test)]
+mod tests;
+
+use faer::Mat;
+use nalgebra::DMatrix;
+
+pub use self::mesh::Mesh;
+use self::system::{Factor, Singular, System};
+use super::{ForwardError, ForwardModel, ImageMesh};
+use crate::detector::{Detector, Electrode};
+use crate::scene::Contact;
+
+/// A pad's contact impedance is at least this share of `radius^2 / sheet conductance`: below, it makes no difference to a
+/// reading (current enters within 1/1000 of the radius) and the equations only lose digits.
+const SMALLEST_PAD_IMPEDANCE: f64 = 1e-6;
+
+/// The thin-shell model of a detector.
+pub struct Shell {
+    detector: Detector,
+    mesh: Mesh,
+    image_mesh: ImageMesh,
+    system: System,
+    fields_ohm: DMatrix<f64>,
+    electrode_fields_ohm: DMatrix<f64>,
+}
+
+/// Potentials for 1 A into each electrode while contacts lead it off to the driving layer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactFields {
+    /// At the electrodes (ohm): the impedance matrix `Z`, `electrodes x electrodes`.
+    pub impedance_ohm: DMatrix<f64>,
+    /// At the nodes (ohm): `nodes x electrodes`.
+    pub nodes_ohm: DMatrix<f64>,
+}
+
+impl Shell {
+    /// Nodes of the mesh unless said otherwise: 2000 for 16 electrodes.
+    pub fn default_nodes(detector: &Detector) -> usize {
+        400 + 100 * detector.electrodes.len()
+    }
+
+    /// A model with the default number of nodes.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the detector cannot be meshed.
+    pub fn new(detector: &Detector) -> Result<Self, ForwardError> {
+        Self::with_nodes(detector, Self::default_nodes(detector))
+    }
+
+    /// A model with about `nodes` nodes.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the detector cannot be meshed.
+    pub fn with_nodes(detector: &Detector, nodes: usize) -> Result<Self, ForwardError> {
+        let singular = |_: Singular| ForwardError::Detector {
+            detector: detector.name.clone(),
+            what: "its equations are singular: conductivity and contact impedance have to be finite and above zero"
+                .to_owned(),
+        };
+        let pad_impedance_ohm_m2: Vec<_> =
+            detector.electrodes.iter().map(|pad| pad_impedance_ohm_m2(detector, pad)).collect();
+        let sheet_conductance_s = detector.sheet_conductance_s();
+        let mesh = Mesh::new(detector, nodes)?;
+        let system = System::new(&mesh, sheet_conductance_s, &pad_impedance_ohm_m2).map_err(singular)?;
+        let node_areas_m2 = mesh.node_areas_m2();
+        // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.
+        let factor = system.factorise([(system.pad(0), sheet_conductance_s)]).map_err(singular)?;
+        let (fields_ohm, electrode_fields_ohm) = neumann_fields_ohm(&factor, &system, &node_areas_m2);
+        let image_mesh = ImageMesh { nodes_m: mesh.nodes_m.clone(), triangles: mesh.triangles.clone(), node_areas_m2 };
+        Ok(Self { detector: detector.clone(), mesh, image_mesh, system, fields_ohm, electrode_fields_ohm })
+    }
+
+    /// Potentials for 1 A into each electrode with contact conductances at nodes (S): pairs of node and conductance.
+    ///
+    /// `d impedance_ohm[(e, g)] / d conductance[k] = -nodes_ohm[(k, e)] nodes_ohm[(k, g)]`.
+    ///
+    /// # Errors
+    /// [`ForwardError::NoContact`] if no node conducts.
+    pub fn contact_fields_ohm(&self, conductances_s: &[(usize, f64)]) -> Result<ContactFields, ForwardError> {
+        if !conductances_s.iter().any(|&(_, conductance_s)| conductance_s > 0.0) {
+            return Err(ForwardError::NoContact);
+        }
+        let factor = self.system.factorise(conductances_s.iter().copied()).map_err(|_| ForwardError::NoContact)?;
+        let pads = self.system.pads();
+        let currents_a = Mat::from_fn(self.system.pad(pads), pads, |i, j| f64::from(u8::from(i == self.system.pad(j))));
+        let (nodes_ohm, impedance_ohm) = factor.solve(currents_a);
+        Ok(ContactFields { impedance_ohm, nodes_ohm })
+    }
+
+    /// Contact conductance that each node gets from discs of contact (S): pairs of node and conductance.
+    ///
+    /// # Errors
+    /// [`ForwardError::Contact`] if a contact is off the detector or no positive disc.
+    pub fn node_conductances_s(&self, contacts: &[Contact]) -> Result<Vec<(usize, f64)>, ForwardError> {
+        contact::node_conductances_s(&self.mesh, contacts)
+    }
+}
+
+impl ForwardModel for Shell {
+    fn name(&self) -> &'static str {
+        "shell"
+    }
+
+    fn detector(&self) -> &Detector {
+        &self.detector
+    }
+
+    fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
+        Ok(self.contact_fields_ohm(&self.node_conductances_s(contacts)?)?.impedance_ohm)
+    }
+
+    fn image_mesh(&self) -> &ImageMesh {
+        &self.image_mesh
+    }
+
+    fn fields_ohm(&self) -> &DMatrix<f64> {
+        &self.fields_ohm
+    }
+
+    fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
+        &self.electrode_fields_ohm
+    }
+}
+
+/// Contact impedance of a pad that the equations are made with (ohm m2).
+fn pad_impedance_ohm_m2(detector: &Detector, pad: &Electrode) -> f64 {
+    let smallest = SMALLEST_PAD_IMPEDANCE * pad.radius_m * pad.radius_m / detector.sheet_conductance_s();
+    detector.contact_impedance_ohm_m2.max(smallest)
+}
+
+/// Neumann functions of the pads, at nodes and at pads: 1 A into a pad, out evenly all over, mean zero. So they are symmetric.
+fn neumann_fields_ohm(factor: &Factor, system: &System, node_areas_m2: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
+    let area_m2: f64 = node_areas_m2.iter().sum();
+    let pads = system.pads();
+    let currents_a = Mat::from_fn(system.pad(pads), pads, |i, j| match node_areas_m2.get(i) {
+        Some(node_area_m2) => -node_area_m2 / area_m2,
+        None => f64::from(u8::from(i == system.pad(j))),
+    });
+    let (mut nodes, mut electrodes) = factor.solve(currents_a);
+    for pad in 0..pads {
+        let sum: f64 = nodes.column(pad).iter().zip(node_areas_m2).map(|(ohm, area)| ohm * area).sum();
+        nodes.column_mut(pad).add_scalar_mut(-sum / area_m2);
+        electrodes.column_mut(pad).add_scalar_mut(-sum / area_m2);
+    }
+    (nodes, electrodes)
+}
