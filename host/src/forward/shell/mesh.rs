@@ -81,7 +81,7 @@ impl Mesh {
         let mut outer = first;
         let (&last_m, rings_m) = pad.inner_radii_m.split_last().unwrap_or((&pad.radius_m, &[]));
         for &radius_m in rings_m {
-            let inner = self.add_ring(pad, radius_m, pad.segments);
+            let inner = self.add_ring(pad, radius_m, 1);
             for i in 0..segments {
                 let next = (i + 1) % segments;
                 self.triangles.push([outer + i, outer + next, inner + i]);
@@ -90,7 +90,7 @@ impl Mesh {
             outer = inner;
         }
         // Almost nothing happens within the last ring: it has half the nodes.
-        let inner = self.add_ring(pad, last_m, pad.segments / 2);
+        let inner = self.add_ring(pad, last_m, 2);
         for i in 0..segments / 2 {
             let (next, odd, even) = ((i + 1) % (segments / 2), outer + 2 * i + 1, outer + (2 * i + 2) % segments);
             self.triangles.push([outer + 2 * i, odd, inner + i]);
@@ -104,10 +104,10 @@ impl Mesh {
         self.pad_triangles.push(start..self.triangles.len());
     }
 
-    /// Adds the nodes of a ring and gives the number of the first.
-    fn add_ring(&mut self, pad: &PadRings, radius_m: f64, segments: usize) -> u32 {
+    /// Adds every `step`th node of a ring and gives the number of the first.
+    fn add_ring(&mut self, pad: &PadRings, radius_m: f64, step: usize) -> u32 {
         let first = self.nodes_m.len() as u32;
-        self.nodes_m.extend(geometry::disc(pad.centre, radius_m, segments));
+        self.nodes_m.extend(geometry::disc(pad.centre, radius_m, pad.segments).into_iter().step_by(step));
         first
     }
 
@@ -117,10 +117,8 @@ impl Mesh {
         for &node in self.triangles.iter().flatten() {
             number[node as usize] = 0;
         }
-        let mut used = 0;
-        for slot in number.iter_mut().filter(|slot| **slot == 0) {
+        for (used, slot) in (0..).zip(number.iter_mut().filter(|slot| **slot == 0)) {
             *slot = used;
-            used += 1;
         }
         let mut old = 0;
         self.nodes_m.retain(|_| {
