@@ -3,6 +3,8 @@
 //! The pipeline runs in a thread of its own and publishes [`Snapshot`]s through a cell that keeps the latest only, so that a
 //! slow page never slows the board. Pages answer with [`Request`]s.
 
+pub mod server;
+
 use tactomo_protocol::{Hello, Status};
 
 use crate::readings::Readings;

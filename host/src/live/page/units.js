@@ -1,0 +1,40 @@
+// Numbers as people read them.
+
+const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
+const MINUS = "\u2212";
+
+/** The SI prefix that puts `value` between 1 and 1000, as `{factor, symbol}`. */
+export function prefixOf(value) {
+  const size = Math.abs(value);
+  const [factor, symbol] = PREFIXES.find(([f]) => size >= f * 0.9995) ?? (size > 0 ? PREFIXES.at(-1) : [1, ""]);
+  return { factor, symbol };
+}
+
+/** `value` with fixed decimals and a true minus sign. */
+export const fixed = (value, decimals) => {
+  const text = value.toFixed(decimals);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", MINUS);
+};
+
+/** Metres as millimetres, one decimal, without the unit. */
+export const millimetres = (metres) => fixed(metres * 1e3, 1);
+
+/** A count with thin spaces between thousands. */
+export const count = (value) => String(Math.round(value)).replace(/\B(?=(\d{3})+$)/g, "\u2009");
+
+/** A step of 1, 2 or 5 times a power of ten that cuts `range` into at most `most` pieces. */
+export function niceStep(range, most) {
+  const rough = range / most;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  return power * [1, 2, 5, 10].find((m) => m * power >= rough * (1 - 1e-9));
+}
+
+/** Multiples of `step` from `low` to `high`. */
+export function ticks(low, high, step) {
+  const first = Math.ceil(low / step - 1e-9);
+  const last = Math.floor(high / step + 1e-9);
+  return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step);
+}
+
+/** Decimals that show multiples of `step` apart. */
+export const decimalsOf = (step) => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));

@@ -1,0 +1,52 @@
+//! The files of the page, held in the program.
+
+use axum::http::StatusCode;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const SVG: &str = "image/svg+xml";
+
+/// Path, type and contents of a file.
+type Asset = (&'static str, &'static str, &'static str);
+
+const ASSETS: [Asset; 15] = [
+    ("/", HTML, include_str!("../page/index.html")),
+    ("/style.css", CSS, include_str!("../page/style.css")),
+    ("/icon.svg", SVG, include_str!("../page/icon.svg")),
+    ("/app.js", SCRIPT, include_str!("../page/app.js")),
+    ("/colours.js", SCRIPT, include_str!("../page/colours.js")),
+    ("/panel.js", SCRIPT, include_str!("../page/panel.js")),
+    ("/picture.js", SCRIPT, include_str!("../page/picture.js")),
+    ("/press.js", SCRIPT, include_str!("../page/press.js")),
+    ("/protocol.js", SCRIPT, include_str!("../page/protocol.js")),
+    ("/raster.js", SCRIPT, include_str!("../page/raster.js")),
+    ("/readings.js", SCRIPT, include_str!("../page/readings.js")),
+    ("/scale.js", SCRIPT, include_str!("../page/scale.js")),
+    ("/svg.js", SCRIPT, include_str!("../page/svg.js")),
+    ("/theme.js", SCRIPT, include_str!("../page/theme.js")),
+    ("/units.js", SCRIPT, include_str!("../page/units.js")),
+];
+
+/// Answer to a request for `path`.
+pub(super) fn answer(path: &str) -> Result<impl IntoResponse + use<>, StatusCode> {
+    let asset = ASSETS.iter().find(|asset| asset.0 == path).ok_or(StatusCode::NOT_FOUND)?;
+    Ok(([(CONTENT_TYPE, asset.1)], asset.2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_import_of_a_script_is_served() {
+        for (path, _, text) in ASSETS.iter().filter(|asset| asset.1 == SCRIPT) {
+            for line in text.lines().filter(|line| line.starts_with("import ")) {
+                let name = line.split('"').nth(1).and_then(|name| name.strip_prefix('.'));
+                assert!(name.is_some_and(|name| answer(name).is_ok()), "{path}: {line}");
+            }
+        }
+    }
+}
