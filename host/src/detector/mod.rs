@@ -5,7 +5,7 @@ mod preset;
 /// A detection layer with its electrodes and the circuit that measures it.
 ///
 /// Coordinates: x and y from the middle of the outline's bounding box, z up from the electrode side; metres.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Detector {
     /// Preset or file name, for people.
     pub name: String,
@@ -26,7 +26,7 @@ pub struct Detector {
 }
 
 /// Closed polygons, without repeating the first corner (m).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outline {
     /// Outer edge, counter-clockwise.
     pub outer: Vec<[f64; 2]>,
@@ -35,7 +35,7 @@ pub struct Outline {
 }
 
 /// One layer; its conductivity runs exponentially from bottom to top, as in eq. (11) of the paper.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Layer {
     /// Thickness (m).
     pub thickness_m: f64,
@@ -46,7 +46,7 @@ pub struct Layer {
 }
 
 /// A round pad under the layer.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Electrode {
     /// Centre, x (m).
     pub x_m: f64,
@@ -57,7 +57,7 @@ pub struct Electrode {
 }
 
 /// The analogue-to-digital converter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Adc {
     /// Bits of one conversion.
     pub bits: u8,

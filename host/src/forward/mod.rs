@@ -3,10 +3,13 @@
 //! A [`ForwardModel`] gives the electrode impedance matrix `Z` of a detector for any contacts, and the fields that make
 //! the linear theory. What follows from those is the same for every model and lives here, once.
 
+pub mod jacobian;
+mod jacobian_file;
 pub mod shell;
 
 use nalgebra::DMatrix;
 
+pub use self::jacobian_file::JacobianFileError;
 use crate::detector::Detector;
 use crate::readings::Readings;
 use crate::scene::Contact;
@@ -38,7 +41,7 @@ pub trait ForwardModel: Send + Sync {
 }
 
 /// Nodes of an image of contact conductance and the triangles between them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ImageMesh {
     /// Positions (m).
     pub nodes_m: Vec<[f64; 2]>,

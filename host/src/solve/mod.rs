@@ -1,5 +1,10 @@
 //! From readings back to touch: one file a method, one trait.
 
+mod locate;
+mod tikhonov;
+
+pub use self::locate::Locate;
+pub use self::tikhonov::{Lambda, Tikhonov};
 use crate::readings::Readings;
 
 /// A method that reads touch from the readings of a frame.
@@ -54,4 +59,20 @@ pub enum SolveError {
         /// Electrode read.
         e: usize,
     },
+}
+
+impl Readings {
+    /// Checks that there is a finite number for each pair of `electrodes`.
+    ///
+    /// # Errors
+    /// [`SolveError`], which says what is wrong.
+    pub fn check(&self, electrodes: usize) -> Result<(), SolveError> {
+        if self.electrodes() != electrodes {
+            return Err(SolveError::Electrodes { found: self.electrodes(), expected: electrodes });
+        }
+        match self.volts().iter().position(|volts| !volts.is_finite()) {
+            Some(index) => Err(SolveError::NotFinite { g: index / electrodes, e: index % electrodes }),
+            None => Ok(()),
+        }
+    }
 }
