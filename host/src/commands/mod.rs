@@ -1,5 +1,8 @@
 //! The commands, one file each: its arguments and what it does.
 
+mod choice;
+mod forward;
+mod output;
 mod ports;
 
 use clap::{Parser, Subcommand};
@@ -14,12 +17,14 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Forward(Box<forward::Args>),
     Ports(ports::Args),
 }
 
 /// Runs the command that was asked for.
 pub fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
+        Command::Forward(args) => forward::run(&args),
         Command::Ports(args) => ports::run(args),
     }
 }

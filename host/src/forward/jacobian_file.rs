@@ -208,7 +208,8 @@ mod tests {
     #[test]
     fn every_difference_is_named() {
         let saved = preset("square-60");
-        let changes: [(&str, fn(&mut Detector)); 5] = [
+        type Change = fn(&mut Detector);
+        let changes: [(&str, Change); 5] = [
             ("size (m)", |detector| detector.outline = crate::detector::Outline::rectangle(0.061, 0.06)),
             ("electrodes: 16", |detector| detector.electrodes.truncate(8)),
             ("layers", |detector| detector.layers[0].thickness_m = 0.004),
