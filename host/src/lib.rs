@@ -10,6 +10,7 @@ pub mod detector;
 pub mod forward;
 pub mod live;
 pub mod readings;
+pub mod record;
 pub mod scene;
 pub mod simulate;
 pub mod solve;

@@ -37,6 +37,11 @@ impl Readings {
         &self.volts
     }
 
+    /// All of them, row by row (V), to be changed.
+    pub fn volts_mut(&mut self) -> &mut [f64] {
+        &mut self.volts
+    }
+
     /// The largest (V); zero if there are none.
     pub fn largest_v(&self) -> f64 {
         self.volts.iter().copied().fold(0.0, f64::max)

@@ -3,7 +3,15 @@
 //! The pipeline runs in a thread of its own and publishes [`Snapshot`]s through a cell that keeps the latest only, so that a
 //! slow page never slows the board. Pages answer with [`Request`]s.
 
+pub mod board_log;
+pub mod interpret;
+pub mod pipeline;
+pub mod plan;
+pub mod rest;
+pub mod sequence;
 pub mod server;
+pub mod session;
+pub mod statistics;
 
 use tactomo_protocol::{Hello, Status};
 

@@ -1,0 +1,109 @@
+//! What the pipeline is to do, and what comes of it.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc;
+use std::time::Duration;
+
+use tokio::sync::watch;
+
+use super::board_log::BoardLog;
+use super::interpret::Mismatch;
+use super::session::{GreetError, Wish};
+use super::{Latency, Request, Snapshot};
+use crate::detector::Detector;
+use crate::record::{RecordError, Recorder};
+use crate::scene::Contact;
+use crate::solve::{SolveError, Solver};
+use crate::source::SourceError;
+
+/// Makes a solver for a detector.
+pub type MakeSolver = Box<dyn FnMut(&Detector) -> Result<Box<dyn Solver>, BoxError> + Send>;
+/// Presses on a simulated detector, or lets go.
+pub type Press = Box<dyn Fn(Option<Contact>) + Send>;
+/// Any error.
+pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
+
+/// What the pipeline is to do.
+pub struct Plan {
+    /// The detector that is connected; drive and ADC are the board's to tell.
+    pub detector: Detector,
+    /// Settings asked of the board.
+    pub wish: Wish,
+    /// Makes the solver, once the board has said Hello; `None` only receives.
+    pub make_solver: Option<MakeSolver>,
+    /// Keeps the bytes.
+    pub recorder: Option<Recorder>,
+    /// Where the board's log goes.
+    pub board_log: BoardLog,
+    /// Who is told of presses, if the detector is simulated.
+    pub press: Option<Press>,
+    /// Time from Hello to the end; `None` for without end.
+    pub seconds: Option<Duration>,
+}
+
+/// Where the pipeline meets the rest of the program.
+pub struct Ends {
+    /// Where snapshots go.
+    pub snapshots: watch::Sender<Arc<Snapshot>>,
+    /// Where requests come from.
+    pub requests: mpsc::Receiver<Request>,
+    /// Set to end the pipeline.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// What a run of the pipeline has come to.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Summary {
+    /// Where the bytes came from.
+    pub source: String,
+    /// Name of the solver; `none` if there was none.
+    pub solver: String,
+    /// Frames received whole.
+    pub frames: u64,
+    /// Frames a second, from the first to the last.
+    pub frames_per_s: f64,
+    /// Frames that the sequence numbers say are missing.
+    pub dropped: u64,
+    /// Stretches of bytes that were no message, since the board's Hello.
+    pub corrupt: u64,
+    /// From the last byte of a frame received to its image ready, in microseconds (us).
+    pub latency_us: Latency,
+}
+
+/// Why the pipeline cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum LiveError {
+    /// The source does not open.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The board cannot be talked to.
+    #[error("{link}: {error}")]
+    Greet {
+        /// Name of the link.
+        link: String,
+        /// Why.
+        error: GreetError,
+    },
+    /// The link broke and cannot come back.
+    #[error("{link} broke")]
+    Link {
+        /// Name of the link.
+        link: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The board does not fit the detector.
+    #[error(transparent)]
+    Mismatch(#[from] Mismatch),
+    /// No solver can be made for the detector.
+    #[error("cannot make a solver for this detector")]
+    MakeSolver(#[source] BoxError),
+    /// The solver cannot answer.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// The recording cannot be kept.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
