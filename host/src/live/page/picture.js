@@ -218,7 +218,7 @@ export class Picture {
 
   #tell() {
     const { xM, yM, value, lowest } = this.peak;
-    this.peakText.textContent = value > this.scale.floor
+    this.peakText.textContent = this.contacts.length
       ? `peak ${this.#inBarUnits(value)} at x ${millimetres(xM)}, y ${millimetres(yM)} mm` : "no touch";
     Object.assign(document.documentElement.dataset, {
       peakXMm: (xM * 1e3).toFixed(2), peakYMm: (yM * 1e3).toFixed(2), peakSPerM2: value.toPrecision(5),

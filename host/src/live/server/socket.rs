@@ -1,5 +1,6 @@
 //! One page's socket.
 
+use std::future::pending;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -47,7 +48,6 @@ struct Page<'a> {
 enum Turn {
     Status,
     Update,
-    Over,
 }
 
 impl<'a> Page<'a> {
@@ -73,7 +73,6 @@ impl<'a> Page<'a> {
                 },
                 turn = next_turn(&mut self.snapshots, self.update_due, self.status_due), if self.taken => {
                     let message = match turn {
-                        Turn::Over => return Some("the program is ending"),
                         Turn::Status => self.status(),
                         Turn::Update => self.update(),
                     };
@@ -143,11 +142,14 @@ impl<'a> Page<'a> {
 async fn next_turn(snapshots: &mut watch::Receiver<Arc<Snapshot>>, update_due: Instant, status_due: Instant) -> Turn {
     let update = async {
         sleep_until(update_due).await;
-        snapshots.changed().await
+        if snapshots.changed().await.is_err() {
+            // The pipeline has ended: the status says why, and there are no more frames.
+            pending().await
+        }
     };
     tokio::select! {
         biased;
         () = sleep_until(status_due) => Turn::Status,
-        changed = update => if changed.is_ok() { Turn::Update } else { Turn::Over },
+        () = update => Turn::Update,
     }
 }

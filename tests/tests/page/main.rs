@@ -1,0 +1,4 @@
+//! The live page: its server, spoken to byte by byte, and the page in a browser.
+
+mod raw;
+mod server;

@@ -1,0 +1,210 @@
+//! The server alone: what it lets in, what it sends when, and what it makes of nonsense.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use tactomo::detector::Detector;
+use tactomo::forward::ImageMesh;
+use tactomo::live::server::{Finger, Scene, Server, ServerError};
+use tactomo::live::{FrameSnapshot, Request, Snapshot};
+use tactomo::readings::Readings;
+use tactomo::scene::Contact;
+use tactomo::solve::Solution;
+use tokio::sync::watch;
+
+use crate::raw::{Heard, RawPage, ask, ask_socket};
+
+const FINGER: Finger = Finger { radius_m: 0.003, conductance_s: 1e-4 };
+
+/// A server with nothing behind it.
+struct Rig {
+    server: Server,
+    snapshots: watch::Sender<Arc<Snapshot>>,
+    requests: Receiver<Request>,
+}
+
+fn scene(finger: Option<Finger>) -> Result<Scene> {
+    Ok(Scene {
+        detector: Detector::preset(Detector::DEFAULT).context("the default preset")?,
+        mesh: ImageMesh::default(),
+        solver: "none".to_owned(),
+        source: "a test".to_owned(),
+        finger,
+    })
+}
+
+impl Rig {
+    fn start(finger: Option<Finger>) -> Result<Self> {
+        let (snapshots, receiver) = watch::channel(Arc::default());
+        let (sender, requests) = sync_channel(64);
+        let server = Server::start(Some(0), scene(finger)?, receiver, sender)?;
+        Ok(Self { server, snapshots, requests })
+    }
+
+    fn publish(&self, sequence: u64) {
+        let frame = FrameSnapshot {
+            sequence,
+            board_time_us: 0,
+            status: Default::default(),
+            readings: Readings::from_fn(16, |_, _| 0.0),
+            solution: Solution::default(),
+            rezeroing: false,
+        };
+        self.snapshots.send_replace(Arc::new(Snapshot { frame: Some(frame), ..Snapshot::default() }));
+    }
+
+    fn request(&self) -> Result<Request> {
+        Ok(self.requests.recv_timeout(Duration::from_secs(5))?)
+    }
+}
+
+#[test]
+fn the_page_is_served_to_its_own_names_only() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let port = rig.server.port();
+    let own = format!("127.0.0.1:{port}");
+    for (path, host, status) in [
+        ("/", own.as_str(), 200),
+        ("/app.js", &format!("localhost:{port}"), 200),
+        ("/Cargo.toml", &own, 404),
+        ("/../style.css", &own, 404),
+        ("/", "127.0.0.1", 403),
+        ("/", &format!("rebound.example:{port}"), 403),
+    ] {
+        let answer = ask(port, path, host, &[])?;
+        assert_eq!(answer.status, status, "{path} of {host}");
+        assert!(answer.headers.contains("content-security-policy: default-src 'self'; "), "{}", answer.headers);
+    }
+    Ok(())
+}
+
+#[test]
+fn a_foreign_page_cannot_open_the_socket() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let port = rig.server.port();
+    let (own, page) = (format!("localhost:{port}"), format!("http://localhost:{port}"));
+    let rebound = format!("rebound.example:{port}");
+    for (host, origin, status) in [
+        (own.as_str(), Some(page.as_str()), 101),
+        (&own, None, 403),
+        (&own, Some("null"), 403),
+        (&own, Some("http://foreign.example"), 403),
+        (&own, Some("http://localhost:1"), 403),
+        (&rebound, Some(&page), 403),
+        (&rebound, Some(&format!("http://{rebound}")), 403),
+    ] {
+        assert_eq!(ask_socket(port, host, origin)?.status, status, "{host} from {origin:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_message_is_sent_when_the_last_was_taken() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let mut page = RawPage::open(rig.server.port())?;
+    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"scene","layout":1,"#)));
+    assert!(page.is_silent_for(Duration::from_millis(400))?, "the scene was not taken");
+    page.take()?;
+    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"status","#)));
+    rig.publish(1);
+    assert!(page.is_silent_for(Duration::from_millis(400))?, "the status was not taken");
+    assert_eq!(page.next_sequence()?, 1);
+    Ok(())
+}
+
+#[test]
+fn pages_get_the_newest_frame_however_long_they_slept() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let mut sleeper = RawPage::open(rig.server.port())?;
+    let mut awake = RawPage::open(rig.server.port())?;
+    rig.publish(0);
+    assert_eq!((sleeper.next_sequence()?, awake.next_sequence()?), (0, 0));
+    for sequence in 1..=20 {
+        rig.publish(sequence);
+        assert_eq!(u64::from(awake.next_sequence()?), sequence);
+    }
+    assert_eq!(sleeper.next_sequence()?, 20);
+    Ok(())
+}
+
+#[test]
+fn updates_come_at_the_pace_of_a_screen() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let mut page = RawPage::open(rig.server.port())?;
+    let begin = Instant::now();
+    let mut updates = 0_u32;
+    while begin.elapsed() < Duration::from_millis(600) {
+        rig.publish(u64::from(updates));
+        page.next_sequence()?;
+        updates += 1;
+    }
+    // 15 ms at least between two, however fast the page takes them.
+    let most = begin.elapsed().as_millis() / 15 + 2;
+    assert!(u128::from(updates) <= most && updates >= 5, "{updates} updates, {most} allowed");
+    Ok(())
+}
+
+#[test]
+fn nonsense_closes_its_page_and_no_other() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let mut other = RawPage::open(rig.server.port())?;
+    let long = format!("\"{}\"", "a".repeat(5000));
+    for text in ["", "taken", "{", r#""flash""#, r#"{"press":{"x_m":0}}"#, r#"{"press":{"x_m":0,"y_m":0}}"#, &long] {
+        let mut page = RawPage::open(rig.server.port())?;
+        page.say(text)?;
+        ensure!(matches!(page.hear()?, Heard::Text(_)), "the scene comes first");
+        // A message that is too long ends the stream at once; others are answered with a reason.
+        match page.hear() {
+            Ok(Heard::Close(reason)) => assert!(!reason.is_empty(), "{text}"),
+            Ok(heard) => anyhow::bail!("{text} is answered with {heard:?}"),
+            Err(_) => assert_eq!(text, long),
+        }
+    }
+    rig.publish(3);
+    assert_eq!(other.next_sequence()?, 3);
+    assert!(rig.requests.try_recv().is_err(), "nothing of this reaches the board");
+    Ok(())
+}
+
+#[test]
+fn a_page_presses_on_the_detector_and_lets_go_when_it_leaves() -> Result<()> {
+    let rig = Rig::start(Some(FINGER))?;
+    let mut page = RawPage::open(rig.server.port())?;
+    page.say(r#"{"press":{"x_m":0.031,"y_m":0}}"#)?;
+    page.say(r#"{"press":{"x_m":0.01,"y_m":-0.02}}"#)?;
+    let contact = Contact { x_m: 0.01, y_m: -0.02, radius_m: 0.003, conductance_s: 1e-4 };
+    assert_eq!(rig.request()?, Request::Press(contact), "0.031 m is off the detector");
+    page.say("\"rezero\"")?;
+    assert_eq!(rig.request()?, Request::Rezero);
+    drop(page);
+    assert_eq!(rig.request()?, Request::Release);
+    Ok(())
+}
+
+#[test]
+fn a_busy_port_is_named_and_the_default_gives_way() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let start = |port| {
+        let (_, receiver) = watch::channel(Arc::default());
+        Server::start(port, scene(None)?, receiver, sync_channel(1).0).map_err(anyhow::Error::from)
+    };
+    let error = start(Some(rig.server.port())).err().context("a busy port")?;
+    assert!(matches!(error.downcast_ref(), Some(ServerError::Busy { port }) if *port == rig.server.port()));
+    let (first, second) = (start(None)?, start(None)?);
+    assert_ne!(first.port(), second.port());
+    Ok(())
+}
+
+#[test]
+fn a_stopped_server_is_gone() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let port = rig.server.port();
+    let mut page = RawPage::open(port)?;
+    drop(rig.server);
+    page.hear().context("the scene was sent before")?;
+    assert!(page.hear().is_err());
+    assert!(ask(port, "/", "localhost", &[]).is_err());
+    Ok(())
+}
