@@ -1,9 +1,11 @@
 //! The detector of the simulated board: a scene that moves by itself, the physics that answers to it, and its measurement.
 
+mod noise;
 mod scene;
 
 use crate::readings::Readings;
 
+pub use noise::Noise;
 pub use scene::Scene;
 
 /// What the simulated board measures.

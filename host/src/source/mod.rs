@@ -3,6 +3,7 @@
 pub mod discover;
 pub mod replay;
 pub mod serial;
+pub mod simulated;
 
 use std::io;
 use std::path::PathBuf;

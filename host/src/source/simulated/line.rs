@@ -1,0 +1,209 @@
+//! The line between the simulated board and the host: two bounded queues of bytes.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use tactomo_firmware::Serial;
+
+use super::circuit::Circuit;
+
+/// Bytes that wait for the host: as many as the kernel keeps for a serial port that nobody reads.
+const UP_BYTES: usize = 64 * 1024;
+/// Bytes that wait for the board.
+const DOWN_BYTES: usize = 4 * 1024;
+/// Bytes in the FIFO of the board's UART.
+const FIFO_BYTES: f64 = 128.0;
+/// Bits that a UART sends for a byte: start, eight, stop.
+const BITS_A_BYTE: f64 = 10.0;
+
+/// Both directions.
+#[derive(Debug)]
+pub(super) struct Line {
+    /// Board to host.
+    pub(super) up: Queue,
+    /// Host to board.
+    pub(super) down: Queue,
+}
+
+impl Default for Line {
+    fn default() -> Self {
+        Self { up: Queue::new(UP_BYTES), down: Queue::new(DOWN_BYTES) }
+    }
+}
+
+impl Line {
+    pub(super) fn is_open(&self) -> bool {
+        self.down.lock().open
+    }
+
+    pub(super) fn close(&self) {
+        self.up.close();
+        self.down.close();
+    }
+}
+
+/// Closes the line at the end of the scope, however it ends.
+pub(super) struct CloseOnDrop<'a>(pub(super) &'a Line);
+
+impl Drop for CloseOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.close();
+    }
+}
+
+/// A bounded queue of bytes between two threads.
+#[derive(Debug)]
+pub(super) struct Queue {
+    state: Mutex<State>,
+    changed: Condvar,
+    capacity: usize,
+}
+
+#[derive(Debug)]
+struct State {
+    bytes: VecDeque<u8>,
+    open: bool,
+}
+
+impl Queue {
+    fn new(capacity: usize) -> Self {
+        let state = State { bytes: VecDeque::with_capacity(capacity), open: true };
+        Self { state: Mutex::new(state), changed: Condvar::new(), capacity }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn close(&self) {
+        self.lock().open = false;
+        self.changed.notify_all();
+    }
+
+    /// Takes as many of `bytes` as there is room for; returns how many.
+    fn put(&self, bytes: &[u8]) -> usize {
+        let mut state = self.lock();
+        let count = bytes.len().min(self.capacity - state.bytes.len());
+        state.bytes.extend(&bytes[..count]);
+        drop(state);
+        if count > 0 {
+            self.changed.notify_all();
+        }
+        count
+    }
+
+    /// Puts all of `bytes`, waiting for room.
+    ///
+    /// # Errors
+    /// If the other end is gone, or there was no room in time.
+    pub(super) fn put_all_within(&self, mut bytes: &[u8], bound: Duration) -> io::Result<()> {
+        let end = Instant::now() + bound;
+        while !bytes.is_empty() {
+            if !self.lock().open {
+                return Err(gone());
+            }
+            bytes = &bytes[self.put(bytes)..];
+            let left = end.saturating_duration_since(Instant::now());
+            if !bytes.is_empty() && left.is_zero() {
+                return Err(io::Error::new(io::ErrorKind::TimedOut, "the simulated board does not take its commands"));
+            }
+            if !bytes.is_empty() {
+                self.wait_until(left, |state| state.bytes.len() < self.capacity);
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves what is there into `buffer`; returns how many bytes.
+    fn take(&self, buffer: &mut [u8]) -> usize {
+        let mut state = self.lock();
+        let count = buffer.len().min(state.bytes.len());
+        buffer.iter_mut().zip(state.bytes.drain(..count)).for_each(|(to, byte)| *to = byte);
+        drop(state);
+        if count > 0 {
+            self.changed.notify_all();
+        }
+        count
+    }
+
+    /// As [`take`](Self::take), but waits for a first byte.
+    ///
+    /// # Errors
+    /// If nothing is left and the other end is gone.
+    pub(super) fn take_within(&self, buffer: &mut [u8], bound: Duration) -> io::Result<usize> {
+        self.wait(bound);
+        match self.take(buffer) {
+            0 if !self.lock().open => Err(gone()),
+            count => Ok(count),
+        }
+    }
+
+    /// Waits at most `bound` for a byte.
+    pub(super) fn wait(&self, bound: Duration) {
+        self.wait_until(bound, |state| !state.bytes.is_empty());
+    }
+
+    fn wait_until(&self, bound: Duration, ready: impl Fn(&State) -> bool) {
+        let waiting = |state: &mut State| state.open && !ready(state);
+        drop(self.changed.wait_timeout_while(self.lock(), bound, waiting));
+    }
+}
+
+fn gone() -> io::Error {
+    io::Error::new(io::ErrorKind::BrokenPipe, "the simulated board has stopped")
+}
+
+/// The board's end, as the firmware sees it.
+#[derive(Debug)]
+pub(super) struct BoardEnd {
+    line: Arc<Line>,
+    uart: Option<Uart>,
+}
+
+impl BoardEnd {
+    pub(super) fn new(line: &Arc<Line>, circuit: &Arc<Circuit>, baud: Option<u32>) -> Self {
+        Self { line: Arc::clone(line), uart: baud.map(|baud| Uart::new(circuit, baud)) }
+    }
+}
+
+impl Serial for BoardEnd {
+    fn push(&mut self, bytes: &[u8]) -> usize {
+        let room = self.uart.as_mut().map_or(bytes.len(), Uart::room);
+        let count = self.line.up.put(&bytes[..bytes.len().min(room)]);
+        if let Some(uart) = &mut self.uart {
+            uart.held += count as f64;
+        }
+        count
+    }
+
+    fn pull(&mut self, buffer: &mut [u8]) -> usize {
+        self.line.down.take(buffer)
+    }
+}
+
+/// The FIFO of a UART that empties at a baud rate. A byte reaches the host when the FIFO takes it: up to 128 byte times early.
+#[derive(Debug)]
+struct Uart {
+    circuit: Arc<Circuit>,
+    bytes_per_s: f64,
+    held: f64,
+    at: Duration,
+}
+
+impl Uart {
+    fn new(circuit: &Arc<Circuit>, baud: u32) -> Self {
+        let bytes_per_s = f64::from(baud) / BITS_A_BYTE;
+        Self { circuit: Arc::clone(circuit), bytes_per_s, held: 0.0, at: Duration::ZERO }
+    }
+
+    /// Bytes that the FIFO has room for now.
+    fn room(&mut self) -> usize {
+        let now = self.circuit.now();
+        let sent = (now - self.at).as_secs_f64() * self.bytes_per_s;
+        self.at = now;
+        self.held = (self.held - sent).max(0.0);
+        (FIFO_BYTES - self.held) as usize
+    }
+}
