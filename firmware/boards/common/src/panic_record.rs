@@ -1,0 +1,101 @@
+//! Where a panic leaves its message for the next boot: memory that a reset does not clear.
+
+use core::fmt::{self, Write};
+
+use heapless::String;
+
+/// Longest message kept, in bytes: what a fault packet can carry.
+const MAX_TEXT: usize = 96;
+/// Marks a record that was written whole.
+const MAGIC: [u8; 4] = *b"PNC1";
+
+/// Bytes of a record: a mark, the sum of the rest, the length of the text, the text.
+pub const RECORD_BYTES: usize = 4 + 1 + 1 + MAX_TEXT;
+
+/// A view of the memory that outlives a reset. After power-on it holds anything.
+pub struct PanicRecord<'a>(pub &'a mut [u8; RECORD_BYTES]);
+
+impl PanicRecord<'_> {
+    /// Writes down where and why, cut at the longest message.
+    pub fn store(&mut self, panic: &core::panic::PanicInfo) {
+        let mut text = Cut::default();
+        if let Some(place) = panic.location() {
+            // Cannot fail: `Cut` takes any text.
+            let _ = write!(text, "{}:{}: ", place.file(), place.line());
+        }
+        let _ = write!(text, "{}", panic.message());
+        self.store_text(&text.0);
+    }
+
+    fn store_text(&mut self, text: &String<MAX_TEXT>) {
+        let (head, rest) = self.0.split_at_mut(6);
+        rest[..text.len()].copy_from_slice(text.as_bytes());
+        head.copy_from_slice(&[MAGIC[0], MAGIC[1], MAGIC[2], MAGIC[3], sum(text.as_bytes()), text.len() as u8]);
+    }
+
+    /// Takes the message of the last panic, if there was one since the last call.
+    pub fn take(&mut self) -> Option<String<MAX_TEXT>> {
+        let text = self.text();
+        self.0[..MAGIC.len()].fill(0);
+        text
+    }
+
+    fn text(&self) -> Option<String<MAX_TEXT>> {
+        let (magic, rest) = self.0.split_first_chunk::<4>()?;
+        let [check, length, text @ ..] = rest else { return None };
+        let text = text.get(..usize::from(*length))?;
+        if *magic != MAGIC || sum(text) != *check {
+            return None;
+        }
+        String::try_from(core::str::from_utf8(text).ok()?).ok()
+    }
+}
+
+/// A checksum that notices memory that decayed while the power was off.
+fn sum(text: &[u8]) -> u8 {
+    text.iter().fold(0, |sum: u8, byte| sum.rotate_left(1) ^ byte)
+}
+
+/// Text that keeps what fits and forgets the rest.
+#[derive(Default)]
+struct Cut(String<MAX_TEXT>);
+
+impl Write for Cut {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for character in text.chars() {
+            if self.0.push(character).is_err() {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_taken_once() {
+        let mut memory = [0xA5; RECORD_BYTES];
+        let mut record = PanicRecord(&mut memory);
+        assert_eq!(record.take(), None);
+        let mut text = Cut::default();
+        let long = "x".repeat(MAX_TEXT + 10);
+        assert_eq!(write!(text, "main.rs:7: {long}"), Ok(()));
+        record.store_text(&text.0);
+        assert_eq!(record.take().as_deref(), Some(&*format!("main.rs:7: {}", &long[..MAX_TEXT - 11])));
+        assert_eq!(record.take(), None);
+    }
+
+    #[test]
+    fn decayed_memory_is_no_message() {
+        let mut memory = [0; RECORD_BYTES];
+        PanicRecord(&mut memory).store_text(&Cut(String::try_from("main.rs:7").unwrap_or_default()).0);
+        memory[9] ^= 4;
+        assert_eq!(PanicRecord(&mut memory).take(), None);
+    }
+
+    extern crate std;
+    use std::format;
+}

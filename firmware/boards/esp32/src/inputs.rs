@@ -1,0 +1,104 @@
+//! Which pin reads which electrode.
+//!
+//! esp-hal does not tie a pin to the ADC unit that it is wired to: the wrong unit compiles and reads another pin. So the
+//! table below is the one place that says it, and it is checked against the chip's own map when it compiles.
+
+use esp_hal::analog::adc::{AdcCalLine, AdcConfig, AdcPin};
+use esp_hal::peripherals::{
+    ADC1, ADC2, GPIO0, GPIO2, GPIO4, GPIO12, GPIO13, GPIO14, GPIO15, GPIO25, GPIO26, GPIO27, GPIO32, GPIO33, GPIO34,
+    GPIO35, GPIO36, GPIO39,
+};
+use tactomo_board_espressif::analog::{ATTENUATION, AnalogUnit, ceiling_mv, millivolts};
+use tactomo_firmware::{Adc, Sampler, TimedOut};
+
+/// Electrodes of the board.
+pub const ELECTRODES: u8 = 16;
+/// GPIO of each channel of ADC1 (37 and 38 are not on the module), from the chip's data sheet.
+const ADC1_GPIO: [u8; 8] = [36, 37, 38, 39, 32, 33, 34, 35];
+/// GPIO of each channel of ADC2.
+const ADC2_GPIO: [u8; 10] = [4, 0, 2, 15, 13, 12, 14, 27, 25, 26];
+
+macro_rules! inputs {
+    (ADC1: $($electrode1:literal $pin1:ident $gpio1:ident),*; ADC2: $($electrode2:literal $pin2:ident $gpio2:ident),*;) => {
+        /// The pins that the inputs take.
+        #[allow(missing_docs, reason = "the fields are called like the pins")]
+        pub struct InputPins<'d> {
+            $(pub $pin1: $gpio1<'d>,)*
+            $(pub $pin2: $gpio2<'d>,)*
+        }
+
+        /// The two ADCs and the sixteen calibrated inputs.
+        pub struct Inputs<'d> {
+            adc1: AnalogUnit<'d, ADC1<'d>>,
+            adc2: AnalogUnit<'d, ADC2<'d>>,
+            $($pin1: AdcPin<$gpio1<'d>, ADC1<'d>, AdcCalLine<ADC1<'d>>>,)*
+            $($pin2: AdcPin<$gpio2<'d>, ADC2<'d>, AdcCalLine<ADC2<'d>>>,)*
+        }
+
+        impl<'d> Inputs<'d> {
+            /// Takes the ADCs and the pins, and reads the calibration from the chip's fuses.
+            pub fn new(adc1: ADC1<'d>, adc2: ADC2<'d>, pins: InputPins<'d>) -> Self {
+                let (mut config1, mut config2) = (AdcConfig::new(), AdcConfig::new());
+                $(let $pin1 = config1.enable_pin_with_cal(pins.$pin1, ATTENUATION);)*
+                $(let $pin2 = config2.enable_pin_with_cal(pins.$pin2, ATTENUATION);)*
+                let (adc1, adc2) = (AnalogUnit::new(adc1, config1), AnalogUnit::new(adc2, config2));
+                Self { adc1, adc2, $($pin1,)* $($pin2,)* }
+            }
+        }
+
+        impl Sampler for Inputs<'_> {
+            fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
+                match electrode {
+                    $($electrode1 => self.adc1.convert(&mut self.$pin1),)*
+                    $($electrode2 => self.adc2.convert(&mut self.$pin2),)*
+                    _ => Err(TimedOut),
+                }
+            }
+        }
+
+        const _: () = {
+            $(assert!(has(&ADC1_GPIO, stringify!($gpio1)), "this pin is not an input of ADC1");)*
+            $(assert!(has(&ADC2_GPIO, stringify!($gpio2)), "this pin is not an input of ADC2");)*
+            let electrodes = [$($electrode1,)* $($electrode2,)*];
+            let mut next = 0;
+            while next < electrodes.len() {
+                assert!(electrodes[next] == next, "the electrodes are not in order");
+                next += 1;
+            }
+            assert!(electrodes.len() == ELECTRODES as usize);
+        };
+    };
+}
+
+// Electrode and pin, in the order of the ADCs' channels.
+inputs! {
+    ADC1: 0 gpio36 GPIO36, 1 gpio39 GPIO39, 2 gpio32 GPIO32, 3 gpio33 GPIO33, 4 gpio34 GPIO34, 5 gpio35 GPIO35;
+    ADC2: 6 gpio4 GPIO4, 7 gpio0 GPIO0, 8 gpio2 GPIO2, 9 gpio15 GPIO15, 10 gpio13 GPIO13, 11 gpio12 GPIO12,
+        12 gpio14 GPIO14, 13 gpio27 GPIO27, 14 gpio25 GPIO25, 15 gpio26 GPIO26;
+}
+
+/// What the readings mean: the lower end of the two ADCs' scales counts.
+pub fn adc() -> Adc {
+    let (ceiling1, ceiling2) = (ceiling_mv::<_, AdcCalLine<ADC1>>(), ceiling_mv::<_, AdcCalLine<ADC2>>());
+    millivolts(ceiling1.min(ceiling2))
+}
+
+/// Whether an ADC with these GPIOs has the pin called `name`, such as `GPIO36`.
+const fn has(gpios: &[u8], name: &str) -> bool {
+    let mut digits = name.as_bytes();
+    let mut number = 0;
+    while let [first, rest @ ..] = digits {
+        if first.is_ascii_digit() {
+            number = number * 10 + (*first - b'0');
+        }
+        digits = rest;
+    }
+    let mut next = 0;
+    while next < gpios.len() {
+        if gpios[next] == number {
+            return true;
+        }
+        next += 1;
+    }
+    false
+}

@@ -1,0 +1,49 @@
+//! Firmware of the ESP32-C3 board: one ADC input behind half B of the multiplexer, the chip's own USB port.
+//!
+//! The wiring is in `docs/hardware.md`.
+#![no_std]
+#![no_main]
+
+mod input;
+mod line;
+
+use esp_hal::clock::CpuClock;
+use esp_hal::gpio::{Level, Output, OutputConfig, OutputPin};
+use esp_hal::timer::timg::TimerGroup;
+use tactomo_board_espressif::{EspChip, boot_fault};
+use tactomo_firmware::mux::{LatchLines, Latched};
+use tactomo_firmware::{Board16, Identity, Parts};
+
+use crate::input::Input;
+use crate::line::UsbLine;
+
+esp_bootloader_esp_idf::esp_app_desc!();
+
+#[esp_hal::main]
+fn main() -> ! {
+    let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
+    let address = [output(chip.GPIO4), output(chip.GPIO5), output(chip.GPIO6), output(chip.GPIO7)];
+    let latches = LatchLines { wr: output(chip.GPIO10), csa: output(chip.GPIO1), csb: output(chip.GPIO3) };
+    let Ok(mux) = Latched::new(address, latches);
+    let parts = Parts {
+        mux,
+        sampler: Input::new(chip.ADC1, chip.GPIO0),
+        serial: UsbLine::new(chip.USB_DEVICE),
+        chip: EspChip::new(TimerGroup::new(chip.TIMG0)),
+    };
+    let adc = input::adc();
+    let identity =
+        Identity { firmware_version: env!("CARGO_PKG_VERSION"), board: "esp32c3", electrodes: 16, adc, drive_mv: 2000 };
+    let mut board = match Board16::new(parts, identity) {
+        Ok(board) => board,
+        Err(_) => panic!("the board's identity does not fit the protocol"),
+    };
+    defmt::info!("the ADC's scale ends at {=u16} mV", adc.saturated_from);
+    boot_fault().into_iter().for_each(|fault| board.report(fault));
+    match board.run() {}
+}
+
+/// An output that is high at first, so that the latches stay closed.
+fn output<'d>(pin: impl OutputPin + 'd) -> Output<'d> {
+    Output::new(pin, Level::High, OutputConfig::default())
+}

@@ -1,0 +1,85 @@
+//! The pins and the ADC of the emulated board: address lines kept in memory, readings from the table.
+
+use core::cell::Cell;
+use core::convert::Infallible;
+
+use embedded_hal::digital::{ErrorType, OutputPin};
+use tactomo_firmware::{Sampler, TimedOut};
+
+use crate::gauge::Gauge;
+use crate::table::{ELECTRODES, FRAMES, reading};
+
+type Readings = [[u16; ELECTRODES]; ELECTRODES];
+
+/// The readings of each frame, in memory.
+static TABLE: [Readings; FRAMES] = table();
+
+const fn table() -> [Readings; FRAMES] {
+    let mut table = [[[0; ELECTRODES]; ELECTRODES]; FRAMES];
+    let mut place = 0;
+    while place < FRAMES * ELECTRODES * ELECTRODES {
+        let (frame, ground, electrode) =
+            (place / (ELECTRODES * ELECTRODES), place / ELECTRODES % ELECTRODES, place % ELECTRODES);
+        table[frame][ground][electrode] = reading(frame, ground, electrode);
+        place += 1;
+    }
+    table
+}
+
+/// One of the multiplexer's address lines, a bit of their levels.
+pub struct AddressLine<'a> {
+    levels: &'a Cell<u8>,
+    bit: u8,
+}
+
+/// The four address lines A0 to A3, whose levels are kept in `levels`.
+pub fn address_lines(levels: &Cell<u8>) -> [AddressLine<'_>; 4] {
+    [0, 1, 2, 3].map(|line| AddressLine { levels, bit: 1 << line })
+}
+
+impl ErrorType for AddressLine<'_> {
+    type Error = Infallible;
+}
+
+impl OutputPin for AddressLine<'_> {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.levels.set(self.levels.get() & !self.bit);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.levels.set(self.levels.get() | self.bit);
+        Ok(())
+    }
+}
+
+/// Reads the table under the ground that the address lines tell; goes to its next frame when they come back to 0.
+pub struct TableSampler<'a> {
+    levels: &'a Cell<u8>,
+    gauge: &'a Gauge,
+    frame: usize,
+    ground: usize,
+}
+
+impl<'a> TableSampler<'a> {
+    /// A sampler that begins with the first frame.
+    pub fn new(levels: &'a Cell<u8>, gauge: &'a Gauge) -> Self {
+        Self { levels, gauge, frame: FRAMES - 1, ground: ELECTRODES - 1 }
+    }
+
+    fn read(&mut self, electrode: usize) -> Option<u16> {
+        let before = self.ground;
+        self.ground = usize::from(self.levels.get());
+        if self.ground == 0 && before != 0 {
+            self.frame = (self.frame + 1) % FRAMES;
+        }
+        TABLE[self.frame].get(self.ground)?.get(electrode).copied()
+    }
+}
+
+impl Sampler for TableSampler<'_> {
+    fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
+        let gauge = self.gauge;
+        gauge.leave_out(|| self.read(usize::from(electrode))).ok_or(TimedOut)
+    }
+}

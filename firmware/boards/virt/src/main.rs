@@ -1,0 +1,186 @@
+//! Firmware of the emulated board: QEMU's riscv32 `virt` machine with a table of frames for an ADC.
+//!
+//! Everything else is what a chip runs: the firmware library, the wire, the log, the panic record.
+#![no_std]
+#![no_main]
+
+mod detector;
+mod gauge;
+mod machine;
+mod table;
+mod uart;
+
+use core::cell::Cell;
+use core::panic::PanicInfo;
+
+use embedded_hal::delay::DelayNs;
+use tactomo_firmware::mux::Transparent;
+use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Parts, Serial, log};
+use tactomo_protocol::{Command, Fault, MAX_COMMAND, encode_command};
+
+use crate::detector::{AddressLine, TableSampler, address_lines};
+use crate::gauge::Gauge;
+use crate::machine::Request;
+use crate::uart::Uart;
+
+const IDENTITY: Identity = Identity {
+    firmware_version: env!("CARGO_PKG_VERSION"),
+    board: "virt",
+    electrodes: table::ELECTRODES as u8,
+    adc: Adc::new(table::ADC_BITS, 3300),
+    drive_mv: 2000,
+};
+
+/// Frames that a measurement leaves out at first, and then counts: the table several times over.
+const MEASURED_FRAMES: u64 = 8 * table::FRAMES as u64;
+
+type VirtBoard<'a> = Board16<Transparent<AddressLine<'a>>, TableSampler<'a>, Line, VirtChip<'a>>;
+
+defmt::timestamp!("{=u64:us}", machine::now_us());
+
+#[allow(missing_docs, reason = "the macro makes a public symbol of it")]
+#[riscv_rt::entry]
+fn main() -> ! {
+    gauge::paint_stack();
+    let request = Request::read();
+    let (levels, gauge) = (Cell::new(0), Gauge::default());
+    let parts = Parts {
+        mux: Transparent::new(address_lines(&levels)),
+        sampler: TableSampler::new(&levels, &gauge),
+        serial: Line::new(request),
+        chip: VirtChip(&gauge),
+    };
+    let mut board = match VirtBoard::new(parts, IDENTITY) {
+        Ok(board) => board,
+        Err(_) => panic!("the board's identity does not fit"),
+    };
+    match request {
+        Request::Measure => measure(board, &gauge),
+        _ => serve(&mut board, request),
+    }
+}
+
+/// Serves the host, as a chip would.
+fn serve(board: &mut VirtBoard, request: Request) -> ! {
+    let last_panic = machine::panic_record().take();
+    let panics = request == Request::Panic && last_panic.is_none();
+    if let Some(text) = last_panic {
+        board.report(Fault::Panic(text));
+    }
+    let mut streamed = false;
+    loop {
+        let Ok(activity) = board.step();
+        match activity {
+            Activity::Frame if panics => panic!("as it was asked to"),
+            Activity::Frame if !streamed => {
+                defmt::info!("the first of {=usize} frames is out", table::FRAMES);
+                streamed = true;
+            }
+            Activity::Idle if streamed && request == Request::ExitOnStop => machine::exit(),
+            _ => {}
+        }
+    }
+}
+
+/// Prints what a frame costs, and leaves.
+fn measure(mut board: VirtBoard, gauge: &Gauge) -> ! {
+    while board.step() != Ok(Activity::Frame) {}
+    let start = gauge.count();
+    let mut frames = 0;
+    while frames < MEASURED_FRAMES {
+        frames += u64::from(board.step() == Ok(Activity::Frame));
+    }
+    let instructions = (gauge.count() - start) / frames;
+    Report(Uart::new()).line(&[
+        ("instructions a frame outside conversions", instructions),
+        ("stack bytes", gauge::stack_used_bytes() as u64),
+        ("board bytes", size_of_val(&board) as u64),
+    ]);
+    machine::exit()
+}
+
+/// The line to the host: the UART, after what a measurement says in the host's place.
+struct Line {
+    uart: Uart,
+    command: [u8; MAX_COMMAND],
+    command_length: usize,
+}
+
+impl Line {
+    fn new(request: Request) -> Self {
+        let mut command = [0; MAX_COMMAND];
+        if request != Request::Measure {
+            return Self { uart: Uart::new(), command, command_length: 0 };
+        }
+        static mut NOWHERE: [u8; 8] = [0; 8];
+        let nowhere = &raw mut NOWHERE;
+        // SAFETY: taken once, here.
+        let uart = Uart::nowhere(unsafe { &mut *nowhere });
+        let command_length = encode_command(&Command::Start, &mut command).unwrap_or(0);
+        Self { uart, command, command_length }
+    }
+}
+
+impl Serial for Line {
+    fn push(&mut self, bytes: &[u8]) -> usize {
+        self.uart.push(bytes)
+    }
+
+    fn pull(&mut self, buffer: &mut [u8]) -> usize {
+        let length = core::mem::take(&mut self.command_length);
+        if let Some(buffer) = buffer.get_mut(..length).filter(|buffer| !buffer.is_empty()) {
+            buffer.copy_from_slice(&self.command[..length]);
+            return length;
+        }
+        self.uart.pull(buffer)
+    }
+}
+
+/// Writes text to the UART, for a person.
+struct Report(Uart);
+
+impl Report {
+    fn line(&mut self, figures: &[(&str, u64)]) {
+        for (name, value) in figures {
+            // Cannot fail: the UART takes any text.
+            let _ = core::fmt::write(self, format_args!("{name}: {value}\n"));
+        }
+    }
+}
+
+impl core::fmt::Write for Report {
+    fn write_str(&mut self, text: &str) -> core::fmt::Result {
+        let mut rest = text.as_bytes();
+        while !rest.is_empty() {
+            rest = &rest[self.0.push(rest)..];
+        }
+        Ok(())
+    }
+}
+
+/// Clock, delay and log; the machine has no watchdog.
+struct VirtChip<'a>(&'a Gauge);
+
+impl DelayNs for VirtChip<'_> {
+    fn delay_ns(&mut self, ns: u32) {
+        self.0.leave_out(|| machine::wait_ns(ns));
+    }
+}
+
+impl Chip for VirtChip<'_> {
+    fn now_us(&mut self) -> u64 {
+        machine::now_us()
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    fn pull_log(&mut self, buffer: &mut [u8]) -> usize {
+        log::pull(buffer)
+    }
+}
+
+#[panic_handler]
+fn panic(panic: &PanicInfo) -> ! {
+    machine::panic_record().store(panic);
+    machine::reset()
+}

@@ -1,0 +1,127 @@
+//! The firmware on an emulated microcontroller: its UART, its frames, its log, its faults, what a frame costs.
+
+mod host;
+mod qemu;
+#[path = "../../../firmware/boards/virt/src/table.rs"]
+mod table;
+
+use std::sync::OnceLock;
+
+use anyhow::{Context, Result, ensure};
+use tactomo_protocol::{BoardMessage, Command, Fault, Frame, Settings, Status};
+
+use crate::host::Host;
+use crate::qemu::{Qemu, Request};
+
+/// The table several times over.
+const FRAMES: usize = 4 * table::FRAMES;
+
+/// Builds the board once; `None` if the tools are missing and that is allowed.
+fn elf() -> Result<Option<&'static std::path::Path>> {
+    static ELF: OnceLock<std::result::Result<std::path::PathBuf, String>> = OnceLock::new();
+    if !qemu::available()? {
+        return Ok(None);
+    }
+    let built = ELF.get_or_init(|| qemu::build().map_err(|error| format!("{error:#}")));
+    Ok(Some(built.as_ref().map_err(|error| anyhow::anyhow!("{error}"))?))
+}
+
+/// The frame of the table that `readings` is, at `fraction_bits` below a code.
+fn place_in_table(frame: &Frame) -> Option<usize> {
+    (0..table::FRAMES).find(|place| frame.readings.as_slice() == expected(*place, frame.head.fraction_bits))
+}
+
+fn expected(place: usize, fraction_bits: u8) -> Vec<u16> {
+    let cells = (0..table::ELECTRODES).flat_map(|ground| (0..table::ELECTRODES).map(move |e| (ground, e)));
+    cells.map(|(ground, electrode)| table::reading(place, ground, electrode) << fraction_bits).collect()
+}
+
+/// Checks that the frames follow each other in the table and in number, and that their status is right.
+fn check(frames: &[Frame]) -> Result<()> {
+    let first = place_in_table(&frames[0]).context("the first frame is none of the table's")?;
+    for (count, frame) in frames.iter().enumerate() {
+        let place = (first + count) % table::FRAMES;
+        let saturated = expected(place, 0).contains(&table::FULL_SCALE);
+        ensure!(frame.readings.as_slice() == expected(place, frame.head.fraction_bits), "frame {count} differs");
+        ensure!(
+            frame.head.sequence == frames[0].head.sequence.wrapping_add(count as u16),
+            "frame {count} is out of order"
+        );
+        ensure!(frame.head.status.contains(Status::SATURATED) == saturated, "frame {count}: {:?}", frame.head.status);
+        ensure!(!frame.head.status.contains(Status::TIMED_OUT), "frame {count} timed out");
+    }
+    ensure!(frames.windows(2).all(|pair| pair[0].head.time_us < pair[1].head.time_us), "board time does not run on");
+    Ok(())
+}
+
+#[test]
+fn frames_arrive_bit_for_bit_and_the_log_with_them() -> Result<()> {
+    let Some(elf) = elf()? else { return Ok(()) };
+    let board = Qemu::start(elf, Request::ExitOnStop)?;
+    let mut host = Host::open(board.pty(), elf)?;
+    let hello = host.hello()?;
+    assert_eq!((hello.board.as_str(), hello.electrodes, hello.adc_bits), ("virt", 16, table::ADC_BITS));
+
+    // A cap that any machine keeps up with, so that no frame is dropped.
+    let settings = Settings { settle_us: 5, average_log2: 0, max_frames_per_s: 1000 };
+    host.send(&Command::Configure(settings))?;
+    host.send(&Command::Start)?;
+    check(&host.frames(FRAMES)?)?;
+
+    host.send(&Command::Configure(Settings { average_log2: 4, ..settings }))?;
+    let averaged = host.frames_where(table::FRAMES, |frame| frame.head.fraction_bits == 4)?;
+    check(&averaged)?;
+
+    assert_eq!(host.counters().corrupt, 0);
+    assert_eq!(host.log(), ["INFO the first of 14 frames is out"]);
+    host.send(&Command::Stop)?;
+    assert_eq!(board.exit_code()?, 0);
+    Ok(())
+}
+
+#[test]
+fn settings_out_of_range_are_refused() -> Result<()> {
+    let Some(elf) = elf()? else { return Ok(()) };
+    let board = Qemu::start(elf, Request::Run)?;
+    let mut host = Host::open(board.pty(), elf)?;
+    let before = host.hello()?.settings;
+    host.send(&Command::Configure(Settings { average_log2: 9, ..before }))?;
+    host.wait_for(|message| matches!(message, BoardMessage::Fault(Fault::BadSettings)).then_some(()))?;
+    assert_eq!(host.hello()?.settings, before);
+    Ok(())
+}
+
+#[test]
+fn a_panic_is_told_after_the_reset() -> Result<()> {
+    let Some(elf) = elf()? else { return Ok(()) };
+    let board = Qemu::start(elf, Request::Panic)?;
+    let mut host = Host::open(board.pty(), elf)?;
+    host.hello()?;
+    host.send(&Command::Start)?;
+    let text = host.wait_for(|message| match message {
+        BoardMessage::Fault(Fault::Panic(text)) => Some(text),
+        _ => None,
+    })?;
+    assert!(text.ends_with(": as it was asked to"), "{text}");
+    assert!(text.contains("main.rs:"), "{text}");
+    // The board lives on, and does not tell it for ever.
+    host.send(&Command::Start)?;
+    host.frames(1)?;
+    Ok(())
+}
+
+#[test]
+fn a_frame_costs_the_same_in_every_run() -> Result<()> {
+    let Some(elf) = elf()? else { return Ok(()) };
+    let figures = qemu::measure(elf)?;
+    print!("{figures}");
+    assert_eq!(figures, qemu::measure(elf)?);
+    let instructions: u64 = figures
+        .lines()
+        .find_map(|line| line.strip_prefix("instructions a frame outside conversions: "))
+        .context("no figure")?
+        .parse()?;
+    // Half a millisecond of a chip at 160 MHz, and not so few that nothing can have been sent.
+    assert!((20_000..100_000).contains(&instructions), "{instructions}");
+    Ok(())
+}
