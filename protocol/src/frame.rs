@@ -119,17 +119,27 @@ pub(crate) fn pack(readings: &[u16], width: u32, packed: &mut [u8]) {
 /// of the largest, the spare bits at the end are zero.
 pub(crate) fn unpack(packed: &[u8], width: u32, count: usize) -> Option<Vec<u16, MAX_READINGS>> {
     let mask = (1u32 << width) - 1;
-    let (mut bits, mut held) = (0u32, 0);
-    let mut bytes = packed.iter();
     let mut readings = Vec::new();
-    for _ in 0..count {
-        while held < width {
-            bits |= u32::from(*bytes.next()?) << held;
-            held += 8;
+    readings.resize_default(count.next_multiple_of(4)).ok()?;
+    // Four readings start at a whole byte or at half of one: eight bytes hold them at any width.
+    for (group, readings) in readings.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+        let mut bits = bits_from(packed, 4 * group * width as usize);
+        for reading in readings {
+            *reading = (bits as u32 & mask) as u16;
+            bits >>= width;
         }
-        readings.push((bits & mask) as u16).ok()?;
-        bits >>= width;
-        held -= width;
     }
-    (bits == 0 && self::width(&readings) == width).then_some(readings)
+    readings.truncate(count);
+    let spare = bits_from(packed, count * width as usize);
+    (spare == 0 && self::width(&readings) == width).then_some(readings)
+}
+
+/// The bits from number `bit` to the end of the eighth byte from there, zeros after the end of `bytes`.
+fn bits_from(bytes: &[u8], bit: usize) -> u64 {
+    let bytes = bytes.get(bit / 8..).unwrap_or_default();
+    let word = match bytes.first_chunk() {
+        Some(eight) => u64::from_le_bytes(*eight),
+        None => bytes.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte)),
+    };
+    word >> (bit % 8)
 }

@@ -56,23 +56,3 @@ type CrcTable = crc::Table<1>;
 type CrcTable = crc::Table<16>;
 
 static CRC: crc::Crc<u32, CrcTable> = crc::Crc::<u32, CrcTable>::new(&crc::CRC_32_ISO_HDLC);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_largest_frame_of_a_16_electrode_board_takes_400_bytes() {
-        let mut out = [0; MAX_WIRE];
-        let head = FrameHead { sequence: u16::MAX, time_us: u32::MAX, status: Status(255), fraction_bits: 0 };
-        let readings = [4095; 256];
-        let length = encode_frame(head, &readings, &mut out).unwrap();
-        assert!(length <= 400, "{length}");
-        let mut input = &out[..length];
-        let BoardMessage::Frame(frame) = BoardReceiver::default().receive(&mut input).unwrap().unwrap() else {
-            panic!()
-        };
-        assert_eq!(frame.head, head);
-        assert_eq!(frame.readings, readings);
-    }
-}

@@ -1,0 +1,133 @@
+//! A stream of good packets, disturbed as the fuzzer likes: what arrives whole is received, and nothing that was not sent.
+//!
+//! The input chooses the disturbances but not bytes in a row, so it cannot write a packet of its own, checksum and all.
+#![no_main]
+
+use std::sync::LazyLock;
+
+use libfuzzer_sys::fuzz_target;
+use tactomo_protocol::{
+    BoardMessage, BoardReceiver, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Log, MAX_WIRE, Settings,
+    encode_board, encode_command,
+};
+
+/// Packets in a stream at most.
+const PACKETS: usize = 8;
+
+enum Sent {
+    Board(BoardMessage),
+    Host(Command),
+}
+
+static PACKETS_SENT: LazyLock<Vec<(Sent, Vec<u8>)>> = LazyLock::new(|| {
+    let frame = |sequence, readings: &[u16]| {
+        let head = FrameHead { sequence, time_us: 7 * u32::from(sequence), ..FrameHead::default() };
+        BoardMessage::Frame(Frame { head, readings: readings.iter().copied().collect() })
+    };
+    let settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 0 };
+    let board = [
+        BoardMessage::Hello(Hello {
+            firmware_version: "0.1.0".try_into().expect("short"),
+            board: "esp32".try_into().expect("short"),
+            electrodes: 16,
+            adc_bits: 12,
+            adc_full_scale_mv: 3300,
+            drive_mv: 2000,
+            settings,
+        }),
+        frame(1, &std::array::from_fn::<u16, 16, _>(|i| i as u16)),
+        frame(0, &[0; 64]),
+        frame(2, &std::array::from_fn::<u16, 256, _>(|i| (i * i % 2000) as u16)),
+        frame(3, &[4095; 256]),
+        BoardMessage::Log(Log([0xFF, 0, 1, 0, 0].into_iter().collect())),
+        BoardMessage::Fault(Fault::AdcStuck),
+        BoardMessage::Fault(Fault::Reset("watchdog".try_into().expect("short"))),
+    ];
+    let host = [Command::Hello, Command::Start, Command::Stop, Command::Configure(settings)];
+    let mut out = [0; MAX_WIRE];
+    let mut sent = Vec::new();
+    for message in board {
+        let length = encode_board(&message, &mut out).expect("within the limits");
+        sent.push((Sent::Board(message), out[..length].to_vec()));
+    }
+    for command in host {
+        let length = encode_command(&command, &mut out).expect("within the limits");
+        sent.push((Sent::Host(command), out[..length].to_vec()));
+    }
+    sent
+});
+
+fuzz_target!(|input: &[u8]| {
+    let Some((choice, disturbances)) = input.split_first_chunk::<PACKETS>() else { return };
+    let mut stream: Vec<u8> = choice.iter().flat_map(|choice| packet(*choice)).copied().collect();
+    for disturbance in disturbances.as_chunks().0 {
+        disturb(&mut stream, *disturbance);
+    }
+    check_host(choice, &stream);
+    check_board(choice, &stream);
+});
+
+fn chosen(choice: u8) -> &'static (Sent, Vec<u8>) {
+    &PACKETS_SENT[usize::from(choice) % PACKETS_SENT.len()]
+}
+
+fn packet(choice: u8) -> &'static [u8] {
+    &chosen(choice).1
+}
+
+/// Flips bits, cuts, puts in noise, repeats a part, or joins late.
+fn disturb(stream: &mut Vec<u8>, [kind, low, high, a, b]: [u8; 5]) {
+    if stream.is_empty() {
+        return;
+    }
+    let at = usize::from(u16::from_le_bytes([low, high])) % stream.len();
+    let part = at..(at + usize::from(a)).min(stream.len());
+    match kind % 6 {
+        0 => stream[at] ^= a,
+        1 => drop(stream.drain(part)),
+        2 => drop(stream.splice(at..at, noise(b).take(usize::from(a)))),
+        3 => stream.extend_from_within(part),
+        4 => drop(stream.drain(..at)),
+        _ => stream.insert(at, 0),
+    }
+}
+
+/// Bytes by a linear congruential generator.
+fn noise(seed: u8) -> impl Iterator<Item = u8> {
+    let next = |state: &u32| Some(state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+    std::iter::successors(Some(u32::from(seed)), next).skip(1).map(|state| (state >> 24) as u8)
+}
+
+/// How many stretches of the stream are, byte for byte, a packet that `counts`.
+fn whole(stream: &[u8], counts: impl Fn(&Sent) -> bool) -> usize {
+    let closed = stream.iter().rposition(|byte| *byte == 0).map_or(0, |end| end + 1);
+    let packets: Vec<_> = PACKETS_SENT.iter().filter(|(sent, _)| counts(sent)).collect();
+    let is_whole = |stretch: &&[u8]| packets.iter().any(|(_, wire)| wire == stretch);
+    stream[..closed].split_inclusive(|byte| *byte == 0).filter(is_whole).count()
+}
+
+fn check_host(choice: &[u8], mut stream: &[u8]) {
+    let whole = whole(stream, |sent| matches!(sent, Sent::Board(_)));
+    let mut receiver = BoardReceiver::default();
+    let mut accepted = 0;
+    while let Some(result) = receiver.receive(&mut stream) {
+        let Ok(message) = result else { continue };
+        let sent = |choice: &u8| matches!(&chosen(*choice).0, Sent::Board(sent) if *sent == message);
+        assert!(choice.iter().any(sent), "never sent: {message:?}");
+        accepted += 1;
+    }
+    assert!(accepted >= whole, "{whole} packets arrived whole, {accepted} were received");
+}
+
+fn check_board(choice: &[u8], mut stream: &[u8]) {
+    let whole = whole(stream, |sent| matches!(sent, Sent::Host(_)));
+    let mut receiver = CommandReceiver::default();
+    let mut accepted = 0;
+    while let Some(result) = receiver.receive(&mut stream) {
+        let Ok(command) = result else { continue };
+        let sent = |choice: &u8| matches!(&chosen(*choice).0, Sent::Host(sent) if *sent == command);
+        assert!(choice.iter().any(sent), "never sent: {command:?}");
+        accepted += 1;
+    }
+    assert!(accepted >= whole, "{whole} packets arrived whole, {accepted} were received");
+}

@@ -1,0 +1,104 @@
+//! The examples in docs/protocol.md are what the crate sends and takes.
+//!
+//! Each is a block marked `wire`: who sends it and what a receiver makes of it, then the bytes in hexadecimal.
+
+use std::fmt::Debug;
+
+use heapless::Vec as Fixed;
+use tactomo_protocol::{BoardMessage, Command, DecodeError, Fault, Frame, FrameHead, Log, Settings, Status};
+
+use crate::common::{board_wire, command_wire, hello, packet, receive_board, receive_command};
+
+const PAGE: &str = include_str!("../../../docs/protocol.md");
+
+/// What a receiver makes of the bytes, and the bytes.
+type Example = (String, Vec<u8>);
+
+/// The examples of the page.
+fn examples() -> Vec<Example> {
+    let blocks = PAGE.split("```wire\n").skip(1);
+    blocks
+        .map(|block| {
+            let (told, rest) = block.split_once('\n').unwrap();
+            let (bytes, _) = rest.split_once("```").unwrap();
+            let bytes = bytes.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap());
+            (told.to_owned(), bytes.collect())
+        })
+        .collect()
+}
+
+fn frame(head: FrameHead, readings: &[u16]) -> BoardMessage {
+    BoardMessage::Frame(Frame { head, readings: Fixed::from_slice(readings).unwrap() })
+}
+
+/// One of every kind of message, and the edges of a frame's coding.
+fn board_messages() -> Vec<BoardMessage> {
+    let head = FrameHead { sequence: 513, time_us: 67_305_985, status: Status(0), fraction_bits: 0 };
+    let mut timed_out = FrameHead { sequence: 65535, fraction_bits: 4, ..head };
+    timed_out.status.insert(Status::SATURATED);
+    timed_out.status.insert(Status::TIMED_OUT);
+    vec![
+        BoardMessage::Hello(hello()),
+        frame(head, &[0, 1, 2, 3, 4, 0, 6, 7, 8, 9, 0, 11, 12, 13, 14, 0]),
+        frame(head, &std::array::from_fn::<u16, 25, _>(|i| if i % 6 == 0 { 0 } else { 150 * i as u16 })),
+        frame(timed_out, &[65535, 256, 0, 1, 255, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
+        frame(head, &[0; 16]),
+        BoardMessage::Log(Log(Fixed::from_slice(&[0xFF, 0x00, 0x12, 0x00]).unwrap())),
+        BoardMessage::Fault(Fault::Panic("src/main.rs:42".try_into().unwrap())),
+        BoardMessage::Fault(Fault::Reset("watchdog".try_into().unwrap())),
+        BoardMessage::Fault(Fault::AdcStuck),
+        BoardMessage::Fault(Fault::BadSettings),
+        BoardMessage::Fault(Fault::UnknownVersion(2)),
+    ]
+}
+
+fn commands() -> Vec<Command> {
+    let settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 100 };
+    vec![Command::Hello, Command::Start, Command::Stop, Command::Configure(settings)]
+}
+
+fn told<M: Debug>(result: &Result<M, DecodeError>) -> String {
+    match result {
+        Ok(message) => format!("{message:?}"),
+        Err(error) => format!("refused: {error}"),
+    }
+}
+
+/// The examples as the crate sends them, and two packets that it refuses.
+fn expected() -> Vec<Example> {
+    let boards = board_messages().into_iter().map(|message| (board_wire(&message), Ok(message)));
+    let refused = [
+        (packet(0x20, &[0xC0, 0xDE]), Err(DecodeError::Version(2))),
+        (board_wire(&BoardMessage::Fault(Fault::AdcStuck))[1..].to_vec(), Err(DecodeError::Corrupt)),
+    ];
+    let hosts = commands().into_iter().map(|command| (command_wire(&command), command));
+    let boards = boards.chain(refused).map(|(wire, result)| (format!("board: {}", told(&result)), wire));
+    boards.chain(hosts.map(|(wire, command)| (format!("host: {command:?}"), wire))).collect()
+}
+
+fn page_text(examples: &[Example]) -> String {
+    let line = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ");
+    let block = |(told, bytes): &Example| {
+        format!("```wire\n{told}\n{}\n```\n", bytes.chunks(32).map(line).collect::<Vec<_>>().join("\n"))
+    };
+    examples.iter().map(block).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn the_examples_are_what_is_sent() {
+    let expected = expected();
+    assert!(examples() == expected, "docs/protocol.md should have these examples:\n\n{}", page_text(&expected));
+}
+
+#[test]
+fn the_examples_are_what_is_taken() {
+    for (expected, wire) in examples() {
+        let taken = match expected.split_once(": ") {
+            Some(("board", _)) => {
+                receive_board(&[&wire]).0.iter().map(|result| format!("board: {}", told(result))).collect()
+            }
+            _ => receive_command(&wire).0.iter().map(|result| format!("host: {}", told(result))).collect::<Vec<_>>(),
+        };
+        assert_eq!(taken, [expected]);
+    }
+}
