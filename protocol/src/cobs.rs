@@ -83,4 +83,11 @@ mod tests {
             prop_assert_eq!(unstuff(&mut wire).map(|length| wire[..length].to_vec()), expected);
         }
     }
+
+    #[test]
+    fn an_empty_block_after_a_full_one_stands_for_nothing() {
+        let full = [&[255][..], &[7; MAX_RUN]].concat();
+        assert_eq!(unstuff(&mut full.clone()), Some(MAX_RUN));
+        assert_eq!(unstuff(&mut [&full[..], &[1]].concat()), Some(MAX_RUN));
+    }
 }

@@ -143,3 +143,17 @@ fn bits_from(bytes: &[u8], bit: usize) -> u64 {
     };
     word >> (bit % 8)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_length_fits_one_electrode_count_only() {
+        for width in 1..=16 {
+            for n in MIN_ELECTRODES..=MAX_ELECTRODES {
+                assert_eq!(electrodes(width, packed_bytes(width, n * n)), Some(n), "width {width}");
+            }
+        }
+    }
+}

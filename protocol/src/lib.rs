@@ -1,6 +1,9 @@
 //! The wire between a tomographic tactile sensor board and its host.
 //!
-//! A *packet* is one message. On the wire it is COBS-encoded and ends with a zero byte, so a receiver that joins in the
+//! The board sends [`BoardMessage`]s: who it is, its scans, its log and its faults. The host sends [`Command`]s. Both use this crate; it
+//! has no allocator, no floating point and no unsafe code, and it never panics, whatever comes down the line.
+//!
+//! A *packet* is one message. On the wire it is stuffed (COBS) and ends with a zero byte, so a receiver that joins in the
 //! middle, or gets noise or boot text, waits for the next zero and goes on. Inside:
 //!
 //! | bytes | what |
@@ -10,7 +13,33 @@
 //! | 4 | CRC-32 (ISO-HDLC, as in zlib) of head and body, little-endian |
 //!
 //! Only head, CRC and COBS are promised to every future version: that is enough for a receiver to recognise a newer peer
-//! and to refuse it by name instead of misreading it.
+//! and to refuse it by name ([`DecodeError::Version`]) instead of misreading it. `docs/protocol.md` is the whole specification, with
+//! examples that are tested against this crate.
+//!
+//! A host asks, and gets the answer through a line that said something else before:
+//!
+//! ```
+//! use tactomo_protocol::{BoardMessage, BoardReceiver, Command, Fault, MAX_COMMAND, encode_board, encode_command};
+//!
+//! let mut command = [0; MAX_COMMAND];
+//! let length = encode_command(&Command::Start, &mut command)?;
+//! assert_eq!(command[..length], [0x07, 0x18, 0x01, 0x30, 0xBA, 0xC5, 0xB4, 0x00]);
+//!
+//! let mut line = *b"ets Jul 29 2019\r\n\0.............";
+//! let length = encode_board(&BoardMessage::Fault(Fault::AdcStuck), &mut line[18..])?;
+//!
+//! let mut receiver = BoardReceiver::default();
+//! let mut bytes = &line[..18 + length];
+//! let mut messages = Vec::new();
+//! while let Some(message) = receiver.receive(&mut bytes) {
+//!     messages.extend(message.ok());
+//! }
+//! assert_eq!(messages, [BoardMessage::Fault(Fault::AdcStuck)]);
+//! assert_eq!(receiver.counters().dropped_bytes, 17);
+//! # Ok::<(), tactomo_protocol::EncodeError>(())
+//! ```
+//!
+//! The feature `fast-crc` spends 16 kB instead of 1 kB on the checksum's table: decoding twice as fast, for hosts.
 #![no_std]
 
 #[cfg(test)]
