@@ -15,3 +15,4 @@ pub mod scene;
 pub mod simulate;
 pub mod solve;
 pub mod source;
+pub mod validate;

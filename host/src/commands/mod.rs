@@ -4,6 +4,7 @@ mod choice;
 mod forward;
 mod output;
 mod ports;
+mod validate;
 
 use clap::{Parser, Subcommand};
 
@@ -19,6 +20,7 @@ pub struct Cli {
 enum Command {
     Forward(Box<forward::Args>),
     Ports(ports::Args),
+    Validate(validate::Args),
 }
 
 /// Runs the command that was asked for.
@@ -26,5 +28,6 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Forward(args) => forward::run(&args),
         Command::Ports(args) => ports::run(args),
+        Command::Validate(args) => validate::run(&args),
     }
 }

@@ -1,10 +1,12 @@
 //! The detector of the simulated board: a scene that moves by itself, the physics that answers to it, and its measurement.
 
+mod measure;
 mod noise;
 mod scene;
 
 use crate::readings::Readings;
 
+pub use measure::measured;
 pub use noise::Noise;
 pub use scene::Scene;
 

@@ -5,16 +5,6 @@ use crate::detector::Detector;
 use crate::forward::ImageMesh;
 use crate::readings::Readings;
 
-/// How contacts are read off an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Locate {
-    /// Each peak, by the centroid of what stands out around it.
-    Peaks,
-    /// One contact, at the centroid of all of the image above zero, as in the paper. It is pulled to the middle of the
-    /// detector, the more so the smoother the image.
-    Centroid,
-}
-
 /// Readings that stand for no contact: so many standard deviations of noise and quantisation for the largest of them.
 const NOISE_DEVIATIONS: f64 = 5.0;
 /// Height of a further peak over the highest, at least.
@@ -25,7 +15,6 @@ const STANDS_OUT: f32 = 0.7;
 /// Finds contacts in images on one mesh.
 #[derive(Clone, Debug)]
 pub struct Locator {
-    locate: Locate,
     nodes_m: Vec<[f64; 2]>,
     areas_m2: Vec<f64>,
     /// Peaks nearer than this are one (m): the mean distance of electrodes, which is about what an image resolves.
@@ -36,12 +25,11 @@ pub struct Locator {
 
 impl Locator {
     /// Makes it for a mesh and a detector.
-    pub fn new(mesh: &ImageMesh, detector: &Detector, locate: Locate) -> Self {
+    pub fn new(mesh: &ImageMesh, detector: &Detector) -> Self {
         let area_m2: f64 = mesh.node_areas_m2.iter().sum();
         let lsb_v = detector.adc.full_scale_v / 2f64.powi(i32::from(detector.adc.bits));
         let noise_lsb = (detector.adc.noise_lsb.powi(2) + 1.0 / 12.0).sqrt();
         Self {
-            locate,
             nodes_m: mesh.nodes_m.clone(),
             areas_m2: mesh.node_areas_m2.clone(),
             apart_m: (area_m2 / detector.electrodes.len() as f64).sqrt(),
@@ -49,27 +37,24 @@ impl Locator {
         }
     }
 
-    /// How contacts are read off.
-    pub fn locate(&self) -> Locate {
-        self.locate
+    /// Whether readings are no more than noise and quantisation.
+    pub fn is_rest(&self, readings: &Readings) -> bool {
+        readings.largest_v() < self.rest_v
     }
 
-    /// Contacts in an image (S/m2 at each node) of these readings; none if the readings are no more than noise.
-    pub fn contacts(&self, image: &[f32], readings: &Readings) -> Vec<FoundContact> {
-        if readings.largest_v() < self.rest_v {
-            return Vec::new();
-        }
-        match self.locate {
-            Locate::Centroid => self.centroid(image, |_| true, 0.0).into_iter().collect(),
-            Locate::Peaks => {
-                let peaks = self.peaks(image);
-                peaks.iter().filter_map(|&peak| self.contact_at(image, peak, &peaks)).collect()
-            }
-        }
+    /// One contact, at the centroid of all of an image above zero (S/m2 at each node).
+    pub fn whole(&self, image: &[f32]) -> Option<FoundContact> {
+        self.centroid(image, |_| true, 0.0)
+    }
+
+    /// The contacts at the peaks of an image (S/m2 at each node), the highest first.
+    pub fn peaks(&self, image: &[f32]) -> Vec<FoundContact> {
+        let peaks = self.peak_nodes(image);
+        peaks.iter().filter_map(|&peak| self.contact_at(image, peak, &peaks)).collect()
     }
 
     /// Nodes that are highest within `apart_m`, the highest first.
-    fn peaks(&self, image: &[f32]) -> Vec<usize> {
+    fn peak_nodes(&self, image: &[f32]) -> Vec<usize> {
         let highest = image.iter().copied().fold(0.0, f32::max);
         let mut high: Vec<_> = (0..image.len()).filter(|&node| image[node] > FURTHER_PEAK * highest).collect();
         high.sort_unstable_by(|&a, &b| image[b].total_cmp(&image[a]));

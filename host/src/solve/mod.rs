@@ -1,10 +1,10 @@
 //! From readings back to touch: one file a method, one trait.
 
+mod balance;
 mod locate;
 mod tikhonov;
 
-pub use self::locate::Locate;
-pub use self::tikhonov::{Lambda, Tikhonov};
+pub use self::tikhonov::{Lambda, Tikhonov, Variant};
 use crate::readings::Readings;
 
 /// A method that reads touch from the readings of a frame.

@@ -8,7 +8,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::locate::{Locate, Locator};
+use super::balance;
+use super::locate::Locator;
 use super::{Solution, SolveError, Solver};
 use crate::forward::jacobian::Jacobian;
 use crate::readings::Readings;
@@ -32,9 +33,22 @@ impl Default for Lambda {
     }
 }
 
+/// What is done before and after the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variant {
+    /// The force is taken out of the readings first, so that a firm contact is where a light one is; contacts are the image's
+    /// peaks. The image of one contact then has the conductance of contact and detector in series.
+    Balanced,
+    /// As in the paper: readings as they are; one contact, at the centroid of all of the image above zero. A firm contact
+    /// is misplaced, and every contact pulled to the middle.
+    Paper,
+}
+
 /// Tikhonov's linear image.
 pub struct Tikhonov {
     electrodes: usize,
+    drive_v: f64,
+    variant: Variant,
     /// Singular values of `B` (V m / S), falling.
     singular_values: Vec<f64>,
     lambda: f64,
@@ -49,7 +63,7 @@ impl Tikhonov {
     /// Makes it ready for a detector.
     ///
     /// Takes about a millisecond for 2000 nodes.
-    pub fn new(jacobian: &Jacobian, lambda: Lambda, locate: Locate) -> Self {
+    pub fn new(jacobian: &Jacobian, lambda: Lambda, variant: Variant) -> Self {
         let Decomposition { left, singular_values, right } = Decomposition::of(jacobian);
         let lambda = lambda.absolute(jacobian, singular_values[0]);
         let mut to_coefficients = Vec::with_capacity(left.len());
@@ -63,11 +77,13 @@ impl Tikhonov {
         }
         Self {
             electrodes: jacobian.electrodes(),
+            drive_v: jacobian.detector.drive_v,
+            variant,
             singular_values,
             lambda,
             to_coefficients,
             to_image: to_image.iter().map(|&value| value as f32).collect(),
-            locator: Locator::new(&jacobian.image_mesh, &jacobian.detector, locate),
+            locator: Locator::new(&jacobian.image_mesh, &jacobian.detector),
         }
     }
 
@@ -87,7 +103,10 @@ impl Tikhonov {
     /// [`SolveError`] if the readings are of another number of electrodes or not finite.
     pub fn image_s_per_m2(&self, readings: &Readings) -> Result<Vec<f32>, SolveError> {
         readings.check(self.electrodes)?;
-        let volts: Vec<f32> = readings.volts().iter().map(|&volts| volts as f32).collect();
+        let volts: Vec<f32> = match self.variant {
+            Variant::Balanced => balance::balanced(readings, self.drive_v).iter().map(|&volts| volts as f32).collect(),
+            Variant::Paper => readings.volts().iter().map(|&volts| volts as f32).collect(),
+        };
         let nodes = self.to_image.len() / self.singular_values.len();
         let mut image = vec![0.0f32; nodes];
         let columns = self.to_image.chunks_exact(nodes);
@@ -103,15 +122,19 @@ impl Tikhonov {
 
 impl Solver for Tikhonov {
     fn name(&self) -> &'static str {
-        match self.locator.locate() {
-            Locate::Peaks => "tikhonov",
-            Locate::Centroid => "tikhonov-centroid",
+        match self.variant {
+            Variant::Balanced => "tikhonov",
+            Variant::Paper => "tikhonov-paper",
         }
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         let image = self.image_s_per_m2(readings)?;
-        let contacts = self.locator.contacts(&image, readings);
+        let contacts = match self.variant {
+            _ if self.locator.is_rest(readings) => Vec::new(),
+            Variant::Balanced => self.locator.peaks(&image),
+            Variant::Paper => self.locator.whole(&image).into_iter().collect(),
+        };
         Ok(Solution { image_s_per_m2: Some(image), contacts })
     }
 }
@@ -232,7 +255,7 @@ mod tests {
         let jacobian = jacobian(500);
         let readings = readings(CONTACT);
         for share in [1e-3, 0.02, 0.5] {
-            let tikhonov = Tikhonov::new(&jacobian, Lambda::Relative(share), Locate::Peaks);
+            let tikhonov = Tikhonov::new(&jacobian, Lambda::Relative(share), Variant::Paper);
             let roots_m = DVector::from_iterator(
                 jacobian.fields_ohm.nrows(),
                 jacobian.image_mesh.node_areas_m2.iter().map(|a| a.sqrt()),
@@ -257,7 +280,7 @@ mod tests {
             column *= area_m2.sqrt();
         }
         let dense = weighted.singular_values();
-        let tikhonov = Tikhonov::new(&jacobian, Lambda::default(), Locate::Peaks);
+        let tikhonov = Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced);
         assert_eq!(tikhonov.singular_values().len(), 16);
         for (thin, dense) in tikhonov.singular_values().iter().zip(&dense) {
             assert!((thin / dense - 1.0).abs() < 1e-9, "{thin} {dense}");
@@ -269,7 +292,7 @@ mod tests {
         let readings = readings(CONTACT);
         let at = |nodes: usize| {
             let jacobian = jacobian(nodes);
-            let image = Tikhonov::new(&jacobian, Lambda::default(), Locate::Peaks)
+            let image = Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced)
                 .image_s_per_m2(&readings)
                 .unwrap_or_default();
             let near = |node: &[f64; 2]| (node[0] - 0.009).hypot(node[1] + 0.006);
@@ -285,7 +308,7 @@ mod tests {
 
     #[test]
     fn refuses_readings_of_another_detector_and_no_numbers() {
-        let mut tikhonov = Tikhonov::new(&jacobian(400), Lambda::default(), Locate::Peaks);
+        let mut tikhonov = Tikhonov::new(&jacobian(400), Lambda::default(), Variant::Balanced);
         let few = tikhonov.solve(&Readings::from_fn(4, |_, _| 0.0));
         assert_eq!(few, Err(SolveError::Electrodes { found: 4, expected: 16 }));
         let nan = tikhonov.solve(&Readings::from_fn(16, |g, e| if (g, e) == (3, 5) { f64::NAN } else { 0.0 }));
@@ -294,7 +317,7 @@ mod tests {
 
     #[test]
     fn finds_a_contact_where_it_is() {
-        let mut tikhonov = Tikhonov::new(&jacobian(2000), Lambda::default(), Locate::Peaks);
+        let mut tikhonov = Tikhonov::new(&jacobian(2000), Lambda::default(), Variant::Balanced);
         let solution = tikhonov.solve(&readings(CONTACT)).unwrap_or_default();
         let [found] = solution.contacts[..] else { panic!("{:?}", solution.contacts) };
         assert!((found.x_m - 0.009).hypot(found.y_m + 0.006) < 0.003, "{found:?}");

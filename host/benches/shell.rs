@@ -1,0 +1,85 @@
+//! Cost of the thin shell: `cargo bench --package tactomo --bench shell`.
+//!
+//! Arguments are nodes of the mesh, about, on the detector `square-60`.
+
+use divan::{Bencher, black_box};
+use tactomo::detector::Detector;
+use tactomo::forward::jacobian::Jacobian;
+use tactomo::forward::shell::{Mesh, Shell};
+use tactomo::forward::{ForwardModel, readings_v};
+use tactomo::readings::Readings;
+use tactomo::scene::Contact;
+use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
+
+const NODES: [usize; 5] = [500, 2000, 5000, 20_000, 50_000];
+const CONTACT: Contact = Contact { x_m: 0.004, y_m: -0.009, radius_m: 0.003, conductance_s: 1e-3 };
+
+fn main() {
+    divan::main();
+}
+
+fn detector() -> Detector {
+    Detector::preset(Detector::DEFAULT).unwrap_or_else(|| panic!("no preset"))
+}
+
+fn shell(nodes: usize) -> Shell {
+    Shell::with_nodes(&detector(), nodes).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn readings() -> Readings {
+    let shell = shell(5000);
+    let impedance_ohm = shell.impedance_ohm(&[CONTACT]).unwrap_or_else(|error| panic!("{error}"));
+    readings_v(&impedance_ohm, shell.detector())
+}
+
+/// Triangles alone.
+#[divan::bench(args = NODES)]
+fn mesh(bencher: Bencher, nodes: usize) {
+    let detector = detector();
+    bencher.bench(|| Mesh::new(black_box(&detector), nodes));
+}
+
+/// From the description of the detector to the Jacobian's factors: mesh, matrix, factorisation, 16 fields.
+#[divan::bench(args = NODES)]
+fn jacobian(bencher: Bencher, nodes: usize) {
+    let detector = detector();
+    bencher.bench(|| Shell::with_nodes(black_box(&detector), nodes));
+}
+
+/// From a model to an image operator: two QR and one SVD.
+#[divan::bench(args = NODES)]
+fn tikhonov(bencher: Bencher, nodes: usize) {
+    let jacobian = Jacobian::of(&shell(nodes));
+    bencher.bench(|| Tikhonov::new(black_box(&jacobian), Lambda::default(), Variant::Balanced));
+}
+
+/// Impedance matrix for one contact: a factorisation and 16 solves.
+#[divan::bench(args = NODES)]
+fn one_contact(bencher: Bencher, nodes: usize) {
+    let shell = shell(nodes);
+    bencher.bench(|| shell.impedance_ohm(black_box(&[CONTACT])));
+}
+
+/// Linear image of one frame.
+#[divan::bench(args = NODES)]
+fn image(bencher: Bencher, nodes: usize) {
+    let tikhonov = Tikhonov::new(&Jacobian::of(&shell(nodes)), Lambda::default(), Variant::Balanced);
+    let readings = readings();
+    bencher.bench(|| tikhonov.image_s_per_m2(black_box(&readings)));
+}
+
+/// Linear image of one frame, and the contacts in it.
+#[divan::bench(args = NODES)]
+fn image_and_contacts(bencher: Bencher, nodes: usize) {
+    let mut tikhonov = Tikhonov::new(&Jacobian::of(&shell(nodes)), Lambda::default(), Variant::Balanced);
+    let readings = readings();
+    bencher.bench_local(|| tikhonov.solve(black_box(&readings)));
+}
+
+/// The same image by a dense matrix of `nodes x 256`, for comparison.
+#[divan::bench(args = [2000])]
+fn image_by_dense_matrix(bencher: Bencher, nodes: usize) {
+    let matrix = nalgebra::DMatrix::<f32>::from_element(nodes, 256, 0.5);
+    let volts = nalgebra::DVector::<f32>::from_element(256, 0.1);
+    bencher.bench(|| black_box(&matrix) * black_box(&volts));
+}

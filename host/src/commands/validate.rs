@@ -1,0 +1,133 @@
+//! `tactomo validate`: models and solvers against reference cases.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use serde::Serialize;
+use tactomo::case::Case;
+use tactomo::forward::jacobian::Jacobian;
+use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
+use tactomo::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
+
+use super::choice::Model;
+use super::output;
+
+/// Compares models and solvers with reference cases.
+///
+/// The forward model computes the readings of each case; solvers, on a coarser mesh of the same model, read the contacts
+/// from the readings that the case gives.
+///
+/// Example: tactomo validate reference/slab/*.json --noise-lsb 1.5 --trials 20
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// Case files
+    #[arg(required = true, value_name = "CASE")]
+    cases: Vec<PathBuf>,
+    /// Forward model
+    #[arg(long, value_enum, default_value = "shell")]
+    model: Model,
+    /// Nodes of the shell's mesh for the forward comparison, about
+    #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    nodes: u32,
+    /// Adds noise of so many LSB to quantised readings
+    #[arg(long, value_name = "LSB", value_parser = noise)]
+    noise_lsb: Option<f64>,
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How often each solver is tried, with new noise each time
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    trials: u32,
+    /// Tikhonov's lambda, as a share of the largest singular value
+    #[arg(long, value_name = "SHARE", value_parser = positive)]
+    lambda: Option<f64>,
+    /// Prints `{cases: [...]}` as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    cases: Vec<CaseReport>,
+}
+
+/// Runs all cases and prints a table or JSON.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let mut report = Report { cases: Vec::with_capacity(args.cases.len()) };
+    for path in &args.cases {
+        let case = Case::read(path)?;
+        report.cases.push(report_case(args, &case).with_context(|| path.display().to_string())?);
+    }
+    let text = if args.json { serde_json::to_string(&report)? } else { table(&report.cases) };
+    Ok(output::print(&text)?)
+}
+
+fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
+    let forward = args.model.build(&case.detector, Some(args.nodes as usize))?;
+    let [forward_error, impedance_error] = forward_errors(case, &*forward)?;
+    let jacobian = Jacobian::of(&*args.model.build(&case.detector, None)?);
+    let trials = Trials { noise_lsb: args.noise_lsb, seed: args.seed, count: args.trials as usize };
+    let solvers = solvers(&jacobian, args)
+        .iter_mut()
+        .map(|solver| try_solver(case, &mut **solver, &trials))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(CaseReport {
+        case: case.detector.name.clone(),
+        model: forward.name().to_owned(),
+        forward_error,
+        impedance_error,
+        reference_error: case.mesh_error_v / case.readings.largest_v(),
+        solvers,
+    })
+}
+
+fn solvers(jacobian: &Jacobian, args: &Args) -> Vec<Box<dyn Solver>> {
+    let lambda = args.lambda.map_or_else(Lambda::default, Lambda::Relative);
+    [Variant::Balanced, Variant::Paper]
+        .map(|variant| Box::new(Tikhonov::new(jacobian, lambda, variant)) as Box<dyn Solver>)
+        .into()
+}
+
+fn noise(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(lsb) if (0.0..1e6).contains(&lsb) => Ok(lsb),
+        _ => Err("a number of LSB is needed, zero or above".to_owned()),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if share > 0.0 && f64::is_finite(share) => Ok(share),
+        _ => Err("a number above zero is needed".to_owned()),
+    }
+}
+
+/// Errors in per cent of the largest reading or impedance.
+fn table(cases: &[CaseReport]) -> String {
+    let mut lines = vec![format!(
+        "{:<28} {:<6} {:>9} {:>9} {:>9}   {:<18} {:>10} {:>9} {:>12} {:>9}",
+        "case", "model", "reading %", "Z %", "ref. %", "solver", "found/true", "error mm", "conduct. S", "us/frame"
+    )];
+    for case in cases {
+        let forward = format!(
+            "{:<28} {:<6} {:>9.2} {:>9.2} {:>9.2}",
+            case.case,
+            case.model,
+            100.0 * case.forward_error,
+            100.0 * case.impedance_error,
+            100.0 * case.reference_error
+        );
+        for (i, solver) in case.solvers.iter().enumerate() {
+            lines.push(format!("{:<65}   {}", if i == 0 { forward.as_str() } else { "" }, solver_columns(solver)));
+        }
+    }
+    lines.join("\n")
+}
+
+fn solver_columns(report: &SolverReport) -> String {
+    let error = report.position_error_m.map_or_else(|| "-".to_owned(), |error_m| format!("{:.2}", error_m * 1e3));
+    let conductance_s: f64 = report.contacts.iter().map(|contact| contact.conductance_s).sum();
+    let found = format!("{:.1}/{}", report.count_found, report.count_true);
+    format!("{:<18} {found:>10} {error:>9} {conductance_s:>12.2e} {:>9.1}", report.solver, report.frame_us)
+}
