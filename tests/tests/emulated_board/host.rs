@@ -1,12 +1,12 @@
 //! The host's end of the emulated board's line.
 
-use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use defmt_decoder::{DecodeError, Table};
-use serialport::TTYPort;
+use tactomo::source::Link;
+use tactomo::source::serial::{DEFAULT_BAUD, SerialLink};
 use tactomo_protocol::{BoardMessage, BoardReceiver, Command, Counters, Frame, Hello, MAX_COMMAND, encode_command};
 
 /// Longest wait for anything, on a machine under load.
@@ -16,7 +16,7 @@ const CALL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Sends commands, receives messages, decodes the log.
 pub struct Host {
-    port: TTYPort,
+    link: SerialLink,
     receiver: BoardReceiver,
     /// Bytes received that the receiver has not had yet.
     waiting: Vec<u8>,
@@ -30,9 +30,9 @@ impl Host {
     /// # Errors
     /// If the pseudo-terminal cannot be opened or the ELF file has no log table.
     pub fn open(pty: &str, elf: &Path) -> Result<Self> {
-        let port = serialport::new(pty, 921_600).timeout(Duration::from_millis(20)).open_native()?;
+        let link = SerialLink::open(pty, DEFAULT_BAUD)?;
         let log_table = Table::parse(&std::fs::read(elf)?)?.context("no log table in the ELF file")?;
-        Ok(Self { port, receiver: BoardReceiver::default(), waiting: Vec::new(), log_table, log_bytes: Vec::new() })
+        Ok(Self { link, receiver: BoardReceiver::default(), waiting: Vec::new(), log_table, log_bytes: Vec::new() })
     }
 
     /// Sends a command.
@@ -42,7 +42,7 @@ impl Host {
     pub fn send(&mut self, command: &Command) -> Result<()> {
         let mut bytes = [0; MAX_COMMAND];
         let length = encode_command(command, &mut bytes)?;
-        Ok(self.port.write_all(&bytes[..length])?)
+        Ok(self.link.write_all(&bytes[..length])?)
     }
 
     /// Asks for Hello until it comes.
@@ -151,11 +151,8 @@ impl Host {
 
     fn read(&mut self) -> Result<()> {
         let mut bytes = [0; 4096];
-        match self.port.read(&mut bytes) {
-            Ok(count) => self.waiting.extend_from_slice(&bytes[..count]),
-            Err(error) if error.kind() == ErrorKind::TimedOut => {}
-            Err(error) => return Err(error.into()),
-        }
+        let count = self.link.read(&mut bytes)?;
+        self.waiting.extend_from_slice(&bytes[..count]);
         Ok(())
     }
 }
