@@ -144,16 +144,6 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         activity
     }
 
-    /// The parts, to look at.
-    pub fn parts(&self) -> &Parts<M, S, L, C> {
-        &self.parts
-    }
-
-    /// The parts, to take apart after use.
-    pub fn into_parts(self) -> Parts<M, S, L, C> {
-        self.parts
-    }
-
     fn receive(&mut self) {
         let mut bytes = [0; RECEIVED_A_STEP];
         let count = self.parts.serial.pull(&mut bytes);

@@ -90,9 +90,13 @@ impl<const WIRE: usize> Uplink<WIRE> {
         fits
     }
 
-    /// Queues a frame in the place of one that still waits; returns whether nothing was dropped for it.
+    /// Queues a frame in the place of those of which no byte is gone; returns whether nothing was dropped for it.
     pub fn frame(&mut self, head: FrameHead, readings: &[u16]) -> bool {
-        let free = !core::mem::take(&mut self.frame_waits);
+        let stalled = self.sending == Sending::Frame && self.gone == 0;
+        if stalled {
+            self.sending = Sending::Nothing;
+        }
+        let free = !core::mem::take(&mut self.frame_waits) && !stalled;
         let packet = &mut self.frames[1 - self.outgoing];
         match encode_frame(head, readings, &mut packet.bytes) {
             Ok(length) => packet.length = length,

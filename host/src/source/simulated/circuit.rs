@@ -24,6 +24,8 @@ pub(super) struct Circuit {
     address: AtomicU8,
     /// Times that an address line was driven, which tells a ground set anew from one that stayed.
     writes: AtomicU64,
+    /// When that was last.
+    written_ns: AtomicU64,
 }
 
 impl Circuit {
@@ -39,6 +41,11 @@ impl Circuit {
 
     fn advance(&self, ns: u64) {
         self.now_ns.fetch_add(ns, Relaxed);
+    }
+
+    fn note_write(&self) {
+        self.writes.fetch_add(1, Relaxed);
+        self.written_ns.store(self.now_ns.load(Relaxed), Relaxed);
     }
 }
 
@@ -62,13 +69,13 @@ impl ErrorType for AddressPin {
 impl OutputPin for AddressPin {
     fn set_low(&mut self) -> Result<(), Infallible> {
         self.circuit.address.fetch_and(!self.mask, Relaxed);
-        self.circuit.writes.fetch_add(1, Relaxed);
+        self.circuit.note_write();
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
         self.circuit.address.fetch_or(self.mask, Relaxed);
-        self.circuit.writes.fetch_add(1, Relaxed);
+        self.circuit.note_write();
         Ok(())
     }
 }
@@ -114,14 +121,16 @@ impl SimulatedSampler {
         Self { circuit: Arc::clone(circuit), physics, adc, noise: Noise::new(seed), readings: None, begun_at_write: 0 }
     }
 
-    /// Asks for the pad voltages anew if electrode 0 was grounded since the last time: a scan begins there.
+    /// Asks for the pad voltages anew, as they were at that moment, if electrode 0 was grounded since the last time: a scan
+    /// begins there.
     fn readings(&mut self, ground: u8) -> &Readings {
         let writes = self.circuit.writes.load(Relaxed);
         if ground == 0 && writes != self.begun_at_write {
             self.begun_at_write = writes;
             self.readings = None;
         }
-        self.readings.get_or_insert_with(|| self.physics.readings_v(self.circuit.now().as_secs_f64()))
+        let begun = Duration::from_nanos(self.circuit.written_ns.load(Relaxed));
+        self.readings.get_or_insert_with(|| self.physics.readings_v(begun.as_secs_f64()))
     }
 
     /// The code nearest to a voltage (V), with noise.

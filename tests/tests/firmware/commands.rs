@@ -1,0 +1,186 @@
+//! The command loop: commands good and bad, the frame-rate cap, what is told after a reset.
+
+use tactomo_firmware::mux::Transparent;
+use tactomo_firmware::{Activity, Board16, Identity, NewBoardError, Parts};
+use tactomo_protocol::{Command, Fault, Settings, encode_command};
+
+use super::parts::*;
+
+#[test]
+fn a_board_scans_from_start_to_stop_only() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    assert_eq!(board.step(), Ok(Activity::Idle));
+    outside.send(Command::Start);
+    assert_eq!(board.step(), Ok(Activity::Row));
+    outside.send(Command::Stop);
+    assert_eq!(board.step(), Ok(Activity::Idle));
+    let conversions = outside.conversions.get();
+    assert_eq!(conversions, 16, "the scan was given up after its first row");
+
+    outside.send(Command::Start);
+    scan(&mut board, 2);
+    assert_eq!(outside.conversions.get() - conversions, 512, "and begun anew");
+    let messages = outside.messages();
+    assert_eq!(frames(&messages).iter().map(|frame| frame.head.sequence).collect::<Vec<_>>(), [0, 1]);
+}
+
+#[test]
+fn settings_take_effect_at_once_and_are_confirmed() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    board.step().unwrap();
+    let settings = Settings { settle_us: 500, average_log2: 1, max_frames_per_s: 0 };
+    outside.send(Command::Configure(settings));
+    let (begin_us, before) = (outside.clock_us.get(), outside.conversions.get());
+    scan(&mut board, 1);
+    assert_eq!(outside.conversions.get() - before, 512);
+    assert_eq!(outside.clock_us.get() - begin_us, 16 * (500 + 32 * CONVERSION_US));
+    let messages = outside.messages();
+    assert_eq!(
+        hellos(&messages).iter().map(|hello| hello.settings).collect::<Vec<_>>(),
+        [Settings::default(), settings]
+    );
+    assert_eq!(u64::from(frames(&messages)[0].head.time_us), begin_us, "a frame has settings of one kind");
+}
+
+#[test]
+fn settings_out_of_range_are_refused_and_the_old_ones_stay() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    board.step().unwrap();
+    outside.messages();
+    outside.send(Command::Configure(Settings { average_log2: 9, ..Settings::default() }));
+    outside.send(Command::Hello);
+    board.step().unwrap();
+    let messages = outside.messages();
+    assert_eq!(faults(&messages), [&Fault::BadSettings]);
+    assert_eq!(hellos(&messages)[0].settings, Settings::default());
+}
+
+#[test]
+fn a_newer_host_is_told_by_number_and_not_obeyed() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send_bytes(&in_version(2, Command::Start));
+    assert_eq!(board.step(), Ok(Activity::Idle));
+    assert_eq!(faults(&outside.messages()), [&Fault::UnknownVersion(2)]);
+}
+
+/// A command as another version of the protocol would send it: head, checksum and framing are the same in every version.
+fn in_version(version: u8, command: Command) -> Vec<u8> {
+    let mut packet = [0; 32];
+    let length = encode_command(&command, &mut packet).unwrap();
+    let mut content = cobs::decode_vec(&packet[..length - 1]).unwrap();
+    content.truncate(content.len() - 4);
+    content[0] = version << 4 | content[0] & 15;
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&content);
+    content.extend(crc.to_le_bytes());
+    let mut packet = cobs::encode_vec(&content);
+    packet.push(0);
+    packet
+}
+
+#[test]
+fn commands_are_found_among_garbage() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    board.step().unwrap();
+    outside.messages();
+    // A byte of every value, a run longer than any command, half a command; then a zero ends the junk.
+    outside.send_bytes(&(0..=255).chain([0x55; 500]).collect::<Vec<u8>>());
+    outside.send_bytes(&in_version(1, Command::Start)[..3]);
+    outside.send_bytes(&[0]);
+    outside.send(Command::Hello);
+    step(&mut board, 20);
+    let messages = outside.messages();
+    assert_eq!((messages.len(), hellos(&messages).len()), (1, 1), "{messages:?}");
+}
+
+#[test]
+fn a_flood_of_garbage_does_not_hold_up_the_scan() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    outside.send_bytes(&[0xaa; 1_000_000]);
+    scan(&mut board, 10);
+    assert_eq!(frames(&outside.messages()).len(), 10);
+    assert!(!outside.wire.borrow().to_board.is_empty());
+}
+
+#[test]
+fn the_frame_rate_is_capped_without_drift() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Configure(Settings { max_frames_per_s: 300, ..Settings::default() }));
+    outside.send(Command::Start);
+    let mut begun = Vec::new();
+    while begun.len() < 301 {
+        match board.step().unwrap() {
+            // The loop comes round every 7 us, which divides no period.
+            Activity::Waiting { until_us } => {
+                assert!(until_us > outside.clock_us.get());
+                outside.advance_us(7);
+            }
+            Activity::Frame => begun.extend(frames(&outside.messages()).iter().map(|frame| frame.head.time_us)),
+            Activity::Row | Activity::Idle => {}
+        }
+    }
+    let duration_us = begun[300] - begun[0];
+    assert!((1_000_000..1_000_300).contains(&duration_us), "300 frames in {duration_us} us");
+    assert!(begun.windows(2).all(|pair| pair[1] - pair[0] >= 3334 - 7));
+}
+
+#[test]
+fn after_a_pause_no_frames_are_caught_up() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Configure(Settings { max_frames_per_s: 100, ..Settings::default() }));
+    outside.send(Command::Start);
+    scan(&mut board, 1);
+    outside.advance_us(1_000_000);
+    scan(&mut board, 1);
+    let Activity::Waiting { until_us } = board.step().unwrap() else { panic!("the next frame is due a period later") };
+    let messages = outside.messages();
+    let late = frames(&messages)[1].head.time_us;
+    assert_eq!(until_us, u64::from(late) + 10_000);
+}
+
+#[test]
+fn a_fault_before_the_reset_is_told_at_once_and_to_the_first_host_that_asks() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    let panic = Fault::Panic("src/main.rs:7".try_into().unwrap());
+    board.report(panic.clone());
+    board.step().unwrap();
+    let messages = outside.messages();
+    assert_eq!((hellos(&messages).len(), faults(&messages)), (1, vec![&panic]));
+
+    outside.send(Command::Hello);
+    board.step().unwrap();
+    assert_eq!(faults(&outside.messages()), [&panic]);
+    outside.send(Command::Hello);
+    board.step().unwrap();
+    assert!(faults(&outside.messages()).is_empty());
+}
+
+#[test]
+fn an_identity_that_does_not_fit_is_refused() {
+    let new = |identity| {
+        let parts = Parts { mux: NoMux, sampler: NullPart, serial: NullPart, chip: NullPart };
+        Board16::new(parts, identity).err()
+    };
+    assert_eq!(new(IDENTITY), None);
+    assert_eq!(new(Identity { electrodes: 17, ..IDENTITY }), Some(NewBoardError::Electrodes(17)));
+    assert_eq!(new(Identity { electrodes: 3, ..IDENTITY }), Some(NewBoardError::Electrodes(3)));
+    let adc = tactomo_firmware::Adc { bits: 17, ..IDENTITY.adc };
+    assert_eq!(new(Identity { adc, ..IDENTITY }), Some(NewBoardError::AdcBits(17)));
+}
+
+#[test]
+fn a_board_of_16_electrodes_takes_less_than_2560_bytes_of_ram() {
+    type Parts0 = Board16<Transparent<NullPart, 4>, NullPart, NullPart, NullPart>;
+    let bytes = size_of::<Parts0>();
+    assert!(bytes < 2560, "{bytes} bytes");
+}

@@ -1,0 +1,8 @@
+//! The firmware library: on mocked parts, and as the simulated board.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod closed_loop;
+mod commands;
+mod parts;
+mod scan;
+mod uplink;

@@ -1,0 +1,152 @@
+//! The uplink on fast, slow and dead lines.
+
+use tactomo_protocol::{BoardMessage, Command, Fault};
+
+use super::parts::*;
+
+#[test]
+fn a_lone_zero_cuts_boot_text_off_and_hello_follows() {
+    let outside = Outside::default();
+    simple_board(&outside, numbered).step().unwrap();
+    assert_eq!(outside.wire.borrow().sent[0], 0);
+    let messages = outside.messages();
+    let [BoardMessage::Hello(hello)] = &messages[..] else { panic!("{messages:?}") };
+    assert_eq!((hello.board.as_str(), hello.firmware_version.as_str(), hello.electrodes), ("test", "1.2.3", 16));
+    assert_eq!((hello.adc_bits, hello.adc_full_scale_mv, hello.drive_mv), (12, 3300, 2000));
+}
+
+#[test]
+fn a_line_that_takes_one_byte_at_a_time_carries_whole_frames() {
+    let outside = Outside::default();
+    outside.set_room(1);
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    scan(&mut board, 20);
+    outside.send(Command::Stop);
+    step(&mut board, 2000);
+
+    let messages = outside.messages();
+    let expected: Vec<u16> = (0..256).map(|reading| 4 * reading).collect();
+    let frames = frames(&messages);
+    assert!(frames.iter().all(|frame| frame.readings[..] == expected));
+    // About 272 bytes leave a scan, one before each conversion and one a step; a frame has 332.
+    assert!((14..=17).contains(&frames.len()), "{} frames", frames.len());
+    assert_eq!(frames.last().unwrap().head.sequence, 19, "the newest frame is the one that is kept");
+    let times: Vec<_> = frames.iter().map(|frame| frame.head.time_us / frame_us()).collect();
+    let numbers: Vec<_> = frames.iter().map(|frame| u32::from(frame.head.sequence)).collect();
+    assert_eq!(numbers, times, "every scan has a number, sent or not");
+}
+
+/// Time of a scan of the test board (us).
+fn frame_us() -> u32 {
+    16 * (20 + 16 * CONVERSION_US as u32)
+}
+
+#[test]
+fn a_dead_line_does_not_slow_the_scan_and_the_gap_shows_in_the_numbers() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    scan(&mut board, 3);
+    let before = outside.messages();
+    assert_eq!(frames(&before).iter().map(|frame| frame.head.sequence).collect::<Vec<_>>(), [0, 1, 2]);
+
+    outside.set_room(0);
+    let begin_us = outside.clock_us.get();
+    scan(&mut board, 1000);
+    assert_eq!(outside.clock_us.get() - begin_us, 1000 * u64::from(frame_us()), "at full rate");
+    assert!(outside.messages().is_empty());
+
+    outside.set_room(usize::MAX);
+    scan(&mut board, 2);
+    let after = outside.messages();
+    let numbers: Vec<_> = frames(&after).iter().map(|frame| frame.head.sequence).collect();
+    // No byte of a frame was gone when the line died, so the newest one replaced it.
+    assert_eq!(numbers, [1002, 1003, 1004]);
+}
+
+#[test]
+fn sequence_numbers_wrap() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    scan(&mut board, 65_535);
+    outside.wire.borrow_mut().sent.clear();
+    scan(&mut board, 3);
+    let messages = outside.messages();
+    let numbers: Vec<_> = frames(&messages).iter().map(|frame| frame.head.sequence).collect();
+    assert_eq!(numbers, [65_535, 0, 1]);
+}
+
+#[test]
+fn sending_overlaps_sampling() {
+    let outside = Outside::default();
+    outside.set_room(8);
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    scan(&mut board, 1);
+    let sent = outside.wire.borrow().sent.len();
+    board.step().unwrap();
+    let row = outside.wire.borrow().sent.len() - sent;
+    assert_eq!(row, 17 * 8, "a push before each of a row's 16 conversions, and one after the row");
+}
+
+#[test]
+fn answers_go_before_frames_and_logs_between_them() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    scan(&mut board, 1);
+    outside.messages();
+
+    // While the line is blocked, a frame, a log of 100 bytes, a fault and an answer gather.
+    outside.set_room(0);
+    outside.log.borrow_mut().extend(0..100);
+    scan(&mut board, 2);
+    board.report(Fault::AdcStuck);
+    outside.send(Command::Hello);
+    outside.set_room(usize::MAX);
+    scan(&mut board, 3);
+    let kinds: String = outside.messages().iter().map(kind).collect();
+    assert_eq!(kinds, "LXHXFLFFF", "the log that had begun, faults and answers, then frames and log in turn");
+}
+
+fn kind(message: &BoardMessage) -> char {
+    match message {
+        BoardMessage::Hello(_) => 'H',
+        BoardMessage::Frame(_) => 'F',
+        BoardMessage::Log(_) => 'L',
+        BoardMessage::Fault(_) => 'X',
+    }
+}
+
+#[test]
+fn log_bytes_arrive_in_order() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    let log: Vec<u8> = (0..1000u32).map(|i| (i * 7) as u8).collect();
+    outside.log.borrow_mut().extend(&log);
+    outside.send(Command::Start);
+    scan(&mut board, 30);
+    let arrived: Vec<u8> = outside
+        .messages()
+        .into_iter()
+        .filter_map(|message| if let BoardMessage::Log(log) = message { Some(log.0) } else { None })
+        .flatten()
+        .collect();
+    assert_eq!(arrived, log);
+}
+
+#[test]
+fn a_flood_of_questions_is_answered_as_far_as_there_is_room_and_never_cut() {
+    let outside = Outside::default();
+    outside.set_room(0);
+    let mut board = simple_board(&outside, numbered);
+    (0..100).for_each(|_| outside.send(Command::Hello));
+    step(&mut board, 100);
+    outside.set_room(3);
+    step(&mut board, 1000);
+    let messages = outside.messages();
+    assert!((4..100).contains(&hellos(&messages).len()));
+    assert_eq!(hellos(&messages).len(), messages.len());
+}
