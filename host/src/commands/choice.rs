@@ -1,9 +1,12 @@
 //! Arguments that several commands share: detector, model, contacts.
 
+use clap::ValueEnum;
 use tactomo::detector::Detector;
+use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{ForwardError, ForwardModel};
 use tactomo::scene::Contact;
+use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
 
 /// Which forward model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -19,6 +22,31 @@ impl Model {
         match self {
             Self::Shell => Ok(Box::new(Shell::with_nodes(detector, nodes)?)),
         }
+    }
+}
+
+/// Which solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum SolverName {
+    /// Linear image of the readings less the force; a contact at each of its peaks
+    Tikhonov,
+    /// Linear image and one contact at its centroid, as in the paper
+    TikhonovPaper,
+}
+
+impl SolverName {
+    /// Makes it for the detector of `jacobian`.
+    pub fn build(self, jacobian: &Jacobian) -> Box<dyn Solver> {
+        let variant = match self {
+            Self::Tikhonov => Variant::Balanced,
+            Self::TikhonovPaper => Variant::Paper,
+        };
+        Box::new(Tikhonov::new(jacobian, Lambda::default(), variant))
+    }
+
+    /// Its name on the command line.
+    pub fn name(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 }
 

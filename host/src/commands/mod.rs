@@ -2,8 +2,14 @@
 
 mod choice;
 mod forward;
+mod interrupt;
+mod live;
 mod output;
 mod ports;
+mod record;
+mod recording;
+mod replay;
+mod source;
 mod validate;
 
 use clap::{Parser, Subcommand};
@@ -18,16 +24,22 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Forward(Box<forward::Args>),
+    Live(Box<live::Args>),
     Ports(ports::Args),
+    Record(Box<record::Args>),
+    Replay(Box<replay::Args>),
+    Forward(Box<forward::Args>),
     Validate(validate::Args),
 }
 
 /// Runs the command that was asked for.
 pub fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
+        Command::Live(args) => live::run(*args),
+        Command::Ports(args) => ports::run(&args),
+        Command::Record(args) => record::run(&args),
+        Command::Replay(args) => replay::run(*args),
         Command::Forward(args) => forward::run(&args),
-        Command::Ports(args) => ports::run(args),
         Command::Validate(args) => validate::run(&args),
     }
 }

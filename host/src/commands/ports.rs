@@ -1,16 +1,52 @@
-//! `tactomo ports`: which serial ports there are.
+//! `tactomo ports`: which serial ports there are, and which have a board.
 
-/// Lists the serial ports.
+use tactomo::source::discover::{self, Probe};
+use tactomo::source::serial::DEFAULT_BAUD;
+use tactomo_protocol::Hello;
+
+use super::output;
+
+/// Lists the serial ports, and asks each USB port whether it has a board.
 ///
 /// Example: tactomo ports
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
-pub struct Args {}
+pub struct Args {
+    /// Lists only: opening a port resets many boards
+    #[arg(long)]
+    no_probe: bool,
+    /// Bits a second of the serial ports
+    #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
+    baud: u32,
+}
 
 /// Prints one line for each serial port.
-pub fn run(Args {}: Args) -> anyhow::Result<()> {
-    for port in serialport::available_ports()? {
-        println!("{}", port.port_name);
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let ports = discover::ports();
+    if ports.is_empty() {
+        eprintln!("no serial ports: is the board plugged in, with a cable that carries data?");
+        return Ok(());
     }
-    Ok(())
+    if args.no_probe {
+        return Ok(output::print(&lines(ports.iter().map(|port| port.name.clone())))?);
+    }
+    let (usb, others): (Vec<_>, Vec<_>) = ports.into_iter().partition(|port| port.usb);
+    let probed = discover::probe(usb, args.baud);
+    let others = others.into_iter().map(|port| format!("{}  not USB, not asked", port.name));
+    Ok(output::print(&lines(probed.iter().map(line).chain(others)))?)
+}
+
+fn lines(lines: impl Iterator<Item = String>) -> String {
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+fn line(probe: &Probe) -> String {
+    let product = probe.port.product.as_deref().map(|name| format!(" ({name})")).unwrap_or_default();
+    let answer = probe.answer.as_ref().map_or_else(ToString::to_string, board);
+    format!("{}{product}  {answer}", probe.port.name)
+}
+
+fn board(hello: &Hello) -> String {
+    let Hello { board, firmware_version, electrodes, .. } = hello;
+    format!("board {board}, firmware {firmware_version}, {electrodes} electrodes")
 }

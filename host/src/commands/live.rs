@@ -1,0 +1,196 @@
+//! `tactomo live`: the live picture.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::thread;
+use std::time::Duration;
+
+use tactomo::detector::Detector;
+use tactomo::forward::jacobian::Jacobian;
+use tactomo::live::pipeline;
+use tactomo::live::plan::{Ends, MakeSolver, Plan, Summary};
+use tactomo::live::server::{Scene, Server};
+use tactomo::live::session::Wish;
+use tactomo::live::{Request, Snapshot};
+use tactomo::source::Source;
+use tokio::sync::watch;
+
+use super::choice::{self, Model, SolverName};
+use super::source::{self, BoardArgs};
+use super::{interrupt, output, recording};
+
+/// Requests of pages that may wait.
+const REQUESTS: usize = 64;
+
+/// Shows the live picture of a board or a recording.
+///
+/// Examples:
+///   tactomo live                                    finds the board and serves the page
+/// ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
+///   tactomo live --replay touch.tactomo --speed 0.25
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    #[command(flatten)]
+    pub board: BoardArgs,
+    /// Plays a recording instead
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "settle_us", "average", "max_fps"])]
+    pub replay: Option<PathBuf>,
+    /// How many times faster the recording is played; `max` for as fast as it can be read
+    #[arg(long, value_name = "FACTOR", default_value = "1", requires = "replay", value_parser = source::speed)]
+    pub speed: f64,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Ends this many seconds after the board said Hello
+    #[arg(long, value_parser = source::seconds)]
+    pub seconds: Option<Duration>,
+    /// Keeps all bytes that come in a new file
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// ELF file of the board's firmware, to print its log
+    #[arg(long, value_name = "FILE")]
+    pub elf: Option<PathBuf>,
+}
+
+/// What becomes of the bytes.
+#[derive(Debug, clap::Args)]
+pub struct PictureArgs {
+    /// Detector that is connected, by the name of a preset
+    #[arg(long, value_name = "NAME", value_parser = choice::preset, default_value = Detector::DEFAULT)]
+    pub detector: Detector,
+    /// Solver that makes the image
+    #[arg(long, value_enum, default_value = "tikhonov")]
+    pub solver: SolverName,
+    /// Jacobian from `forward --save-jacobian`, instead of computing it
+    #[arg(long, value_name = "FILE")]
+    pub jacobian: Option<PathBuf>,
+    /// Port of the page on 127.0.0.1; 0 for any
+    #[arg(long, value_name = "PORT")]
+    pub http_port: Option<u16>,
+    /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, corrupt, latency_us}` at the end as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What is shown, whichever command asks for it.
+pub struct Show {
+    /// Where the bytes come from.
+    pub source: Box<dyn Source>,
+    /// What becomes of the bytes.
+    pub picture: PictureArgs,
+    /// Settings asked of the board.
+    pub wish: Wish,
+    /// Time from Hello to the end.
+    pub seconds: Option<Duration>,
+    /// Where all bytes are kept.
+    pub record: Option<PathBuf>,
+    /// ELF file of the board's firmware.
+    pub elf: Option<PathBuf>,
+}
+
+/// Shows what `args` choose.
+pub fn run(args: Args) -> anyhow::Result<()> {
+    let source = match args.replay {
+        Some(file) => source::recording(file, args.speed),
+        None => args.board.serial(),
+    };
+    let wish = args.board.settings.wish();
+    show(Show { source, wish, picture: args.picture, seconds: args.seconds, record: args.record, elf: args.elf })
+}
+
+/// Serves the page, or only counts, until the end.
+pub fn show(mut show: Show) -> anyhow::Result<()> {
+    let jacobian = jacobian(&show.picture)?;
+    let stop = interrupt::flag()?;
+    let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
+    let (request, requests) = mpsc::sync_channel(REQUESTS);
+    let server = serve(&show, &jacobian, shown, request)?;
+    let plan = plan(&show, jacobian)?;
+    // The page may outlive the pipeline, so the snapshots have a sender here too.
+    let ends = Ends { snapshots: snapshots.clone(), requests, stop: Arc::clone(&stop) };
+    let summary = pipeline::run(&mut *show.source, plan, ends)?;
+    report(&summary, show.picture.json)?;
+    if server.is_some() && show.seconds.is_none() {
+        wait(&stop);
+    }
+    Ok(())
+}
+
+fn jacobian(args: &PictureArgs) -> anyhow::Result<Jacobian> {
+    match &args.jacobian {
+        Some(path) => Ok(Jacobian::load(path, &args.detector)?),
+        None => Ok(Jacobian::of(&*Model::Shell.build(&args.detector, None)?)),
+    }
+}
+
+fn plan(show: &Show, jacobian: Jacobian) -> anyhow::Result<Plan> {
+    let detector = show.picture.detector.clone();
+    Ok(Plan {
+        wish: show.wish,
+        make_solver: Some(make_solver(show.picture.solver, jacobian)),
+        recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
+        board_log: recording::board_log(show.elf.as_deref())?,
+        press: None,
+        seconds: show.seconds,
+        detector,
+    })
+}
+
+/// The fields of the detector do not depend on how it is driven and measured, so one Jacobian serves every board.
+fn make_solver(solver: SolverName, mut jacobian: Jacobian) -> MakeSolver {
+    Box::new(move |detector| {
+        jacobian.detector = detector.clone();
+        Ok(solver.build(&jacobian))
+    })
+}
+
+/// The page, unless only the figures are wanted.
+fn serve(
+    show: &Show,
+    jacobian: &Jacobian,
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    requests: mpsc::SyncSender<Request>,
+) -> anyhow::Result<Option<Server>> {
+    if show.picture.json {
+        return Ok(None);
+    }
+    let scene = Scene {
+        detector: show.picture.detector.clone(),
+        mesh: jacobian.image_mesh.clone(),
+        solver: show.picture.solver.name(),
+        source: show.source.name(),
+        finger: None,
+    };
+    let server = Server::start(show.picture.http_port, scene, snapshots, requests)?;
+    eprintln!("live picture: {}", server.url());
+    Ok(Some(server))
+}
+
+/// Waits for Ctrl-C: the last picture stays on the page.
+fn wait(stop: &AtomicBool) {
+    if !stop.load(Ordering::Relaxed) {
+        eprintln!("the page stays open until Ctrl-C");
+    }
+    while !stop.load(Ordering::Relaxed) {
+        thread::sleep(Duration::from_millis(50));
+    }
+}
+
+fn report(summary: &Summary, json: bool) -> anyhow::Result<()> {
+    if json {
+        return Ok(output::print(&serde_json::to_string(summary)?)?);
+    }
+    eprintln!("{}", sentence(summary));
+    Ok(())
+}
+
+/// A summary in a line.
+pub fn sentence(summary: &Summary) -> String {
+    let Summary { source, frames, frames_per_s, dropped, corrupt, latency_us, .. } = summary;
+    format!(
+        "{source}: {frames} frames, {frames_per_s:.0} a second, {dropped} dropped, {corrupt} corrupt; byte to image p50 \
+         {:.0} us, p99 {:.0} us, at most {:.0} us",
+        latency_us.p50, latency_us.p99, latency_us.max
+    )
+}

@@ -1,0 +1,54 @@
+//! `tactomo record`: keeps what a board sends, without a picture.
+
+use std::path::PathBuf;
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+use tactomo::detector::Detector;
+use tactomo::live::Snapshot;
+use tactomo::live::board_log::BoardLog;
+use tactomo::live::pipeline;
+use tactomo::live::plan::{Ends, Plan};
+use tokio::sync::watch;
+
+use super::source::{self, BoardArgs};
+use super::{choice, interrupt, live, recording};
+
+/// Keeps the bytes of a board in a new file.
+///
+/// Example: tactomo record touch.tactomo --seconds 30
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// The new file
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    board: BoardArgs,
+    /// Detector that is connected, by the name of a preset
+    #[arg(long, value_name = "NAME", value_parser = choice::preset, default_value = Detector::DEFAULT)]
+    detector: Detector,
+    /// Ends this many seconds after the board said Hello; otherwise with Ctrl-C
+    #[arg(long, value_parser = source::seconds)]
+    seconds: Option<Duration>,
+}
+
+/// Records until the end.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let mut source = args.board.serial();
+    let plan = Plan {
+        wish: args.board.settings.wish(),
+        make_solver: None,
+        recorder: recording::begin(Some(&args.file), &args.detector, source.name())?,
+        board_log: BoardLog::unread(),
+        press: None,
+        seconds: args.seconds,
+        detector: args.detector.clone(),
+    };
+    let (snapshots, _) = watch::channel(Arc::new(Snapshot::default()));
+    let (_, requests) = mpsc::sync_channel(1);
+    let ends = Ends { snapshots, requests, stop: interrupt::flag()? };
+    let summary = pipeline::run(&mut *source, plan, ends)?;
+    eprintln!("{}; kept in {}", live::sentence(&summary), args.file.display());
+    Ok(())
+}

@@ -1,0 +1,20 @@
+//! What `live` and `record` keep, and the board's log.
+
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use tactomo::detector::Detector;
+use tactomo::live::board_log::{BoardLog, ElfError};
+use tactomo::record::{Header, RecordError, Recorder};
+
+/// Begins a recording in a new file, if one is wanted.
+pub fn begin(file: Option<&Path>, detector: &Detector, source: String) -> Result<Option<Recorder>, RecordError> {
+    let started_unix_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let header = Header { detector: detector.name.clone(), source, started_unix_s, notes: String::new() };
+    file.map(|file| Recorder::create(file, &header)).transpose()
+}
+
+/// Where the board's log goes: printed with the texts of the firmware file `elf`, or only noticed.
+pub fn board_log(elf: Option<&Path>) -> Result<BoardLog, ElfError> {
+    elf.map_or_else(|| Ok(BoardLog::unread()), BoardLog::from_elf)
+}

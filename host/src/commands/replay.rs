@@ -1,0 +1,41 @@
+//! `tactomo replay`: the live picture of a recording.
+
+use std::path::PathBuf;
+
+use tactomo::live::session::Wish;
+
+use super::live::{self, PictureArgs, Show};
+use super::source;
+
+/// Plays a recording: the same as `live --replay`.
+///
+/// Examples:
+///   tactomo replay touch.tactomo
+///   tactomo replay touch.tactomo --speed max --json
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// The recording
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// How many times faster it is played; `max` for as fast as it can be read
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = source::speed)]
+    speed: f64,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// ELF file of the board's firmware, to print its log
+    #[arg(long, value_name = "FILE")]
+    elf: Option<PathBuf>,
+}
+
+/// Plays it.
+pub fn run(args: Args) -> anyhow::Result<()> {
+    live::show(Show {
+        source: source::recording(args.file, args.speed),
+        picture: args.picture,
+        wish: Wish::default(),
+        seconds: None,
+        record: None,
+        elf: args.elf,
+    })
+}

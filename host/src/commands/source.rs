@@ -1,0 +1,95 @@
+//! Arguments that choose where the bytes come from.
+
+use std::path::PathBuf;
+
+use tactomo::live::session::Wish;
+use tactomo::source::serial::DEFAULT_BAUD;
+use tactomo::source::{AnyBoard, NamedPort, Recording, Source};
+
+/// A board: on the port that is named, or on whichever USB serial port one is found.
+#[derive(Clone, Debug, clap::Args)]
+pub struct BoardArgs {
+    /// Serial port of the board; without it, each USB serial port is asked
+    #[arg(long, value_name = "PORT")]
+    pub port: Option<String>,
+    /// Bits a second of the serial port
+    #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
+    pub baud: u32,
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+}
+
+/// Settings of the scan; what is not given stays as the board has it.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct SettingsArgs {
+    /// Wait between grounding an electrode and reading (us)
+    #[arg(long, value_name = "US")]
+    settle_us: Option<u16>,
+    /// Conversions averaged into one reading
+    #[arg(long, value_name = "1|2|4|...|256", value_parser = average_log2)]
+    average: Option<u8>,
+    /// Frames a second at most; 0 for as fast as the board can
+    #[arg(long, value_name = "FRAMES")]
+    max_fps: Option<u16>,
+}
+
+impl BoardArgs {
+    /// The board on a serial port.
+    pub fn serial(&self) -> Box<dyn Source> {
+        let baud = self.baud;
+        match &self.port {
+            Some(port) => Box::new(NamedPort { port: port.clone(), baud }),
+            None => Box::new(AnyBoard { baud }),
+        }
+    }
+}
+
+impl SettingsArgs {
+    /// What is asked of the board.
+    pub fn wish(&self) -> Wish {
+        Wish { settle_us: self.settle_us, average_log2: self.average, max_frames_per_s: self.max_fps }
+    }
+}
+
+/// A recording to be played.
+pub fn recording(path: PathBuf, speed: f64) -> Box<dyn Source> {
+    Box::new(Recording { path, speed })
+}
+
+/// A speed above zero, or `max`.
+pub fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        _ if text == "max" => Ok(f64::INFINITY),
+        Ok(speed) if speed > 0.0 => Ok(speed),
+        _ => Err("a number above 0, or `max` for as fast as it can be read".to_owned()),
+    }
+}
+
+/// A time above zero (s).
+pub fn seconds(text: &str) -> Result<std::time::Duration, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| *seconds > 0.0);
+    seconds
+        .and_then(|seconds| std::time::Duration::try_from_secs_f64(seconds).ok())
+        .ok_or_else(|| "a number of seconds above 0".to_owned())
+}
+
+/// Base-2 logarithm of a power of two up to 256.
+fn average_log2(text: &str) -> Result<u8, String> {
+    let count = text.parse::<u16>().ok().filter(|count| count.is_power_of_two() && *count <= 256);
+    count.map(|count| count.ilog2() as u8).ok_or_else(|| "1, 2, 4, 8, 16, 32, 64, 128 or 256".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speeds_times_and_averages_are_checked() {
+        assert_eq!(speed("2.5"), Ok(2.5));
+        assert_eq!(speed("max"), Ok(f64::INFINITY));
+        assert!(speed("0").is_err() && speed("-1").is_err() && speed("NaN").is_err());
+        assert!(seconds("1.5").is_ok() && seconds("0").is_err() && seconds("inf").is_err());
+        assert_eq!(average_log2("256"), Ok(8));
+        assert!(average_log2("3").is_err() && average_log2("512").is_err() && average_log2("0").is_err());
+    }
+}

@@ -1,0 +1,60 @@
+//! The program as a user calls it: exit codes and messages.
+
+#![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
+
+use std::process::{Command, Output};
+
+fn tactomo(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).output().unwrap()
+}
+
+/// Exit code and what stands on stderr.
+fn failure(args: &[&str]) -> (Option<i32>, String) {
+    let output = tactomo(args);
+    assert!(output.stdout.is_empty(), "only machine output belongs on stdout");
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn every_command_has_a_help_with_an_example() {
+    for command in ["live", "ports", "record", "replay", "forward", "validate"] {
+        let output = tactomo(&[command, "--help"]);
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        assert!(text.contains("Example") && text.contains(&format!("tactomo {command}")), "{command}: {text}");
+    }
+}
+
+#[test]
+fn wrong_use_exits_with_2_and_names_the_argument() {
+    for (args, named) in [
+        (&["live", "--detector", "round-9"][..], "square-60"),
+        (&["live", "--average", "3"], "--average"),
+        (&["live", "--port", "/dev/ttyUSB0", "--replay", "some.file"], "--replay"),
+        (&["live", "--speed", "2"], "--replay"),
+        (&["replay", "some.file", "--speed", "0"], "max"),
+        (&["record"], "FILE"),
+        (&["dance"], "dance"),
+    ] {
+        let (code, message) = failure(args);
+        assert_eq!(code, Some(2), "{args:?}: {message}");
+        assert!(message.contains(named), "{args:?}: {message}");
+    }
+}
+
+#[test]
+fn what_fails_exits_with_1_and_says_what_to_do() {
+    let text = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    for (args, told) in [
+        (&["live", "--port", "/dev/ttyNOT7", "--json"][..], "there is no serial port /dev/ttyNOT7"),
+        (&["live", "--port", "/dev/null", "--json"], "/dev/null is not a serial port; `tactomo ports`"),
+        (&["replay", "no/such.tactomo", "--json"], "cannot open the recording no/such.tactomo: No such file"),
+        (&["replay", text, "--json"], "is not a recording of tactomo"),
+        (&["live", "--port", "/dev/null", "--elf", text, "--json"], "is not the ELF file of a firmware"),
+        (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
+    ] {
+        let (code, message) = failure(args);
+        assert_eq!(code, Some(1), "{args:?}: {message}");
+        assert!(message.contains(told), "{args:?}: {message}");
+    }
+}

@@ -1,0 +1,182 @@
+//! A board of bytes only: it answers commands and sends frames as fast as they are read, with the faults that a test asks for.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+
+use tactomo::detector::Detector;
+use tactomo::live::board_log::BoardLog;
+use tactomo::live::plan::{Ends, Plan};
+use tactomo::live::session::Wish;
+use tactomo::live::{Request, Snapshot};
+use tactomo::source::{Link, Source, SourceError};
+use tactomo_protocol::{
+    BoardMessage, Command, CommandReceiver, FrameHead, Hello, MAX_WIRE, Settings, encode_board, encode_frame,
+};
+use tokio::sync::watch;
+
+/// A board on the test's own link.
+pub struct FakeBoard {
+    pub electrodes: u8,
+    /// Frames to send, then the link ends as a recording does, or breaks.
+    pub frames: u64,
+    pub breaks: bool,
+    /// After every so many frames one is left out.
+    pub skip_every: u64,
+    /// After every so many frames come bytes that are no message.
+    pub junk_every: u64,
+    pub settings: Settings,
+    pub receiver: CommandReceiver,
+    pub out: VecDeque<u8>,
+    pub streaming: bool,
+    pub sent: u64,
+    pub sequence: u64,
+}
+
+impl FakeBoard {
+    pub fn new(frames: u64) -> Self {
+        Self {
+            electrodes: 16,
+            frames,
+            breaks: false,
+            skip_every: u64::MAX,
+            junk_every: u64::MAX,
+            settings: Settings::default(),
+            receiver: CommandReceiver::default(),
+            out: VecDeque::new(),
+            streaming: false,
+            sent: 0,
+            sequence: 0,
+        }
+    }
+
+    fn obey(&mut self, command: Command) {
+        match command {
+            Command::Hello => self.say_hello(),
+            Command::Configure(settings) => {
+                self.settings = settings;
+                self.say_hello();
+            }
+            Command::Start => self.streaming = true,
+            Command::Stop => self.streaming = false,
+        }
+    }
+
+    fn say_hello(&mut self) {
+        let hello = Hello {
+            firmware_version: "0.0.1".try_into().unwrap(),
+            board: "fake".try_into().unwrap(),
+            electrodes: self.electrodes,
+            adc_bits: 12,
+            adc_full_scale_mv: 3300,
+            drive_mv: 2000,
+            settings: self.settings,
+        };
+        let mut wire = [0; MAX_WIRE];
+        let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
+        self.out.extend(&wire[..length]);
+    }
+
+    /// A frame of a press that comes and goes, with faults where they are due.
+    fn send_frame(&mut self) {
+        self.sent += 1;
+        self.sequence += if self.sent.is_multiple_of(self.skip_every) { 2 } else { 1 };
+        if self.sent.is_multiple_of(self.junk_every) {
+            self.out.extend(b"\x05junk\x00");
+        }
+        let height = (self.sent / 100 % 2 * 40) as u16;
+        let n = usize::from(self.electrodes);
+        let readings: Vec<u16> =
+            (0..n * n).map(|i| if i % (n + 1) == 0 { 0 } else { height + (i % 7) as u16 }).collect();
+        let head = FrameHead {
+            sequence: self.sequence as u16,
+            time_us: (self.sequence * 1000) as u32,
+            ..FrameHead::default()
+        };
+        let mut wire = [0; MAX_WIRE];
+        let length = encode_frame(head, &readings, &mut wire).unwrap();
+        self.out.extend(&wire[..length]);
+    }
+}
+
+impl Link for FakeBoard {
+    fn name(&self) -> String {
+        "fake board".to_owned()
+    }
+
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.out.is_empty() && self.streaming {
+            if self.sent == self.frames {
+                let kind = if self.breaks { io::ErrorKind::BrokenPipe } else { io::ErrorKind::UnexpectedEof };
+                return Err(kind.into());
+            }
+            self.send_frame();
+        }
+        let count = buffer.len().min(self.out.len());
+        buffer.iter_mut().zip(self.out.drain(..count)).for_each(|(place, byte)| *place = byte);
+        Ok(count)
+    }
+
+    fn write_all(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        while let Some(Ok(command)) = self.receiver.receive(&mut bytes) {
+            self.obey(command);
+        }
+        Ok(())
+    }
+}
+
+/// Links that open one after the other, as a board does that is unplugged and plugged in again.
+pub struct Links(pub Vec<FakeBoard>);
+
+impl Source for Links {
+    fn name(&self) -> String {
+        "fake boards".to_owned()
+    }
+
+    fn open(&mut self) -> Result<Box<dyn Link>, SourceError> {
+        if self.0.is_empty() {
+            return Err(SourceError::Ended(self.name()));
+        }
+        Ok(Box::new(self.0.remove(0)))
+    }
+
+    fn comes_back(&self) -> bool {
+        true
+    }
+}
+
+/// A plan for the default detector that finds nothing.
+pub fn plan() -> Plan {
+    Plan {
+        detector: Detector::preset(Detector::DEFAULT).unwrap(),
+        wish: Wish::default(),
+        make_solver: None,
+        recorder: None,
+        board_log: BoardLog::unread(),
+        press: None,
+        seconds: None,
+    }
+}
+
+/// The other side of a pipeline's ends.
+pub struct Other {
+    pub snapshots: watch::Receiver<Arc<Snapshot>>,
+    pub requests: mpsc::SyncSender<Request>,
+    pub stop: Arc<AtomicBool>,
+}
+
+impl Other {
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Ends for a pipeline, and their other side.
+pub fn ends() -> (Ends, Other) {
+    let (snapshot, snapshots) = watch::channel(Arc::new(Snapshot::default()));
+    let (request, requests) = mpsc::sync_channel(8);
+    let stop = Arc::new(AtomicBool::new(false));
+    let ends = Ends { snapshots: snapshot, requests, stop: Arc::clone(&stop) };
+    (ends, Other { snapshots, requests: request, stop })
+}

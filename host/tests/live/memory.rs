@@ -1,0 +1,51 @@
+//! Memory stays flat, however long the picture runs.
+
+use crate::fake::{FakeBoard, ends, plan};
+use tactomo::forward::jacobian::Jacobian;
+use tactomo::forward::shell::Shell;
+use tactomo::live::pipeline;
+use tactomo::live::plan::{MakeSolver, Plan};
+use tactomo::solve::{Lambda, Tikhonov, Variant};
+use tactomo::source::Opened;
+
+/// Resident memory of this process (kB).
+fn resident_kb() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let line = status.lines().find(|line| line.starts_with("VmRSS:")).unwrap();
+    line.split_whitespace().nth(1).unwrap().parse().unwrap()
+}
+
+/// Resident memory (kB) after `frames` frames through the whole pipeline, a page looking on.
+fn resident_after(frames: u64) -> u64 {
+    let make_solver: MakeSolver = Box::new(|detector| {
+        let jacobian = Jacobian::of(&Shell::new(detector)?);
+        Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced)))
+    });
+    let (ends, _page) = ends();
+    let mut source = Opened::new(Box::new(FakeBoard { skip_every: 1000, junk_every: 1000, ..FakeBoard::new(frames) }));
+    let summary = pipeline::run(&mut source, Plan { make_solver: Some(make_solver), ..plan() }, ends).unwrap();
+    assert_eq!(summary.frames, frames);
+    let resident_kb = resident_kb();
+    eprintln!(
+        "{frames} frames: {resident_kb} kB resident, {:.0} frames/s, {:?}",
+        summary.frames_per_s, summary.latency_us
+    );
+    resident_kb
+}
+
+#[test]
+fn memory_is_flat() {
+    let first_kb = resident_after(2_000);
+    let last_kb = resident_after(12_000);
+    assert!(last_kb < first_kb + 8_000, "{first_kb} kB after 2000 frames, {last_kb} kB after 14000");
+    assert!(last_kb < 100_000, "{last_kb} kB");
+}
+
+#[test]
+#[ignore = "an hour's worth of frames takes minutes: cargo test --release --test live -- --ignored --nocapture"]
+fn memory_is_flat_over_an_hour_of_frames() {
+    let first_kb = resident_after(10_000);
+    let last_kb = resident_after(3_600_000);
+    assert!(last_kb < first_kb + 8_000, "{first_kb} kB after 10000 frames, {last_kb} kB after an hour of them");
+    assert!(last_kb < 100_000, "{last_kb} kB");
+}

@@ -1,0 +1,154 @@
+//! The pipeline from bytes to snapshots, on a board of bytes only.
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use tactomo::forward::jacobian::Jacobian;
+use tactomo::forward::shell::Shell;
+use tactomo::live::plan::{LiveError, Plan};
+use tactomo::live::session::{GreetError, Wish, greet};
+use tactomo::live::{LinkState, Request, pipeline};
+use tactomo::record::{Header, Recorder};
+use tactomo::scene::Contact;
+use tactomo::solve::{Lambda, Tikhonov, Variant};
+use tactomo::source::{Link, Opened, Recording};
+use tactomo_protocol::Settings;
+
+use crate::fake::{FakeBoard, Links, ends, plan};
+
+fn opened(link: impl Link + 'static) -> Opened {
+    Opened::new(Box::new(link))
+}
+
+fn imaging() -> Plan {
+    let make_solver: tactomo::live::plan::MakeSolver = Box::new(|detector| {
+        let jacobian = Jacobian::of(&Shell::with_nodes(detector, 500)?);
+        Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced)))
+    });
+    Plan { make_solver: Some(make_solver), ..plan() }
+}
+
+#[test]
+fn frames_become_images_and_everything_is_counted() {
+    let board = FakeBoard { skip_every: 10, junk_every: 25, ..FakeBoard::new(1000) };
+    let (ends, other) = ends();
+    let summary = pipeline::run(&mut opened(board), imaging(), ends).unwrap();
+    assert_eq!((summary.source.as_str(), summary.solver.as_str()), ("fake board", "tikhonov"));
+    assert_eq!((summary.frames, summary.dropped, summary.corrupt), (1000, 100, 40));
+    assert!(summary.latency_us.p50 > 0.0 && summary.latency_us.p50 <= summary.latency_us.max);
+    let snapshot = other.snapshots.borrow().clone();
+    let frame = snapshot.frame.as_ref().unwrap();
+    assert_eq!(frame.readings.electrodes(), 16);
+    assert!(frame.solution.image_s_per_m2.as_ref().is_some_and(|image| image.len() > 300));
+    assert!(matches!(&snapshot.link, LinkState::Ended(_)));
+    assert_eq!(snapshot.hello.as_ref().unwrap().board, "fake");
+}
+
+#[test]
+fn a_board_with_other_electrodes_than_the_detector_is_refused() {
+    let board = FakeBoard { electrodes: 8, ..FakeBoard::new(10) };
+    let error = pipeline::run(&mut opened(board), plan(), ends().0).unwrap_err();
+    assert!(matches!(error, LiveError::Mismatch(_)), "{error:?}");
+}
+
+#[test]
+fn settings_that_are_asked_for_reach_the_board() {
+    let settings = Settings { settle_us: 70, average_log2: 3, ..Settings::default() };
+    let wish = Wish { settle_us: Some(70), average_log2: Some(3), max_frames_per_s: None };
+    let (ends, other) = ends();
+    pipeline::run(&mut opened(FakeBoard::new(5)), Plan { wish, ..plan() }, ends).unwrap();
+    assert_eq!(other.snapshots.borrow().hello.as_ref().unwrap().settings, settings);
+}
+
+#[test]
+fn a_board_that_is_unplugged_is_waited_for() {
+    let lost = FakeBoard { breaks: true, ..FakeBoard::new(50) };
+    let summary = pipeline::run(&mut Links(vec![lost, FakeBoard::new(70)]), plan(), ends().0).unwrap();
+    assert_eq!((summary.frames, summary.dropped), (120, 0));
+}
+
+#[test]
+fn a_link_that_cannot_come_back_is_an_error() {
+    let lost = FakeBoard { breaks: true, ..FakeBoard::new(50) };
+    let error = pipeline::run(&mut opened(lost), plan(), ends().0).unwrap_err();
+    assert!(matches!(error, LiveError::Link { .. }), "{error:?}");
+}
+
+#[test]
+fn a_board_of_a_newer_protocol_is_refused() {
+    let error = pipeline::run(&mut opened(Says(newer_hello())), plan(), ends().0).unwrap_err();
+    let LiveError::Greet { error: GreetError::Version(_), .. } = &error else { panic!("{error:?}") };
+    assert!(error.to_string().contains("version 2"), "{error}");
+}
+
+#[test]
+fn a_board_that_says_nothing_of_use_is_given_up() {
+    let mut link = Says(b"ets Jun  8 2016 00:22:57\r\n\0".to_vec());
+    let deadline = std::time::Instant::now() + Duration::from_millis(50);
+    let error = greet(&mut link, deadline).unwrap_err();
+    assert!(matches!(error, GreetError::Silent { junk_bytes: 26, .. }), "{error:?}");
+}
+
+#[test]
+fn presses_reach_the_simulated_detector_and_the_stop_ends_the_run() {
+    let pressed = Arc::new(Mutex::new(Vec::new()));
+    let seen = Arc::clone(&pressed);
+    let (ends, other) = ends();
+    let contact = Contact { x_m: 0.01, y_m: 0.0, radius_m: 0.002, conductance_s: 1e-3 };
+    for request in [Request::Press(contact), Request::Release, Request::Rezero] {
+        other.requests.send(request).unwrap();
+    }
+    let press: tactomo::live::plan::Press = Box::new(move |contact| seen.lock().unwrap().push(contact));
+    let plan = Plan { press: Some(press), ..plan() };
+    let runs = std::thread::spawn(move || pipeline::run(&mut opened(FakeBoard::new(u64::MAX)), plan, ends).unwrap());
+    while pressed.lock().unwrap().len() < 2 {
+        std::thread::yield_now();
+    }
+    other.stop();
+    runs.join().unwrap();
+    assert_eq!(*pressed.lock().unwrap(), [Some(contact), None]);
+}
+
+#[test]
+fn a_recording_plays_as_it_was_received() {
+    let file = std::env::temp_dir().join(format!("tactomo-{}-pipeline", std::process::id()));
+    let recorder = Recorder::create(&file, &Header::default()).unwrap();
+    let board = FakeBoard { skip_every: 7, junk_every: 9, ..FakeBoard::new(500) };
+    let live = pipeline::run(&mut opened(board), Plan { recorder: Some(recorder), ..plan() }, ends().0).unwrap();
+    let mut recording = Recording { path: file.clone(), speed: f64::INFINITY };
+    let played = pipeline::run(&mut recording, plan(), ends().0).unwrap();
+    std::fs::remove_file(file).unwrap();
+    assert_eq!((played.frames, played.dropped, played.corrupt), (live.frames, live.dropped, live.corrupt));
+    assert_eq!(played.frames, 500);
+}
+
+/// A link that says the same once, and then nothing.
+struct Says(Vec<u8>);
+
+impl Link for Says {
+    fn name(&self) -> String {
+        "a link".to_owned()
+    }
+
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = buffer.len().min(self.0.len());
+        buffer.iter_mut().zip(self.0.drain(..count)).for_each(|(place, byte)| *place = byte);
+        Ok(count)
+    }
+
+    fn write_all(&mut self, _bytes: &[u8]) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A packet in version 2 of the protocol: a body without zeros whose checksum has none either is its own COBS.
+fn newer_hello() -> Vec<u8> {
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+    let packet = (1..=255u8).find_map(|byte| {
+        let body = [2 << 4, byte, 7, 7];
+        let packet: Vec<u8> = body.into_iter().chain(crc.checksum(&body).to_le_bytes()).collect();
+        (!packet.contains(&0)).then_some(packet)
+    });
+    let packet = packet.unwrap();
+    [&[packet.len() as u8 + 1], packet.as_slice(), &[0]].concat()
+}
