@@ -1,0 +1,78 @@
+//! The host's pipeline on a serial port, in a thread of its own.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use tactomo::detector::Detector;
+use tactomo::live::board_log::BoardLog;
+use tactomo::live::plan::{Ends, LiveError, Plan, Summary};
+use tactomo::live::session::Wish;
+use tactomo::live::{Request, Snapshot, pipeline};
+use tactomo::source::NamedPort;
+use tactomo::source::serial::DEFAULT_BAUD;
+use tokio::sync::watch;
+
+/// How long anything may take.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+pub struct Host {
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<Result<Summary, LiveError>>,
+    /// Kept, since the pipeline may not lose its page.
+    _requests: mpsc::Sender<Request>,
+}
+
+impl Host {
+    pub fn start(port: &Path) -> Self {
+        let (snapshot, snapshots) = watch::channel(Arc::default());
+        let (_requests, requests) = mpsc::channel();
+        let stop = Arc::new(AtomicBool::new(false));
+        let plan = Plan {
+            detector: Detector::preset("square-60").unwrap(),
+            wish: Wish::default(),
+            make_solver: None,
+            recorder: None,
+            board_log: BoardLog::unread(),
+            press: None,
+            seconds: None,
+        };
+        let ends = Ends { snapshots: snapshot, requests, stop: Arc::clone(&stop) };
+        let mut source = NamedPort { port: port.to_str().unwrap().to_owned(), baud: DEFAULT_BAUD };
+        let thread = thread::spawn(move || pipeline::run(&mut source, plan, ends));
+        Self { snapshots, stop, thread, _requests }
+    }
+
+    /// Waits for a snapshot of which `told` holds.
+    pub fn wait_until(&self, what: &str, told: impl Fn(&Snapshot) -> bool) {
+        let begin = Instant::now();
+        while !told(&self.snapshots.borrow()) {
+            assert!(begin.elapsed() < PATIENCE, "never: {what}; the last is {:?}", self.snapshots.borrow());
+            assert!(!self.thread.is_finished(), "the host ended before: {what}");
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    pub fn wait_for_frames(&self, frames: u64) {
+        self.wait_until(&format!("{frames} frames"), |snapshot| snapshot.statistics.frames >= frames);
+    }
+
+    /// Ends the run.
+    pub fn finish(self) -> Result<Summary, LiveError> {
+        self.stop.store(true, Ordering::Relaxed);
+        self.ended()
+    }
+
+    /// What came of a run that ends, or is to end, by itself.
+    pub fn ended(self) -> Result<Summary, LiveError> {
+        let begin = Instant::now();
+        while !self.thread.is_finished() {
+            assert!(begin.elapsed() < PATIENCE, "the host does not end");
+            thread::sleep(Duration::from_millis(5));
+        }
+        self.thread.join().unwrap()
+    }
+}
