@@ -3,13 +3,16 @@
 //! A [`ForwardModel`] gives the electrode impedance matrix `Z` of a detector for any contacts, and the fields that make
 //! the linear theory. What follows from those is the same for every model and lives here, once.
 
+pub mod contact;
 pub mod jacobian;
 mod jacobian_file;
 pub mod shell;
+mod slab;
 
 use nalgebra::DMatrix;
 
 pub use self::jacobian_file::JacobianFileError;
+pub use self::slab::{Resolution, Slab};
 use crate::detector::Detector;
 use crate::readings::Readings;
 use crate::scene::Contact;

@@ -1,0 +1,37 @@
+//! The slab model: making it, and its readings.
+
+use divan::Bencher;
+use tactomo::detector::Detector;
+use tactomo::forward::{ForwardModel, Slab, readings_v};
+use tactomo::scene::Contact;
+
+fn main() {
+    divan::main();
+}
+
+fn detector() -> Detector {
+    Detector::preset(Detector::DEFAULT).unwrap_or_else(|| unreachable!("the default is a preset"))
+}
+
+fn slab() -> Slab {
+    Slab::new(&detector()).unwrap_or_else(|error| unreachable!("{error}"))
+}
+
+/// Contacts of 2 mm radius in a row across the detector.
+fn contacts(count: usize) -> Vec<Contact> {
+    let place = |i: usize| 0.05 * ((i as f64 + 0.5) / count as f64 - 0.5);
+    (0..count).map(|i| Contact { x_m: place(i), y_m: 0.3 * place(i), radius_m: 0.002, conductance_s: 1e-3 }).collect()
+}
+
+/// All fields of square-60 on its image grid, ready to solve with.
+#[divan::bench]
+fn fields_of_square_60(bencher: Bencher) {
+    bencher.bench(slab);
+}
+
+/// Readings for a number of contacts.
+#[divan::bench(args = [1, 2, 5])]
+fn readings(bencher: Bencher, count: usize) {
+    let (slab, contacts) = (slab(), contacts(count));
+    bencher.bench(|| slab.impedance_ohm(&contacts).map(|z| readings_v(&z, slab.detector())));
+}

@@ -1,0 +1,318 @@
+//! A rectangular detector in full: layers in depth, equipotential pads below, contacts on top.
+//!
+//! The slab is diagonal in cosine modes in the plane and exact in depth ([`layers`]). Its kernel between points of a surface
+//! is a look-up ([`kernel`]); pads and contacts are discs of a few densities ([`disc`]); the pads are eliminated once
+//! ([`pads`]), so that a contact costs a few look-ups and a small solve.
+
+mod disc;
+mod kernel;
+mod layers;
+mod pads;
+mod quadrature;
+mod spline;
+#[cfg(test)]
+mod tests;
+
+use nalgebra::{DMatrix, DVector};
+use realfft::RealFftPlanner;
+
+use self::disc::{DiscBasis, MAX_DEGREE};
+use self::kernel::{Surface, SurfaceKernel};
+use self::pads::{Across, Pad, PadFields, between, pad_impedances};
+use super::contact::ContactSystem;
+use super::{ForwardError, ForwardModel, ImageMesh};
+use crate::detector::{Detector, Layer};
+use crate::scene::Contact;
+
+/// Nodes of the image mesh, about.
+const IMAGE_NODES: f64 = 2000.0;
+
+/// How finely a [`Slab`] is resolved: degrees of the polynomials that current densities are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resolution {
+    /// On the pads.
+    pub pad_degree: usize,
+    /// On contacts that are small against the thickness; wider ones get more.
+    pub contact_degree: usize,
+}
+
+impl Resolution {
+    /// Enough for readings within a few tenths of a per cent.
+    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 3 };
+    /// Finer than any solver needs.
+    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4 };
+}
+
+/// A rectangular detector, layered in depth.
+#[derive(Clone, Debug)]
+pub struct Slab {
+    detector: Detector,
+    size_m: [f64; 2],
+    resolution: Resolution,
+    top: SurfaceKernel,
+    pads: PadFields,
+    image_mesh: ImageMesh,
+    fields_ohm: DMatrix<f64>,
+}
+
+/// A contact, ready to be put into the system.
+struct Disc {
+    centre_m: [f64; 2],
+    radius_m: f64,
+    conductance_s: f64,
+    basis: &'static DiscBasis,
+    nodes: Vec<[f64; 2]>,
+    fields: DMatrix<f64>,
+}
+
+impl Slab {
+    /// Makes the model at the standard resolution.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the outline is not a rectangle, or a layer or an electrode makes no sense.
+    pub fn new(detector: &Detector) -> Result<Self, ForwardError> {
+        Self::with_resolution(detector, Resolution::STANDARD)
+    }
+
+    /// Makes the model at a resolution.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn with_resolution(detector: &Detector, resolution: Resolution) -> Result<Self, ForwardError> {
+        let wrong = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
+        let size_m = check(detector).map_err(wrong)?;
+        let mut planner = RealFftPlanner::new();
+        let pads = bare(detector, size_m, resolution, &mut planner)
+            .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
+        let top = SurfaceKernel::new(size_m, split_m(detector, size_m), &mut planner, &top_surface(detector));
+        let image_mesh = image_grid(size_m);
+        let fields_ohm = image_fields(&pads, &image_mesh, size_m);
+        Ok(Self { detector: detector.clone(), size_m, resolution, top, pads, image_mesh, fields_ohm })
+    }
+
+    /// A place from the corner, given from the middle (m).
+    fn from_corner(&self, x_m: f64, y_m: f64) -> [f64; 2] {
+        from_corner(self.size_m, [x_m, y_m])
+    }
+
+    fn disc(&self, index: usize, contact: &Contact) -> Result<Disc, ForwardError> {
+        self.check_contact(contact).map_err(|what| ForwardError::Contact { index, what })?;
+        let centre_m = self.from_corner(contact.x_m, contact.y_m);
+        let basis = DiscBasis::of_degree(self.contact_degree(contact.radius_m));
+        let nodes = basis.nodes_m(centre_m, contact.radius_m);
+        let fields = self.pads.under_disc(basis, &nodes);
+        Ok(Disc { centre_m, radius_m: contact.radius_m, conductance_s: contact.conductance_s, basis, nodes, fields })
+    }
+
+    /// The smooth part of the kernel varies over a split length: a disc that is wider needs more degrees.
+    fn contact_degree(&self, radius_m: f64) -> usize {
+        let wider = (radius_m / self.top.split_m() - 1.0).max(0.0);
+        (self.resolution.contact_degree + (2.0 * wider).ceil() as usize).min(MAX_DEGREE)
+    }
+
+    /// Whether a contact can be on this detector, or what is wrong with it.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn check_contact(&self, contact: &Contact) -> Result<(), String> {
+        let inside = 2.0 * contact.x_m.abs() <= self.size_m[0] && 2.0 * contact.y_m.abs() <= self.size_m[1];
+        if !inside {
+            return Err(format!("its middle, {} {} m, is not on the detector", contact.x_m, contact.y_m));
+        }
+        if !(contact.radius_m > 0.0 && contact.radius_m <= self.size_m[0].max(self.size_m[1])) {
+            return Err(format!("its radius is {} m", contact.radius_m));
+        }
+        if !(contact.conductance_s >= 0.0 && contact.conductance_s.is_finite()) {
+            return Err(format!("its conductance is {} S", contact.conductance_s));
+        }
+        Ok(())
+    }
+
+    fn system(&self, discs: &[Disc]) -> ContactSystem {
+        let electrodes = self.pads.electrodes();
+        let starts: Vec<_> = discs
+            .iter()
+            .scan(0, |next, disc| {
+                let start = *next;
+                *next += disc.basis.len();
+                Some(start)
+            })
+            .collect();
+        let size = discs.iter().map(|disc| disc.basis.len()).sum();
+        let mut system = ContactSystem {
+            electrodes: self.pads.electrodes_ohm.clone(),
+            cross: DMatrix::zeros(size, electrodes),
+            contacts: DMatrix::zeros(size, size),
+            current: DVector::zeros(size),
+        };
+        for (disc, &row) in discs.iter().zip(&starts) {
+            let scale = disc.conductance_s.sqrt();
+            system.current[row] = scale;
+            let cross = disc.fields.columns(0, electrodes) * scale;
+            system.cross.rows_mut(row, disc.basis.len()).copy_from(&cross);
+            for (other, &column) in discs.iter().zip(&starts).take_while(|(_, column)| **column <= row) {
+                let block = self.block(disc, other, row == column);
+                let shape = (disc.basis.len(), other.basis.len());
+                system.contacts.view_mut((row, column), shape).copy_from(&block);
+                system.contacts.view_mut((column, row), (shape.1, shape.0)).tr_copy_from(&block);
+            }
+        }
+        system
+    }
+
+    /// Scaled impedances between the densities of two contacts, with the floating pads below them.
+    fn block(&self, disc: &Disc, other: &Disc, same: bool) -> DMatrix<f64> {
+        let electrodes = self.pads.electrodes();
+        let images = self.top.images(disc.centre_m, other.centre_m, disc.radius_m + other.radius_m);
+        let mut block = between(disc.basis, &disc.nodes, other.basis, &other.nodes, &self.top, &images, same);
+        let corrections = |disc: &Disc| disc.fields.columns(electrodes, disc.fields.ncols() - electrodes).into_owned();
+        block -= corrections(disc) * corrections(other).transpose();
+        block *= (disc.conductance_s * other.conductance_s).sqrt();
+        if same {
+            block += self.top.disc_self(disc.radius_m).reduced(disc.basis, 1.0, disc.conductance_s);
+        }
+        block
+    }
+}
+
+impl ForwardModel for Slab {
+    fn name(&self) -> &'static str {
+        "slab"
+    }
+
+    fn detector(&self) -> &Detector {
+        &self.detector
+    }
+
+    fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
+        let discs = contacts
+            .iter()
+            .enumerate()
+            .map(|(index, contact)| self.disc(index, contact))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(self.system(&discs).solve().ok_or(ForwardError::NoContact)?.impedance_ohm)
+    }
+
+    fn image_mesh(&self) -> &ImageMesh {
+        &self.image_mesh
+    }
+
+    fn fields_ohm(&self) -> &DMatrix<f64> {
+        &self.fields_ohm
+    }
+
+    fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
+        &self.pads.electrodes_ohm
+    }
+}
+
+/// Width and height of a detector that the model can be made for (m), or what is wrong with it.
+fn check(detector: &Detector) -> Result<[f64; 2], String> {
+    let size_m =
+        detector.outline.as_rectangle().ok_or("its outline is not a rectangle; use the shell for other outlines")?;
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    let sound = |layer: &Layer| [layer.thickness_m, layer.bottom_s_per_m, layer.top_s_per_m].into_iter().all(positive);
+    if detector.layers.is_empty() {
+        return Err("it has no layer".to_owned());
+    }
+    if let Some(index) = detector.layers.iter().position(|layer| !sound(layer)) {
+        return Err(format!("layer {index} needs a thickness and conductivities above zero"));
+    }
+    if detector.electrodes.is_empty() {
+        return Err("it has no electrode".to_owned());
+    }
+    if !(detector.contact_impedance_ohm_m2 >= 0.0 && detector.contact_impedance_ohm_m2.is_finite()) {
+        return Err("its contact impedance is below zero or not a number".to_owned());
+    }
+    for (index, pad) in detector.electrodes.iter().enumerate() {
+        let inside =
+            [(pad.x_m, size_m[0]), (pad.y_m, size_m[1])].iter().all(|(at, size)| at.abs() + pad.radius_m <= size / 2.0);
+        if !(positive(pad.radius_m) && inside) {
+            return Err(format!("electrode {index} needs a radius above zero and a place inside the outline"));
+        }
+    }
+    Ok(size_m)
+}
+
+fn from_corner(size_m: [f64; 2], at_m: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|axis| at_m[axis] + size_m[axis] / 2.0)
+}
+
+/// Length at which the kernels are split: short enough that the near part fades within a few thicknesses, long enough that
+/// the tables stay small.
+fn split_m(detector: &Detector, size_m: [f64; 2]) -> f64 {
+    (0.6 * detector.thickness_m()).min(0.05 * size_m[0].max(size_m[1]))
+}
+
+fn top_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {
+    Surface {
+        response: |k| layers::response(&detector.layers, k).tt,
+        floating: layers::floating_response(&detector.layers).tt,
+        sheet_s: detector.sheet_conductance_s(),
+        sigma: detector.layers.last().map_or(0.0, |layer| layer.top_s_per_m),
+    }
+}
+
+fn bottom_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {
+    Surface {
+        response: |k| layers::response(&detector.layers, k).bb,
+        floating: layers::floating_response(&detector.layers).bb,
+        sheet_s: detector.sheet_conductance_s(),
+        sigma: detector.layers.first().map_or(0.0, |layer| layer.bottom_s_per_m),
+    }
+}
+
+/// The bare slab with its pads eliminated.
+fn bare(
+    detector: &Detector,
+    size_m: [f64; 2],
+    resolution: Resolution,
+    planner: &mut RealFftPlanner<f64>,
+) -> Option<PadFields> {
+    let pads: Vec<_> = detector
+        .electrodes
+        .iter()
+        .map(|pad| Pad { centre_m: from_corner(size_m, [pad.x_m, pad.y_m]), radius_m: pad.radius_m })
+        .collect();
+    let basis = DiscBasis::of_degree(resolution.pad_degree);
+    let split_m = split_m(detector, size_m);
+    let kernel = SurfaceKernel::new(size_m, split_m, planner, &bottom_surface(detector));
+    let impedances = pad_impedances(&pads, basis, &kernel, detector.contact_impedance_ohm_m2);
+    let across = Across {
+        size_m,
+        thickness_m: detector.thickness_m(),
+        response: |k| layers::response(&detector.layers, k).tb,
+        floating: layers::floating_response(&detector.layers).tb,
+    };
+    PadFields::new(&pads, basis, &impedances, &across, planner)
+}
+
+/// A regular grid of nodes, edges included, with two triangles in each cell.
+fn image_grid(size_m: [f64; 2]) -> ImageMesh {
+    let step_m = (size_m[0] * size_m[1] / IMAGE_NODES).sqrt();
+    let cells = size_m.map(|size_m| (size_m / step_m).round().max(2.0) as usize);
+    let [nx, ny] = cells;
+    let place = |axis: usize, i: usize| size_m[axis] * (i as f64 / cells[axis] as f64 - 0.5);
+    let share =
+        |axis: usize, i: usize| size_m[axis] / cells[axis] as f64 * if i == 0 || i == cells[axis] { 0.5 } else { 1.0 };
+    let at = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
+    let nodes = || (0..=ny).flat_map(|j| (0..=nx).map(move |i| (i, j)));
+    ImageMesh {
+        nodes_m: nodes().map(|(i, j)| [place(0, i), place(1, j)]).collect(),
+        node_areas_m2: nodes().map(|(i, j)| share(0, i) * share(1, j)).collect(),
+        triangles: (0..ny)
+            .flat_map(|j| (0..nx).map(move |i| (i, j)))
+            .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]])
+            .collect(),
+    }
+}
+
+fn image_fields(pads: &PadFields, mesh: &ImageMesh, size_m: [f64; 2]) -> DMatrix<f64> {
+    let mut fields = DMatrix::zeros(mesh.nodes_m.len(), pads.electrodes());
+    let mut sample = vec![0.0; pads.electrodes()];
+    for (row, at) in mesh.nodes_m.iter().enumerate() {
+        pads.sample(from_corner(size_m, *at), &mut sample);
+        sample.iter().enumerate().for_each(|(e, value)| fields[(row, e)] = f64::from(*value));
+    }
+    fields
+}

@@ -1,0 +1,128 @@
+//! The slab against answers known otherwise.
+
+use super::*;
+use crate::detector::{Electrode, Outline};
+use crate::forward::readings_v;
+
+fn square(thickness_m: f64, radius_m: f64) -> Detector {
+    let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+    detector.layers = vec![Layer::uniform(thickness_m, 0.25)];
+    detector.electrodes.iter_mut().for_each(|pad| pad.radius_m = radius_m);
+    detector
+}
+
+fn contact(x_m: f64, y_m: f64, radius_m: f64, conductance_s: f64) -> Contact {
+    Contact { x_m, y_m, radius_m, conductance_s }
+}
+
+/// Largest difference of a reading, as a share of the largest reading.
+fn apart(detector: &Detector, a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
+    let [a, b] = [a, b].map(|z| readings_v(z, detector));
+    let largest = a.volts().iter().zip(b.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    largest / b.largest_v()
+}
+
+#[test]
+fn impedance_is_symmetric_and_positive_definite() {
+    let slab = Slab::new(&square(0.005, 0.002)).unwrap();
+    let z = slab.impedance_ohm(&[contact(0.01, 0.004, 0.002, 1e-3), contact(-0.027, 0.0, 0.003, 1e-6)]).unwrap();
+    assert!((&z - z.transpose()).amax() < 1e-9 * z.amax());
+    assert!(z.symmetric_eigenvalues().min() > 0.0);
+}
+
+#[test]
+fn more_densities_change_next_to_nothing() {
+    let mut detector = square(0.01, 0.002);
+    detector.layers = vec![Layer { thickness_m: 0.01, bottom_s_per_m: 1.0, top_s_per_m: 0.01 }];
+    let contacts = [contact(-0.01, 0.012, 0.002, 1e-3), contact(0.012, -0.02, 0.006, 1e-2)];
+    let finest = Resolution { pad_degree: 4, contact_degree: 6 };
+    let [coarse, fine] = [Resolution::STANDARD, finest]
+        .map(|resolution| Slab::with_resolution(&detector, resolution).unwrap().impedance_ohm(&contacts).unwrap());
+    assert!(apart(&detector, &coarse, &fine) < 2e-3, "{}", apart(&detector, &coarse, &fine));
+}
+
+#[test]
+fn a_mirrored_contact_gives_mirrored_readings() {
+    let slab = Slab::new(&square(0.005, 0.002)).unwrap();
+    let [left, right] =
+        [-1.0, 1.0].map(|sign| slab.impedance_ohm(&[contact(sign * 0.0265, 0.005, 0.002, 1e-3)]).unwrap());
+    let mirror = |e: usize| e / 4 * 4 + 3 - e % 4;
+    let mirrored = DMatrix::from_fn(16, 16, |i, j| left[(mirror(i), mirror(j))]);
+    // The points of a disc are not mirror images of each other.
+    assert!(apart(slab.detector(), &mirrored, &right) < 1e-3, "{}", apart(slab.detector(), &mirrored, &right));
+}
+
+#[test]
+fn a_thin_slab_has_the_fields_of_the_sheet() {
+    let (detector, sheet_s) = (square(0.0008, 0.0004), 0.25 * 0.0008);
+    let slab = Slab::new(&detector).unwrap();
+    let mesh = slab.image_mesh();
+    let node = mesh.nodes_m.iter().position(|at| at[0].abs() < 8e-4 && (at[1] - 0.015).abs() < 8e-4).unwrap();
+    let fields = slab.fields_ohm();
+    let [e, f] = [0, 6];
+    let found = fields[(node, e)] - fields[(node, f)];
+    let place = |index: usize| {
+        let Electrode { x_m, y_m, .. } = detector.electrodes[index];
+        from_corner([0.06, 0.06], [x_m, y_m])
+    };
+    let expected = sheet_series(sheet_s, place(e), from_corner([0.06, 0.06], mesh.nodes_m[node]))
+        - sheet_series(sheet_s, place(f), from_corner([0.06, 0.06], mesh.nodes_m[node]));
+    assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
+}
+
+/// Neumann function of a thin square sheet of side 0.06 m by its cosine series, less its mean.
+fn sheet_series(sheet_s: f64, a: [f64; 2], b: [f64; 2]) -> f64 {
+    let wave = |m: u32| f64::from(m) * std::f64::consts::PI / 0.06;
+    let mut sum = 0.0;
+    for i in 1..300_u32 * 300 {
+        let (m, n) = (i / 300, i % 300);
+        let count = if m == 0 || n == 0 { 2.0 } else { 4.0 };
+        let k2 = wave(m).powi(2) + wave(n).powi(2);
+        let x = (wave(m) * a[0]).cos() * (wave(m) * b[0]).cos();
+        sum += count * x * (wave(n) * a[1]).cos() * (wave(n) * b[1]).cos() / k2;
+    }
+    sum / (0.06 * 0.06 * sheet_s)
+}
+
+#[test]
+fn a_layer_cut_in_two_stays_the_same_detector() {
+    let whole = square(0.006, 0.002);
+    let mut cut = whole.clone();
+    cut.layers = vec![Layer::uniform(0.0015, 0.25), Layer::uniform(0.0045, 0.25)];
+    let press = [contact(0.003, -0.008, 0.002, 1e-3)];
+    let [a, b] = [&whole, &cut].map(|detector| Slab::new(detector).unwrap().impedance_ohm(&press).unwrap());
+    assert!(apart(&whole, &a, &b) < 1e-9);
+}
+
+#[test]
+fn light_contacts_obey_the_linear_theory() {
+    let mut detector = square(0.005, 0.002);
+    // The linear theory grounds the electrode without a resistance.
+    detector.on_resistance_ohm = 0.0;
+    let slab = Slab::new(&detector).unwrap();
+    let mesh = slab.image_mesh();
+    let node = mesh.nodes_m.iter().position(|at| (at[0] - 0.01).abs() < 8e-4 && (at[1] + 0.012).abs() < 8e-4).unwrap();
+    let [x_m, y_m] = mesh.nodes_m[node];
+    let conductance_s = 1e-9;
+    let z = slab.impedance_ohm(&[contact(x_m, y_m, 5e-4, conductance_s)]).unwrap();
+    let readings = readings_v(&z, slab.detector());
+    let (fields, between) = (slab.fields_ohm(), slab.electrode_fields_ohm());
+    let (g, e) = (5, 9);
+    let resistance = fields[(node, e)] - fields[(node, g)] - between[(e, g)] + between[(g, g)];
+    let expected = slab.detector().drive_v * conductance_s * resistance;
+    assert!((readings.at(g, e) / expected - 1.0).abs() < 2e-3, "{} {expected}", readings.at(g, e));
+}
+
+#[test]
+fn what_the_slab_cannot_be_is_refused_by_name() {
+    let mut detector = square(0.005, 0.002);
+    detector.outline = Outline { outer: vec![[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]], holes: Vec::new() };
+    assert!(Slab::new(&detector).unwrap_err().to_string().contains("rectangle"));
+    let mut detector = square(0.005, 0.002);
+    detector.electrodes[7].x_m = 0.0295;
+    assert!(Slab::new(&detector).unwrap_err().to_string().contains("electrode 7"));
+    let slab = Slab::new(&square(0.005, 0.002)).unwrap();
+    assert_eq!(slab.impedance_ohm(&[]), Err(ForwardError::NoContact));
+    let outside = slab.impedance_ohm(&[contact(0.0, 0.0, 0.001, 1e-3), contact(0.04, 0.0, 0.001, 1e-3)]);
+    assert!(matches!(outside, Err(ForwardError::Contact { index: 1, .. })));
+}
