@@ -3,12 +3,14 @@
 mod measure;
 mod noise;
 mod scene;
+mod slab;
 
 use crate::readings::Readings;
 
 pub use measure::measured;
 pub use noise::Noise;
 pub use scene::Scene;
+pub use slab::SlabPhysics;
 
 /// What the simulated board measures.
 pub trait Physics: Send {
