@@ -139,7 +139,7 @@ impl DiscSelf {
 
     /// Impedance between two densities of angular order 0; for others it is half of that.
     fn between(&self, n: usize, other: usize) -> f64 {
-        let sign = if n.abs_diff(other) % 4 == 0 { 1.0 } else { -1.0 };
+        let sign = if n.abs_diff(other).is_multiple_of(4) { 1.0 } else { -1.0 };
         sign * 2.0 / PI * self.0[n.max(other) * (MAX_ORDER + 1) + n.min(other)]
     }
 

@@ -90,14 +90,9 @@ impl Slab {
         Ok(Self { detector: detector.clone(), size_m, resolution, top, pads, image_mesh, fields_ohm })
     }
 
-    /// A place from the corner, given from the middle (m).
-    fn from_corner(&self, x_m: f64, y_m: f64) -> [f64; 2] {
-        from_corner(self.size_m, [x_m, y_m])
-    }
-
     fn disc(&self, index: usize, contact: &Contact) -> Result<Disc, ForwardError> {
         self.check_contact(contact).map_err(|what| ForwardError::Contact { index, what })?;
-        let centre_m = self.from_corner(contact.x_m, contact.y_m);
+        let centre_m = from_corner(self.size_m, [contact.x_m, contact.y_m]);
         let basis = DiscBasis::of_degree(self.contact_degree(contact.radius_m));
         let nodes = basis.nodes_m(centre_m, contact.radius_m);
         let fields = self.pads.under_disc(basis, &nodes);
@@ -234,6 +229,7 @@ fn check(detector: &Detector) -> Result<[f64; 2], String> {
     Ok(size_m)
 }
 
+/// A place from the corner, given from the middle (m).
 fn from_corner(size_m: [f64; 2], at_m: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|axis| at_m[axis] + size_m[axis] / 2.0)
 }
