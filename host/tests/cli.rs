@@ -31,6 +31,7 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["live", "--detector", "round-9"][..], "square-60"),
         (&["live", "--average", "3"], "--average"),
         (&["live", "--port", "/dev/ttyUSB0", "--replay", "some.file"], "--replay"),
+        (&["live", "--port", "/dev/ttyUSB0", "--simulate"], "--simulate"),
         (&["live", "--speed", "2"], "--replay"),
         (&["replay", "some.file", "--speed", "0"], "max"),
         (&["record"], "FILE"),

@@ -17,17 +17,18 @@ use tactomo::source::Source;
 use tokio::sync::watch;
 
 use super::choice::{self, Model, SolverName};
-use super::source::{self, BoardArgs};
+use super::source::{self, BoardArgs, Mouse};
 use super::{interrupt, output, recording};
 
 /// Requests of pages that may wait.
 const REQUESTS: usize = 64;
 
-/// Shows the live picture of a board or a recording.
+/// Shows the live picture of a board, the simulated board or a recording.
 ///
 /// Examples:
 ///   tactomo live                                    finds the board and serves the page
-/// ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
+///   tactomo live --simulate                         without hardware
+///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
 ///   tactomo live --replay touch.tactomo --speed 0.25
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -35,7 +36,7 @@ pub struct Args {
     #[command(flatten)]
     pub board: BoardArgs,
     /// Plays a recording instead
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "settle_us", "average", "max_fps"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "simulate", "settle_us", "average", "max_fps"])]
     pub replay: Option<PathBuf>,
     /// How many times faster the recording is played; `max` for as fast as it can be read
     #[arg(long, value_name = "FACTOR", default_value = "1", requires = "replay", value_parser = source::speed)]
@@ -77,6 +78,8 @@ pub struct PictureArgs {
 pub struct Show {
     /// Where the bytes come from.
     pub source: Box<dyn Source>,
+    /// The mouse's way to the detector, if that is simulated.
+    pub mouse: Option<Mouse>,
     /// What becomes of the bytes.
     pub picture: PictureArgs,
     /// Settings asked of the board.
@@ -91,12 +94,12 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let source = match args.replay {
-        Some(file) => source::recording(file, args.speed),
-        None => args.board.serial(),
+    let (source, mouse) = match args.replay {
+        Some(file) => (source::recording(file, args.speed), None),
+        None => source::board(&args.board, &args.picture.detector)?,
     };
     let wish = args.board.settings.wish();
-    show(Show { source, wish, picture: args.picture, seconds: args.seconds, record: args.record, elf: args.elf })
+    show(Show { source, mouse, wish, picture: args.picture, seconds: args.seconds, record: args.record, elf: args.elf })
 }
 
 /// Serves the page, or only counts, until the end.
@@ -106,7 +109,7 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
     let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
     let (request, requests) = mpsc::sync_channel(REQUESTS);
     let server = serve(&show, &jacobian, shown, request)?;
-    let plan = plan(&show, jacobian)?;
+    let plan = plan(&mut show, jacobian)?;
     // The page may outlive the pipeline, so the snapshots have a sender here too.
     let ends = Ends { snapshots: snapshots.clone(), requests, stop: Arc::clone(&stop) };
     let summary = pipeline::run(&mut *show.source, plan, ends)?;
@@ -124,14 +127,14 @@ fn jacobian(args: &PictureArgs) -> anyhow::Result<Jacobian> {
     }
 }
 
-fn plan(show: &Show, jacobian: Jacobian) -> anyhow::Result<Plan> {
+fn plan(show: &mut Show, jacobian: Jacobian) -> anyhow::Result<Plan> {
     let detector = show.picture.detector.clone();
     Ok(Plan {
         wish: show.wish,
         make_solver: Some(make_solver(show.picture.solver, jacobian)),
         recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
         board_log: recording::board_log(show.elf.as_deref())?,
-        press: None,
+        press: show.mouse.take().map(|mouse| mouse.press),
         seconds: show.seconds,
         detector,
     })
@@ -160,7 +163,7 @@ fn serve(
         mesh: jacobian.image_mesh.clone(),
         solver: show.picture.solver.name(),
         source: show.source.name(),
-        finger: None,
+        finger: show.mouse.as_ref().map(|mouse| mouse.finger),
     };
     let server = Server::start(show.picture.http_port, scene, snapshots, requests)?;
     eprintln!("live picture: {}", server.url());

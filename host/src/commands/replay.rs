@@ -32,6 +32,7 @@ pub struct Args {
 pub fn run(args: Args) -> anyhow::Result<()> {
     live::show(Show {
         source: source::recording(args.file, args.speed),
+        mouse: None,
         picture: args.picture,
         wish: Wish::default(),
         seconds: None,

@@ -2,16 +2,28 @@
 
 use std::path::PathBuf;
 
+use tactomo::detector::Detector;
+use tactomo::live::plan::Press;
+use tactomo::live::server::Finger;
 use tactomo::live::session::Wish;
+use tactomo::scene::Contact;
+use tactomo::simulate::{Scene, SlabPhysics};
 use tactomo::source::serial::DEFAULT_BAUD;
-use tactomo::source::{AnyBoard, NamedPort, Recording, Source};
+use tactomo::source::simulated::{Options, SimulatedBoard};
+use tactomo::source::{AnyBoard, NamedPort, Opened, Recording, Source};
+
+/// How firmly the mouse presses on the simulated detector, from 0 to 1.
+const MOUSE_FIRMNESS: f64 = 0.3;
 
 /// A board: on the port that is named, or on whichever USB serial port one is found.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BoardArgs {
     /// Serial port of the board; without it, each USB serial port is asked
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", conflicts_with = "simulate")]
     pub port: Option<String>,
+    /// Runs the simulated board: the firmware over simulated pins
+    #[arg(long)]
+    pub simulate: bool,
     /// Bits a second of the serial port
     #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     pub baud: u32,
@@ -35,7 +47,7 @@ pub struct SettingsArgs {
 
 impl BoardArgs {
     /// The board on a serial port.
-    pub fn serial(&self) -> Box<dyn Source> {
+    fn serial(&self) -> Box<dyn Source> {
         let baud = self.baud;
         match &self.port {
             Some(port) => Box::new(NamedPort { port: port.clone(), baud }),
@@ -49,6 +61,27 @@ impl SettingsArgs {
     pub fn wish(&self) -> Wish {
         Wish { settle_us: self.settle_us, average_log2: self.average, max_frames_per_s: self.max_fps }
     }
+}
+
+/// The mouse's way to a simulated detector.
+pub struct Mouse {
+    /// Who is told of presses.
+    pub press: Press,
+    /// What it presses with.
+    pub finger: Finger,
+}
+
+/// The board that is chosen, and the mouse's way to it if it is simulated.
+pub fn board(args: &BoardArgs, detector: &Detector) -> anyhow::Result<(Box<dyn Source>, Option<Mouse>)> {
+    if !args.simulate {
+        return Ok((args.serial(), None));
+    }
+    let scene = Scene::wandering(detector);
+    let Contact { radius_m, conductance_s, .. } = scene.touch(0.0, 0.0, MOUSE_FIRMNESS);
+    let physics = Box::new(SlabPhysics::new(detector, scene.clone())?);
+    let link = SimulatedBoard::start(detector, physics, Options::default())?;
+    let press: Press = Box::new(move |contact| scene.press(contact));
+    Ok((Box::new(Opened::new(Box::new(link))), Some(Mouse { press, finger: Finger { radius_m, conductance_s } })))
 }
 
 /// A recording to be played.
