@@ -62,6 +62,7 @@ function draw(now) {
   picture.show(update, now);
   readings.show(update, now);
   dataset.sequence = String(update.sequence);
+  dataset.received = String(update.frames);
   dataset.updates = String(Number(dataset.updates ?? 0) + 1);
   connection.taken();
 }

@@ -1,0 +1,119 @@
+//! The whole way in one process: simulated board, pipeline, server.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::sync_channel;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use tactomo::detector::Detector;
+use tactomo::forward::ForwardModel;
+use tactomo::forward::jacobian::Jacobian;
+use tactomo::forward::shell::Shell;
+use tactomo::live::board_log::BoardLog;
+use tactomo::live::plan::{Ends, LiveError, Plan, Summary};
+use tactomo::live::server::{self, Finger, Server};
+use tactomo::live::session::Wish;
+use tactomo::live::{Snapshot, Statistics, pipeline};
+use tactomo::simulate::{Scene, SlabPhysics};
+use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
+
+use tactomo::source::Opened;
+use tactomo::source::simulated::{Options, SimulatedBoard};
+use tokio::sync::watch;
+
+/// How firmly the mouse presses.
+const FIRMNESS: f64 = 0.2;
+
+/// A live picture of the simulated board.
+pub struct Live {
+    pub server: Server,
+    /// What presses.
+    pub scene: Scene,
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    stop: Arc<AtomicBool>,
+    pipeline: Option<JoinHandle<Result<Summary, LiveError>>>,
+}
+
+impl Live {
+    /// Starts it with what `scene` makes of the default detector.
+    pub fn start(scene: impl Fn(&Detector) -> Scene) -> Result<Self> {
+        let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
+        let scene = scene(&detector);
+        let model = Shell::new(&detector)?;
+        let (snapshots, receiver) = watch::channel(Arc::default());
+        let (sender, requests) = sync_channel(64);
+        let page = server::Scene {
+            detector: detector.clone(),
+            mesh: model.image_mesh().clone(),
+            solver: "tikhonov".to_owned(),
+            source: "simulated board".to_owned(),
+            finger: Some(finger(&scene)),
+        };
+        let server = Server::start(Some(0), page, receiver.clone(), sender)?;
+        let stop = Arc::default();
+        let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
+        let pipeline = Some(run(&detector, &scene, Jacobian::of(&model), ends)?);
+        Ok(Self { server, scene, snapshots: receiver, stop, pipeline })
+    }
+
+    /// Presses here (mm), as if by itself.
+    pub fn press(&self, [x_mm, y_mm]: [f64; 2]) {
+        self.scene.press(Some(self.scene.touch(x_mm * 1e-3, y_mm * 1e-3, FIRMNESS)));
+    }
+
+    /// Counts of now.
+    pub fn statistics(&self) -> Statistics {
+        self.snapshots.borrow().statistics
+    }
+
+    /// Frames a second, and frames dropped, over the next while.
+    pub async fn rate_over(&self, time: Duration) -> (f64, u64) {
+        let (before, begin) = (self.statistics(), std::time::Instant::now());
+        tokio::time::sleep(time).await;
+        let after = self.statistics();
+        let rate = (after.frames - before.frames) as f64 / begin.elapsed().as_secs_f64();
+        (rate, after.dropped - before.dropped)
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(Ok(Err(error))) = self.pipeline.take().map(JoinHandle::join) {
+            eprintln!("the pipeline failed: {error}");
+        }
+    }
+}
+
+fn finger(scene: &Scene) -> Finger {
+    let touch = scene.touch(0.0, 0.0, FIRMNESS);
+    Finger { radius_m: touch.radius_m, conductance_s: touch.conductance_s }
+}
+
+fn run(
+    detector: &Detector,
+    scene: &Scene,
+    jacobian: Jacobian,
+    ends: Ends,
+) -> Result<JoinHandle<Result<Summary, LiveError>>> {
+    let physics = SlabPhysics::new(detector, scene.clone())?;
+    let board = SimulatedBoard::start(detector, Box::new(physics), Options::default())?;
+    let mouse = scene.clone();
+    let plan = Plan {
+        detector: detector.clone(),
+        wish: Wish::default(),
+        make_solver: Some(Box::new(move |_| Ok(tikhonov(&jacobian)))),
+        recorder: None,
+        board_log: BoardLog::unread(),
+        press: Some(Box::new(move |contact| mouse.press(contact))),
+        seconds: None,
+    };
+    let mut source = Opened::new(Box::new(board));
+    Ok(std::thread::spawn(move || pipeline::run(&mut source, plan, ends)))
+}
+
+fn tikhonov(jacobian: &Jacobian) -> Box<dyn Solver> {
+    Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Balanced))
+}
