@@ -48,6 +48,9 @@ pub enum NewBoardError {
     /// A reading has 16 bits.
     #[error("a converter of {0} bits: 1 to 16 fit")]
     AdcBits(u8),
+    /// Without them the host cannot make volts of readings.
+    #[error("the converter's full scale and the drive need to be above 0 mV")]
+    Millivolts,
 }
 
 /// What a step did.
@@ -98,6 +101,9 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         }
         if !(1..=16).contains(&identity.adc.bits) {
             return Err(NewBoardError::AdcBits(identity.adc.bits));
+        }
+        if identity.adc.full_scale_mv == 0 || identity.drive_mv == 0 {
+            return Err(NewBoardError::Millivolts);
         }
         let mut board = Self {
             parts,

@@ -1,6 +1,6 @@
 //! The ADG726: two 16-channel switches (halves A and B) on common address lines, with a latch for each half.
 //!
-//! From its data sheet (Analog Devices, ADG726/ADG732): with WR and a half's chip select (CSA, CSB) low, that half follows the
+//! After its data sheet (Analog Devices, ADG726/ADG732), times rounded to the safe side: with WR and a half's chip select (CSA, CSB) low, that half follows the
 //! address lines; it keeps what it had once WR or its chip select is high. EN is active low and is latched along with the
 //! address. A change of address breaks before it makes, so two electrodes are never joined. All its times are shorter than
 //! two writes to a GPIO register of the chips used here, so that only [`Latched::select`] needs a wait of its own, for the

@@ -176,6 +176,7 @@ fn an_identity_that_does_not_fit_is_refused() {
     assert_eq!(new(Identity { electrodes: 3, ..IDENTITY }), Some(NewBoardError::Electrodes(3)));
     let adc = tactomo_firmware::Adc { bits: 17, ..IDENTITY.adc };
     assert_eq!(new(Identity { adc, ..IDENTITY }), Some(NewBoardError::AdcBits(17)));
+    assert_eq!(new(Identity { drive_mv: 0, ..IDENTITY }), Some(NewBoardError::Millivolts));
 }
 
 #[test]
