@@ -8,6 +8,7 @@
 pub mod case;
 pub mod detector;
 pub mod forward;
+mod geometry;
 pub mod live;
 pub mod readings;
 pub mod record;

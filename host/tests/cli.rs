@@ -17,7 +17,7 @@ fn failure(args: &[&str]) -> (Option<i32>, String) {
 
 #[test]
 fn every_command_has_a_help_with_an_example() {
-    for command in ["live", "ports", "record", "replay", "forward", "validate"] {
+    for command in ["live", "ports", "record", "replay", "forward", "validate", "detector"] {
         let output = tactomo(&[command, "--help"]);
         let text = String::from_utf8(output.stdout).unwrap();
         assert_eq!(output.status.code(), Some(0));
@@ -34,6 +34,7 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["live", "--port", "/dev/ttyUSB0", "--simulate"], "--simulate"),
         (&["live", "--speed", "2"], "--replay"),
         (&["replay", "some.file", "--speed", "0"], "max"),
+        (&["record", "some.file", "--material", "AX"], "A, B, C or D"),
         (&["record"], "FILE"),
         (&["dance"], "dance"),
     ] {
@@ -51,6 +52,8 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         (&["live", "--port", "/dev/null", "--json"], "/dev/null is not a serial port; `tactomo ports`"),
         (&["replay", "no/such.tactomo", "--json"], "cannot open the recording no/such.tactomo: No such file"),
         (&["replay", text, "--json"], "is not a recording of tactomo"),
+        (&["detector", "check", "no/such.toml"], "cannot read the detector no/such.toml: No such file"),
+        (&["forward", "--detector", text, "--contact", "0,0,1,1e-3"], "unknown field `"),
         (&["live", "--port", "/dev/null", "--elf", text, "--json"], "is not the ELF file of a firmware"),
         (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
     ] {
@@ -58,4 +61,20 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         assert_eq!(code, Some(1), "{args:?}: {message}");
         assert!(message.contains(told), "{args:?}: {message}");
     }
+}
+
+#[test]
+fn a_detector_goes_through_its_file_into_the_model() {
+    let path = std::env::temp_dir().join(format!("tactomo-{}.toml", std::process::id()));
+    let file = path.to_str().unwrap();
+    let shown = tactomo(&["detector", "show", "fingertip-10", "--material", "BC", "--toml"]);
+    std::fs::write(&path, &shown.stdout).unwrap();
+    let contact = ["--contact", "1,0,1,1e-3", "--json"];
+    let from_file = tactomo(&[&["forward", "--detector", file], &contact[..]].concat());
+    let preset = tactomo(&[&["forward", "--detector", "fingertip-10", "--material", "BC"], &contact[..]].concat());
+    let again = tactomo(&["detector", "show", file, "--toml"]);
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(from_file.status.code(), Some(0), "{}", String::from_utf8_lossy(&from_file.stderr));
+    assert_eq!(from_file.stdout, preset.stdout);
+    assert_eq!(again.stdout, shown.stdout);
 }

@@ -1,7 +1,9 @@
 //! Arguments that several commands share: detector, model, contacts.
 
+use std::path::PathBuf;
+
 use clap::ValueEnum;
-use tactomo::detector::Detector;
+use tactomo::detector::{Detector, Stack};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{ForwardError, ForwardModel};
@@ -50,10 +52,51 @@ impl SolverName {
     }
 }
 
-/// A preset by its name.
-pub fn preset(name: &str) -> Result<Detector, String> {
-    let names = || Detector::preset_names().collect::<Vec<_>>().join(", ");
-    Detector::preset(name).ok_or_else(|| format!("no such detector; there are {}", names()))
+/// Which detector.
+#[derive(Clone, Debug, clap::Args)]
+pub struct DetectorArgs {
+    /// Detector: name of a preset, or a TOML file
+    #[arg(long, value_name = "NAME|FILE", value_parser = detector, default_value = Detector::DEFAULT)]
+    pub detector: Chosen,
+    /// Foam that the detector is made of, or stack of foams with the upper one first, as in `BC`
+    #[arg(long, value_name = "A..D|STACK")]
+    pub material: Option<Stack>,
+}
+
+/// A preset, or a file that is still to be read.
+#[derive(Clone, Debug)]
+pub enum Chosen {
+    /// A preset.
+    Preset(Box<Detector>),
+    /// A TOML file.
+    File(PathBuf),
+}
+
+impl DetectorArgs {
+    /// The detector, in the material that is asked for.
+    pub fn get(&self) -> anyhow::Result<Detector> {
+        let detector = match &self.detector {
+            Chosen::Preset(detector) => (**detector).clone(),
+            Chosen::File(path) => Detector::read(path)?,
+        };
+        match &self.material {
+            Some(stack) => detector.in_material(stack).map_err(anyhow::Error::msg),
+            None => Ok(detector),
+        }
+    }
+}
+
+/// A preset by its name, or a file.
+pub fn detector(name: &str) -> Result<Chosen, String> {
+    if let Some(preset) = Detector::preset(name) {
+        return Ok(Chosen::Preset(Box::new(preset)));
+    }
+    let path = PathBuf::from(name);
+    if path.extension().is_some() || path.is_file() {
+        return Ok(Chosen::File(path));
+    }
+    let names = Detector::preset_names().collect::<Vec<_>>().join(", ");
+    Err(format!("no such detector; there are {names}, and files such as my.toml"))
 }
 
 /// A contact from `x_mm,y_mm,radius_mm,conductance_s`.
@@ -86,6 +129,6 @@ mod tests {
     fn wrong_contacts_and_detectors_say_what_is_allowed() {
         assert!(contact("1,2,3").is_err_and(|error| error.contains("x_mm,y_mm,radius_mm,conductance_s")));
         assert!(contact("1,2,3,much").is_err_and(|error| error.contains("`much` is not a number")));
-        assert!(preset("round").is_err_and(|error| error.contains("square-60, square-50")));
+        assert!(detector("round").is_err_and(|error| error.contains("square-60, square-50")));
     }
 }

@@ -12,7 +12,7 @@ use tactomo::forward::readings_v;
 use tactomo::readings::Readings;
 use tactomo::scene::Contact;
 
-use super::choice::{self, Model};
+use super::choice::{self, DetectorArgs, Model};
 use super::output;
 
 /// Computes the readings of a detector for given contacts, or saves its Jacobian.
@@ -23,11 +23,10 @@ use super::output;
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
-    /// Detector, by the name of a preset
-    #[arg(long, value_name = "NAME", value_parser = choice::preset, default_value = Detector::DEFAULT)]
-    detector: Detector,
+    #[command(flatten)]
+    detector: DetectorArgs,
     /// Takes detector and contacts from a case file instead
-    #[arg(long, value_name = "FILE", conflicts_with = "detector")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["detector", "material"])]
     case: Option<PathBuf>,
     /// A contact (millimetres and siemens); give it again for more
     #[arg(long, value_name = "X,Y,RADIUS,CONDUCTANCE", value_parser = choice::contact, allow_hyphen_values = true)]
@@ -94,7 +93,7 @@ fn scene(args: &Args) -> anyhow::Result<(Detector, Vec<Contact>)> {
             let case = Case::read(path)?;
             (case.detector, case.contacts)
         }
-        None => (args.detector.clone(), Vec::new()),
+        None => (args.detector.get()?, Vec::new()),
     };
     if !args.contact.is_empty() {
         contacts.clone_from(&args.contact);

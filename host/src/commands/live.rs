@@ -16,7 +16,7 @@ use tactomo::live::{Request, Snapshot};
 use tactomo::source::Source;
 use tokio::sync::watch;
 
-use super::choice::{self, Model, SolverName};
+use super::choice::{DetectorArgs, Model, SolverName};
 use super::source::{self, BoardArgs, Mouse};
 use super::{interrupt, output, recording};
 
@@ -57,9 +57,8 @@ pub struct Args {
 /// What becomes of the bytes.
 #[derive(Debug, clap::Args)]
 pub struct PictureArgs {
-    /// Detector that is connected, by the name of a preset
-    #[arg(long, value_name = "NAME", value_parser = choice::preset, default_value = Detector::DEFAULT)]
-    pub detector: Detector,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
     /// Solver that makes the image
     #[arg(long, value_enum, default_value = "tikhonov")]
     pub solver: SolverName,
@@ -80,6 +79,8 @@ pub struct Show {
     pub source: Box<dyn Source>,
     /// The mouse's way to the detector, if that is simulated.
     pub mouse: Option<Mouse>,
+    /// The detector that is connected.
+    pub detector: Detector,
     /// What becomes of the bytes.
     pub picture: PictureArgs,
     /// Settings asked of the board.
@@ -94,17 +95,19 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
+    let detector = args.picture.detector.get()?;
     let (source, mouse) = match args.replay {
         Some(file) => (source::recording(file, args.speed), None),
-        None => source::board(&args.board, &args.picture.detector)?,
+        None => source::board(&args.board, &detector)?,
     };
     let wish = args.board.settings.wish();
-    show(Show { source, mouse, wish, picture: args.picture, seconds: args.seconds, record: args.record, elf: args.elf })
+    let Args { picture, seconds, record, elf, .. } = args;
+    show(Show { source, mouse, wish, detector, picture, seconds, record, elf })
 }
 
 /// Serves the page, or only counts, until the end.
 pub fn show(mut show: Show) -> anyhow::Result<()> {
-    let jacobian = jacobian(&show.picture)?;
+    let jacobian = jacobian(&show.picture, &show.detector)?;
     let stop = interrupt::flag()?;
     let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
     let (request, requests) = mpsc::sync_channel(REQUESTS);
@@ -120,15 +123,15 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn jacobian(args: &PictureArgs) -> anyhow::Result<Jacobian> {
+fn jacobian(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Jacobian> {
     match &args.jacobian {
-        Some(path) => Ok(Jacobian::load(path, &args.detector)?),
-        None => Ok(Jacobian::of(&*Model::Shell.build(&args.detector, None)?)),
+        Some(path) => Ok(Jacobian::load(path, detector)?),
+        None => Ok(Jacobian::of(&*Model::Shell.build(detector, None)?)),
     }
 }
 
 fn plan(show: &mut Show, jacobian: Jacobian) -> anyhow::Result<Plan> {
-    let detector = show.picture.detector.clone();
+    let detector = show.detector.clone();
     Ok(Plan {
         wish: show.wish,
         make_solver: Some(make_solver(show.picture.solver, jacobian)),
@@ -159,7 +162,7 @@ fn serve(
         return Ok(None);
     }
     let scene = Scene {
-        detector: show.picture.detector.clone(),
+        detector: show.detector.clone(),
         mesh: jacobian.image_mesh.clone(),
         solver: show.picture.solver.name(),
         source: show.source.name(),

@@ -1,6 +1,7 @@
 //! The commands, one file each: its arguments and what it does.
 
 mod choice;
+mod detector;
 mod forward;
 mod interrupt;
 mod live;
@@ -28,6 +29,7 @@ enum Command {
     Ports(ports::Args),
     Record(Box<record::Args>),
     Replay(Box<replay::Args>),
+    Detector(detector::Args),
     Forward(Box<forward::Args>),
     Validate(validate::Args),
 }
@@ -39,6 +41,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Ports(args) => ports::run(&args),
         Command::Record(args) => record::run(&args),
         Command::Replay(args) => replay::run(*args),
+        Command::Detector(args) => detector::run(args),
         Command::Forward(args) => forward::run(&args),
         Command::Validate(args) => validate::run(&args),
     }

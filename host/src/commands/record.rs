@@ -4,15 +4,15 @@ use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use tactomo::detector::Detector;
 use tactomo::live::Snapshot;
 use tactomo::live::board_log::BoardLog;
 use tactomo::live::pipeline;
 use tactomo::live::plan::{Ends, Plan};
 use tokio::sync::watch;
 
+use super::choice::DetectorArgs;
 use super::source::{self, BoardArgs};
-use super::{choice, interrupt, live, recording};
+use super::{interrupt, live, recording};
 
 /// Keeps the bytes of a board in a new file.
 ///
@@ -25,9 +25,8 @@ pub struct Args {
     file: PathBuf,
     #[command(flatten)]
     board: BoardArgs,
-    /// Detector that is connected, by the name of a preset
-    #[arg(long, value_name = "NAME", value_parser = choice::preset, default_value = Detector::DEFAULT)]
-    detector: Detector,
+    #[command(flatten)]
+    detector: DetectorArgs,
     /// Ends this many seconds after the board said Hello; otherwise with Ctrl-C
     #[arg(long, value_parser = source::seconds)]
     seconds: Option<Duration>,
@@ -35,15 +34,16 @@ pub struct Args {
 
 /// Records until the end.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let (mut source, _) = source::board(&args.board, &args.detector)?;
+    let detector = args.detector.get()?;
+    let (mut source, _) = source::board(&args.board, &detector)?;
     let plan = Plan {
         wish: args.board.settings.wish(),
         make_solver: None,
-        recorder: recording::begin(Some(&args.file), &args.detector, source.name())?,
+        recorder: recording::begin(Some(&args.file), &detector, source.name())?,
         board_log: BoardLog::unread(),
         press: None,
         seconds: args.seconds,
-        detector: args.detector.clone(),
+        detector,
     };
     let (snapshots, _) = watch::channel(Arc::new(Snapshot::default()));
     let (_, requests) = mpsc::sync_channel(1);

@@ -33,6 +33,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     live::show(Show {
         source: source::recording(args.file, args.speed),
         mouse: None,
+        detector: args.picture.detector.get()?,
         picture: args.picture,
         wish: Wish::default(),
         seconds: None,

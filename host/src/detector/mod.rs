@@ -1,6 +1,15 @@
 //! What a detector is: outline, layers, electrodes, and how it is measured.
 
+mod check;
+mod file;
+mod material;
 mod preset;
+mod svg;
+
+pub use self::check::{ELECTRODES, Problem};
+pub use self::file::{FileError, TomlError};
+pub use self::material::{FOAMS, Foam, Stack};
+pub use self::svg::short;
 
 /// A detection layer with its electrodes and the circuit that measures it.
 ///
@@ -106,6 +115,12 @@ impl Outline {
     pub fn as_rectangle(&self) -> Option<[f64; 2]> {
         let [x, y] = *self.outer.get(2)?;
         (*self == Self::rectangle(2.0 * x, 2.0 * y)).then_some([2.0 * x, 2.0 * y])
+    }
+
+    /// Width and height of the bounding box (m).
+    pub fn size_m(&self) -> [f64; 2] {
+        let [low, high] = self.bounds();
+        [high[0] - low[0], high[1] - low[1]]
     }
 
     /// Corners of the bounding box: smallest and largest x and y (m).

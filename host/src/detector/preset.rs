@@ -1,9 +1,14 @@
 //! Detectors of the paper, by name.
 
+use super::material::FOAMS;
 use super::{Adc, Detector, Electrode, Layer, Outline};
 
-/// Conductivity of the paper's sample A (S/m).
-const SAMPLE_A_S_PER_M: f64 = 0.2273;
+/// Contact impedance where none is given (ohm m2).
+pub(super) const CONTACT_IMPEDANCE_OHM_M2: f64 = 1e-5;
+/// Drive where none is given (V).
+pub(super) const DRIVE_V: f64 = 2.0;
+/// On-resistance where none is given: the ADG726's (ohm).
+pub(super) const ON_RESISTANCE_OHM: f64 = 4.0;
 
 /// Name, width, height, thickness (m), columns and rows of electrodes, their diameter (m).
 type Row = (&'static str, f64, f64, f64, usize, usize, f64);
@@ -34,11 +39,11 @@ impl Detector {
         Some(Self {
             name: name.to_owned(),
             outline: Outline::rectangle(width_m, height_m),
-            layers: vec![Layer::uniform(thickness_m, SAMPLE_A_S_PER_M)],
+            layers: vec![Layer::uniform(thickness_m, FOAMS[0].conductivity_s_per_m)],
             electrodes: electrode_grid(width_m, height_m, columns, rows, diameter_m / 2.0),
-            contact_impedance_ohm_m2: 1e-5,
-            drive_v: 2.0,
-            on_resistance_ohm: 4.0,
+            contact_impedance_ohm_m2: CONTACT_IMPEDANCE_OHM_M2,
+            drive_v: DRIVE_V,
+            on_resistance_ohm: ON_RESISTANCE_OHM,
             adc: Adc::default(),
         })
     }

@@ -1,8 +1,8 @@
 //! Discs of contact on a mesh.
 
-use super::geometry;
 use super::mesh::Mesh;
 use crate::forward::ForwardError;
+use crate::geometry;
 use crate::scene::Contact;
 
 /// Corners of the polygon that stands for a disc, which has the disc's area.

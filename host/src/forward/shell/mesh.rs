@@ -12,9 +12,9 @@ use std::f64::consts::TAU;
 
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
-use super::geometry::{self, Point};
 use crate::detector::{Detector, Electrode, Outline};
 use crate::forward::ForwardError;
+use crate::geometry::{self, Point};
 
 /// Smallest angle that the refinement aims at (degrees).
 const ANGLE_DEG: f64 = 27.0;

@@ -5,7 +5,6 @@
 //! physics for what that costs.
 
 mod contact;
-pub(crate) mod geometry;
 mod mesh;
 mod system;
 #[cfg(test)]

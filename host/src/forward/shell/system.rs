@@ -9,8 +9,8 @@ use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::DMatrix;
 
-use super::geometry::cross;
 use super::mesh::Mesh;
+use crate::geometry::cross;
 
 /// The matrix of a bare, floating detector, and the plan of its factorisation.
 pub struct System {

@@ -6,6 +6,7 @@ use nalgebra::Cholesky;
 
 use super::*;
 use crate::detector::{Adc, Layer, Outline};
+use crate::geometry;
 
 /// Sheet conductance of the detectors made here (S).
 const SHEET_S: f64 = 1e-3;

@@ -1,0 +1,127 @@
+//! `tactomo detector`: which detectors there are, what one is, whether a file is one.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use serde::Serialize;
+use tactomo::detector::{Detector, FOAMS, Foam, Stack, short};
+
+use super::choice::{self, Chosen, DetectorArgs};
+use super::output;
+
+/// Lists, shows and checks detectors.
+///
+/// Examples:
+///   tactomo detector list
+///   tactomo detector show square-60 --material BC --svg square.svg
+///   tactomo detector show square-60 --toml          a file to start from
+///   tactomo detector check my.toml
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Action {
+    /// Lists the presets, and the foams that `--material` takes
+    List {
+        /// Prints `{detectors, foams}` as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Shows a detector
+    Show(ShowArgs),
+    /// Checks files; the first one that is no detector is an error
+    Check {
+        /// TOML files
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+struct ShowArgs {
+    /// Name of a preset, or a TOML file
+    #[arg(value_name = "NAME|FILE", value_parser = choice::detector, default_value = Detector::DEFAULT)]
+    detector: Chosen,
+    /// Foam, or stack of foams with the upper one first, as in `BC`
+    #[arg(long, value_name = "A..D|STACK")]
+    material: Option<Stack>,
+    /// Draws it in an SVG file
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Prints it as a TOML file
+    #[arg(long, conflicts_with = "json")]
+    toml: bool,
+    /// Prints it as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct List {
+    detectors: Vec<Detector>,
+    foams: [Foam; 4],
+}
+
+/// Does what is asked.
+pub fn run(args: Args) -> anyhow::Result<()> {
+    match args.action {
+        Action::List { json } => list(json),
+        Action::Show(args) => show(args),
+        Action::Check { files } => files.iter().try_for_each(|file| {
+            let detector = Detector::read(file)?;
+            Ok(output::print(&format!("{}: {}, {}", file.display(), detector.name, detector.summary()))?)
+        }),
+    }
+}
+
+fn list(json: bool) -> anyhow::Result<()> {
+    let list = List { detectors: Detector::preset_names().filter_map(Detector::preset).collect(), foams: FOAMS };
+    let text = if json { serde_json::to_string(&list)? } else { table(&list) };
+    Ok(output::print(&text)?)
+}
+
+fn table(list: &List) -> String {
+    let detectors = list.detectors.iter().map(|detector| format!("{:<16} {}", detector.name, detector.summary()));
+    let foams = list.foams.iter().map(|foam| {
+        let Foam { letter, product, conductivity_s_per_m, elasticity_pa } = foam;
+        let [conductivity, elasticity] = [*conductivity_s_per_m, elasticity_pa * 1e-6].map(short);
+        format!("{letter}  {product:<22} {conductivity:>9} S/m {elasticity:>6} MPa")
+    });
+    let mut lines = vec!["detectors, in foam A:".to_owned()];
+    lines.extend(detectors);
+    lines.push("\nfoams for --material, alone or stacked with the upper one first, as in BC:".to_owned());
+    lines.extend(foams);
+    lines.join("\n")
+}
+
+fn show(args: ShowArgs) -> anyhow::Result<()> {
+    let detector = DetectorArgs { detector: args.detector, material: args.material }.get()?;
+    if let Some(path) = &args.svg {
+        std::fs::write(path, detector.to_svg()).with_context(|| format!("cannot write {}", path.display()))?;
+        eprintln!("drew {} in {}", detector.name, path.display());
+    }
+    let text = match (args.toml, args.json) {
+        (true, _) => detector.to_toml().trim_end().to_owned(),
+        (_, true) => serde_json::to_string(&detector)?,
+        _ if args.svg.is_some() => return Ok(()),
+        _ => description(&detector),
+    };
+    Ok(output::print(&text)?)
+}
+
+fn description(detector: &Detector) -> String {
+    let mut lines = vec![format!("{}: {}", detector.name, detector.summary())];
+    lines.push("layers, the top one first:".to_owned());
+    lines.extend(detector.layers.iter().rev().map(|layer| format!("  {}", layer.summary())));
+    lines.extend(detector.facts().into_iter().map(|(what, value)| format!("{what}: {value}")));
+    lines.push("electrodes, x and y in mm from the middle:".to_owned());
+    let place = |(channel, pad): (usize, &tactomo::detector::Electrode)| {
+        format!("  {channel:>2} {:>8} {:>8}", short(pad.x_m * 1e3), short(pad.y_m * 1e3))
+    };
+    lines.extend(detector.electrodes.iter().enumerate().map(place));
+    lines.join("\n")
+}

@@ -1,0 +1,398 @@
+//! Detectors as TOML files.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::de::{DeTable, DeValue};
+
+use super::check::{LENGTH_M, Problem, within};
+use super::material::Foam;
+use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM, electrode_grid};
+use super::{Adc, Detector, Electrode, Layer, Outline};
+use crate::geometry::area;
+
+/// No detector's file is longer (bytes).
+const MAX_BYTES: u64 = 1 << 20;
+/// An outline whose middle is nearer to the origin stays where it is (m).
+const CENTRED_M: f64 = 1e-9;
+
+/// Why a file is no detector.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// It cannot be read.
+    #[error("cannot read the detector {path}: {error}")]
+    Read {
+        /// The file.
+        path: String,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// It does not say what a detector is.
+    #[error("{path}: {error}")]
+    Wrong {
+        /// The file.
+        path: String,
+        /// What is wrong.
+        error: TomlError,
+    },
+}
+
+/// Why a text is no detector.
+#[derive(Debug, thiserror::Error)]
+pub enum TomlError {
+    /// It is not TOML, or has a field that is missing, unknown or of another type.
+    #[error("{}", .0.to_string().trim_end())]
+    Toml(toml::de::Error),
+    /// A field has a value that is not allowed.
+    #[error("{}{problem}", line.map_or_else(String::new, |line| format!("line {line}: ")))]
+    Field {
+        /// Where it stands, from 1.
+        line: Option<usize>,
+        /// What is wrong.
+        problem: Problem,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    name: Option<String>,
+    contact_impedance_ohm_m2: Option<f64>,
+    drive_v: Option<f64>,
+    on_resistance_ohm: Option<f64>,
+    outline: OutlineTable,
+    layers: Vec<LayerTable>,
+    electrodes: ElectrodeTable,
+    #[serde(default)]
+    adc: AdcTable,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OutlineTable {
+    size_m: Option<[f64; 2]>,
+    corners_m: Option<Vec<[f64; 2]>>,
+    #[serde(default)]
+    holes_m: Vec<Vec<[f64; 2]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LayerTable {
+    thickness_m: f64,
+    material: Option<String>,
+    conductivity_s_per_m: Option<f64>,
+    bottom_s_per_m: Option<f64>,
+    top_s_per_m: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ElectrodeTable {
+    grid: Option<[usize; 2]>,
+    positions_m: Option<Vec<[f64; 2]>>,
+    diameter_m: Option<f64>,
+    diameters_m: Option<Vec<f64>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AdcTable {
+    bits: Option<u8>,
+    full_scale_v: Option<f64>,
+    noise_lsb: Option<f64>,
+}
+
+impl Detector {
+    /// Reads a TOML file; without a name in it, the detector is named as the file.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read, or says nothing that could be built.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let named = || path.display().to_string();
+        let text = read_text(path).map_err(|error| FileError::Read { path: named(), error })?;
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        Self::from_toml(&text, &stem).map_err(|error| FileError::Wrong { path: named(), error })
+    }
+
+    /// Reads a detector from TOML, named `name` unless the text has a name.
+    ///
+    /// # Errors
+    /// [`TomlError`] with field, line and what is allowed.
+    pub fn from_toml(text: &str, name: &str) -> Result<Self, TomlError> {
+        let document: Document = toml::from_str(text).map_err(TomlError::Toml)?;
+        let checked = document.into_detector(name).and_then(|detector| detector.check().map(|()| detector));
+        checked.map_err(|problem| TomlError::Field { line: line_of(text, &problem.field), problem })
+    }
+
+    /// This detector as TOML, for [`from_toml`](Self::from_toml).
+    pub fn to_toml(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write_toml(&mut text);
+        text
+    }
+
+    fn write_toml(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "name = {}", quoted(&self.name))?;
+        writeln!(text, "contact_impedance_ohm_m2 = {:?}", self.contact_impedance_ohm_m2)?;
+        writeln!(text, "drive_v = {:?}", self.drive_v)?;
+        writeln!(text, "on_resistance_ohm = {:?}", self.on_resistance_ohm)?;
+        self.outline.write_toml(text)?;
+        self.layers.iter().try_for_each(|layer| layer.write_toml(text))?;
+        self.write_electrodes(text)?;
+        writeln!(text, "\n[adc]\nbits = {}", self.adc.bits)?;
+        writeln!(text, "full_scale_v = {:?}", self.adc.full_scale_v)?;
+        writeln!(text, "noise_lsb = {:?}", self.adc.noise_lsb)
+    }
+
+    fn write_electrodes(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "\n[electrodes]")?;
+        match self.grid() {
+            Some([columns, rows]) => writeln!(text, "grid = [{columns}, {rows}]")?,
+            None => {
+                writeln!(text, "positions_m = [")?;
+                self.electrodes.iter().try_for_each(|pad| writeln!(text, "  [{:?}, {:?}],", pad.x_m, pad.y_m))?;
+                writeln!(text, "]")?;
+            }
+        }
+        let diameters_m: Vec<f64> = self.electrodes.iter().map(|pad| 2.0 * pad.radius_m).collect();
+        match diameters_m.split_first() {
+            Some((first, others)) if others.iter().all(|other| other == first) => {
+                writeln!(text, "diameter_m = {first:?}")
+            }
+            _ => writeln!(text, "diameters_m = {diameters_m:?}"),
+        }
+    }
+
+    /// Columns and rows, if the electrodes are a grid.
+    fn grid(&self) -> Option<[usize; 2]> {
+        let (count, radius_m) = (self.electrodes.len(), self.electrodes.first()?.radius_m);
+        let [width_m, height_m] = self.outline.size_m();
+        let is_grid = |&[columns, rows]: &[usize; 2]| {
+            electrode_grid(width_m, height_m, columns, rows, radius_m) == self.electrodes
+        };
+        (1..=count).filter(|columns| count % columns == 0).map(|columns| [columns, count / columns]).find(is_grid)
+    }
+}
+
+impl Outline {
+    fn write_toml(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "\n[outline]")?;
+        match self.as_rectangle() {
+            Some(size_m) => writeln!(text, "size_m = {size_m:?}"),
+            None => {
+                writeln!(text, "corners_m = {:?}", self.outer)?;
+                if self.holes.is_empty() { Ok(()) } else { writeln!(text, "holes_m = {:?}", self.holes) }
+            }
+        }
+    }
+
+    /// Moves it so that the middle of its bounding box is the origin; returns how far (m).
+    fn centre(&mut self) -> [f64; 2] {
+        let [low, high] = self.bounds();
+        let mut shift_m = [0, 1].map(|axis| -(low[axis] + high[axis]) / 2.0);
+        if shift_m.iter().all(|shift_m| shift_m.abs() < CENTRED_M) {
+            shift_m = [0.0; 2];
+        }
+        let corners = self.outer.iter_mut().chain(self.holes.iter_mut().flatten());
+        corners.for_each(|corner| (0..2).for_each(|axis| corner[axis] += shift_m[axis]));
+        shift_m
+    }
+
+    /// Turns the outer edge counter-clockwise and holes clockwise, and a rectangle into one that is recognised as such.
+    fn tidy(mut self) -> Self {
+        if area(&self.outer) < 0.0 {
+            self.outer.reverse();
+        }
+        self.holes.iter_mut().filter(|hole| area(hole) > 0.0).for_each(|hole| hole.reverse());
+        let [width_m, height_m] = self.size_m();
+        let rectangle = Self::rectangle(width_m, height_m);
+        let is_rectangle = self.holes.is_empty()
+            && self.outer.len() == 4
+            && rectangle.outer.iter().all(|corner| self.outer.contains(corner));
+        if is_rectangle { rectangle } else { self }
+    }
+}
+
+impl Layer {
+    fn write_toml(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "\n[[layers]]\nthickness_m = {:?}", self.thickness_m)?;
+        if self.bottom_s_per_m == self.top_s_per_m {
+            return writeln!(text, "conductivity_s_per_m = {:?}", self.bottom_s_per_m);
+        }
+        writeln!(text, "bottom_s_per_m = {:?}\ntop_s_per_m = {:?}", self.bottom_s_per_m, self.top_s_per_m)
+    }
+}
+
+impl Document {
+    fn into_detector(self, name: &str) -> Result<Detector, Problem> {
+        let (outline, shift_m) = self.outline.into_outline()?;
+        let layer = |(index, layer): (usize, LayerTable)| layer.into_layer(&format!("layers[{index}]"));
+        Ok(Detector {
+            name: self.name.unwrap_or_else(|| name.to_owned()),
+            layers: self.layers.into_iter().enumerate().map(layer).collect::<Result<_, _>>()?,
+            electrodes: self.electrodes.into_list(&outline, shift_m)?,
+            outline,
+            contact_impedance_ohm_m2: self.contact_impedance_ohm_m2.unwrap_or(CONTACT_IMPEDANCE_OHM_M2),
+            drive_v: self.drive_v.unwrap_or(DRIVE_V),
+            on_resistance_ohm: self.on_resistance_ohm.unwrap_or(ON_RESISTANCE_OHM),
+            adc: self.adc.into_adc(),
+        })
+    }
+}
+
+impl OutlineTable {
+    /// The outline about the origin, and how far it was moved to get there (m).
+    fn into_outline(self) -> Result<(Outline, [f64; 2]), Problem> {
+        match (self.size_m, self.corners_m) {
+            (Some([width_m, height_m]), None) if self.holes_m.is_empty() => {
+                within("outline.size_m[0]", width_m, LENGTH_M)?;
+                within("outline.size_m[1]", height_m, LENGTH_M)?;
+                Ok((Outline::rectangle(width_m, height_m), [0.0; 2]))
+            }
+            (None, Some(outer)) => {
+                let mut outline = Outline { outer, holes: self.holes_m };
+                let shift_m = outline.centre();
+                Ok((outline.tidy(), shift_m))
+            }
+            _ => Err(Problem::new("outline", "has to have either size_m, or corners_m with holes_m if there are any")),
+        }
+    }
+}
+
+impl LayerTable {
+    fn into_layer(self, field: &str) -> Result<Layer, Problem> {
+        let Self { thickness_m, material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m } = self;
+        match (material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m) {
+            (Some(material), None, None, None) => {
+                let foam = single(&material).and_then(Foam::of);
+                let what = || format!("is {}, but has to be \"A\", \"B\", \"C\" or \"D\"", quoted(&material));
+                let foam = foam.ok_or_else(|| Problem::new(format!("{field}.material"), what()))?;
+                Ok(Layer::uniform(thickness_m, foam.conductivity_s_per_m))
+            }
+            (None, Some(conductivity), None, None) => Ok(Layer::uniform(thickness_m, conductivity)),
+            (None, None, Some(bottom), Some(top)) => {
+                Ok(Layer { thickness_m, bottom_s_per_m: bottom, top_s_per_m: top })
+            }
+            _ => Err(Problem::new(
+                field,
+                "has to have one of material, conductivity_s_per_m, or bottom_s_per_m with top_s_per_m",
+            )),
+        }
+    }
+}
+
+impl ElectrodeTable {
+    fn into_list(self, outline: &Outline, shift_m: [f64; 2]) -> Result<Vec<Electrode>, Problem> {
+        let mut electrodes = match (self.grid, self.positions_m) {
+            (Some(grid), None) => grid_electrodes(grid, outline)?,
+            (None, Some(positions_m)) => {
+                let pad = |[x_m, y_m]: [f64; 2]| (x_m + shift_m[0], y_m + shift_m[1]);
+                positions_m.into_iter().map(pad).map(|(x_m, y_m)| Electrode { x_m, y_m, radius_m: f64::NAN }).collect()
+            }
+            _ => return Err(Problem::new("electrodes", "has to have either grid = [columns, rows] or positions_m")),
+        };
+        let diameters_m = diameters_m(self.diameter_m, self.diameters_m, electrodes.len())?;
+        electrodes.iter_mut().zip(diameters_m).for_each(|(pad, diameter_m)| pad.radius_m = diameter_m / 2.0);
+        Ok(electrodes)
+    }
+}
+
+impl AdcTable {
+    fn into_adc(self) -> Adc {
+        let usual = Adc::default();
+        Adc {
+            bits: self.bits.unwrap_or(usual.bits),
+            full_scale_v: self.full_scale_v.unwrap_or(usual.full_scale_v),
+            noise_lsb: self.noise_lsb.unwrap_or(usual.noise_lsb),
+        }
+    }
+}
+
+fn grid_electrodes([columns, rows]: [usize; 2], outline: &Outline) -> Result<Vec<Electrode>, Problem> {
+    let count = columns.checked_mul(rows).filter(|count| super::ELECTRODES.contains(count));
+    if count.is_none() {
+        let what = format!(
+            "is [{columns}, {rows}], but columns times rows has to be {} to {}",
+            super::ELECTRODES.start(),
+            super::ELECTRODES.end()
+        );
+        return Err(Problem::new("electrodes.grid", what));
+    }
+    let [width_m, height_m] = outline.size_m();
+    Ok(electrode_grid(width_m, height_m, columns, rows, f64::NAN))
+}
+
+/// One diameter for all, or one for each.
+fn diameters_m(one: Option<f64>, each: Option<Vec<f64>>, count: usize) -> Result<Vec<f64>, Problem> {
+    match (one, each) {
+        (Some(diameter_m), None) => {
+            within("electrodes.diameter_m", diameter_m, LENGTH_M)?;
+            Ok(vec![diameter_m; count])
+        }
+        (None, Some(diameters_m)) if diameters_m.len() == count => Ok(diameters_m),
+        (None, Some(diameters_m)) => {
+            let what = format!("has {} numbers, but has to have one for each of {count} electrodes", diameters_m.len());
+            Err(Problem::new("electrodes.diameters_m", what))
+        }
+        _ => Err(Problem::new("electrodes", "has to have either diameter_m, for all, or diameters_m, one for each")),
+    }
+}
+
+fn read_text(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    File::open(path)?.take(MAX_BYTES + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "it is longer than 1 MiB"));
+    }
+    Ok(text)
+}
+
+/// The only character of a text.
+fn single(text: &str) -> Option<char> {
+    let mut characters = text.chars();
+    characters.next().filter(|_| characters.next().is_none())
+}
+
+/// A basic string of TOML.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from('"');
+    for character in text.chars() {
+        match character {
+            '"' | '\\' => quoted.extend(['\\', character]),
+            _ if character.is_control() => quoted.push_str(&format!("\\u{:04X}", u32::from(character))),
+            _ => quoted.push(character),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+/// The line, from 1, of a field such as `layers[0].thickness_m`, or of what holds it.
+fn line_of(text: &str, field: &str) -> Option<usize> {
+    let mut value = DeValue::Table(DeTable::parse(text).ok()?.into_inner());
+    let mut start = None;
+    for step in field.split(['.', '[']).map(|step| step.trim_end_matches(']')) {
+        let next = match value {
+            DeValue::Table(table) => table
+                .into_iter()
+                .find(|(key, _)| key.get_ref() == step)
+                .map(|(key, value)| (key.span().start, value.into_inner())),
+            DeValue::Array(array) => {
+                let index = step.parse().unwrap_or(usize::MAX);
+                array.into_iter().nth(index).map(|value| (value.span().start, value.into_inner()))
+            }
+            _ => None,
+        };
+        let Some((at, inner)) = next else { break };
+        (start, value) = (Some(at), inner);
+    }
+    start.map(|start| 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count())
+}
+
+#[cfg(test)]
+mod tests;
