@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::forward::{ForwardError, ForwardModel};
+use tactomo::forward::{ForwardError, ForwardModel, Slab};
 use tactomo::scene::Contact;
 use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
 
@@ -15,6 +15,8 @@ use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
 pub enum Model {
     /// Thin shell of triangles: any outline, no thickness.
     Shell,
+    /// Layers in full depth: rectangles only.
+    Slab,
 }
 
 impl Model {
@@ -23,6 +25,7 @@ impl Model {
         let nodes = nodes.unwrap_or_else(|| Shell::default_nodes(detector));
         match self {
             Self::Shell => Ok(Box::new(Shell::with_nodes(detector, nodes)?)),
+            Self::Slab => Ok(Box::new(Slab::new(detector)?)),
         }
     }
 }

@@ -14,10 +14,12 @@ use super::output;
 
 /// Compares models and solvers with reference cases.
 ///
-/// The forward model computes the readings of each case; solvers, on a coarser mesh of the same model, read the contacts
-/// from the readings that the case gives.
+/// The forward model computes the readings of each case; solvers, on that model's image mesh (the shell's default one), read
+/// the contacts from the readings that the case gives.
 ///
-/// Example: tactomo validate reference/slab/*.json --noise-lsb 1.5 --trials 20
+/// Examples:
+///   tactomo validate reference/slab/*.json --noise-lsb 1.5 --trials 20
+///   tactomo validate reference/slab/*.json --model slab
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
