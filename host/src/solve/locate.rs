@@ -16,6 +16,7 @@ const STANDS_OUT: f32 = 0.7;
 #[derive(Clone, Debug)]
 pub struct Locator {
     nodes_m: Vec<[f64; 2]>,
+    triangles: Vec<[u32; 3]>,
     areas_m2: Vec<f64>,
     /// Peaks nearer than this are one (m): the mean distance of electrodes, which is about what an image resolves.
     apart_m: f64,
@@ -31,6 +32,7 @@ impl Locator {
         let noise_lsb = (detector.adc.noise_lsb.powi(2) + 1.0 / 12.0).sqrt();
         Self {
             nodes_m: mesh.nodes_m.clone(),
+            triangles: mesh.triangles.clone(),
             areas_m2: mesh.node_areas_m2.clone(),
             apart_m: (area_m2 / detector.electrodes.len() as f64).sqrt(),
             rest_v: NOISE_DEVIATIONS * noise_lsb * lsb_v,
@@ -50,47 +52,72 @@ impl Locator {
     /// The contacts at the peaks of an image (S/m2 at each node), the highest first.
     pub fn peaks(&self, image: &[f32]) -> Vec<FoundContact> {
         let peaks = self.peak_nodes(image);
-        peaks.iter().filter_map(|&peak| self.contact_at(image, peak, &peaks)).collect()
+        let owners = self.nearest(&peaks);
+        peaks
+            .iter()
+            .enumerate()
+            .filter_map(|(owner, &peak)| self.contact_at(image, peak, |node| owners[node] == owner))
+            .collect()
     }
 
-    /// Nodes that are highest within `apart_m`, the highest first.
+    /// Nodes that are highest within half of `apart_m` and apart from higher peaks, the highest first.
     fn peak_nodes(&self, image: &[f32]) -> Vec<usize> {
         let highest = image.iter().copied().fold(0.0, f32::max);
-        let mut high: Vec<_> = (0..image.len()).filter(|&node| image[node] > FURTHER_PEAK * highest).collect();
-        high.sort_unstable_by(|&a, &b| image[b].total_cmp(&image[a]));
+        let mut tops = self.tops(image);
+        tops.retain(|&node| image[node] > FURTHER_PEAK * highest);
+        tops.sort_unstable_by(|&a, &b| image[b].total_cmp(&image[a]));
         let mut peaks: Vec<usize> = Vec::new();
-        let mut hills: Vec<usize> = Vec::new();
-        for node in high {
-            // A node on the slope of a hill is near a higher node of it; only one that is not begins a hill of its own.
-            if hills.iter().all(|&higher| self.distance_m(node, higher) > 0.5 * self.apart_m)
-                && self.is_apart(node, &peaks)
-            {
+        for node in tops {
+            if !self.is_on_a_slope(image, node) && self.is_apart(node, &peaks) {
                 peaks.push(node);
             }
-            hills.push(node);
         }
         peaks
     }
 
+    /// Nodes that no neighbour on the mesh exceeds.
+    fn tops(&self, image: &[f32]) -> Vec<usize> {
+        let mut is_top = vec![true; image.len()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|node| node as usize);
+            for (one, other) in [(a, b), (b, c), (c, a)] {
+                is_top[one] &= image[one] >= image[other];
+                is_top[other] &= image[other] >= image[one];
+            }
+        }
+        (0..image.len()).filter(|&node| is_top[node]).collect()
+    }
+
+    /// Whether there is a higher node near: then this one is on the slope of a hill.
+    fn is_on_a_slope(&self, image: &[f32], node: usize) -> bool {
+        let near_m2 = (0.5 * self.apart_m).powi(2);
+        (0..image.len()).any(|higher| image[higher] > image[node] && self.distance_m2(node, higher) <= near_m2)
+    }
+
     fn is_apart(&self, node: usize, peaks: &[usize]) -> bool {
-        peaks.iter().all(|&peak| self.distance_m(node, peak) > self.apart_m)
+        peaks.iter().all(|&peak| self.distance_m2(node, peak) > self.apart_m.powi(2))
     }
 
-    fn distance_m(&self, a: usize, b: usize) -> f64 {
-        let (a, b) = (self.nodes_m[a], self.nodes_m[b]);
-        (a[0] - b[0]).hypot(a[1] - b[1])
-    }
-
-    /// The contact of a peak: its place from what stands out around it, its conductance from all that is nearer to it than to
-    /// another peak.
-    fn contact_at(&self, image: &[f32], peak: usize, peaks: &[usize]) -> Option<FoundContact> {
-        let own = |node: usize| {
-            let from_own_m = self.distance_m(node, peak);
-            peaks.iter().all(|&other| other == peak || self.distance_m(node, other) >= from_own_m)
+    /// For each node the place of the nearest peak in the list.
+    fn nearest(&self, peaks: &[usize]) -> Vec<usize> {
+        let nearest = |node: usize| {
+            let distance_m2 = |&peak: &usize| self.distance_m2(node, peaks[peak]);
+            (0..peaks.len()).min_by(|a, b| distance_m2(a).total_cmp(&distance_m2(b)))
         };
-        let near = |node: usize| self.distance_m(node, peak) < 0.75 * self.apart_m && own(node);
+        (0..self.nodes_m.len()).map(|node| nearest(node).unwrap_or(0)).collect()
+    }
+
+    fn distance_m2(&self, a: usize, b: usize) -> f64 {
+        let (a, b) = (self.nodes_m[a], self.nodes_m[b]);
+        (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
+    }
+
+    /// The contact of a peak: its place from what stands out around it, its conductance from all that is its `own`.
+    fn contact_at(&self, image: &[f32], peak: usize, own: impl Fn(usize) -> bool) -> Option<FoundContact> {
+        let near_m2 = (0.75 * self.apart_m).powi(2);
+        let near = |node: usize| own(node) && self.distance_m2(node, peak) < near_m2;
         let place = self.centroid(image, near, STANDS_OUT * image[peak])?;
-        let conductance_s = self.centroid(image, own, 0.0)?.conductance_s;
+        let conductance_s = self.centroid(image, &own, 0.0)?.conductance_s;
         Some(FoundContact { conductance_s, ..place })
     }
 
