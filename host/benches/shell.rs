@@ -12,7 +12,7 @@ use tactomo::scene::Contact;
 use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
 
 const NODES: [usize; 5] = [500, 2000, 5000, 20_000, 50_000];
-const CONTACT: Contact = Contact { x_m: 0.004, y_m: -0.009, radius_m: 0.003, conductance_s: 1e-3 };
+const CONTACT: Contact = Contact::flat(0.004, -0.009, 0.003, 1e-3);
 
 fn main() {
     divan::main();

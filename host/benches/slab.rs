@@ -20,7 +20,7 @@ fn slab() -> Slab {
 /// Contacts of 2 mm radius in a row across the detector.
 fn contacts(count: usize) -> Vec<Contact> {
     let place = |i: usize| 0.05 * ((i as f64 + 0.5) / count as f64 - 0.5);
-    (0..count).map(|i| Contact { x_m: place(i), y_m: 0.3 * place(i), radius_m: 0.002, conductance_s: 1e-3 }).collect()
+    (0..count).map(|i| Contact::flat(place(i), 0.3 * place(i), 0.002, 1e-3)).collect()
 }
 
 /// All fields of square-60 on its image grid, ready to solve with.

@@ -72,7 +72,7 @@ fn scenes(detector: &Detector, firmness: f64) -> Result<Vec<Scene>> {
     let places = PLACES_M.iter().flat_map(|&x_m| PLACES_M.map(|y_m| (x_m, y_m)));
     places
         .map(|(x_m, y_m)| {
-            let truth = Contact { x_m, y_m, radius_m: RADIUS_M, conductance_s };
+            let truth = Contact::flat(x_m, y_m, RADIUS_M, conductance_s);
             let readings = readings_v(&slab.impedance_ohm(&[truth])?, detector);
             let frames = (0..FRAMES).map(|_| measured(&readings, &detector.adc, &mut noise)).collect();
             Ok(Scene { truth, frames })

@@ -228,7 +228,7 @@ impl Electrodes {
 
     fn into_list(self) -> Vec<Electrode> {
         let radius_m = self.diameter_m / 2.0;
-        self.positions_m.into_iter().map(|[x_m, y_m]| Electrode { x_m, y_m, radius_m }).collect()
+        self.positions_m.into_iter().map(|[x_m, y_m]| Electrode::flat(x_m, y_m, radius_m)).collect()
     }
 }
 

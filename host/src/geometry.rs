@@ -29,6 +29,11 @@ pub fn area_and_centroid(polygon: &[Point]) -> Option<(f64, Point)> {
     (twice > 0.0).then(|| (twice / 2.0, [origin[0] + moment[0] / twice, origin[1] + moment[1] / twice]))
 }
 
+/// Whether a coordinate need not be written, as the height of what is flat.
+pub fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 /// Distance between two points (m).
 pub fn distance(a: Point, b: Point) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])

@@ -7,8 +7,34 @@ pub struct Contact {
     pub x_m: f64,
     /// Centre, y (m).
     pub y_m: f64,
+    /// Centre, z (m): on a curved detector; zero on a flat one.
+    #[serde(default, skip_serializing_if = "crate::geometry::is_zero")]
+    pub z_m: f64,
     /// Radius (m).
     pub radius_m: f64,
     /// Conductance of the whole disc (S), spread evenly over its area.
     pub conductance_s: f64,
+}
+
+impl Contact {
+    /// A contact on a flat detector.
+    pub const fn flat(x_m: f64, y_m: f64, radius_m: f64, conductance_s: f64) -> Self {
+        Self { x_m, y_m, z_m: 0.0, radius_m, conductance_s }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_height_of_a_flat_contact_need_not_be_written() {
+        let flat = Contact::flat(0.01, 0.02, 0.003, 1e-3);
+        let text = serde_json::to_string(&flat).unwrap();
+        assert_eq!(text, r#"{"x_m":0.01,"y_m":0.02,"radius_m":0.003,"conductance_s":0.001}"#);
+        for contact in [flat, Contact { z_m: 0.004, ..flat }] {
+            let text = serde_json::to_string(&contact).unwrap();
+            assert_eq!(serde_json::from_str::<Contact>(&text).unwrap(), contact);
+        }
+    }
 }

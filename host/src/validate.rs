@@ -130,11 +130,11 @@ mod tests {
     use super::*;
 
     fn truth(x_m: f64) -> Contact {
-        Contact { x_m, y_m: 0.0, radius_m: 0.001, conductance_s: 1e-3 }
+        Contact::flat(x_m, 0.0, 0.001, 1e-3)
     }
 
     fn found(x_m: f64) -> FoundContact {
-        FoundContact { x_m, y_m: 0.0, conductance_s: 1e-3 }
+        FoundContact::flat(x_m, 0.0, 1e-3)
     }
 
     #[test]

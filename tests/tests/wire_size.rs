@@ -13,7 +13,7 @@ const ELECTRODES: usize = 16;
 
 /// A contact in millimetres and siemens.
 fn contact(x_mm: f64, y_mm: f64, radius_mm: f64, conductance_s: f64) -> Contact {
-    Contact { x_m: x_mm / 1e3, y_m: y_mm / 1e3, radius_m: radius_mm / 1e3, conductance_s }
+    Contact::flat(x_mm / 1e3, y_mm / 1e3, radius_mm / 1e3, conductance_s)
 }
 
 /// Scenes by name, from nobody touching to a palm.

@@ -114,7 +114,7 @@ pub fn contact(text: &str) -> Result<Contact, String> {
             numbers.len()
         ));
     };
-    Ok(Contact { x_m: x_mm * 1e-3, y_m: y_mm * 1e-3, radius_m: radius_mm * 1e-3, conductance_s })
+    Ok(Contact::flat(x_mm * 1e-3, y_mm * 1e-3, radius_mm * 1e-3, conductance_s))
 }
 
 #[cfg(test)]

@@ -292,7 +292,7 @@ impl ElectrodeTable {
             (Some(grid), None) => grid_electrodes(grid, outline)?,
             (None, Some(positions_m)) => {
                 let pad = |[x_m, y_m]: [f64; 2]| (x_m + shift_m[0], y_m + shift_m[1]);
-                positions_m.into_iter().map(pad).map(|(x_m, y_m)| Electrode { x_m, y_m, radius_m: f64::NAN }).collect()
+                positions_m.into_iter().map(pad).map(|(x_m, y_m)| Electrode::flat(x_m, y_m, f64::NAN)).collect()
             }
             _ => return Err(Problem::new("electrodes", "has to have either grid = [columns, rows] or positions_m")),
         };

@@ -61,6 +61,9 @@ pub struct Electrode {
     pub x_m: f64,
     /// Centre, y (m).
     pub y_m: f64,
+    /// Centre, z (m): on a curved detector; zero on a flat one.
+    #[serde(default)]
+    pub z_m: f64,
     /// Radius (m).
     pub radius_m: f64,
 }
@@ -85,6 +88,13 @@ impl Detector {
     /// Conductivity integrated over the thickness (S per square): the natural unit of contact conductance.
     pub fn sheet_conductance_s(&self) -> f64 {
         self.layers.iter().map(Layer::sheet_conductance_s).sum()
+    }
+}
+
+impl Electrode {
+    /// A pad of a flat detector.
+    pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
+        Self { x_m, y_m, z_m: 0.0, radius_m }
     }
 }
 

@@ -54,10 +54,6 @@ pub fn electrode_grid(width_m: f64, height_m: f64, columns: usize, rows: usize, 
     let place = |side_m: f64, index: usize, count: usize| side_m * ((index as f64 + 0.5) / count as f64 - 0.5);
     (0..rows)
         .flat_map(|row| (0..columns).map(move |column| (column, row)))
-        .map(|(column, row)| Electrode {
-            x_m: place(width_m, column, columns),
-            y_m: place(height_m, row, rows),
-            radius_m,
-        })
+        .map(|(column, row)| Electrode::flat(place(width_m, column, columns), place(height_m, row, rows), radius_m))
         .collect()
 }

@@ -62,6 +62,7 @@ impl Scene {
         let firmness = firmness.clamp(LIGHTEST, 1.0);
         let shorter_m = 2.0 * self.half_size_m[0].min(self.half_size_m[1]);
         Contact {
+            z_m: 0.0,
             x_m: x_m.clamp(-self.half_size_m[0], self.half_size_m[0]),
             y_m: y_m.clamp(-self.half_size_m[1], self.half_size_m[1]),
             // A sphere pressed into foam: the area grows as the two-thirds power of the force (Hertz).

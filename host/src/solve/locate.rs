@@ -130,6 +130,6 @@ impl Locator {
             moment[0] += weight * self.nodes_m[node][0];
             moment[1] += weight * self.nodes_m[node][1];
         }
-        (sum > 0.0).then(|| FoundContact { x_m: moment[0] / sum, y_m: moment[1] / sum, conductance_s: sum })
+        (sum > 0.0).then(|| FoundContact::flat(moment[0] / sum, moment[1] / sum, sum))
     }
 }

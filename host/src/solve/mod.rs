@@ -36,8 +36,18 @@ pub struct FoundContact {
     pub x_m: f64,
     /// Centre, y (m).
     pub y_m: f64,
+    /// Centre, z (m): on a curved detector; zero on a flat one.
+    #[serde(skip_serializing_if = "crate::geometry::is_zero")]
+    pub z_m: f64,
     /// Conductance (S).
     pub conductance_s: f64,
+}
+
+impl FoundContact {
+    /// A contact on a flat detector.
+    pub const fn flat(x_m: f64, y_m: f64, conductance_s: f64) -> Self {
+        Self { x_m, y_m, z_m: 0.0, conductance_s }
+    }
 }
 
 /// Why a solver cannot answer.

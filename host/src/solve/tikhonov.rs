@@ -249,7 +249,7 @@ mod tests {
         }
     }
 
-    const CONTACT: Contact = Contact { x_m: 0.009, y_m: -0.006, radius_m: 0.003, conductance_s: 2e-4 };
+    const CONTACT: Contact = Contact::flat(0.009, -0.006, 0.003, 2e-4);
 
     #[test]
     fn equals_the_dense_solution() {

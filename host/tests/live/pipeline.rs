@@ -94,7 +94,7 @@ fn presses_reach_the_simulated_detector_and_the_stop_ends_the_run() {
     let pressed = Arc::new(Mutex::new(Vec::new()));
     let seen = Arc::clone(&pressed);
     let (ends, other) = ends();
-    let contact = Contact { x_m: 0.01, y_m: 0.0, radius_m: 0.002, conductance_s: 1e-3 };
+    let contact = Contact::flat(0.01, 0.0, 0.002, 1e-3);
     for request in [Request::Press(contact), Request::Release, Request::Rezero] {
         other.requests.send(request).unwrap();
     }

@@ -174,7 +174,7 @@ fn a_page_presses_on_the_detector_and_lets_go_when_it_leaves() -> Result<()> {
     let mut page = RawPage::open(rig.server.port())?;
     page.say(r#"{"press":{"x_m":0.031,"y_m":0}}"#)?;
     page.say(r#"{"press":{"x_m":0.01,"y_m":-0.02}}"#)?;
-    let contact = Contact { x_m: 0.01, y_m: -0.02, radius_m: 0.003, conductance_s: 1e-4 };
+    let contact = Contact::flat(0.01, -0.02, 0.003, 1e-4);
     assert_eq!(rig.request()?, Request::Press(contact), "0.031 m is off the detector");
     page.say("\"rezero\"")?;
     assert_eq!(rig.request()?, Request::Rezero);

@@ -114,7 +114,7 @@ fn detectors() -> impl Strategy<Value = Detector> {
         });
         let pad = |index: usize| {
             let (sin, cos) = ring(count, index);
-            Electrode { x_m: 0.018 * cos, y_m: 0.018 * sin, radius_m: 1e-3 + 1e-5 * index as f64 }
+            Electrode::flat(0.018 * cos, 0.018 * sin, 1e-3 + 1e-5 * index as f64)
         };
         let holes = if hole { vec![vec![[0.0, 0.0], [0.0, 1e-3], [1e-3, 0.0]]] } else { vec![] };
         let mut outline = Outline { outer: outer.collect(), holes };

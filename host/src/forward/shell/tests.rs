@@ -20,7 +20,7 @@ fn shell(detector: &Detector, nodes: usize) -> Shell {
 }
 
 fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
-    let electrodes = pads_m.iter().map(|&[x_m, y_m, radius_m]| Electrode { x_m, y_m, radius_m }).collect();
+    let electrodes = pads_m.iter().map(|&[x_m, y_m, radius_m]| Electrode::flat(x_m, y_m, radius_m)).collect();
     Detector {
         name: "test".to_owned(),
         outline,
@@ -34,7 +34,7 @@ fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
 }
 
 fn contact(x_m: f64, y_m: f64, radius_m: f64, conductance_s: f64) -> Contact {
-    Contact { x_m, y_m, radius_m, conductance_s }
+    Contact::flat(x_m, y_m, radius_m, conductance_s)
 }
 
 /// The node nearest to a place.

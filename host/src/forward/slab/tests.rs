@@ -12,7 +12,7 @@ fn square(thickness_m: f64, radius_m: f64) -> Detector {
 }
 
 fn contact(x_m: f64, y_m: f64, radius_m: f64, conductance_s: f64) -> Contact {
-    Contact { x_m, y_m, radius_m, conductance_s }
+    Contact::flat(x_m, y_m, radius_m, conductance_s)
 }
 
 /// Largest difference of a reading, as a share of the largest reading.

@@ -113,7 +113,7 @@ impl<'a> Page<'a> {
         if (low[0]..=high[0]).contains(&x_m) && (low[1]..=high[1]).contains(&y_m) {
             self.presses = true;
             let Finger { radius_m, conductance_s } = finger;
-            self.ask(Request::Press(Contact { x_m, y_m, radius_m, conductance_s }));
+            self.ask(Request::Press(Contact::flat(x_m, y_m, radius_m, conductance_s)));
         }
     }
 

@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn an_update_is_laid_out_as_documented() {
-        let contact = FoundContact { x_m: 0.25, y_m: -0.5, conductance_s: 2.0 };
+        let contact = FoundContact::flat(0.25, -0.5, 2.0);
         let frame = FrameSnapshot {
             sequence: (7 << 32) + 9,
             board_time_us: 0,
