@@ -172,6 +172,7 @@ impl File {
             detector: Detector {
                 name: self.name,
                 outline: Outline::rectangle(width_m, height_m),
+                surface: None,
                 layers: self.conductivity_s_per_m.into_layers(thickness_m),
                 electrodes: self.electrodes.into_list(),
                 contact_impedance_ohm_m2: self.electrode_contact_impedance_ohm_m2,

@@ -34,6 +34,13 @@ pub fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
+/// Corners of the bounding box of points: smallest and largest x and y.
+pub fn bounds(points: &[Point]) -> [Point; 2] {
+    points.iter().fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], at| {
+        [[low[0].min(at[0]), low[1].min(at[1])], [high[0].max(at[0]), high[1].max(at[1])]]
+    })
+}
+
 /// Distance between two points (m).
 pub fn distance(a: Point, b: Point) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])

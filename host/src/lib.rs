@@ -16,4 +16,5 @@ pub mod scene;
 pub mod simulate;
 pub mod solve;
 pub mod source;
+mod space;
 pub mod validate;

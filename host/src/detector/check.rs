@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use super::{Adc, Detector, Layer, Outline};
 use crate::geometry::{Point, area, cross, distance, edges, is_inside, segment_distance};
+use crate::space::{self, Place};
 
 /// How many electrodes a detector may have.
 pub const ELECTRODES: RangeInclusive<usize> = 4..=32;
@@ -42,7 +43,10 @@ impl Detector {
     /// The first [`Problem`] found.
     pub fn check(&self) -> Result<(), Problem> {
         check_name(&self.name)?;
-        self.outline.check()?;
+        // A surface was checked when it was read, and its map is only drawn.
+        if self.surface.is_none() {
+            self.outline.check()?;
+        }
         self.check_layers()?;
         self.check_electrodes()?;
         within("contact_impedance_ohm_m2", self.contact_impedance_ohm_m2, 0.0..=1e3)?;
@@ -72,22 +76,34 @@ impl Detector {
     fn check_electrode(&self, index: usize) -> Result<(), Problem> {
         let pad = self.electrodes[index];
         within(&format!("electrodes.diameters_m[{index}]"), 2.0 * pad.radius_m, LENGTH_M)?;
-        let at = [pad.x_m, pad.y_m];
+        let at = pad.place_m();
         let position = format!("electrodes.positions_m[{index}]");
         at.iter().try_for_each(|&at_m| within(&position, at_m, -LENGTH_M.end()..=*LENGTH_M.end()))?;
         let wrong = |what: String| {
-            let place = format!("puts electrode {index} at {} mm", millimetres(at));
+            let place = format!("puts electrode {index} at {} mm", self.millimetres(at));
             Err(Problem::new(&position, place + &what))
         };
-        if self.outline.clearance_m(at) <= pad.radius_m {
+        let clearance_m = match &self.surface {
+            Some(surface) => surface.clearance_m(at),
+            None => self.outline.clearance_m([pad.x_m, pad.y_m]),
+        };
+        if clearance_m <= pad.radius_m {
             let diameter_mm = 2e3 * pad.radius_m;
             return wrong(format!(", but with its diameter of {diameter_mm:.3} mm it has to lie within the outline"));
         }
         let overlaps =
-            |other: &super::Electrode| distance(at, [other.x_m, other.y_m]) <= pad.radius_m + other.radius_m + APART_M;
+            |other: &super::Electrode| space::distance(at, other.place_m()) <= pad.radius_m + other.radius_m + APART_M;
         match self.electrodes[..index].iter().position(overlaps) {
             Some(other) => wrong(format!(", where it overlaps with electrode {other}; there has to be a gap")),
             None => Ok(()),
+        }
+    }
+
+    /// A place for people: two numbers, or three on a surface.
+    fn millimetres(&self, at: Place) -> String {
+        match self.surface {
+            Some(_) => format!("({:.3}, {:.3}, {:.3})", at[0] * 1e3, at[1] * 1e3, at[2] * 1e3),
+            None => millimetres([at[0], at[1]]),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Detectors as TOML files.
 
+mod electrodes;
+
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read};
@@ -8,16 +10,17 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
 
+use self::electrodes::ElectrodeTable;
 use super::check::{LENGTH_M, Problem, within};
 use super::material::Foam;
-use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM, electrode_grid};
-use super::{Adc, Detector, Electrode, Layer, Outline};
+use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
+use super::{Adc, Detector, Layer, Outline, Surface, SurfaceError};
 use crate::geometry::area;
 
 /// No detector's file is longer (bytes).
 const MAX_BYTES: u64 = 1 << 20;
 /// An outline whose middle is nearer to the origin stays where it is (m).
-const CENTRED_M: f64 = 1e-9;
+pub(super) const CENTRED_M: f64 = 1e-9;
 
 /// Why a file is no detector.
 #[derive(Debug, thiserror::Error)]
@@ -63,7 +66,9 @@ struct Document {
     contact_impedance_ohm_m2: Option<f64>,
     drive_v: Option<f64>,
     on_resistance_ohm: Option<f64>,
-    outline: OutlineTable,
+    surface: Option<String>,
+    surface_unit: Option<String>,
+    outline: Option<OutlineTable>,
     layers: Vec<LayerTable>,
     electrodes: ElectrodeTable,
     #[serde(default)]
@@ -89,15 +94,6 @@ struct LayerTable {
     top_s_per_m: Option<f64>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ElectrodeTable {
-    grid: Option<[usize; 2]>,
-    positions_m: Option<Vec<[f64; 2]>>,
-    diameter_m: Option<f64>,
-    diameters_m: Option<Vec<f64>>,
-}
-
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct AdcTable {
@@ -115,16 +111,21 @@ impl Detector {
         let named = || path.display().to_string();
         let text = read_text(path).map_err(|error| FileError::Read { path: named(), error })?;
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        Self::from_toml(&text, &stem).map_err(|error| FileError::Wrong { path: named(), error })
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::from_toml_in(folder, &text, &stem).map_err(|error| FileError::Wrong { path: named(), error })
     }
 
-    /// Reads a detector from TOML, named `name` unless the text has a name.
+    /// Reads a detector from TOML, named `name` unless the text has a name. A surface's file is sought in the current folder.
     ///
     /// # Errors
     /// [`TomlError`] with field, line and what is allowed.
     pub fn from_toml(text: &str, name: &str) -> Result<Self, TomlError> {
+        Self::from_toml_in(Path::new(""), text, name)
+    }
+
+    fn from_toml_in(folder: &Path, text: &str, name: &str) -> Result<Self, TomlError> {
         let document: Document = toml::from_str(text).map_err(TomlError::Toml)?;
-        let checked = document.into_detector(name).and_then(|detector| detector.check().map(|()| detector));
+        let checked = document.into_detector(folder, name).and_then(|detector| detector.check().map(|()| detector));
         checked.map_err(|problem| TomlError::Field { line: line_of(text, &problem.field), problem })
     }
 
@@ -141,41 +142,22 @@ impl Detector {
         writeln!(text, "contact_impedance_ohm_m2 = {:?}", self.contact_impedance_ohm_m2)?;
         writeln!(text, "drive_v = {:?}", self.drive_v)?;
         writeln!(text, "on_resistance_ohm = {:?}", self.on_resistance_ohm)?;
-        self.outline.write_toml(text)?;
+        match &self.surface {
+            Some(surface) => surface.write_toml(text)?,
+            None => self.outline.write_toml(text)?,
+        }
         self.layers.iter().try_for_each(|layer| layer.write_toml(text))?;
         self.write_electrodes(text)?;
         writeln!(text, "\n[adc]\nbits = {}", self.adc.bits)?;
         writeln!(text, "full_scale_v = {:?}", self.adc.full_scale_v)?;
         writeln!(text, "noise_lsb = {:?}", self.adc.noise_lsb)
     }
+}
 
-    fn write_electrodes(&self, text: &mut String) -> std::fmt::Result {
-        writeln!(text, "\n[electrodes]")?;
-        match self.grid() {
-            Some([columns, rows]) => writeln!(text, "grid = [{columns}, {rows}]")?,
-            None => {
-                writeln!(text, "positions_m = [")?;
-                self.electrodes.iter().try_for_each(|pad| writeln!(text, "  [{:?}, {:?}],", pad.x_m, pad.y_m))?;
-                writeln!(text, "]")?;
-            }
-        }
-        let diameters_m: Vec<f64> = self.electrodes.iter().map(|pad| 2.0 * pad.radius_m).collect();
-        match diameters_m.split_first() {
-            Some((first, others)) if others.iter().all(|other| other == first) => {
-                writeln!(text, "diameter_m = {first:?}")
-            }
-            _ => writeln!(text, "diameters_m = {diameters_m:?}"),
-        }
-    }
-
-    /// Columns and rows, if the electrodes are a grid.
-    fn grid(&self) -> Option<[usize; 2]> {
-        let (count, radius_m) = (self.electrodes.len(), self.electrodes.first()?.radius_m);
-        let [width_m, height_m] = self.outline.size_m();
-        let is_grid = |&[columns, rows]: &[usize; 2]| {
-            electrode_grid(width_m, height_m, columns, rows, radius_m) == self.electrodes
-        };
-        (1..=count).filter(|columns| count % columns == 0).map(|columns| [columns, count / columns]).find(is_grid)
+impl Surface {
+    fn write_toml(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "surface = {}", quoted(&self.file))?;
+        writeln!(text, "surface_unit = {}", quoted(&self.unit))
     }
 }
 
@@ -229,14 +211,31 @@ impl Layer {
 }
 
 impl Document {
-    fn into_detector(self, name: &str) -> Result<Detector, Problem> {
-        let (outline, shift_m) = self.outline.into_outline()?;
+    fn into_detector(self, folder: &Path, name: &str) -> Result<Detector, Problem> {
+        let (outline, surface, shift_m) = match (self.outline, self.surface) {
+            (Some(outline), None) if self.surface_unit.is_none() => {
+                let (outline, shift_m) = outline.into_outline()?;
+                (outline, None, shift_m)
+            }
+            (None, Some(file)) => {
+                let surface = read_surface(folder, &file, self.surface_unit.as_deref())?;
+                let moved_m = surface.moved_m;
+                (surface.outline(), Some(surface), moved_m)
+            }
+            _ => {
+                return Err(Problem::new(
+                    "outline",
+                    "or surface has to be there, and only one of them; surface_unit goes with surface",
+                ));
+            }
+        };
         let layer = |(index, layer): (usize, LayerTable)| layer.into_layer(&format!("layers[{index}]"));
         Ok(Detector {
             name: self.name.unwrap_or_else(|| name.to_owned()),
             layers: self.layers.into_iter().enumerate().map(layer).collect::<Result<_, _>>()?,
-            electrodes: self.electrodes.into_list(&outline, shift_m)?,
+            electrodes: self.electrodes.into_list(&outline, surface.as_ref(), shift_m)?,
             outline,
+            surface,
             contact_impedance_ohm_m2: self.contact_impedance_ohm_m2.unwrap_or(CONTACT_IMPEDANCE_OHM_M2),
             drive_v: self.drive_v.unwrap_or(DRIVE_V),
             on_resistance_ohm: self.on_resistance_ohm.unwrap_or(ON_RESISTANCE_OHM),
@@ -286,22 +285,6 @@ impl LayerTable {
     }
 }
 
-impl ElectrodeTable {
-    fn into_list(self, outline: &Outline, shift_m: [f64; 2]) -> Result<Vec<Electrode>, Problem> {
-        let mut electrodes = match (self.grid, self.positions_m) {
-            (Some(grid), None) => grid_electrodes(grid, outline)?,
-            (None, Some(positions_m)) => {
-                let pad = |[x_m, y_m]: [f64; 2]| (x_m + shift_m[0], y_m + shift_m[1]);
-                positions_m.into_iter().map(pad).map(|(x_m, y_m)| Electrode::flat(x_m, y_m, f64::NAN)).collect()
-            }
-            _ => return Err(Problem::new("electrodes", "has to have either grid = [columns, rows] or positions_m")),
-        };
-        let diameters_m = diameters_m(self.diameter_m, self.diameters_m, electrodes.len())?;
-        electrodes.iter_mut().zip(diameters_m).for_each(|(pad, diameter_m)| pad.radius_m = diameter_m / 2.0);
-        Ok(electrodes)
-    }
-}
-
 impl AdcTable {
     fn into_adc(self) -> Adc {
         let usual = Adc::default();
@@ -313,34 +296,13 @@ impl AdcTable {
     }
 }
 
-fn grid_electrodes([columns, rows]: [usize; 2], outline: &Outline) -> Result<Vec<Electrode>, Problem> {
-    let count = columns.checked_mul(rows).filter(|count| super::ELECTRODES.contains(count));
-    if count.is_none() {
-        let what = format!(
-            "is [{columns}, {rows}], but columns times rows has to be {} to {}",
-            super::ELECTRODES.start(),
-            super::ELECTRODES.end()
-        );
-        return Err(Problem::new("electrodes.grid", what));
-    }
-    let [width_m, height_m] = outline.size_m();
-    Ok(electrode_grid(width_m, height_m, columns, rows, f64::NAN))
-}
-
-/// One diameter for all, or one for each.
-fn diameters_m(one: Option<f64>, each: Option<Vec<f64>>, count: usize) -> Result<Vec<f64>, Problem> {
-    match (one, each) {
-        (Some(diameter_m), None) => {
-            within("electrodes.diameter_m", diameter_m, LENGTH_M)?;
-            Ok(vec![diameter_m; count])
-        }
-        (None, Some(diameters_m)) if diameters_m.len() == count => Ok(diameters_m),
-        (None, Some(diameters_m)) => {
-            let what = format!("has {} numbers, but has to have one for each of {count} electrodes", diameters_m.len());
-            Err(Problem::new("electrodes.diameters_m", what))
-        }
-        _ => Err(Problem::new("electrodes", "has to have either diameter_m, for all, or diameters_m, one for each")),
-    }
+/// Reads a surface from a file named relative to a folder.
+fn read_surface(folder: &Path, file: &str, unit: Option<&str>) -> Result<Surface, Problem> {
+    let path = folder.join(file);
+    Surface::read(&path, file, unit.unwrap_or("mm")).map_err(|error| {
+        let field = if matches!(error, SurfaceError::Unit(_)) { "surface_unit" } else { "surface" };
+        Problem::new(field, format!("{}: {error}", path.display()))
+    })
 }
 
 fn read_text(path: &Path) -> io::Result<String> {

@@ -4,12 +4,16 @@ mod check;
 mod file;
 mod material;
 mod preset;
+pub(crate) mod surface;
 mod svg;
 
 pub use self::check::{ELECTRODES, Problem};
 pub use self::file::{FileError, TomlError};
 pub use self::material::{FOAMS, Foam, Stack};
+pub(crate) use self::surface::edges_of;
+pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
 pub use self::svg::short;
+use crate::geometry;
 
 /// A detection layer with its electrodes and the circuit that measures it.
 ///
@@ -18,8 +22,10 @@ pub use self::svg::short;
 pub struct Detector {
     /// Preset or file name, for people.
     pub name: String,
-    /// Edge of the layer.
+    /// Edge of the layer; on a curved detector that of the flat map that it is drawn on.
     pub outline: Outline,
+    /// The surface that the layer lies on, if that is not a plane.
+    pub surface: Option<Surface>,
     /// Bottom (electrode side) first.
     pub layers: Vec<Layer>,
     /// In the order of the channels.
@@ -85,6 +91,19 @@ impl Detector {
         self.layers.iter().map(|layer| layer.thickness_m).sum()
     }
 
+    /// Where a place is drawn (m): its x and y, but on a curved detector the point of its map.
+    pub fn map_m(&self, place_m: [f64; 3]) -> [f64; 2] {
+        self.surface.as_ref().map_or([place_m[0], place_m[1]], |surface| surface.map_m(place_m))
+    }
+
+    /// The place that is drawn at a point (m); `None` beside a curved detector.
+    pub fn place_m(&self, map_m: [f64; 2]) -> Option<[f64; 3]> {
+        match &self.surface {
+            Some(surface) => surface.place_m(map_m),
+            None => Some([map_m[0], map_m[1], 0.0]),
+        }
+    }
+
     /// Conductivity integrated over the thickness (S per square): the natural unit of contact conductance.
     pub fn sheet_conductance_s(&self) -> f64 {
         self.layers.iter().map(Layer::sheet_conductance_s).sum()
@@ -92,6 +111,11 @@ impl Detector {
 }
 
 impl Electrode {
+    /// Its centre (m).
+    pub fn place_m(&self) -> [f64; 3] {
+        [self.x_m, self.y_m, self.z_m]
+    }
+
     /// A pad of a flat detector.
     pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
         Self { x_m, y_m, z_m: 0.0, radius_m }
@@ -135,9 +159,7 @@ impl Outline {
 
     /// Corners of the bounding box: smallest and largest x and y (m).
     pub fn bounds(&self) -> [[f64; 2]; 2] {
-        self.outer.iter().fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], corner| {
-            [[low[0].min(corner[0]), low[1].min(corner[1])], [high[0].max(corner[0]), high[1].max(corner[1])]]
-        })
+        geometry::bounds(&self.outer)
     }
 }
 

@@ -39,6 +39,7 @@ impl Detector {
         Some(Self {
             name: name.to_owned(),
             outline: Outline::rectangle(width_m, height_m),
+            surface: None,
             layers: vec![Layer::uniform(thickness_m, FOAMS[0].conductivity_s_per_m)],
             electrodes: electrode_grid(width_m, height_m, columns, rows, diameter_m / 2.0),
             contact_impedance_ohm_m2: CONTACT_IMPEDANCE_OHM_M2,

@@ -46,8 +46,10 @@ pub trait ForwardModel: Send + Sync {
 /// Nodes of an image of contact conductance and the triangles between them.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ImageMesh {
-    /// Positions (m).
+    /// Positions (m); on a curved detector those of its map.
     pub nodes_m: Vec<[f64; 2]>,
+    /// Positions in space (m) on a curved detector, else none.
+    pub places_m: Vec<[f64; 3]>,
     /// Corners of each triangle, counter-clockwise.
     pub triangles: Vec<[u32; 3]>,
     /// Area that belongs to each node (m2); they add up to the detector's.

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::detector::Electrode;
 
 const DOCUMENTATION: &str = include_str!("../../../../docs/detector.md");
 
@@ -78,7 +79,7 @@ fn unknown_missing_and_mistyped_fields_are_named() {
     let unknown = error("diameter_m", "diametre_m");
     assert!(unknown.contains("line 10") && unknown.contains("unknown field `diametre_m`"), "{unknown}");
     assert!(unknown.contains("`diameter_m`"), "{unknown}");
-    assert!(error("[outline]\nsize_m = [0.06, 0.06]", "").contains("missing field `outline`"));
+    assert!(error("[outline]\nsize_m = [0.06, 0.06]", "").contains("outline or surface has to be there"));
     let mistyped = error("0.005", "\"five\"");
     assert!(mistyped.contains("line 5") && mistyped.contains("expected f64"), "{mistyped}");
 }
@@ -125,6 +126,7 @@ fn detectors() -> impl Strategy<Value = Detector> {
         let detector = Detector {
             name,
             outline,
+            surface: None,
             layers: layers.into_iter().map(layer).collect(),
             electrodes,
             contact_impedance_ohm_m2: impedance,

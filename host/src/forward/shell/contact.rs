@@ -38,15 +38,22 @@ fn check(contact: &Contact) -> Result<(), &'static str> {
 }
 
 /// Adds one disc; whether it touches the detector at all.
+///
+/// On a curved detector a disc is what lies within a sphere about its centre, on the side of the surface that it lies on.
 fn add_disc(mesh: &Mesh, contact: &Contact, conductances_s: &mut [f64]) -> bool {
-    let disc = geometry::disc([contact.x_m, contact.y_m], contact.radius_m, CORNERS);
-    let density_s_per_m2 = contact.conductance_s / geometry::area(&disc);
+    let Some((centre, side)) = mesh.footing([contact.x_m, contact.y_m, contact.z_m], contact.radius_m) else {
+        return false;
+    };
+    let disc_m2 = geometry::area(&geometry::disc([0.0; 2], contact.radius_m, CORNERS));
+    let density_s_per_m2 = contact.conductance_s / disc_m2;
     let mut touches = false;
     for &triangle in &mesh.triangles {
-        let corners = mesh.corners(triangle);
-        if is_far(corners, contact) {
+        if mesh.is_apart(triangle, centre, 1.01 * contact.radius_m) || !mesh.faces(triangle, side) {
             continue;
         }
+        let (corners, middle, height_m) = mesh.seen_from(triangle, centre);
+        let radius2 = contact.radius_m * contact.radius_m - height_m * height_m;
+        let disc = geometry::disc(middle, radius2.max(0.0).sqrt(), CORNERS);
         let Some((area_m2, centroid)) = geometry::area_and_centroid(&geometry::clip(&disc, corners)) else { continue };
         let [a, b, c] = corners;
         let twice_m2 = geometry::cross(a, b, c);
@@ -58,13 +65,4 @@ fn add_disc(mesh: &Mesh, contact: &Contact, conductances_s: &mut [f64]) -> bool 
         touches = true;
     }
     touches
-}
-
-/// Whether the bounding boxes of triangle and disc are apart.
-fn is_far(corners: [[f64; 2]; 3], contact: &Contact) -> bool {
-    let reach_m = 1.01 * contact.radius_m;
-    [(0, contact.x_m), (1, contact.y_m)].into_iter().any(|(axis, middle)| {
-        corners.iter().all(|corner| corner[axis] > middle + reach_m)
-            || corners.iter().all(|corner| corner[axis] < middle - reach_m)
-    })
 }

@@ -12,9 +12,11 @@ use std::f64::consts::TAU;
 
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
+use super::facets;
 use crate::detector::{Detector, Electrode, Outline};
 use crate::forward::ForwardError;
 use crate::geometry::{self, Point};
+use crate::space::{self, Frame, Place};
 
 /// Smallest angle that the refinement aims at (degrees).
 const ANGLE_DEG: f64 = 27.0;
@@ -26,8 +28,10 @@ const FEWEST_SEGMENTS: usize = 12;
 /// A triangulated detector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
-    /// Positions (m).
+    /// Positions (m); on a curved detector those of its map.
     pub nodes_m: Vec<Point>,
+    /// Positions in space (m) on a curved detector, else none.
+    pub places_m: Vec<Place>,
     /// Corners of each triangle, counter-clockwise.
     pub triangles: Vec<[u32; 3]>,
     /// Which of the triangles are each electrode's pad.
@@ -42,7 +46,9 @@ impl Mesh {
     /// # Errors
     /// [`ForwardError::Detector`] if an electrode does not lie on the outline, or overlaps with another.
     pub fn new(detector: &Detector, target_nodes: usize) -> Result<Self, ForwardError> {
-        check(detector)?;
+        if detector.surface.is_none() {
+            check(detector)?;
+        }
         let mut edge_m = first_edge_m(detector, target_nodes);
         let mut mesh = Self::with_edge(detector, edge_m)?;
         // The first guess is for squares with a grid of pads; an odd outline may need another try.
@@ -62,9 +68,12 @@ impl Mesh {
         let edge_depth_m = (detector.sheet_conductance_s() * detector.contact_impedance_ohm_m2).sqrt();
         let pads: Vec<_> =
             detector.electrodes.iter().map(|electrode| PadRings::new(electrode, edge_depth_m, edge_m)).collect();
-        let (nodes_m, triangles) = triangulate(&detector.outline, &pads, edge_m)
-            .map_err(|what| ForwardError::Detector { detector: detector.name.clone(), what })?;
-        let mut mesh = Self { nodes_m, triangles, pad_triangles: Vec::with_capacity(pads.len()) };
+        let error = |what| ForwardError::Detector { detector: detector.name.clone(), what };
+        if let Some(surface) = &detector.surface {
+            return facets::mesh(surface, &detector.electrodes, &pads, edge_m).map_err(error);
+        }
+        let (nodes_m, triangles) = triangulate(&detector.outline, &pads, edge_m).map_err(error)?;
+        let mut mesh = Self { nodes_m, places_m: Vec::new(), triangles, pad_triangles: Vec::with_capacity(pads.len()) };
         let mut first = 0;
         for pad in &pads {
             mesh.fill_pad(pad, first);
@@ -130,9 +139,52 @@ impl Mesh {
         }
     }
 
-    /// Corners of a triangle (m).
+    /// Corners of a triangle (m), in a plane of its own on a curved detector.
     pub fn corners(&self, triangle: [u32; 3]) -> [Point; 3] {
-        triangle.map(|node| self.nodes_m[node as usize])
+        self.seen_from(triangle, [0.0; 3]).0
+    }
+
+    /// Corners of a triangle (m), the foot of a place in the same plane, and how high above it the place is.
+    pub fn seen_from(&self, triangle: [u32; 3], place_m: Place) -> ([Point; 3], Point, f64) {
+        if self.places_m.is_empty() {
+            return (triangle.map(|node| self.nodes_m[node as usize]), [place_m[0], place_m[1]], 0.0);
+        }
+        let corners = triangle.map(|node| self.places_m[node as usize]);
+        let frame = Frame::of(corners);
+        (corners.map(|corner| frame.flat(corner)), frame.flat(place_m), frame.height(place_m))
+    }
+
+    /// The centre of a contact moved up or down onto a curved surface, not along it, and the surface's normal there; on a plane
+    /// the centre and no normal. `None` farther than `reach_m` from the surface.
+    pub fn footing(&self, centre: Place, reach_m: f64) -> Option<(Place, Place)> {
+        if self.places_m.is_empty() {
+            return Some((centre, [0.0; 3]));
+        }
+        let corners = self.triangles.iter().map(|triangle| triangle.map(|node| self.places_m[node as usize]));
+        let away_m = |corners: [Place; 3]| space::distance(space::nearest_on_triangle(centre, corners), centre);
+        let (away_m, corners) = corners.map(|corners| (away_m(corners), corners)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let normal = space::normal(corners);
+        let height = space::dot(space::sub(centre, corners[0]), normal) / space::dot(normal, normal);
+        (away_m <= reach_m).then(|| (space::along(centre, -height, normal), normal))
+    }
+
+    /// Whether a triangle faces the side that a normal points to.
+    pub fn faces(&self, triangle: [u32; 3], side: Place) -> bool {
+        self.places_m.is_empty()
+            || space::dot(space::normal(triangle.map(|node| self.places_m[node as usize])), side) > 0.0
+    }
+
+    /// Whether the bounding boxes of a triangle and of a ball are apart.
+    pub fn is_apart(&self, triangle: [u32; 3], centre: Place, radius_m: f64) -> bool {
+        let apart = |axis: usize, of: &dyn Fn(u32) -> f64| {
+            triangle.iter().all(|&node| of(node) > centre[axis] + radius_m)
+                || triangle.iter().all(|&node| of(node) < centre[axis] - radius_m)
+        };
+        if self.places_m.is_empty() {
+            (0..2).any(|axis| apart(axis, &|node| self.nodes_m[node as usize][axis]))
+        } else {
+            (0..3).any(|axis| apart(axis, &|node| self.places_m[node as usize][axis]))
+        }
     }
 
     /// Area that belongs to each node (m2): a third of its triangles'.
@@ -149,11 +201,11 @@ impl Mesh {
 }
 
 /// A pad's edge and the rings within.
-struct PadRings {
+pub(super) struct PadRings {
     centre: Point,
-    radius_m: f64,
-    segments: usize,
-    inner_radii_m: Vec<f64>,
+    pub radius_m: f64,
+    pub segments: usize,
+    pub inner_radii_m: Vec<f64>,
 }
 
 impl PadRings {
@@ -174,17 +226,28 @@ impl PadRings {
 
     /// Size of triangles at a place (m): like the segments of the pad's edge, and growing as the distance from its centre.
     fn size_m(&self, at: Point) -> f64 {
-        TAU / self.segments as f64 * geometry::distance(at, self.centre).max(self.radius_m)
+        self.size_at_m(geometry::distance(at, self.centre))
+    }
+
+    /// The same for a distance from its centre (m).
+    pub fn size_at_m(&self, distance_m: f64) -> f64 {
+        TAU / self.segments as f64 * distance_m.max(self.radius_m)
     }
 
     /// Rings around the pad, out to where triangles have the size `edge_m`.
     fn outer_rings(&self, edge_m: f64) -> impl Iterator<Item = Point> + '_ {
+        self.outer_radii_m(edge_m)
+            .flat_map(|(radius_m, turn)| geometry::turned_disc(self.centre, radius_m, self.segments, turn))
+    }
+
+    /// Radii of these rings (m), and by which angle they are turned.
+    pub fn outer_radii_m(&self, edge_m: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         // Equilateral triangles are as high as 0.87 of their edge; every second ring is turned by half a step.
         let ratio = 1.0 + 0.87 * TAU / self.segments as f64;
         let rings = (edge_m * self.segments as f64 / TAU / self.radius_m).ln() / ratio.ln();
-        (1..=rings.floor().max(0.0) as i32).flat_map(move |ring| {
+        (1..=rings.floor().max(0.0) as i32).map(move |ring| {
             let turn = TAU / self.segments as f64 * 0.5 * f64::from(ring % 2);
-            geometry::turned_disc(self.centre, self.radius_m * ratio.powi(ring), self.segments, turn)
+            (self.radius_m * ratio.powi(ring), turn)
         })
     }
 }
@@ -197,8 +260,12 @@ fn segments(radius_m: f64, edge_m: f64) -> usize {
 
 /// Edge length that gives about `target_nodes` nodes (m), by bisection of a count from areas.
 fn first_edge_m(detector: &Detector, target_nodes: usize) -> f64 {
-    let outline_m2 = geometry::area(&detector.outline.outer)
-        + detector.outline.holes.iter().map(|hole| geometry::area(hole)).sum::<f64>();
+    let outline_m2 = match &detector.surface {
+        Some(surface) => surface.area_m2(),
+        None => {
+            std::iter::once(&detector.outline.outer).chain(&detector.outline.holes).map(|p| geometry::area(p)).sum()
+        }
+    };
     let count = |edge_m: f64| {
         let mut nodes = outline_m2 / (0.62 * edge_m * edge_m);
         for electrode in &detector.electrodes {

@@ -5,7 +5,10 @@
 //! physics for what that costs.
 
 mod contact;
+mod facets;
 mod mesh;
+#[cfg(test)]
+mod surface_tests;
 mod system;
 #[cfg(test)]
 mod tests;
@@ -75,7 +78,12 @@ impl Shell {
         // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.
         let factor = system.factorise([(system.pad(0), sheet_conductance_s)]).map_err(singular)?;
         let (fields_ohm, electrode_fields_ohm) = neumann_fields_ohm(&factor, &system, &node_areas_m2);
-        let image_mesh = ImageMesh { nodes_m: mesh.nodes_m.clone(), triangles: mesh.triangles.clone(), node_areas_m2 };
+        let image_mesh = ImageMesh {
+            nodes_m: mesh.nodes_m.clone(),
+            places_m: mesh.places_m.clone(),
+            triangles: mesh.triangles.clone(),
+            node_areas_m2,
+        };
         Ok(Self { detector: detector.clone(), mesh, image_mesh, system, fields_ohm, electrode_fields_ohm })
     }
 

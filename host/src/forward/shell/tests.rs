@@ -24,6 +24,7 @@ fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
     Detector {
         name: "test".to_owned(),
         outline,
+        surface: None,
         layers: vec![Layer::uniform(0.01, SHEET_S / 0.01)],
         electrodes,
         contact_impedance_ohm_m2: 1e-5,

@@ -294,6 +294,7 @@ fn image_grid(size_m: [f64; 2]) -> ImageMesh {
     let at = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
     let nodes = || (0..=ny).flat_map(|j| (0..=nx).map(move |i| (i, j)));
     ImageMesh {
+        places_m: Vec::new(),
         nodes_m: nodes().map(|(i, j)| [place(0, i), place(1, j)]).collect(),
         node_areas_m2: nodes().map(|(i, j)| share(0, i) * share(1, j)).collect(),
         triangles: (0..ny)

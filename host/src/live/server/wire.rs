@@ -194,6 +194,7 @@ mod tests {
             detector: Detector::preset(Detector::DEFAULT).expect("the default is a preset"),
             mesh: ImageMesh {
                 nodes_m: vec![[0.0, 0.0], [0.01, 0.0], [0.0, 0.01]],
+                places_m: Vec::new(),
                 triangles: vec![[0, 1, 2]],
                 node_areas_m2: vec![1e-5; 3],
             },
