@@ -102,19 +102,25 @@ pub fn detector(name: &str) -> Result<Chosen, String> {
     Err(format!("no such detector; there are {names}, and files such as my.toml"))
 }
 
-/// A contact from `x_mm,y_mm,radius_mm,conductance_s`.
+/// A contact from `x_mm,y_mm,radius_mm,conductance_s`, with `z_mm` after `y_mm` on a curved detector.
 pub fn contact(text: &str) -> Result<Contact, String> {
     let numbers: Vec<f64> = text
         .split(',')
         .map(|number| number.trim().parse().map_err(|_| format!("`{number}` is not a number")))
         .collect::<Result<_, _>>()?;
-    let [x_mm, y_mm, radius_mm, conductance_s] = numbers[..] else {
-        return Err(format!(
-            "four numbers are needed, x_mm,y_mm,radius_mm,conductance_s, but there are {}",
-            numbers.len()
-        ));
+    let (place_mm, radius_mm, conductance_s) = match numbers[..] {
+        [x_mm, y_mm, radius_mm, conductance_s] => ([x_mm, y_mm, 0.0], radius_mm, conductance_s),
+        [x_mm, y_mm, z_mm, radius_mm, conductance_s] => ([x_mm, y_mm, z_mm], radius_mm, conductance_s),
+        _ => {
+            return Err(format!(
+                "four numbers are needed, x_mm,y_mm,radius_mm,conductance_s, or five with z_mm after y_mm on a curved \
+                 detector, but there are {}",
+                numbers.len()
+            ));
+        }
     };
-    Ok(Contact::flat(x_mm * 1e-3, y_mm * 1e-3, radius_mm * 1e-3, conductance_s))
+    let [x_m, y_m, z_m] = place_mm.map(|mm| mm * 1e-3);
+    Ok(Contact { z_m, ..Contact::flat(x_m, y_m, radius_mm * 1e-3, conductance_s) })
 }
 
 #[cfg(test)]
@@ -124,6 +130,8 @@ mod tests {
     #[test]
     fn contacts_are_given_in_millimetres() {
         let contact = contact("3, -4.5,2,1e-3").unwrap_or_else(|error| panic!("{error}"));
+        let above = super::contact("3,-4.5,12,2,1e-3").unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((above.x_m, above.z_m, above.radius_m), (contact.x_m, 0.012, contact.radius_m));
         assert!((contact.x_m - 0.003).abs() < 1e-12 && (contact.y_m + 0.0045).abs() < 1e-12, "{contact:?}");
         assert!((contact.radius_m - 0.002).abs() < 1e-12 && contact.conductance_s == 1e-3, "{contact:?}");
     }

@@ -118,9 +118,11 @@ fn description(detector: &Detector) -> String {
     lines.push("layers, the top one first:".to_owned());
     lines.extend(detector.layers.iter().rev().map(|layer| format!("  {}", layer.summary())));
     lines.extend(detector.facts().into_iter().map(|(what, value)| format!("{what}: {value}")));
-    lines.push("electrodes, x and y in mm from the middle:".to_owned());
+    let axes = if detector.surface.is_some() { 3 } else { 2 };
+    lines.push(format!("electrodes, {} in mm from the middle:", ["x and y", "x, y and z"][axes - 2]));
     let place = |(channel, pad): (usize, &tactomo::detector::Electrode)| {
-        format!("  {channel:>2} {:>8} {:>8}", short(pad.x_m * 1e3), short(pad.y_m * 1e3))
+        let numbers = pad.place_m().into_iter().take(axes).map(|at_m| format!(" {:>8}", short(at_m * 1e3)));
+        format!("  {channel:>2}{}", numbers.collect::<String>())
     };
     lines.extend(detector.electrodes.iter().enumerate().map(place));
     lines.join("\n")

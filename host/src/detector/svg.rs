@@ -19,7 +19,10 @@ const NUMBERED_PX: f64 = 8.0;
 /// Between ticks (px), at least.
 const TICK_PX: f64 = 42.0;
 
-const STYLE: &str = "text { font: 12px -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif; \
+/// Surfaces of more facets are drawn without them.
+const MOST_FACETS: usize = 4000;
+
+const STYLE: &str = ".facet { stroke: #4b4653; stroke-opacity: 0.25; fill: none } text { font: 12px -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif; \
     fill: #1d1b22 } .title { font-size: 19px; font-weight: 650 } .muted { fill: #66626e } .middle { text-anchor: middle } \
     .end { text-anchor: end } .pad { fill: #1d1b22 } .on { fill: #ffffff; font-weight: 600 } \
     .axis { stroke: #8b8793; fill: none } .edge { stroke: #4b4653; stroke-width: 1.5; stroke-linejoin: round }";
@@ -80,8 +83,9 @@ impl<'a> Picture<'a> {
         writeln!(out, r##"<style>{STYLE}</style><rect width="100%" height="100%" fill="#ffffff"/>"##)?;
         let name = escaped(&self.detector.name);
         writeln!(out, r#"<title>{name}</title><text class="title" x="24" y="34">{name}</text>"#)?;
-        writeln!(out, r#"<text class="muted" x="24" y="55">{}</text>"#, self.detector.summary())?;
+        writeln!(out, r#"<text class="muted" x="24" y="55">{}</text>"#, escaped(&self.detector.summary()))?;
         self.write_outline(out)?;
+        self.write_facets(out)?;
         self.write_electrodes(out)?;
         self.write_axes(out)?;
         self.write_section(out)?;
@@ -103,9 +107,27 @@ impl<'a> Picture<'a> {
         writeln!(out, r#""/>"#)
     }
 
+    /// The facets of a curved surface, on its map.
+    fn write_facets(&self, out: &mut String) -> fmt::Result {
+        let Some(surface) = self.detector.surface.as_ref().filter(|surface| surface.triangles.len() <= MOST_FACETS)
+        else {
+            return Ok(());
+        };
+        write!(out, r#"<path class="facet" d=""#)?;
+        for triangle in 0..surface.triangles.len() {
+            let corners = surface.corners(triangle).map(|corner| surface.map_m(corner));
+            if corners.iter().all(|corner| surface.shows(*corner)) {
+                let [a, b, c] = corners.map(|[x, y]| format!("{:.1} {:.1}", self.x_px(x), self.y_px(y)));
+                write!(out, "M{a}L{b}L{c}Z")?;
+            }
+        }
+        writeln!(out, r#""/>"#)
+    }
+
     fn write_electrodes(&self, out: &mut String) -> fmt::Result {
         for (channel, pad) in self.detector.electrodes.iter().enumerate() {
-            let (x, y, radius) = (self.x_px(pad.x_m), self.y_px(pad.y_m), pad.radius_m * self.px_per_m);
+            let [x_m, y_m] = self.detector.map_m(pad.place_m());
+            let (x, y, radius) = (self.x_px(x_m), self.y_px(y_m), pad.radius_m * self.px_per_m);
             writeln!(out, r#"<circle class="pad" cx="{x:.1}" cy="{y:.1}" r="{radius:.1}"/>"#)?;
             let (class, x, y) =
                 if radius >= NUMBERED_PX { ("on middle", x, y + 4.2) } else { ("", x + radius + 2.0, y - radius) };
@@ -142,7 +164,9 @@ impl<'a> Picture<'a> {
     /// Places of the ticks of an axis (m) and what is written there.
     fn ticks(&self, axis: usize) -> Vec<(f64, String)> {
         let (low_mm, high_mm) = (self.low_m[axis] * 1e3, (self.low_m[axis] + self.size_m[axis]) * 1e3);
-        let (step_mm, decimals) = round_step(TICK_PX / self.px_per_m * 1e3);
+        // A narrow side has three ticks, too.
+        let least_px = TICK_PX.min(self.plan_px()[axis] / 3.0);
+        let (step_mm, decimals) = round_step(least_px / self.px_per_m * 1e3);
         let (first, last) = ((low_mm / step_mm - 1e-9).ceil() as i64, (high_mm / step_mm + 1e-9).floor() as i64);
         let label = |mm: f64| format!("{mm:.decimals$}").replace('-', "\u{2212}");
         (first..=last).map(|i| i as f64 * step_mm).map(|mm| (mm * 1e-3, label(mm))).collect()
@@ -226,13 +250,12 @@ impl Detector {
             diameters_mm.fold([f64::INFINITY, 0.0], |[least, most]: [f64; 2], mm| [least.min(mm), most.max(mm)]);
         let diameters =
             if short(least) == short(most) { short(most) } else { format!("{} to {}", short(least), short(most)) };
-        format!(
-            "{} \u{d7} {} \u{d7} {} mm, {} electrodes of {diameters} mm",
-            short(width_m * 1e3),
-            short(height_m * 1e3),
-            short(self.thickness_m() * 1e3),
-            self.electrodes.len(),
-        )
+        let size = match &self.surface {
+            Some(surface) => format!("{} cm\u{b2} of {} \u{d7}", short(surface.area_m2() * 1e4), surface.file),
+            None => format!("{} \u{d7} {} \u{d7}", short(width_m * 1e3), short(height_m * 1e3)),
+        };
+        let thickness_mm = short(self.thickness_m() * 1e3);
+        format!("{size} {thickness_mm} mm, {} electrodes of {diameters} mm", self.electrodes.len())
     }
 
     /// What else there is to know, each with its name.

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ImageMesh;
 use super::jacobian::Jacobian;
-use crate::detector::Detector;
+use crate::detector::{Detector, Surface};
 
 const MAGIC: &[u8; 8] = b"TACTOJAC";
 const VERSION: u32 = 2;
@@ -114,6 +114,9 @@ fn difference(saved: &Detector, asked: &Detector) -> Option<String> {
             _ => Some("the outline".to_owned()),
         };
     }
+    if saved.surface.as_ref().map(Surface::shape) != asked.surface.as_ref().map(Surface::shape) {
+        return Some("the surface".to_owned());
+    }
     if saved.electrodes.len() != asked.electrodes.len() {
         return differs("electrodes:", &saved.electrodes.len(), &asked.electrodes.len());
     }
@@ -159,7 +162,9 @@ impl From<&Jacobian> for Stored {
 impl Stored {
     fn into_jacobian(self) -> Option<Jacobian> {
         let (nodes, electrodes) = (self.image_mesh.nodes_m.len(), self.detector.electrodes.len());
+        let places = self.image_mesh.places_m.len();
         let fits = self.image_mesh.node_areas_m2.len() == nodes
+            && (places == nodes || places == 0)
             && self.image_mesh.triangles.iter().flatten().all(|&node| (node as usize) < nodes)
             && self.fields_ohm.len() == nodes * electrodes
             && self.electrode_fields_ohm.len() == electrodes * electrodes;

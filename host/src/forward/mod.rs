@@ -46,7 +46,7 @@ pub trait ForwardModel: Send + Sync {
 /// Nodes of an image of contact conductance and the triangles between them.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ImageMesh {
-    /// Positions (m); on a curved detector those of its map.
+    /// Positions (m); on a curved detector those of its map, which are for drawing only.
     pub nodes_m: Vec<[f64; 2]>,
     /// Positions in space (m) on a curved detector, else none.
     pub places_m: Vec<[f64; 3]>,
@@ -54,6 +54,17 @@ pub struct ImageMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Area that belongs to each node (m2); they add up to the detector's.
     pub node_areas_m2: Vec<f64>,
+}
+
+impl ImageMesh {
+    /// Where a node is (m), with height zero on a flat detector.
+    ///
+    /// # Panics
+    /// If there is no such node.
+    pub fn place_m(&self, node: usize) -> [f64; 3] {
+        let [x, y] = self.nodes_m[node];
+        self.places_m.get(node).copied().unwrap_or([x, y, 0.0])
+    }
 }
 
 /// Why a model cannot answer.

@@ -1,9 +1,10 @@
 //! Contacts in an image.
 
 use super::FoundContact;
-use crate::detector::Detector;
+use crate::detector::{Detector, Surface};
 use crate::forward::ImageMesh;
 use crate::readings::Readings;
+use crate::space::{self, Place};
 
 /// Readings that stand for no contact: so many standard deviations of noise and quantisation for the largest of them.
 const NOISE_DEVIATIONS: f64 = 5.0;
@@ -15,7 +16,8 @@ const STANDS_OUT: f32 = 0.7;
 /// Finds contacts in images on one mesh.
 #[derive(Clone, Debug)]
 pub struct Locator {
-    nodes_m: Vec<[f64; 2]>,
+    places_m: Vec<Place>,
+    surface: Option<Surface>,
     triangles: Vec<[u32; 3]>,
     areas_m2: Vec<f64>,
     /// Peaks nearer than this are one (m): the mean distance of electrodes, which is about what an image resolves.
@@ -31,7 +33,8 @@ impl Locator {
         let lsb_v = detector.adc.full_scale_v / 2f64.powi(i32::from(detector.adc.bits));
         let noise_lsb = (detector.adc.noise_lsb.powi(2) + 1.0 / 12.0).sqrt();
         Self {
-            nodes_m: mesh.nodes_m.clone(),
+            places_m: (0..mesh.nodes_m.len()).map(|node| mesh.place_m(node)).collect(),
+            surface: detector.surface.clone(),
             triangles: mesh.triangles.clone(),
             areas_m2: mesh.node_areas_m2.clone(),
             apart_m: (area_m2 / detector.electrodes.len() as f64).sqrt(),
@@ -104,12 +107,12 @@ impl Locator {
             let distance_m2 = |&peak: &usize| self.distance_m2(node, peaks[peak]);
             (0..peaks.len()).min_by(|a, b| distance_m2(a).total_cmp(&distance_m2(b)))
         };
-        (0..self.nodes_m.len()).map(|node| nearest(node).unwrap_or(0)).collect()
+        (0..self.places_m.len()).map(|node| nearest(node).unwrap_or(0)).collect()
     }
 
     fn distance_m2(&self, a: usize, b: usize) -> f64 {
-        let (a, b) = (self.nodes_m[a], self.nodes_m[b]);
-        (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)
+        let between = space::sub(self.places_m[a], self.places_m[b]);
+        space::dot(between, between)
     }
 
     /// The contact of a peak: its place from what stands out around it, its conductance from all that is its `own`.
@@ -123,13 +126,18 @@ impl Locator {
 
     /// Centroid and conductance of the part of an image above a floor, over some of the nodes.
     fn centroid(&self, image: &[f32], among: impl Fn(usize) -> bool, floor: f32) -> Option<FoundContact> {
-        let (mut sum, mut moment) = (0.0, [0.0; 2]);
+        let (mut sum, mut moment) = (0.0, [0.0; 3]);
         for (node, &value) in image.iter().enumerate().filter(|&(node, &value)| value > floor && among(node)) {
             let weight = f64::from(value - floor) * self.areas_m2[node];
             sum += weight;
-            moment[0] += weight * self.nodes_m[node][0];
-            moment[1] += weight * self.nodes_m[node][1];
+            moment = space::along(moment, weight, self.places_m[node]);
         }
-        (sum > 0.0).then(|| FoundContact::flat(moment[0] / sum, moment[1] / sum, sum))
+        let centroid = space::along([0.0; 3], 1.0 / sum, moment);
+        // The centroid of a part of a curved surface is beside it.
+        let place = |surface: &Surface| surface.nearest(centroid).place_m;
+        (sum > 0.0).then(|| {
+            let [x_m, y_m, z_m] = self.surface.as_ref().map_or(centroid, place);
+            FoundContact { x_m, y_m, z_m, conductance_s: sum }
+        })
     }
 }

@@ -100,6 +100,11 @@ impl Surface {
         Ok(surface)
     }
 
+    /// Nodes and triangles: all that matters to a model.
+    pub fn shape(&self) -> (&[Place], &[[u32; 3]]) {
+        (&self.nodes_m, &self.triangles)
+    }
+
     /// Corners of a triangle (m).
     pub fn corners(&self, triangle: usize) -> [Place; 3] {
         self.triangles[triangle].map(|node| self.nodes_m[node as usize])

@@ -109,11 +109,13 @@ impl<'a> Page<'a> {
 
     /// Presses there (m), if that is on the detector.
     fn press(&mut self, finger: Finger, [x_m, y_m]: [f64; 2]) {
-        let [low, high] = self.shared.scene.detector.outline.bounds();
-        if (low[0]..=high[0]).contains(&x_m) && (low[1]..=high[1]).contains(&y_m) {
+        let detector = &self.shared.scene.detector;
+        let [low, high] = detector.outline.bounds();
+        let within = (low[0]..=high[0]).contains(&x_m) && (low[1]..=high[1]).contains(&y_m);
+        if let Some([x_m, y_m, z_m]) = detector.place_m([x_m, y_m]).filter(|_| within) {
             self.presses = true;
             let Finger { radius_m, conductance_s } = finger;
-            self.ask(Request::Press(Contact::flat(x_m, y_m, radius_m, conductance_s)));
+            self.ask(Request::Press(Contact { x_m, y_m, z_m, radius_m, conductance_s }));
         }
     }
 
@@ -134,7 +136,7 @@ impl<'a> Page<'a> {
         let snapshot = self.snapshots.borrow_and_update().clone();
         self.update_due = Instant::now() + UPDATE_INTERVAL;
         let frame = snapshot.frame.as_ref()?;
-        Some(Message::binary(wire::update(frame, snapshot.statistics.frames)))
+        Some(Message::binary(wire::update(frame, snapshot.statistics.frames, &self.shared.scene.detector)))
     }
 }
 

@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use tactomo_protocol::Hello;
 
 use super::Scene;
+use crate::detector::Detector;
 use crate::live::{FrameSnapshot, Latency, LinkState, Snapshot};
 
 /// Version of the layout of updates; a page of another version says that it must be reloaded.
@@ -47,7 +48,7 @@ struct SceneMessage<'a> {
     outline_m: Vec<&'a [[f64; 2]]>,
     electrodes: Vec<ElectrodeMessage>,
     nodes_m: &'a [[f64; 2]],
-    triangles: &'a [[u32; 3]],
+    triangles: Vec<[u32; 3]>,
     drive_v: f64,
     sheet_conductance_s: f64,
     solver: &'a str,
@@ -75,16 +76,26 @@ pub(super) fn scene(scene: &Scene) -> serde_json::Result<String> {
         electrodes: detector
             .electrodes
             .iter()
-            .map(|pad| ElectrodeMessage { x_m: pad.x_m, y_m: pad.y_m, radius_m: pad.radius_m })
+            .map(|pad| (detector.map_m(pad.place_m()), pad.radius_m))
+            .map(|([x_m, y_m], radius_m)| ElectrodeMessage { x_m, y_m, radius_m })
             .collect(),
         nodes_m: &scene.mesh.nodes_m,
-        triangles: &scene.mesh.triangles,
+        triangles: drawn_triangles(scene),
         drive_v: detector.drive_v,
         sheet_conductance_s: detector.sheet_conductance_s(),
         solver: &scene.solver,
         source: &scene.source,
         simulated: scene.finger.is_some(),
     })
+}
+
+/// The triangles of the image that are drawn: on the map of a closed surface those about the lowest point are torn apart.
+fn drawn_triangles(scene: &Scene) -> Vec<[u32; 3]> {
+    let shows = |node: u32| {
+        let surface = scene.detector.surface.as_ref();
+        surface.is_none_or(|surface| surface.shows(scene.mesh.nodes_m[node as usize]))
+    };
+    scene.mesh.triangles.iter().copied().filter(|triangle| triangle.iter().all(|node| shows(*node))).collect()
 }
 
 #[derive(Serialize)]
@@ -170,10 +181,13 @@ fn hello(hello: &Hello) -> HelloMessage<'_> {
 }
 
 /// An update.
-pub(super) fn update(frame: &FrameSnapshot, frames: u64) -> Vec<u8> {
+pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) -> Vec<u8> {
     let image = frame.solution.image_s_per_m2.as_deref().unwrap_or_default();
     let readings = frame.readings.volts().iter().map(|&volt| volt as f32);
-    let contacts = frame.solution.contacts.iter().flat_map(|found| [found.x_m, found.y_m, found.conductance_s]);
+    let contacts = frame.solution.contacts.iter().flat_map(|found| {
+        let [x_m, y_m] = detector.map_m([found.x_m, found.y_m, found.z_m]);
+        [x_m, y_m, found.conductance_s]
+    });
     let counts = [image.len(), frame.readings.electrodes(), frame.solution.contacts.len()];
     // The page counts modulo 2^32.
     let head = [LAYOUT, frame.sequence as u32, frames as u32].into_iter().chain(counts.map(|count| count as u32));
@@ -184,7 +198,6 @@ pub(super) fn update(frame: &FrameSnapshot, frames: u64) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detector::Detector;
     use crate::forward::ImageMesh;
     use crate::readings::Readings;
     use crate::solve::{FoundContact, Solution};
@@ -219,7 +232,7 @@ mod tests {
             solution: Solution { image_s_per_m2: Some(vec![2.0, 4.0, -8.0]), contacts: vec![contact] },
             rezeroing: false,
         };
-        let bytes = update(&frame, 300);
+        let bytes = update(&frame, 300, &small_scene().detector);
         let head: Vec<u8> = [LAYOUT, 9, 300, 3, 2, 1].into_iter().flat_map(u32::to_le_bytes).collect();
         assert_eq!(bytes[..24], head);
         assert_eq!(floats(&bytes[24..]), [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, -0.5, 2.0]);
