@@ -35,3 +35,11 @@ fn readings(bencher: Bencher, count: usize) {
     let (slab, contacts) = (slab(), contacts(count));
     bencher.bench(|| slab.impedance_ohm(&contacts).map(|z| readings_v(&z, slab.detector())));
 }
+
+/// Readings for an image of conductance on all of its nodes.
+#[divan::bench(args = [100, 400, 900])]
+fn image(bencher: Bencher, nodes: usize) {
+    let slab = slab().on_image(nodes);
+    let image_s = vec![1e-5; slab.image_mesh().nodes_m.len()];
+    bencher.bench(|| slab.image_fields(&image_s).map(|fields| readings_v(&fields.impedance_ohm, slab.detector())));
+}

@@ -12,6 +12,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use crate::detector::Detector;
+
 /// Contact unknowns of a detector, in any basis and any scaling of its unknowns.
 #[derive(Clone, Debug)]
 pub struct ContactSystem {
@@ -57,107 +59,121 @@ impl ContactSystem {
     }
 }
 
-/// A bare detector seen from its electrodes and from patches of its surface, in any gauge common to all three.
-#[derive(Clone, Debug)]
-pub struct PatchFields {
-    /// Between electrodes (ohm): `n x n`.
-    pub electrodes: DMatrix<f64>,
-    /// Of the electrodes at the patches (ohm): `K x n`.
-    pub cross: DMatrix<f64>,
-    /// Between patches, mean over each patch (ohm): `K x K`.
-    pub patches: DMatrix<f64>,
-}
-
-/// Impedance of a detector with conducting patches, and what its derivative is made of.
-#[derive(Clone, Debug)]
-pub struct PatchImpedance {
-    /// Between electrodes (ohm): `n x n`.
-    pub impedance_ohm: DMatrix<f64>,
-    /// From electrodes to patches (ohm): `K x n`, the potential of the detector under each patch for 1 A into each electrode.
-    pub patch_impedance_ohm: DMatrix<f64>,
-}
-
-impl PatchFields {
-    /// Impedance for contact conductances of the patches (S); zero is allowed. `None` if none conducts.
-    pub fn impedance(&self, conductance_s: &[f64]) -> Option<PatchImpedance> {
-        // Scaled by the square roots on both sides, N + diag(1/C) becomes a matrix that a small C leaves well conditioned.
-        let scale = DVector::from_iterator(conductance_s.len(), conductance_s.iter().map(|c| c.sqrt()));
-        let mut contacts =
-            DMatrix::from_fn(scale.len(), scale.len(), |i, j| scale[i] * self.patches[(i, j)] * scale[j]);
-        for i in 0..scale.len() {
-            contacts[(i, i)] += 1.0;
-        }
-        let cross = DMatrix::from_fn(scale.len(), self.cross.ncols(), |i, e| scale[i] * self.cross[(i, e)]);
-        let system = ContactSystem { electrodes: self.electrodes.clone(), cross, contacts, current: scale.clone() };
-        let solved = system.solve()?;
-        let mut currents = solved.unknowns;
-        currents.row_iter_mut().zip(scale.iter()).for_each(|(mut row, &scale)| row *= scale);
-        let mut potentials = &self.cross + &self.patches * currents;
-        potentials
-            .column_iter_mut()
-            .zip(solved.constant_ohm.iter())
-            .for_each(|(mut column, c)| column.add_scalar_mut(*c));
-        Some(PatchImpedance { impedance_ohm: solved.impedance_ohm, patch_impedance_ohm: potentials })
+/// Impedance of a detector on whose surface patches conduct (S, above zero), from the fields between them in any common gauge:
+/// between electrodes (`n x n`), of the electrodes at the patches (`K x n`) and between patches, mean over each (`K x K`).
+///
+/// The unknowns of the answer are the currents from the driving layer into the detector (A per A). `None` as for
+/// [`ContactSystem::solve`].
+pub fn conducting_patches(
+    electrodes: &DMatrix<f64>,
+    cross: &DMatrix<f64>,
+    mut patches: DMatrix<f64>,
+    conductance_s: &[f64],
+) -> Option<Contacted> {
+    // Scaled by the square roots on both sides, N + diag(1/C) becomes a matrix that a small C leaves well conditioned.
+    let scale = DVector::from_iterator(conductance_s.len(), conductance_s.iter().map(|c| c.sqrt()));
+    for (mut column, scale_j) in patches.column_iter_mut().zip(scale.iter()) {
+        column.zip_apply(&scale, |value, scale_i| *value *= scale_i * scale_j);
     }
+    for i in 0..scale.len() {
+        patches[(i, i)] += 1.0;
+    }
+    let mut cross = cross.clone();
+    cross.row_iter_mut().zip(scale.iter()).for_each(|(mut row, scale)| row *= *scale);
+    let system = ContactSystem { electrodes: electrodes.clone(), cross, contacts: patches, current: scale.clone() };
+    let mut solved = system.solve()?;
+    solved.unknowns.row_iter_mut().zip(scale.iter()).for_each(|(mut row, scale)| row *= *scale);
+    Some(solved)
 }
 
-impl PatchImpedance {
-    /// Derivative of the impedance by the conductance of patch `k` (ohm per S): `dZ[e][g] / dC_k = -Z[e][k] Z[k][g]`.
+/// Potentials for 1 A into each electrode while contacts lead it off to the driving layer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactFields {
+    /// At the electrodes (ohm): the impedance matrix `Z`, `electrodes x electrodes`.
+    pub impedance_ohm: DMatrix<f64>,
+    /// Under the nodes of the image (ohm): `nodes x electrodes`.
+    pub nodes_ohm: DMatrix<f64>,
+}
+
+impl ContactFields {
+    /// Derivative of the impedance by the conductance of a node (ohm per S): `dZ[e][g] / dC[k] = -Z[e][k] Z[k][g]`.
     ///
     /// # Panics
-    /// If there is no patch `k`.
-    pub fn derivative(&self, k: usize) -> DMatrix<f64> {
-        let row = self.patch_impedance_ohm.row(k);
-        -(row.transpose() * row)
+    /// If there is no such electrode or node.
+    pub fn ohm_per_s(&self, e: usize, g: usize, node: usize) -> f64 {
+        -self.nodes_ohm[(node, e)] * self.nodes_ohm[(node, g)]
+    }
+
+    /// Jacobian of the readings of `detector` at these contacts (V/S): row `g * electrodes + e`, a column for each node.
+    ///
+    /// With `h = Z[k][g] / (Z[g][g] + R_on)`, `dV[g][e] / dC[k] = Vcc h (Z[k][e] - Z[e][g] h)`.
+    pub fn readings_jacobian_v_per_s(&self, detector: &Detector) -> DMatrix<f64> {
+        let (nodes, electrodes) = self.nodes_ohm.shape();
+        let mut jacobian = DMatrix::zeros(electrodes * electrodes, nodes);
+        for (node, mut column) in jacobian.column_iter_mut().enumerate() {
+            let at_node = self.nodes_ohm.row(node);
+            for g in 0..electrodes {
+                let share = at_node[g] / (self.impedance_ohm[(g, g)] + detector.on_resistance_ohm);
+                for e in 0..electrodes {
+                    column[g * electrodes + e] =
+                        detector.drive_v * share * (at_node[e] - self.impedance_ohm[(e, g)] * share);
+                }
+            }
+        }
+        jacobian
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::forward::readings_v;
 
-    /// Two electrodes and two patches joined to one node by 1, 2, 3 and 4 ohm: every field is a plain sum.
-    fn star() -> PatchFields {
-        PatchFields {
-            electrodes: DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 2.0]),
-            cross: DMatrix::zeros(2, 2),
-            patches: DMatrix::from_row_slice(2, 2, &[3.0, 0.0, 0.0, 4.0]),
-        }
+    /// Fields of two electrodes and two patches joined to one node by 1, 2, 3 and 4 ohm: plain sums, in a gauge.
+    fn star(conductance_s: [f64; 2], gauge_ohm: f64) -> Option<Contacted> {
+        let diagonal = |a: f64, b: f64| DMatrix::from_row_slice(2, 2, &[a, 0.0, 0.0, b]).add_scalar(gauge_ohm);
+        conducting_patches(&diagonal(1.0, 2.0), &diagonal(0.0, 0.0), diagonal(3.0, 4.0), &conductance_s)
     }
 
     #[test]
     fn a_star_of_resistors_has_its_textbook_impedance() {
-        let z = star().impedance(&[1.0, 0.5]).unwrap().impedance_ohm;
-        let to_drive = 1.0 / (1.0 / (3.0 + 1.0) + 1.0 / (4.0 + 2.0));
+        let found = star([1.0, 0.5], 0.0).unwrap();
+        let branches = [1.0 / (3.0 + 1.0), 1.0 / (4.0 + 2.0)];
+        let to_drive = 1.0 / (branches[0] + branches[1]);
         let expected = DMatrix::from_row_slice(2, 2, &[1.0 + to_drive, to_drive, to_drive, 2.0 + to_drive]);
-        assert!((z - expected).amax() < 1e-12);
+        assert!((found.impedance_ohm - expected).amax() < 1e-12);
+        let currents = DMatrix::from_fn(2, 2, |patch, _| -branches[patch] * to_drive);
+        assert!((found.unknowns - currents).amax() < 1e-12);
     }
 
     #[test]
     fn the_gauge_of_the_fields_does_not_matter() {
-        let (plain, mut shifted) = (star(), star());
-        shifted.electrodes.add_scalar_mut(7.0);
-        shifted.cross.add_scalar_mut(7.0);
-        shifted.patches.add_scalar_mut(7.0);
-        let [a, b] = [plain, shifted].map(|fields| fields.impedance(&[0.3, 2e-6]).unwrap());
+        let [a, b] = [0.0, 7.0].map(|gauge_ohm| star([0.3, 2e-6], gauge_ohm).unwrap());
         assert!((a.impedance_ohm - b.impedance_ohm).amax() < 1e-11);
-        assert!((a.patch_impedance_ohm - b.patch_impedance_ohm).amax() < 1e-11);
+        assert!((a.unknowns - b.unknowns).amax() < 1e-11);
     }
 
     #[test]
-    fn the_derivative_is_that_of_a_small_step_at_zero_conductance_too() {
-        let fields = star();
-        for (k, conductance) in [(0, [0.4, 0.2]), (1, [0.4, 0.0])] {
-            let mut stepped = conductance;
-            stepped[k] += 1e-8;
-            let [at, beyond] = [conductance, stepped].map(|c| fields.impedance(&c).unwrap());
-            let step = (beyond.impedance_ohm - &at.impedance_ohm) / 1e-8;
-            assert!((step - at.derivative(k)).amax() < 1e-4, "patch {k}");
+    fn the_readings_follow_their_jacobian() {
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        detector.on_resistance_ohm = 0.7;
+        let conductance_s = [0.4, 0.2];
+        let at = star(conductance_s, 0.0).unwrap();
+        // Contact: the current into the detector is minus the conductance times the potential.
+        let nodes_ohm = DMatrix::from_fn(2, 2, |k, e| -at.unknowns[(k, e)] / conductance_s[k]);
+        let fields = ContactFields { impedance_ohm: at.impedance_ohm, nodes_ohm };
+        let jacobian = fields.readings_jacobian_v_per_s(&detector);
+        for k in 0..2 {
+            let mut stepped_s = conductance_s;
+            stepped_s[k] += 1e-7;
+            let stepped = star(stepped_s, 0.0).unwrap().impedance_ohm;
+            let [before, after] = [&fields.impedance_ohm, &stepped].map(|z| readings_v(z, &detector));
+            for (g, e) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let step = (after.at(g, e) - before.at(g, e)) / 1e-7;
+                assert!((step - jacobian[(2 * g + e, k)]).abs() < 1e-5, "patch {k}, ground {g}, electrode {e}");
+                let step = (stepped[(e, g)] - fields.impedance_ohm[(e, g)]) / 1e-7;
+                assert!((step - fields.ohm_per_s(e, g, k)).abs() < 1e-5, "patch {k}, ground {g}, electrode {e}");
+            }
         }
-    }
-
-    #[test]
-    fn without_a_conducting_patch_there_is_no_impedance() {
-        assert!(star().impedance(&[0.0, 0.0]).is_none());
     }
 }

@@ -77,7 +77,8 @@ mod tests {
         let shell = Shell::with_nodes(&detector, 1000)?;
         let jacobian = Jacobian::of(&shell);
         let (node, conductance_s) = (700, 1e-8);
-        let readings = readings_v(&shell.contact_fields_ohm(&[(node, conductance_s)])?.impedance_ohm, &detector);
+        let image_s = shell.image_mesh().image_with([(node, conductance_s)]);
+        let readings = readings_v(&shell.image_fields(&image_s)?.impedance_ohm, &detector);
         for (g, e) in [(0, 1), (3, 3), (7, 12), (15, 0)] {
             let linear_v = jacobian.volts_per_s(g, e, node) * conductance_s;
             assert!((readings.at(g, e) / linear_v - 1.0).abs() < 1e-3, "{} {linear_v}", readings.at(g, e));

@@ -3,7 +3,7 @@
 //! A [`ForwardModel`] gives the electrode impedance matrix `Z` of a detector for any contacts, and the fields that make
 //! the linear theory. What follows from those is the same for every model and lives here, once.
 
-pub mod contact;
+mod contact;
 pub mod jacobian;
 mod jacobian_file;
 pub mod shell;
@@ -11,6 +11,7 @@ mod slab;
 
 use nalgebra::DMatrix;
 
+pub use self::contact::ContactFields;
 pub use self::jacobian_file::JacobianFileError;
 pub use self::slab::{Resolution, Slab};
 use crate::detector::Detector;
@@ -31,6 +32,14 @@ pub trait ForwardModel: Send + Sync {
     /// # Errors
     /// [`ForwardError`] if a contact is not on the detector or no contact conducts.
     fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError>;
+
+    /// The impedance matrix and the fields under the image's nodes with a conductance at each of them (S): an image of contact,
+    /// or a mask of any shape. A node stands for its cell of the surface, over which its conductance is spread.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if the image has another number of nodes than [`image_mesh`](Self::image_mesh), a value that is no
+    /// conductance, or nothing that conducts.
+    fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError>;
 
     /// Places of the image that this model is inverted on.
     fn image_mesh(&self) -> &ImageMesh;
@@ -65,6 +74,16 @@ impl ImageMesh {
         let [x, y] = self.nodes_m[node];
         self.places_m.get(node).copied().unwrap_or([x, y, 0.0])
     }
+
+    /// An image that is zero but at some nodes.
+    ///
+    /// # Panics
+    /// If there is no such node.
+    pub fn image_with(&self, values: impl IntoIterator<Item = (usize, f64)>) -> Vec<f64> {
+        let mut image = vec![0.0; self.nodes_m.len()];
+        values.into_iter().for_each(|(node, value)| image[node] = value);
+        image
+    }
 }
 
 /// Why a model cannot answer.
@@ -75,6 +94,12 @@ pub enum ForwardError {
     Contact {
         /// Its place in the list, from 0.
         index: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// An image that is not one of this model's.
+    #[error("image of contact: {what}")]
+    Image {
         /// What is wrong.
         what: String,
     },
@@ -89,6 +114,19 @@ pub enum ForwardError {
         /// What is wrong and what is allowed.
         what: String,
     },
+}
+
+/// Whether `image_s` can be an image on so many nodes.
+fn check_image(image_s: &[f64], nodes: usize) -> Result<(), ForwardError> {
+    let wrong = |what: String| Err(ForwardError::Image { what });
+    if image_s.len() != nodes {
+        return wrong(format!("it has {} values, the model's image has {nodes} nodes", image_s.len()));
+    }
+    match image_s.iter().position(|value_s| !(*value_s >= 0.0 && value_s.is_finite())) {
+        Some(node) => wrong(format!("node {node} has a conductance of {} S; zero or above is needed", image_s[node])),
+        None if image_s.iter().all(|value_s| *value_s == 0.0) => Err(ForwardError::NoContact),
+        None => Ok(()),
+    }
 }
 
 /// Readings of a frame from the impedance matrix (V): `V[g][e] = Vcc (1 - Z[e][g] / (Z[g][g] + R_on))`.

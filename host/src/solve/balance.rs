@@ -38,7 +38,7 @@ mod tests {
     use crate::detector::Detector;
     use crate::forward::jacobian::Jacobian;
     use crate::forward::shell::Shell;
-    use crate::forward::{ForwardError, readings_v};
+    use crate::forward::{ForwardError, ForwardModel, readings_v};
 
     #[test]
     fn one_firm_contact_is_made_exactly_linear() -> Result<(), ForwardError> {
@@ -47,7 +47,8 @@ mod tests {
         let jacobian = Jacobian::of(&shell);
         for conductance_s in [1e-6, 1e-3, 1.0] {
             let node = 600;
-            let impedance_ohm = shell.contact_fields_ohm(&[(node, conductance_s)])?.impedance_ohm;
+            let image_s = shell.image_mesh().image_with([(node, conductance_s)]);
+            let impedance_ohm = shell.image_fields(&image_s)?.impedance_ohm;
             let volts = balanced(&readings_v(&impedance_ohm, &detector), detector.drive_v);
             let loads = (0..16).map(|g| (impedance_ohm[(g, g)] + detector.on_resistance_ohm).ln());
             let effective_s = (-loads.sum::<f64>() / 16.0).exp();

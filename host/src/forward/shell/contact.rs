@@ -12,7 +12,7 @@ const CORNERS: usize = 64;
 ///
 /// Exact for a polygon of [`CORNERS`] corners: a linear function's integral over a part is its value at the part's centroid.
 /// So a disc's conductance and its centre are kept, whatever the mesh. A part beyond the edge touches nothing.
-pub fn node_conductances_s(mesh: &Mesh, contacts: &[Contact]) -> Result<Vec<(usize, f64)>, ForwardError> {
+pub fn node_conductances_s(mesh: &Mesh, contacts: &[Contact]) -> Result<Vec<f64>, ForwardError> {
     let mut conductances_s = vec![0.0; mesh.nodes_m.len()];
     for (index, contact) in contacts.iter().enumerate() {
         check(contact).map_err(|what| ForwardError::Contact { index, what: what.to_owned() })?;
@@ -20,7 +20,7 @@ pub fn node_conductances_s(mesh: &Mesh, contacts: &[Contact]) -> Result<Vec<(usi
             return Err(ForwardError::Contact { index, what: "it is off the detector".to_owned() });
         }
     }
-    Ok(conductances_s.into_iter().enumerate().filter(|&(_, conductance_s)| conductance_s > 0.0).collect())
+    Ok(conductances_s)
 }
 
 fn check(contact: &Contact) -> Result<(), &'static str> {

@@ -18,7 +18,8 @@ use nalgebra::DMatrix;
 
 pub use self::mesh::Mesh;
 use self::system::{Factor, Singular, System};
-use super::{ForwardError, ForwardModel, ImageMesh};
+use super::contact::ContactFields;
+use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Electrode};
 use crate::scene::Contact;
 
@@ -34,15 +35,6 @@ pub struct Shell {
     system: System,
     fields_ohm: DMatrix<f64>,
     electrode_fields_ohm: DMatrix<f64>,
-}
-
-/// Potentials for 1 A into each electrode while contacts lead it off to the driving layer.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ContactFields {
-    /// At the electrodes (ohm): the impedance matrix `Z`, `electrodes x electrodes`.
-    pub impedance_ohm: DMatrix<f64>,
-    /// At the nodes (ohm): `nodes x electrodes`.
-    pub nodes_ohm: DMatrix<f64>,
 }
 
 impl Shell {
@@ -87,28 +79,11 @@ impl Shell {
         Ok(Self { detector: detector.clone(), mesh, image_mesh, system, fields_ohm, electrode_fields_ohm })
     }
 
-    /// Potentials for 1 A into each electrode with contact conductances at nodes (S): pairs of node and conductance.
-    ///
-    /// `d impedance_ohm[(e, g)] / d conductance[k] = -nodes_ohm[(k, e)] nodes_ohm[(k, g)]`.
-    ///
-    /// # Errors
-    /// [`ForwardError::NoContact`] if no node conducts.
-    pub fn contact_fields_ohm(&self, conductances_s: &[(usize, f64)]) -> Result<ContactFields, ForwardError> {
-        if !conductances_s.iter().any(|&(_, conductance_s)| conductance_s > 0.0) {
-            return Err(ForwardError::NoContact);
-        }
-        let factor = self.system.factorise(conductances_s.iter().copied()).map_err(|_| ForwardError::NoContact)?;
-        let pads = self.system.pads();
-        let currents_a = Mat::from_fn(self.system.pad(pads), pads, |i, j| f64::from(u8::from(i == self.system.pad(j))));
-        let (nodes_ohm, impedance_ohm) = factor.solve(currents_a);
-        Ok(ContactFields { impedance_ohm, nodes_ohm })
-    }
-
-    /// Contact conductance that each node gets from discs of contact (S): pairs of node and conductance.
+    /// Contact conductance that each node gets from discs of contact (S).
     ///
     /// # Errors
     /// [`ForwardError::Contact`] if a contact is off the detector or no positive disc.
-    pub fn node_conductances_s(&self, contacts: &[Contact]) -> Result<Vec<(usize, f64)>, ForwardError> {
+    pub fn node_conductances_s(&self, contacts: &[Contact]) -> Result<Vec<f64>, ForwardError> {
         contact::node_conductances_s(&self.mesh, contacts)
     }
 }
@@ -123,7 +98,16 @@ impl ForwardModel for Shell {
     }
 
     fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
-        Ok(self.contact_fields_ohm(&self.node_conductances_s(contacts)?)?.impedance_ohm)
+        Ok(self.image_fields(&self.node_conductances_s(contacts)?)?.impedance_ohm)
+    }
+
+    fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
+        check_image(image_s, self.mesh.nodes_m.len())?;
+        let factor = self.system.factorise(image_s.iter().copied().enumerate()).map_err(|_| ForwardError::NoContact)?;
+        let pads = self.system.pads();
+        let currents_a = Mat::from_fn(self.system.pad(pads), pads, |i, j| f64::from(u8::from(i == self.system.pad(j))));
+        let (nodes_ohm, impedance_ohm) = factor.solve(currents_a);
+        Ok(ContactFields { impedance_ohm, nodes_ohm })
     }
 
     fn image_mesh(&self) -> &ImageMesh {

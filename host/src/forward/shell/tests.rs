@@ -121,11 +121,12 @@ fn all_current_leaves_by_the_contacts() -> Result<(), ForwardError> {
     let shell = shell(&preset("strip-13x60"), 2000);
     let conductances_s =
         shell.node_conductances_s(&[contact(0.001, 0.02, 0.003, 0.05), contact(0.0, -0.01, 0.002, 1e-5)])?;
-    let sum: f64 = conductances_s.iter().map(|&(_, conductance_s)| conductance_s).sum();
+    let sum: f64 = conductances_s.iter().sum();
     assert!((sum / 0.05001 - 1.0).abs() < 1e-12, "conductance is kept: {sum}");
-    let fields = shell.contact_fields_ohm(&conductances_s)?;
+    let fields = shell.image_fields(&conductances_s)?;
     for electrode in 0..16 {
-        let current_a: f64 = conductances_s.iter().map(|&(node, s)| s * fields.nodes_ohm[(node, electrode)]).sum();
+        let current_a: f64 =
+            conductances_s.iter().zip(fields.nodes_ohm.column(electrode).iter()).map(|(s, ohm)| s * ohm).sum();
         assert!((current_a - 1.0).abs() < 1e-9, "{current_a} A");
     }
     Ok(())
@@ -259,7 +260,7 @@ fn one_contact_follows_the_closed_form_of_the_fields() -> Result<(), ForwardErro
     let detector = preset("square-60");
     let shell = shell(&detector, 1000);
     let (node, conductance_s) = (nearest(&shell, [0.004, 0.009]), 2e-3);
-    let refactorised = shell.contact_fields_ohm(&[(node, conductance_s)])?;
+    let refactorised = shell.image_fields(&shell.image_mesh().image_with([(node, conductance_s)]))?;
     // The field of the contact's own node: the same Neumann problem with the current entering there.
     let factor = shell.system.factorise([(shell.system.pad(0), 1e-3)]).map_err(|_| ForwardError::NoContact)?;
     let areas_m2 = &shell.image_mesh.node_areas_m2;
@@ -300,11 +301,13 @@ fn the_default_mesh_is_near_its_limit() -> Result<(), ForwardError> {
 fn impedance_derivatives_are_products_of_fields() -> Result<(), ForwardError> {
     let shell = shell(&preset("square-60"), 800);
     let (node, step_s) = (nearest(&shell, [-0.01, 0.003]), 1e-6);
-    let with = |extra_s: f64| shell.contact_fields_ohm(&[(nearest(&shell, [0.0; 2]), 1e-3), (node, 1e-4 + extra_s)]);
+    let middle = nearest(&shell, [0.0; 2]);
+    let with =
+        |extra_s: f64| shell.image_fields(&shell.image_mesh().image_with([(middle, 1e-3), (node, 1e-4 + extra_s)]));
     let (fields, before, after) = (with(0.0)?, with(-step_s)?, with(step_s)?);
     for (e, g) in [(0, 0), (3, 12), (5, 6), (15, 1)] {
         let difference = (after.impedance_ohm[(e, g)] - before.impedance_ohm[(e, g)]) / (2.0 * step_s);
-        let product = -fields.nodes_ohm[(node, e)] * fields.nodes_ohm[(node, g)];
+        let product = fields.ohm_per_s(e, g, node);
         assert!((difference / product - 1.0).abs() < 1e-3, "{difference} {product}");
     }
     Ok(())

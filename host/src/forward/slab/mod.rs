@@ -5,6 +5,7 @@
 //! ([`pads`]), so that a contact costs a few look-ups and a small solve.
 
 mod disc;
+mod image;
 mod kernel;
 mod layers;
 mod pads;
@@ -13,19 +14,22 @@ mod spline;
 #[cfg(test)]
 mod tests;
 
+use std::sync::OnceLock;
+
 use nalgebra::{DMatrix, DVector};
 use realfft::RealFftPlanner;
 
 use self::disc::{DiscBasis, MAX_DEGREE};
+use self::image::{CellFields, ImageGrid};
 use self::kernel::{Surface, SurfaceKernel};
 use self::pads::{Across, Pad, PadFields, between, pad_impedances};
-use super::contact::ContactSystem;
-use super::{ForwardError, ForwardModel, ImageMesh};
+use super::contact::{ContactFields, ContactSystem, conducting_patches};
+use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Layer};
 use crate::scene::Contact;
 
-/// Nodes of the image mesh, about.
-const IMAGE_NODES: f64 = 2000.0;
+/// Nodes of the image unless said otherwise, about.
+const IMAGE_NODES: usize = 2000;
 
 /// How finely a [`Slab`] is resolved: degrees of the polynomials that current densities are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,8 +55,17 @@ pub struct Slab {
     resolution: Resolution,
     top: SurfaceKernel,
     pads: PadFields,
-    image_mesh: ImageMesh,
+    image: Image,
+}
+
+/// The grid that images are on.
+#[derive(Clone, Debug)]
+struct Image {
+    grid: ImageGrid,
+    mesh: ImageMesh,
     fields_ohm: DMatrix<f64>,
+    /// Made when the first image is asked for.
+    cells: OnceLock<CellFields>,
 }
 
 /// A contact, ready to be put into the system.
@@ -85,9 +98,20 @@ impl Slab {
         let pads = bare(detector, size_m, resolution, &mut planner)
             .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
         let top = SurfaceKernel::new(size_m, split_m(detector, size_m), &mut planner, &top_surface(detector));
-        let image_mesh = image_grid(size_m);
-        let fields_ohm = image_fields(&pads, &image_mesh, size_m);
-        Ok(Self { detector: detector.clone(), size_m, resolution, top, pads, image_mesh, fields_ohm })
+        let image = Image::new(ImageGrid::new(size_m, IMAGE_NODES), &pads);
+        Ok(Self { detector: detector.clone(), size_m, resolution, top, pads, image })
+    }
+
+    /// The same model with images of about `nodes` nodes instead of 2000; at least 9.
+    pub fn on_image(self, nodes: usize) -> Self {
+        Self { image: Image::new(ImageGrid::new(self.size_m, nodes), &self.pads), ..self }
+    }
+
+    fn cells(&self) -> &CellFields {
+        self.image.cells.get_or_init(|| {
+            let top = top_surface(&self.detector);
+            CellFields::new(self.image.grid, &self.pads, top.response, top.floating)
+        })
     }
 
     fn disc(&self, index: usize, contact: &Contact) -> Result<Disc, ForwardError> {
@@ -188,12 +212,32 @@ impl ForwardModel for Slab {
         Ok(self.system(&discs).solve().ok_or(ForwardError::NoContact)?.impedance_ohm)
     }
 
+    fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
+        check_image(image_s, self.image.mesh.nodes_m.len())?;
+        let (touched, untouched): (Vec<_>, Vec<_>) = (0..image_s.len()).partition(|node| image_s[*node] > 0.0);
+        let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
+        let cells = self.cells();
+        let fields_ohm = &self.image.fields_ohm;
+        let cross = fields_ohm.select_rows(&touched);
+        let patches = cells.between(&touched, &touched);
+        let solved = conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)
+            .ok_or(ForwardError::NoContact)?;
+        let mut elsewhere = fields_ohm.select_rows(&untouched) + cells.between(&untouched, &touched) * &solved.unknowns;
+        elsewhere.column_iter_mut().zip(&solved.constant_ohm).for_each(|(mut e, ohm)| e.add_scalar_mut(*ohm));
+        let mut nodes_ohm = DMatrix::zeros(image_s.len(), fields_ohm.ncols());
+        for (row, (node, conductance_s)) in touched.iter().zip(&conductance_s).enumerate() {
+            nodes_ohm.row_mut(*node).copy_from(&(solved.unknowns.row(row) / -*conductance_s));
+        }
+        untouched.iter().enumerate().for_each(|(row, node)| nodes_ohm.row_mut(*node).copy_from(&elsewhere.row(row)));
+        Ok(ContactFields { impedance_ohm: solved.impedance_ohm, nodes_ohm })
+    }
+
     fn image_mesh(&self) -> &ImageMesh {
-        &self.image_mesh
+        &self.image.mesh
     }
 
     fn fields_ohm(&self) -> &DMatrix<f64> {
-        &self.fields_ohm
+        &self.image.fields_ohm
     }
 
     fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
@@ -283,33 +327,9 @@ fn bare(
     PadFields::new(&pads, basis, &impedances, &across, planner)
 }
 
-/// A regular grid of nodes, edges included, with two triangles in each cell.
-fn image_grid(size_m: [f64; 2]) -> ImageMesh {
-    let step_m = (size_m[0] * size_m[1] / IMAGE_NODES).sqrt();
-    let cells = size_m.map(|size_m| (size_m / step_m).round().max(2.0) as usize);
-    let [nx, ny] = cells;
-    let place = |axis: usize, i: usize| size_m[axis] * (i as f64 / cells[axis] as f64 - 0.5);
-    let share =
-        |axis: usize, i: usize| size_m[axis] / cells[axis] as f64 * if i == 0 || i == cells[axis] { 0.5 } else { 1.0 };
-    let at = |i: usize, j: usize| (j * (nx + 1) + i) as u32;
-    let nodes = || (0..=ny).flat_map(|j| (0..=nx).map(move |i| (i, j)));
-    ImageMesh {
-        places_m: Vec::new(),
-        nodes_m: nodes().map(|(i, j)| [place(0, i), place(1, j)]).collect(),
-        node_areas_m2: nodes().map(|(i, j)| share(0, i) * share(1, j)).collect(),
-        triangles: (0..ny)
-            .flat_map(|j| (0..nx).map(move |i| (i, j)))
-            .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]])
-            .collect(),
+impl Image {
+    fn new(grid: ImageGrid, pads: &PadFields) -> Self {
+        let fields_ohm = grid.means(pads, pads.electrodes()).transpose();
+        Self { grid, mesh: grid.mesh(), fields_ohm, cells: OnceLock::new() }
     }
-}
-
-fn image_fields(pads: &PadFields, mesh: &ImageMesh, size_m: [f64; 2]) -> DMatrix<f64> {
-    let mut fields = DMatrix::zeros(mesh.nodes_m.len(), pads.electrodes());
-    let mut sample = vec![0.0; pads.electrodes()];
-    for (row, at) in mesh.nodes_m.iter().enumerate() {
-        pads.sample(from_corner(size_m, *at), &mut sample);
-        sample.iter().enumerate().for_each(|(e, value)| fields[(row, e)] = f64::from(*value));
-    }
-    fields
 }

@@ -167,6 +167,11 @@ impl PadFields {
         self.electrodes
     }
 
+    /// Number of fields: of the electrodes and of the correction.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
     /// Fields at a point of the top, from the corner (m): first the electrodes' (ohm), then the correction's (square root of
     /// ohm), `out.len()` of them.
     pub fn sample(&self, at_m: [f64; 2], out: &mut [f32]) {

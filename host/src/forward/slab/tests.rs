@@ -126,3 +126,71 @@ fn what_the_slab_cannot_be_is_refused_by_name() {
     let outside = slab.impedance_ohm(&[contact(0.0, 0.0, 0.001, 1e-3), contact(0.04, 0.0, 0.001, 1e-3)]);
     assert!(matches!(outside, Err(ForwardError::Contact { index: 1, .. })));
 }
+
+/// A disc of contact as an image: each cell's share of its area, by sub-sampling.
+fn disc_image(slab: &Slab, disc: &Contact) -> Vec<f64> {
+    let step_m = (slab.image_mesh().node_areas_m2.iter().copied().fold(0.0, f64::max)).sqrt();
+    let inside = |at: &[f64; 2]| {
+        let at = *at;
+        let points = (0..400).map(|i| [i % 20, i / 20].map(|i| (f64::from(i) + 0.5) / 20.0 - 0.5));
+        points
+            .filter(move |p| (at[0] + p[0] * step_m - disc.x_m).hypot(at[1] + p[1] * step_m - disc.y_m) < disc.radius_m)
+    };
+    let shares: Vec<_> = slab.image_mesh().nodes_m.iter().map(|at| inside(at).count() as f64).collect();
+    let total: f64 = shares.iter().sum();
+    shares.iter().map(|share| disc.conductance_s * share / total).collect()
+}
+
+#[test]
+fn a_disc_and_its_image_agree_and_come_closer_with_the_grid() {
+    let disc = contact(0.0113, -0.0046, 0.004, 2e-3);
+    let slab = Slab::new(&square(0.005, 0.002)).unwrap();
+    let exact = slab.impedance_ohm(&[disc]).unwrap();
+    let errors = [900, 3600].map(|nodes| {
+        let slab = slab.clone().on_image(nodes);
+        let image = slab.image_fields(&disc_image(&slab, &disc)).unwrap().impedance_ohm;
+        apart(slab.detector(), &image, &exact)
+    });
+    assert!(errors[1] < 5e-3 && errors[1] < 0.5 * errors[0], "{errors:?}");
+}
+
+#[test]
+fn an_image_follows_its_jacobian_where_it_touches_and_where_not() {
+    let mut detector = square(0.005, 0.002);
+    detector.on_resistance_ohm = 4.0;
+    let slab = Slab::new(&detector).unwrap().on_image(100);
+    let mesh = slab.image_mesh();
+    let image_s = mesh.image_with([(0, 2e-4), (33, 1e-3), (34, 2e-3), (71, 5e-5)]);
+    let at = slab.image_fields(&image_s).unwrap();
+    let jacobian = at.readings_jacobian_v_per_s(&detector);
+    let before = readings_v(&at.impedance_ohm, &detector);
+    for node in [0, 34, 50, 99] {
+        let mut stepped_s = image_s.clone();
+        stepped_s[node] += 1e-9;
+        let after = readings_v(&slab.image_fields(&stepped_s).unwrap().impedance_ohm, &detector);
+        for (row, (after, before)) in after.volts().iter().zip(before.volts()).enumerate() {
+            let difference = (after - before) / 1e-9 - jacobian[(row, node)];
+            assert!(difference.abs() < 1e-4 * jacobian.amax(), "node {node}, row {row}: {difference}");
+        }
+    }
+}
+
+#[test]
+fn all_current_of_an_image_leaves_through_it() {
+    let slab = Slab::new(&square(0.003, 0.002)).unwrap().on_image(400);
+    let image_s: Vec<_> = (0..slab.image_mesh().nodes_m.len()).map(|node| 1e-6 * (node % 7) as f64).collect();
+    let fields = slab.image_fields(&image_s).unwrap();
+    for electrode in 0..16 {
+        let current_a: f64 = image_s.iter().zip(fields.nodes_ohm.column(electrode).iter()).map(|(s, z)| s * z).sum();
+        assert!((current_a - 1.0).abs() < 1e-9, "{current_a} A");
+    }
+}
+
+#[test]
+fn an_image_of_another_size_or_sign_is_refused() {
+    let slab = Slab::new(&square(0.005, 0.002)).unwrap().on_image(100);
+    let nodes = slab.image_mesh().nodes_m.len();
+    assert!(slab.image_fields(&[1e-3]).unwrap_err().to_string().contains("1 values"));
+    assert!(slab.image_fields(&vec![-1e-3; nodes]).unwrap_err().to_string().contains("node 0"));
+    assert_eq!(slab.image_fields(&vec![0.0; nodes]), Err(ForwardError::NoContact));
+}
