@@ -9,6 +9,7 @@ pub mod case;
 pub mod detector;
 pub mod forward;
 mod geometry;
+pub mod hertz;
 pub mod live;
 pub mod readings;
 pub mod record;

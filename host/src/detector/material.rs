@@ -43,6 +43,13 @@ impl Foam {
     }
 }
 
+impl Stack {
+    /// Its foams, bottom first.
+    pub fn foams(&self) -> &[Foam] {
+        &self.foams
+    }
+}
+
 impl FromStr for Stack {
     type Err = String;
 
