@@ -30,7 +30,7 @@ pub struct Detector {
     pub layers: Vec<Layer>,
     /// In the order of the channels.
     pub electrodes: Vec<Electrode>,
-    /// Contact impedance between pad and layer, in ohm square metres (ohm m2).
+    /// Contact impedance between pad and layer, in ohm square metres (ohm m2), of pads that have none of their own.
     pub contact_impedance_ohm_m2: f64,
     /// Voltage of the driving layer (V).
     pub drive_v: f64,
@@ -72,6 +72,9 @@ pub struct Electrode {
     pub z_m: f64,
     /// Radius (m).
     pub radius_m: f64,
+    /// Contact impedance (ohm m2), where it is not the detector's.
+    #[serde(default)]
+    pub contact_impedance_ohm_m2: Option<f64>,
 }
 
 /// The analogue-to-digital converter.
@@ -104,6 +107,11 @@ impl Detector {
         }
     }
 
+    /// Contact impedance of one of its pads (ohm m2).
+    pub fn pad_impedance_ohm_m2(&self, pad: &Electrode) -> f64 {
+        pad.contact_impedance_ohm_m2.unwrap_or(self.contact_impedance_ohm_m2)
+    }
+
     /// Conductivity integrated over the thickness (S per square): the natural unit of contact conductance.
     pub fn sheet_conductance_s(&self) -> f64 {
         self.layers.iter().map(Layer::sheet_conductance_s).sum()
@@ -118,7 +126,7 @@ impl Electrode {
 
     /// A pad of a flat detector.
     pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
-        Self { x_m, y_m, z_m: 0.0, radius_m }
+        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None }
     }
 }
 

@@ -65,9 +65,10 @@ impl Mesh {
 
     /// Triangulates a detector with edges of about `edge_m` away from the pads.
     fn with_edge(detector: &Detector, edge_m: f64) -> Result<Self, ForwardError> {
-        let edge_depth_m = (detector.sheet_conductance_s() * detector.contact_impedance_ohm_m2).sqrt();
+        let sheet_s = detector.sheet_conductance_s();
+        let edge_depth_m = |pad| (sheet_s * detector.pad_impedance_ohm_m2(pad)).sqrt();
         let pads: Vec<_> =
-            detector.electrodes.iter().map(|electrode| PadRings::new(electrode, edge_depth_m, edge_m)).collect();
+            detector.electrodes.iter().map(|pad| PadRings::new(pad, edge_depth_m(pad), edge_m)).collect();
         let error = |what| ForwardError::Detector { detector: detector.name.clone(), what };
         if let Some(surface) = &detector.surface {
             return facets::mesh(surface, &detector.electrodes, &pads, edge_m).map_err(error);

@@ -56,6 +56,18 @@ impl Shell {
     /// # Errors
     /// [`ForwardError::Detector`] if the detector cannot be meshed.
     pub fn with_nodes(detector: &Detector, nodes: usize) -> Result<Self, ForwardError> {
+        Self::with_sheet(detector, nodes, |_| 1.0)
+    }
+
+    /// A model whose sheet conductance is not everywhere that of the detector, but `factor` times it at a place (m).
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the detector cannot be meshed.
+    pub fn with_sheet(
+        detector: &Detector,
+        nodes: usize,
+        factor: impl Fn([f64; 2]) -> f64,
+    ) -> Result<Self, ForwardError> {
         let singular = |_: Singular| ForwardError::Detector {
             detector: detector.name.clone(),
             what: "its equations are singular: conductivity and contact impedance have to be finite and above zero"
@@ -65,7 +77,11 @@ impl Shell {
             detector.electrodes.iter().map(|pad| pad_impedance_ohm_m2(detector, pad)).collect();
         let sheet_conductance_s = detector.sheet_conductance_s();
         let mesh = Mesh::new(detector, nodes)?;
-        let system = System::new(&mesh, sheet_conductance_s, &pad_impedance_ohm_m2).map_err(singular)?;
+        let sheet_s = |[a, b, c]: [[f64; 2]; 3]| {
+            let centroid = [0, 1].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
+            factor(centroid) * sheet_conductance_s
+        };
+        let system = System::new(&mesh, sheet_s, &pad_impedance_ohm_m2).map_err(singular)?;
         let node_areas_m2 = mesh.node_areas_m2();
         // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.
         let factor = system.factorise([(system.pad(0), sheet_conductance_s)]).map_err(singular)?;
@@ -126,7 +142,7 @@ impl ForwardModel for Shell {
 /// Contact impedance of a pad that the equations are made with (ohm m2).
 fn pad_impedance_ohm_m2(detector: &Detector, pad: &Electrode) -> f64 {
     let smallest = SMALLEST_PAD_IMPEDANCE * pad.radius_m * pad.radius_m / detector.sheet_conductance_s();
-    detector.contact_impedance_ohm_m2.max(smallest)
+    detector.pad_impedance_ohm_m2(pad).max(smallest)
 }
 
 /// Neumann functions of the pads, at nodes and at pads: 1 A into a pad, out evenly all over, mean zero. So they are symmetric.

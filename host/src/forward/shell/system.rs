@@ -33,12 +33,18 @@ pub struct Factor {
 pub struct Singular;
 
 impl System {
-    /// Assembles the matrix; sheet conductance in S, `pad_impedance_ohm_m2` for each pad.
-    pub fn new(mesh: &Mesh, sheet_conductance_s: f64, pad_impedance_ohm_m2: &[f64]) -> Result<Self, Singular> {
+    /// Assembles the matrix; `sheet_s` gives the sheet conductance (S) of a triangle with such corners, `pad_impedance_ohm_m2`
+    /// that of each pad.
+    pub fn new(
+        mesh: &Mesh,
+        sheet_s: impl Fn([[f64; 2]; 3]) -> f64,
+        pad_impedance_ohm_m2: &[f64],
+    ) -> Result<Self, Singular> {
         let (nodes, pads) = (mesh.nodes_m.len(), mesh.pad_triangles.len());
         let mut entries = Vec::with_capacity(7 * mesh.triangles.len());
         for &triangle in &mesh.triangles {
-            add_sheet(&mut entries, triangle, mesh.corners(triangle), sheet_conductance_s);
+            let corners = mesh.corners(triangle);
+            add_sheet(&mut entries, triangle, corners, sheet_s(corners));
         }
         for (pad, range) in mesh.pad_triangles.iter().enumerate() {
             for &triangle in &mesh.triangles[range.clone()] {

@@ -260,14 +260,15 @@ fn check(detector: &Detector) -> Result<[f64; 2], String> {
     if detector.electrodes.is_empty() {
         return Err("it has no electrode".to_owned());
     }
-    if !(detector.contact_impedance_ohm_m2 >= 0.0 && detector.contact_impedance_ohm_m2.is_finite()) {
-        return Err("its contact impedance is below zero or not a number".to_owned());
-    }
     for (index, pad) in detector.electrodes.iter().enumerate() {
         let inside =
             [(pad.x_m, size_m[0]), (pad.y_m, size_m[1])].iter().all(|(at, size)| at.abs() + pad.radius_m <= size / 2.0);
         if !(positive(pad.radius_m) && inside) {
             return Err(format!("electrode {index} needs a radius above zero and a place inside the outline"));
+        }
+        let impedance_ohm_m2 = detector.pad_impedance_ohm_m2(pad);
+        if !(impedance_ohm_m2 >= 0.0 && impedance_ohm_m2.is_finite()) {
+            return Err(format!("the contact impedance of electrode {index} is below zero or not a number"));
         }
     }
     Ok(size_m)
@@ -312,12 +313,16 @@ fn bare(
     let pads: Vec<_> = detector
         .electrodes
         .iter()
-        .map(|pad| Pad { centre_m: from_corner(size_m, [pad.x_m, pad.y_m]), radius_m: pad.radius_m })
+        .map(|pad| Pad {
+            centre_m: from_corner(size_m, [pad.x_m, pad.y_m]),
+            radius_m: pad.radius_m,
+            contact_impedance_ohm_m2: detector.pad_impedance_ohm_m2(pad),
+        })
         .collect();
     let basis = DiscBasis::of_degree(resolution.pad_degree);
     let split_m = split_m(detector, size_m);
     let kernel = SurfaceKernel::new(size_m, split_m, planner, &bottom_surface(detector));
-    let impedances = pad_impedances(&pads, basis, &kernel, detector.contact_impedance_ohm_m2);
+    let impedances = pad_impedances(&pads, basis, &kernel);
     let across = Across {
         size_m,
         thickness_m: detector.thickness_m(),

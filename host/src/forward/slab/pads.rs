@@ -24,29 +24,31 @@ const STEPS_IN_THICKNESS: f64 = 3.6;
 pub(super) struct Pad {
     pub centre_m: [f64; 2],
     pub radius_m: f64,
+    pub contact_impedance_ohm_m2: f64,
+}
+
+impl Pad {
+    fn is_made_as(&self, other: &Self) -> bool {
+        self.radius_m == other.radius_m && self.contact_impedance_ohm_m2 == other.contact_impedance_ohm_m2
+    }
 }
 
 /// Impedances between all densities of all pads (ohm): pad by pad.
-pub(super) fn pad_impedances(
-    pads: &[Pad],
-    basis: &DiscBasis,
-    kernel: &SurfaceKernel,
-    contact_impedance_ohm_m2: f64,
-) -> DMatrix<f64> {
+pub(super) fn pad_impedances(pads: &[Pad], basis: &DiscBasis, kernel: &SurfaceKernel) -> DMatrix<f64> {
     let size = basis.len();
     let nodes: Vec<_> = pads.iter().map(|pad| basis.nodes_m(pad.centre_m, pad.radius_m)).collect();
     let mut all = DMatrix::zeros(pads.len() * size, pads.len() * size);
-    let mut own: Option<(f64, DMatrix<f64>)> = None;
+    let mut own: Option<(Pad, DMatrix<f64>)> = None;
     for (e, pad) in pads.iter().enumerate() {
         for (f, other) in pads.iter().enumerate().take(e + 1) {
             let gap_m = pad.radius_m + other.radius_m;
             let images = kernel.images(pad.centre_m, other.centre_m, gap_m);
             let mut block = between(basis, &nodes[e], basis, &nodes[f], kernel, &images, e == f);
             if e == f {
-                let local = own.take_if(|(radius_m, _)| *radius_m == pad.radius_m).unwrap_or_else(|| {
+                let local = own.take_if(|(like, _)| pad.is_made_as(like)).unwrap_or_else(|| {
                     let area_m2 = std::f64::consts::PI * pad.radius_m * pad.radius_m;
                     let local = kernel.disc_self(pad.radius_m);
-                    (pad.radius_m, local.reduced(basis, contact_impedance_ohm_m2 / area_m2, 1.0))
+                    (*pad, local.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, 1.0))
                 });
                 block += &local.1;
                 own = Some(local);
