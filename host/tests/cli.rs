@@ -36,6 +36,12 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["replay", "some.file", "--speed", "0"], "max"),
         (&["record", "some.file", "--material", "AX"], "A, B, C or D"),
         (&["record"], "FILE"),
+        (&["live", "--scene", "ring"], "--simulate"),
+        (&["record", "some.file", "--fault", "open:3"], "--simulate"),
+        (&["forward", "--scene", "jazz"], "rolling-ball"),
+        (&["forward", "--fault", "open"], "open:3, short:2,7"),
+        (&["forward", "--press", "0,0,2.5"], "tip_radius_mm,force_n"),
+        (&["forward", "--contact", "0,0,1,1e-3", "--time", "2"], "--scene"),
         (&["dance"], "dance"),
     ] {
         let (code, message) = failure(args);
@@ -54,6 +60,10 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         (&["replay", text, "--json"], "is not a recording of tactomo"),
         (&["detector", "check", "no/such.toml"], "cannot read the detector no/such.toml: No such file"),
         (&["forward", "--detector", text, "--contact", "0,0,1,1e-3"], "unknown field `"),
+        (&["forward", "--scene", "rest"], "nothing to compute"),
+        (&["forward", "--scene", "single", "--fault", "swap:3,16"], "swap:3,16: there is no electrode 16"),
+        (&["forward", "--model", "slab", "--scene", "single", "--fault", "uneven:0.2"], "leave out --model slab"),
+        (&["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"], "Poisson's ratio is 0.6"),
         (&["live", "--port", "/dev/null", "--elf", text, "--json"], "is not the ELF file of a firmware"),
         (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
     ] {
@@ -77,4 +87,49 @@ fn a_detector_goes_through_its_file_into_the_model() {
     assert_eq!(from_file.status.code(), Some(0), "{}", String::from_utf8_lossy(&from_file.stderr));
     assert_eq!(from_file.stdout, preset.stdout);
     assert_eq!(again.stdout, shown.stdout);
+}
+
+#[test]
+fn scenes_faults_and_noise_repeat_with_their_seed() {
+    let measured = |seed| {
+        let faults = ["--fault", "open:3", "--fault", "contact-spread:0.3", "--fault", "uneven:0.2", "--nodes", "500"];
+        let scene = ["forward", "--scene", "several", "--force", "2", "--measured", "--json", "--seed", seed];
+        let output = tactomo(&[&scene[..], &faults].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        output.stdout
+    };
+    assert_eq!(measured("5"), measured("5"));
+    assert_ne!(measured("5"), measured("6"));
+}
+
+#[test]
+fn touches_go_through_their_file() {
+    let path = std::env::temp_dir().join(format!("tactomo-touches-{}.json", std::process::id()));
+    let ring = r#"[{"centre_m": [0.002, 0.0], "shape": {"ring": {"radius_m": 0.01, "width_m": 0.002}}, "conductance_s": 0.001}]"#;
+    std::fs::write(&path, ring).unwrap();
+    let forward =
+        |more: &[&str]| tactomo(&[&["forward", "--nodes", "500", "--touches", path.to_str().unwrap()], more].concat());
+    let output = forward(&["--json"]);
+    std::fs::write(&path, ring.replace("width_m", "breadth_m")).unwrap();
+    let wrong = forward(&[]);
+    std::fs::remove_file(&path).unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["touches"], serde_json::from_str::<serde_json::Value>(ring).unwrap());
+    assert_eq!(report["readings_v"].as_array().unwrap().len(), 16);
+    let message = String::from_utf8(wrong.stderr).unwrap();
+    assert_eq!(wrong.status.code(), Some(1));
+    assert!(message.contains("is no list of touches: missing field `width_m`"), "{message}");
+}
+
+#[test]
+fn a_press_in_newtons_is_the_contact_that_hertz_tells() {
+    // As computed by hand in the tests of the contact mechanics.
+    let told = ["--contact", "2,3,2.498666,8.916526e-3"];
+    let pressed = ["--press", "2,3,8,1"];
+    let rows = |arguments: &[&str]| {
+        let output = tactomo(&[&["forward", "--nodes", "500"], arguments].concat());
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert!(rows(&told).contains("readings (mV)"));
+    assert_eq!(rows(&told), rows(&pressed));
 }

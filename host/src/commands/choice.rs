@@ -76,6 +76,14 @@ pub enum Chosen {
 }
 
 impl DetectorArgs {
+    /// What the detector is made of, if that is known: presets are of sample A, a file does not tell how soft its layers are.
+    pub fn foams(&self) -> Option<Stack> {
+        match &self.detector {
+            Chosen::Preset(_) => self.material.clone().or_else(|| "A".parse().ok()),
+            Chosen::File(_) => self.material.clone(),
+        }
+    }
+
     /// The detector, in the material that is asked for.
     pub fn get(&self) -> anyhow::Result<Detector> {
         let detector = match &self.detector {
@@ -104,23 +112,28 @@ pub fn detector(name: &str) -> Result<Chosen, String> {
 
 /// A contact from `x_mm,y_mm,radius_mm,conductance_s`, with `z_mm` after `y_mm` on a curved detector.
 pub fn contact(text: &str) -> Result<Contact, String> {
+    let ([x_m, y_m, z_m], [radius_mm, conductance_s]) = place_and(text, "radius_mm,conductance_s")?;
+    Ok(Contact { z_m, ..Contact::flat(x_m, y_m, radius_mm * 1e-3, conductance_s) })
+}
+
+/// A place (m) from `x_mm,y_mm`, or from `x_mm,y_mm,z_mm` on a curved detector, and two numbers more that have such names.
+pub fn place_and(text: &str, names: &str) -> Result<([f64; 3], [f64; 2]), String> {
     let numbers: Vec<f64> = text
         .split(',')
         .map(|number| number.trim().parse().map_err(|_| format!("`{number}` is not a number")))
         .collect::<Result<_, _>>()?;
-    let (place_mm, radius_mm, conductance_s) = match numbers[..] {
-        [x_mm, y_mm, radius_mm, conductance_s] => ([x_mm, y_mm, 0.0], radius_mm, conductance_s),
-        [x_mm, y_mm, z_mm, radius_mm, conductance_s] => ([x_mm, y_mm, z_mm], radius_mm, conductance_s),
+    let (place_mm, others) = match numbers[..] {
+        [x_mm, y_mm, a, b] => ([x_mm, y_mm, 0.0], [a, b]),
+        [x_mm, y_mm, z_mm, a, b] => ([x_mm, y_mm, z_mm], [a, b]),
         _ => {
             return Err(format!(
-                "four numbers are needed, x_mm,y_mm,radius_mm,conductance_s, or five with z_mm after y_mm on a curved \
-                 detector, but there are {}",
+                "four numbers are needed, x_mm,y_mm,{names}, or five with z_mm after y_mm on a curved detector, but there \
+                 are {}",
                 numbers.len()
             ));
         }
     };
-    let [x_m, y_m, z_m] = place_mm.map(|mm| mm * 1e-3);
-    Ok(Contact { z_m, ..Contact::flat(x_m, y_m, radius_mm * 1e-3, conductance_s) })
+    Ok((place_mm.map(|mm| mm * 1e-3), others))
 }
 
 #[cfg(test)]

@@ -6,19 +6,24 @@ use anyhow::ensure;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use tactomo::case::Case;
-use tactomo::detector::Detector;
+use tactomo::detector::{Detector, Stack};
 use tactomo::forward::jacobian::Jacobian;
-use tactomo::forward::readings_v;
+use tactomo::forward::shell::Shell;
+use tactomo::forward::{ForwardModel, touched_impedance_ohm};
 use tactomo::readings::Readings;
-use tactomo::scene::Contact;
+use tactomo::scene::{Contact, SceneName, Touch};
+use tactomo::simulate::{self, Measurement};
 
 use super::choice::{self, DetectorArgs, Model};
 use super::output;
+use super::scene::{self, Press, SceneArgs};
 
 /// Computes the readings of a detector for given contacts, or saves its Jacobian.
 ///
 /// Examples:
 ///   tactomo forward --detector square-60 --contact 3,-4,2.5,0.001 --json
+///   tactomo forward --model slab --press 3,-4,2.5,0.5 --fault open:3 --measured
+///   tactomo forward --model slab --scene ring --force 5 --seed 7 --json
 ///   tactomo forward --save-jacobian square-60.jacobian
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -31,6 +36,22 @@ pub struct Args {
     /// A contact (millimetres and siemens); give it again for more
     #[arg(long, value_name = "X,Y,RADIUS,CONDUCTANCE", value_parser = choice::contact, allow_hyphen_values = true)]
     contact: Vec<Contact>,
+    /// A ball pressed on the detector (millimetres and newtons); give it again for more
+    #[arg(long, value_name = "X,Y,RADIUS,FORCE", value_parser = scene::press, allow_hyphen_values = true)]
+    press: Vec<Press>,
+    /// Touches of any shape, as `--json` prints them: a list of `{centre_m, shape, conductance_s}`, with shapes
+    /// `{"disc": {radius_m}}`, `{"ring": {radius_m, width_m}}`, `{"line": {length_m, width_m, angle_rad}}` and
+    /// `{"polygon": {corners_m}}`
+    #[arg(long, value_name = "FILE")]
+    touches: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Moment of the scene (s)
+    #[arg(long, value_name = "SECONDS", default_value = "1", requires = "scene")]
+    time: f64,
+    /// Gives readings as the converter does, with its noise and in its steps
+    #[arg(long)]
+    measured: bool,
     /// Forward model
     #[arg(long, value_enum, default_value = "shell")]
     model: Model,
@@ -40,7 +61,7 @@ pub struct Args {
     /// Saves the Jacobian to a file, for `live --jacobian`
     #[arg(long, value_name = "FILE")]
     save_jacobian: Option<PathBuf>,
-    /// Prints `{model, detector, image_nodes, readings_v, impedance_ohm}` as JSON
+    /// Prints `{model, detector, image_nodes, touches, faults, readings_v, impedance_ohm}` as JSON
     #[arg(long)]
     json: bool,
 }
@@ -50,33 +71,38 @@ struct Report<'a> {
     model: &'a str,
     detector: &'a str,
     image_nodes: usize,
+    touches: &'a [Touch],
+    faults: Vec<String>,
     /// `readings_v[g][e]`.
     readings_v: Vec<Vec<f64>>,
+    /// Between the electrodes, whatever is wrong with their wires.
     impedance_ohm: Vec<Vec<f64>>,
 }
 
 /// Computes and prints.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let (detector, contacts) = scene(args)?;
+    let (detector, touches) = touched(args)?;
     ensure!(
-        !contacts.is_empty() || args.save_jacobian.is_some(),
-        "nothing to compute: give --contact, --case or --save-jacobian"
+        !touches.is_empty() || args.save_jacobian.is_some(),
+        "nothing to compute: give --contact, --press, --touches, --scene (with something that touches then), --case or --save-jacobian"
     );
-    let model = args.model.build(&detector, args.nodes.map(|nodes| nodes as usize))?;
+    let model = model(args, &detector)?;
     if let Some(path) = &args.save_jacobian {
         Jacobian::of(&*model).save(path)?;
         eprintln!("saved the Jacobian of {} ({}) to {}", detector.name, model.name(), path.display());
     }
-    if contacts.is_empty() {
+    if touches.is_empty() {
         return Ok(());
     }
-    let impedance_ohm = model.impedance_ohm(&contacts)?;
-    let readings = readings_v(&impedance_ohm, &detector);
+    let impedance_ohm = touched_impedance_ohm(&*model, &touches)?;
+    let readings = readings(args, &detector, &impedance_ohm)?;
     if args.json {
         let report = Report {
             model: model.name(),
             detector: &detector.name,
             image_nodes: model.image_mesh().nodes_m.len(),
+            touches: &touches,
+            faults: args.scene.fault.iter().map(ToString::to_string).collect(),
             readings_v: rows_of_readings(&readings),
             impedance_ohm: rows(&impedance_ohm),
         };
@@ -87,18 +113,54 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn scene(args: &Args) -> anyhow::Result<(Detector, Vec<Contact>)> {
-    let (detector, mut contacts) = match &args.case {
-        Some(path) => {
-            let case = Case::read(path)?;
-            (case.detector, case.contacts)
-        }
-        None => (args.detector.get()?, Vec::new()),
-    };
+/// The detector, and all that touches it.
+fn touched(args: &Args) -> anyhow::Result<(Detector, Vec<Touch>)> {
+    let (detector, foams, mut contacts) = detector(args)?;
     if !args.contact.is_empty() {
         contacts.clone_from(&args.contact);
     }
-    Ok((detector, contacts))
+    let mut touches: Vec<Touch> = contacts.into_iter().map(Touch::from).collect();
+    if !args.press.is_empty() {
+        let hertz = args.scene.hertz(foams.clone(), &detector)?;
+        touches.extend(args.press.iter().map(|press| press.touch(&hertz)));
+    }
+    if let Some(path) = &args.touches {
+        touches.extend(scene::read_touches(path)?);
+    }
+    touches.extend(args.scene.scene(SceneName::Rest, foams, &detector)?.at(args.time));
+    Ok((detector, touches))
+}
+
+/// The detector, what it is made of if that is known, and the contacts of its case.
+fn detector(args: &Args) -> anyhow::Result<(Detector, Option<Stack>, Vec<Contact>)> {
+    match &args.case {
+        Some(path) => {
+            let case = Case::read(path)?;
+            Ok((case.detector, None, case.contacts))
+        }
+        None => Ok((args.detector.get()?, args.detector.foams(), Vec::new())),
+    }
+}
+
+fn model(args: &Args, detector: &Detector) -> anyhow::Result<Box<dyn ForwardModel>> {
+    let nodes = args.nodes.map(|nodes| nodes as usize);
+    let shell_nodes = nodes.unwrap_or_else(|| Shell::default_nodes(detector));
+    let detector = &simulate::with_spread_contacts(detector, &args.scene.fault, args.scene.seed());
+    match simulate::uneven_shell(detector, shell_nodes, &args.scene.fault, args.scene.seed())? {
+        Some(shell) => {
+            ensure!(args.model == Model::Shell, "only the shell can be uneven in the plane: leave out --model slab");
+            Ok(Box::new(shell))
+        }
+        None => Ok(args.model.build(detector, nodes)?),
+    }
+}
+
+fn readings(args: &Args, detector: &Detector, impedance_ohm: &DMatrix<f64>) -> anyhow::Result<Readings> {
+    let mut measurement = Measurement::new(detector, &args.scene.fault, args.scene.seed())?;
+    Ok(match args.measured {
+        true => measurement.readings_v(Some(impedance_ohm)),
+        false => measurement.pad_voltages(Some(impedance_ohm)),
+    })
 }
 
 fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {

@@ -28,6 +28,7 @@ const REQUESTS: usize = 64;
 /// Examples:
 ///   tactomo live                                    finds the board and serves the page
 ///   tactomo live --simulate                         without hardware
+///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
 ///   tactomo live --replay touch.tactomo --speed 0.25
 #[derive(Debug, clap::Args)]
@@ -98,7 +99,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     let detector = args.picture.detector.get()?;
     let (source, mouse) = match args.replay {
         Some(file) => (source::recording(file, args.speed), None),
-        None => source::board(&args.board, &detector)?,
+        None => source::board(&args.board, &args.picture.detector, &detector)?,
     };
     let wish = args.board.settings.wish();
     let Args { picture, seconds, record, elf, .. } = args;

@@ -10,6 +10,7 @@ mod ports;
 mod record;
 mod recording;
 mod replay;
+mod scene;
 mod source;
 mod validate;
 

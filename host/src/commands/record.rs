@@ -35,7 +35,7 @@ pub struct Args {
 /// Records until the end.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let detector = args.detector.get()?;
-    let (mut source, _) = source::board(&args.board, &detector)?;
+    let (mut source, _) = source::board(&args.board, &args.detector, &detector)?;
     let plan = Plan {
         wish: args.board.settings.wish(),
         make_solver: None,

@@ -2,21 +2,26 @@
 
 use std::path::PathBuf;
 
+use clap::ArgGroup;
 use tactomo::detector::Detector;
 use tactomo::live::plan::Press;
 use tactomo::live::server::Finger;
 use tactomo::live::session::Wish;
-use tactomo::scene::Contact;
-use tactomo::simulate::{Scene, SlabPhysics};
+use tactomo::scene::SceneName;
+use tactomo::simulate::Simulation;
 use tactomo::source::serial::DEFAULT_BAUD;
 use tactomo::source::simulated::{Options, SimulatedBoard};
 use tactomo::source::{AnyBoard, NamedPort, Opened, Recording, Source};
+
+use super::choice::DetectorArgs;
+use super::scene::SceneArgs;
 
 /// How firmly the mouse presses on the simulated detector, from 0 to 1.
 const MOUSE_FIRMNESS: f64 = 0.3;
 
 /// A board: on the port that is named, or on whichever USB serial port one is found.
 #[derive(Clone, Debug, clap::Args)]
+#[command(group(ArgGroup::new("simulated").args(SceneArgs::NAMES).multiple(true).requires("simulate")))]
 pub struct BoardArgs {
     /// Serial port of the board; without it, each USB serial port is asked
     #[arg(long, value_name = "PORT", conflicts_with = "simulate")]
@@ -29,6 +34,8 @@ pub struct BoardArgs {
     pub baud: u32,
     #[command(flatten)]
     pub settings: SettingsArgs,
+    #[command(flatten)]
+    pub scene: SceneArgs,
 }
 
 /// Settings of the scan; what is not given stays as the board has it.
@@ -72,16 +79,22 @@ pub struct Mouse {
 }
 
 /// The board that is chosen, and the mouse's way to it if it is simulated.
-pub fn board(args: &BoardArgs, detector: &Detector) -> anyhow::Result<(Box<dyn Source>, Option<Mouse>)> {
+pub fn board(
+    args: &BoardArgs,
+    chosen: &DetectorArgs,
+    detector: &Detector,
+) -> anyhow::Result<(Box<dyn Source>, Option<Mouse>)> {
     if !args.simulate {
         return Ok((args.serial(), None));
     }
-    let scene = Scene::wandering(detector);
-    let Contact { radius_m, conductance_s, .. } = scene.touch(0.0, 0.0, MOUSE_FIRMNESS);
-    let physics = Box::new(SlabPhysics::new(detector, scene.clone())?);
-    let link = SimulatedBoard::start(detector, physics, Options::default())?;
-    let press: Press = Box::new(move |contact| scene.press(contact));
-    Ok((Box::new(Opened::new(Box::new(link))), Some(Mouse { press, finger: Finger { radius_m, conductance_s } })))
+    let scene = args.scene.scene(SceneName::Wandering, chosen.foams(), detector)?;
+    let finger = scene.hand().tip([0.0; 2], MOUSE_FIRMNESS, 1.0).disc().map(Finger::from);
+    let seed = args.scene.seed();
+    let physics = Simulation::new(detector, scene, &args.scene.fault, seed)?;
+    let mouse = physics.mouse();
+    let link = SimulatedBoard::start(detector, Box::new(physics), Options { seed, ..Options::default() })?;
+    let press: Press = Box::new(move |contact| mouse.press(contact));
+    Ok((Box::new(Opened::new(Box::new(link))), finger.map(|finger| Mouse { press, finger })))
 }
 
 /// A recording to be played.

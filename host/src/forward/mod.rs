@@ -8,12 +8,14 @@ pub mod jacobian;
 mod jacobian_file;
 pub mod shell;
 mod slab;
+mod spread;
 
 use nalgebra::DMatrix;
 
 pub use self::contact::ContactFields;
 pub use self::jacobian_file::JacobianFileError;
 pub use self::slab::{Resolution, Slab};
+pub use self::spread::touched_impedance_ohm;
 use crate::detector::Detector;
 use crate::readings::Readings;
 use crate::scene::Contact;

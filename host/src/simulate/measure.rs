@@ -4,11 +4,16 @@ use super::Noise;
 use crate::detector::Adc;
 use crate::readings::Readings;
 
-/// Readings (V) as a converter gives them: with its noise, rounded to whole codes, held within its range.
-pub fn measured(readings: &Readings, adc: &Adc, noise: &mut Noise) -> Readings {
+/// The code that a converter gives for a voltage (V): with its noise, rounded, held within its range.
+pub fn code(volts: f64, adc: &Adc, noise: &mut Noise) -> u32 {
     let codes = 2f64.powi(i32::from(adc.bits));
-    let lsb_v = adc.full_scale_v / codes;
-    let measure = |volts: f64| (volts / lsb_v + adc.noise_lsb * noise.normal()).round().clamp(0.0, codes - 1.0) * lsb_v;
+    (volts / adc.full_scale_v * codes + adc.noise_lsb * noise.normal()).round().clamp(0.0, codes - 1.0) as u32
+}
+
+/// Readings (V) as a converter gives them: each the voltage of its code.
+pub fn measured(readings: &Readings, adc: &Adc, noise: &mut Noise) -> Readings {
+    let lsb_v = adc.full_scale_v / 2f64.powi(i32::from(adc.bits));
+    let measure = |volts: f64| f64::from(code(volts, adc, noise)) * lsb_v;
     let electrodes = readings.electrodes();
     let mut volts = readings.volts().iter().copied().map(measure);
     Readings::from_fn(electrodes, |_, _| volts.next().unwrap_or_default())

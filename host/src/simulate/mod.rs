@@ -1,19 +1,27 @@
-//! The detector of the simulated board: a scene that moves by itself, the physics that answers to it, and its measurement.
+//! A detector without hardware: what touches it, its wires and their faults, and its measurement.
+//!
+//! One way for all: a [`Scene`](crate::scene::Scene) touches a model of the detector, which gives impedances;
+//! [`Measurement`] makes readings of them. [`Simulation`] is both together, for the simulated board.
 
+mod board;
+mod circuit;
+mod fault;
 mod measure;
+mod measurement;
 mod noise;
-mod scene;
-mod slab;
+mod unevenness;
 
 use crate::readings::Readings;
 
-pub use measure::measured;
+pub use board::{Mouse, Simulation, SimulationError};
+pub use fault::{Fault, FaultError};
+pub use measure::{code, measured};
+pub use measurement::Measurement;
 pub use noise::Noise;
-pub use scene::Scene;
-pub use slab::SlabPhysics;
+pub use unevenness::{uneven_shell, with_spread_contacts};
 
 /// What the simulated board measures.
 pub trait Physics: Send {
-    /// Pad voltages of a whole frame (V), noise-free, at `time_s` seconds after the start.
+    /// Pad voltages of a whole frame (V), before the converter, at `time_s` seconds after the start.
     fn readings_v(&mut self, time_s: f64) -> Readings;
 }

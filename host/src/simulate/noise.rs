@@ -8,7 +8,27 @@ pub struct Noise {
     spare: Option<f64>,
 }
 
+/// Independent numbers of one seed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stream {
+    Conversion,
+    Floating,
+    ContactSpread,
+    Uneven,
+}
+
 impl Noise {
+    /// One of the streams of a seed.
+    pub(super) fn of(seed: u64, stream: Stream) -> Self {
+        let mut seeds = fastrand::Rng::with_seed(seed);
+        Self::new(std::iter::repeat_with(|| seeds.u64(..)).nth(stream as usize).unwrap_or(seed))
+    }
+
+    /// The next number, evenly distributed from 0 to 1.
+    pub(super) fn uniform(&mut self) -> f64 {
+        self.uniform.f64()
+    }
+
     /// Noise that is the same for the same `seed`.
     pub fn new(seed: u64) -> Self {
         Self { uniform: fastrand::Rng::with_seed(seed), spare: None }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
-use tactomo::simulate::Scene;
+use tactomo::scene::SceneName;
 use tokio::sync::{Mutex, MutexGuard};
 
 use crate::chromium::{self, Browser};
@@ -25,7 +25,7 @@ struct Stage {
 
 impl Stage {
     /// Sets it up; `None` without a browser on this machine.
-    async fn set(scene: impl Fn(&tactomo::detector::Detector) -> Scene) -> Result<Option<Self>> {
+    async fn set(scene: SceneName) -> Result<Option<Self>> {
         if !chromium::is_here()? {
             return Ok(None);
         }
@@ -59,16 +59,16 @@ macro_rules! on_stage {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_picture_follows_the_contact() -> Result<()> {
-    on_stage!(Scene::at_rest, stage, {
+    on_stage!(SceneName::Rest, stage, {
         for place in [[12.0, 9.0], [-14.0, 5.0], [3.0, -16.0]] {
-            stage.live.press(place);
+            stage.live.press(place)?;
             let what = format!("a contact near {place:?}");
             let near = stage
                 .browser
                 .until(&what, |told| told.number("contacts") > 0.0 && told.peak_from_mm(place) < PEAK_TOLERANCE_MM);
             near.await?;
         }
-        stage.live.scene.press(None);
+        stage.live.mouse.press(None);
         stage.browser.until("rest", |told| told.number("contacts") == 0.0).await?;
         Ok(())
     })
@@ -76,7 +76,7 @@ async fn the_picture_follows_the_contact() -> Result<()> {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_picture_moves_by_itself() -> Result<()> {
-    on_stage!(Scene::wandering, stage, {
+    on_stage!(SceneName::Wandering, stage, {
         let first = stage.browser.until("a contact", |told| told.number("contacts") > 0.0).await?;
         let place = [first.number("peakXMm"), first.number("peakYMm")];
         stage
@@ -89,7 +89,7 @@ async fn the_picture_moves_by_itself() -> Result<()> {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_mouse_presses_where_it_is() -> Result<()> {
-    on_stage!(Scene::at_rest, stage, {
+    on_stage!(SceneName::Rest, stage, {
         for place in [[-10.0, 12.0], [16.0, -8.0]] {
             stage.browser.press(place).await?;
             let what = format!("a contact near {place:?}");
@@ -106,8 +106,8 @@ async fn the_mouse_presses_where_it_is() -> Result<()> {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_press_becomes_rest_when_re_zeroed() -> Result<()> {
-    on_stage!(Scene::at_rest, stage, {
-        stage.live.press([10.0, 10.0]);
+    on_stage!(SceneName::Rest, stage, {
+        stage.live.press([10.0, 10.0])?;
         stage.browser.until("a contact", |told| told.number("contacts") > 0.0).await?;
         let button = stage.browser.client.find(fantoccini::Locator::Id("rezero")).await?;
         button.click().await?;
@@ -119,7 +119,7 @@ async fn a_press_becomes_rest_when_re_zeroed() -> Result<()> {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_second_page_keeps_up() -> Result<()> {
-    on_stage!(Scene::at_rest, stage, {
+    on_stage!(SceneName::Rest, stage, {
         let second = Browser::open(&stage.live.server.url()).await?;
         let outcome = both_follow(&stage, &second).await;
         second.close().await?;
@@ -129,7 +129,7 @@ async fn a_second_page_keeps_up() -> Result<()> {
 
 async fn both_follow(stage: &Stage, second: &Browser) -> Result<()> {
     for place in [[12.0, 12.0], [-12.0, -12.0]] {
-        stage.live.press(place);
+        stage.live.press(place)?;
         for page in [&stage.browser, second] {
             page.until("the contact", |told| {
                 told.number("contacts") > 0.0 && told.peak_from_mm(place) < PEAK_TOLERANCE_MM
@@ -146,7 +146,7 @@ async fn both_follow(stage: &Stage, second: &Browser) -> Result<()> {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_page_that_hangs_does_not_slow_the_board() -> Result<()> {
-    on_stage!(Scene::at_rest, stage, {
+    on_stage!(SceneName::Rest, stage, {
         let (before, dropped_before) = stage.live.rate_over(Duration::from_secs(2)).await;
         let hang = "const end = performance.now() + 3000; while (performance.now() < end); return true";
         let updates = stage.browser.told().await?.number("updates");
@@ -170,8 +170,8 @@ async fn screenshot() -> Result<()> {
     let Some(folder) = std::env::var_os("TACTOMO_SCREENSHOT") else { return Ok(()) };
     // Tests run in their package's folder; a person means the workspace's.
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
-    on_stage!(Scene::at_rest, stage, {
-        stage.live.press([9.0, 7.0]);
+    on_stage!(SceneName::Rest, stage, {
+        stage.live.press([9.0, 7.0])?;
         tokio::time::sleep(Duration::from_secs(3)).await;
         let button = stage.browser.client.find(fantoccini::Locator::Id("theme")).await?;
         for _ in 0..2 {

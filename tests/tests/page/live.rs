@@ -16,7 +16,8 @@ use tactomo::live::plan::{Ends, LiveError, Plan, Summary};
 use tactomo::live::server::{self, Finger, Server};
 use tactomo::live::session::Wish;
 use tactomo::live::{Snapshot, Statistics, pipeline};
-use tactomo::simulate::{Scene, SlabPhysics};
+use tactomo::scene::{Contact, Hand, Scene, SceneName};
+use tactomo::simulate::{Mouse, Simulation};
 use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
 
 use tactomo::source::Opened;
@@ -29,18 +30,21 @@ const FIRMNESS: f64 = 0.2;
 /// A live picture of the simulated board.
 pub struct Live {
     pub server: Server,
-    /// What presses.
-    pub scene: Scene,
+    /// What presses beside the scene.
+    pub mouse: Mouse,
+    hand: Hand,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     stop: Arc<AtomicBool>,
     pipeline: Option<JoinHandle<Result<Summary, LiveError>>>,
 }
 
 impl Live {
-    /// Starts it with what `scene` makes of the default detector.
-    pub fn start(scene: impl Fn(&Detector) -> Scene) -> Result<Self> {
+    /// Starts it with a scene on the default detector.
+    pub fn start(scene: SceneName) -> Result<Self> {
         let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
-        let scene = scene(&detector);
+        let hand = Hand::relative(&detector);
+        let scene = Scene::new(scene, &detector, hand, 1);
+        let physics = Simulation::new(&detector, scene, &[], 1)?;
         let model = Shell::new(&detector)?;
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
@@ -49,18 +53,20 @@ impl Live {
             mesh: model.image_mesh().clone(),
             solver: "tikhonov".to_owned(),
             source: "simulated board".to_owned(),
-            finger: Some(finger(&scene)),
+            finger: Some(Finger::from(touch(&hand, [0.0; 2])?)),
         };
         let server = Server::start(Some(0), page, receiver.clone(), sender)?;
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
-        let pipeline = Some(run(&detector, &scene, Jacobian::of(&model), ends)?);
-        Ok(Self { server, scene, snapshots: receiver, stop, pipeline })
+        let mouse = physics.mouse();
+        let pipeline = Some(run(&detector, physics, Jacobian::of(&model), ends)?);
+        Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 
     /// Presses here (mm), as if by itself.
-    pub fn press(&self, [x_mm, y_mm]: [f64; 2]) {
-        self.scene.press(Some(self.scene.touch(x_mm * 1e-3, y_mm * 1e-3, FIRMNESS)));
+    pub fn press(&self, at_mm: [f64; 2]) -> Result<()> {
+        self.mouse.press(Some(touch(&self.hand, at_mm)?));
+        Ok(())
     }
 
     /// Counts of now.
@@ -87,20 +93,19 @@ impl Drop for Live {
     }
 }
 
-fn finger(scene: &Scene) -> Finger {
-    let touch = scene.touch(0.0, 0.0, FIRMNESS);
-    Finger { radius_m: touch.radius_m, conductance_s: touch.conductance_s }
+/// The mouse's touch at a place (mm).
+fn touch(hand: &Hand, at_mm: [f64; 2]) -> Result<Contact> {
+    hand.tip(at_mm.map(|mm| mm * 1e-3), FIRMNESS, 1.0).disc().context("a tip touches in a disc")
 }
 
 fn run(
     detector: &Detector,
-    scene: &Scene,
+    physics: Simulation,
     jacobian: Jacobian,
     ends: Ends,
 ) -> Result<JoinHandle<Result<Summary, LiveError>>> {
-    let physics = SlabPhysics::new(detector, scene.clone())?;
+    let mouse = physics.mouse();
     let board = SimulatedBoard::start(detector, Box::new(physics), Options::default())?;
-    let mouse = scene.clone();
     let plan = Plan {
         detector: detector.clone(),
         wish: Wish::default(),

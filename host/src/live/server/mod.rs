@@ -27,6 +27,7 @@ use self::guard::Guard;
 use super::{Request, Snapshot};
 use crate::detector::Detector;
 use crate::forward::ImageMesh;
+use crate::scene::Contact;
 
 /// Port of the page unless the user asks for another.
 pub const DEFAULT_PORT: u16 = 7878;
@@ -62,6 +63,12 @@ pub struct Finger {
     pub radius_m: f64,
     /// Conductance of the contact (S).
     pub conductance_s: f64,
+}
+
+impl From<Contact> for Finger {
+    fn from(contact: Contact) -> Self {
+        Self { radius_m: contact.radius_m, conductance_s: contact.conductance_s }
+    }
 }
 
 /// A running server; stops when dropped.

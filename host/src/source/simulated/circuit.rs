@@ -11,7 +11,7 @@ use tactomo_firmware::{Chip, Sampler, TimedOut};
 
 use crate::detector::Adc;
 use crate::readings::Readings;
-use crate::simulate::{Noise, Physics};
+use crate::simulate::{Noise, Physics, code};
 
 /// Time of one conversion, the firmware's share included: that of a fast SAR converter.
 const CONVERSION_NS: u64 = 2_000;
@@ -135,9 +135,8 @@ impl SimulatedSampler {
 
     /// The code nearest to a voltage (V), with noise.
     fn convert(&mut self, volts: f64) -> u16 {
-        let codes = f64::from(1u32 << self.adc.bits);
-        let noise = self.adc.noise_lsb * self.noise.normal();
-        (volts / self.adc.full_scale_v * codes + noise).round().clamp(0.0, codes - 1.0) as u16
+        // The board refuses converters of more than 16 bits.
+        code(volts, &self.adc, &mut self.noise).min(u32::from(u16::MAX)) as u16
     }
 }
 

@@ -1,4 +1,12 @@
-//! What presses: the contacts present at a moment.
+//! What presses: the contacts present at a moment, and scenes in which they come and go.
+
+mod hand;
+mod script;
+mod touch;
+
+pub use self::hand::{Fingertip, Hand};
+pub use self::script::{Scene, SceneName};
+pub use self::touch::{Shape, Touch};
 
 /// A disc of contact between driving layer and detector.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -1,0 +1,140 @@
+//! Arguments that say what touches a simulated detector, and what is wrong with it.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::Context;
+use tactomo::detector::{Detector, Stack};
+use tactomo::hertz::{Hertz, POISSON, SURFACE_DEPTH_M, Skin};
+use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
+use tactomo::simulate::Fault;
+
+/// Seed unless said otherwise.
+const SEED: u64 = 1;
+
+/// A scene, its hand and faults.
+#[derive(Clone, Debug, clap::Args)]
+pub struct SceneArgs {
+    /// What touches: rest, wandering, single, several, wide, ring, line, five-fingers, rolling-ball, moving, changing-force
+    #[arg(long, value_name = "NAME")]
+    pub scene: Option<SceneName>,
+    /// Force of the scene's firmest press (N); else conductances relative to the detector's
+    #[arg(long, value_name = "NEWTONS", value_parser = positive)]
+    force: Option<f64>,
+    /// Radius of the scene's tips and bars (mm); else a fingertip's, 8 mm, or a seventh of a smaller detector's side
+    #[arg(long, value_name = "MM", value_parser = positive, requires = "force")]
+    tip: Option<f64>,
+    /// Young's modulus of the detector, under forces (MPa); else that of its foams
+    #[arg(long, value_name = "MPA", value_parser = positive)]
+    elasticity: Option<f64>,
+    /// Poisson's ratio of the detector, under forces
+    #[arg(long, value_name = "RATIO", default_value_t = POISSON)]
+    poisson: f64,
+    /// Depth of the detector's surface that a contact's current crosses, under forces (mm)
+    #[arg(long, value_name = "MM", default_value_t = SURFACE_DEPTH_M * 1e3, value_parser = positive)]
+    surface_depth: f64,
+    /// Something wrong: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, uneven:0.2 or
+    /// clip:0.14,1.8 (V); give it again for more
+    #[arg(long, value_name = "FAULT")]
+    pub fault: Vec<Fault>,
+    /// Seed of places, noise and faults
+    #[arg(long)]
+    seed: Option<u64>,
+}
+
+impl SceneArgs {
+    /// Names of the arguments.
+    pub const NAMES: [&str; 8] = ["scene", "force", "tip", "elasticity", "poisson", "surface_depth", "fault", "seed"];
+
+    /// The seed.
+    pub fn seed(&self) -> u64 {
+        self.seed.unwrap_or(SEED)
+    }
+
+    /// The scene, or `otherwise`, on a detector of such foams if they are known.
+    pub fn scene(&self, otherwise: SceneName, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Scene> {
+        let hand = self.hand(foams, detector)?;
+        Ok(Scene::new(self.scene.unwrap_or(otherwise), detector, hand, self.seed()))
+    }
+
+    fn hand(&self, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hand> {
+        let Some(force_n) = self.force else { return Ok(Hand::relative(detector)) };
+        let radius_m = self.tip.map_or_else(|| Fingertip::fitting_m(detector), |tip_mm| tip_mm * 1e-3);
+        let hand = Hand::in_newtons(detector, Fingertip { hertz: self.hertz(foams, detector)?, force_n, radius_m });
+        if let Some(beyond) = hand.beyond(1.0, 1.0) {
+            eprintln!("beyond Hertz's theory at {force_n} N: {beyond}");
+        }
+        Ok(hand)
+    }
+
+    /// Mechanics of a detector of such foams, if they are known.
+    pub fn hertz(&self, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hertz> {
+        let skin = self.elasticity.map(|mpa| Skin::of(mpa * 1e6)).or_else(|| foams.as_ref().map(Skin::from));
+        let skin = skin.with_context(|| {
+            format!("it is not known how soft {} is, for forces: give --elasticity or --material", detector.name)
+        })?;
+        let surface_depth_m = self.surface_depth * 1e-3;
+        Ok(Hertz::new(detector, Skin { poisson: self.poisson, surface_depth_m, ..skin })?)
+    }
+}
+
+/// A ball pressed on a detector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Press {
+    place_m: [f64; 3],
+    radius_m: f64,
+    force_n: f64,
+}
+
+impl Press {
+    /// The contact that it makes.
+    pub fn touch(&self, hertz: &Hertz) -> Touch {
+        let imprint = hertz.ball(self.radius_m, self.force_n);
+        if let Some(beyond) = imprint.beyond {
+            eprintln!("beyond Hertz's theory at {} N: {beyond}", self.force_n);
+        }
+        let shape = Shape::Disc { radius_m: imprint.half_width_m };
+        let [x_m, y_m, z_m] = self.place_m;
+        Touch { z_m, ..Touch::flat([x_m, y_m], shape, imprint.conductance_s) }
+    }
+}
+
+/// A press from `x_mm,y_mm,tip_radius_mm,force_n`, with `z_mm` after `y_mm` on a curved detector.
+pub fn press(text: &str) -> Result<Press, String> {
+    let (place_m, [radius_mm, force_n]) = super::choice::place_and(text, "tip_radius_mm,force_n")?;
+    if !(radius_mm > 0.0 && force_n > 0.0 && radius_mm.is_finite() && force_n.is_finite()) {
+        return Err("the tip's radius and the force have to be above zero".to_owned());
+    }
+    Ok(Press { place_m, radius_m: radius_mm * 1e-3, force_n })
+}
+
+/// Touches from a JSON file.
+pub fn read_touches(path: &Path) -> anyhow::Result<Vec<Touch>> {
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read the touches {}", path.display()))?;
+    serde_json::from_str(&text).with_context(|| format!("{} is no list of touches", path.display()))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
+    number.ok_or_else(|| "a number above 0".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presses_are_given_in_millimetres_and_newtons() {
+        let press = press("3,-4,2.5,1.5").unwrap_or_else(|error| panic!("{error}"));
+        assert!((press.radius_m - 0.0025).abs() < 1e-15 && press.force_n == 1.5, "{press:?}");
+        assert!((press.place_m[1] + 0.004).abs() < 1e-15, "{press:?}");
+    }
+
+    #[test]
+    fn wrong_presses_say_what_is_allowed() {
+        for (text, told) in [("1,2,3", "tip_radius_mm,force_n"), ("1,2,0,1", "above zero"), ("1,2,3,inf", "above zero")]
+        {
+            assert!(press(text).is_err_and(|error| error.contains(told)), "{text}");
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! What can be wrong with a board or a detector.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Something wrong. Electrodes count from 0. Breaks and shorts are told by electrode; what stands behind them, the exchange of
+/// two wires first, then gain and sign, by channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fault {
+    /// The wire of an electrode is broken: it is neither grounded nor read. `open:3`
+    Open {
+        /// The electrode.
+        electrode: usize,
+    },
+    /// Two wires touch. `short:2,7`, or with a resistance in ohms `short:2,7:50`
+    Short {
+        /// Both electrodes.
+        electrodes: [usize; 2],
+        /// Resistance between them (ohm).
+        ohm: f64,
+    },
+    /// Two wires are exchanged. `swap:1,5`
+    Swap {
+        /// Both channels.
+        channels: [usize; 2],
+    },
+    /// A channel's readings are too large by a factor. `gain:4:0.8`
+    Gain {
+        /// The channel.
+        channel: usize,
+        /// The factor.
+        factor: f64,
+    },
+    /// A channel's readings have the wrong sign: full scale less the voltage. `invert:4`
+    Invert {
+        /// The channel.
+        channel: usize,
+    },
+    /// Contact impedances of the electrodes differ. `contact-spread:0.2`
+    ContactSpread {
+        /// Standard deviation of their logarithm.
+        deviation: f64,
+    },
+    /// The conductivity differs from place to place. `uneven:0.2`
+    Uneven {
+        /// Standard deviation of its logarithm.
+        deviation: f64,
+    },
+    /// The converter, or an amplifier before it, tells no voltage outside a range. `clip:0.14,1.8`
+    Clip {
+        /// The range (V).
+        range_v: [f64; 2],
+    },
+}
+
+/// Forms of faults, for messages.
+const FORMS: &str =
+    "open:3, short:2,7, short:2,7:50, swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, uneven:0.2 or clip:0.14,1.8";
+
+/// Why a fault cannot be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FaultError {
+    /// Not one of the forms.
+    #[error("`{text}` is no fault ({what}); faults are told as {FORMS}")]
+    Text {
+        /// What was given.
+        text: String,
+        /// What is wrong with it.
+        what: &'static str,
+    },
+    /// No such electrode.
+    #[error("fault {fault}: there is no electrode {electrode}; the detector has {electrodes}, counted from 0")]
+    Electrode {
+        /// The fault.
+        fault: String,
+        /// The electrode that it names.
+        electrode: usize,
+        /// How many there are.
+        electrodes: usize,
+    },
+}
+
+impl Fault {
+    /// Whether it can be on a detector of so many electrodes.
+    ///
+    /// # Errors
+    /// [`FaultError::Electrode`] if it names another one.
+    pub fn check(&self, electrodes: usize) -> Result<(), FaultError> {
+        match self.named().into_iter().flatten().find(|electrode| *electrode >= electrodes) {
+            Some(electrode) => Err(FaultError::Electrode { fault: self.to_string(), electrode, electrodes }),
+            None => Ok(()),
+        }
+    }
+
+    /// Electrodes or channels that it names.
+    fn named(&self) -> [Option<usize>; 2] {
+        match *self {
+            Self::Open { electrode: one } | Self::Gain { channel: one, .. } | Self::Invert { channel: one } => {
+                [Some(one), None]
+            }
+            Self::Short { electrodes: [a, b], .. } | Self::Swap { channels: [a, b] } => [Some(a), Some(b)],
+            Self::ContactSpread { .. } | Self::Uneven { .. } | Self::Clip { .. } => [None; 2],
+        }
+    }
+
+    fn parse(text: &str) -> Result<Self, &'static str> {
+        let mut parts = text.split(':');
+        let name = parts.next().unwrap_or_default();
+        let arguments: Vec<_> = parts.collect();
+        match (name, &arguments[..]) {
+            ("open", [electrode]) => Ok(Self::Open { electrode: index(electrode)? }),
+            ("short", [both]) => Ok(Self::Short { electrodes: indices(both)?, ohm: 0.0 }),
+            ("short", [both, ohm]) => Ok(Self::Short { electrodes: indices(both)?, ohm: not_negative(ohm)? }),
+            ("swap", [both]) => Ok(Self::Swap { channels: indices(both)? }),
+            ("gain", [channel, factor]) => Ok(Self::Gain { channel: index(channel)?, factor: not_negative(factor)? }),
+            ("invert", [channel]) => Ok(Self::Invert { channel: index(channel)? }),
+            ("contact-spread", [deviation]) => Ok(Self::ContactSpread { deviation: not_negative(deviation)? }),
+            ("uneven", [deviation]) => Ok(Self::Uneven { deviation: not_negative(deviation)? }),
+            ("clip", [range]) => Ok(Self::Clip { range_v: self::range(range)? }),
+            _ => Err("no such fault, or too few or too many numbers"),
+        }
+    }
+}
+
+fn index(text: &str) -> Result<usize, &'static str> {
+    text.trim().parse().map_err(|_| "an electrode is a whole number from 0")
+}
+
+fn indices(text: &str) -> Result<[usize; 2], &'static str> {
+    let (a, b) = text.split_once(',').ok_or("two electrodes are needed, as in 2,7")?;
+    let both = [index(a)?, index(b)?];
+    if both[0] == both[1] { Err("two different electrodes are needed") } else { Ok(both) }
+}
+
+fn not_negative(text: &str) -> Result<f64, &'static str> {
+    let number = text.trim().parse::<f64>().ok().filter(|number| *number >= 0.0 && number.is_finite());
+    number.ok_or("a number of zero or above is needed")
+}
+
+fn range(text: &str) -> Result<[f64; 2], &'static str> {
+    let (low, high) = text.split_once(',').ok_or("two voltages are needed, as in 0.14,1.8")?;
+    let range_v = [not_negative(low)?, not_negative(high)?];
+    if range_v[0] < range_v[1] { Ok(range_v) } else { Err("the first voltage has to be below the second") }
+}
+
+impl FromStr for Fault {
+    type Err = FaultError;
+
+    fn from_str(text: &str) -> Result<Self, FaultError> {
+        Self::parse(text).map_err(|what| FaultError::Text { text: text.to_owned(), what })
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Open { electrode } => write!(formatter, "open:{electrode}"),
+            Self::Short { electrodes: [a, b], ohm: 0.0 } => write!(formatter, "short:{a},{b}"),
+            Self::Short { electrodes: [a, b], ohm } => write!(formatter, "short:{a},{b}:{ohm}"),
+            Self::Swap { channels: [a, b] } => write!(formatter, "swap:{a},{b}"),
+            Self::Gain { channel, factor } => write!(formatter, "gain:{channel}:{factor}"),
+            Self::Invert { channel } => write!(formatter, "invert:{channel}"),
+            Self::ContactSpread { deviation } => write!(formatter, "contact-spread:{deviation}"),
+            Self::Uneven { deviation } => write!(formatter, "uneven:{deviation}"),
+            Self::Clip { range_v: [low_v, high_v] } => write!(formatter, "clip:{low_v},{high_v}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_form_is_read_back_as_it_was_written() {
+        let forms = [
+            "open:3",
+            "short:2,7",
+            "short:2,7:50",
+            "swap:1,5",
+            "gain:4:0.8",
+            "invert:4",
+            "contact-spread:0.2",
+            "uneven:0.2",
+            "clip:0.14,1.8",
+        ];
+        for form in forms {
+            assert_eq!(form.parse::<Fault>().unwrap().to_string(), form);
+            assert!(FORMS.contains(form), "{form}");
+        }
+    }
+
+    #[test]
+    fn other_texts_say_what_is_allowed() {
+        for (text, what) in [
+            ("broken:3", "no such fault"),
+            ("open", "too few"),
+            ("open:1:2", "too many"),
+            ("open:-1", "whole number"),
+            ("short:2", "two electrodes"),
+            ("swap:2,2", "two different"),
+            ("gain:1:-0.8", "zero or above"),
+            ("gain:1:NaN", "zero or above"),
+            ("clip:2,1", "below the second"),
+        ] {
+            let error = text.parse::<Fault>().unwrap_err().to_string();
+            assert!(error.contains(what) && error.contains("contact-spread:0.2"), "{error}");
+        }
+    }
+
+    #[test]
+    fn electrodes_have_to_be_there() {
+        let fault: Fault = "short:3,16".parse().unwrap();
+        assert_eq!(fault.check(17), Ok(()));
+        let error = fault.check(16).unwrap_err().to_string();
+        assert_eq!(error, "fault short:3,16: there is no electrode 16; the detector has 16, counted from 0");
+    }
+}

@@ -1,0 +1,165 @@
+//! Detectors that are not as they are described: pads and places that differ.
+
+use std::f64::consts::TAU;
+
+use super::Fault;
+use super::noise::{Noise, Stream};
+use crate::detector::Detector;
+use crate::forward::ForwardError;
+use crate::forward::shell::Shell;
+use crate::geometry::Point;
+
+/// Waves that make up the pattern: enough that its values are nearly normally distributed.
+const WAVES: usize = 32;
+/// Length over which it changes, as a share of the detector's shorter side.
+const LENGTH_SHARE: f64 = 0.25;
+
+/// `detector` with contact impedances that differ from pad to pad, if that is one of the faults. `seed` chooses which are large and
+/// which small.
+pub fn with_spread_contacts(detector: &Detector, faults: &[Fault], seed: u64) -> Detector {
+    let mut detector = detector.clone();
+    for fault in faults {
+        let Fault::ContactSpread { deviation } = fault else { continue };
+        let mut noise = Noise::of(seed, Stream::ContactSpread);
+        let common_ohm_m2 = detector.contact_impedance_ohm_m2;
+        for pad in &mut detector.electrodes {
+            let ohm_m2 = pad.contact_impedance_ohm_m2.get_or_insert(common_ohm_m2);
+            *ohm_m2 *= (deviation * noise.normal()).exp();
+        }
+    }
+    detector
+}
+
+/// A shell of `nodes` nodes with uneven conductivity, if that is one of the faults. `seed` chooses where it is high and low.
+///
+/// # Errors
+/// [`ForwardError::Detector`] if the detector cannot be meshed.
+pub fn uneven_shell(
+    detector: &Detector,
+    nodes: usize,
+    faults: &[Fault],
+    seed: u64,
+) -> Result<Option<Shell>, ForwardError> {
+    let deviation = |fault: &Fault| match fault {
+        Fault::Uneven { deviation } => Some(*deviation),
+        _ => None,
+    };
+    let Some(deviation) = faults.iter().find_map(deviation) else { return Ok(None) };
+    let uneven = Unevenness::new(detector, deviation, seed);
+    Shell::with_sheet(detector, nodes, |at_m| uneven.factor(at_m)).map(Some)
+}
+
+/// A smooth random pattern of factors about 1, whose logarithm has the covariance `d^2 exp(-|x - y|^2 / 2 l^2)` over all seeds (a sum of
+/// random waves: Rahimi and Recht, 2007).
+#[derive(Clone, Debug, PartialEq)]
+struct Unevenness {
+    deviation: f64,
+    waves: Vec<Wave>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Wave {
+    per_m: [f64; 2],
+    phase: f64,
+}
+
+impl Unevenness {
+    /// A pattern on `detector` whose logarithm has that standard deviation.
+    fn new(detector: &Detector, deviation: f64, seed: u64) -> Self {
+        let [width_m, height_m] = detector.outline.size_m();
+        let length_m = LENGTH_SHARE * width_m.min(height_m);
+        let mut noise = Noise::of(seed, Stream::Uneven);
+        let mut wave = || Wave { per_m: [(); 2].map(|()| noise.normal() / length_m), phase: TAU * noise.uniform() };
+        Self { deviation, waves: (0..WAVES).map(|_| wave()).collect() }
+    }
+
+    /// The factor at a place.
+    fn factor(&self, [x, y]: Point) -> f64 {
+        let at = |wave: &Wave| (wave.per_m[0] * x + wave.per_m[1] * y + wave.phase).cos();
+        let sum: f64 = self.waves.iter().map(at).sum();
+        (self.deviation * sum * (2.0 / WAVES as f64).sqrt()).exp()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::forward::{ForwardModel, Slab};
+    use crate::scene::Contact;
+
+    #[test]
+    fn contact_impedances_spread_as_asked_and_the_same_for_a_seed() {
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        detector.electrodes = vec![detector.electrodes[0]; 2000];
+        let of = |seed| with_spread_contacts(&detector, &[Fault::ContactSpread { deviation: 0.2 }], seed);
+        let log = |pad| (of(3).pad_impedance_ohm_m2(pad) / detector.contact_impedance_ohm_m2).ln();
+        let logs: Vec<f64> = of(3).electrodes.iter().map(log).collect();
+        let mean = logs.iter().sum::<f64>() / 2000.0;
+        let deviation = (logs.iter().map(|log| (log - mean).powi(2)).sum::<f64>() / 2000.0).sqrt();
+        // Four standard errors: 0.2 / sqrt(2000), and that over the square root of two.
+        assert!(mean.abs() < 0.018 && (deviation - 0.2).abs() < 0.0127, "{mean} {deviation}");
+        assert_eq!(of(3), of(3));
+        assert_ne!(of(3), of(4));
+        assert_eq!(with_spread_contacts(&detector, &[], 3), detector);
+    }
+
+    #[test]
+    fn pads_that_all_changed_alike_are_a_detector_that_did() {
+        let alike = Detector { contact_impedance_ohm_m2: 1e-3, ..Detector::preset(Detector::DEFAULT).unwrap() };
+        let mut each = Detector::preset(Detector::DEFAULT).unwrap();
+        each.electrodes.iter_mut().for_each(|pad| pad.contact_impedance_ohm_m2 = Some(1e-3));
+        let press = Contact::flat(0.004, -0.011, 0.003, 1e-3);
+        let slab = |detector| Slab::new(detector).unwrap().impedance_ohm(&[press]).unwrap();
+        assert_eq!(slab(&alike), slab(&each));
+        let shell = |detector| Shell::new(detector).unwrap().impedance_ohm(&[press]).unwrap();
+        assert_eq!(shell(&alike), shell(&each));
+    }
+
+    #[test]
+    fn one_worse_pad_shows_in_its_own_impedance_by_the_most() {
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let press = Contact::flat(0.004, -0.011, 0.003, 1e-3);
+        let slab = |detector: &Detector| Slab::new(detector).unwrap().impedance_ohm(&[press]).unwrap();
+        let before = slab(&detector);
+        detector.electrodes[5].contact_impedance_ohm_m2 = Some(1e-3);
+        let change = slab(&detector) - before;
+        // dZ/dz is the mean square of the current density: at least that of a current spread evenly over the pad, more where it is
+        // crowded at the edge, as it is before.
+        let even_ohm = (1e-3 - 1e-5) / (std::f64::consts::PI * 0.002f64.powi(2));
+        let own = change[(5, 5)] / even_ohm;
+        assert!(own > 1.0 && own < 1.5, "{own}");
+        let others = (0..256).filter(|k| *k != 5 * 17).map(|k| change[k].abs()).fold(0.0, f64::max);
+        assert!(others < 0.05 * even_ohm, "{others} {even_ohm}");
+    }
+
+    #[test]
+    fn an_uneven_shell_of_no_deviation_is_the_even_one() {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let press = Contact::flat(0.004, -0.011, 0.003, 1e-3);
+        let uneven = |deviation, seed| {
+            let shell = uneven_shell(&detector, 1000, &[Fault::Uneven { deviation }], seed).unwrap().unwrap();
+            shell.impedance_ohm(&[press]).unwrap()
+        };
+        let even = Shell::with_nodes(&detector, 1000).unwrap().impedance_ohm(&[press]).unwrap();
+        assert_eq!(uneven(0.0, 1), even);
+        assert_eq!(uneven(0.2, 1), uneven(0.2, 1));
+        assert_ne!(uneven(0.2, 1), uneven(0.2, 2));
+        assert!(uneven_shell(&detector, 1000, &[], 1).unwrap().is_none());
+    }
+
+    fn logs_at(place: Point) -> Vec<f64> {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        (0..4000).map(|seed| Unevenness::new(&detector, 0.2, seed).factor(place).ln()).collect()
+    }
+
+    #[test]
+    fn deviation_and_covariance_over_seeds_are_those_asked_for() {
+        let covariance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64;
+        let (here, near, far) = (logs_at([0.01, -0.02]), logs_at([0.025, -0.02]), logs_at([-0.03, 0.03]));
+        // 15 mm is the length itself: exp(-1/2). Four standard errors of 4000 products of variance about 0.04^2 (1 + r^2).
+        for (other, expected) in [(&here, 0.04), (&near, 0.04 * (-0.5f64).exp()), (&far, 0.0)] {
+            let found = covariance(&here, other);
+            assert!((found - expected).abs() < 4.0 * 0.04 * (2.0f64 / 4000.0).sqrt(), "{found} {expected}");
+        }
+    }
+}
