@@ -43,6 +43,14 @@ pub trait ForwardModel: Send + Sync {
     /// conductance, or nothing that conducts.
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError>;
 
+    /// The impedance matrix alone (ohm) of [`image_fields`](Self::image_fields), which is less work on some models.
+    ///
+    /// # Errors
+    /// As for [`image_fields`](Self::image_fields).
+    fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
+        Ok(self.image_fields(image_s)?.impedance_ohm)
+    }
+
     /// Places of the image that this model is inverted on.
     fn image_mesh(&self) -> &ImageMesh;
 

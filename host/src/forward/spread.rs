@@ -13,7 +13,7 @@ use crate::scene::{Contact, Touch};
 pub fn touched_impedance_ohm(model: &dyn ForwardModel, touches: &[Touch]) -> Result<DMatrix<f64>, ForwardError> {
     match touches.iter().map(Touch::disc).collect::<Option<Vec<Contact>>>() {
         Some(discs) => model.impedance_ohm(&discs),
-        None => Ok(model.image_fields(&model.image_mesh().conductances_s(touches)?)?.impedance_ohm),
+        None => model.image_impedance_ohm(&model.image_mesh().conductances_s(touches)?),
     }
 }
 

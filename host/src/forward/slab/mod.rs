@@ -23,7 +23,7 @@ use self::disc::{DiscBasis, MAX_DEGREE};
 use self::image::{CellFields, ImageGrid};
 use self::kernel::{Surface, SurfaceKernel};
 use self::pads::{Across, Pad, PadFields, between, pad_impedances};
-use super::contact::{ContactFields, ContactSystem, conducting_patches};
+use super::contact::{ContactFields, ContactSystem, Contacted, conducting_patches};
 use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Layer};
 use crate::scene::Contact;
@@ -147,6 +147,17 @@ impl Slab {
         Ok(())
     }
 
+    /// The nodes of an image that conduct, and the impedances and currents that they make.
+    fn touched(&self, image_s: &[f64]) -> Result<(Vec<usize>, Contacted), ForwardError> {
+        check_image(image_s, self.image.mesh.nodes_m.len())?;
+        let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
+        let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
+        let cross = self.image.fields_ohm.select_rows(&touched);
+        let patches = self.cells().between(&touched, &touched);
+        let solved = conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s);
+        Ok((touched, solved.ok_or(ForwardError::NoContact)?))
+    }
+
     fn system(&self, discs: &[Disc]) -> ContactSystem {
         let electrodes = self.pads.electrodes();
         let starts: Vec<_> = discs
@@ -213,23 +224,22 @@ impl ForwardModel for Slab {
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
-        check_image(image_s, self.image.mesh.nodes_m.len())?;
-        let (touched, untouched): (Vec<_>, Vec<_>) = (0..image_s.len()).partition(|node| image_s[*node] > 0.0);
-        let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
+        let (touched, solved) = self.touched(image_s)?;
+        let untouched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] == 0.0).collect();
         let cells = self.cells();
         let fields_ohm = &self.image.fields_ohm;
-        let cross = fields_ohm.select_rows(&touched);
-        let patches = cells.between(&touched, &touched);
-        let solved = conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)
-            .ok_or(ForwardError::NoContact)?;
         let mut elsewhere = fields_ohm.select_rows(&untouched) + cells.between(&untouched, &touched) * &solved.unknowns;
         elsewhere.column_iter_mut().zip(&solved.constant_ohm).for_each(|(mut e, ohm)| e.add_scalar_mut(*ohm));
         let mut nodes_ohm = DMatrix::zeros(image_s.len(), fields_ohm.ncols());
-        for (row, (node, conductance_s)) in touched.iter().zip(&conductance_s).enumerate() {
-            nodes_ohm.row_mut(*node).copy_from(&(solved.unknowns.row(row) / -*conductance_s));
+        for (row, node) in touched.iter().enumerate() {
+            nodes_ohm.row_mut(*node).copy_from(&(solved.unknowns.row(row) / -image_s[*node]));
         }
         untouched.iter().enumerate().for_each(|(row, node)| nodes_ohm.row_mut(*node).copy_from(&elsewhere.row(row)));
         Ok(ContactFields { impedance_ohm: solved.impedance_ohm, nodes_ohm })
+    }
+
+    fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
+        Ok(self.touched(image_s)?.1.impedance_ohm)
     }
 
     fn image_mesh(&self) -> &ImageMesh {
