@@ -145,7 +145,7 @@ fn detector(args: &Args) -> anyhow::Result<(Detector, Option<Stack>, Vec<Contact
 fn model(args: &Args, detector: &Detector) -> anyhow::Result<Box<dyn ForwardModel>> {
     let nodes = args.nodes.map(|nodes| nodes as usize);
     let shell_nodes = nodes.unwrap_or_else(|| Shell::default_nodes(detector));
-    let detector = &simulate::with_spread_contacts(detector, &args.scene.fault, args.scene.seed());
+    let detector = &simulate::as_built(detector, &args.scene.fault, args.scene.seed());
     match simulate::uneven_shell(detector, shell_nodes, &args.scene.fault, args.scene.seed())? {
         Some(shell) => {
             ensure!(args.model == Model::Shell, "only the shell can be uneven in the plane: leave out --model slab");

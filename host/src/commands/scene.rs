@@ -33,7 +33,7 @@ pub struct SceneArgs {
     /// Depth of the detector's surface that a contact's current crosses, under forces (mm)
     #[arg(long, value_name = "MM", default_value_t = SURFACE_DEPTH_M * 1e3, value_parser = positive)]
     surface_depth: f64,
-    /// Something wrong: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, uneven:0.2 or
+    /// Something wrong: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2 or
     /// clip:0.14,1.8 (V); give it again for more
     #[arg(long, value_name = "FAULT")]
     pub fault: Vec<Fault>,

@@ -4,13 +4,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::DMatrix;
 
-use super::{Fault, FaultError, Measurement, Physics, uneven_shell, with_spread_contacts};
+use super::{Fault, FaultError, Measurement, Physics, as_built, uneven_shell};
 use crate::detector::Detector;
 use crate::forward::shell::Shell;
 use crate::forward::{ForwardError, ForwardModel, Resolution, Slab, touched_impedance_ohm};
 use crate::readings::Readings;
 use crate::scene::{Contact, Scene, Touch};
 
+/// Nodes of the image that touches of other shapes than discs have on a simulated slab: not those that slabs are inverted on.
+const SLAB_IMAGE_NODES: usize = 3000;
 /// Nodes of a simulated shell for each one of the shell that is inverted.
 const FINER: usize = 3;
 
@@ -42,13 +44,13 @@ pub struct Simulation {
 /// The best model of a detector with such faults, finer than those that are inverted: the slab for rectangles, else the shell. Uneven
 /// conductivity only the shell can have.
 fn model(detector: &Detector, faults: &[Fault], seed: u64) -> Result<Box<dyn ForwardModel>, ForwardError> {
-    let detector = &with_spread_contacts(detector, faults, seed);
+    let detector = &as_built(detector, faults, seed);
     let nodes = FINER * Shell::default_nodes(detector);
     if let Some(uneven) = uneven_shell(detector, nodes, faults, seed)? {
         return Ok(Box::new(uneven));
     }
     if detector.outline.as_rectangle().is_some() {
-        return Ok(Box::new(Slab::with_resolution(detector, Resolution::FINE)?.on_image(nodes)));
+        return Ok(Box::new(Slab::with_resolution(detector, Resolution::FINE)?.on_image(SLAB_IMAGE_NODES)));
     }
     Ok(Box::new(Shell::with_nodes(detector, nodes)?))
 }

@@ -63,7 +63,7 @@ impl Circuit {
                 self.clip_v = [self.clip_v[0].max(low_v), self.clip_v[1].min(high_v)];
             }
             // The model of the detector has these.
-            Fault::ContactSpread { .. } | Fault::Uneven { .. } => {}
+            Fault::ContactSpread { .. } | Fault::Conductivity { .. } | Fault::Uneven { .. } => {}
         }
     }
 

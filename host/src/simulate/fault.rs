@@ -41,6 +41,11 @@ pub enum Fault {
         /// Standard deviation of their logarithm.
         deviation: f64,
     },
+    /// The conductivity is not the one told, by a factor. `conductivity:2`
+    Conductivity {
+        /// The factor.
+        factor: f64,
+    },
     /// The conductivity differs from place to place. `uneven:0.2`
     Uneven {
         /// Standard deviation of its logarithm.
@@ -54,8 +59,7 @@ pub enum Fault {
 }
 
 /// Forms of faults, for messages.
-const FORMS: &str =
-    "open:3, short:2,7, short:2,7:50, swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, uneven:0.2 or clip:0.14,1.8";
+const FORMS: &str = "open:3, short:2,7, short:2,7:50, swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2 or clip:0.14,1.8";
 
 /// Why a fault cannot be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -99,7 +103,9 @@ impl Fault {
                 [Some(one), None]
             }
             Self::Short { electrodes: [a, b], .. } | Self::Swap { channels: [a, b] } => [Some(a), Some(b)],
-            Self::ContactSpread { .. } | Self::Uneven { .. } | Self::Clip { .. } => [None; 2],
+            Self::ContactSpread { .. } | Self::Conductivity { .. } | Self::Uneven { .. } | Self::Clip { .. } => {
+                [None; 2]
+            }
         }
     }
 
@@ -115,6 +121,7 @@ impl Fault {
             ("gain", [channel, factor]) => Ok(Self::Gain { channel: index(channel)?, factor: not_negative(factor)? }),
             ("invert", [channel]) => Ok(Self::Invert { channel: index(channel)? }),
             ("contact-spread", [deviation]) => Ok(Self::ContactSpread { deviation: not_negative(deviation)? }),
+            ("conductivity", [factor]) => Ok(Self::Conductivity { factor: positive(factor)? }),
             ("uneven", [deviation]) => Ok(Self::Uneven { deviation: not_negative(deviation)? }),
             ("clip", [range]) => Ok(Self::Clip { range_v: self::range(range)? }),
             _ => Err("no such fault, or too few or too many numbers"),
@@ -135,6 +142,10 @@ fn indices(text: &str) -> Result<[usize; 2], &'static str> {
 fn not_negative(text: &str) -> Result<f64, &'static str> {
     let number = text.trim().parse::<f64>().ok().filter(|number| *number >= 0.0 && number.is_finite());
     number.ok_or("a number of zero or above is needed")
+}
+
+fn positive(text: &str) -> Result<f64, &'static str> {
+    not_negative(text).ok().filter(|number| *number > 0.0).ok_or("a number above zero is needed")
 }
 
 fn range(text: &str) -> Result<[f64; 2], &'static str> {
@@ -161,6 +172,7 @@ impl fmt::Display for Fault {
             Self::Gain { channel, factor } => write!(formatter, "gain:{channel}:{factor}"),
             Self::Invert { channel } => write!(formatter, "invert:{channel}"),
             Self::ContactSpread { deviation } => write!(formatter, "contact-spread:{deviation}"),
+            Self::Conductivity { factor } => write!(formatter, "conductivity:{factor}"),
             Self::Uneven { deviation } => write!(formatter, "uneven:{deviation}"),
             Self::Clip { range_v: [low_v, high_v] } => write!(formatter, "clip:{low_v},{high_v}"),
         }
@@ -181,6 +193,7 @@ mod tests {
             "gain:4:0.8",
             "invert:4",
             "contact-spread:0.2",
+            "conductivity:2",
             "uneven:0.2",
             "clip:0.14,1.8",
         ];
@@ -201,6 +214,7 @@ mod tests {
             ("swap:2,2", "two different"),
             ("gain:1:-0.8", "zero or above"),
             ("gain:1:NaN", "zero or above"),
+            ("conductivity:0", "above zero"),
             ("clip:2,1", "below the second"),
         ] {
             let error = text.parse::<Fault>().unwrap_err().to_string();

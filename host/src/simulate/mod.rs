@@ -4,21 +4,21 @@
 //! [`Measurement`] makes readings of them. [`Simulation`] is both together, for the simulated board.
 
 mod board;
+mod built;
 mod circuit;
 mod fault;
 mod measure;
 mod measurement;
 mod noise;
-mod unevenness;
 
 use crate::readings::Readings;
 
 pub use board::{Mouse, Simulation, SimulationError};
+pub use built::{as_built, uneven_shell};
 pub use fault::{Fault, FaultError};
 pub use measure::{code, measured};
 pub use measurement::Measurement;
 pub use noise::Noise;
-pub use unevenness::{uneven_shell, with_spread_contacts};
 
 /// What the simulated board measures.
 pub trait Physics: Send {

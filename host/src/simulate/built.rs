@@ -14,20 +14,33 @@ const WAVES: usize = 32;
 /// Length over which it changes, as a share of the detector's shorter side.
 const LENGTH_SHARE: f64 = 0.25;
 
-/// `detector` with contact impedances that differ from pad to pad, if that is one of the faults. `seed` chooses which are large and
-/// which small.
-pub fn with_spread_contacts(detector: &Detector, faults: &[Fault], seed: u64) -> Detector {
+/// `detector` as its faults make it: of another conductivity, with contact impedances that differ from pad to pad. `seed` chooses which
+/// are large and which small.
+pub fn as_built(detector: &Detector, faults: &[Fault], seed: u64) -> Detector {
     let mut detector = detector.clone();
     for fault in faults {
-        let Fault::ContactSpread { deviation } = fault else { continue };
-        let mut noise = Noise::of(seed, Stream::ContactSpread);
-        let common_ohm_m2 = detector.contact_impedance_ohm_m2;
-        for pad in &mut detector.electrodes {
-            let ohm_m2 = pad.contact_impedance_ohm_m2.get_or_insert(common_ohm_m2);
-            *ohm_m2 *= (deviation * noise.normal()).exp();
+        match *fault {
+            Fault::Conductivity { factor } => scale(&mut detector, factor),
+            Fault::ContactSpread { deviation } => spread_contacts(&mut detector, deviation, seed),
+            _ => {}
         }
     }
     detector
+}
+
+fn scale(detector: &mut Detector, factor: f64) {
+    for layer in &mut detector.layers {
+        layer.bottom_s_per_m *= factor;
+        layer.top_s_per_m *= factor;
+    }
+}
+
+fn spread_contacts(detector: &mut Detector, deviation: f64, seed: u64) {
+    let mut noise = Noise::of(seed, Stream::ContactSpread);
+    let common_ohm_m2 = detector.contact_impedance_ohm_m2;
+    for pad in &mut detector.electrodes {
+        *pad.contact_impedance_ohm_m2.get_or_insert(common_ohm_m2) *= (deviation * noise.normal()).exp();
+    }
 }
 
 /// A shell of `nodes` nodes with uneven conductivity, if that is one of the faults. `seed` chooses where it is high and low.
@@ -91,7 +104,7 @@ mod tests {
     fn contact_impedances_spread_as_asked_and_the_same_for_a_seed() {
         let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
         detector.electrodes = vec![detector.electrodes[0]; 2000];
-        let of = |seed| with_spread_contacts(&detector, &[Fault::ContactSpread { deviation: 0.2 }], seed);
+        let of = |seed| as_built(&detector, &[Fault::ContactSpread { deviation: 0.2 }], seed);
         let log = |pad| (of(3).pad_impedance_ohm_m2(pad) / detector.contact_impedance_ohm_m2).ln();
         let logs: Vec<f64> = of(3).electrodes.iter().map(log).collect();
         let mean = logs.iter().sum::<f64>() / 2000.0;
@@ -100,7 +113,15 @@ mod tests {
         assert!(mean.abs() < 0.018 && (deviation - 0.2).abs() < 0.0127, "{mean} {deviation}");
         assert_eq!(of(3), of(3));
         assert_ne!(of(3), of(4));
-        assert_eq!(with_spread_contacts(&detector, &[], 3), detector);
+        assert_eq!(as_built(&detector, &[], 3), detector);
+    }
+
+    #[test]
+    fn another_conductivity_is_that_of_every_layer() {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let built = as_built(&detector, &[Fault::Conductivity { factor: 0.5 }], 1);
+        assert_eq!(built.sheet_conductance_s(), 0.5 * detector.sheet_conductance_s());
+        assert_eq!(built.electrodes, detector.electrodes);
     }
 
     #[test]
