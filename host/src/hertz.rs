@@ -15,8 +15,8 @@ use crate::detector::{Detector, Foam, Stack};
 /// Poisson's ratio where none is given: open-cell foams are near 1/3. The paper gives none.
 pub const POISSON: f64 = 0.3;
 
-/// Depth of surface that a contact's current crosses where none is given (m). The paper gives none either; this one takes
-/// its sample A to nine tenths of saturation near the 2.8 N of its table II, under its tip of 5 mm.
+/// Depth of surface that a contact's current crosses where none is given (m). The paper gives none either; with
+/// this one the contact on its sample A is at nine tenths of the drive at 2.1 N under its tip of 5 mm, where its table II has 2.8 N.
 pub const SURFACE_DEPTH_M: f64 = 0.5e-3;
 
 /// Contacts are within Hertz's theory up to this share of the tip's radius, and of the layer's thickness.
@@ -159,6 +159,8 @@ impl Hertz {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::forward::{ForwardModel, Slab};
+    use crate::scene::Contact;
 
     fn sample_a() -> Hertz {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
@@ -181,6 +183,18 @@ mod tests {
         let imprint = sample_a().cylinder(0.003, 0.04, 2.0);
         assert!((imprint.half_width_m - 7.0467e-4).abs() < 2e-8, "{imprint:?}");
         assert!((imprint.conductance_s - 454.6 * 5.6374e-5).abs() < 1e-6, "{imprint:?}");
+    }
+
+    #[test]
+    fn sample_a_saturates_near_the_force_of_the_paper() {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let imprint = sample_a().ball(0.0025, 2.1);
+        let contact = Contact::flat(0.0, 0.0, imprint.half_width_m, imprint.conductance_s);
+        let z = Slab::new(&detector).unwrap().impedance_ohm(&[contact]).unwrap();
+        // All current goes through the contact: what it takes of the drive, mean over the grounds.
+        let share = |g: usize| 1.0 / imprint.conductance_s / (z[(g, g)] + detector.on_resistance_ohm);
+        let at_contact = 1.0 - (0..16).map(share).sum::<f64>() / 16.0;
+        assert!((at_contact - 0.9).abs() < 0.005, "{at_contact}");
     }
 
     /// Force of a rigid sphere with a contact of radius `a`, without Hertz's paraboloid (Sneddon 1965).

@@ -97,6 +97,7 @@ impl Unevenness {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detector::{Electrode, Outline};
     use crate::forward::{ForwardModel, Slab};
     use crate::scene::Contact;
 
@@ -151,6 +152,29 @@ mod tests {
         assert!(own > 1.0 && own < 1.5, "{own}");
         let others = (0..256).filter(|k| *k != 5 * 17).map(|k| change[k].abs()).fold(0.0, f64::max);
         assert!(others < 0.05 * even_ohm, "{others} {even_ohm}");
+    }
+
+    #[test]
+    fn along_a_bar_of_changing_conductivity_the_potential_is_ohms() {
+        let (length_m, width_m, per_m) = (0.12, 0.01, 30.0);
+        let bar = Detector {
+            outline: Outline::rectangle(length_m, width_m),
+            electrodes: [-0.055, 0.055].map(|x_m| Electrode::flat(x_m, 0.0, 0.002)).to_vec(),
+            ..Detector::preset(Detector::DEFAULT).unwrap()
+        };
+        let shell = Shell::with_sheet(&bar, 3000, |[x, _]| (per_m * x).exp()).unwrap();
+        // 1 A from one end to the other; the integral of dx over conductance is -exp(-k x) / (k s w).
+        let ohm = |x: f64| (-per_m * x).exp() / (per_m * bar.sheet_conductance_s() * width_m);
+        let off: Vec<f64> = (0..shell.image_mesh().nodes_m.len())
+            .filter(|node| shell.image_mesh().nodes_m[*node][0].abs() < 0.03)
+            .map(|node| {
+                let fields_ohm = shell.fields_ohm();
+                fields_ohm[(node, 0)] - fields_ohm[(node, 1)] - ohm(shell.image_mesh().nodes_m[node][0])
+            })
+            .collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        let largest = off.iter().map(|ohm| (ohm - mean).abs()).fold(0.0, f64::max);
+        assert!(off.len() > 100 && largest < 3e-3 * (ohm(-0.03) - ohm(0.03)), "{} {largest}", off.len());
     }
 
     #[test]
