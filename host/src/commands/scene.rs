@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use tactomo::detector::{Detector, Stack};
 use tactomo::hertz::{Hertz, POISSON, SURFACE_DEPTH_M, Skin};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
@@ -54,6 +54,9 @@ impl SceneArgs {
     /// The scene, or `otherwise`, on a detector of such foams if they are known.
     pub fn scene(&self, otherwise: SceneName, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Scene> {
         let hand = self.hand(foams, detector)?;
+        let is_flat = detector.surface.is_none();
+        let has_shape = matches!(self.scene, Some(SceneName::Ring | SceneName::Line));
+        ensure!(is_flat || !has_shape, "only discs can touch a curved detector: choose another scene");
         Ok(Scene::new(self.scene.unwrap_or(otherwise), detector, hand, self.seed()))
     }
 

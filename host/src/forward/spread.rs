@@ -25,11 +25,14 @@ impl ImageMesh {
     /// the conductance of a touch and its centre are kept on any mesh; what lies beyond the edge touches nothing.
     ///
     /// # Errors
-    /// [`ForwardError::Contact`] if a touch is off the mesh, or cannot be.
+    /// [`ForwardError::Contact`] if the mesh is that of a curved detector, or a touch is off the mesh, or cannot be.
     pub fn conductances_s(&self, touches: &[Touch]) -> Result<Vec<f64>, ForwardError> {
         let mut image_s = vec![0.0; self.nodes_m.len()];
         for (index, touch) in touches.iter().enumerate() {
             let wrong = |what: &str| ForwardError::Contact { index, what: what.to_owned() };
+            if !self.places_m.is_empty() {
+                return Err(wrong("on a curved detector only discs can touch"));
+            }
             let density_s_per_m2 = touch.density_s_per_m2().map_err(wrong)?;
             let mut touches = false;
             for piece in touch.pieces() {
@@ -99,7 +102,7 @@ mod tests {
                 [[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]]
             })
             .collect();
-        ImageMesh { nodes_m, triangles, node_areas_m2: Vec::new() }
+        ImageMesh { nodes_m, triangles, ..ImageMesh::default() }
     }
 
     fn touch(shape: Shape) -> Touch {

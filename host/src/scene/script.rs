@@ -5,8 +5,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::hand::LIGHTEST;
-use super::{Hand, Touch};
-use crate::detector::{Detector, Outline};
+use super::{Contact, Hand, Touch};
+use crate::detector::{Detector, Outline, Surface};
 use crate::geometry::{self, Point};
 
 /// Seconds between two presses of a contact that comes and goes.
@@ -66,6 +66,8 @@ pub struct Scene {
     half_size_m: [f64; 2],
     places: Vec<Point>,
     phase: f64,
+    /// Where places of the map are, on a curved detector.
+    surface: Option<Surface>,
 }
 
 /// A name that no scene has.
@@ -127,7 +129,7 @@ impl Scene {
         };
         let half_size_m = detector.outline.size_m().map(|side_m| side_m / 2.0);
         let places = places(&detector.outline, half_size_m, count, &mut random);
-        Self { name, hand, half_size_m, places, phase: TAU * random.f64() }
+        Self { name, hand, half_size_m, places, phase: TAU * random.f64(), surface: detector.surface.clone() }
     }
 
     /// The hand that presses.
@@ -135,8 +137,16 @@ impl Scene {
         &self.hand
     }
 
-    /// All that touches at `time_s` seconds after the start. Parts of it may lie beside a detector that is no rectangle.
+    /// All that touches at `time_s` seconds after the start. Parts of it may lie beside a detector that is no rectangle. On a curved one,
+    /// what touches beside its map is left out, and so are lines and rings.
     pub fn at(&self, time_s: f64) -> Vec<Touch> {
+        match &self.surface {
+            Some(surface) => self.on_map(time_s).into_iter().filter_map(|touch| raised(touch, surface)).collect(),
+            None => self.on_map(time_s),
+        }
+    }
+
+    fn on_map(&self, time_s: f64) -> Vec<Touch> {
         let one = |touch: Touch| vec![touch];
         match self.name {
             SceneName::Rest => Vec::new(),
@@ -217,6 +227,12 @@ fn places(outline: &Outline, half_size_m: [f64; 2], count: usize, random: &mut f
     places
 }
 
+/// A disc of the map where it is in space.
+fn raised(touch: Touch, surface: &Surface) -> Option<Touch> {
+    let [x_m, y_m, z_m] = surface.place_m(touch.centre_m)?;
+    touch.disc().map(|disc| Touch::from(Contact { x_m, y_m, z_m, ..disc }))
+}
+
 fn is_on(outline: &Outline, place: Point) -> bool {
     geometry::is_inside(place, &outline.outer) && !outline.holes.iter().any(|hole| geometry::is_inside(place, hole))
 }
@@ -239,6 +255,21 @@ mod tests {
                 let scene = scene(name, preset, seed);
                 let corners = (0..60).flat_map(|i| scene.at(f64::from(i) * 0.37)).flat_map(|touch| touch.pieces());
                 assert!(corners.flatten().all(inside), "{name} on {preset}");
+            }
+        }
+    }
+
+    #[test]
+    fn on_a_curved_detector_scenes_touch_the_surface() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/detectors/fingertip.toml");
+        let detector = Detector::read(file.as_ref()).unwrap();
+        let surface = detector.surface.as_ref().unwrap();
+        for (name, touches) in [(SceneName::RollingBall, 1), (SceneName::FiveFingers, 5), (SceneName::Several, 3)] {
+            let found = Scene::new(name, &detector, Hand::relative(&detector), 1).at(1.0);
+            assert!(!found.is_empty() && found.len() <= touches, "{name}: {found:?}");
+            for Touch { centre_m: [x_m, y_m], z_m, .. } in found {
+                let foot = surface.nearest([x_m, y_m, z_m]);
+                assert!(crate::space::distance(foot.place_m, [x_m, y_m, z_m]) < 1e-6, "{name}");
             }
         }
     }

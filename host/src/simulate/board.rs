@@ -49,7 +49,7 @@ fn model(detector: &Detector, faults: &[Fault], seed: u64) -> Result<Box<dyn For
     if let Some(uneven) = uneven_shell(detector, nodes, faults, seed)? {
         return Ok(Box::new(uneven));
     }
-    if detector.outline.as_rectangle().is_some() {
+    if detector.surface.is_none() && detector.outline.as_rectangle().is_some() {
         return Ok(Box::new(Slab::with_resolution(detector, Resolution::FINE)?.on_image(SLAB_IMAGE_NODES)));
     }
     Ok(Box::new(Shell::with_nodes(detector, nodes)?))

@@ -7,7 +7,7 @@ use super::noise::{Noise, Stream};
 use crate::detector::Detector;
 use crate::forward::ForwardError;
 use crate::forward::shell::Shell;
-use crate::geometry::Point;
+use crate::space::Place;
 
 /// Waves that make up the pattern: enough that its values are nearly normally distributed.
 const WAVES: usize = 32;
@@ -72,7 +72,7 @@ struct Unevenness {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Wave {
-    per_m: [f64; 2],
+    per_m: [f64; 3],
     phase: f64,
 }
 
@@ -82,13 +82,13 @@ impl Unevenness {
         let [width_m, height_m] = detector.outline.size_m();
         let length_m = LENGTH_SHARE * width_m.min(height_m);
         let mut noise = Noise::of(seed, Stream::Uneven);
-        let mut wave = || Wave { per_m: [(); 2].map(|()| noise.normal() / length_m), phase: TAU * noise.uniform() };
+        let mut wave = || Wave { per_m: [(); 3].map(|()| noise.normal() / length_m), phase: TAU * noise.uniform() };
         Self { deviation, waves: (0..WAVES).map(|_| wave()).collect() }
     }
 
     /// The factor at a place.
-    fn factor(&self, [x, y]: Point) -> f64 {
-        let at = |wave: &Wave| (wave.per_m[0] * x + wave.per_m[1] * y + wave.phase).cos();
+    fn factor(&self, [x, y, z]: Place) -> f64 {
+        let at = |wave: &Wave| (wave.per_m[0] * x + wave.per_m[1] * y + wave.per_m[2] * z + wave.phase).cos();
         let sum: f64 = self.waves.iter().map(at).sum();
         (self.deviation * sum * (2.0 / WAVES as f64).sqrt()).exp()
     }
@@ -162,7 +162,7 @@ mod tests {
             electrodes: [-0.055, 0.055].map(|x_m| Electrode::flat(x_m, 0.0, 0.002)).to_vec(),
             ..Detector::preset(Detector::DEFAULT).unwrap()
         };
-        let shell = Shell::with_sheet(&bar, 3000, |[x, _]| (per_m * x).exp()).unwrap();
+        let shell = Shell::with_sheet(&bar, 3000, |[x, ..]| (per_m * x).exp()).unwrap();
         // 1 A from one end to the other; the integral of dx over conductance is -exp(-k x) / (k s w).
         let ohm = |x: f64| (-per_m * x).exp() / (per_m * bar.sheet_conductance_s() * width_m);
         let off: Vec<f64> = (0..shell.image_mesh().nodes_m.len())
@@ -192,7 +192,7 @@ mod tests {
         assert!(uneven_shell(&detector, 1000, &[], 1).unwrap().is_none());
     }
 
-    fn logs_at(place: Point) -> Vec<f64> {
+    fn logs_at(place: Place) -> Vec<f64> {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
         (0..4000).map(|seed| Unevenness::new(&detector, 0.2, seed).factor(place).ln()).collect()
     }
@@ -200,7 +200,8 @@ mod tests {
     #[test]
     fn deviation_and_covariance_over_seeds_are_those_asked_for() {
         let covariance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64;
-        let (here, near, far) = (logs_at([0.01, -0.02]), logs_at([0.025, -0.02]), logs_at([-0.03, 0.03]));
+        let (here, near, far) =
+            (logs_at([0.01, -0.02, 0.0]), logs_at([0.025, -0.02, 0.0]), logs_at([-0.03, 0.03, 0.0]));
         // 15 mm is the length itself: exp(-1/2). Four standard errors of 4000 products of variance about 0.04^2 (1 + r^2).
         for (other, expected) in [(&here, 0.04), (&near, 0.04 * (-0.5f64).exp()), (&far, 0.0)] {
             let found = covariance(&here, other);

@@ -140,6 +140,16 @@ impl Mesh {
         }
     }
 
+    /// Middle of a triangle (m).
+    pub fn centroid_m(&self, triangle: [u32; 3]) -> Place {
+        let corner = |node: u32| {
+            let [x, y] = self.nodes_m[node as usize];
+            self.places_m.get(node as usize).copied().unwrap_or([x, y, 0.0])
+        };
+        let [a, b, c] = triangle.map(corner);
+        [0, 1, 2].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0)
+    }
+
     /// Corners of a triangle (m), in a plane of its own on a curved detector.
     pub fn corners(&self, triangle: [u32; 3]) -> [Point; 3] {
         self.seen_from(triangle, [0.0; 3]).0

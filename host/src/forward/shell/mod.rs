@@ -22,6 +22,7 @@ use super::contact::ContactFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Electrode};
 use crate::scene::Contact;
+use crate::space::Place;
 
 /// A pad's contact impedance is at least this share of `radius^2 / sheet conductance`: below, it makes no difference to a
 /// reading (current enters within 1/1000 of the radius) and the equations only lose digits.
@@ -63,11 +64,7 @@ impl Shell {
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if the detector cannot be meshed.
-    pub fn with_sheet(
-        detector: &Detector,
-        nodes: usize,
-        factor: impl Fn([f64; 2]) -> f64,
-    ) -> Result<Self, ForwardError> {
+    pub fn with_sheet(detector: &Detector, nodes: usize, factor: impl Fn(Place) -> f64) -> Result<Self, ForwardError> {
         let singular = |_: Singular| ForwardError::Detector {
             detector: detector.name.clone(),
             what: "its equations are singular: conductivity and contact impedance have to be finite and above zero"
@@ -77,10 +74,7 @@ impl Shell {
             detector.electrodes.iter().map(|pad| pad_impedance_ohm_m2(detector, pad)).collect();
         let sheet_conductance_s = detector.sheet_conductance_s();
         let mesh = Mesh::new(detector, nodes)?;
-        let sheet_s = |[a, b, c]: [[f64; 2]; 3]| {
-            let centroid = [0, 1].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
-            factor(centroid) * sheet_conductance_s
-        };
+        let sheet_s = |triangle| factor(mesh.centroid_m(triangle)) * sheet_conductance_s;
         let system = System::new(&mesh, sheet_s, &pad_impedance_ohm_m2).map_err(singular)?;
         let node_areas_m2 = mesh.node_areas_m2();
         // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.

@@ -33,18 +33,13 @@ pub struct Factor {
 pub struct Singular;
 
 impl System {
-    /// Assembles the matrix; `sheet_s` gives the sheet conductance (S) of a triangle with such corners, `pad_impedance_ohm_m2`
+    /// Assembles the matrix; `sheet_s` gives the sheet conductance (S) of a triangle, `pad_impedance_ohm_m2`
     /// that of each pad.
-    pub fn new(
-        mesh: &Mesh,
-        sheet_s: impl Fn([[f64; 2]; 3]) -> f64,
-        pad_impedance_ohm_m2: &[f64],
-    ) -> Result<Self, Singular> {
+    pub fn new(mesh: &Mesh, sheet_s: impl Fn([u32; 3]) -> f64, pad_impedance_ohm_m2: &[f64]) -> Result<Self, Singular> {
         let (nodes, pads) = (mesh.nodes_m.len(), mesh.pad_triangles.len());
         let mut entries = Vec::with_capacity(7 * mesh.triangles.len());
         for &triangle in &mesh.triangles {
-            let corners = mesh.corners(triangle);
-            add_sheet(&mut entries, triangle, corners, sheet_s(corners));
+            add_sheet(&mut entries, triangle, mesh.corners(triangle), sheet_s(triangle));
         }
         for (pad, range) in mesh.pad_triangles.iter().enumerate() {
             for &triangle in &mesh.triangles[range.clone()] {

@@ -259,6 +259,9 @@ impl ForwardModel for Slab {
 fn check(detector: &Detector) -> Result<[f64; 2], String> {
     let size_m =
         detector.outline.as_rectangle().ok_or("its outline is not a rectangle; use the shell for other outlines")?;
+    if detector.surface.is_some() {
+        return Err("it is curved; use the shell".to_owned());
+    }
     let positive = |value: f64| value > 0.0 && value.is_finite();
     let sound = |layer: &Layer| [layer.thickness_m, layer.bottom_s_per_m, layer.top_s_per_m].into_iter().all(positive);
     if detector.layers.is_empty() {
