@@ -53,11 +53,32 @@ fn tikhonov(bencher: Bencher, nodes: usize) {
     bencher.bench(|| Tikhonov::new(black_box(&jacobian), Lambda::default(), Variant::Balanced));
 }
 
-/// Impedance matrix for one contact: a factorisation and 16 solves.
+/// Impedance matrix for one contact that stays where it is: from the fields between the nodes it touches, or, where they are
+/// many, a factorisation and 16 solves.
 #[divan::bench(args = NODES)]
 fn one_contact(bencher: Bencher, nodes: usize) {
     let shell = shell(nodes);
     bencher.bench(|| shell.impedance_ohm(black_box(&[CONTACT])));
+}
+
+/// The same for a contact that comes everywhere; what is found out of nodes on the way is kept.
+#[divan::bench(args = NODES)]
+fn moving_contact(bencher: Bencher, nodes: usize) {
+    let shell = shell(nodes);
+    let mut angle = 0.0_f64;
+    bencher.bench_local(move || {
+        angle += 0.005;
+        let at = [0.026 * (1.3 * angle).sin(), 0.026 * angle.sin()];
+        shell.impedance_ohm(black_box(&[Contact { x_m: at[0], y_m: at[1], ..CONTACT }]))
+    });
+}
+
+/// Impedance matrix by factorising anew, for comparison.
+#[divan::bench(args = NODES)]
+fn refactorised_contact(bencher: Bencher, nodes: usize) {
+    let shell = shell(nodes);
+    let conductances_s = shell.node_conductances_s(&[CONTACT]).unwrap_or_else(|error| panic!("{error}"));
+    bencher.bench(|| shell.image_fields(black_box(&conductances_s)));
 }
 
 /// Linear image of one frame.

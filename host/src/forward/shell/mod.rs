@@ -6,6 +6,7 @@
 
 mod contact;
 mod facets;
+mod inverse;
 mod mesh;
 #[cfg(test)]
 mod surface_tests;
@@ -13,12 +14,15 @@ mod system;
 #[cfg(test)]
 mod tests;
 
+use std::sync::OnceLock;
+
 use faer::Mat;
 use nalgebra::DMatrix;
 
+use self::inverse::Inverse;
 pub use self::mesh::Mesh;
 use self::system::{Factor, Singular, System};
-use super::contact::ContactFields;
+use super::contact::{ContactFields, conducting_patches};
 use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Electrode};
 use crate::scene::Contact;
@@ -28,6 +32,9 @@ use crate::space::Place;
 /// reading (current enters within 1/1000 of the radius) and the equations only lose digits.
 const SMALLEST_PAD_IMPEDANCE: f64 = 1e-6;
 
+/// Contacts that touch more nodes are solved for by factorising anew.
+const MOST_TOUCHED: usize = 400;
+
 /// The thin-shell model of a detector.
 pub struct Shell {
     detector: Detector,
@@ -36,6 +43,8 @@ pub struct Shell {
     system: System,
     fields_ohm: DMatrix<f64>,
     electrode_fields_ohm: DMatrix<f64>,
+    /// Fields between single nodes and pads; made when first contacts are small enough to ask for them.
+    inverse: OnceLock<Option<Inverse>>,
 }
 
 impl Shell {
@@ -86,7 +95,32 @@ impl Shell {
             triangles: mesh.triangles.clone(),
             node_areas_m2,
         };
-        Ok(Self { detector: detector.clone(), mesh, image_mesh, system, fields_ohm, electrode_fields_ohm })
+        Ok(Self {
+            detector: detector.clone(),
+            mesh,
+            image_mesh,
+            system,
+            fields_ohm,
+            electrode_fields_ohm,
+            inverse: OnceLock::new(),
+        })
+    }
+
+    /// The impedance matrix from the fields between the few nodes that conduct (Woodbury's identity), which costs less than
+    /// factorising anew. `None` if they are many.
+    fn touched_impedance_ohm(&self, image_s: &[f64]) -> Option<DMatrix<f64>> {
+        let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
+        if touched.len() > MOST_TOUCHED {
+            return None;
+        }
+        let ground = (self.system.pad(0), self.detector.sheet_conductance_s());
+        let inverse = self.inverse.get_or_init(|| self.system.inverse(ground).ok()).as_ref()?;
+        let pad = |e: usize| self.system.pad(e);
+        let pads = symmetric(self.system.pads(), |e, g| inverse.element(pad(e), pad(g)));
+        let cross = DMatrix::from_fn(touched.len(), pads.ncols(), |k, e| inverse.element(touched[k], pad(e)));
+        let nodes = symmetric(touched.len(), |k, l| inverse.element(touched[k], touched[l]));
+        let conductances_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
+        conducting_patches(&pads, &cross, nodes, &conductances_s).map(|found| found.impedance_ohm)
     }
 
     /// Contact conductance that each node gets from discs of contact (S).
@@ -108,7 +142,15 @@ impl ForwardModel for Shell {
     }
 
     fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
-        Ok(self.image_fields(&self.node_conductances_s(contacts)?)?.impedance_ohm)
+        self.image_impedance_ohm(&self.node_conductances_s(contacts)?)
+    }
+
+    fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
+        check_image(image_s, self.mesh.nodes_m.len())?;
+        match self.touched_impedance_ohm(image_s) {
+            Some(impedance_ohm) => Ok(impedance_ohm),
+            None => Ok(self.image_fields(image_s)?.impedance_ohm),
+        }
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
@@ -131,6 +173,18 @@ impl ForwardModel for Shell {
     fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
         &self.electrode_fields_ohm
     }
+}
+
+/// A symmetric matrix from its lower triangle.
+fn symmetric(count: usize, element: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+    let mut matrix = DMatrix::zeros(count, count);
+    for column in 0..count {
+        for row in column..count {
+            let value = element(row, column);
+            (matrix[(row, column)], matrix[(column, row)]) = (value, value);
+        }
+    }
+    matrix
 }
 
 /// Contact impedance of a pad that the equations are made with (ohm m2).

@@ -9,6 +9,7 @@ use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::DMatrix;
 
+use super::inverse::Inverse;
 use super::mesh::Mesh;
 use crate::geometry::cross;
 
@@ -63,6 +64,13 @@ impl System {
         let factor =
             Llt::try_new_with_symbolic(self.symbolic.clone(), matrix.as_ref(), Side::Lower).map_err(|_| Singular)?;
         Ok(Factor { nodes: self.nodes, factor })
+    }
+
+    /// Elements of the matrix's inverse, with a conductance to ground (S) added to one unknown.
+    pub fn inverse(&self, (unknown, conductance_s): (usize, f64)) -> Result<Inverse, Singular> {
+        let mut matrix = self.matrix.clone();
+        matrix.val_mut()[self.diagonal[unknown]] += conductance_s;
+        Inverse::new(matrix.as_ref())
     }
 
     /// Number of the unknown that is a pad's potential.

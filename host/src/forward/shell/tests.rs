@@ -280,6 +280,21 @@ fn one_contact_follows_the_closed_form_of_the_fields() -> Result<(), ForwardErro
     }
     Ok(())
 }
+
+#[test]
+fn touched_nodes_give_what_factorising_anew_gives() -> Result<(), ForwardError> {
+    let shell = shell(&preset("square-60"), 1500);
+    let press = |conductance_s: f64| contact(0.004, 0.009, 0.003, conductance_s);
+    for contacts in [vec![press(1e-5)], vec![press(10.0)], vec![press(1e-3), contact(-0.02, -0.02, 0.004, 1e-4)]] {
+        let conductances_s = shell.node_conductances_s(&contacts)?;
+        let anew = shell.image_fields(&conductances_s)?.impedance_ohm;
+        let touched = shell.touched_impedance_ohm(&conductances_s).unwrap_or_default();
+        let apart = (touched - &anew).amax() / anew.amax();
+        assert!(apart < 1e-8, "{apart}: {contacts:?}");
+    }
+    Ok(())
+}
+
 #[test]
 fn the_default_mesh_is_near_its_limit() -> Result<(), ForwardError> {
     let detector = preset("square-60");
