@@ -11,6 +11,8 @@ pub const ELECTRODES: RangeInclusive<usize> = 4..=32;
 /// Lengths (m).
 pub(super) const LENGTH_M: RangeInclusive<f64> = 1e-6..=10.0;
 const CONDUCTIVITY_S_PER_M: RangeInclusive<f64> = 1e-9..=1e9;
+/// Contact impedances that a pad may have (ohm m2).
+const IMPEDANCE_OHM_M2: RangeInclusive<f64> = 0.0..=1e3;
 const DRIVE_V: RangeInclusive<f64> = 1e-3..=1e3;
 const BITS: RangeInclusive<u8> = 1..=24;
 const MAX_LAYERS: usize = 16;
@@ -49,7 +51,7 @@ impl Detector {
         }
         self.check_layers()?;
         self.check_electrodes()?;
-        within("contact_impedance_ohm_m2", self.contact_impedance_ohm_m2, 0.0..=1e3)?;
+        within("contact_impedance_ohm_m2", self.contact_impedance_ohm_m2, IMPEDANCE_OHM_M2)?;
         within("drive_v", self.drive_v, DRIVE_V)?;
         within("on_resistance_ohm", self.on_resistance_ohm, 0.0..=1e9)?;
         self.adc.check()
@@ -76,6 +78,8 @@ impl Detector {
     fn check_electrode(&self, index: usize) -> Result<(), Problem> {
         let pad = self.electrodes[index];
         within(&format!("electrodes.diameters_m[{index}]"), 2.0 * pad.radius_m, LENGTH_M)?;
+        let impedance = format!("electrodes.contact_impedances_ohm_m2[{index}]");
+        within(&impedance, self.pad_impedance_ohm_m2(&pad), IMPEDANCE_OHM_M2)?;
         let at = pad.place_m();
         let position = format!("electrodes.positions_m[{index}]");
         at.iter().try_for_each(|&at_m| within(&position, at_m, -LENGTH_M.end()..=*LENGTH_M.end()))?;

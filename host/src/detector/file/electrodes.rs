@@ -16,6 +16,7 @@ pub(super) struct ElectrodeTable {
     positions_m: Option<Vec<Vec<f64>>>,
     diameter_m: Option<f64>,
     diameters_m: Option<Vec<f64>>,
+    contact_impedances_ohm_m2: Option<Vec<f64>>,
 }
 
 impl Detector {
@@ -39,10 +40,15 @@ impl Detector {
         let diameters_m: Vec<f64> = self.electrodes.iter().map(|pad| 2.0 * pad.radius_m).collect();
         match diameters_m.split_first() {
             Some((first, others)) if others.iter().all(|other| other == first) => {
-                writeln!(text, "diameter_m = {first:?}")
+                writeln!(text, "diameter_m = {first:?}")?;
             }
-            _ => writeln!(text, "diameters_m = {diameters_m:?}"),
+            _ => writeln!(text, "diameters_m = {diameters_m:?}")?,
         }
+        if self.electrodes.iter().all(|pad| pad.contact_impedance_ohm_m2.is_none()) {
+            return Ok(());
+        }
+        let ohm_m2: Vec<f64> = self.electrodes.iter().map(|pad| self.pad_impedance_ohm_m2(pad)).collect();
+        writeln!(text, "contact_impedances_ohm_m2 = {ohm_m2:?}")
     }
 
     /// Columns and rows, if the electrodes are a grid.
@@ -77,6 +83,10 @@ impl ElectrodeTable {
         };
         let diameters_m = diameters_m(self.diameter_m, self.diameters_m, electrodes.len())?;
         electrodes.iter_mut().zip(diameters_m).for_each(|(pad, diameter_m)| pad.radius_m = diameter_m / 2.0);
+        if let Some(each) = self.contact_impedances_ohm_m2 {
+            let each = one_for_each("electrodes.contact_impedances_ohm_m2", each, electrodes.len())?;
+            electrodes.iter_mut().zip(each).for_each(|(pad, ohm_m2)| pad.contact_impedance_ohm_m2 = Some(ohm_m2));
+        }
         if let Some(surface) = surface {
             electrodes.iter_mut().enumerate().try_for_each(|(index, pad)| pad.lay_on(surface, index))?;
         }
@@ -138,11 +148,15 @@ fn diameters_m(one: Option<f64>, each: Option<Vec<f64>>, count: usize) -> Result
             within("electrodes.diameter_m", diameter_m, LENGTH_M)?;
             Ok(vec![diameter_m; count])
         }
-        (None, Some(diameters_m)) if diameters_m.len() == count => Ok(diameters_m),
-        (None, Some(diameters_m)) => {
-            let what = format!("has {} numbers, but has to have one for each of {count} electrodes", diameters_m.len());
-            Err(Problem::new("electrodes.diameters_m", what))
-        }
+        (None, Some(diameters_m)) => one_for_each("electrodes.diameters_m", diameters_m, count),
         _ => Err(Problem::new("electrodes", "has to have either diameter_m, for all, or diameters_m, one for each")),
     }
+}
+
+fn one_for_each(field: &str, numbers: Vec<f64>, count: usize) -> Result<Vec<f64>, Problem> {
+    if numbers.len() == count {
+        return Ok(numbers);
+    }
+    let what = format!("has {} numbers, but has to have one for each of {count} electrodes", numbers.len());
+    Err(Problem::new(field, what))
 }

@@ -95,6 +95,26 @@ fn a_polygon_is_turned_and_moved_to_the_origin_with_its_electrodes() {
 }
 
 #[test]
+fn pads_may_have_contact_impedances_of_their_own() {
+    let ohm_m2: Vec<f64> = (1..=16).map(|k| 1e-5 * f64::from(k)).collect();
+    let with = |numbers: &[f64]| {
+        let line = format!("diameter_m = 0.004\ncontact_impedances_ohm_m2 = {numbers:?}");
+        Detector::from_toml(&SQUARE.replace("diameter_m = 0.004", &line), "spread")
+    };
+    let detector = with(&ohm_m2).unwrap();
+    assert_eq!(detector.electrodes[2].contact_impedance_ohm_m2, Some(ohm_m2[2]));
+    assert_eq!(Detector::from_toml(&detector.to_toml(), "").unwrap(), detector);
+    let error = |numbers: &[f64]| with(numbers).unwrap_err().to_string();
+    assert!(
+        error(&ohm_m2[..3]).contains("electrodes.contact_impedances_ohm_m2 has 3 numbers"),
+        "{}",
+        error(&ohm_m2[..3])
+    );
+    let negative: Vec<f64> = ohm_m2.iter().map(|ohm_m2| -ohm_m2).collect();
+    assert!(error(&negative).contains("electrodes.contact_impedances_ohm_m2[0] is -1e-5"), "{}", error(&negative));
+}
+
+#[test]
 fn a_file_that_is_missing_or_no_text_says_so() {
     let missing = Detector::read(Path::new("no/such.toml")).unwrap_err().to_string();
     assert!(missing.starts_with("cannot read the detector no/such.toml: No such file"), "{missing}");
