@@ -171,7 +171,8 @@ impl Mesh {
         if self.places_m.is_empty() {
             return Some((centre, [0.0; 3]));
         }
-        let corners = self.triangles.iter().map(|triangle| triangle.map(|node| self.places_m[node as usize]));
+        let near = self.triangles.iter().filter(|triangle| !self.is_apart(**triangle, centre, reach_m));
+        let corners = near.map(|triangle| triangle.map(|node| self.places_m[node as usize]));
         let away_m = |corners: [Place; 3]| space::distance(space::nearest_on_triangle(centre, corners), centre);
         let (away_m, corners) = corners.map(|corners| (away_m(corners), corners)).min_by(|a, b| a.0.total_cmp(&b.0))?;
         let normal = space::normal(corners);
