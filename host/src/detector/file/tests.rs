@@ -2,6 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::detector::Electrode;
+use crate::space;
 
 const DOCUMENTATION: &str = include_str!("../../../../docs/detector.md");
 
@@ -179,4 +180,39 @@ proptest! {
             prop_assert_eq!(Detector::from_toml(&detector.to_toml(), "").unwrap(), detector);
         }
     }
+}
+
+fn example(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/detectors").join(name)
+}
+
+#[test]
+fn examples_are_read_and_written_alike() {
+    for name in ["fingertip.toml", "l-shape.toml"] {
+        let path = example(name);
+        let detector = Detector::read(&path).unwrap();
+        let folder = path.parent().unwrap();
+        let again = Detector::from_toml_in(folder, &detector.to_toml(), "else").unwrap();
+        assert_eq!(again.surface, detector.surface);
+        for (ours, theirs) in again.electrodes.iter().zip(&detector.electrodes) {
+            assert!(space::distance(ours.place_m(), theirs.place_m()) < 1e-9, "{name}");
+        }
+    }
+}
+
+#[test]
+fn errors_of_surfaces_name_electrode_file_and_unit() {
+    let path = example("fingertip.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let error = |from: &str, to: &str| {
+        assert!(text.contains(from));
+        Detector::from_toml_in(path.parent().unwrap(), &text.replace(from, to), "x").unwrap_err().to_string()
+    };
+    let far = error("[-0.00263, -0.00144, 0.00742]", "[-0.00263, -0.00144, 0.01242]");
+    assert!(far.contains("electrodes.positions_m[15] puts electrode 15 4.") && far.contains("mm away"), "{far}");
+    assert!(error("\"mm\"", "\"m\"").contains("see surface_unit"));
+    assert!(error("\"mm\"", "\"parsec\"").contains("surface_unit"));
+    assert!(error("fingertip.obj", "no-such.obj").contains("no-such.obj"));
+    assert!(error(", 0.00742],", "],").contains("has 2 numbers, but has to be [x, y, z]"));
+    assert!(error("surface = \"fingertip.obj\"", "").contains("outline or surface has to be there"));
 }
