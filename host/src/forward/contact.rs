@@ -10,21 +10,25 @@
 //!
 //! with `c0` the constant. Nothing here knows where the fields come from: triangles, modes or a measurement.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{MatMut, MatRef, Par};
+use nalgebra::{DMatrix, DVector};
 
 use crate::detector::Detector;
 
 /// Contact unknowns of a detector, in any basis and any scaling of its unknowns.
 #[derive(Clone, Debug)]
-pub struct ContactSystem {
+pub struct ContactSystem<'a> {
     /// Fields between the electrodes (ohm): `n x n`.
-    pub electrodes: DMatrix<f64>,
-    /// Fields of the unknowns at the electrodes: `K x n`.
-    pub cross: DMatrix<f64>,
-    /// Fields between the unknowns, with the resistance of the contacts: `K x K`, symmetric, positive definite.
+    pub electrodes: &'a DMatrix<f64>,
+    /// Fields between the unknowns, with the resistance of the contacts: `K x K`, symmetric, positive definite; only its lower
+    /// triangle is used.
     pub contacts: DMatrix<f64>,
-    /// Current to the driving layer that one unit of each unknown carries: `K`.
-    pub current: DVector<f64>,
+    /// Fields of the unknowns at the electrodes, and the current to the driving layer that one unit of each carries:
+    /// `K x (n + 1)`.
+    pub cross_and_current: DMatrix<f64>,
 }
 
 /// What a [`ContactSystem`] gives.
@@ -38,39 +42,65 @@ pub struct Contacted {
     pub constant_ohm: DVector<f64>,
 }
 
-impl ContactSystem {
-    /// Solves the bordered system by the Cholesky factor of its large block; `None` if that is not positive definite or no
+impl ContactSystem<'_> {
+    /// The impedance matrix (ohm) by the Cholesky factor `L` of the large block; `None` if that is not positive definite or no
     /// unknown carries current.
-    pub fn solve(&self) -> Option<Contacted> {
-        let factor = Cholesky::new(self.contacts.clone())?;
-        let response = factor.solve(&self.cross);
-        let unit = factor.solve(&self.current);
-        let conductance = self.current.dot(&unit);
+    pub fn impedance_ohm(mut self) -> Option<DMatrix<f64>> {
+        Some(self.eliminate()?.0)
+    }
+
+    /// The impedance matrix and the unknowns; `None` as for [`impedance_ohm`](Self::impedance_ohm).
+    pub fn solve(mut self) -> Option<Contacted> {
+        let (impedance_ohm, constant_ohm) = self.eliminate()?;
+        let electrodes = self.electrodes.nrows();
+        let mut unknowns = self.cross_and_current;
+        let size = unknowns.nrows();
+        let factor = MatRef::from_column_major_slice(self.contacts.as_slice(), size, size);
+        let solved = MatMut::from_column_major_slice_mut(unknowns.as_mut_slice(), size, electrodes + 1);
+        solve_upper_triangular_in_place(factor.transpose(), solved, Par::Seq);
+        let unit = unknowns.column(electrodes).into_owned();
+        let unknowns = -unknowns.columns(0, electrodes) - unit * constant_ohm.transpose();
+        Some(Contacted { impedance_ohm, unknowns, constant_ohm })
+    }
+
+    /// Leaves `L` in place of the contacts' block and `L^-1` times the right sides in their place; gives impedances and constants.
+    fn eliminate(&mut self) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let (size, electrodes) = (self.contacts.nrows(), self.electrodes.nrows());
+        let block = MatMut::from_column_major_slice_mut(self.contacts.as_mut_slice(), size, size);
+        let mut memory =
+            MemBuffer::try_new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Default::default())).ok()?;
+        let stack = MemStack::new(&mut memory);
+        cholesky_in_place(block, Default::default(), Par::Seq, stack, Default::default()).ok()?;
+        let factor = MatRef::from_column_major_slice(self.contacts.as_slice(), size, size);
+        let right = MatMut::from_column_major_slice_mut(self.cross_and_current.as_mut_slice(), size, electrodes + 1);
+        solve_lower_triangular_in_place(factor, right, Par::Seq);
+
+        let products = self.cross_and_current.transpose() * &self.cross_and_current;
+        let conductance = products[(electrodes, electrodes)];
         if !(conductance.is_finite() && conductance > 0.0) {
             return None;
         }
         // What of each electrode's ampere the contacts do not take up while their potential is held at the bare one.
-        let missing = DVector::from_element(self.electrodes.nrows(), 1.0) - response.tr_mul(&self.current);
+        let missing = DVector::from_fn(electrodes, |e, _| 1.0 - products[(electrodes, e)]);
         let constant_ohm = &missing / conductance;
-        let impedance_ohm =
-            &self.electrodes - self.cross.tr_mul(&response) + &missing * missing.transpose() / conductance;
-        let unknowns = -response - unit * constant_ohm.transpose();
-        Some(Contacted { impedance_ohm, unknowns, constant_ohm })
+        let impedance_ohm = DMatrix::from_fn(electrodes, electrodes, |i, j| {
+            self.electrodes[(i, j)] - products[(i, j)] + missing[i] * constant_ohm[j]
+        });
+        Some((impedance_ohm, constant_ohm))
     }
 }
 
-/// Impedance of a detector on whose surface patches conduct (S, above zero), from the fields between them in any common gauge:
-/// between electrodes (`n x n`), of the electrodes at the patches (`K x n`) and between patches, mean over each (`K x K`).
+/// The system of patches of surface that conduct (S, above zero), from the fields between them in any common gauge: between
+/// electrodes (`n x n`), of the electrodes at the patches (`K x n`) and between patches, mean over each (`K x K`).
 ///
-/// The unknowns of the answer are the currents from the driving layer into the detector (A per A). `None` as for
-/// [`ContactSystem::solve`].
-pub fn conducting_patches(
-    electrodes: &DMatrix<f64>,
+/// Its unknowns are currents divided by the square roots of the conductances: so `N + diag(1/C)` becomes a matrix that a small
+/// `C` leaves well conditioned.
+pub fn conducting_patches<'a>(
+    electrodes: &'a DMatrix<f64>,
     cross: &DMatrix<f64>,
     mut patches: DMatrix<f64>,
     conductance_s: &[f64],
-) -> Option<Contacted> {
-    // Scaled by the square roots on both sides, N + diag(1/C) becomes a matrix that a small C leaves well conditioned.
+) -> ContactSystem<'a> {
     let scale = DVector::from_iterator(conductance_s.len(), conductance_s.iter().map(|c| c.sqrt()));
     for (mut column, scale_j) in patches.column_iter_mut().zip(scale.iter()) {
         column.zip_apply(&scale, |value, scale_i| *value *= scale_i * scale_j);
@@ -78,12 +108,10 @@ pub fn conducting_patches(
     for i in 0..scale.len() {
         patches[(i, i)] += 1.0;
     }
-    let mut cross = cross.clone();
-    cross.row_iter_mut().zip(scale.iter()).for_each(|(mut row, scale)| row *= *scale);
-    let system = ContactSystem { electrodes: electrodes.clone(), cross, contacts: patches, current: scale.clone() };
-    let mut solved = system.solve()?;
-    solved.unknowns.row_iter_mut().zip(scale.iter()).for_each(|(mut row, scale)| row *= *scale);
-    Some(solved)
+    let current = cross.ncols();
+    let cross_and_current =
+        DMatrix::from_fn(scale.len(), current + 1, |k, e| scale[k] * if e == current { 1.0 } else { cross[(k, e)] });
+    ContactSystem { electrodes, contacts: patches, cross_and_current }
 }
 
 /// Potentials for 1 A into each electrode while contacts lead it off to the driving layer.
@@ -132,7 +160,10 @@ mod tests {
     /// Fields of two electrodes and two patches joined to one node by 1, 2, 3 and 4 ohm: plain sums, in a gauge.
     fn star(conductance_s: [f64; 2], gauge_ohm: f64) -> Option<Contacted> {
         let diagonal = |a: f64, b: f64| DMatrix::from_row_slice(2, 2, &[a, 0.0, 0.0, b]).add_scalar(gauge_ohm);
-        conducting_patches(&diagonal(1.0, 2.0), &diagonal(0.0, 0.0), diagonal(3.0, 4.0), &conductance_s)
+        let mut found =
+            conducting_patches(&diagonal(1.0, 2.0), &diagonal(0.0, 0.0), diagonal(3.0, 4.0), &conductance_s).solve()?;
+        found.unknowns.row_iter_mut().zip(conductance_s).for_each(|(mut row, s)| row *= s.sqrt());
+        Some(found)
     }
 
     #[test]

@@ -120,7 +120,7 @@ impl Shell {
         let cross = DMatrix::from_fn(touched.len(), pads.ncols(), |k, e| inverse.element(touched[k], pad(e)));
         let nodes = symmetric(touched.len(), |k, l| inverse.element(touched[k], touched[l]));
         let conductances_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
-        conducting_patches(&pads, &cross, nodes, &conductances_s).map(|found| found.impedance_ohm)
+        conducting_patches(&pads, &cross, nodes, &conductances_s).impedance_ohm()
     }
 
     /// Contact conductance that each node gets from discs of contact (S).

@@ -21,8 +21,15 @@ const MAX_ORDER: usize = 31;
 /// Orders up to which the layers' part of the self-impedance is integrated; above it only the half-space's counts.
 const LAYERED_ORDER: usize = 8;
 
+/// Share of the layers' part of the self-impedance that is left out, for each point of the quadrature.
+const NEGLIGIBLE: f64 = 1e-8;
+
 /// Highest degree of a basis.
 pub(super) const MAX_DEGREE: usize = 14;
+
+/// Radius of a disc, in distances from another, below which it acts by its first densities only: of degree 1, or 2.
+const FAR: f64 = 0.12;
+const NEAR: f64 = 0.25;
 
 /// One density: radial order, angular order, and whether it is the sine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +86,17 @@ impl DiscBasis {
         ALL[degree].get_or_init(|| Self::new(degree))
     }
 
+    /// The basis, of at most this degree, that another disc at a distance sees; `radius` is this one's in distances. A density of
+    /// order `n` acts there as `radius^(n + 1)`.
+    pub fn seen_from(&'static self, radius: f64) -> &'static Self {
+        let degree = match radius {
+            ..FAR => 1,
+            ..NEAR => 2,
+            _ => self.degree,
+        };
+        Self::of_degree(degree.min(self.degree))
+    }
+
     /// Number of densities.
     pub fn len(&self) -> usize {
         self.densities.len()
@@ -120,14 +138,17 @@ fn radial(n: usize, m: usize, rho: f64) -> f64 {
 pub(super) struct DiscSelf(Vec<f64>);
 
 impl DiscSelf {
-    /// For a disc of radius `a_m` on a surface of conductivity `sigma`; `excess` is what the kernel by wave number has over the
-    /// half-space's `1 / (sigma k)`, as a share of that.
+    /// For a disc of radius `a_m` on a surface of conductivity `sigma`; `excess` is what the kernel by the logarithm of the wave
+    /// number has over the half-space's `1 / (sigma k)`, as a share of that.
     pub fn new(a_m: f64, sigma: f64, excess: impl Fn(f64) -> f64) -> Self {
         let mut integrals = HALF_SPACE.iter().map(|w| w / (sigma * a_m)).collect::<Vec<_>>();
         let width = MAX_ORDER + 1;
+        let ln_a = a_m.ln();
         for point in HANKEL.iter() {
-            let k = point.at / a_m;
-            let rest = point.weight * excess(k) / (sigma * a_m * point.at * point.at);
+            let rest = point.weight * excess(point.ln_at - ln_a) / (sigma * a_m * point.at * point.at);
+            if rest.abs() * sigma * a_m < NEGLIGIBLE {
+                continue;
+            }
             for (n, bessel) in point.bessel.iter().enumerate() {
                 for other in ((n % 2)..=n).step_by(2) {
                     integrals[n * width + other] += rest * bessel * point.bessel[other];
@@ -207,6 +228,7 @@ fn gamma_of_half(twice: i32) -> f64 {
 /// A point of the quadrature over `x = k a`, with `J_(n+1)(x)`.
 struct HankelPoint {
     at: f64,
+    ln_at: f64,
     weight: f64,
     bessel: [f64; LAYERED_ORDER + 1],
 }
@@ -217,7 +239,12 @@ static HANKEL: LazyLock<Vec<HankelPoint>> = LazyLock::new(|| {
     let edges: Vec<f64> = coarse.into_iter().chain(fine).collect();
     panels(&edges, 5)
         .into_iter()
-        .map(|[at, weight]| HankelPoint { at, weight, bessel: std::array::from_fn(|n| libm::jn(n as i32 + 1, at)) })
+        .map(|[at, weight]| HankelPoint {
+            at,
+            ln_at: at.ln(),
+            weight,
+            bessel: std::array::from_fn(|n| libm::jn(n as i32 + 1, at)),
+        })
         .collect()
 });
 

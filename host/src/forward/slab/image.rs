@@ -100,7 +100,7 @@ impl CellFields {
     /// Impedances (ohm) between some of the cells, with the floating pads below them: `rows x columns`.
     pub fn between(&self, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
         let correction = |nodes: &[usize]| self.corrections.select_columns(nodes);
-        let mut all = correction(rows).tr_mul(&correction(columns));
+        let mut all = correction(rows).transpose() * correction(columns);
         let indices: Vec<_> = rows.iter().map(|node| self.grid.indices(*node)).collect();
         for (mut column, node) in all.column_iter_mut().zip(columns) {
             let [i, j] = self.grid.indices(*node);

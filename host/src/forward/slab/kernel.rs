@@ -11,7 +11,7 @@ use realfft::RealFftPlanner;
 
 use super::disc::DiscSelf;
 use super::quadrature::panels;
-use super::spline::{Grid, Taps};
+use super::spline::Grid;
 
 /// `k R` at which the smooth part's factor has fallen to 2e-5.
 const SMOOTH_END: f64 = 6.6;
@@ -38,9 +38,6 @@ pub(super) struct SurfaceKernel {
     near: NearPart,
     spectrum: NearSpectrum,
 }
-
-/// Weights of the look-ups for the four sign combinations of one pair of points.
-struct PairTaps([[Taps; 2]; 2]);
 
 impl SurfaceKernel {
     /// Makes the tables: `response` is the surface's potential per normal current density for a wave number, `floating` what
@@ -81,23 +78,23 @@ impl SurfaceKernel {
 
     /// Smooth part between two points (ohm); coordinates from the corner (m).
     pub fn smooth_ohm(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
-        let PairTaps([x, y]) = self.pair_taps(a, b);
+        let taps = |axis: usize| [self.grid.taps(axis, a[axis] - b[axis]), self.grid.taps(axis, a[axis] + b[axis])];
+        let (x, y) = (taps(0), taps(1));
         let stride = self.grid.nodes(1);
         let mut sum = 0.0;
-        for (column, x_weights) in &x {
-            for (row, y_weights) in &y {
-                let start = column * stride + row;
-                for (i, wx) in x_weights.iter().enumerate() {
-                    let line = &self.smooth[start + i * stride..start + i * stride + 4];
-                    sum += wx * line.iter().zip(y_weights).map(|(value, wy)| value * wy).sum::<f64>();
+        for (row, y_weights) in &y {
+            // Four sums side by side, for the processor to do at once.
+            let mut lanes = [0.0; 4];
+            for (column, x_weights) in &x {
+                for (i, weight) in x_weights.iter().enumerate() {
+                    let start = (column + i) * stride + row;
+                    let line = &self.smooth[start..start + 4];
+                    lanes.iter_mut().zip(line).for_each(|(lane, value)| *lane += weight * value);
                 }
             }
+            sum += lanes.iter().zip(y_weights).map(|(lane, weight)| lane * weight).sum::<f64>();
         }
         0.25 * sum
-    }
-
-    fn pair_taps(&self, a: [f64; 2], b: [f64; 2]) -> PairTaps {
-        PairTaps([0, 1].map(|axis| [self.grid.taps(axis, a[axis] - b[axis]), self.grid.taps(axis, a[axis] + b[axis])]))
     }
 
     /// Near part at a distance (ohm).
@@ -107,34 +104,31 @@ impl SurfaceKernel {
 
     /// Self-impedance of a disc on this surface, without the smooth part.
     pub fn disc_self(&self, radius_m: f64) -> DiscSelf {
-        DiscSelf::new(radius_m, self.spectrum.sigma, |k| self.spectrum.at(k))
+        DiscSelf::new(radius_m, self.spectrum.sigma, |ln_k| self.spectrum.at(ln_k))
     }
 
-    /// Mirror images, as sign and offset along each direction, that bring a disc at `b` within reach of a disc at `a`;
-    /// `gap_m` is added to the reach, the image in place comes first if at all.
+    /// Mirror images that bring a disc at `b` within reach of a disc at `a`; `gap_m` is added to the reach.
     pub fn images(&self, a: [f64; 2], b: [f64; 2], gap_m: f64) -> Vec<Image> {
         let reach_m = self.reach_m() + gap_m;
-        let along = |axis: usize| -> Vec<[f64; 2]> {
+        // Along one direction: sign and offset.
+        let along = |axis: usize| {
             let period_m = 2.0 * self.size_m[axis];
-            let turns = (reach_m / period_m).ceil() as i32 + 1;
-            let mut found: Vec<_> = (-turns..=turns)
-                .flat_map(|turn| [[1.0, f64::from(turn) * period_m], [-1.0, f64::from(turn) * period_m]])
-                .filter(|[sign, offset_m]| (a[axis] - (sign * b[axis] + offset_m)).abs() < reach_m)
-                .collect();
-            found.sort_by(|p, q| {
-                (q[0], -q[1].abs()).partial_cmp(&(p[0], -p[1].abs())).unwrap_or(std::cmp::Ordering::Equal)
-            });
-            found
+            let turns = (reach_m / period_m) as i32 + 1;
+            (-turns..=turns)
+                .flat_map(move |turn| [[1.0, f64::from(turn) * period_m], [-1.0, f64::from(turn) * period_m]])
+                .filter(move |[sign, offset_m]| (a[axis] - (sign * b[axis] + offset_m)).abs() < reach_m)
         };
-        let (x, y) = (along(0), along(1));
-        let image = |&[sx, ox]: &[f64; 2], &[sy, oy]: &[f64; 2]| Image { sign: [sx, sy], offset_m: [ox, oy] };
-        x.iter()
-            .flat_map(|x| y.iter().map(move |y| image(x, y)))
-            .filter(|image| {
+        let mut found = Vec::new();
+        for [sign_x, offset_x_m] in along(0) {
+            for [sign_y, offset_y_m] in along(1) {
+                let image = Image { sign: [sign_x, sign_y], offset_m: [offset_x_m, offset_y_m] };
                 let at = image.of(b);
-                (a[0] - at[0]).hypot(a[1] - at[1]) < reach_m
-            })
-            .collect()
+                if (a[0] - at[0]).powi(2) + (a[1] - at[1]).powi(2) < reach_m * reach_m {
+                    found.push(image);
+                }
+            }
+        }
+        found
     }
 }
 
@@ -247,8 +241,8 @@ impl NearSpectrum {
         Self { sigma: surface.sigma, first_ln_k, values }
     }
 
-    fn at(&self, k: f64) -> f64 {
-        let at = ((k.ln() - self.first_ln_k) * SPECTRUM_STEPS[1] as f64).clamp(0.0, SPECTRUM_STEPS[0] as f64 - 1.0);
+    fn at(&self, ln_k: f64) -> f64 {
+        let at = ((ln_k - self.first_ln_k) * SPECTRUM_STEPS[1] as f64).clamp(0.0, SPECTRUM_STEPS[0] as f64 - 1.0);
         let (cell, part) = (at as usize, at.fract());
         self.values[cell] + (self.values[cell + 1] - self.values[cell]) * part
     }

@@ -16,14 +16,14 @@ mod tests;
 
 use std::sync::OnceLock;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 
 use self::disc::{DiscBasis, MAX_DEGREE};
 use self::image::{CellFields, ImageGrid};
 use self::kernel::{Surface, SurfaceKernel};
 use self::pads::{Across, Pad, PadFields, between, pad_impedances};
-use super::contact::{ContactFields, ContactSystem, Contacted, conducting_patches};
+use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Layer};
 use crate::scene::Contact;
@@ -75,6 +75,7 @@ struct Disc {
     conductance_s: f64,
     basis: &'static DiscBasis,
     nodes: Vec<[f64; 2]>,
+    /// Of the pads' fields, means under the densities: `columns x densities`.
     fields: DMatrix<f64>,
 }
 
@@ -147,61 +148,66 @@ impl Slab {
         Ok(())
     }
 
-    /// The nodes of an image that conduct, and the impedances and currents that they make.
-    fn touched(&self, image_s: &[f64]) -> Result<(Vec<usize>, Contacted), ForwardError> {
+    /// The nodes of an image that conduct, and their system.
+    fn touched(&self, image_s: &[f64]) -> Result<(Vec<usize>, ContactSystem<'_>), ForwardError> {
         check_image(image_s, self.image.mesh.nodes_m.len())?;
         let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
         let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
         let cross = self.image.fields_ohm.select_rows(&touched);
         let patches = self.cells().between(&touched, &touched);
-        let solved = conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s);
-        Ok((touched, solved.ok_or(ForwardError::NoContact)?))
+        Ok((touched, conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)))
     }
 
-    fn system(&self, discs: &[Disc]) -> ContactSystem {
+    fn system(&self, discs: &[Disc]) -> ContactSystem<'_> {
         let electrodes = self.pads.electrodes();
-        let starts: Vec<_> = discs
-            .iter()
-            .scan(0, |next, disc| {
-                let start = *next;
-                *next += disc.basis.len();
-                Some(start)
-            })
-            .collect();
         let size = discs.iter().map(|disc| disc.basis.len()).sum();
-        let mut system = ContactSystem {
-            electrodes: self.pads.electrodes_ohm.clone(),
-            cross: DMatrix::zeros(size, electrodes),
-            contacts: DMatrix::zeros(size, size),
-            current: DVector::zeros(size),
-        };
-        for (disc, &row) in discs.iter().zip(&starts) {
+        let mut fields = DMatrix::zeros(self.pads.columns(), size);
+        let mut cross_and_current = DMatrix::zeros(size, electrodes + 1);
+        let mut start = 0;
+        for disc in discs {
             let scale = disc.conductance_s.sqrt();
-            system.current[row] = scale;
-            let cross = disc.fields.columns(0, electrodes) * scale;
-            system.cross.rows_mut(row, disc.basis.len()).copy_from(&cross);
-            for (other, &column) in discs.iter().zip(&starts).take_while(|(_, column)| **column <= row) {
-                let block = self.block(disc, other, row == column);
-                let shape = (disc.basis.len(), other.basis.len());
-                system.contacts.view_mut((row, column), shape).copy_from(&block);
-                system.contacts.view_mut((column, row), (shape.1, shape.0)).tr_copy_from(&block);
-            }
+            cross_and_current[(start, electrodes)] = scale;
+            fields.columns_mut(start, disc.basis.len()).copy_from(&(&disc.fields * scale));
+            start += disc.basis.len();
         }
-        system
+        cross_and_current.columns_mut(0, electrodes).tr_copy_from(&fields.rows(0, electrodes));
+        let corrections = fields.rows(electrodes, fields.nrows() - electrodes);
+        // The floating pads below are a short way for the current between contacts.
+        let mut contacts = -corrections.transpose() * corrections;
+        self.add_kernel(discs, &mut contacts);
+        ContactSystem { electrodes: &self.pads.electrodes_ohm, contacts, cross_and_current }
     }
 
-    /// Scaled impedances between the densities of two contacts, with the floating pads below them.
-    fn block(&self, disc: &Disc, other: &Disc, same: bool) -> DMatrix<f64> {
-        let electrodes = self.pads.electrodes();
-        let images = self.top.images(disc.centre_m, other.centre_m, disc.radius_m + other.radius_m);
-        let mut block = between(disc.basis, &disc.nodes, other.basis, &other.nodes, &self.top, &images, same);
-        let corrections = |disc: &Disc| disc.fields.columns(electrodes, disc.fields.ncols() - electrodes).into_owned();
-        block -= corrections(disc) * corrections(other).transpose();
-        block *= (disc.conductance_s * other.conductance_s).sqrt();
-        if same {
-            block += self.top.disc_self(disc.radius_m).reduced(disc.basis, 1.0, disc.conductance_s);
+    /// Adds what the kernel of the top gives, to the lower triangle.
+    fn add_kernel(&self, discs: &[Disc], contacts: &mut DMatrix<f64>) {
+        let mut row = 0;
+        for (i, disc) in discs.iter().enumerate() {
+            let mut column = 0;
+            for other in &discs[..=i] {
+                let scale = (disc.conductance_s * other.conductance_s).sqrt();
+                let mut block = self.block(disc, other, row == column) * scale;
+                if row == column {
+                    block += self.top.disc_self(disc.radius_m).reduced(disc.basis, 1.0, disc.conductance_s);
+                }
+                let mut view = contacts.view_mut((row, column), block.shape());
+                view += block;
+                column += other.basis.len();
+            }
+            row += disc.basis.len();
         }
-        block
+    }
+
+    /// Impedances between the densities of two contacts without their own singular parts. Of contacts far apart, only the first
+    /// densities see each other.
+    fn block(&self, disc: &Disc, other: &Disc, same: bool) -> DMatrix<f64> {
+        let images = self.top.images(disc.centre_m, other.centre_m, disc.radius_m + other.radius_m);
+        if same {
+            return between(disc.basis, &disc.nodes, disc.basis, &disc.nodes, &self.top, &images, true);
+        }
+        let distance_m = (disc.centre_m[0] - other.centre_m[0]).hypot(disc.centre_m[1] - other.centre_m[1]);
+        let [far, far_other] = [disc, other].map(|disc| disc.basis.seen_from(disc.radius_m / distance_m));
+        let nodes = [(disc, far), (other, far_other)].map(|(disc, far)| far.nodes_m(disc.centre_m, disc.radius_m));
+        between(far, &nodes[0], far_other, &nodes[1], &self.top, &images, false)
     }
 }
 
@@ -220,11 +226,14 @@ impl ForwardModel for Slab {
             .enumerate()
             .map(|(index, contact)| self.disc(index, contact))
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(self.system(&discs).solve().ok_or(ForwardError::NoContact)?.impedance_ohm)
+        self.system(&discs).impedance_ohm().ok_or(ForwardError::NoContact)
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
-        let (touched, solved) = self.touched(image_s)?;
+        let (touched, system) = self.touched(image_s)?;
+        let mut solved = system.solve().ok_or(ForwardError::NoContact)?;
+        let scaled = |row: usize| image_s[touched[row]].sqrt();
+        solved.unknowns.row_iter_mut().enumerate().for_each(|(row, mut currents)| currents *= scaled(row));
         let untouched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] == 0.0).collect();
         let cells = self.cells();
         let fields_ohm = &self.image.fields_ohm;
@@ -239,7 +248,7 @@ impl ForwardModel for Slab {
     }
 
     fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
-        Ok(self.touched(image_s)?.1.impedance_ohm)
+        self.touched(image_s)?.1.impedance_ohm().ok_or(ForwardError::NoContact)
     }
 
     fn image_mesh(&self) -> &ImageMesh {

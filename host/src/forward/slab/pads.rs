@@ -189,16 +189,15 @@ impl PadFields {
         }
     }
 
-    /// Means of all columns of [`sample`](Self::sample) under the densities of a disc: `densities x columns`.
+    /// Means of all columns of [`sample`](Self::sample) under the densities of a disc: `columns x densities`.
     pub fn under_disc(&self, basis: &DiscBasis, nodes: &[[f64; 2]]) -> DMatrix<f64> {
         let mut sample = vec![0.0_f32; self.columns];
-        // Column-major with a point's fields together, for the product below runs over points.
         let mut points = DMatrix::zeros(self.columns, nodes.len());
         for (node, mut column) in nodes.iter().zip(points.column_iter_mut()) {
             self.sample(*node, &mut sample);
             column.iter_mut().zip(&sample).for_each(|(to, from)| *to = f64::from(*from));
         }
-        basis.weights() * points.transpose()
+        points * basis.weights().transpose()
     }
 }
 

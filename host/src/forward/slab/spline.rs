@@ -7,6 +7,7 @@ use realfft::RealFftPlanner;
 pub(super) struct Grid {
     size_m: [f64; 2],
     cells: [usize; 2],
+    cells_per_m: [f64; 2],
 }
 
 /// Four weights along one direction, and the first node that they belong to.
@@ -17,7 +18,8 @@ impl Grid {
     pub fn new(size_m: [f64; 2], step_m: f64) -> Self {
         // Even, and never so few that the lowest modes are missed.
         let cells = size_m.map(|size_m| ((size_m / step_m / 2.0).ceil() as usize * 2).max(8));
-        Self { size_m, cells }
+        let cells_per_m = [0, 1].map(|axis| cells[axis] as f64 / size_m[axis]);
+        Self { size_m, cells, cells_per_m }
     }
 
     /// Nodes along a direction, with those around the rectangle.
@@ -36,10 +38,11 @@ impl Grid {
     }
 
     /// Weights at `u_m`, which is first folded back into the rectangle: the table is even about both of its edges.
+    #[inline]
     pub fn taps(&self, axis: usize, u_m: f64) -> Taps {
         let size_m = self.size_m[axis];
         let folded_m = if u_m.abs() > size_m { (2.0 * size_m - u_m.abs()).abs() } else { u_m.abs() };
-        let at = folded_m / size_m * self.cells[axis] as f64;
+        let at = folded_m * self.cells_per_m[axis];
         let cell = (at as usize).min(self.cells[axis] - 1);
         (cell, cubic_weights(at - cell as f64))
     }
@@ -64,14 +67,12 @@ impl Grid {
 }
 
 /// Cubic B-spline weights of the four nodes around a point, `t` of the way from the second to the third.
+#[inline]
 fn cubic_weights(t: f64) -> [f64; 4] {
+    const SIXTH: f64 = 1.0 / 6.0;
     let s = 1.0 - t;
-    [
-        s * s * s / 6.0,
-        (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-        (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
-        t * t * t / 6.0,
-    ]
+    let (t_cubed, s_cubed) = (SIXTH * t * t * t, SIXTH * s * s * s);
+    [s_cubed, 4.0 * SIXTH - t * t + 3.0 * t_cubed, 4.0 * SIXTH - s * s + 3.0 * s_cubed, t_cubed]
 }
 
 /// Factor from the coefficients of a B-spline to its values at the nodes, for one mode.
