@@ -31,6 +31,9 @@ use crate::scene::Contact;
 /// Nodes of the image unless said otherwise, about.
 const IMAGE_NODES: usize = 2000;
 
+/// The kernels' split length is at least this share of a pad's radius.
+const SPLIT_IN_PAD: f64 = 1.0;
+
 /// How finely a [`Slab`] is resolved: degrees of the polynomials that current densities are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Resolution {
@@ -302,9 +305,10 @@ fn from_corner(size_m: [f64; 2], at_m: [f64; 2]) -> [f64; 2] {
 }
 
 /// Length at which the kernels are split: short enough that the near part fades within a few thicknesses, long enough that
-/// the tables stay small.
+/// the tables stay small, and that what bends the current on a pad is in the near part, which is resolved to high orders there.
 fn split_m(detector: &Detector, size_m: [f64; 2]) -> f64 {
-    (0.6 * detector.thickness_m()).min(0.05 * size_m[0].max(size_m[1]))
+    let pad_m = detector.electrodes.iter().map(|pad| pad.radius_m).fold(0.0, f64::max);
+    (0.6 * detector.thickness_m()).min(0.05 * size_m[0].max(size_m[1])).max(SPLIT_IN_PAD * pad_m)
 }
 
 fn top_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {

@@ -19,6 +19,9 @@ const ACROSS_END: f64 = 11.0;
 /// Table steps in a thickness: the finest mode that crosses the slab still fits.
 const STEPS_IN_THICKNESS: f64 = 3.6;
 
+/// Most table steps in a pad's radius, for layers that are thin against it: finer modes only matter at the pads' rims.
+const STEPS_IN_PAD: f64 = 10.0;
+
 /// A pad, from the corner (m).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pad {
@@ -134,7 +137,9 @@ impl PadFields {
         across: &Across<impl Fn(f64) -> f64>,
         planner: &mut RealFftPlanner<f64>,
     ) -> Option<Self> {
-        let grid = Grid::new(across.size_m, across.thickness_m / STEPS_IN_THICKNESS);
+        let smallest_m = pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min);
+        let step_m = (across.thickness_m / STEPS_IN_THICKNESS).max(smallest_m / STEPS_IN_PAD);
+        let grid = Grid::new(across.size_m, step_m);
         let modes = across.modes(&grid);
         let size = basis.len();
         let uniform: Vec<_> = (0..pads.len()).map(|pad| pad * size).collect();

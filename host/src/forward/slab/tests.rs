@@ -3,6 +3,7 @@
 use super::*;
 use crate::detector::{Electrode, Outline};
 use crate::forward::readings_v;
+use crate::forward::shell::Shell;
 
 fn square(thickness_m: f64, radius_m: f64) -> Detector {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
@@ -82,6 +83,22 @@ fn sheet_series(sheet_s: f64, a: [f64; 2], b: [f64; 2]) -> f64 {
         sum += count * x * (wave(n) * a[1]).cos() * (wave(n) * b[1]).cos() / k2;
     }
     sum / (0.06 * 0.06 * sheet_s)
+}
+
+#[test]
+fn the_thin_limit_is_the_shell() {
+    let press = [contact(-0.012, 0.007, 0.003, 1e-4)];
+    let errors = [0.001, 0.00025].map(|thickness_m| {
+        let mut detector = square(thickness_m, 0.002);
+        detector.layers[0] = Layer::uniform(thickness_m, 0.3e-3 / thickness_m);
+        let [slab, shell] = [
+            Slab::new(&detector).unwrap().impedance_ohm(&press).unwrap(),
+            Shell::with_nodes(&detector, 8000).unwrap().impedance_ohm(&press).unwrap(),
+        ];
+        apart(&detector, &shell, &slab)
+    });
+    // What the shell lacks is the resistance across, in proportion to the thickness.
+    assert!(errors[1] < 0.02 && errors[1] < 0.5 * errors[0], "{errors:?}");
 }
 
 #[test]
