@@ -6,13 +6,15 @@ use clap::ValueEnum;
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::forward::{ForwardError, ForwardModel, Slab};
+use tactomo::forward::{Auto, ForwardError, ForwardModel, Slab};
 use tactomo::scene::Contact;
 use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
 
 /// Which forward model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Model {
+    /// The one that the detector needs, and says why.
+    Auto,
     /// Thin shell of triangles: any outline, no thickness.
     Shell,
     /// Layers in full depth: rectangles only.
@@ -22,9 +24,16 @@ pub enum Model {
 impl Model {
     /// Makes it for a detector; `nodes` of a shell's mesh, or the default.
     pub fn build(self, detector: &Detector, nodes: Option<usize>) -> Result<Box<dyn ForwardModel>, ForwardError> {
-        let nodes = nodes.unwrap_or_else(|| Shell::default_nodes(detector));
         match self {
-            Self::Shell => Ok(Box::new(Shell::with_nodes(detector, nodes)?)),
+            Self::Auto => {
+                let Auto { model, reason } = Auto::new(detector, nodes)?;
+                eprintln!("model of {}: {}, for {reason}", detector.name, model.name());
+                Ok(model)
+            }
+            Self::Shell => {
+                let nodes = nodes.unwrap_or_else(|| Shell::default_nodes(detector));
+                Ok(Box::new(Shell::with_nodes(detector, nodes)?))
+            }
             Self::Slab => Ok(Box::new(Slab::new(detector)?)),
         }
     }

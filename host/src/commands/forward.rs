@@ -53,7 +53,7 @@ pub struct Args {
     #[arg(long)]
     measured: bool,
     /// Forward model
-    #[arg(long, value_enum, default_value = "shell")]
+    #[arg(long, value_enum, default_value = "auto")]
     model: Model,
     /// Nodes of the shell's mesh, about
     #[arg(long, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
@@ -148,7 +148,7 @@ fn model(args: &Args, detector: &Detector) -> anyhow::Result<Box<dyn ForwardMode
     let detector = &simulate::as_built(detector, &args.scene.fault, args.scene.seed());
     match simulate::uneven_shell(detector, shell_nodes, &args.scene.fault, args.scene.seed())? {
         Some(shell) => {
-            ensure!(args.model == Model::Shell, "only the shell can be uneven in the plane: leave out --model slab");
+            ensure!(args.model != Model::Slab, "only the shell can be uneven in the plane: leave out --model slab");
             Ok(Box::new(shell))
         }
         None => Ok(args.model.build(detector, nodes)?),

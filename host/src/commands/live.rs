@@ -127,7 +127,7 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
 fn jacobian(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Jacobian> {
     match &args.jacobian {
         Some(path) => Ok(Jacobian::load(path, detector)?),
-        None => Ok(Jacobian::of(&*Model::Shell.build(detector, None)?)),
+        None => Ok(Jacobian::of(&*Model::Auto.build(detector, None)?)),
     }
 }
 

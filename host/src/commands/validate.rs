@@ -6,6 +6,7 @@ use anyhow::Context;
 use serde::Serialize;
 use tactomo::case::Case;
 use tactomo::forward::jacobian::Jacobian;
+use tactomo::forward::shell::Shell;
 use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
 use tactomo::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
 
@@ -14,7 +15,7 @@ use super::output;
 
 /// Compares models and solvers with reference cases.
 ///
-/// The forward model computes the readings of each case; solvers, on that model's image mesh (the shell's default one), read
+/// The forward model computes the readings of each case; solvers, on that model's image mesh (of the default size), read
 /// the contacts from the readings that the case gives.
 ///
 /// Examples:
@@ -27,7 +28,7 @@ pub struct Args {
     #[arg(required = true, value_name = "CASE")]
     cases: Vec<PathBuf>,
     /// Forward model
-    #[arg(long, value_enum, default_value = "shell")]
+    #[arg(long, value_enum, default_value = "auto")]
     model: Model,
     /// Nodes of the shell's mesh for the forward comparison, about
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
@@ -68,7 +69,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
     let forward = args.model.build(&case.detector, Some(args.nodes as usize))?;
     let [forward_error, impedance_error] = forward_errors(case, &*forward)?;
-    let jacobian = Jacobian::of(&*args.model.build(&case.detector, None)?);
+    // The slab has no mesh to be finer for the comparison.
+    let jacobian = match forward.name() {
+        "shell" => Jacobian::of(&Shell::new(&case.detector)?),
+        _ => Jacobian::of(&*forward),
+    };
     let trials = Trials { noise_lsb: args.noise_lsb, seed: args.seed, count: args.trials as usize };
     let solvers = solvers(&jacobian, args)
         .iter_mut()

@@ -3,6 +3,7 @@
 //! A [`ForwardModel`] gives the electrode impedance matrix `Z` of a detector for any contacts, and the fields that make
 //! the linear theory. What follows from those is the same for every model and lives here, once.
 
+mod auto;
 mod contact;
 pub mod jacobian;
 mod jacobian_file;
@@ -12,6 +13,7 @@ mod spread;
 
 use nalgebra::DMatrix;
 
+pub use self::auto::Auto;
 pub use self::contact::ContactFields;
 pub use self::jacobian_file::JacobianFileError;
 pub use self::slab::{Resolution, Slab};
