@@ -12,8 +12,8 @@ use crate::live::Live;
 /// One browser at a time: each has several processes, and frame rates are compared.
 static TURN: Mutex<()> = Mutex::const_new(());
 
-/// How far from the contact the image may peak (mm). A linear method on a thin shell images a thick detector, so it is not exact;
-/// the places pressed are three times as far apart.
+/// How far from the contact the image may peak (mm). Between electrodes a linear image peaks at the nearest of them, up to 11 mm
+/// off on a pitch of 15 mm; the places pressed are three times as far apart.
 const PEAK_TOLERANCE_MM: f64 = 10.0;
 
 /// A browser in front of a simulated board.

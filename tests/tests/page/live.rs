@@ -8,9 +8,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use tactomo::detector::Detector;
-use tactomo::forward::ForwardModel;
+use tactomo::forward::Auto;
 use tactomo::forward::jacobian::Jacobian;
-use tactomo::forward::shell::Shell;
 use tactomo::live::board_log::BoardLog;
 use tactomo::live::plan::{Ends, LiveError, Plan, Summary};
 use tactomo::live::server::{self, Finger, Server};
@@ -45,7 +44,7 @@ impl Live {
         let hand = Hand::relative(&detector);
         let scene = Scene::new(scene, &detector, hand, 1);
         let physics = Simulation::new(&detector, scene, &[], 1)?;
-        let model = Shell::new(&detector)?;
+        let model = Auto::new(&detector, None)?.model;
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
         let page = server::Scene {
@@ -59,7 +58,7 @@ impl Live {
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
         let mouse = physics.mouse();
-        let pipeline = Some(run(&detector, physics, Jacobian::of(&model), ends)?);
+        let pipeline = Some(run(&detector, physics, Jacobian::of(&*model), ends)?);
         Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 
