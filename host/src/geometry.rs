@@ -102,6 +102,15 @@ pub fn clip(polygon: &[Point], triangle: [Point; 3]) -> Vec<Point> {
     part
 }
 
+/// Integrals over the part of a triangle inside a `polygon` of the three functions that are linear in
+/// it and one at one corner (m2); `None` if nothing is inside. Exact: such an integral is area times the value at the centroid.
+pub fn shape_integrals_m2(polygon: &[Point], corners: [Point; 3]) -> Option<[f64; 3]> {
+    let (area_m2, centroid) = area_and_centroid(&clip(polygon, corners))?;
+    let [a, b, c] = corners;
+    let twice_m2 = cross(a, b, c);
+    Some([(b, c), (c, a), (a, b)].map(|(from, to)| area_m2 * cross(from, to, centroid) / twice_m2))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

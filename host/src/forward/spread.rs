@@ -54,14 +54,9 @@ impl ImageMesh {
             if are_apart(bounds, corners) {
                 continue;
             }
-            let Some((area_m2, centroid)) = geometry::area_and_centroid(&geometry::clip(polygon, corners)) else {
-                continue;
-            };
-            let [a, b, c] = corners;
-            let twice_m2 = geometry::cross(a, b, c);
-            let shares = [(b, c), (c, a), (a, b)].map(|(from, to)| geometry::cross(from, to, centroid) / twice_m2);
-            for (node, share) in triangle.iter().zip(shares) {
-                image_s[*node as usize] += density_s_per_m2 * area_m2 * share;
+            let Some(integrals_m2) = geometry::shape_integrals_m2(polygon, corners) else { continue };
+            for (node, integral_m2) in triangle.iter().zip(integrals_m2) {
+                image_s[*node as usize] += density_s_per_m2 * integral_m2;
             }
             covers = true;
         }

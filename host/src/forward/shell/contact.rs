@@ -54,13 +54,9 @@ fn add_disc(mesh: &Mesh, contact: &Contact, conductances_s: &mut [f64]) -> bool 
         let (corners, middle, height_m) = mesh.seen_from(triangle, centre);
         let radius2 = contact.radius_m * contact.radius_m - height_m * height_m;
         let disc = geometry::disc(middle, radius2.max(0.0).sqrt(), CORNERS);
-        let Some((area_m2, centroid)) = geometry::area_and_centroid(&geometry::clip(&disc, corners)) else { continue };
-        let [a, b, c] = corners;
-        let twice_m2 = geometry::cross(a, b, c);
-        let shares =
-            [geometry::cross(b, c, centroid), geometry::cross(c, a, centroid), geometry::cross(a, b, centroid)];
-        for (node, share) in triangle.into_iter().zip(shares) {
-            conductances_s[node as usize] += density_s_per_m2 * area_m2 * share / twice_m2;
+        let Some(integrals_m2) = geometry::shape_integrals_m2(&disc, corners) else { continue };
+        for (node, integral_m2) in triangle.into_iter().zip(integrals_m2) {
+            conductances_s[node as usize] += density_s_per_m2 * integral_m2;
         }
         touches = true;
     }
