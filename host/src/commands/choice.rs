@@ -2,13 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::ValueEnum;
 use tactomo::detector::{Detector, Stack};
-use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{Auto, ForwardError, ForwardModel, Slab};
 use tactomo::scene::Contact;
-use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
 
 /// Which forward model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -36,31 +33,6 @@ impl Model {
             }
             Self::Slab => Ok(Box::new(Slab::new(detector)?)),
         }
-    }
-}
-
-/// Which solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum SolverName {
-    /// Linear image of the readings less the force; a contact at each of its peaks
-    Tikhonov,
-    /// Linear image and one contact at its centroid, as in the paper
-    TikhonovPaper,
-}
-
-impl SolverName {
-    /// Makes it for the detector of `jacobian`.
-    pub fn build(self, jacobian: &Jacobian) -> Box<dyn Solver> {
-        let variant = match self {
-            Self::Tikhonov => Variant::Balanced,
-            Self::TikhonovPaper => Variant::Paper,
-        };
-        Box::new(Tikhonov::new(jacobian, Lambda::default(), variant))
-    }
-
-    /// Its name on the command line.
-    pub fn name(self) -> String {
-        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
     }
 }
 

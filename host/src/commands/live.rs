@@ -13,10 +13,11 @@ use tactomo::live::plan::{Ends, MakeSolver, Plan, Summary};
 use tactomo::live::server::{Scene, Server};
 use tactomo::live::session::Wish;
 use tactomo::live::{Request, Snapshot};
+use tactomo::solve::{Method, Problem};
 use tactomo::source::Source;
 use tokio::sync::watch;
 
-use super::choice::{DetectorArgs, Model, SolverName};
+use super::choice::{DetectorArgs, Model};
 use super::source::{self, BoardArgs, Mouse};
 use super::{interrupt, output, recording};
 
@@ -60,9 +61,9 @@ pub struct Args {
 pub struct PictureArgs {
     #[command(flatten)]
     pub detector: DetectorArgs,
-    /// Solver that makes the image
-    #[arg(long, value_enum, default_value = "tikhonov")]
-    pub solver: SolverName,
+    /// Solver that reads the touch
+    #[arg(long, value_name = "NAME", default_value = "tikhonov")]
+    pub solver: Method,
     /// Jacobian from `forward --save-jacobian`, instead of computing it
     #[arg(long, value_name = "FILE")]
     pub jacobian: Option<PathBuf>,
@@ -108,12 +109,12 @@ pub fn run(args: Args) -> anyhow::Result<()> {
 
 /// Serves the page, or only counts, until the end.
 pub fn show(mut show: Show) -> anyhow::Result<()> {
-    let jacobian = jacobian(&show.picture, &show.detector)?;
+    let problem = problem(&show.picture, &show.detector)?;
     let stop = interrupt::flag()?;
     let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
     let (request, requests) = mpsc::sync_channel(REQUESTS);
-    let server = serve(&show, &jacobian, shown, request)?;
-    let plan = plan(&mut show, jacobian)?;
+    let server = serve(&show, &problem, shown, request)?;
+    let plan = plan(&mut show, problem)?;
     // The page may outlive the pipeline, so the snapshots have a sender here too.
     let ends = Ends { snapshots: snapshots.clone(), requests, stop: Arc::clone(&stop) };
     let summary = pipeline::run(&mut *show.source, plan, ends)?;
@@ -124,18 +125,20 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn jacobian(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Jacobian> {
-    match &args.jacobian {
-        Some(path) => Ok(Jacobian::load(path, detector)?),
-        None => Ok(Jacobian::of(&*Model::Auto.build(detector, None)?)),
-    }
+fn problem(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Problem> {
+    let loaded = args.jacobian.as_ref().map(|path| Jacobian::load(path, detector)).transpose()?;
+    let problem = Problem::new(Model::Auto.build(detector, None)?);
+    Ok(match loaded {
+        Some(jacobian) => problem.with_jacobian(jacobian),
+        None => problem,
+    })
 }
 
-fn plan(show: &mut Show, jacobian: Jacobian) -> anyhow::Result<Plan> {
+fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
     let detector = show.detector.clone();
     Ok(Plan {
         wish: show.wish,
-        make_solver: Some(make_solver(show.picture.solver, jacobian)),
+        make_solver: Some(make_solver(show.picture.solver, problem)),
         recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
         board_log: recording::board_log(show.elf.as_deref())?,
         press: show.mouse.take().map(|mouse| mouse.press),
@@ -144,18 +147,14 @@ fn plan(show: &mut Show, jacobian: Jacobian) -> anyhow::Result<Plan> {
     })
 }
 
-/// The fields of the detector do not depend on how it is driven and measured, so one Jacobian serves every board.
-fn make_solver(solver: SolverName, mut jacobian: Jacobian) -> MakeSolver {
-    Box::new(move |detector| {
-        jacobian.detector = detector.clone();
-        Ok(solver.build(&jacobian))
-    })
+fn make_solver(method: Method, problem: Problem) -> MakeSolver {
+    Box::new(move |detector| Ok(method.build(&problem.measured_as(detector))?))
 }
 
 /// The page, unless only the figures are wanted.
 fn serve(
     show: &Show,
-    jacobian: &Jacobian,
+    problem: &Problem,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     requests: mpsc::SyncSender<Request>,
 ) -> anyhow::Result<Option<Server>> {
@@ -164,8 +163,8 @@ fn serve(
     }
     let scene = Scene {
         detector: show.detector.clone(),
-        mesh: jacobian.image_mesh.clone(),
-        solver: show.picture.solver.name(),
+        mesh: problem.jacobian.image_mesh.clone(),
+        solver: show.picture.solver.name().to_owned(),
         source: show.source.name(),
         finger: show.mouse.as_ref().map(|mouse| mouse.finger),
     };

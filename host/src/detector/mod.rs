@@ -88,6 +88,18 @@ pub struct Adc {
     pub noise_lsb: f64,
 }
 
+impl Adc {
+    /// Voltage of one code (V).
+    pub fn lsb_v(&self) -> f64 {
+        self.full_scale_v / 2f64.powi(i32::from(self.bits))
+    }
+
+    /// Standard deviation of a reading by noise and by rounding (V).
+    pub fn deviation_v(&self) -> f64 {
+        (self.noise_lsb.powi(2) + 1.0 / 12.0).sqrt() * self.lsb_v()
+    }
+}
+
 impl Detector {
     /// Thickness of all layers together (m).
     pub fn thickness_m(&self) -> f64 {

@@ -56,6 +56,12 @@ pub trait ForwardModel: Send + Sync {
     /// Places of the image that this model is inverted on.
     fn image_mesh(&self) -> &ImageMesh;
 
+    /// The same model with images of about so many nodes.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if there is no such model of the detector.
+    fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError>;
+
     /// Neumann fields of the bare detector at the image's nodes (ohm): `nodes x electrodes`, `N(e, x)` up to a constant
     /// that is the same for all `e` and `x`; electrodes as floating equipotential pads.
     fn fields_ohm(&self) -> &DMatrix<f64>;

@@ -128,7 +128,7 @@ mod tests {
 
         fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
             let image = vec![readings.largest_v() as f32];
-            Ok(Solution { image_s_per_m2: Some(image), contacts: Vec::new() })
+            Ok(Solution { image_s_per_m2: Some(image), ..Solution::default() })
         }
     }
 

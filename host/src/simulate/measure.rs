@@ -12,7 +12,7 @@ pub fn code(volts: f64, adc: &Adc, noise: &mut Noise) -> u32 {
 
 /// Readings (V) as a converter gives them: each the voltage of its code.
 pub fn measured(readings: &Readings, adc: &Adc, noise: &mut Noise) -> Readings {
-    let lsb_v = adc.full_scale_v / 2f64.powi(i32::from(adc.bits));
+    let lsb_v = adc.lsb_v();
     let measure = |volts: f64| f64::from(code(volts, adc, noise)) * lsb_v;
     let electrodes = readings.electrodes();
     let mut volts = readings.volts().iter().copied().map(measure);

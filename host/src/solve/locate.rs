@@ -30,15 +30,13 @@ impl Locator {
     /// Makes it for a mesh and a detector.
     pub fn new(mesh: &ImageMesh, detector: &Detector) -> Self {
         let area_m2: f64 = mesh.node_areas_m2.iter().sum();
-        let lsb_v = detector.adc.full_scale_v / 2f64.powi(i32::from(detector.adc.bits));
-        let noise_lsb = (detector.adc.noise_lsb.powi(2) + 1.0 / 12.0).sqrt();
         Self {
             places_m: (0..mesh.nodes_m.len()).map(|node| mesh.place_m(node)).collect(),
             surface: detector.surface.clone(),
             triangles: mesh.triangles.clone(),
             areas_m2: mesh.node_areas_m2.clone(),
             apart_m: (area_m2 / detector.electrodes.len() as f64).sqrt(),
-            rest_v: NOISE_DEVIATIONS * noise_lsb * lsb_v,
+            rest_v: NOISE_DEVIATIONS * detector.adc.deviation_v(),
         }
     }
 
@@ -137,7 +135,7 @@ impl Locator {
         let place = |surface: &Surface| surface.nearest(centroid).place_m;
         (sum > 0.0).then(|| {
             let [x_m, y_m, z_m] = self.surface.as_ref().map_or(centroid, place);
-            FoundContact { x_m, y_m, z_m, conductance_s: sum }
+            FoundContact { z_m, ..FoundContact::flat(x_m, y_m, sum) }
         })
     }
 }

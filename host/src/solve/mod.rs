@@ -2,8 +2,12 @@
 
 mod balance;
 mod locate;
+mod method;
+mod problem;
 mod tikhonov;
 
+pub use self::method::Method;
+pub use self::problem::Problem;
 pub use self::tikhonov::{Lambda, Tikhonov, Variant};
 use crate::readings::Readings;
 
@@ -17,6 +21,9 @@ pub trait Solver: Send {
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError>;
+
+    /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.
+    fn reset(&mut self) {}
 }
 
 /// What a solver found.
@@ -27,10 +34,39 @@ pub struct Solution {
     pub image_s_per_m2: Option<Vec<f32>>,
     /// Contacts found.
     pub contacts: Vec<FoundContact>,
+    /// How far the readings are from those of what was found: root mean square, in standard deviations of the noise; if the
+    /// method predicts readings. About 1 where noise is all that is left.
+    pub residual: Option<f64>,
+    /// What to know before this is believed.
+    pub flags: Flags,
+    /// What was chosen and why, by a solver that chooses.
+    pub choice: Option<Choice>,
+}
+
+/// What to know before a solution is believed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Flags {
+    /// Readings are at an end of the converter's range, or contacts conduct so well that more would change nothing.
+    pub saturated: bool,
+    /// The readings are not what the model can give for what was found, by more than noise and the model's own error.
+    pub misfit: bool,
+    /// The method stopped before its end, to keep a limit of time or steps.
+    pub unfinished: bool,
+    /// Electrodes that were left out.
+    pub excluded: Vec<usize>,
+}
+
+/// What a solver chose.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Choice {
+    /// The model of the scene: `nothing`, `2 contacts`, `image`.
+    pub what: String,
+    /// Why, with the figures that decided.
+    pub why: String,
 }
 
 /// One contact found.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct FoundContact {
     /// Centre, x (m).
     pub x_m: f64,
@@ -41,12 +77,37 @@ pub struct FoundContact {
     pub z_m: f64,
     /// Conductance (S).
     pub conductance_s: f64,
+    /// Radius (m), where the readings tell it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_m: Option<f64>,
+    /// Force (N), on a calibrated detector.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<f64>,
+    /// Standard errors, of a method that knows them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Uncertainty>,
+    /// The same number from frame to frame for the same contact, of a method that follows contacts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<u32>,
+}
+
+/// Standard errors of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Uncertainty {
+    /// Of x (m).
+    pub x_m: f64,
+    /// Of y (m).
+    pub y_m: f64,
+    /// Correlation of the errors of x and y, -1 to 1.
+    pub correlation: f64,
+    /// Of the conductance (S).
+    pub conductance_s: f64,
 }
 
 impl FoundContact {
     /// A contact on a flat detector.
-    pub const fn flat(x_m: f64, y_m: f64, conductance_s: f64) -> Self {
-        Self { x_m, y_m, z_m: 0.0, conductance_s }
+    pub fn flat(x_m: f64, y_m: f64, conductance_s: f64) -> Self {
+        Self { x_m, y_m, conductance_s, ..Self::default() }
     }
 }
 

@@ -136,7 +136,7 @@ impl Solver for Tikhonov {
             Variant::Balanced => self.locator.peaks(&image),
             Variant::Paper => self.locator.whole(&image).into_iter().collect(),
         };
-        Ok(Solution { image_s_per_m2: Some(image), contacts })
+        Ok(Solution { image_s_per_m2: Some(image), contacts, ..Solution::default() })
     }
 }
 

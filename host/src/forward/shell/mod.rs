@@ -162,6 +162,10 @@ impl ForwardModel for Shell {
         Ok(ContactFields { impedance_ohm, nodes_ohm })
     }
 
+    fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {
+        Ok(Box::new(Self::with_nodes(&self.detector, nodes)?))
+    }
+
     fn image_mesh(&self) -> &ImageMesh {
         &self.image_mesh
     }

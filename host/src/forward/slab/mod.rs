@@ -254,6 +254,10 @@ impl ForwardModel for Slab {
         self.touched(image_s)?.1.impedance_ohm().ok_or(ForwardError::NoContact)
     }
 
+    fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {
+        Ok(Box::new(self.clone().on_image(nodes)))
+    }
+
     fn image_mesh(&self) -> &ImageMesh {
         &self.image.mesh
     }

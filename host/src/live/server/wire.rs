@@ -229,7 +229,11 @@ mod tests {
             board_time_us: 0,
             status: Default::default(),
             readings: Readings::from_fn(2, |g, e| (2 * g + e) as f64),
-            solution: Solution { image_s_per_m2: Some(vec![2.0, 4.0, -8.0]), contacts: vec![contact] },
+            solution: Solution {
+                image_s_per_m2: Some(vec![2.0, 4.0, -8.0]),
+                contacts: vec![contact],
+                ..Solution::default()
+            },
             rezeroing: false,
         };
         let bytes = update(&frame, 300, &small_scene().detector);

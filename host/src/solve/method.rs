@@ -1,0 +1,58 @@
+//! The solvers by their names.
+
+use super::{Lambda, Problem, Solver, Tikhonov, Variant};
+use crate::forward::ForwardError;
+
+/// A solver, with its parameters as they are best for most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Linear image of the readings less the force; a contact at each of its peaks.
+    Tikhonov,
+    /// Linear image and one contact at its centroid, as in the paper.
+    TikhonovPaper,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Tikhonov, Self::TikhonovPaper];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tikhonov => "tikhonov",
+            Self::TikhonovPaper => "tikhonov-paper",
+        }
+    }
+
+    /// What it is, in a line.
+    pub fn explanation(self) -> &'static str {
+        match self {
+            Self::Tikhonov => "linear image of the readings less the force; a contact at each of its peaks",
+            Self::TikhonovPaper => "linear image and one contact at its centroid, as in the paper",
+        }
+    }
+
+    /// Makes the solver for a problem.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if the model cannot give what the solver needs.
+    pub fn build(self, problem: &Problem) -> Result<Box<dyn Solver>, ForwardError> {
+        let jacobian = &problem.jacobian;
+        Ok(match self {
+            Self::Tikhonov => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Balanced)),
+            Self::TikhonovPaper => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Paper)),
+        })
+    }
+}
+
+impl std::str::FromStr for Method {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let known = || Self::ALL.map(Self::name).join(", ");
+        Self::ALL
+            .into_iter()
+            .find(|method| method.name() == name)
+            .ok_or_else(|| format!("no such solver; there are {}", known()))
+    }
+}

@@ -1,0 +1,40 @@
+//! What solvers are made for.
+
+use std::sync::Arc;
+
+use crate::detector::Detector;
+use crate::forward::ForwardModel;
+use crate::forward::jacobian::Jacobian;
+
+/// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
+#[derive(Clone)]
+pub struct Problem {
+    /// The model. Its fields do not depend on drive voltage and converter, so it serves any board.
+    pub model: Arc<dyn ForwardModel>,
+    /// The linear theory for the detector as measured, and the mesh that solvers' images are on.
+    pub jacobian: Arc<Jacobian>,
+}
+
+impl Problem {
+    /// The problem of a model, measured as its detector says.
+    pub fn new(model: impl Into<Arc<dyn ForwardModel>>) -> Self {
+        let model = model.into();
+        let jacobian = Arc::new(Jacobian::of(&*model));
+        Self { model, jacobian }
+    }
+
+    /// The same with another linear theory, on a mesh of its own.
+    pub fn with_jacobian(self, jacobian: Jacobian) -> Self {
+        Self { jacobian: Arc::new(jacobian), ..self }
+    }
+
+    /// The same with drive voltage, multiplexer and converter of `detector`.
+    pub fn measured_as(&self, detector: &Detector) -> Self {
+        self.clone().with_jacobian(Jacobian { detector: detector.clone(), ..(*self.jacobian).clone() })
+    }
+
+    /// The detector as measured.
+    pub fn detector(&self) -> &Detector {
+        &self.jacobian.detector
+    }
+}
