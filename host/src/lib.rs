@@ -11,6 +11,7 @@ pub mod forward;
 mod geometry;
 pub mod hertz;
 pub mod live;
+pub mod metrics;
 pub mod readings;
 pub mod record;
 pub mod scene;

@@ -7,8 +7,8 @@ use serde::Serialize;
 use crate::case::Case;
 use crate::detector::Adc;
 use crate::forward::{ForwardError, ForwardModel, readings_v};
+use crate::metrics::position_error_m;
 use crate::readings::Readings;
-use crate::scene::Contact;
 use crate::simulate::{Noise, measured};
 use crate::solve::{FoundContact, SolveError, Solver};
 
@@ -103,48 +103,5 @@ fn trial_readings(case: &Case, trials: &Trials, noise: &mut Noise) -> Readings {
     match trials.noise_lsb {
         None => case.readings.clone(),
         Some(noise_lsb) => measured(&case.readings, &Adc { noise_lsb, ..case.detector.adc }, noise),
-    }
-}
-
-/// Mean distance (m) of true contacts from the found ones that are matched to them, each to one at most; `None` without a
-/// match. Nearest pairs are matched first.
-pub fn position_error_m(truth: &[Contact], found: &[FoundContact]) -> Option<f64> {
-    let mut pairs: Vec<_> = (0..truth.len())
-        .flat_map(|i| (0..found.len()).map(move |j| (i, j)))
-        .map(|(i, j)| ((truth[i].x_m - found[j].x_m).hypot(truth[i].y_m - found[j].y_m), i, j))
-        .collect();
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut true_free, mut found_free) = (vec![true; truth.len()], vec![true; found.len()]);
-    let mut matched_m = Vec::new();
-    for (distance_m, i, j) in pairs {
-        if true_free[i] && found_free[j] {
-            (true_free[i], found_free[j]) = (false, false);
-            matched_m.push(distance_m);
-        }
-    }
-    (!matched_m.is_empty()).then(|| matched_m.iter().sum::<f64>() / matched_m.len() as f64)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn truth(x_m: f64) -> Contact {
-        Contact::flat(x_m, 0.0, 0.001, 1e-3)
-    }
-
-    fn found(x_m: f64) -> FoundContact {
-        FoundContact::flat(x_m, 0.0, 1e-3)
-    }
-
-    #[test]
-    fn nearest_pairs_are_matched_first_and_once() {
-        let error_m = position_error_m(&[truth(0.0), truth(0.010)], &[found(0.009), found(0.002), found(0.5)]);
-        assert!(error_m.is_some_and(|error_m| (error_m - 0.0015).abs() < 1e-12), "{error_m:?}");
-        assert_eq!(
-            position_error_m(&[truth(0.0), truth(0.010)], &[found(0.009)]).map(|m| (m * 1e3).round()),
-            Some(1.0)
-        );
-        assert_eq!(position_error_m(&[truth(0.0)], &[]), None);
     }
 }
