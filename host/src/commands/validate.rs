@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use anyhow::Context;
 use serde::Serialize;
 use tactomo::case::Case;
-use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
+use tactomo::forward::{ForwardError, ForwardModel};
+use tactomo::solve::{Lambda, Method, Problem, Solver, Tikhonov, Variant};
 use tactomo::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
 
 use super::choice::Model;
@@ -42,6 +42,9 @@ pub struct Args {
     /// How often each solver is tried, with new noise each time
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     trials: u32,
+    /// Solver to try; all, if none is given
+    #[arg(long, value_name = "NAME")]
+    solver: Vec<Method>,
     /// Tikhonov's lambda, as a share of the largest singular value
     #[arg(long, value_name = "SHARE", value_parser = positive)]
     lambda: Option<f64>,
@@ -70,18 +73,19 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
     let forward = args.model.build(&case.detector, Some(args.nodes as usize))?;
     let [forward_error, impedance_error] = forward_errors(case, &*forward)?;
     // The slab has no mesh to be finer for the comparison.
-    let jacobian = match forward.name() {
-        "shell" => Jacobian::of(&Shell::new(&case.detector)?),
-        _ => Jacobian::of(&*forward),
+    let model: Box<dyn ForwardModel> = match forward.name() {
+        "shell" => Box::new(Shell::new(&case.detector)?),
+        _ => forward,
     };
     let trials = Trials { noise_lsb: args.noise_lsb, seed: args.seed, count: args.trials as usize };
-    let solvers = solvers(&jacobian, args)
-        .iter_mut()
-        .map(|solver| try_solver(case, &mut **solver, &trials))
-        .collect::<Result<Vec<_>, _>>()?;
+    let problem = Problem::new(model);
+    let solvers = Method::ALL.iter().filter(|m| args.solver.is_empty() || args.solver.contains(m));
+    let solvers = solvers
+        .map(|method| Ok(try_solver(case, &mut *build(*method, &problem, args.lambda)?, &trials)?))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     Ok(CaseReport {
         case: case.detector.name.clone(),
-        model: forward.name().to_owned(),
+        model: problem.model.name().to_owned(),
         forward_error,
         impedance_error,
         reference_error: case.mesh_error_v / case.readings.largest_v(),
@@ -89,11 +93,13 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
     })
 }
 
-fn solvers(jacobian: &Jacobian, args: &Args) -> Vec<Box<dyn Solver>> {
-    let lambda = args.lambda.map_or_else(Lambda::default, Lambda::Relative);
-    [Variant::Balanced, Variant::Paper]
-        .map(|variant| Box::new(Tikhonov::new(jacobian, lambda, variant)) as Box<dyn Solver>)
-        .into()
+fn build(method: Method, problem: &Problem, lambda: Option<f64>) -> Result<Box<dyn Solver>, ForwardError> {
+    let tikhonov = |lambda, variant| Ok(Box::new(Tikhonov::new(&problem.jacobian, lambda, variant)) as Box<dyn Solver>);
+    match (method, lambda.map(Lambda::Relative)) {
+        (Method::Tikhonov, Some(lambda)) => tikhonov(lambda, Variant::Balanced),
+        (Method::TikhonovPaper, Some(lambda)) => tikhonov(lambda, Variant::Paper),
+        _ => method.build(problem),
+    }
 }
 
 fn noise(text: &str) -> Result<f64, String> {

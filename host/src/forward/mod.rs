@@ -9,6 +9,7 @@ pub mod jacobian;
 mod jacobian_file;
 pub mod shell;
 mod slab;
+pub mod spots;
 mod spread;
 
 use nalgebra::DMatrix;
@@ -17,6 +18,7 @@ pub use self::auto::Auto;
 pub use self::contact::ContactFields;
 pub use self::jacobian_file::JacobianFileError;
 pub use self::slab::{Resolution, Slab};
+use self::spots::SpotFields;
 pub use self::spread::touched_impedance_ohm;
 use crate::detector::Detector;
 use crate::readings::Readings;
@@ -61,6 +63,9 @@ pub trait ForwardModel: Send + Sync {
     /// # Errors
     /// [`ForwardError::Detector`] if there is no such model of the detector.
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError>;
+
+    /// Fields of spots that stand for contacts of a radius (m); none if the model has no such thing.
+    fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>>;
 
     /// Neumann fields of the bare detector at the image's nodes (ohm): `nodes x electrodes`, `N(e, x)` up to a constant
     /// that is the same for all `e` and `x`; electrodes as floating equipotential pads.

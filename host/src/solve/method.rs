@@ -1,6 +1,6 @@
 //! The solvers by their names.
 
-use super::{Lambda, Problem, Solver, Tikhonov, Variant};
+use super::{ContactSettings, Contacts, Lambda, Problem, Solver, Tikhonov, Variant};
 use crate::forward::ForwardError;
 
 /// A solver, with its parameters as they are best for most.
@@ -10,17 +10,20 @@ pub enum Method {
     Tikhonov,
     /// Linear image and one contact at its centroid, as in the paper.
     TikhonovPaper,
+    /// A few contacts fitted to the full contact physics.
+    Contacts,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Tikhonov, Self::TikhonovPaper];
+    pub const ALL: [Self; 3] = [Self::Tikhonov, Self::TikhonovPaper, Self::Contacts];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Tikhonov => "tikhonov",
             Self::TikhonovPaper => "tikhonov-paper",
+            Self::Contacts => "contacts",
         }
     }
 
@@ -29,6 +32,7 @@ impl Method {
         match self {
             Self::Tikhonov => "linear image of the readings less the force; a contact at each of its peaks",
             Self::TikhonovPaper => "linear image and one contact at its centroid, as in the paper",
+            Self::Contacts => "up to five contacts fitted to the full contact physics, as many as the readings ask for",
         }
     }
 
@@ -41,6 +45,7 @@ impl Method {
         Ok(match self {
             Self::Tikhonov => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Balanced)),
             Self::TikhonovPaper => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Paper)),
+            Self::Contacts => Box::new(Contacts::new(problem, ContactSettings::of(problem))?),
         })
     }
 }

@@ -1,11 +1,14 @@
 //! From readings back to touch: one file a method, one trait.
 
 mod balance;
+mod contacts;
 mod locate;
 mod method;
 mod problem;
 mod tikhonov;
+mod track;
 
+pub use self::contacts::{ContactSettings, Contacts};
 pub use self::method::Method;
 pub use self::problem::Problem;
 pub use self::tikhonov::{Lambda, Tikhonov, Variant};

@@ -37,4 +37,10 @@ impl Problem {
     pub fn detector(&self) -> &Detector {
         &self.jacobian.detector
     }
+
+    /// Mean distance of electrodes (m): the side of a square that each has for itself.
+    pub fn spacing_m(&self) -> f64 {
+        let area_m2: f64 = self.jacobian.image_mesh.node_areas_m2.iter().sum();
+        (area_m2 / self.detector().electrodes.len().max(1) as f64).sqrt()
+    }
 }

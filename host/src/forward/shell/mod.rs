@@ -166,6 +166,10 @@ impl ForwardModel for Shell {
         Ok(Box::new(Self::with_nodes(&self.detector, nodes)?))
     }
 
+    fn spots(&self, _radius_m: f64) -> Option<Box<dyn crate::forward::spots::SpotFields>> {
+        None
+    }
+
     fn image_mesh(&self) -> &ImageMesh {
         &self.image_mesh
     }

@@ -11,6 +11,7 @@ mod layers;
 mod pads;
 mod quadrature;
 mod spline;
+mod spots;
 #[cfg(test)]
 mod tests;
 
@@ -23,7 +24,9 @@ use self::disc::{DiscBasis, MAX_DEGREE};
 use self::image::{CellFields, ImageGrid};
 use self::kernel::{Surface, SurfaceKernel};
 use self::pads::{Across, Pad, PadFields, between, pad_impedances};
+use self::spots::SlabSpots;
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
+use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Layer};
 use crate::scene::Contact;
@@ -256,6 +259,10 @@ impl ForwardModel for Slab {
 
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {
         Ok(Box::new(self.clone().on_image(nodes)))
+    }
+
+    fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
+        Some(Box::new(SlabSpots::new(self.clone(), radius_m)))
     }
 
     fn image_mesh(&self) -> &ImageMesh {

@@ -1,0 +1,53 @@
+//! Fields of small contacts that may be anywhere, for solvers that look for a few of them.
+//!
+//! A spot carries one current, so a scene of `K` of them is a system of `K` unknowns, with derivatives by the places. It is
+//! near to a small contact of any conductance: what the current's spread over the contact adds is a few per cent, and
+//! smooth in the place, so that a solver can take it from [`ForwardModel::impedance_ohm`](super::ForwardModel::impedance_ohm)
+//! as a correction.
+
+use crate::space::Place;
+
+/// Fields of spots on a detector.
+pub trait SpotFields: Send + Sync {
+    /// Radius of the contact that a spot stands for (m).
+    fn radius_m(&self) -> f64;
+
+    /// The spot at the place of the detector that is nearest.
+    fn spot(&self, place_m: Place) -> Spot;
+
+    /// Field of one spot at another, and its derivatives.
+    fn between(&self, a: &Spot, b: &Spot) -> Between;
+
+    /// Field between two spots alone (ohm).
+    fn between_ohm(&self, a: &Spot, b: &Spot) -> f64 {
+        self.between(a, b).ohm
+    }
+}
+
+/// A place where current may enter, with its fields in the gauge of the model's.
+#[derive(Clone, Debug, Default)]
+pub struct Spot {
+    /// Where it is (m).
+    pub place_m: Place,
+    /// Unit vectors of the two directions that derivatives are by, along the surface.
+    pub along: [Place; 2],
+    /// Field of each electrode here (ohm).
+    pub electrodes_ohm: Vec<f64>,
+    /// Its derivatives along the two directions (ohm/m).
+    pub slopes_ohm_per_m: [Vec<f64>; 2],
+    /// Field of its own current, mean over the contact (ohm).
+    pub own_ohm: f64,
+    /// What the model needs besides: values, and derivatives along both directions.
+    pub(super) inner: [Vec<f32>; 3],
+}
+
+/// Field of a spot at another.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Between {
+    /// The field (ohm).
+    pub ohm: f64,
+    /// Its derivatives by the first spot's place (ohm/m).
+    pub by_first: [f64; 2],
+    /// Its derivatives by the second spot's place (ohm/m).
+    pub by_second: [f64; 2],
+}

@@ -1,0 +1,183 @@
+//! How many contacts, and where each fit starts.
+
+use super::discs::{DiscFit, DiscFitter};
+use super::fit::{Fit, Fitter, Target};
+use super::network::FitSpot;
+use super::{Contacts, Explanation};
+use crate::forward::readings_v;
+use crate::scene::Contact;
+
+/// Steps of a fit from a scan, and of one from the frame before.
+const COLD_STEPS: usize = 12;
+const WARM_STEPS: usize = 4;
+/// Steps after the readings were corrected, and how often they are.
+const CORRECTED_STEPS: usize = 3;
+const CORRECTIONS: usize = 3;
+/// Steps of discs from spots, and from the frame before.
+const COLD_DISC_STEPS: usize = 15;
+const WARM_DISC_STEPS: usize = 3;
+/// Places that a fit starts from.
+const STARTS: usize = 3;
+/// By how much each parameter has to lower the sum of squares: the Bayesian information criterion for 256 readings asks for
+/// 5.5; this leaves room for the many places that are looked at.
+const WORTH: f64 = 13.0;
+/// The same for there being any contact at all.
+const WORTH_FIRST: f64 = 60.0;
+/// The sum of squares may be this times that of the frame before.
+const WORSE: f64 = 1.3;
+/// A contact is lost when the logarithm of its resistance is known no better than this.
+const WEAK: f64 = 0.2;
+
+impl Contacts {
+    /// What explains a frame, from what explained the one before.
+    pub(super) fn search(&self, last: Option<Explanation>, target: &Target) -> Option<Explanation> {
+        match last.and_then(|last| self.follow(last, target)) {
+            Some(found) => Some(found),
+            None => self.search_anew(target),
+        }
+    }
+
+    /// The same contacts in the next frame; `None` if they do not explain it.
+    fn follow(&self, last: Explanation, target: &Target) -> Option<Explanation> {
+        let enough = (WORSE * last.cost()).max(target.count() as f64);
+        let found = match last {
+            Explanation::Spots(fit, correction_v) => {
+                let moved = self.fitter().fit(fit.spots.clone(), &target.less(&correction_v), WARM_STEPS)?;
+                if is_near(&fit.spots, &moved.spots, self.settings.radius_m) {
+                    Explanation::Spots(moved, correction_v)
+                } else {
+                    self.correct(moved, target, 1)
+                }
+            }
+            Explanation::Discs(fit) => {
+                Explanation::Discs(self.disc_fitter().fit(fit.contacts, target, WARM_DISC_STEPS)?)
+            }
+        };
+        (found.cost() <= enough && !is_weak(&found)).then_some(found)
+    }
+
+    fn search_anew(&self, target: &Target) -> Option<Explanation> {
+        let fitter = self.fitter();
+        let apart_m = self.spacing_m / 3.0;
+        let first = self.scan.first(&fitter, target, STARTS, apart_m);
+        if first.first().is_none_or(|best| best.gain < WORTH_FIRST) {
+            return None;
+        }
+        let starts = first.into_iter().map(|candidate| vec![candidate.spot]);
+        let mut spots = self.correct(lowest(&fitter, starts, target)?, target, CORRECTIONS);
+        let mut best = spots.clone();
+        loop {
+            if explains(&best, target) {
+                break;
+            }
+            let Explanation::Spots(fit, correction_v) = &spots else { break };
+            if let Some(discs) = self.discs(fit, target).map(Explanation::Discs)
+                && score(&discs) < score(&best)
+            {
+                best = discs;
+            }
+            if explains(&best, target) || fit.spots.len() >= self.settings.most {
+                break;
+            }
+            let corrected = target.less(correction_v);
+            let further = self.scan.further(&fitter, fit, &corrected, STARTS, apart_m);
+            let starts = further.into_iter().map(|candidate| {
+                let mut all = fit.spots.clone();
+                all.push(candidate.spot);
+                all
+            });
+            let Some(more) = lowest(&fitter, starts, &corrected) else { break };
+            spots = self.correct(more, target, CORRECTIONS);
+            if score(&spots) >= score(&best) {
+                break;
+            }
+            best = spots.clone();
+        }
+        Some(best)
+    }
+
+    /// Repeats a fit with the forward model's readings, so many times or until they settle.
+    fn correct(&self, mut fit: Fit, target: &Target, times: usize) -> Explanation {
+        let mut used_v = vec![0.0; fit.volts.len()];
+        for _ in 0..times {
+            let Some(correction_v) = self.correction_v(&fit) else { break };
+            let changed_v = correction_v.iter().zip(&used_v).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let corrected = target.less(&correction_v);
+            let Some(next) = self.fitter().fit(fit.spots.clone(), &corrected, CORRECTED_STEPS) else { break };
+            (fit, used_v) = (next, correction_v);
+            if changed_v < 0.3 * self.noise_v {
+                break;
+            }
+        }
+        Explanation::Spots(fit, used_v)
+    }
+
+    /// Readings of the forward model over those of the spots (V).
+    fn correction_v(&self, fit: &Fit) -> Option<Vec<f64>> {
+        let contacts: Vec<_> = fit.spots.iter().map(|spot| self.contact(spot)).collect();
+        let impedance_ohm = self.problem.model.impedance_ohm(&contacts).ok()?;
+        let exact = readings_v(&impedance_ohm, self.problem.detector());
+        Some(exact.volts().iter().zip(&fit.volts).map(|(exact, spots)| exact - spots).collect())
+    }
+
+    /// Discs with radii of their own, from where spots are.
+    fn discs(&self, fit: &Fit, target: &Target) -> Option<DiscFit> {
+        let start = fit.spots.iter().map(|spot| {
+            let contact = self.contact(spot);
+            // A contact that is better than perfect is a wider one.
+            let wider = (spot.spot.own_ohm / spot.ohm).max(1.0);
+            let conductance_s = contact.conductance_s.min(10.0 * self.sheet_s);
+            Contact { radius_m: wider * contact.radius_m, conductance_s, ..contact }
+        });
+        self.disc_fitter().fit(start.collect(), target, COLD_DISC_STEPS)
+    }
+
+    fn fitter(&self) -> Fitter<'_> {
+        Fitter {
+            network: &self.network,
+            fields: &*self.fields,
+            longest_m: self.spacing_m / 3.0,
+            sheet_ohm: 1.0 / self.sheet_s,
+        }
+    }
+
+    fn disc_fitter(&self) -> DiscFitter<'_> {
+        let detector = self.problem.detector();
+        DiscFitter {
+            model: &*self.problem.model,
+            usual_radius_m: self.settings.radius_m,
+            sheet_s: self.sheet_s,
+            half_m: detector.outline.size_m().map(|size_m| size_m / 2.0),
+            detector,
+        }
+    }
+}
+
+/// The fit of lowest cost over some starts.
+fn lowest(fitter: &Fitter<'_>, starts: impl Iterator<Item = Vec<FitSpot>>, target: &Target) -> Option<Fit> {
+    starts.filter_map(|start| fitter.fit(start, target, COLD_STEPS)).min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// Sum of squares with a price on each parameter: what is lower is believed.
+fn score(found: &Explanation) -> f64 {
+    found.cost() + WORTH * found.parameters() as f64
+}
+
+/// Whether no more than noise and model error is left.
+fn explains(found: &Explanation, target: &Target) -> bool {
+    found.cost() < target.count() as f64
+}
+
+/// Whether spots have moved so little that the forward model's correction still holds.
+fn is_near(before: &[FitSpot], after: &[FitSpot], radius_m: f64) -> bool {
+    before.iter().zip(after).all(|(before, after)| {
+        let moved_m = crate::space::distance(before.spot.place_m, after.spot.place_m);
+        moved_m < 0.02 * radius_m && (before.ohm / after.ohm).ln().abs() < 0.005
+    })
+}
+
+/// Whether a contact is so weak that it may not be there.
+fn is_weak(found: &Explanation) -> bool {
+    let Explanation::Spots(Fit { covariance: Some(covariance), spots, .. }, _) = found else { return false };
+    (0..spots.len()).any(|k| covariance[(3 * k + 2, 3 * k + 2)] > WEAK * WEAK)
+}
