@@ -61,7 +61,7 @@ fn main() -> Result<()> {
 
 /// Lambda as a share of the largest singular value.
 fn relative(solver: &Tikhonov) -> f64 {
-    solver.lambda() / solver.singular_values()[0]
+    solver.lambda().unwrap_or(f64::NAN) / solver.singular_values()[0]
 }
 
 /// Nine contacts of one firmness, as a slab finer than any that is inverted reads them.

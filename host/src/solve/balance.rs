@@ -1,7 +1,5 @@
 //! Readings as if a firm contact were a light one.
 
-use crate::readings::Readings;
-
 /// Smallest `1 - V / Vcc` that a ratio is taken of: below, a reading is at the drive voltage to its noise.
 const SMALLEST: f64 = 1e-3;
 
@@ -25,13 +23,6 @@ pub fn balance(volts: &mut [f64], electrodes: usize, drive_v: f64) {
     }
 }
 
-/// [`balance`] of readings.
-pub fn balanced(readings: &Readings, drive_v: f64) -> Vec<f64> {
-    let mut volts = readings.volts().to_vec();
-    balance(&mut volts, readings.electrodes(), drive_v);
-    volts
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,7 +40,8 @@ mod tests {
             let node = 600;
             let image_s = shell.image_mesh().image_with([(node, conductance_s)]);
             let impedance_ohm = shell.image_fields(&image_s)?.impedance_ohm;
-            let volts = balanced(&readings_v(&impedance_ohm, &detector), detector.drive_v);
+            let mut volts = readings_v(&impedance_ohm, &detector).volts().to_vec();
+            balance(&mut volts, 16, detector.drive_v);
             let loads = (0..16).map(|g| (impedance_ohm[(g, g)] + detector.on_resistance_ohm).ln());
             let effective_s = (-loads.sum::<f64>() / 16.0).exp();
             for (i, volts) in volts.iter().enumerate() {

@@ -2,16 +2,22 @@
 
 mod balance;
 mod contacts;
+mod lambda;
+mod linear;
 mod locate;
 mod method;
 mod problem;
+#[cfg(test)]
+mod samples;
 mod tikhonov;
 mod track;
 
 pub use self::contacts::{ContactSettings, Contacts};
+pub use self::lambda::Lambda;
+use self::lambda::Spectrum;
 pub use self::method::Method;
 pub use self::problem::Problem;
-pub use self::tikhonov::{Lambda, Tikhonov, Variant};
+pub use self::tikhonov::{Tikhonov, Variant};
 use crate::readings::Readings;
 
 /// A method that reads touch from the readings of a frame.

@@ -1,38 +1,14 @@
-//! Linear images by Tikhonov's method, through the few dimensions that readings have.
+//! Tikhonov's linear image.
 //!
-//! The image is contact conductance per area `c`. It minimises `|dV - J A c|^2 + lambda^2 int c^2 dA`, with the nodes' areas
-//! `A` on the diagonal: both terms are integrals, so the image does not depend on the mesh. With `u = A^(1/2) c` and
-//! `B = J A^(1/2)` this is `u = (B'B + lambda^2)^-1 B' dV`. `J` factors into `256 x 16` (differences of readings) times
-//! `16 x nodes` (fields, and one row for the total conductance), so two thin QR and the SVD of a `16 x 16` matrix give the
-//! whole SVD of `B`. Exact, for any lambda; a frame then costs 256 x 16 and 16 x nodes products rather than 256 x nodes.
+//! It minimises `|dV - J A c|^2 + lambda^2 int c^2 dA`, with the nodes' areas `A` on the diagonal: both terms are integrals, so
+//! the image does not depend on the mesh.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::balance;
+use super::lambda::{Rule, kept};
+use super::linear::{Decomposition, Force, LinearImage};
 use super::locate::Locator;
-use super::{Solution, SolveError, Solver};
+use super::{Lambda, Solution, SolveError, Solver};
 use crate::forward::jacobian::Jacobian;
 use crate::readings::Readings;
-
-/// How strongly an image is held down.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Lambda {
-    /// A share of the largest singular value: the same meaning for every detector, mesh and drive voltage.
-    Relative(f64),
-    /// In V m / S, the unit of the singular values of `B`.
-    Absolute(f64),
-    /// `lambda^2` under the paper's scaling: the conductance of each node (S) as unknown, on a mesh of as many nodes, of equal
-    /// areas, with a sheet of 1 S and a drive of 2 V; so in V2/S2.
-    Paper(f64),
-}
-
-impl Default for Lambda {
-    /// Smallest position error over light and firm contacts with 1.5 LSB of noise, on shell and slab together:
-    /// `examples/lambda.rs`.
-    fn default() -> Self {
-        Self::Relative(0.03)
-    }
-}
 
 /// What is done before and after the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,55 +23,49 @@ pub enum Variant {
 
 /// Tikhonov's linear image.
 pub struct Tikhonov {
-    electrodes: usize,
-    drive_v: f64,
+    name: &'static str,
     variant: Variant,
-    /// Singular values of `B` (V m / S), falling.
-    singular_values: Vec<f64>,
-    lambda: f64,
-    /// `rank x electrodes^2`, row by row: from readings to coefficients.
-    to_coefficients: Vec<f32>,
-    /// `nodes x rank`, column by column: from coefficients to the image (S/m2).
-    to_image: Vec<f32>,
+    linear: LinearImage,
+    rule: Rule,
     locator: Locator,
 }
 
 impl Tikhonov {
     /// Makes it ready for a detector.
     ///
-    /// Takes about a millisecond for 2000 nodes.
+    /// Takes about two milliseconds for 2000 nodes.
     pub fn new(jacobian: &Jacobian, lambda: Lambda, variant: Variant) -> Self {
-        let Decomposition { left, singular_values, right } = Decomposition::of(jacobian);
-        let lambda = lambda.absolute(jacobian, singular_values[0]);
-        let mut to_coefficients = Vec::with_capacity(left.len());
-        for (column, &value) in left.column_iter().zip(&singular_values) {
-            let filter = value / (value * value + lambda * lambda);
-            to_coefficients.extend(column.iter().map(|&u| (filter * u) as f32));
-        }
-        let mut to_image = right;
-        for (mut row, &area_m2) in to_image.row_iter_mut().zip(&jacobian.image_mesh.node_areas_m2) {
-            row /= area_m2.sqrt();
-        }
-        Self {
-            electrodes: jacobian.electrodes(),
-            drive_v: jacobian.detector.drive_v,
-            variant,
-            singular_values,
-            lambda,
-            to_coefficients,
-            to_image: to_image.iter().map(|&value| value as f32).collect(),
-            locator: Locator::new(&jacobian.image_mesh, &jacobian.detector),
-        }
+        let name = match variant {
+            Variant::Balanced => "tikhonov",
+            Variant::Paper => "tikhonov-paper",
+        };
+        Self::with_prior(name, jacobian, Decomposition::of(jacobian), lambda, variant)
+    }
+
+    /// The same with another prior than the integral of the image's square.
+    pub(super) fn with_prior(
+        name: &'static str,
+        jacobian: &Jacobian,
+        decomposition: Decomposition,
+        lambda: Lambda,
+        variant: Variant,
+    ) -> Self {
+        let linear = LinearImage::new(jacobian, decomposition);
+        let rule = lambda.rule(jacobian, linear.singular_values()[0]);
+        Self { name, variant, linear, rule, locator: Locator::new(&jacobian.image_mesh, &jacobian.detector) }
     }
 
     /// Singular values of the Jacobian weighted by the roots of the nodes' areas (V m / S), falling.
     pub fn singular_values(&self) -> &[f64] {
-        &self.singular_values
+        self.linear.singular_values()
     }
 
-    /// Lambda (V m / S).
-    pub fn lambda(&self) -> f64 {
-        self.lambda
+    /// Lambda (V m / S); `None` if each frame chooses its own.
+    pub fn lambda(&self) -> Option<f64> {
+        match self.rule {
+            Rule::Given(lambda) => Some(lambda),
+            _ => None,
+        }
     }
 
     /// The image alone: contact conductance per area at each node (S/m2). A linear image can be below zero.
@@ -103,125 +73,42 @@ impl Tikhonov {
     /// # Errors
     /// [`SolveError`] if the readings are of another number of electrodes or not finite.
     pub fn image_s_per_m2(&self, readings: &Readings) -> Result<Vec<f32>, SolveError> {
-        readings.check(self.electrodes)?;
-        let volts: Vec<f32> = match self.variant {
-            Variant::Balanced => balance::balanced(readings, self.drive_v).iter().map(|&volts| volts as f32).collect(),
-            Variant::Paper => readings.volts().iter().map(|&volts| volts as f32).collect(),
+        Ok(self.imaged(readings)?.image_s_per_m2.unwrap_or_default())
+    }
+
+    /// The image and what is known of it, without contacts.
+    fn imaged(&self, readings: &Readings) -> Result<Solution, SolveError> {
+        let force = match self.variant {
+            Variant::Balanced => Force::Balanced,
+            Variant::Paper => Force::AsRead,
         };
-        let nodes = self.to_image.len() / self.singular_values.len();
-        let mut image = vec![0.0f32; nodes];
-        let columns = self.to_image.chunks_exact(nodes);
-        for (row, column) in self.to_coefficients.chunks_exact(volts.len()).zip(columns) {
-            let coefficient = dot(row, &volts);
-            for (value, part) in image.iter_mut().zip(column) {
-                *value += coefficient * part;
-            }
-        }
-        Ok(image)
+        let spectrum = self.linear.spectrum(readings, force)?;
+        let lambda = self.rule.lambda(&spectrum);
+        let (shares, left_v2) = spectrum.filtered(|value| kept(value, lambda));
+        Ok(Solution {
+            image_s_per_m2: Some(self.linear.image_s_per_m2(&shares)),
+            residual: Some(spectrum.deviations(left_v2)),
+            choice: self.rule.choice(&spectrum, lambda, left_v2),
+            ..Solution::default()
+        })
     }
 }
 
 impl Solver for Tikhonov {
     fn name(&self) -> &'static str {
-        match self.variant {
-            Variant::Balanced => "tikhonov",
-            Variant::Paper => "tikhonov-paper",
-        }
+        self.name
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        let image = self.image_s_per_m2(readings)?;
+        let solution = self.imaged(readings)?;
+        let image = solution.image_s_per_m2.as_deref().unwrap_or_default();
         let contacts = match self.variant {
             _ if self.locator.is_rest(readings) => Vec::new(),
-            Variant::Balanced => self.locator.peaks(&image),
-            Variant::Paper => self.locator.whole(&image).into_iter().collect(),
+            Variant::Balanced => self.locator.peaks(image),
+            Variant::Paper => self.locator.whole(image).into_iter().collect(),
         };
-        Ok(Solution { image_s_per_m2: Some(image), contacts, ..Solution::default() })
+        Ok(Solution { contacts, ..solution })
     }
-}
-
-impl Lambda {
-    /// In V m / S.
-    fn absolute(self, jacobian: &Jacobian, largest: f64) -> f64 {
-        match self {
-            Self::Relative(share) => share * largest,
-            Self::Absolute(lambda) => lambda,
-            Self::Paper(squared) => squared.sqrt() * paper_unit(jacobian),
-        }
-    }
-}
-
-/// What 1 V/S of the paper is here (V m / S): its unknowns are conductances `a c` of nodes with equal areas `a`, so its
-/// singular values are ours over `sqrt(a)`; and they are proportional to the drive over the sheet conductance.
-fn paper_unit(jacobian: &Jacobian) -> f64 {
-    let areas_m2 = &jacobian.image_mesh.node_areas_m2;
-    let mean_m2 = areas_m2.iter().sum::<f64>() / areas_m2.len() as f64;
-    mean_m2.sqrt() * (jacobian.detector.drive_v / 2.0) / jacobian.detector.sheet_conductance_s()
-}
-
-/// Singular value decomposition of `B = J A^(1/2)`.
-struct Decomposition {
-    /// `electrodes^2 x rank`.
-    left: DMatrix<f64>,
-    singular_values: Vec<f64>,
-    /// `nodes x rank`.
-    right: DMatrix<f64>,
-}
-
-impl Decomposition {
-    fn of(jacobian: &Jacobian) -> Self {
-        let readings = readings_of_sources(jacobian).qr();
-        let sources = sources_of_nodes(jacobian).qr();
-        let mut core = (readings.r() * sources.r().transpose()).svd(true, true);
-        core.sort_by_singular_values();
-        let identity = || DMatrix::zeros(0, 0);
-        let (u, v_t) = (core.u.unwrap_or_else(identity), core.v_t.unwrap_or_else(identity));
-        Self {
-            left: readings.q() * u,
-            singular_values: core.singular_values.iter().copied().collect(),
-            right: sources.q() * v_t.transpose(),
-        }
-    }
-}
-
-/// `electrodes^2 x electrodes`: readings (V) for each source. Source `i` is the field at electrode `i` less that at the last,
-/// summed over all conductance (A/V of contact times ohm); the last source is the total conductance (S).
-fn readings_of_sources(jacobian: &Jacobian) -> DMatrix<f64> {
-    let electrodes = jacobian.electrodes();
-    let drive_v = jacobian.detector.drive_v;
-    DMatrix::from_fn(electrodes * electrodes, electrodes, |row, source| {
-        let (g, e) = (row / electrodes, row % electrodes);
-        if source == electrodes - 1 {
-            drive_v * jacobian.total_ohm(g, e)
-        } else {
-            drive_v * (f64::from(u8::from(source == e)) - f64::from(u8::from(source == g)))
-        }
-    })
-}
-
-/// `nodes x electrodes`: what each node's `u` gives to each source, with the root of its area.
-fn sources_of_nodes(jacobian: &Jacobian) -> DMatrix<f64> {
-    let electrodes = jacobian.electrodes();
-    let fields = &jacobian.fields_ohm;
-    let roots_m =
-        DVector::from_iterator(fields.nrows(), jacobian.image_mesh.node_areas_m2.iter().map(|area_m2| area_m2.sqrt()));
-    DMatrix::from_fn(fields.nrows(), electrodes, |node, source| {
-        let ohm = if source == electrodes - 1 { 1.0 } else { fields[(node, source)] - fields[(node, electrodes - 1)] };
-        ohm * roots_m[node]
-    })
-}
-
-/// Sum of products, in eight lanes so that the processor's vector units can take it.
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let (a_lanes, a_rest) = a.as_chunks::<8>();
-    let (b_lanes, b_rest) = b.as_chunks::<8>();
-    let mut sums = [0.0f32; 8];
-    for (a, b) in a_lanes.iter().zip(b_lanes) {
-        for lane in 0..8 {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum::<f32>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f32>()
 }
 
 #[cfg(test)]
@@ -229,27 +116,8 @@ mod tests {
     use super::*;
     use crate::detector::{Detector, Layer};
     use crate::forward::shell::Shell;
-    use crate::forward::{ForwardModel, readings_v};
-    use crate::scene::Contact;
-
-    fn jacobian(nodes: usize) -> Jacobian {
-        match Detector::preset("square-60").map(|detector| Shell::with_nodes(&detector, nodes)) {
-            Some(Ok(shell)) => Jacobian::of(&shell),
-            _ => panic!("no shell"),
-        }
-    }
-
-    /// Readings of a contact by a finer mesh than the one that is inverted.
-    fn readings(contact: Contact) -> Readings {
-        let model = Detector::preset("square-60").and_then(|detector| Shell::with_nodes(&detector, 5000).ok());
-        let Some(model) = model else { panic!("no shell") };
-        match model.impedance_ohm(&[contact]) {
-            Ok(impedance_ohm) => readings_v(&impedance_ohm, model.detector()),
-            Err(error) => panic!("{error}"),
-        }
-    }
-
-    const CONTACT: Contact = Contact::flat(0.009, -0.006, 0.003, 2e-4);
+    use crate::solve::samples::{CONTACT, jacobian, readings};
+    use nalgebra::{DMatrix, DVector};
 
     #[test]
     fn equals_the_dense_solution() {
@@ -263,7 +131,7 @@ mod tests {
             );
             let weighted = jacobian.dense() * DMatrix::from_diagonal(&roots_m);
             let normal = weighted.transpose() * &weighted
-                + DMatrix::identity(roots_m.len(), roots_m.len()) * tikhonov.lambda().powi(2);
+                + DMatrix::identity(roots_m.len(), roots_m.len()) * tikhonov.lambda().unwrap_or(f64::NAN).powi(2);
             let right = weighted.transpose() * DVector::from_column_slice(readings.volts());
             let dense =
                 normal.cholesky().map(|factor| factor.solve(&right).component_div(&roots_m)).unwrap_or_default();
