@@ -1,4 +1,4 @@
-//! Which lambda suits Tikhonov's image: `cargo run --release --package tactomo --example lambda`.
+//! Which lambda suits linear images: `cargo run --release --package tactomo --example lambda`.
 //!
 //! A slab of `square-60` in full depth is touched at nine places, lightly and firmly, and measured with 12 bits and 1.5 LSB of
 //! noise. Each lambda then images the readings on two models: mean distance of the strongest contact found from the true one
@@ -12,7 +12,7 @@ use tactomo::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo::readings::Readings;
 use tactomo::scene::Contact;
 use tactomo::simulate::{Noise, measured};
-use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
+use tactomo::solve::{Lambda, Solver, Tikhonov, Tsvd, Variant};
 
 /// Conductance of a contact in sheet conductances: within the linear theory, and far beyond.
 const FIRMNESS: [f64; 2] = [0.02, 1.0];
@@ -23,6 +23,16 @@ const FRAMES: usize = 20;
 const RADIUS_M: f64 = 0.002;
 /// Lambda as shares of the largest singular value: decades, and more closely where the best one lies.
 const SHARES: [f64; 13] = [1e-4, 1e-3, 3e-3, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.07, 0.1, 1.0];
+
+/// Linear methods.
+const FAMILIES: [&str; 4] = ["tikhonov", "tsvd", "noser", "laplace"];
+/// Lambda chosen anew for each frame.
+const CHOSEN: [(&str, Lambda); 4] = [
+    ("discrepancy", Lambda::Discrepancy(1.0)),
+    ("discrepancy, 3 times the noise", Lambda::Discrepancy(3.0)),
+    ("L-curve", Lambda::LCurve),
+    ("GCV", Lambda::Gcv),
+];
 
 /// A contact and frames of its readings.
 struct Scene {
@@ -47,15 +57,40 @@ fn main() -> Result<()> {
     for model in models {
         let jacobian = Jacobian::of(&*model);
         let paper = Tikhonov::new(&jacobian, Lambda::Paper(5000.0), Variant::Paper);
-        println!("\n{}; the paper's lambda^2 = 5000 is {:.2e} here", model.name(), relative(&paper));
-        println!("| lambda | light, mm | found | firm, mm | found | mean, mm |\n|---|---|---|---|---|---|");
-        for share in SHARES {
-            let mut solver = Tikhonov::new(&jacobian, Lambda::Relative(share), Variant::Balanced);
-            let (light, firm) = (score(&mut solver, &light)?, score(&mut solver, &firm)?);
-            let mean_mm = (light.mean_mm() + firm.mean_mm()) / 2.0;
-            println!("| {share} | {} | {} | {mean_mm:.1} |", light.columns(), firm.columns());
+        println!("\n# {}; the paper's lambda^2 = 5000 is {:.2e} here", model.name(), relative(&paper));
+        for name in FAMILIES {
+            println!(
+                "\n{name}\n\n| lambda | light, mm | found | firm, mm | found | mean, mm |\n|---|---|---|---|---|---|"
+            );
+            for share in SHARES {
+                row(&format!("{share}"), solver(name, &jacobian, Lambda::Relative(share))?, &light, &firm)?;
+            }
+        }
+        println!(
+            "\ntikhonov, lambda chosen from the readings\n\n| lambda | light, mm | found | firm, mm | found | mean, mm |\n|---|---|---|---|---|---|"
+        );
+        for (name, lambda) in CHOSEN {
+            row(name, solver("tikhonov", &jacobian, lambda)?, &light, &firm)?;
         }
     }
+    Ok(())
+}
+
+/// A linear method by its name.
+fn solver(name: &str, jacobian: &Jacobian, lambda: Lambda) -> Result<Box<dyn Solver>> {
+    Ok(match (name, lambda) {
+        ("tsvd", Lambda::Relative(share)) => Box::new(Tsvd::new(jacobian, share)),
+        ("noser", lambda) => Box::new(Tikhonov::noser(jacobian, lambda)),
+        ("laplace", lambda) => Box::new(Tikhonov::laplace_with(jacobian, lambda)?),
+        (_, lambda) => Box::new(Tikhonov::new(jacobian, lambda, Variant::Balanced)),
+    })
+}
+
+/// Prints what a solver makes of light and of firm contacts.
+fn row(name: &str, mut solver: Box<dyn Solver>, light: &[Scene], firm: &[Scene]) -> Result<()> {
+    let (light, firm) = (score(&mut *solver, light)?, score(&mut *solver, firm)?);
+    let mean_mm = (light.mean_mm() + firm.mean_mm()) / 2.0;
+    println!("| {name} | {} | {} | {mean_mm:.1} |", light.columns(), firm.columns());
     Ok(())
 }
 
@@ -80,7 +115,7 @@ fn scenes(detector: &Detector, firmness: f64) -> Result<Vec<Scene>> {
         .collect()
 }
 
-fn score(solver: &mut Tikhonov, scenes: &[Scene]) -> Result<Score> {
+fn score(solver: &mut dyn Solver, scenes: &[Scene]) -> Result<Score> {
     let mut score = Score::default();
     for (truth, readings) in scenes.iter().flat_map(|scene| scene.frames.iter().map(|frame| (&scene.truth, frame))) {
         let contacts = solver.solve(readings)?.contacts;

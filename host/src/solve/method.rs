@@ -1,6 +1,6 @@
 //! The solvers by their names.
 
-use super::{ContactSettings, Contacts, Lambda, Problem, Solver, Tikhonov, Variant};
+use super::{ContactSettings, Contacts, Lambda, Problem, Solver, Tikhonov, Tsvd, Variant};
 use crate::forward::ForwardError;
 
 /// A solver, with its parameters as they are best for most.
@@ -12,11 +12,18 @@ pub enum Method {
     TikhonovPaper,
     /// A few contacts fitted to the full contact physics.
     Contacts,
+    /// Linear image from the first singular images alone.
+    Tsvd,
+    /// Linear image that makes up for sensitivity.
+    Noser,
+    /// Smooth linear image.
+    Laplace,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Tikhonov, Self::TikhonovPaper, Self::Contacts];
+    pub const ALL: [Self; 6] =
+        [Self::Tikhonov, Self::TikhonovPaper, Self::Tsvd, Self::Noser, Self::Laplace, Self::Contacts];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
@@ -24,6 +31,9 @@ impl Method {
             Self::Tikhonov => "tikhonov",
             Self::TikhonovPaper => "tikhonov-paper",
             Self::Contacts => "contacts",
+            Self::Tsvd => "tsvd",
+            Self::Noser => "noser",
+            Self::Laplace => "laplace",
         }
     }
 
@@ -33,6 +43,9 @@ impl Method {
             Self::Tikhonov => "linear image of the readings less the force; a contact at each of its peaks",
             Self::TikhonovPaper => "linear image and one contact at its centroid, as in the paper",
             Self::Contacts => "up to five contacts fitted to the full contact physics, as many as the readings ask for",
+            Self::Tsvd => "linear image from the first singular images alone",
+            Self::Noser => "linear image that makes up for places that readings hear less",
+            Self::Laplace => "linear image with a prior of smoothness",
         }
     }
 
@@ -46,6 +59,9 @@ impl Method {
             Self::Tikhonov => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Balanced)),
             Self::TikhonovPaper => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Paper)),
             Self::Contacts => Box::new(Contacts::new(problem, ContactSettings::of(problem))?),
+            Self::Tsvd => Box::new(Tsvd::new(jacobian, Tsvd::SHARE)),
+            Self::Noser => Box::new(Tikhonov::noser(jacobian, Lambda::default())),
+            Self::Laplace => Box::new(Tikhonov::laplace(jacobian)?),
         })
     }
 }

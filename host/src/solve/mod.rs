@@ -3,14 +3,17 @@
 mod balance;
 mod contacts;
 mod lambda;
+mod laplace;
 mod linear;
 mod locate;
 mod method;
+mod noser;
 mod problem;
 #[cfg(test)]
 mod samples;
 mod tikhonov;
 mod track;
+mod tsvd;
 
 pub use self::contacts::{ContactSettings, Contacts};
 pub use self::lambda::Lambda;
@@ -18,6 +21,7 @@ use self::lambda::Spectrum;
 pub use self::method::Method;
 pub use self::problem::Problem;
 pub use self::tikhonov::{Tikhonov, Variant};
+pub use self::tsvd::Tsvd;
 use crate::readings::Readings;
 
 /// A method that reads touch from the readings of a frame.
