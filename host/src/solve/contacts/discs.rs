@@ -5,7 +5,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::fit::{Target, dot};
+use super::target::{Target, dot};
 use crate::detector::Detector;
 use crate::forward::{ForwardModel, readings_v};
 use crate::scene::Contact;

@@ -4,6 +4,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::network::{FitSpot, Network, Solved};
+use super::target::{Target, dot};
 use crate::forward::spots::SpotFields;
 use crate::space;
 
@@ -19,15 +20,6 @@ const LONGEST_LOG: f64 = 1.5;
 const LEAST_OHM: f64 = 0.6;
 /// And at most, over the sheet's resistance: such a contact is nothing.
 const MOST_SHEETS: f64 = 1e6;
-
-/// What a fit is made to: readings, weighted.
-#[derive(Clone, Debug)]
-pub(super) struct Target {
-    /// Readings, less what spots cannot say (V).
-    pub volts: Vec<f64>,
-    /// One over the standard deviation of each (1/V); zero leaves a reading out.
-    pub weights: Vec<f64>,
-}
 
 /// Contacts that fit best.
 #[derive(Clone, Debug)]
@@ -139,7 +131,7 @@ impl Fitter<'_> {
     fn equations(&self, fit: &Fit, target: &Target) -> (DMatrix<f64>, DVector<f64>) {
         let mut slopes = self.network.slopes(&fit.spots, &fit.solved);
         for slope in &mut slopes {
-            slope.iter_mut().zip(&target.weights).for_each(|(slope, weight)| *slope *= weight);
+            target.whiten(slope);
         }
         let residuals = target.residuals(&fit.volts);
         let size = slopes.len();
@@ -154,54 +146,10 @@ impl Fitter<'_> {
     }
 }
 
-impl Target {
-    /// Weighted differences of the readings from predicted ones.
-    pub fn residuals(&self, volts: &[f64]) -> Vec<f64> {
-        self.volts
-            .iter()
-            .zip(volts)
-            .zip(&self.weights)
-            .map(|((ours, theirs), weight)| (ours - theirs) * weight)
-            .collect()
-    }
-
-    fn cost(&self, volts: &[f64]) -> f64 {
-        let residuals = self.residuals(volts);
-        dot(&residuals, &residuals)
-    }
-
-    /// The same without some volts in each reading.
-    pub fn less(&self, volts: &[f64]) -> Self {
-        let volts = self.volts.iter().zip(volts).map(|(ours, less)| ours - less).collect();
-        Self { volts, weights: self.weights.clone() }
-    }
-
-    /// Standard deviation of a reading that counts (V).
-    pub fn deviation_v(&self) -> f64 {
-        1.0 / self.weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
-    }
-
-    /// Readings that count.
-    pub fn count(&self) -> usize {
-        self.weights.iter().filter(|weight| **weight > 0.0).count()
-    }
-}
-
 fn covariance(normal: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     // Places in metres and logarithms are of different size: scaled, the matrix is well conditioned.
     let scale: Vec<_> = (0..normal.nrows()).map(|i| 1.0 / normal[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| normal[(i, j)] * scale[i] * scale[j]);
     let inverse = Cholesky::new(scaled)?.inverse();
     Some(DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j]))
-}
-
-/// Scalar product, in four sums for the processor to do at once.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a_lanes, a_rest) = a.as_chunks::<4>();
-    let (b_lanes, b_rest) = b.as_chunks::<4>();
-    let mut sums = [0.0; 4];
-    for (a, b) in a_lanes.iter().zip(b_lanes) {
-        (0..4).for_each(|lane| sums[lane] += a[lane] * b[lane]);
-    }
-    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }

@@ -11,13 +11,15 @@ mod fit;
 mod network;
 mod scan;
 mod search;
+mod target;
 
 use nalgebra::DMatrix;
 
 use self::discs::DiscFit;
-use self::fit::{Fit, Target};
+use self::fit::Fit;
 use self::network::{FitSpot, Network};
 use self::scan::Scan;
+use self::target::{Errors, Target};
 use super::track::Tracker;
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Solver, Uncertainty};
 use crate::forward::ForwardError;
@@ -43,12 +45,14 @@ pub struct ContactSettings {
     pub radius_m: f64,
     /// Error of the forward model, as a share of the largest reading.
     pub model_error: f64,
+    /// Error of the model's, or the builder's, impedance of a pad, as a share of it.
+    pub pad_error: f64,
 }
 
 impl ContactSettings {
     /// For fingers on a detector: contacts of a sixth of the mean distance of its electrodes.
     pub fn of(problem: &Problem) -> Self {
-        Self { most: 5, radius_m: problem.spacing_m() / 6.0, model_error: 0.003 }
+        Self { most: 5, radius_m: problem.spacing_m() / 6.0, model_error: 0.0005, pad_error: 0.03 }
     }
 }
 
@@ -59,11 +63,9 @@ pub struct Contacts {
     network: Network,
     fields: Box<dyn SpotFields>,
     scan: Scan,
-    noise_v: f64,
     sheet_s: f64,
     spacing_m: f64,
-    /// Readings from here on are saturated (V).
-    full_v: f64,
+    errors: Errors,
     last: Option<Explanation>,
     tracker: Tracker,
 }
@@ -118,21 +120,20 @@ impl Contacts {
             network: Network::new(detector, problem.model.electrode_fields_ohm()),
             scan: Scan::new(coarse.image_mesh(), &*fields),
             fields,
-            noise_v: detector.adc.deviation_v(),
+            errors: Errors {
+                noise_v: detector.adc.deviation_v(),
+                model: settings.model_error,
+                pad: settings.pad_error,
+                drive_v: detector.drive_v,
+                full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
+            },
             sheet_s: detector.sheet_conductance_s(),
             spacing_m: problem.spacing_m(),
-            full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
             problem: problem.clone(),
             settings,
             last: None,
             tracker: Tracker::new(problem.spacing_m()),
         })
-    }
-
-    fn target(&self, readings: &Readings) -> Target {
-        let deviation_v = self.noise_v.hypot(self.settings.model_error * readings.largest_v());
-        let weight = |volts: &f64| if *volts < self.full_v { 1.0 / deviation_v } else { 0.0 };
-        Target { volts: readings.volts().to_vec(), weights: readings.volts().iter().map(weight).collect() }
     }
 
     fn contact(&self, spot: &FitSpot) -> Contact {
@@ -164,12 +165,12 @@ impl Contacts {
         let left = found.cost() / freedom as f64;
         let is_perfect = |contact: &FoundContact| contact.conductance_s > 0.9 * self.most_s();
         let flags = Flags {
-            saturated: target.weights.contains(&0.0) || contacts.iter().any(is_perfect),
+            saturated: target.is_saturated() || contacts.iter().any(is_perfect),
             misfit: left > MISFIT,
             unfinished: !found.is_settled(),
             excluded: Vec::new(),
         };
-        let residual = Some(left.sqrt() * target.deviation_v() / self.noise_v);
+        let residual = Some(left.sqrt() * target.deviation_v() / self.errors.noise_v);
         Solution { contacts, residual, flags, ..Solution::default() }
     }
 
@@ -205,7 +206,7 @@ impl Solver for Contacts {
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         readings.check(self.network.electrodes())?;
-        let target = self.target(readings);
+        let target = Target::new(readings, &self.errors);
         let last = self.last.take();
         self.last = self.search(last, &target);
         let mut solution = self.last.as_ref().map_or_else(Solution::default, |found| self.solution(found, &target));

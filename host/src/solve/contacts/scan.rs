@@ -1,7 +1,8 @@
 //! Where another contact would explain most of what is left: a look at every place.
 
-use super::fit::{Fit, Fitter, Target, dot};
+use super::fit::{Fit, Fitter};
 use super::network::FitSpot;
+use super::target::{Target, dot};
 use crate::forward::ImageMesh;
 use crate::forward::spots::{Spot, SpotFields};
 use crate::solve::balance;
@@ -36,6 +37,7 @@ impl Scan {
         let n = network.electrodes();
         let mut volts = target.volts.clone();
         balance::balance(&mut volts, n, network.drive_v);
+        target.whiten(&mut volts);
         let pads = &network.electrodes_ohm;
         let constant: Vec<_> =
             (0..n * n).map(|i| pads[(i / n, i / n)] - pads[(i % n, i / n)] + network.on_resistance_ohm).collect();
@@ -45,7 +47,7 @@ impl Scan {
             for (i, value) in pattern.iter_mut().enumerate() {
                 *value = network.drive_v * (field[i % n] - field[i / n] + constant[i]);
             }
-            let (conductance_s, gain) = amplitude(&pattern, &volts, &target.weights)?;
+            let (conductance_s, gain) = amplitude(&mut pattern, &volts, target)?;
             let mean_load =
                 (0..n).map(|g| pads[(g, g)] - 2.0 * field[g] + network.on_resistance_ohm).sum::<f64>() / n as f64;
             let ohm = (1.0 / conductance_s - mean_load).max(spot.own_ohm);
@@ -64,13 +66,12 @@ impl Scan {
         apart_m: f64,
     ) -> Vec<Candidate> {
         let n = fitter.network.electrodes();
-        let mut left: Vec<_> = target.volts.iter().zip(&fit.volts).map(|(ours, theirs)| ours - theirs).collect();
-        left.iter_mut().for_each(|volts| *volts = if volts.is_finite() { *volts } else { 0.0 });
+        let left = target.residuals(&fit.volts);
         let mut pattern = vec![0.0; n * n];
         let all = self.spots.iter().filter_map(|spot| {
             let potentials_ohm = fitter.network.potentials_ohm(&fit.solved, &fit.spots, spot, fitter.fields);
             fitter.network.volts_per_s(&fit.solved, &potentials_ohm, &mut pattern);
-            let (conductance_s, gain) = amplitude(&pattern, &left, &target.weights)?;
+            let (conductance_s, gain) = amplitude(&mut pattern, &left, target)?;
             let ohm = (1.0 / conductance_s).max(spot.own_ohm);
             Some(Candidate { spot: fitter.spot(spot.clone(), ohm), gain })
         });
@@ -78,10 +79,11 @@ impl Scan {
     }
 }
 
-/// How much of a pattern is in some volts, and by how much that lowers their sum of squares; `None` if not above zero.
-fn amplitude(pattern: &[f64], volts: &[f64], weights: &[f64]) -> Option<(f64, f64)> {
-    let weighted: Vec<_> = pattern.iter().zip(weights).map(|(value, weight)| value * weight * weight).collect();
-    let (along, square) = (dot(&weighted, volts), dot(&weighted, pattern));
+/// How much of a pattern (V/S) is in some whitened volts, and by how much that lowers their sum of squares; `None` if not
+/// above zero.
+fn amplitude(pattern: &mut [f64], volts: &[f64], target: &Target) -> Option<(f64, f64)> {
+    target.whiten(pattern);
+    let (along, square) = (dot(pattern, volts), dot(pattern, pattern));
     (along > 0.0 && square > 0.0).then(|| (along / square, along * along / square))
 }
 

@@ -1,11 +1,13 @@
 //! How many contacts, and where each fit starts.
 
 use super::discs::{DiscFit, DiscFitter};
-use super::fit::{Fit, Fitter, Target};
+use super::fit::{Fit, Fitter};
 use super::network::FitSpot;
+use super::target::Target;
 use super::{Contacts, Explanation};
 use crate::forward::readings_v;
 use crate::scene::Contact;
+use crate::space::{self, Place};
 
 /// Steps of a fit from a scan, and of one from the frame before.
 const COLD_STEPS: usize = 12;
@@ -23,6 +25,8 @@ const STARTS: usize = 3;
 const WORTH: f64 = 13.0;
 /// The same for there being any contact at all.
 const WORTH_FIRST: f64 = 60.0;
+/// Half the distance of two contacts that one is split into, in mean distances of electrodes.
+const SPLIT: f64 = 0.25;
 /// The sum of squares may be this times that of the frame before.
 const WORSE: f64 = 1.3;
 /// A contact is lost when the logarithm of its resistance is known no better than this.
@@ -64,36 +68,53 @@ impl Contacts {
             return None;
         }
         let starts = first.into_iter().map(|candidate| vec![candidate.spot]);
-        let mut spots = self.correct(lowest(&fitter, starts, target)?, target, CORRECTIONS);
-        let mut best = spots.clone();
-        loop {
+        let mut fit = lowest(&fitter, starts, target)?;
+        let mut best = self.correct(fit.clone(), target, CORRECTIONS);
+        if let (Explanation::Spots(spots, _), false) = (&best, explains(&best, target)) {
+            let discs = self.discs(spots, target).map(Explanation::Discs);
+            best = better(best, discs);
+        }
+        for _ in 1..self.settings.most {
             if explains(&best, target) {
                 break;
             }
-            let Explanation::Spots(fit, correction_v) = &spots else { break };
-            if let Some(discs) = self.discs(fit, target).map(Explanation::Discs)
-                && score(&discs) < score(&best)
-            {
-                best = discs;
-            }
-            if explains(&best, target) || fit.spots.len() >= self.settings.most {
-                break;
-            }
-            let corrected = target.less(correction_v);
-            let further = self.scan.further(&fitter, fit, &corrected, STARTS, apart_m);
-            let starts = further.into_iter().map(|candidate| {
-                let mut all = fit.spots.clone();
-                all.push(candidate.spot);
-                all
-            });
-            let Some(more) = lowest(&fitter, starts, &corrected) else { break };
-            spots = self.correct(more, target, CORRECTIONS);
-            if score(&spots) >= score(&best) {
-                break;
-            }
-            best = spots.clone();
+            let Some(spots) = self.one_more(&fitter, &fit, target, apart_m) else { break };
+            let Explanation::Spots(next, _) = &spots else { break };
+            fit = next.clone();
+            best = better(best, Some(spots));
         }
         Some(best)
+    }
+
+    /// One more contact than a fit has.
+    fn one_more(&self, fitter: &Fitter<'_>, fit: &Fit, target: &Target, apart_m: f64) -> Option<Explanation> {
+        let correction_v = self.correction_v(fit)?;
+        let corrected = target.less(&correction_v);
+        let further = self.scan.further(fitter, fit, &corrected, STARTS, apart_m);
+        let added = further.into_iter().map(|candidate| {
+            let mut all = fit.spots.clone();
+            all.push(candidate.spot);
+            all
+        });
+        let split = (0..fit.spots.len()).flat_map(|k| self.split(fitter, &fit.spots, k));
+        Some(self.correct(lowest(fitter, added.chain(split), &corrected)?, target, CORRECTIONS))
+    }
+
+    /// Starts with one contact taken for two beside each other, in some directions.
+    fn split(&self, fitter: &Fitter<'_>, spots: &[FitSpot], k: usize) -> Vec<Vec<FitSpot>> {
+        let half_m = SPLIT * self.spacing_m;
+        let directions = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]];
+        let start = |[a, b]: [f64; 2]| {
+            let spot = &spots[k];
+            let way = space::along(scaled(a, spot.spot.along[0]), b, spot.spot.along[1]);
+            let halves = [-half_m, half_m].map(|way_m| {
+                let place_m = space::along(spot.spot.place_m, way_m, way);
+                fitter.spot(self.fields.spot(place_m), 2.0 * spot.ohm)
+            });
+            let others = spots.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, spot)| spot.clone());
+            others.chain(halves).collect()
+        };
+        directions.map(start).into()
     }
 
     /// Repeats a fit with the forward model's readings, so many times or until they settle.
@@ -105,7 +126,7 @@ impl Contacts {
             let corrected = target.less(&correction_v);
             let Some(next) = self.fitter().fit(fit.spots.clone(), &corrected, CORRECTED_STEPS) else { break };
             (fit, used_v) = (next, correction_v);
-            if changed_v < 0.3 * self.noise_v {
+            if changed_v < 0.3 * self.errors.noise_v {
                 break;
             }
         }
@@ -163,6 +184,18 @@ fn score(found: &Explanation) -> f64 {
     found.cost() + WORTH * found.parameters() as f64
 }
 
+/// Which of two is believed.
+fn better(best: Explanation, other: Option<Explanation>) -> Explanation {
+    match other {
+        Some(other) if score(&other) < score(&best) => other,
+        _ => best,
+    }
+}
+
+fn scaled(share: f64, a: Place) -> Place {
+    space::along([0.0; 3], share, a)
+}
+
 /// Whether no more than noise and model error is left.
 fn explains(found: &Explanation, target: &Target) -> bool {
     found.cost() < target.count() as f64
@@ -171,7 +204,7 @@ fn explains(found: &Explanation, target: &Target) -> bool {
 /// Whether spots have moved so little that the forward model's correction still holds.
 fn is_near(before: &[FitSpot], after: &[FitSpot], radius_m: f64) -> bool {
     before.iter().zip(after).all(|(before, after)| {
-        let moved_m = crate::space::distance(before.spot.place_m, after.spot.place_m);
+        let moved_m = space::distance(before.spot.place_m, after.spot.place_m);
         moved_m < 0.02 * radius_m && (before.ohm / after.ohm).ln().abs() < 0.005
     })
 }
