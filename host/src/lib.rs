@@ -19,4 +19,5 @@ pub mod simulate;
 pub mod solve;
 pub mod source;
 mod space;
+pub mod study;
 pub mod validate;

@@ -3,11 +3,15 @@
 //! Machine output goes to stdout, everything else to stderr. Exit codes: 0 done, 1 failed, 2 used wrongly.
 
 mod commands;
+mod heap;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
+
+#[global_allocator]
+static ALLOCATOR: heap::Counting = heap::Counting;
 
 fn main() -> ExitCode {
     let cli = commands::Cli::parse();

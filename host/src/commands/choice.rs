@@ -6,6 +6,7 @@ use tactomo::detector::{Detector, Stack};
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{Auto, ForwardError, ForwardModel, Slab};
 use tactomo::scene::Contact;
+use tactomo::solve::Method;
 
 /// Which forward model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -56,6 +57,29 @@ pub enum Chosen {
     File(PathBuf),
 }
 
+impl Chosen {
+    /// The detector.
+    fn get(&self) -> anyhow::Result<Detector> {
+        match self {
+            Self::Preset(detector) => Ok((**detector).clone()),
+            Self::File(path) => Ok(Detector::read(path)?),
+        }
+    }
+}
+
+/// The detectors that were chosen, or the presets of such names.
+pub fn detectors(chosen: &[Chosen], otherwise: &[&str]) -> anyhow::Result<Vec<Detector>> {
+    match chosen {
+        [] => Ok(otherwise.iter().filter_map(|name| Detector::preset(name)).collect()),
+        _ => chosen.iter().map(Chosen::get).collect(),
+    }
+}
+
+/// The solvers that were chosen, or all.
+pub fn methods(chosen: &[Method]) -> Vec<Method> {
+    if chosen.is_empty() { Method::ALL.to_vec() } else { chosen.to_vec() }
+}
+
 impl DetectorArgs {
     /// What the detector is made of, if that is known: presets are of sample A, a file does not tell how soft its layers are.
     pub fn foams(&self) -> Option<Stack> {
@@ -67,10 +91,7 @@ impl DetectorArgs {
 
     /// The detector, in the material that is asked for.
     pub fn get(&self) -> anyhow::Result<Detector> {
-        let detector = match &self.detector {
-            Chosen::Preset(detector) => (**detector).clone(),
-            Chosen::File(path) => Detector::read(path)?,
-        };
+        let detector = self.detector.get()?;
         match &self.material {
             Some(stack) => detector.in_material(stack).map_err(anyhow::Error::msg),
             None => Ok(detector),

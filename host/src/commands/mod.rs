@@ -12,6 +12,7 @@ mod recording;
 mod replay;
 mod scene;
 mod source;
+mod tradeoff;
 mod validate;
 
 use clap::{Parser, Subcommand};
@@ -33,6 +34,7 @@ enum Command {
     Detector(detector::Args),
     Forward(Box<forward::Args>),
     Validate(validate::Args),
+    Tradeoff(tradeoff::Args),
 }
 
 /// Runs the command that was asked for.
@@ -45,5 +47,6 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Detector(args) => detector::run(args),
         Command::Forward(args) => forward::run(&args),
         Command::Validate(args) => validate::run(&args),
+        Command::Tradeoff(args) => tradeoff::run(&args),
     }
 }

@@ -49,6 +49,14 @@ impl Matching {
         mean(self.pairs.iter().map(|pair| pair.distance_m))
     }
 
+    /// Mean error (m) with what was missed or invented counted as `reach_m` each: the OSPA distance of order 1 (Schuhmacher, Vo and
+    /// Vo, 2008, eq. 3), with this greedy matching for the optimal one. Zero where nothing is there and nothing was found.
+    pub fn ospa_m(&self, reach_m: f64) -> f64 {
+        let unmatched = self.missed.len().max(self.invented.len());
+        let sum_m: f64 = self.pairs.iter().map(|pair| pair.distance_m).sum();
+        (sum_m + reach_m * unmatched as f64) / (self.pairs.len() + unmatched).max(1) as f64
+    }
+
     /// Mean of `|found / true - 1|` of the pairs' conductances; `None` without a pair.
     ///
     /// # Panics
@@ -112,7 +120,20 @@ mod tests {
     #[test]
     fn what_is_out_of_reach_is_missed_and_invented() {
         let matching = Matching::within(0.004, &[truth(0.0), truth(0.010)], &[found(0.003), found(0.015)]);
+        // One pair 3 mm apart, and one contact at 4 mm.
+        assert!((matching.ospa_m(0.004) - 0.0035).abs() < 1e-12);
         assert_eq!((matching.pairs.len(), matching.missed, matching.invented), (1, vec![1], vec![1]));
+    }
+
+    #[test]
+    fn the_distance_of_sets_counts_what_is_missed_and_invented() {
+        let error_mm =
+            |truth: &[Contact], found: &[FoundContact]| Matching::within(0.010, truth, found).ospa_m(0.010) * 1e3;
+        assert_eq!(error_mm(&[], &[]), 0.0);
+        assert_eq!(error_mm(&[truth(0.0)], &[]), 10.0);
+        assert_eq!(error_mm(&[], &[found(0.0), found(0.1)]), 10.0);
+        // Two found for one that is there, 2 mm beside it: (2 + 10) / 2.
+        assert!((error_mm(&[truth(0.0)], &[found(0.002), found(0.004)]) - 6.0).abs() < 1e-12);
     }
 
     #[test]

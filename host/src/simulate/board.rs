@@ -43,7 +43,10 @@ pub struct Simulation {
 
 /// The best model of a detector with such faults, finer than those that are inverted: the slab for rectangles, else the shell. Uneven
 /// conductivity only the shell can have.
-fn model(detector: &Detector, faults: &[Fault], seed: u64) -> Result<Box<dyn ForwardModel>, ForwardError> {
+///
+/// # Errors
+/// [`ForwardError::Detector`] if there is no model of the detector.
+pub fn finer_model(detector: &Detector, faults: &[Fault], seed: u64) -> Result<Box<dyn ForwardModel>, ForwardError> {
     let detector = &as_built(detector, faults, seed);
     let nodes = FINER * Shell::default_nodes(detector);
     if let Some(uneven) = uneven_shell(detector, nodes, faults, seed)? {
@@ -73,7 +76,7 @@ impl Simulation {
     /// [`SimulationError`] if there is no model of the detector or it cannot have the faults.
     pub fn new(detector: &Detector, scene: Scene, faults: &[Fault], seed: u64) -> Result<Self, SimulationError> {
         let measurement = Measurement::new(detector, faults, seed)?;
-        let model = model(detector, faults, seed)?;
+        let model = finer_model(detector, faults, seed)?;
         Ok(Self { model, measurement, scene, mouse: Mouse::default(), last: None })
     }
 

@@ -13,7 +13,7 @@ mod noise;
 
 use crate::readings::Readings;
 
-pub use board::{Mouse, Simulation, SimulationError};
+pub use board::{Mouse, Simulation, SimulationError, finer_model};
 pub use built::{as_built, uneven_shell};
 pub use fault::{Fault, FaultError};
 pub use measure::{code, measured};

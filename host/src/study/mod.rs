@@ -1,0 +1,17 @@
+//! Studies of solvers: how speed and accuracy trade against each other, and where methods fail.
+//!
+//! Data always come from a [finer model](crate::simulate::finer_model) than any that is inverted, through wires, noise and converter.
+
+mod data;
+mod judge;
+mod machine;
+pub mod page;
+mod scenes;
+pub mod tradeoff;
+mod variant;
+
+pub use self::data::{Frame, Laboratory, StudyError};
+pub use self::judge::{Judge, Score, Summary};
+pub use self::machine::Machine;
+pub use self::scenes::{Group, SceneKind};
+pub use self::variant::{Family, Setting, Variation, family};

@@ -1,0 +1,270 @@
+//! Charts of marks between two logarithmic axes.
+
+use std::fmt::Write;
+
+use super::axis::Axis;
+use super::escaped;
+use super::label::Labels;
+
+/// Room around the plot: left, top, right, bottom (px).
+const ROOM: [f64; 4] = [58.0, 44.0, 14.0, 42.0];
+
+/// Marks between two logarithmic axes; further left and further down is better.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// What it shows, in a few words.
+    pub title: String,
+    /// A line below the title.
+    pub subtitle: String,
+    /// To the right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
+    /// What is in it.
+    pub series: Vec<Series>,
+    /// Whether marks that no other beats in both directions are joined, and what is beaten steps back.
+    pub has_front: bool,
+    /// A value to the right that matters, and why.
+    pub guide: Option<(f64, &'static str)>,
+    /// Width and height (px).
+    pub size: [f64; 2],
+}
+
+/// Marks that belong together.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Its label.
+    pub name: String,
+    /// Class that gives it its colour: one of the style sheet's.
+    pub class: &'static str,
+    /// Its marks, in order.
+    pub marks: Vec<Mark>,
+    /// The mark that has the label; others are small.
+    pub main: usize,
+    /// Whether its marks are joined.
+    pub is_joined: bool,
+}
+
+/// A mark.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// To the right.
+    pub x: f64,
+    /// Upwards.
+    pub y: f64,
+    /// What to tell when it is pointed at.
+    pub tells: String,
+}
+
+impl Chart {
+    /// The chart as SVG, for a page of this module.
+    pub fn svg(&self) -> String {
+        let [width, height] = self.size;
+        let mut svg = format!(
+            "<svg class=\"chart\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">\n\
+             <text class=\"title\" x=\"0\" y=\"15\">{}</text><text class=\"subtitle\" x=\"0\" y=\"32\">{}</text>\n",
+            escaped(&self.title),
+            escaped(&self.title),
+            escaped(&self.subtitle)
+        );
+        self.axes(&mut svg);
+        let front = if self.has_front { self.front() } else { Vec::new() };
+        self.front_line(&front, &mut svg);
+        // What leads is drawn last, over the others, but is labelled first.
+        let mut order: Vec<_> = self.series.iter().filter(|series| !series.marks.is_empty()).collect();
+        order.sort_by_key(|series| self.leads(series, &front));
+        order.iter().for_each(|series| self.draw(series, &front, &mut svg));
+        self.labels(order.iter().rev().copied(), &front, &mut svg);
+        svg + "</svg>"
+    }
+
+    fn plot(&self) -> [f64; 4] {
+        [ROOM[0], ROOM[1], self.size[0] - ROOM[2], self.size[1] - ROOM[3]]
+    }
+
+    fn at(&self, x: f64, y: f64) -> [f64; 2] {
+        let [left, top, right, bottom] = self.plot();
+        [left + (right - left) * self.x.share(x), bottom - (bottom - top) * self.y.share(y)]
+    }
+
+    fn axes(&self, svg: &mut String) {
+        let [left, top, right, bottom] = self.plot();
+        for (value, text) in self.y.ticks() {
+            let [_, y] = self.at(self.x.range[0], value);
+            _ = writeln!(
+                svg,
+                "<path class=\"grid\" d=\"M{left} {y:.1}H{right}\"/><text class=\"tick\" x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                left - 6.0,
+                y + 4.0,
+                escaped(&text)
+            );
+        }
+        let mut free_from = f64::NEG_INFINITY;
+        for (value, text) in self.x.ticks() {
+            let [x, _] = self.at(value, self.y.range[0]);
+            _ = write!(svg, "<path class=\"grid\" d=\"M{x:.1} {top}V{bottom}\"/>");
+            if x > free_from {
+                let y = bottom + 16.0;
+                _ = writeln!(
+                    svg,
+                    "<text class=\"tick\" x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{}</text>",
+                    escaped(&text)
+                );
+                free_from = x + 46.0;
+            }
+        }
+        _ = writeln!(
+            svg,
+            "<text class=\"tick\" x=\"{right}\" y=\"{}\" text-anchor=\"end\">{}</text>",
+            bottom + 33.0,
+            escaped(&self.x.title)
+        );
+        if let Some((value, why)) = self.guide.filter(|(value, _)| (self.x.range[0]..=self.x.range[1]).contains(value))
+        {
+            let [x, _] = self.at(value, self.y.range[0]);
+            _ = writeln!(
+                svg,
+                "<path class=\"guide\" d=\"M{x:.1} {top}V{bottom}\"/><text class=\"tick\" x=\"{:.1}\" y=\"{}\" text-anchor=\"end\">{}</text>",
+                x - 5.0,
+                top + 10.0,
+                escaped(why)
+            );
+        }
+        if self.has_front {
+            _ = writeln!(svg, "<text class=\"better\" x=\"{}\" y=\"{}\">↙ better</text>", left + 6.0, bottom - 7.0);
+        }
+    }
+
+    /// Marks that no other beats, from the left: each is lower than all before it.
+    fn front(&self) -> Vec<[f64; 2]> {
+        let marks = self.series.iter().flat_map(|series| &series.marks);
+        let mut all: Vec<_> =
+            marks.map(|mark| [mark.x, mark.y]).filter(|at| at.iter().all(|x| x.is_finite())).collect();
+        all.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+        let mut lowest = f64::INFINITY;
+        all.retain(|[_, y]| {
+            let leads = *y < lowest;
+            lowest = lowest.min(*y);
+            leads
+        });
+        all
+    }
+
+    fn leads(&self, series: &Series, front: &[[f64; 2]]) -> bool {
+        !self.has_front || series.marks.iter().any(|mark| front.contains(&[mark.x, mark.y]))
+    }
+
+    fn front_line(&self, front: &[[f64; 2]], svg: &mut String) {
+        let Some(first) = front.first() else { return };
+        let [_, top, right, _] = self.plot();
+        let mut path = format!("M{:.1} {top}", self.at(first[0], first[1])[0]);
+        for [x, y] in front.iter().map(|at| self.at(at[0], at[1])) {
+            _ = write!(path, "H{x:.1}V{y:.1}");
+        }
+        _ = writeln!(svg, "<path class=\"front\" d=\"{path}H{right}\"/>");
+    }
+
+    fn draw(&self, series: &Series, front: &[[f64; 2]], svg: &mut String) {
+        let behind = if self.leads(series, front) { "" } else { " behind" };
+        _ = writeln!(svg, "<g class=\"{}{behind}\">", series.class);
+        if series.is_joined {
+            let points: Vec<_> = series
+                .marks
+                .iter()
+                .map(|mark| self.at(mark.x, mark.y))
+                .map(|[x, y]| format!("{x:.1},{y:.1}"))
+                .collect();
+            _ = writeln!(svg, "<polyline points=\"{}\"/>", points.join(" "));
+        }
+        // The main mark is drawn last, over the others.
+        let mut marks: Vec<_> = series.marks.iter().enumerate().collect();
+        marks.sort_by_key(|(index, _)| *index == series.main);
+        for (index, mark) in marks {
+            let [x, y] = self.at(mark.x, mark.y);
+            let radius = if index == series.main { 5.0 } else { 2.5 };
+            _ = writeln!(
+                svg,
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}</title></circle>",
+                escaped(&mark.tells)
+            );
+        }
+        *svg += "</g>\n";
+    }
+
+    fn labels<'a>(&self, series: impl Iterator<Item = &'a Series>, front: &[[f64; 2]], svg: &mut String) {
+        let marks = self.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
+        let mut labels = Labels::new(self.plot(), marks);
+        for series in series {
+            let Some(mark) = series.marks.get(series.main) else { continue };
+            let at = self.at(mark.x, mark.y);
+            let place = labels.place(at, &series.name);
+            if place.is_far {
+                let to = place.left + 4.0;
+                _ = write!(
+                    svg,
+                    "<path class=\"lead\" d=\"M{:.1} {:.1}L{to:.1} {:.1}\"/>",
+                    at[0],
+                    at[1],
+                    place.baseline - 4.0
+                );
+            }
+            _ = writeln!(
+                svg,
+                "<text class=\"label {}{}\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                series.class,
+                if self.leads(series, front) { "" } else { " behind" },
+                place.left,
+                place.baseline,
+                escaped(&series.name)
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::axis::Unit;
+    use super::*;
+
+    fn chart(points: &[[f64; 2]]) -> Chart {
+        let axis = || Axis { title: "x".to_owned(), unit: Unit::Plain, range: [1.0, 100.0] };
+        let series = points.iter().map(|&[x, y]| Series {
+            name: format!("s{x}"),
+            class: "linear",
+            marks: vec![Mark { x, y, tells: "<&".to_owned() }],
+            main: 0,
+            is_joined: false,
+        });
+        Chart {
+            title: "t".to_owned(),
+            subtitle: String::new(),
+            x: axis(),
+            y: axis(),
+            series: series.collect(),
+            has_front: true,
+            guide: None,
+            size: [400.0, 300.0],
+        }
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_beats() {
+        let chart =
+            chart(&[[10.0, 10.0], [2.0, 50.0], [20.0, 20.0], [50.0, 2.0], [2.0, 60.0], [60.0, 2.0], [5.0, f64::NAN]]);
+        assert_eq!(chart.front(), [[2.0, 50.0], [10.0, 10.0], [50.0, 2.0]]);
+    }
+
+    #[test]
+    fn values_lie_where_their_logarithms_do() {
+        let [x, y] = chart(&[]).at(10.0, 10.0);
+        assert!((x - (58.0 + 386.0) / 2.0).abs() < 1e-9 && (y - (44.0 + 258.0) / 2.0).abs() < 1e-9);
+        assert_eq!(chart(&[]).at(1e9, 0.0), [386.0, 258.0], "what is beyond an axis lies on its end");
+    }
+
+    #[test]
+    fn what_is_beaten_steps_back_and_texts_are_harmless() {
+        let svg = chart(&[[10.0, 10.0], [20.0, 20.0]]).svg();
+        assert_eq!(svg.matches("<g class=\"linear behind\">").count(), 1);
+        assert!(svg.contains("&lt;&amp;") && svg.starts_with("<svg") && svg.ends_with("</svg>"));
+    }
+}

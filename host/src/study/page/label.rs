@@ -1,0 +1,99 @@
+//! Places for labels beside marks, so that none hides another.
+
+/// A box: left, top, right, bottom (px).
+pub(super) type Area = [f64; 4];
+
+/// Width of a character and height of a line at the size of labels (px).
+const CHARACTER: f64 = 6.4;
+const LINE: f64 = 13.0;
+/// Room that a mark takes, from its middle (px).
+const MARK: f64 = 4.0;
+
+/// Where a label goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place {
+    /// Left end of its baseline.
+    pub left: f64,
+    /// Its baseline.
+    pub baseline: f64,
+    /// Whether it is so far from its mark that a line has to lead there.
+    pub is_far: bool,
+}
+
+/// Finds places one after the other, within a frame.
+pub(super) struct Labels {
+    frame: Area,
+    taken: Vec<Area>,
+}
+
+impl Labels {
+    /// Labels within `frame`, clear of marks at `marks`.
+    pub fn new(frame: Area, marks: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        let around = |[x, y]: [f64; 2]| [x - MARK, y - MARK, x + MARK, y + MARK];
+        Self { frame, taken: marks.into_iter().map(around).collect() }
+    }
+
+    /// A place for `text` near a mark: right, left, above, below; else further and further away.
+    pub fn place(&mut self, [x, y]: [f64; 2], text: &str) -> Place {
+        let width = CHARACTER * text.chars().count() as f64;
+        let at = |dx: f64, dy: f64| [x + dx, y + dy - LINE / 2.0, x + dx + width, y + dy + LINE / 2.0];
+        let candidates = (0..9).flat_map(|step| {
+            let away = 16.0 * f64::from(step);
+            [
+                at(8.0, away),
+                at(8.0, -away),
+                at(-8.0 - width, away),
+                at(-8.0 - width, -away),
+                at(-width / 2.0, 13.0 + away),
+                at(-width / 2.0, -13.0 - away),
+            ]
+        });
+        let found = candidates.clone().find(|area| self.is_free(*area));
+        // Where all is taken, a label over others is better than none.
+        let area = found.or_else(|| candidates.clone().find(|area| self.is_within(*area))).unwrap_or(at(8.0, 0.0));
+        self.taken.push(area);
+        let middle = (area[1] + area[3]) / 2.0;
+        Place { left: area[0], baseline: middle + 4.0, is_far: (middle - y).abs() > 15.0 }
+    }
+
+    fn is_within(&self, area: Area) -> bool {
+        let [left, top, right, bottom] = self.frame;
+        area[0] >= left && area[1] >= top && area[2] <= right && area[3] <= bottom
+    }
+
+    fn is_free(&self, area: Area) -> bool {
+        let apart =
+            |other: &Area| area[2] <= other[0] || other[2] <= area[0] || area[3] <= other[1] || other[3] <= area[1];
+        self.is_within(area) && self.taken.iter().all(apart)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRAME: Area = [0.0, 0.0, 300.0, 200.0];
+
+    #[test]
+    fn a_label_alone_is_to_the_right_and_at_the_edge_to_the_left() {
+        let mut labels = Labels::new(FRAME, [[100.0, 100.0], [290.0, 50.0]]);
+        let place = labels.place([100.0, 100.0], "solver");
+        assert!(place.left > 100.0 && !place.is_far);
+        let place = labels.place([290.0, 50.0], "solver");
+        assert!(place.left + 6.0 * CHARACTER < 290.0);
+    }
+
+    #[test]
+    fn labels_of_marks_on_one_spot_do_not_hide_each_other() {
+        let mut labels = Labels::new(FRAME, [[100.0, 100.0]; 8]);
+        for _ in 0..8 {
+            labels.place([100.0, 100.0], "tikhonov");
+        }
+        let boxes = &labels.taken[8..];
+        for (i, a) in boxes.iter().enumerate() {
+            for b in &boxes[..i] {
+                assert!(a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1], "{a:?} {b:?}");
+            }
+        }
+    }
+}
