@@ -8,6 +8,8 @@ use super::label::Labels;
 
 /// Room around the plot: left, top, right, bottom (px).
 const ROOM: [f64; 4] = [58.0, 44.0, 14.0, 42.0];
+/// Marks nearer than this have one label (px).
+const ONE_SPOT: f64 = 14.0;
 
 /// Marks between two logarithmic axes; further left and further down is better.
 #[derive(Clone, Debug)]
@@ -124,14 +126,14 @@ impl Chart {
             let [x, _] = self.at(value, self.y.range[0]);
             _ = writeln!(
                 svg,
-                "<path class=\"guide\" d=\"M{x:.1} {top}V{bottom}\"/><text class=\"tick\" x=\"{:.1}\" y=\"{}\" text-anchor=\"end\">{}</text>",
-                x - 5.0,
+                "<path class=\"guide\" d=\"M{x:.1} {top}V{bottom}\"/><text class=\"tick\" x=\"{:.1}\" y=\"{}\">{}</text>",
+                x + 5.0,
                 top + 10.0,
                 escaped(why)
             );
         }
         if self.has_front {
-            _ = writeln!(svg, "<text class=\"better\" x=\"{}\" y=\"{}\">↙ better</text>", left + 6.0, bottom - 7.0);
+            _ = writeln!(svg, "<text class=\"better\" x=\"{}\" y=\"{}\">↙ better</text>", left, bottom + 33.0);
         }
     }
 
@@ -191,34 +193,57 @@ impl Chart {
         *svg += "</g>\n";
     }
 
+    /// One label for marks of a class that lie on one spot.
     fn labels<'a>(&self, series: impl Iterator<Item = &'a Series>, front: &[[f64; 2]], svg: &mut String) {
-        let marks = self.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
-        let mut labels = Labels::new(self.plot(), marks);
+        let mut spots: Vec<Spot> = Vec::new();
         for series in series {
             let Some(mark) = series.marks.get(series.main) else { continue };
-            let at = self.at(mark.x, mark.y);
-            let place = labels.place(at, &series.name);
+            let (at, leads) = (self.at(mark.x, mark.y), self.leads(series, front));
+            let near = |spot: &&mut Spot| spot.class == series.class && distance(spot.at, at) < ONE_SPOT;
+            match spots.iter_mut().find(near) {
+                Some(spot) => spot.add(&series.name, leads),
+                None => spots.push(Spot { at, class: series.class, text: series.name.clone(), leads }),
+            }
+        }
+        let small = self.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
+        let mut labels = Labels::new(self.plot(), spots.iter().map(|spot| spot.at), small);
+        for spot in &spots {
+            let place = labels.place(spot.at, &spot.text);
             if place.is_far {
-                let to = place.left + 4.0;
-                _ = write!(
-                    svg,
-                    "<path class=\"lead\" d=\"M{:.1} {:.1}L{to:.1} {:.1}\"/>",
-                    at[0],
-                    at[1],
-                    place.baseline - 4.0
-                );
+                let (to, y) = (place.left + 4.0, place.baseline - 4.0);
+                _ = write!(svg, "<path class=\"lead\" d=\"M{:.1} {:.1}L{to:.1} {y:.1}\"/>", spot.at[0], spot.at[1]);
             }
             _ = writeln!(
                 svg,
                 "<text class=\"label {}{}\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-                series.class,
-                if self.leads(series, front) { "" } else { " behind" },
+                spot.class,
+                if spot.leads { "" } else { " behind" },
                 place.left,
                 place.baseline,
-                escaped(&series.name)
+                escaped(&spot.text)
             );
         }
     }
+}
+
+/// Marks on one spot, for their label.
+struct Spot {
+    at: [f64; 2],
+    class: &'static str,
+    text: String,
+    leads: bool,
+}
+
+impl Spot {
+    fn add(&mut self, name: &str, leads: bool) {
+        self.text += " · ";
+        self.text += name;
+        self.leads |= leads;
+    }
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 #[cfg(test)]

@@ -9,6 +9,8 @@ use crate::study::variant::Family;
 
 /// Errors below this show there (m).
 const FLOOR_M: f64 = 1e-5;
+/// Panels up to this width have no room for more than their marks (px).
+const SMALL_PX: f64 = 330.0;
 /// Of 1 less the correlation, what is below this shows there.
 const FLOOR_CORRELATION: f64 = 0.01;
 
@@ -137,7 +139,7 @@ fn drawn(panels: &[Panel]) -> String {
             },
             series: panel.series.clone(),
             has_front: true,
-            guide: Some((1e-3, "1000 frames/s")),
+            guide: (panel.size[0] > SMALL_PX).then_some((1e-3, "1000 frames/s")),
             size: panel.size,
         };
         chart.svg() + "\n"
