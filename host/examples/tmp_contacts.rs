@@ -4,7 +4,9 @@ use tactomo::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo::scene::Contact;
 use tactomo::simulate::{Noise, measured};
 use tactomo::solve::{Method, Problem};
+#[allow(clippy::all)]
 fn main() {
+    let only = std::env::var("ONLY").unwrap_or_default();
     let method: Method = std::env::args().nth(1).unwrap_or("contacts".into()).parse().unwrap();
     let detector = Detector::preset("square-60").unwrap();
     let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
@@ -23,6 +25,9 @@ fn main() {
     }
     println!("invented in 10000 frames: {invented}");
     let mut test = |name: &str, make: &mut dyn FnMut(&mut fastrand::Rng) -> Vec<Contact>, trials: usize| {
+        if !name.starts_with(&only) {
+            return;
+        }
         let (mut right, mut errs, mut cerr, mut cold, mut warm, mut flags) = (0, vec![], vec![], vec![], vec![], 0);
         let mut counts = std::collections::BTreeMap::new();
         for _ in 0..trials {
@@ -39,6 +44,32 @@ fn main() {
             *counts.entry(s.contacts.len()).or_insert(0) += 1;
             if s.flags.misfit {
                 flags += 1;
+            }
+            if std::env::var("SHOW").is_ok() && (s.contacts.len() != contacts.len() || s.flags.misfit) {
+                let p = |x: f64| format!("{:.1}", x * 1e3);
+                println!(
+                    "  true {}",
+                    contacts
+                        .iter()
+                        .map(|c| format!("({},{}) {:.2}", p(c.x_m), p(c.y_m), c.conductance_s / sheet))
+                        .collect::<Vec<_>>()
+                        .join(" ")
+                );
+                println!(
+                    "  found {} res {:.2}",
+                    s.contacts
+                        .iter()
+                        .map(|c| format!(
+                            "({},{}) {:.2} r {:?}",
+                            p(c.x_m),
+                            p(c.y_m),
+                            c.conductance_s / sheet,
+                            c.radius_m.map(p)
+                        ))
+                        .collect::<Vec<_>>()
+                        .join(" "),
+                    s.residual.unwrap_or(0.0)
+                );
             }
             if s.contacts.len() == contacts.len() {
                 right += 1;

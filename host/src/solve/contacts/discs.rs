@@ -20,6 +20,8 @@ const CONDUCTANCE_DEVIATION: f64 = 4.0;
 const DIFFERENCE: f64 = 1e-3;
 /// Longest change of a logarithm in a step.
 const LONGEST_LOG: f64 = 0.7;
+/// Widest radius, in halves of the detector's shorter side: what is wider is an image's business.
+const WIDEST: f64 = 0.6;
 /// Tries of one step, and the share of the cost below which a step is the last.
 const TRIES: usize = 4;
 const SMALL: f64 = 1e-4;
@@ -107,7 +109,7 @@ impl DiscFitter<'_> {
                 x_m: (contact.x_m + shorten * by_x).clamp(-self.half_m[0], self.half_m[0]),
                 y_m: (contact.y_m + shorten * by_y).clamp(-self.half_m[1], self.half_m[1]),
                 conductance_s: contact.conductance_s * limited(*by_s),
-                radius_m: (contact.radius_m * limited(*by_m)).min(self.half_m[0].max(self.half_m[1])),
+                radius_m: (contact.radius_m * limited(*by_m)).min(WIDEST * self.half_m[0].min(self.half_m[1])),
                 ..*contact
             }
         };

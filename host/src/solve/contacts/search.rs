@@ -3,13 +3,16 @@
 use super::discs::{DiscFit, DiscFitter};
 use super::fit::{Fit, Fitter};
 use super::network::FitSpot;
+use super::scan::{Candidate, Looks};
 use super::target::Target;
 use super::{Contacts, Explanation};
 use crate::forward::readings_v;
 use crate::scene::Contact;
 use crate::space::{self, Place};
 
-/// Steps of a fit from a scan, and of one from the frame before.
+/// Steps from each of some starts, how many of them go on, steps of those, and steps from the frame before.
+const FIRST_STEPS: usize = 5;
+const FINALISTS: usize = 2;
 const COLD_STEPS: usize = 12;
 const WARM_STEPS: usize = 4;
 /// Steps after the readings were corrected, and how often they are.
@@ -22,11 +25,13 @@ const WARM_DISC_STEPS: usize = 3;
 const STARTS: usize = 3;
 /// By how much each parameter has to lower the sum of squares: the Bayesian information criterion for 256 readings asks for
 /// 5.5; this leaves room for the many places that are looked at.
-const WORTH: f64 = 13.0;
+const WORTH: f64 = 7.0;
 /// The same for there being any contact at all.
 const WORTH_FIRST: f64 = 60.0;
 /// Half the distance of two contacts that one is split into, in mean distances of electrodes.
 const SPLIT: f64 = 0.25;
+/// Mean square of what is left below which a fit is nearly right.
+const NEARLY: f64 = 100.0;
 /// The sum of squares may be this times that of the frame before.
 const WORSE: f64 = 1.3;
 /// A contact is lost when the logarithm of its resistance is known no better than this.
@@ -62,42 +67,64 @@ impl Contacts {
 
     fn search_anew(&self, target: &Target) -> Option<Explanation> {
         let fitter = self.fitter();
-        let apart_m = self.spacing_m / 3.0;
-        let first = self.scan.first(&fitter, target, STARTS, apart_m);
+        let looks = self.scan.at_first(&fitter, target);
+        let first = self.scan.ones(&looks, STARTS, self.apart_m());
         if first.first().is_none_or(|best| best.gain < WORTH_FIRST) {
             return None;
         }
-        let starts = first.into_iter().map(|candidate| vec![candidate.spot]);
-        let mut fit = lowest(&fitter, starts, target)?;
-        let mut best = self.correct(fit.clone(), target, CORRECTIONS);
-        if let (Explanation::Spots(spots, _), false) = (&best, explains(&best, target)) {
-            let discs = self.discs(spots, target).map(Explanation::Discs);
-            best = better(best, discs);
+        let start = |candidate: &Candidate| self.scan.start(&fitter, &looks, candidate);
+        let one = lowest(&fitter, first.iter().map(start).collect(), target)?;
+        let mut best = self.correct(one.clone(), target, CORRECTIONS);
+        if best.cost() > 1.2 * target.count() as f64 {
+            best = better(best, self.discs(&one, target).map(Explanation::Discs));
         }
-        for _ in 1..self.settings.most {
-            if explains(&best, target) {
+        let pairs = self.scan.pairs(&looks, STARTS, self.apart_m()).iter().map(start).collect();
+        let mut fits = vec![one];
+        let mut starts: Vec<Vec<FitSpot>> = pairs;
+        while fits.len() < self.settings.most && !explains(&best, target) {
+            let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
+            let Explanation::Spots(fit, _) = &more else { break };
+            fits.push(fit.clone());
+            let is_better = score(&more) < score(&best);
+            if !is_better && fits.len() > 2 {
                 break;
             }
-            let Some(spots) = self.one_more(&fitter, &fit, target, apart_m) else { break };
-            let Explanation::Spots(next, _) = &spots else { break };
-            fit = next.clone();
-            best = better(best, Some(spots));
+            best = better(best, Some(more));
+            starts = Vec::new();
         }
         Some(best)
     }
 
-    /// One more contact than a fit has.
-    fn one_more(&self, fitter: &Fitter<'_>, fit: &Fit, target: &Target, apart_m: f64) -> Option<Explanation> {
-        let correction_v = self.correction_v(fit)?;
-        let corrected = target.less(&correction_v);
-        let further = self.scan.further(fitter, fit, &corrected, STARTS, apart_m);
-        let added = further.into_iter().map(|candidate| {
-            let mut all = fit.spots.clone();
-            all.push(candidate.spot);
-            all
-        });
-        let split = (0..fit.spots.len()).flat_map(|k| self.split(fitter, &fit.spots, k));
-        Some(self.correct(lowest(fitter, added.chain(split), &corrected)?, target, CORRECTIONS))
+    /// One more contact than the last of some fits has: from starts, from that fit, and from two more than the fit before it has.
+    fn one_more(
+        &self,
+        fitter: &Fitter<'_>,
+        fits: &[Fit],
+        mut starts: Vec<Vec<FitSpot>>,
+        target: &Target,
+    ) -> Option<Explanation> {
+        let (last, before) = fits.split_last()?;
+        // What spots leave out of a wrong fit is of no use.
+        let is_near = last.cost < NEARLY * target.count() as f64;
+        let correction_v = is_near.then(|| self.correction_v(last)).flatten();
+        let corrected = correction_v.map_or_else(|| target.clone(), |correction_v| target.less(&correction_v));
+        let mut add = |fit: &Fit, of: &dyn Fn(&Looks) -> Vec<Candidate>| {
+            let looks = self.scan.beside(fitter, fit, &corrected);
+            for candidate in of(&looks) {
+                starts.push(fit.spots.iter().cloned().chain(self.scan.start(fitter, &looks, &candidate)).collect());
+            }
+        };
+        add(last, &|looks| self.scan.ones(looks, STARTS, self.apart_m()));
+        if let Some(before) = before.last() {
+            add(before, &|looks| self.scan.pairs(looks, STARTS, self.apart_m()));
+        }
+        starts.extend((0..last.spots.len()).flat_map(|k| self.split(fitter, &last.spots, k)));
+        Some(self.correct(lowest(fitter, starts, &corrected)?, target, CORRECTIONS))
+    }
+
+    /// Starts nearer to each other are one (m).
+    fn apart_m(&self) -> f64 {
+        self.spacing_m / 3.0
     }
 
     /// Starts with one contact taken for two beside each other, in some directions.
@@ -174,9 +201,14 @@ impl Contacts {
     }
 }
 
-/// The fit of lowest cost over some starts.
-fn lowest(fitter: &Fitter<'_>, starts: impl Iterator<Item = Vec<FitSpot>>, target: &Target) -> Option<Fit> {
-    starts.filter_map(|start| fitter.fit(start, target, COLD_STEPS)).min_by(|a, b| a.cost.total_cmp(&b.cost))
+/// The fit of lowest cost over some starts: a few steps from each, then more from the best.
+fn lowest(fitter: &Fitter<'_>, starts: Vec<Vec<FitSpot>>, target: &Target) -> Option<Fit> {
+    let mut fits: Vec<_> = starts.into_iter().filter_map(|start| fitter.fit(start, target, FIRST_STEPS)).collect();
+    fits.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost));
+    fits.truncate(FINALISTS);
+    fits.into_iter()
+        .filter_map(|fit| fitter.fit(fit.spots, target, COLD_STEPS))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
 /// Sum of squares with a price on each parameter: what is lower is believed.
@@ -198,7 +230,7 @@ fn scaled(share: f64, a: Place) -> Place {
 
 /// Whether no more than noise and model error is left.
 fn explains(found: &Explanation, target: &Target) -> bool {
-    found.cost() < target.count() as f64
+    found.cost() < 0.75 * target.count() as f64
 }
 
 /// Whether spots have moved so little that the forward model's correction still holds.
