@@ -7,6 +7,7 @@ mod auto;
 mod contact;
 pub mod jacobian;
 mod jacobian_file;
+mod patches;
 pub mod shell;
 mod slab;
 pub mod spots;
@@ -17,6 +18,7 @@ use nalgebra::DMatrix;
 pub use self::auto::Auto;
 pub use self::contact::ContactFields;
 pub use self::jacobian_file::JacobianFileError;
+pub use self::patches::Patches;
 pub use self::slab::{Resolution, Slab};
 use self::spots::SpotFields;
 pub use self::spread::touched_impedance_ohm;
@@ -70,6 +72,13 @@ pub trait ForwardModel: Send + Sync {
     /// Neumann fields of the bare detector at the image's nodes (ohm): `nodes x electrodes`, `N(e, x)` up to a constant
     /// that is the same for all `e` and `x`; electrodes as floating equipotential pads.
     fn fields_ohm(&self) -> &DMatrix<f64>;
+
+    /// The same fields between the image's nodes (ohm): `nodes x nodes`, symmetric, of a current over a node's cell the mean over another.
+    /// For images of a few hundred nodes: it has as many elements as their square.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the model cannot give them.
+    fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError>;
 
     /// The same fields at the electrodes themselves (ohm): `electrodes x electrodes`, symmetric, same constant.
     fn electrode_fields_ohm(&self) -> &DMatrix<f64>;

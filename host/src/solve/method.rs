@@ -1,6 +1,8 @@
 //! The solvers by their names.
 
-use super::{ContactSettings, Contacts, Lambda, Problem, Solver, Tikhonov, Tsvd, Variant};
+use super::{
+    ContactSettings, Contacts, Lambda, Nonlinear, NonlinearSettings, Problem, Solver, Tikhonov, Tsvd, Variant,
+};
 use crate::forward::ForwardError;
 
 /// A solver, with its parameters as they are best for most.
@@ -18,12 +20,14 @@ pub enum Method {
     Noser,
     /// Smooth linear image.
     Laplace,
+    /// Image by the full contact physics.
+    Nonlinear,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Tikhonov, Self::TikhonovPaper, Self::Tsvd, Self::Noser, Self::Laplace, Self::Contacts];
+    pub const ALL: [Self; 7] =
+        [Self::Tikhonov, Self::TikhonovPaper, Self::Tsvd, Self::Noser, Self::Laplace, Self::Nonlinear, Self::Contacts];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
@@ -34,6 +38,7 @@ impl Method {
             Self::Tsvd => "tsvd",
             Self::Noser => "noser",
             Self::Laplace => "laplace",
+            Self::Nonlinear => "nonlinear",
         }
     }
 
@@ -46,6 +51,7 @@ impl Method {
             Self::Tsvd => "linear image from the first singular images alone",
             Self::Noser => "linear image that makes up for places that readings hear less",
             Self::Laplace => "linear image with a prior of smoothness",
+            Self::Nonlinear => "image of conductance by the full contact physics, never negative",
         }
     }
 
@@ -62,6 +68,7 @@ impl Method {
             Self::Tsvd => Box::new(Tsvd::new(jacobian, Tsvd::SHARE)),
             Self::Noser => Box::new(Tikhonov::noser(jacobian, Lambda::default())),
             Self::Laplace => Box::new(Tikhonov::laplace(jacobian)?),
+            Self::Nonlinear => Box::new(Nonlinear::new(problem, NonlinearSettings::default())?),
         })
     }
 }

@@ -2,11 +2,13 @@
 
 mod balance;
 mod contacts;
+mod interpolate;
 mod lambda;
 mod laplace;
 mod linear;
 mod locate;
 mod method;
+mod nonlinear;
 mod noser;
 mod problem;
 #[cfg(test)]
@@ -19,6 +21,7 @@ pub use self::contacts::{ContactSettings, Contacts};
 pub use self::lambda::Lambda;
 use self::lambda::Spectrum;
 pub use self::method::Method;
+pub use self::nonlinear::{Nonlinear, NonlinearSettings};
 pub use self::problem::Problem;
 pub use self::tikhonov::{Tikhonov, Variant};
 pub use self::tsvd::Tsvd;

@@ -14,6 +14,7 @@ mod system;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use faer::Mat;
@@ -74,11 +75,7 @@ impl Shell {
     /// # Errors
     /// [`ForwardError::Detector`] if the detector cannot be meshed.
     pub fn with_sheet(detector: &Detector, nodes: usize, factor: impl Fn(Place) -> f64) -> Result<Self, ForwardError> {
-        let singular = |_: Singular| ForwardError::Detector {
-            detector: detector.name.clone(),
-            what: "its equations are singular: conductivity and contact impedance have to be finite and above zero"
-                .to_owned(),
-        };
+        let singular = |_: Singular| singular(detector);
         let pad_impedance_ohm_m2: Vec<_> =
             detector.electrodes.iter().map(|pad| pad_impedance_ohm_m2(detector, pad)).collect();
         let sheet_conductance_s = detector.sheet_conductance_s();
@@ -88,7 +85,8 @@ impl Shell {
         let node_areas_m2 = mesh.node_areas_m2();
         // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.
         let factor = system.factorise([(system.pad(0), sheet_conductance_s)]).map_err(singular)?;
-        let (fields_ohm, electrode_fields_ohm) = neumann_fields_ohm(&factor, &system, &node_areas_m2);
+        let pads = system.pad(0)..system.pad(system.pads());
+        let (fields_ohm, electrode_fields_ohm) = floating_fields_ohm(&factor, &system, &node_areas_m2, pads);
         let image_mesh = ImageMesh {
             nodes_m: mesh.nodes_m.clone(),
             places_m: mesh.places_m.clone(),
@@ -178,6 +176,14 @@ impl ForwardModel for Shell {
         &self.fields_ohm
     }
 
+    fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
+        let ground = (self.system.pad(0), self.detector.sheet_conductance_s());
+        let singular = |_| singular(&self.detector);
+        let factor = self.system.factorise([ground]).map_err(singular)?;
+        let nodes = self.mesh.nodes_m.len();
+        Ok(floating_fields_ohm(&factor, &self.system, &self.image_mesh.node_areas_m2, 0..nodes).0)
+    }
+
     fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
         &self.electrode_fields_ohm
     }
@@ -201,19 +207,31 @@ fn pad_impedance_ohm_m2(detector: &Detector, pad: &Electrode) -> f64 {
     detector.pad_impedance_ohm_m2(pad).max(smallest)
 }
 
-/// Neumann functions of the pads, at nodes and at pads: 1 A into a pad, out evenly all over, mean zero. So they are symmetric.
-fn neumann_fields_ohm(factor: &Factor, system: &System, node_areas_m2: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
+fn singular(detector: &Detector) -> ForwardError {
+    ForwardError::Detector {
+        detector: detector.name.clone(),
+        what: "its equations are singular: conductivity and contact impedance have to be finite and above zero"
+            .to_owned(),
+    }
+}
+
+/// Neumann functions of some unknowns, at nodes and at pads: 1 A into each, out evenly all over, mean zero. So they are symmetric.
+fn floating_fields_ohm(
+    factor: &Factor,
+    system: &System,
+    node_areas_m2: &[f64],
+    into: Range<usize>,
+) -> (DMatrix<f64>, DMatrix<f64>) {
     let area_m2: f64 = node_areas_m2.iter().sum();
-    let pads = system.pads();
-    let currents_a = Mat::from_fn(system.pad(pads), pads, |i, j| match node_areas_m2.get(i) {
-        Some(node_area_m2) => -node_area_m2 / area_m2,
-        None => f64::from(u8::from(i == system.pad(j))),
+    let currents_a = Mat::from_fn(system.pad(system.pads()), into.len(), |i, j| {
+        let out = node_areas_m2.get(i).map_or(0.0, |node_area_m2| node_area_m2 / area_m2);
+        f64::from(u8::from(i == into.start + j)) - out
     });
     let (mut nodes, mut electrodes) = factor.solve(currents_a);
-    for pad in 0..pads {
-        let sum: f64 = nodes.column(pad).iter().zip(node_areas_m2).map(|(ohm, area)| ohm * area).sum();
-        nodes.column_mut(pad).add_scalar_mut(-sum / area_m2);
-        electrodes.column_mut(pad).add_scalar_mut(-sum / area_m2);
+    for column in 0..into.len() {
+        let sum: f64 = nodes.column(column).iter().zip(node_areas_m2).map(|(ohm, area)| ohm * area).sum();
+        nodes.column_mut(column).add_scalar_mut(-sum / area_m2);
+        electrodes.column_mut(column).add_scalar_mut(-sum / area_m2);
     }
     (nodes, electrodes)
 }

@@ -273,6 +273,11 @@ impl ForwardModel for Slab {
         &self.image.fields_ohm
     }
 
+    fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
+        let nodes: Vec<_> = (0..self.image.mesh.nodes_m.len()).collect();
+        Ok(self.cells().between(&nodes, &nodes))
+    }
+
     fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
         &self.pads.electrodes_ohm
     }

@@ -1,0 +1,90 @@
+//! How like the truth images are: `cargo run --release --package tactomo --example images [SOLVER...]`.
+//!
+//! A slab of `square-60` in full depth, of a finer grid than any that is inverted, is touched as in the scenes that are not a
+//! few small contacts, and measured with 12 bits and 1.5 LSB of noise. For each solver and scene: correlation of the image of a
+//! first frame with the true one, both smoothed by 2 mm, the mean of several placings; time of that frame; and the same after
+//! some more frames of the same contacts.
+
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use tactomo::detector::Detector;
+use tactomo::forward::{ForwardModel, ImageMesh, Resolution, Slab, readings_v, touched_impedance_ohm};
+use tactomo::metrics::{Comparison, truth_s_per_m2};
+use tactomo::readings::Readings;
+use tactomo::scene::{Hand, Scene, SceneName};
+use tactomo::simulate::{Noise, measured};
+use tactomo::solve::{Method, Problem};
+
+const SCENES: [SceneName; 6] =
+    [SceneName::FiveFingers, SceneName::Wide, SceneName::Ring, SceneName::Line, SceneName::Single, SceneName::Several];
+const SMOOTHING_M: f64 = 0.002;
+/// Nodes of the grid that simulates: 61 x 61, against 45 x 45 and 20 x 20 that are inverted.
+const NODES: usize = 3721;
+/// Placings of each scene.
+const SEEDS: u64 = 5;
+/// Frames of each, with new noise.
+const FRAMES: usize = 10;
+
+/// What a solver is shown, and the truth.
+struct Shown {
+    frames: Vec<Readings>,
+    truth: Vec<f32>,
+}
+
+fn main() -> Result<()> {
+    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let detector = Detector::preset(Detector::DEFAULT).context("no preset")?;
+    let problem = Problem::new(Box::new(Slab::new(&detector)?) as Box<dyn ForwardModel>);
+    let mesh = &problem.jacobian.image_mesh;
+    let shown: Vec<_> = SCENES.iter().map(|&scene| shown(&detector, mesh, scene)).collect::<Result<_>>()?;
+    let comparison = Comparison::new(mesh, SMOOTHING_M);
+    println!("first frame: correlation, ms / frame {FRAMES}: correlation, ms\n");
+    println!("| solver | {} |", SCENES.map(|scene| scene.to_string()).join(" | "));
+    println!("|---|{}", "---|".repeat(SCENES.len()));
+    for method in Method::ALL {
+        if !(asked.is_empty() || asked.iter().any(|name| name == method.name())) {
+            continue;
+        }
+        let cells: Vec<_> =
+            shown.iter().map(|shown| cell(method, &problem, &comparison, shown)).collect::<Result<_>>()?;
+        println!("| {} | {} |", method.name(), cells.join(" | "));
+    }
+    Ok(())
+}
+
+/// Frames of several placings of a scene.
+fn shown(detector: &Detector, mesh: &ImageMesh, scene: SceneName) -> Result<Vec<Shown>> {
+    let slab = Slab::with_resolution(detector, Resolution::FINE)?.on_image(NODES);
+    (0..SEEDS)
+        .map(|seed| {
+            let touches = Scene::new(scene, detector, Hand::relative(detector), seed).at(1.0 + seed as f64);
+            let exact = readings_v(&touched_impedance_ohm(&slab, &touches)?, detector);
+            let mut noise = Noise::new(seed);
+            let frames = (0..FRAMES).map(|_| measured(&exact, &detector.adc, &mut noise)).collect();
+            Ok(Shown { frames, truth: truth_s_per_m2(mesh, &touches)? })
+        })
+        .collect()
+}
+
+fn cell(method: Method, problem: &Problem, comparison: &Comparison, shown: &[Shown]) -> Result<String> {
+    let mut solver = method.build(problem)?;
+    // Correlation and seconds of the first frame and the last.
+    let mut sums = [[0.0; 2]; 2];
+    for Shown { frames, truth } in shown {
+        solver.reset();
+        for (index, readings) in frames.iter().enumerate() {
+            let begin = Instant::now();
+            let image = solver.solve(readings)?.image_s_per_m2;
+            let seconds = begin.elapsed().as_secs_f64();
+            let Some(image) = image else { return Ok("no image".to_owned()) };
+            if index == 0 || index + 1 == FRAMES {
+                let correlation = comparison.of(truth, &image).correlation.unwrap_or(0.0);
+                let sum = &mut sums[usize::from(index > 0)];
+                *sum = [sum[0] + f64::from(correlation), sum[1] + seconds];
+            }
+        }
+    }
+    let [[first, first_s], [last, last_s]] = sums.map(|sum| sum.map(|sum| sum / shown.len() as f64));
+    Ok(format!("{first:.2}, {:.1} / {last:.2}, {:.1}", 1e3 * first_s, 1e3 * last_s))
+}
