@@ -12,6 +12,7 @@ mod recording;
 mod replay;
 mod scene;
 mod source;
+mod stability;
 mod tradeoff;
 mod validate;
 
@@ -35,6 +36,7 @@ enum Command {
     Forward(Box<forward::Args>),
     Validate(validate::Args),
     Tradeoff(tradeoff::Args),
+    Stability(stability::Args),
 }
 
 /// Runs the command that was asked for.
@@ -48,5 +50,6 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Forward(args) => forward::run(&args),
         Command::Validate(args) => validate::run(&args),
         Command::Tradeoff(args) => tradeoff::run(&args),
+        Command::Stability(args) => stability::run(&args),
     }
 }

@@ -5,11 +5,14 @@ use std::time::{Duration, Instant};
 
 use super::scenes::electrode_distance_m;
 use crate::detector::Detector;
-use crate::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
+use crate::forward::{Auto, ForwardError, ForwardModel, readings_v, touched_impedance_ohm};
 use crate::readings::Readings;
 use crate::scene::{Contact, Touch};
 use crate::simulate::{Fault, FaultError, Measurement, finer_model};
 use crate::solve::{Problem, SolveError};
+
+/// Frames without contact that make the readings at rest, where those are not zero.
+const REST_FRAMES: u8 = 16;
 
 /// Why a study cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -58,7 +61,11 @@ pub struct Laboratory {
     /// Name of the inverted model.
     pub model: String,
     truth: Arc<dyn ForwardModel>,
+    /// The detector as it is measured in truth.
+    measured: Detector,
     faults: Vec<Fault>,
+    /// Readings that are taken for those at rest (V).
+    baseline: Option<Readings>,
 }
 
 impl Laboratory {
@@ -76,7 +83,16 @@ impl Laboratory {
         let problem = Problem::new(model);
         let model_time = start.elapsed();
         let truth = finer_model(detector, &[], 0)?.into();
-        Ok(Self { detector: detector.clone(), problem, model_time, model: name, truth, faults: Vec::new() })
+        Ok(Self {
+            detector: detector.clone(),
+            problem,
+            model_time,
+            model: name,
+            truth,
+            measured: detector.clone(),
+            faults: Vec::new(),
+            baseline: None,
+        })
     }
 
     /// The same detector, in truth with such faults. `seed` chooses what they leave open.
@@ -94,17 +110,27 @@ impl Laboratory {
         Ok(Self { truth, faults: faults.to_vec(), ..self.again() })
     }
 
-    /// The same, in truth another detector than the one told: thicker, or of another converter.
+    /// The same, in truth another detector than the one told: thicker, or noisier.
     ///
     /// # Errors
     /// [`StudyError`] if it cannot be modelled.
     pub fn with_truth(&self, detector: &Detector) -> Result<Self, StudyError> {
-        Ok(Self { truth: finer_model(detector, &[], 0)?.into(), ..self.again() })
+        Ok(Self { truth: finer_model(detector, &[], 0)?.into(), measured: detector.clone(), ..self.again() })
+    }
+
+    /// The same, with readings under such contacts taken for those at rest.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a contact is off the detector.
+    pub fn with_baseline(&self, contacts: &[Contact]) -> Result<Self, StudyError> {
+        let readings = readings_v(&self.truth.impedance_ohm(contacts)?, &self.measured);
+        Ok(Self { baseline: Some(readings), ..self.again() })
     }
 
     /// The same readings, measured by another converter or drive, which solvers know of.
     pub fn measured_as(&self, detector: &Detector) -> Self {
-        Self { detector: detector.clone(), problem: self.problem.measured_as(detector), ..self.again() }
+        let problem = self.problem.measured_as(detector);
+        Self { detector: detector.clone(), measured: detector.clone(), problem, ..self.again() }
     }
 
     /// The same, inverted on another model.
@@ -121,8 +147,24 @@ impl Laboratory {
             model_time: self.model_time,
             model: self.model.clone(),
             truth: Arc::clone(&self.truth),
+            measured: self.measured.clone(),
             faults: self.faults.clone(),
+            baseline: self.baseline.clone(),
         }
+    }
+
+    /// What is taken for the readings at rest: those told, or the mean of a few frames without contact, where faults show in them.
+    fn rest(&self, measurement: &mut Measurement) -> Readings {
+        let electrodes = self.detector.electrodes.len();
+        let mut rest = self.baseline.clone().unwrap_or_else(|| Readings::from_fn(electrodes, |_, _| 0.0));
+        if self.baseline.is_none() && !self.faults.is_empty() {
+            for _ in 0..REST_FRAMES {
+                let frame = measurement.readings_v(None);
+                let share = |(sum, volts): (&mut f64, &f64)| *sum += volts / f64::from(REST_FRAMES);
+                rest.volts_mut().iter_mut().zip(frame.volts()).for_each(share);
+            }
+        }
+        rest
     }
 
     /// Mean distance of electrodes (m): contacts further from the truth are counted as missed and invented.
@@ -135,7 +177,8 @@ impl Laboratory {
     /// # Errors
     /// [`StudyError`] if a touch is off the detector.
     pub fn frames(&self, touches: &[Vec<Touch>], seed: u64) -> Result<Vec<Frame>, StudyError> {
-        let mut measurement = Measurement::new(&self.detector, &self.faults, seed)?;
+        let mut measurement = Measurement::new(&self.measured, &self.faults, seed)?;
+        let rest = self.rest(&mut measurement);
         let mut frames: Vec<Frame> = Vec::with_capacity(touches.len());
         let mut last = None;
         for touches in touches {
@@ -144,11 +187,68 @@ impl Laboratory {
                 _ if touches.is_empty() => None,
                 _ => Some(touched_impedance_ohm(&*self.truth, touches)?),
             };
-            let readings = measurement.readings_v(impedance_ohm.as_ref());
+            let mut readings = measurement.readings_v(impedance_ohm.as_ref());
+            readings.volts_mut().iter_mut().zip(rest.volts()).for_each(|(volts, rest)| *volts -= rest);
             let contacts = touches.iter().map(Touch::disc).collect();
             frames.push(Frame { touches: touches.clone(), contacts, readings });
             last = Some((touches, impedance_ohm));
         }
         Ok(frames)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::scenes::SceneKind;
+
+    fn laboratory() -> Laboratory {
+        Laboratory::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
+    }
+
+    fn readings(laboratory: &Laboratory, seed: u64) -> Readings {
+        let touches = SceneKind::Firm.frames(&laboratory.detector, 1, 1);
+        laboratory.frames(&touches, seed).unwrap().remove(0).readings
+    }
+
+    #[test]
+    fn readings_are_the_finer_models_with_noise_and_those_of_a_seed() {
+        let laboratory = laboratory();
+        let first = readings(&laboratory, 1);
+        assert_eq!(first, readings(&laboratory, 1));
+        assert_ne!(first, readings(&laboratory, 2));
+        let contact = SceneKind::Firm.frames(&laboratory.detector, 1, 1)[0][0].disc().unwrap();
+        let model = readings_v(&laboratory.problem.model.impedance_ohm(&[contact]).unwrap(), &laboratory.detector);
+        let off = first.volts().iter().zip(model.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off > 0.0 && off < 0.02 * model.largest_v() + 0.006, "{off}");
+    }
+
+    #[test]
+    fn a_wrong_sign_shows_in_the_readings_at_rest_and_is_taken_off() {
+        let laboratory = laboratory();
+        let wrong = laboratory.with_faults(&[Fault::Invert { channel: 3 }], 1).unwrap();
+        let (sound, wrong) = (readings(&laboratory, 1), readings(&wrong, 1));
+        assert!(sound.at(7, 3) > 0.02 && (wrong.at(7, 3) + sound.at(7, 3)).abs() < 0.02, "{}", wrong.at(7, 3));
+        assert!((wrong.at(7, 4) - sound.at(7, 4)).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_baseline_under_load_is_taken_off() {
+        let laboratory = laboratory();
+        let contact = SceneKind::Firm.frames(&laboratory.detector, 1, 1)[0][0].disc().unwrap();
+        let loaded = readings(&laboratory.with_baseline(&[contact]).unwrap(), 1);
+        assert!(loaded.volts().iter().all(|volts| volts.abs() < 0.01), "the same contact is no change");
+    }
+
+    #[test]
+    fn solvers_know_of_another_converter_but_not_of_a_wrong_detector() {
+        let laboratory = laboratory();
+        let mut other = laboratory.detector.clone();
+        other.adc.bits = 10;
+        assert_eq!(laboratory.measured_as(&other).problem.detector().adc.bits, 10);
+        other.layers[0].thickness_m *= 2.0;
+        let wrong = laboratory.with_truth(&other).unwrap();
+        assert_eq!(wrong.problem.detector(), &laboratory.detector);
+        assert_ne!(readings(&wrong, 1), readings(&laboratory, 1));
     }
 }

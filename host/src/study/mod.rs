@@ -2,14 +2,17 @@
 //!
 //! Data always come from a [finer model](crate::simulate::finer_model) than any that is inverted, through wires, noise and converter.
 
+mod bound;
 mod data;
 mod judge;
 mod machine;
 pub mod page;
 mod scenes;
+pub mod stability;
 pub mod tradeoff;
 mod variant;
 
+pub use self::bound::{Bound, cramer_rao};
 pub use self::data::{Frame, Laboratory, StudyError};
 pub use self::judge::{Judge, Score, Summary};
 pub use self::machine::Machine;

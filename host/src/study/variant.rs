@@ -31,6 +31,20 @@ pub enum Family {
     Auto,
 }
 
+impl Family {
+    /// Its class in the style sheet of pages.
+    pub fn class(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Linear => "linear",
+            Self::Image => "image",
+            Self::Contacts => "contacts",
+            Self::Learned => "learned",
+            Self::Auto => "auto",
+        }
+    }
+}
+
 /// What family a method is of.
 pub fn family(method: Method) -> Family {
     match method.name() {

@@ -9,6 +9,8 @@ pub use self::axis::{Axis, Unit};
 pub use self::chart::{Chart, Mark, Series};
 pub use self::heat::{Cell, Heat, Row};
 
+use super::machine::Machine;
+
 const STYLE: &str = include_str!("style.css");
 
 /// A page under a title, with parts of HTML.
@@ -41,6 +43,19 @@ pub fn table(heads: &[&str], rows: &[Vec<String>]) -> String {
 /// What is folded away under a line until it is asked for.
 pub fn folded(summary: &str, content: &str) -> String {
     format!("<details><summary>{}</summary>\n{content}\n</details>", escaped(summary))
+}
+
+/// Where and how a study ran, in a few lines.
+pub fn machine(machine: &Machine, command: &str) -> String {
+    let built = if machine.optimised { "" } else { ", <b>built without optimisation: times mean nothing</b>" };
+    format!(
+        "<p class=\"note\">{} ({} cores, {}), {}{built}.<br><code>{}</code></p>",
+        escaped(&machine.processor),
+        machine.cores,
+        escaped(&machine.system),
+        escaped(&machine.version),
+        escaped(command)
+    )
 }
 
 #[cfg(test)]

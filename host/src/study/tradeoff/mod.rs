@@ -79,6 +79,8 @@ pub struct DetectorReport {
     pub model_ms: f64,
     /// What a contact missed or invented counts (m).
     pub reach_m: f64,
+    /// Solvers that cannot be made for this model, and why.
+    pub unavailable: Vec<String>,
     /// One for each solver and parameter.
     pub solvers: Vec<SolverReport>,
 }
@@ -169,10 +171,13 @@ fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str))
         false => vec![Variation::default_of(*method)],
     };
     let mut judge = Judge::new(&laboratory);
-    let mut solvers = Vec::new();
+    let (mut solvers, mut unavailable) = (Vec::new(), Vec::new());
     for variation in plan.methods.iter().flat_map(sweep) {
         progress(&format!("{}: {}", detector.name, variation.label()));
-        solvers.push(try_variation(plan, &laboratory, &scenes, &mut judge, variation)?);
+        match try_variation(plan, &laboratory, &scenes, &mut judge, variation) {
+            Ok(report) => solvers.push(report),
+            Err(error) => unavailable.push(format!("{}: {error}", variation.label())),
+        }
     }
     Ok(DetectorReport {
         detector: detector.name.clone(),
@@ -180,6 +185,7 @@ fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str))
         model: laboratory.model.clone(),
         model_ms: milliseconds(laboratory.model_time),
         reach_m: laboratory.reach_m(),
+        unavailable,
         solvers,
     })
 }

@@ -3,8 +3,7 @@
 use super::table::{label, names, number};
 use super::{DetectorReport, Group, Report, SceneKind, SolverReport};
 use crate::study::judge::Summary;
-use crate::study::machine::Machine;
-use crate::study::page::{Axis, Chart, Mark, Series, Unit, escaped, folded, html, table};
+use crate::study::page::{Axis, Chart, Mark, Series, Unit, escaped, folded, html, machine, table};
 use crate::study::variant::Family;
 
 /// Errors below this show there (m).
@@ -47,22 +46,10 @@ fn legend(report: &Report) -> String {
         (Family::Auto, "chooses by itself"),
     ] {
         if solvers().any(|solver| solver.family == family) {
-            items += &format!("<li class=\"{}\">{name}</li>", class(family));
+            items += &format!("<li class=\"{}\">{name}</li>", family.class());
         }
     }
     format!("<ul class=\"legend\">{items}</ul>")
-}
-
-/// Its class in the style sheet.
-fn class(family: Family) -> &'static str {
-    match family {
-        Family::Paper => "paper",
-        Family::Linear => "linear",
-        Family::Image => "image",
-        Family::Contacts => "contacts",
-        Family::Learned => "learned",
-        Family::Auto => "auto",
-    }
 }
 
 fn of_detector(report: &DetectorReport) -> String {
@@ -170,7 +157,7 @@ fn series<'a>(
             Some(series) => series.marks.push(mark),
             None => all.push(Series {
                 name: solver.solver.clone(),
-                class: class(solver.family),
+                class: solver.family.class(),
                 marks: vec![mark],
                 main: 0,
                 is_joined: false,
@@ -209,7 +196,8 @@ fn nothing(report: &DetectorReport) -> String {
         true => "no solver finds a contact".to_owned(),
         false => format!("contacts are invented by {}", inventors.join(", ")),
     };
-    format!("<p><b>Where nothing touches</b>, {told}.</p>")
+    let untried: String = report.unavailable.iter().map(|why| format!(" Not tried: {}.", escaped(why))).collect();
+    format!("<p><b>Where nothing touches</b>, {told}.{untried}</p>")
 }
 
 fn costs(report: &DetectorReport) -> String {
@@ -307,17 +295,4 @@ fn footer(report: &Report) -> String {
         report.places, report.frames, report.seed
     );
     format!("<h2>How it was measured</h2>\n<p class=\"note\">{text}</p>\n{}", machine(&report.machine, &report.command))
-}
-
-/// Where and how a study ran.
-pub(crate) fn machine(machine: &Machine, command: &str) -> String {
-    let built = if machine.optimised { "" } else { ", <b>built without optimisation: times mean nothing</b>" };
-    format!(
-        "<p class=\"note\">{} ({} cores, {}), {}{built}.<br><code>{}</code></p>",
-        escaped(&machine.processor),
-        machine.cores,
-        escaped(&machine.system),
-        escaped(&machine.version),
-        escaped(command)
-    )
 }

@@ -29,6 +29,7 @@ pub fn table(report: &Report) -> String {
             "Dice"
         ));
         lines.extend(detector.solvers.iter().map(line));
+        lines.extend(detector.unavailable.iter().map(|why| format!("not tried: {why}")));
         lines.push(String::new());
     }
     lines.push("one, several: mean error with contacts missed and invented; conduct.: relative error of one contact's; correl., Dice: images of".to_owned());

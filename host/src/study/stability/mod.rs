@@ -1,0 +1,16 @@
+//! Where methods fail: each thing that can go wrong, swept from harmless to hopeless.
+
+mod bounds;
+mod breakdown;
+mod faults;
+mod page;
+mod scenes;
+mod sweep;
+mod table;
+mod wrong;
+
+pub use self::bounds::{BoundChart, BoundCurve, BoundReport};
+pub use self::breakdown::{Break, Breakdown, CellReport};
+pub use self::page::page;
+pub use self::sweep::{Plan, PointReport, Report, SolverRow, SweepReport, run};
+pub use self::table::table;
