@@ -42,6 +42,14 @@ impl Readings {
         &mut self.volts
     }
 
+    /// The readings of some electrodes alone, in this order.
+    ///
+    /// # Panics
+    /// If there is no such electrode.
+    pub fn of(&self, electrodes: &[usize]) -> Self {
+        Self::from_fn(electrodes.len(), |g, e| self.at(electrodes[g], electrodes[e]))
+    }
+
     /// The largest (V); zero if there are none.
     pub fn largest_v(&self) -> f64 {
         self.volts.iter().copied().fold(0.0, f64::max)

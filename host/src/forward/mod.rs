@@ -12,6 +12,7 @@ pub mod shell;
 mod slab;
 pub mod spots;
 mod spread;
+mod through;
 
 use nalgebra::DMatrix;
 
@@ -22,6 +23,7 @@ pub use self::patches::Patches;
 pub use self::slab::{Resolution, Slab};
 use self::spots::SpotFields;
 pub use self::spread::touched_impedance_ohm;
+pub use self::through::Through;
 use crate::detector::Detector;
 use crate::readings::Readings;
 use crate::scene::Contact;

@@ -1,7 +1,7 @@
 //! The solvers by their names.
 
 use super::{
-    ContactSettings, Contacts, Lambda, Nonlinear, NonlinearSettings, Problem, Solver, Tikhonov, Tsvd, Variant,
+    Auto, ContactSettings, Contacts, Lambda, Nonlinear, NonlinearSettings, Problem, Solver, Tikhonov, Tsvd, Variant,
 };
 use crate::forward::ForwardError;
 
@@ -14,6 +14,8 @@ pub enum Method {
     TikhonovPaper,
     /// A few contacts fitted to the full contact physics.
     Contacts,
+    /// No more of these than the scene needs.
+    Auto,
     /// Linear image from the first singular images alone.
     Tsvd,
     /// Linear image that makes up for sensitivity.
@@ -26,8 +28,16 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Tikhonov, Self::TikhonovPaper, Self::Tsvd, Self::Noser, Self::Laplace, Self::Nonlinear, Self::Contacts];
+    pub const ALL: [Self; 8] = [
+        Self::Tikhonov,
+        Self::TikhonovPaper,
+        Self::Tsvd,
+        Self::Noser,
+        Self::Laplace,
+        Self::Nonlinear,
+        Self::Contacts,
+        Self::Auto,
+    ];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
@@ -35,6 +45,7 @@ impl Method {
             Self::Tikhonov => "tikhonov",
             Self::TikhonovPaper => "tikhonov-paper",
             Self::Contacts => "contacts",
+            Self::Auto => "auto",
             Self::Tsvd => "tsvd",
             Self::Noser => "noser",
             Self::Laplace => "laplace",
@@ -48,6 +59,7 @@ impl Method {
             Self::Tikhonov => "linear image of the readings less the force; a contact at each of its peaks",
             Self::TikhonovPaper => "linear image and one contact at its centroid, as in the paper",
             Self::Contacts => "up to five contacts fitted to the full contact physics, as many as the readings ask for",
+            Self::Auto => "nothing, contacts or an image: no more than the scene needs",
             Self::Tsvd => "linear image from the first singular images alone",
             Self::Noser => "linear image that makes up for places that readings hear less",
             Self::Laplace => "linear image with a prior of smoothness",
@@ -65,6 +77,7 @@ impl Method {
             Self::Tikhonov => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Balanced)),
             Self::TikhonovPaper => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Paper)),
             Self::Contacts => Box::new(Contacts::new(problem, ContactSettings::of(problem))?),
+            Self::Auto => Box::new(Auto::new(problem)?),
             Self::Tsvd => Box::new(Tsvd::new(jacobian, Tsvd::SHARE)),
             Self::Noser => Box::new(Tikhonov::noser(jacobian, Lambda::default())),
             Self::Laplace => Box::new(Tikhonov::laplace(jacobian)?),

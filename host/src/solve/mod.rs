@@ -1,7 +1,12 @@
 //! From readings back to touch: one file a method, one trait.
 
+use std::time::Duration;
+
+mod auto;
 mod balance;
 mod contacts;
+mod guard;
+mod health;
 mod interpolate;
 mod lambda;
 mod laplace;
@@ -17,7 +22,10 @@ mod tikhonov;
 mod track;
 mod tsvd;
 
+pub use self::auto::Auto;
 pub use self::contacts::{ContactSettings, Contacts};
+pub use self::guard::Guard;
+pub use self::health::{Ailment, ailing};
 pub use self::lambda::Lambda;
 use self::lambda::Spectrum;
 pub use self::method::Method;
@@ -40,6 +48,12 @@ pub trait Solver: Send {
 
     /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.
     fn reset(&mut self) {}
+
+    /// Asks for answers that take no longer than this on the average; `None` for the best ones, however long they take, which is
+    /// how a solver begins.
+    fn keep_within(&mut self, period: Option<Duration>) {
+        let _ = period;
+    }
 }
 
 /// What a solver found.
@@ -154,12 +168,18 @@ impl Readings {
     /// # Errors
     /// [`SolveError`], which says what is wrong.
     pub fn check(&self, electrodes: usize) -> Result<(), SolveError> {
-        if self.electrodes() != electrodes {
-            return Err(SolveError::Electrodes { found: self.electrodes(), expected: electrodes });
-        }
+        self.check_count(electrodes)?;
         match self.volts().iter().position(|volts| !volts.is_finite()) {
             Some(index) => Err(SolveError::NotFinite { g: index / electrodes, e: index % electrodes }),
             None => Ok(()),
+        }
+    }
+
+    /// Checks that there is a number for each pair of `electrodes`.
+    fn check_count(&self, electrodes: usize) -> Result<(), SolveError> {
+        match self.electrodes() == electrodes {
+            true => Ok(()),
+            false => Err(SolveError::Electrodes { found: self.electrodes(), expected: electrodes }),
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::detector::Detector;
-use crate::forward::ForwardModel;
 use crate::forward::jacobian::Jacobian;
+use crate::forward::{ForwardModel, Through};
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -42,5 +42,19 @@ impl Problem {
     pub fn spacing_m(&self) -> f64 {
         let area_m2: f64 = self.jacobian.image_mesh.node_areas_m2.iter().sum();
         (area_m2 / self.detector().electrodes.len().max(1) as f64).sqrt()
+    }
+
+    /// The problem through some of its electrodes, in this order.
+    pub fn through(&self, kept: &[usize]) -> Self {
+        let mut detector = self.detector().clone();
+        detector.electrodes = kept.iter().map(|e| detector.electrodes[*e]).collect();
+        let jacobian = Jacobian {
+            detector,
+            fields_ohm: self.jacobian.fields_ohm.select_columns(kept),
+            electrode_fields_ohm: self.jacobian.electrode_fields_ohm.select_rows(kept).select_columns(kept),
+            ..(*self.jacobian).clone()
+        };
+        let model = Through::new(Arc::clone(&self.model), kept.to_vec());
+        Self { model: Arc::new(model), jacobian: Arc::new(jacobian) }
     }
 }

@@ -122,11 +122,11 @@ impl SurfaceKernel {
     fn smooth_part(&self, x: &Taps, x_slopes: &[f64; 4], y: &Taps, y_slopes: &[f64; 4]) -> [f64; 3] {
         let stride = self.grid.nodes(1);
         let (mut values, mut slopes) = ([0.0; 4], [0.0; 4]);
-        for i in 0..4 {
+        for (i, (weight, slope)) in x.1.iter().zip(x_slopes).enumerate() {
             let start = (x.0 + i) * stride + y.0;
             for (lane, value) in self.smooth[start..start + 4].iter().enumerate() {
-                values[lane] += x.1[i] * value;
-                slopes[lane] += x_slopes[i] * value;
+                values[lane] += weight * value;
+                slopes[lane] += slope * value;
             }
         }
         let along = |lanes: &[f64; 4], weights: &[f64; 4]| lanes.iter().zip(weights).map(|(a, b)| a * b).sum::<f64>();

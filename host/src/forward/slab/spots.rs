@@ -46,8 +46,8 @@ impl SlabSpots {
         let distance_m = apart[0].hypot(apart[1]);
         let [ohm, ohm_per_m] = self.slab.top.near(distance_m);
         field.ohm += ohm;
-        for axis in 0..2 {
-            let slope = ohm_per_m * apart[axis] / distance_m.max(f64::MIN_POSITIVE);
+        for (axis, apart_m) in apart.into_iter().enumerate() {
+            let slope = ohm_per_m * apart_m / distance_m.max(f64::MIN_POSITIVE);
             field.by_first[axis] += slope;
             field.by_second[axis] -= slope * image.sign()[axis];
         }

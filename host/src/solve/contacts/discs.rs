@@ -20,6 +20,9 @@ const CONDUCTANCE_DEVIATION: f64 = 4.0;
 const DIFFERENCE: f64 = 1e-3;
 /// Longest change of a logarithm in a step.
 const LONGEST_LOG: f64 = 0.7;
+/// After so many steps, a fit that still leaves this times what noise and model error make is given up.
+const PROBATION: usize = 5;
+const HOPELESS: f64 = 100.0;
 /// Widest radius, in halves of the detector's shorter side: what is wider is an image's business.
 const WIDEST: f64 = 0.6;
 /// Tries of one step, and the share of the cost below which a step is the last.
@@ -54,7 +57,10 @@ impl DiscFitter<'_> {
         let mut at = start;
         let mut residuals = self.residuals(&at, target)?;
         let (mut damping, mut settled, mut normal) = (1e-3, false, None);
-        for _ in 0..steps {
+        for count in 0..steps {
+            if count == PROBATION && dot(&residuals, &residuals) > HOPELESS * target.count() as f64 {
+                return None;
+            }
             let (matrix, gradient) = self.equations(&at, &residuals, target)?;
             let next = self.step(&at, &residuals, target, (&matrix, &gradient), &mut damping);
             normal = Some(matrix);

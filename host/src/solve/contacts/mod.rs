@@ -12,6 +12,8 @@ mod network;
 mod scan;
 mod search;
 mod target;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::DMatrix;
 
@@ -68,6 +70,17 @@ pub struct Contacts {
     errors: Errors,
     last: Option<Explanation>,
     tracker: Tracker,
+}
+
+/// How much is tried for a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// Contacts are followed, and searched anew where that does not explain the readings.
+    AsNeeded,
+    /// They are searched anew.
+    Anew,
+    /// They are followed, whatever is left.
+    FollowOnly,
 }
 
 /// Contacts that explain a frame.
@@ -134,6 +147,29 @@ impl Contacts {
             last: None,
             tracker: Tracker::new(problem.spacing_m()),
         })
+    }
+
+    /// Solves with a limit to what is tried.
+    ///
+    /// # Errors
+    /// As for [`Solver::solve`].
+    pub(super) fn solve_with(&mut self, readings: &Readings, effort: Effort) -> Result<Solution, SolveError> {
+        readings.check(self.network.electrodes())?;
+        let target = Target::new(readings, &self.errors);
+        let last = self.last.take();
+        self.last = match (effort, last) {
+            (Effort::AsNeeded, last) => self.search(last, &target),
+            (Effort::Anew, _) => self.search_anew(&target),
+            (Effort::FollowOnly, last) => last.and_then(|last| self.follow(last, &target)),
+        };
+        let mut solution = self.last.as_ref().map_or_else(Solution::default, |found| self.solution(found, &target));
+        self.tracker.follow(&mut solution.contacts);
+        Ok(solution)
+    }
+
+    /// Whether there are contacts to follow.
+    pub(super) fn is_following(&self) -> bool {
+        self.last.is_some()
     }
 
     fn contact(&self, spot: &FitSpot) -> Contact {
@@ -205,13 +241,7 @@ impl Solver for Contacts {
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        readings.check(self.network.electrodes())?;
-        let target = Target::new(readings, &self.errors);
-        let last = self.last.take();
-        self.last = self.search(last, &target);
-        let mut solution = self.last.as_ref().map_or_else(Solution::default, |found| self.solution(found, &target));
-        self.tracker.follow(&mut solution.contacts);
-        Ok(solution)
+        self.solve_with(readings, Effort::AsNeeded)
     }
 
     fn reset(&mut self) {

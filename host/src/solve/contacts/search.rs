@@ -7,6 +7,7 @@ use super::scan::{Candidate, Looks};
 use super::target::Target;
 use super::{Contacts, Explanation};
 use crate::forward::readings_v;
+use crate::readings::Readings;
 use crate::scene::Contact;
 use crate::space::{self, Place};
 
@@ -38,17 +39,29 @@ const WORSE: f64 = 1.3;
 const WEAK: f64 = 0.2;
 
 impl Contacts {
+    /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
+    pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
+        let target = Target::new(readings, &self.errors);
+        let fitter = self.fitter();
+        let looks = self.scan.at_first(&fitter, &target);
+        let first = self.scan.ones(&looks, STARTS, self.apart_m());
+        let starts = first.iter().map(|candidate| self.scan.start(&fitter, &looks, candidate)).collect();
+        Some(lowest(&fitter, starts, &target)?.cost / target.count().max(1) as f64)
+    }
+
     /// What explains a frame, from what explained the one before.
     pub(super) fn search(&self, last: Option<Explanation>, target: &Target) -> Option<Explanation> {
+        let known = last.as_ref().map_or(f64::INFINITY, Explanation::cost);
         match last.and_then(|last| self.follow(last, target)) {
-            Some(found) => Some(found),
-            None => self.search_anew(target),
+            Some(found) if found.cost() <= (WORSE * known).max(target.count() as f64) && !is_weak(&found) => {
+                Some(found)
+            }
+            _ => self.search_anew(target),
         }
     }
 
-    /// The same contacts in the next frame; `None` if they do not explain it.
-    fn follow(&self, last: Explanation, target: &Target) -> Option<Explanation> {
-        let enough = (WORSE * last.cost()).max(target.count() as f64);
+    /// The same contacts in the next frame; `None` if that makes no sense.
+    pub(super) fn follow(&self, last: Explanation, target: &Target) -> Option<Explanation> {
         let found = match last {
             Explanation::Spots(fit, correction_v) => {
                 let moved = self.fitter().fit(fit.spots.clone(), &target.less(&correction_v), WARM_STEPS)?;
@@ -62,10 +75,10 @@ impl Contacts {
                 Explanation::Discs(self.disc_fitter().fit(fit.contacts, target, WARM_DISC_STEPS)?)
             }
         };
-        (found.cost() <= enough && !is_weak(&found)).then_some(found)
+        Some(found)
     }
 
-    fn search_anew(&self, target: &Target) -> Option<Explanation> {
+    pub(super) fn search_anew(&self, target: &Target) -> Option<Explanation> {
         let fitter = self.fitter();
         let looks = self.scan.at_first(&fitter, target);
         let first = self.scan.ones(&looks, STARTS, self.apart_m());
