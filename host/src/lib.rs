@@ -8,6 +8,7 @@
 pub mod case;
 pub mod detector;
 pub mod forward;
+pub mod frames;
 mod geometry;
 pub mod hertz;
 pub mod live;
@@ -20,4 +21,5 @@ pub mod solve;
 pub mod source;
 mod space;
 pub mod study;
+pub mod table;
 pub mod validate;

@@ -26,7 +26,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-const MAGIC: [u8; 8] = *b"\x89TCTO\r\n\x1a";
+/// What a recording begins with.
+pub const MAGIC: [u8; 8] = *b"\x89TCTO\r\n\x1a";
 const VERSION: u8 = 1;
 /// Most bytes in a chunk.
 const MAX_CHUNK: usize = 65_536;

@@ -17,7 +17,7 @@ fn failure(args: &[&str]) -> (Option<i32>, String) {
 
 #[test]
 fn every_command_has_a_help_with_an_example() {
-    for command in ["live", "ports", "record", "replay", "forward", "validate", "detector"] {
+    for command in ["live", "ports", "record", "replay", "forward", "validate", "reconstruct", "detector"] {
         let output = tactomo(&[command, "--help"]);
         let text = String::from_utf8(output.stdout).unwrap();
         assert_eq!(output.status.code(), Some(0));

@@ -7,6 +7,7 @@ mod interrupt;
 mod live;
 mod output;
 mod ports;
+mod reconstruct;
 mod record;
 mod recording;
 mod replay;
@@ -37,6 +38,7 @@ enum Command {
     Validate(validate::Args),
     Tradeoff(tradeoff::Args),
     Stability(stability::Args),
+    Reconstruct(reconstruct::Args),
 }
 
 /// Runs the command that was asked for.
@@ -51,5 +53,6 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Validate(args) => validate::run(&args),
         Command::Tradeoff(args) => tradeoff::run(&args),
         Command::Stability(args) => stability::run(&args),
+        Command::Reconstruct(args) => reconstruct::run(&args),
     }
 }

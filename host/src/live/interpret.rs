@@ -79,10 +79,10 @@ impl Interpreter {
         let volts_per_unit = self.volts_per_code / f64::from(1u32 << frame.head.fraction_bits.min(31));
         let units = frame.readings.iter().map(|units| f64::from(*units));
         self.readings.volts_mut().iter_mut().zip(units).for_each(|(volts, units)| *volts = units * volts_per_unit);
-        if self.rest.add(&self.readings) {
+        if self.rest.add(self.readings.volts()) {
             self.check_rest();
         }
-        self.rest.subtract(&self.readings, &mut self.touch);
+        self.rest.subtract(self.readings.volts(), self.touch.volts_mut());
         let Some(solver) = &mut self.solver else { return Ok(Some(Solution::default())) };
         solver.solve(&self.touch).map(Some)
     }

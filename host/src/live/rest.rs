@@ -1,9 +1,7 @@
 //! The readings at rest, which are subtracted from all others.
 
-use crate::readings::Readings;
-
 /// Frames that are averaged.
-const FRAMES: u32 = 32;
+pub const FRAMES: u32 = 32;
 
 /// Mean readings of a detector that nothing touches.
 ///
@@ -12,6 +10,8 @@ const FRAMES: u32 = 32;
 pub struct Rest {
     mean_v: Vec<f64>,
     sum_v: Vec<f64>,
+    /// Frames that are averaged.
+    frames: u32,
     /// Frames still to come.
     missing: u32,
 }
@@ -19,13 +19,18 @@ pub struct Rest {
 impl Rest {
     /// Zeros for `count` readings, until the first frames have given the true ones.
     pub fn new(count: usize) -> Self {
-        Self { mean_v: vec![0.0; count], sum_v: vec![0.0; count], missing: FRAMES }
+        Self::over(FRAMES, count)
+    }
+
+    /// The same with the mean of other than the usual number of frames; of none it stays zero.
+    pub fn over(frames: u32, count: usize) -> Self {
+        Self { mean_v: vec![0.0; count], sum_v: vec![0.0; count], frames, missing: frames }
     }
 
     /// Takes the mean anew from the frames to come; until then the old one holds.
     pub fn renew(&mut self) {
         self.sum_v.fill(0.0);
-        self.missing = FRAMES;
+        self.missing = self.frames;
     }
 
     /// Whether the mean is being taken.
@@ -33,15 +38,15 @@ impl Rest {
         self.missing > 0
     }
 
-    /// Takes `readings` into the mean, if that is being taken; returns whether this has completed it.
-    pub fn add(&mut self, readings: &Readings) -> bool {
+    /// Takes `readings_v` into the mean, if that is being taken; returns whether this has completed it.
+    pub fn add(&mut self, readings_v: &[f64]) -> bool {
         if self.missing == 0 {
             return false;
         }
-        self.sum_v.iter_mut().zip(readings.volts()).for_each(|(sum, volts)| *sum += volts);
+        self.sum_v.iter_mut().zip(readings_v).for_each(|(sum, volts)| *sum += volts);
         self.missing -= 1;
         if self.missing == 0 {
-            self.mean_v.iter_mut().zip(&self.sum_v).for_each(|(mean, sum)| *mean = sum / f64::from(FRAMES));
+            self.mean_v.iter_mut().zip(&self.sum_v).for_each(|(mean, sum)| *mean = sum / f64::from(self.frames));
         }
         self.missing == 0
     }
@@ -51,10 +56,10 @@ impl Rest {
         self.mean_v.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Puts `readings` less those at rest into `touch`.
-    pub fn subtract(&self, readings: &Readings, touch: &mut Readings) {
-        let pairs = readings.volts().iter().zip(&self.mean_v);
-        touch.volts_mut().iter_mut().zip(pairs).for_each(|(touch, (volts, rest))| *touch = volts - rest);
+    /// Puts `readings_v` less those at rest into `touch_v`.
+    pub fn subtract(&self, readings_v: &[f64], touch_v: &mut [f64]) {
+        let pairs = readings_v.iter().zip(&self.mean_v);
+        touch_v.iter_mut().zip(pairs).for_each(|(touch, (volts, rest))| *touch = volts - rest);
     }
 }
 
@@ -62,15 +67,15 @@ impl Rest {
 mod tests {
     use super::*;
 
-    fn touch(rest: &Rest, readings: &Readings) -> Readings {
-        let mut touch = readings.clone();
-        rest.subtract(readings, &mut touch);
-        touch
+    fn touch(rest: &Rest, readings_v: &[f64]) -> Vec<f64> {
+        let mut touch_v = readings_v.to_vec();
+        rest.subtract(readings_v, &mut touch_v);
+        touch_v
     }
 
     #[test]
     fn the_mean_of_the_first_frames_is_subtracted_and_can_be_renewed() {
-        let even = |volts: f64| Readings::from_fn(4, |_, _| volts);
+        let even = |volts: f64| vec![volts; 16];
         let mut rest = Rest::new(16);
         for i in 0..FRAMES {
             assert_eq!(touch(&rest, &even(1.0)), even(1.0), "nothing is subtracted before the mean is known");

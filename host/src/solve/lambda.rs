@@ -44,6 +44,24 @@ impl Default for Lambda {
     }
 }
 
+impl std::str::FromStr for Lambda {
+    type Err = String;
+
+    /// A share of the largest singular value, or `discrepancy`, `l-curve`, `gcv`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.parse::<f64>()) {
+            ("discrepancy", _) => Ok(Self::Discrepancy(1.0)),
+            ("l-curve", _) => Ok(Self::LCurve),
+            ("gcv", _) => Ok(Self::Gcv),
+            (_, Ok(share)) if share > 0.0 && share.is_finite() => Ok(Self::Relative(share)),
+            _ => {
+                Err("a share of the largest singular value above zero, discrepancy, l-curve or gcv is needed"
+                    .to_owned())
+            }
+        }
+    }
+}
+
 /// The readings of a frame in terms of those that images can give.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spectrum<'a> {
@@ -91,7 +109,7 @@ impl Spectrum<'_> {
     }
 
     /// Square of the noise of a reading (V2), or of what stands for it.
-    fn noise_v2(&self) -> f64 {
+    pub fn noise_v2(&self) -> f64 {
         let free = self.readings.saturating_sub(self.singular_values.len()).max(1);
         (self.outside_v2 / free as f64).max(self.noise_v * self.noise_v)
     }
@@ -280,6 +298,15 @@ mod tests {
                     assert!((9e-5..=100.1).contains(&lambda), "{rule:?}: {lambda}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn rules_are_read_by_their_names() {
+        assert_eq!("0.05".parse(), Ok(Lambda::Relative(0.05)));
+        assert_eq!("l-curve".parse(), Ok(Lambda::LCurve));
+        for wrong in ["-1", "0", "nan", "inf", "much"] {
+            assert!(wrong.parse::<Lambda>().is_err(), "{wrong}");
         }
     }
 

@@ -9,7 +9,7 @@
 use nalgebra::DMatrix;
 
 use super::balance;
-use super::{SolveError, Spectrum};
+use super::{Flags, SolveError, Spectrum};
 use crate::forward::jacobian::Jacobian;
 use crate::readings::Readings;
 
@@ -106,6 +106,14 @@ fn sources_of_nodes(jacobian: &Jacobian) -> DMatrix<f64> {
     })
 }
 
+/// Readings above this share of the converter's range, or of the drive, say nothing.
+const FULL: f64 = 0.995;
+/// Readings do not fit if more than this share of them is what no image gives; of touches of any shape it was 0.07 at most, of shorted,
+/// exchanged and inverted electrodes more than 0.09.
+const OUTSIDE: f64 = 0.08;
+/// It counts where it is above so many deviations of noise.
+const OUTSIDE_NOISE: f64 = 3.0;
+
 /// What is done to the readings before an image is made of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Force {
@@ -121,6 +129,8 @@ pub struct LinearImage {
     electrodes: usize,
     drive_v: f64,
     noise_v: f64,
+    /// Smallest reading (V) that says nothing.
+    full_v: f64,
     singular_values: Vec<f64>,
     /// `rank x electrodes^2`, row by row: from readings to coefficients.
     to_coefficients: Vec<f32>,
@@ -137,6 +147,7 @@ impl LinearImage {
             electrodes: jacobian.electrodes(),
             drive_v: jacobian.detector.drive_v,
             noise_v: jacobian.detector.adc.deviation_v(),
+            full_v: FULL * jacobian.detector.adc.full_scale_v.min(jacobian.detector.drive_v),
             singular_values,
             to_coefficients: single(&readings),
             to_image: single(&images),
@@ -173,6 +184,18 @@ impl LinearImage {
             readings: volts.len(),
             noise_v: self.noise_v,
         })
+    }
+
+    /// What to know of the image of a spectrum.
+    pub fn flags(&self, readings: &Readings, spectrum: &Spectrum) -> Flags {
+        let beyond = |volts: f64| volts.abs() > self.drive_v;
+        let outside_v2 = spectrum.noise_v2();
+        let misfit = spectrum.outside() > OUTSIDE && outside_v2.sqrt() > OUTSIDE_NOISE * self.noise_v;
+        Flags {
+            saturated: readings.largest_v() >= self.full_v,
+            misfit: misfit || readings.volts().iter().copied().any(beyond),
+            ..Flags::default()
+        }
     }
 
     /// The image of so much of each of its singular images (S/m2 at each node).

@@ -1,7 +1,8 @@
 //! The solvers by their names.
 
 use super::{
-    Auto, ContactSettings, Contacts, Lambda, Nonlinear, NonlinearSettings, Problem, Solver, Tikhonov, Tsvd, Variant,
+    Auto, ContactSettings, Contacts, KernelSolver, Lambda, Nonlinear, NonlinearSettings, Problem, Solver, Tikhonov,
+    Tsvd, Variant,
 };
 use crate::forward::ForwardError;
 
@@ -24,17 +25,20 @@ pub enum Method {
     Laplace,
     /// Image by the full contact physics.
     Nonlinear,
+    /// Regression from presses at known places.
+    Kernel,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Tikhonov,
         Self::TikhonovPaper,
         Self::Tsvd,
         Self::Noser,
         Self::Laplace,
         Self::Nonlinear,
+        Self::Kernel,
         Self::Contacts,
         Self::Auto,
     ];
@@ -50,6 +54,7 @@ impl Method {
             Self::Noser => "noser",
             Self::Laplace => "laplace",
             Self::Nonlinear => "nonlinear",
+            Self::Kernel => "kernel",
         }
     }
 
@@ -64,6 +69,9 @@ impl Method {
             Self::Noser => "linear image that makes up for places that readings hear less",
             Self::Laplace => "linear image with a prior of smoothness",
             Self::Nonlinear => "image of conductance by the full contact physics, never negative",
+            Self::Kernel => {
+                "one contact, by regression from presses at known places (simulated, unless real ones are told)"
+            }
         }
     }
 
@@ -82,6 +90,7 @@ impl Method {
             Self::Noser => Box::new(Tikhonov::noser(jacobian, Lambda::default())),
             Self::Laplace => Box::new(Tikhonov::laplace(jacobian)?),
             Self::Nonlinear => Box::new(Nonlinear::new(problem, NonlinearSettings::default())?),
+            Self::Kernel => Box::new(KernelSolver::new(problem)?),
         })
     }
 }

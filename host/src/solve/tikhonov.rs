@@ -88,6 +88,7 @@ impl Tikhonov {
         Ok(Solution {
             image_s_per_m2: Some(self.linear.image_s_per_m2(&shares)),
             residual: Some(spectrum.deviations(left_v2)),
+            flags: self.linear.flags(readings, &spectrum),
             choice: self.rule.choice(&spectrum, lambda, left_v2),
             ..Solution::default()
         })

@@ -47,6 +47,7 @@ impl Solver for Tsvd {
         Ok(Solution {
             contacts,
             residual: Some(spectrum.deviations(left_v2)),
+            flags: self.linear.flags(readings, &spectrum),
             image_s_per_m2: Some(image),
             ..Solution::default()
         })

@@ -1,0 +1,196 @@
+//! Numbers in files of others: CSV, NPY and NPZ, recognised by what is in them. None of it is trusted.
+
+mod csv;
+mod npy;
+mod npz;
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+pub use self::npz::NpzWriter;
+
+/// Longest file that is read (bytes).
+const LONGEST: u64 = 1 << 28;
+
+/// Numbers of some shape, the last axis running fastest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Array {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// As many as the product of the lengths.
+    pub values: Vec<f64>,
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Table {
+    /// Columns of text, with names if its first line has them.
+    Columns {
+        /// A name for each column, or none at all.
+        names: Vec<String>,
+        /// A row a line.
+        rows: Array,
+    },
+    /// Arrays with names, in the order of the file; a lone array has the name `array`.
+    Arrays(Vec<(String, Array)>),
+}
+
+/// Why a file is no table.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// It cannot be opened or read.
+    #[error("cannot read {path}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// It is longer than anything that belongs here.
+    #[error("{path} is longer than {} MB: cut it into pieces", LONGEST >> 20)]
+    Long {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It is not what it seems.
+    #[error("{path}: {what}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what is needed.
+        what: String,
+    },
+}
+
+impl Table {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`TableError`], which says where the file is wrong.
+    pub fn read(path: &Path) -> Result<Self, TableError> {
+        let read = |source| TableError::Read { path: path.to_owned(), source };
+        let mut bytes = Vec::new();
+        File::open(path).map_err(read)?.take(LONGEST + 1).read_to_end(&mut bytes).map_err(read)?;
+        if bytes.len() as u64 > LONGEST {
+            return Err(TableError::Long { path: path.to_owned() });
+        }
+        Self::parse(&bytes).map_err(|what| TableError::Format { path: path.to_owned(), what })
+    }
+
+    /// Reads the bytes of a file.
+    ///
+    /// # Errors
+    /// What is wrong and where.
+    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+        if npz::is_npz(bytes) {
+            return npz::parse(bytes).map(Self::Arrays);
+        }
+        if npy::is_npy(bytes) {
+            return Ok(Self::Arrays(vec![("array".to_owned(), npy::parse(bytes)?)]));
+        }
+        let text = str::from_utf8(bytes).map_err(|_| "this is neither text nor NPY nor NPZ".to_owned())?;
+        let (names, rows) = csv::parse(text)?;
+        Ok(Self::Columns { names, rows })
+    }
+
+    /// The array of a name, or the lone one.
+    ///
+    /// # Errors
+    /// The names that there are.
+    pub fn array(self, wanted: &[&str]) -> Result<Array, String> {
+        let mut arrays = match self {
+            Self::Columns { rows, .. } => return Ok(rows),
+            Self::Arrays(arrays) => arrays,
+        };
+        if let Some(index) = arrays.iter().position(|(name, _)| wanted.contains(&name.as_str())) {
+            return Ok(arrays.swap_remove(index).1);
+        }
+        match &mut arrays[..] {
+            [(_, lone)] => Ok(std::mem::take(lone)),
+            _ => Err(format!("no array is called {}; there are {}", wanted.join(" or "), names(&arrays))),
+        }
+    }
+}
+
+/// Names of arrays, for messages.
+fn names(arrays: &[(String, Array)]) -> String {
+    let names: Vec<_> = arrays.iter().map(|(name, _)| name.escape_debug().to_string()).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+}
+
+impl Array {
+    /// Numbers in a row.
+    pub fn flat(values: Vec<f64>) -> Self {
+        Self { shape: vec![values.len()], values }
+    }
+
+    /// Length of the first axis; 1 for a number.
+    pub fn rows(&self) -> usize {
+        self.shape.first().copied().unwrap_or(1)
+    }
+
+    /// Numbers in each row.
+    pub fn columns(&self) -> usize {
+        self.shape.iter().skip(1).product()
+    }
+
+    /// Shape for messages: `3 x 256`.
+    pub fn shape_text(&self) -> String {
+        self.shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn arrays_are_found_by_name_or_alone() {
+        let [one, two] = [1.0, 2.0].map(|value| Array::flat(vec![value]));
+        let both = || Table::Arrays(vec![("x".into(), one.clone()), ("readings_v".into(), two.clone())]);
+        assert_eq!(both().array(&["readings_v"]), Ok(two.clone()));
+        assert_eq!(both().array(&["y"]).unwrap_err(), "no array is called y; there are x, readings_v");
+        assert_eq!(Table::Arrays(vec![("x".into(), one.clone())]).array(&["y"]), Ok(one));
+        assert!(Table::Arrays(Vec::new()).array(&["y"]).is_err());
+    }
+
+    #[test]
+    fn a_missing_file_and_other_bytes_are_told() {
+        let missing = Table::read(Path::new("no/such.csv")).unwrap_err();
+        assert_eq!(missing.to_string(), "cannot read no/such.csv");
+        assert!(Table::parse(&[0xff, 0xfe, 0]).unwrap_err().contains("neither text nor NPY"));
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_read_without_panic(
+            start in prop::sample::select(vec![&b""[..], b"PK\x03\x04", b"\x93NUMPY\x01\x00", b"1,2\n"]),
+            tail in prop::collection::vec(any::<u8>(), 0..400),
+        ) {
+            let bytes = [start, &tail].concat();
+            if let Ok(Table::Columns { rows, .. }) = Table::parse(&bytes) {
+                prop_assert_eq!(rows.values.len(), rows.shape.iter().product::<usize>());
+            }
+        }
+
+        #[test]
+        fn damaged_files_are_read_without_panic(at in any::<prop::sample::Index>(), bit in 0..8u32, cut in any::<prop::sample::Index>()) {
+            let mut bytes = Vec::new();
+            let mut writer = NpzWriter::new(io::Cursor::new(&mut bytes));
+            writer.add("readings_v", &[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
+            writer.finish().unwrap();
+            let npy = npy::bytes(&[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+            for mut bytes in [bytes, npy] {
+                let index = at.index(bytes.len());
+                bytes[index] ^= 1 << bit;
+                for part in [&bytes[..], &bytes[..cut.index(bytes.len())]] {
+                    if let Ok(Table::Arrays(arrays)) = Table::parse(part) {
+                        prop_assert!(arrays.iter().all(|(_, array)| array.values.len() == array.shape.iter().product::<usize>()));
+                    }
+                }
+            }
+        }
+    }
+}

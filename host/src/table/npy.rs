@@ -1,0 +1,180 @@
+//! NumPy's file of one array.
+//!
+//! As in NumPy's documentation of `numpy.lib.format`: the magic `\x93NUMPY`, a version of two bytes, the length of the header (two
+//! bytes in version 1, four after it, little-endian), the header, a literal dictionary of Python with `descr`,
+//! `fortran_order` and `shape`, and the numbers.
+
+use super::Array;
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+/// Numbers begin at a multiple of this.
+const ALIGNMENT: usize = 64;
+/// Most axes of an array.
+const MOST_AXES: usize = 8;
+
+/// Whether a file begins as one of these.
+pub fn is_npy(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
+/// Reads the array.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn parse(bytes: &[u8]) -> Result<Array, String> {
+    let (header, data) = split(bytes).ok_or("the header of the array is cut off")?;
+    let kind = after(header, "'descr':").and_then(quoted).ok_or("the array has no kind of number")?;
+    let shape = after(header, "'shape':").and_then(shape).ok_or("the array has no shape")?;
+    let by_columns = after(header, "'fortran_order':").is_some_and(|rest| rest.trim_start().starts_with("True"));
+    if by_columns && shape.len() > 1 {
+        return Err("the array is kept column by column: save it through numpy.ascontiguousarray".to_owned());
+    }
+    let number = Number::of(kind)?;
+    let count = shape.iter().try_fold(1usize, |count, &length| count.checked_mul(length));
+    let needed = count.and_then(|count| count.checked_mul(number.bytes));
+    if needed != Some(data.len()) {
+        return Err(format!("the array has {} bytes, which is not its shape in {kind}", data.len()));
+    }
+    let values = data.chunks_exact(number.bytes).map(|bytes| number.value(bytes)).collect();
+    Ok(Array { shape, values })
+}
+
+/// Header and numbers.
+fn split(bytes: &[u8]) -> Option<(&str, &[u8])> {
+    let (&version, rest) = bytes.strip_prefix(MAGIC)?.split_first()?;
+    let rest = rest.get(1..)?;
+    let (length, rest) = if version == 1 {
+        let (length, rest) = rest.split_first_chunk::<2>()?;
+        (usize::from(u16::from_le_bytes(*length)), rest)
+    } else {
+        let (length, rest) = rest.split_first_chunk::<4>()?;
+        (usize::try_from(u32::from_le_bytes(*length)).ok()?, rest)
+    };
+    let (header, data) = rest.split_at_checked(length)?;
+    Some((str::from_utf8(header).ok()?, data))
+}
+
+/// What follows a key.
+fn after<'a>(header: &'a str, key: &str) -> Option<&'a str> {
+    header.split_once(key).map(|(_, rest)| rest)
+}
+
+fn quoted(rest: &str) -> Option<&str> {
+    rest.trim_start().strip_prefix('\'')?.split_once('\'').map(|(inside, _)| inside)
+}
+
+/// Lengths between brackets: `(3, 256)`, `(3,)`, `()`.
+fn shape(rest: &str) -> Option<Vec<usize>> {
+    let (inside, _) = rest.trim_start().strip_prefix('(')?.split_once(')')?;
+    let lengths = inside.split(',').map(str::trim).filter(|length| !length.is_empty());
+    let shape: Vec<usize> = lengths.map(|length| length.parse().ok()).collect::<Option<_>>()?;
+    (shape.len() <= MOST_AXES).then_some(shape)
+}
+
+/// How a number is kept.
+struct Number {
+    kind: u8,
+    bytes: usize,
+    big_end_first: bool,
+}
+
+impl Number {
+    fn of(kind: &str) -> Result<Self, String> {
+        let wrong = || format!("arrays of {} are not read: save them as float64", kind.escape_debug());
+        let &[order, kind, size] = kind.as_bytes() else { return Err(wrong()) };
+        let bytes = usize::from(size.wrapping_sub(b'0'));
+        let known = matches!((kind, bytes), (b'f', 4 | 8) | (b'i' | b'u', 1 | 2 | 4 | 8));
+        if !known || !b"<>|=".contains(&order) {
+            return Err(wrong());
+        }
+        Ok(Self { kind, bytes, big_end_first: order == b'>' })
+    }
+
+    fn value(&self, bytes: &[u8]) -> f64 {
+        // Little end first, whatever it was, in as many bytes as the longest has.
+        let mut word = [0; 8];
+        word[..bytes.len()].copy_from_slice(bytes);
+        if self.big_end_first {
+            word[..bytes.len()].reverse();
+        }
+        let unsigned = u64::from_le_bytes(word);
+        match (self.kind, self.bytes) {
+            (b'f', 4) => f64::from(f32::from_bits(unsigned as u32)),
+            (b'f', _) => f64::from_bits(unsigned),
+            (b'u', _) => unsigned as f64,
+            _ => {
+                let unused = 64 - 8 * self.bytes as u32;
+                ((unsigned << unused) as i64 >> unused) as f64
+            }
+        }
+    }
+}
+
+/// The file of an array, in double precision.
+pub fn bytes(shape: &[usize], values: &[f64]) -> Vec<u8> {
+    let lengths: String = shape.iter().map(|length| format!("{length},")).collect();
+    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({lengths}), }}");
+    let before = MAGIC.len() + 4;
+    let padding = (before + header.len() + 1).next_multiple_of(ALIGNMENT) - before - header.len() - 1;
+    header.extend(std::iter::repeat_n(' ', padding));
+    header.push('\n');
+    let mut bytes = [MAGIC, &[1, 0], &(header.len() as u16).to_le_bytes(), header.as_bytes()].concat();
+    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As `numpy.save` writes it.
+    fn file(header: &str, data: &[u8]) -> Vec<u8> {
+        [MAGIC, &[1, 0], &(header.len() as u16).to_le_bytes(), header.as_bytes(), data].concat()
+    }
+
+    fn of(kind: &str, data: &[u8]) -> Result<Array, String> {
+        parse(&file(&format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (1,), }}  \n"), data))
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let values = [1.0, -2.5, f64::INFINITY, 1e-300, 0.0, 7.0];
+        for shape in [&[6][..], &[2, 3], &[1, 3, 2]] {
+            let bytes = bytes(shape, &values);
+            assert_eq!(parse(&bytes), Ok(Array { shape: shape.to_vec(), values: values.to_vec() }));
+            assert_eq!((bytes.len() - 48) % ALIGNMENT, 0, "as NumPy aligns them");
+        }
+    }
+
+    #[test]
+    fn numbers_of_every_kind_are_read() {
+        for (kind, data, value) in [
+            ("<f4", &1.5f32.to_le_bytes()[..], 1.5),
+            (">f8", &(-2.25f64).to_be_bytes(), -2.25),
+            ("|u1", &[200], 200.0),
+            ("|i1", &[200], -56.0),
+            ("<u2", &[0xff, 0x0f], 4095.0),
+            (">i2", &[0xff, 0xfe], -2.0),
+            ("<i4", &[0xff; 4], -1.0),
+            ("<u8", &[1, 0, 0, 0, 1, 0, 0, 0], 4_294_967_297.0),
+            ("<i8", &[0xff; 8], -1.0),
+        ] {
+            assert_eq!(of(kind, data), Ok(Array::flat(vec![value])), "{kind}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_read_is_told() {
+        assert!(of("<c16", &[0; 16]).unwrap_err().contains("arrays of <c16 are not read"));
+        assert!(of("<f2", &[0; 2]).is_err());
+        assert!(of("<f8", &[0; 9]).unwrap_err().contains("9 bytes"));
+        let of_shape = |shape: &str, order: &str| {
+            parse(&file(&format!("{{'descr': '<f8', 'fortran_order': {order}, 'shape': {shape}, }}"), &[0; 8]))
+        };
+        assert!(of_shape("(99999999999, 99999999999)", "False").is_err(), "a shape that no memory holds");
+        assert!(of_shape("(1, 1)", "True").unwrap_err().contains("ascontiguousarray"));
+        assert!(of_shape("(-1,)", "False").unwrap_err().contains("no shape"));
+        assert_eq!(of_shape("()", "False"), Ok(Array { shape: Vec::new(), values: vec![0.0] }));
+        assert!(parse(b"\x93NUMPY\x01\x00\xff\xff{}").unwrap_err().contains("cut off"));
+    }
+}

@@ -1,0 +1,105 @@
+//! NumPy's archive of arrays: a ZIP file of NPY files.
+
+use std::io::{self, Cursor, Read, Seek, Write};
+
+use zip::write::{SimpleFileOptions, ZipWriter};
+use zip::{CompressionMethod, ZipArchive};
+
+use super::{Array, LONGEST, npy};
+
+/// Most arrays in an archive.
+const MOST_ARRAYS: usize = 1000;
+
+/// Whether a file begins as one of these.
+pub fn is_npz(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04")
+}
+
+/// Reads all arrays; together they may be no longer than the longest file.
+///
+/// # Errors
+/// What is wrong, and in which array.
+pub fn parse(bytes: &[u8]) -> Result<Vec<(String, Array)>, String> {
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| format!("no NPZ file: {error}"))?;
+    if archive.len() > MOST_ARRAYS {
+        return Err(format!("{} arrays, but {MOST_ARRAYS} at most are read", archive.len()));
+    }
+    let (mut arrays, mut room) = (Vec::new(), LONGEST);
+    for index in 0..archive.len() {
+        let mut file = archive.by_index(index).map_err(|error| format!("array {index}: {error}"))?;
+        let name = file.name().strip_suffix(".npy").unwrap_or(file.name()).to_owned();
+        let told = |what: String| format!("array {}: {what}", name.escape_debug());
+        let mut bytes = Vec::new();
+        // What the archive says of its length is not trusted.
+        file.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| told(error.to_string()))?;
+        room = room.checked_sub(bytes.len() as u64).ok_or_else(|| told("too long".to_owned()))?;
+        arrays.push((name.clone(), npy::parse(&bytes).map_err(told)?));
+    }
+    Ok(arrays)
+}
+
+/// Writes an archive.
+pub struct NpzWriter<W: Write + Seek> {
+    zip: ZipWriter<W>,
+}
+
+impl<W: Write + Seek> NpzWriter<W> {
+    /// Begins it.
+    pub fn new(out: W) -> Self {
+        Self { zip: ZipWriter::new(out) }
+    }
+
+    /// Adds an array.
+    ///
+    /// # Errors
+    /// If it cannot be written, or one of its name is there already.
+    pub fn add(&mut self, name: &str, shape: &[usize], values: &[f64]) -> io::Result<()> {
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated).large_file(true);
+        self.zip.start_file(format!("{name}.npy"), options)?;
+        self.zip.write_all(&npy::bytes(shape, values))
+    }
+
+    /// Ends it.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(self) -> io::Result<()> {
+        self.zip.finish()?.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        let mut bytes = Vec::new();
+        let mut writer = NpzWriter::new(Cursor::new(&mut bytes));
+        writer.add("x_m", &[3], &[1.0, 2.0, 3.0]).unwrap();
+        writer.add("readings_v", &[1, 2], &[0.5, -0.5]).unwrap();
+        writer.finish().unwrap();
+        let arrays = parse(&bytes).unwrap();
+        assert_eq!(arrays[0], ("x_m".to_owned(), Array::flat(vec![1.0, 2.0, 3.0])));
+        assert_eq!(arrays[1].0, "readings_v");
+        assert_eq!(arrays[1].1.shape, [1, 2]);
+    }
+
+    #[test]
+    fn no_array_is_written_twice() {
+        let mut writer = NpzWriter::new(Cursor::new(Vec::new()));
+        writer.add("x_m", &[1], &[1.0]).unwrap();
+        assert!(writer.add("x_m", &[0], &[]).is_err());
+    }
+
+    #[test]
+    fn other_archives_are_told() {
+        assert!(parse(b"PK\x03\x04 and no more").unwrap_err().contains("no NPZ file"));
+        let mut bytes = Vec::new();
+        let mut zip = ZipWriter::new(Cursor::new(&mut bytes));
+        zip.start_file("letter.txt", SimpleFileOptions::default()).unwrap();
+        zip.write_all(b"hello").unwrap();
+        zip.finish().unwrap();
+        assert_eq!(parse(&bytes).unwrap_err(), "array letter.txt: the header of the array is cut off");
+    }
+}
