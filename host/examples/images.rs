@@ -81,7 +81,7 @@ fn cell(method: Method, problem: &Problem, comparison: &Comparison, shown: &[Sho
             if index == 0 || index + 1 == FRAMES {
                 let correlation = comparison.of(truth, &image).correlation.unwrap_or(0.0);
                 let sum = &mut sums[usize::from(index > 0)];
-                *sum = [sum[0] + f64::from(correlation), sum[1] + seconds];
+                *sum = [sum[0] + correlation, sum[1] + seconds];
             }
         }
     }

@@ -15,7 +15,7 @@ use crate::readings::Readings;
 
 /// Weight of the newest frame in the mean residual of a scene.
 const NEWEST: f64 = 0.1;
-/// Rise of that mean over what the last search left, of a mean square of about one, that asks for a new search.
+/// Rise of that mean over what the last search left, or over what noise alone leaves, that asks for a new search.
 const RISE: f64 = 0.12;
 /// After so many frames that contacts did not explain, they are tried again; doubled each time, up to the second.
 const PATIENCE: [u32; 2] = [2, 64];
@@ -95,7 +95,7 @@ impl Auto {
     fn contacts(&mut self, readings: &Readings) -> Result<Option<Solution>, SolveError> {
         let Some(contacts) = &mut self.contacts else { return Ok(None) };
         let followed = contacts.is_following();
-        let risen = followed && self.mean > self.searched + RISE * self.searched.max(1.0);
+        let risen = followed && self.mean > (1.0 + RISE) * self.searched.max(1.0);
         let found = contacts.solve_with(readings, if risen { Effort::Anew } else { Effort::AsNeeded })?;
         let left = found.residual.unwrap_or_default().powi(2);
         if risen || !followed {

@@ -184,7 +184,8 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_told_and_left_out() {
-        let cases: [(&[&str], &[(usize, Ailment)]); 5] = [
+        type Case<'a> = (&'a [&'a str], &'a [(usize, Ailment)]);
+        let cases: [Case<'_>; 5] = [
             (&["open:3"], &[(3, Ailment::Open)]),
             (&["open:3", "open:9"], &[(3, Ailment::Open), (9, Ailment::Open)]),
             (&["short:2,7"], &[(2, Ailment::Shorted), (7, Ailment::Shorted)]),

@@ -129,9 +129,10 @@ impl Contacts {
             what: format!("the {} has no fields of single contacts", problem.model.name()),
         })?;
         let coarse = problem.model.on_image_of(SCAN_NODES)?;
+        let network = Network::new(detector, problem.model.electrode_fields_ohm());
         Ok(Self {
-            network: Network::new(detector, problem.model.electrode_fields_ohm()),
-            scan: Scan::new(coarse.image_mesh(), &*fields),
+            scan: Scan::new(coarse.image_mesh(), &*fields, &network),
+            network,
             fields,
             errors: Errors {
                 noise_v: detector.adc.deviation_v(),

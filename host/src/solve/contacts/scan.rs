@@ -1,9 +1,11 @@
 //! Where contacts would explain most of what is left: a look at every place, and at every pair of places.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::fit::{Fit, Fitter};
-use super::network::FitSpot;
+use super::network::{FitSpot, Network};
 use super::target::{Target, dot};
 use crate::forward::ImageMesh;
 use crate::forward::spots::{Spot, SpotFields};
@@ -17,16 +19,34 @@ const PAIR_STRIDE: usize = 2;
 #[derive(Clone, Debug)]
 pub(super) struct Scan {
     spots: Vec<Spot>,
+    first: FirstLook,
+}
+
+/// What single light contacts do to the readings, which has as few dimensions as there are electrodes.
+#[derive(Clone, Debug)]
+struct FirstLook {
+    /// Orthonormal directions of readings: `electrodes^2 x electrodes`.
+    basis: DMatrix<f64>,
+    /// Change of the readings by conductance in these (V/S): a column for each place.
+    patterns: DMatrix<f64>,
+    /// Scalar products of the patterns of places that are looked at in pairs.
+    pairs: DMatrix<f64>,
+    /// Mean of `E[g][g] - 2 f + R` at each place (ohm).
+    load_ohm: Vec<f64>,
 }
 
 /// What contacts at all places would do to whitened readings, linearly, and what is to be explained.
-pub(super) struct Looks {
+pub(super) struct Looks<'a> {
     /// Whitened change of the readings by conductance (1/S): a column for each place.
-    patterns: DMatrix<f64>,
+    patterns: Cow<'a, DMatrix<f64>>,
+    /// Scalar products of those that are looked at in pairs, if they are known.
+    pairs: Option<&'a DMatrix<f64>>,
     /// Whitened readings that are left.
     left: DVector<f64>,
-    /// Resistance besides that of a contact alone that its share of the readings stands for (ohm).
-    load_ohm: Vec<f64>,
+    /// Resistance besides that of a contact alone that its share of the readings stands for (ohm); none if there is none.
+    load_ohm: &'a [f64],
+    /// Gains are to be multiplied with this.
+    gain: f64,
 }
 
 /// Contacts to start from, and by how much they lower the sum of squares, in the linear theory.
@@ -38,43 +58,30 @@ pub(super) struct Candidate {
 
 impl Scan {
     /// Looks at the nodes of a mesh.
-    pub fn new(mesh: &ImageMesh, fields: &dyn SpotFields) -> Self {
-        Self { spots: (0..mesh.nodes_m.len()).map(|node| fields.spot(mesh.place_m(node))).collect() }
+    pub fn new(mesh: &ImageMesh, fields: &dyn SpotFields, network: &Network) -> Self {
+        let spots: Vec<_> = (0..mesh.nodes_m.len()).map(|node| fields.spot(mesh.place_m(node))).collect();
+        Self { first: FirstLook::new(&spots, network), spots }
     }
 
     /// Looks for contacts where there are none yet.
     ///
-    /// Balanced readings of one contact are exactly linear in the fields at its place (`solve::balance`), whatever its force,
-    /// so the scan finds it; the rows' mean load is `A - 2 f + E[g][g] + R`, which gives its resistance `A`.
-    pub fn at_first(&self, fitter: &Fitter<'_>, target: &Target) -> Looks {
-        let network = fitter.network;
-        let n = network.electrodes();
+    /// Balanced readings of one contact are exactly linear in the fields at its place (`solve::balance`), whatever its force and
+    /// whatever the pads' own impedances, so the scan finds it; the rows' mean load is `A - 2 f + E[g][g] + R`, which gives its
+    /// resistance `A`.
+    pub fn at_first(&self, network: &Network, target: &Target) -> Looks<'_> {
         let mut volts = target.volts.clone();
-        balance::balance(&mut volts, n, network.drive_v);
-        target.whiten(&mut volts);
-        let pads = &network.electrodes_ohm;
-        let mean_ohm = |field: &[f64]| {
-            (0..n).map(|g| pads[(g, g)] - 2.0 * field[g] + network.on_resistance_ohm).sum::<f64>() / n as f64
-        };
-        let mut patterns = DMatrix::zeros(n * n, self.spots.len());
-        for (mut column, spot) in patterns.column_iter_mut().zip(&self.spots) {
-            let (field, pattern) = (&spot.electrodes_ohm, column.as_mut_slice());
-            for (g, row) in pattern.chunks_exact_mut(n).enumerate() {
-                let own = pads[(g, g)] - field[g] + network.on_resistance_ohm;
-                let pads_g = pads.column(g);
-                let fields = field.iter().zip(pads_g.iter());
-                row.iter_mut()
-                    .zip(fields)
-                    .for_each(|(volts, (field, pad))| *volts = network.drive_v * (own + field - pad));
-            }
-            target.whiten(pattern);
+        balance::balance(&mut volts, network.electrodes(), network.drive_v);
+        Looks {
+            patterns: Cow::Borrowed(&self.first.patterns),
+            pairs: Some(&self.first.pairs),
+            left: self.first.basis.tr_mul(&DVector::from_vec(volts)),
+            load_ohm: &self.first.load_ohm,
+            gain: target.deviation_v().powi(-2),
         }
-        let load_ohm = self.spots.iter().map(|spot| mean_ohm(&spot.electrodes_ohm)).collect();
-        Looks { patterns, left: volts.into(), load_ohm }
     }
 
     /// Looks for more contacts beside those of a fit.
-    pub fn beside(&self, fitter: &Fitter<'_>, fit: &Fit, target: &Target) -> Looks {
+    pub fn beside(&self, fitter: &Fitter<'_>, fit: &Fit, target: &Target) -> Looks<'_> {
         let n = fitter.network.electrodes();
         let mut patterns = DMatrix::zeros(n * n, self.spots.len());
         for (mut column, spot) in patterns.column_iter_mut().zip(&self.spots) {
@@ -82,23 +89,32 @@ impl Scan {
             fitter.network.volts_per_s(&fit.solved, &potentials_ohm, column.as_mut_slice());
             target.whiten(column.as_mut_slice());
         }
-        Looks { patterns, left: target.residuals(&fit.volts).into(), load_ohm: vec![0.0; self.spots.len()] }
+        Looks {
+            patterns: Cow::Owned(patterns),
+            pairs: None,
+            left: target.residuals(&fit.volts).into(),
+            load_ohm: &[],
+            gain: 1.0,
+        }
     }
 
     /// The best places for one contact, each apart from better ones.
-    pub fn ones(&self, looks: &Looks, count: usize, apart_m: f64) -> Vec<Candidate> {
+    pub fn ones(&self, looks: &Looks<'_>, count: usize, apart_m: f64) -> Vec<Candidate> {
         let all = looks.patterns.column_iter().enumerate().filter_map(|(place, pattern)| {
             let (along, square) = (dot(pattern.as_slice(), looks.left.as_slice()), pattern.norm_squared());
-            (along > 0.0).then(|| Candidate { contacts: vec![(place, along / square)], gain: along * along / square })
+            (along > 0.0).then(|| Candidate {
+                contacts: vec![(place, along / square)],
+                gain: looks.gain * along * along / square,
+            })
         });
         self.best(all.collect(), count, apart_m)
     }
 
     /// The best places for two contacts at once, over all pairs of a coarser choice of places.
-    pub fn pairs(&self, looks: &Looks, count: usize, apart_m: f64) -> Vec<Candidate> {
-        let places: Vec<_> = (0..self.spots.len()).step_by(PAIR_STRIDE).collect();
+    pub fn pairs(&self, looks: &Looks<'_>, count: usize, apart_m: f64) -> Vec<Candidate> {
+        let places = paired(self.spots.len());
         let patterns = looks.patterns.select_columns(&places);
-        let products = patterns.tr_mul(&patterns);
+        let products = looks.pairs.map_or_else(|| Cow::Owned(patterns.tr_mul(&patterns)), Cow::Borrowed);
         let along = patterns.tr_mul(&looks.left);
         let mut all = Vec::new();
         let mut floor = 0.0;
@@ -111,7 +127,7 @@ impl Scan {
                     continue;
                 }
                 let determinant = own_i * own_j - cross * cross;
-                let gain = (a * along_i + b * along[j]) / determinant;
+                let gain = looks.gain * (a * along_i + b * along[j]) / determinant;
                 if gain > floor {
                     floor = floor.max(KEPT * gain);
                     let contacts = vec![(places[i], a / determinant), (places[j], b / determinant)];
@@ -119,14 +135,16 @@ impl Scan {
                 }
             }
         }
+        all.retain(|candidate| candidate.gain >= floor);
         self.best(all, count, apart_m)
     }
 
     /// The spots of a candidate.
-    pub fn start(&self, fitter: &Fitter<'_>, looks: &Looks, candidate: &Candidate) -> Vec<FitSpot> {
+    pub fn start(&self, fitter: &Fitter<'_>, looks: &Looks<'_>, candidate: &Candidate) -> Vec<FitSpot> {
         let spot = |(place, conductance_s): &(usize, f64)| {
             let spot = self.spots[*place].clone();
-            let ohm = (1.0 / conductance_s - looks.load_ohm[*place]).max(spot.own_ohm);
+            let load_ohm = looks.load_ohm.get(*place).copied().unwrap_or_default();
+            let ohm = (1.0 / conductance_s - load_ohm).max(spot.own_ohm);
             fitter.spot(spot, ohm)
         };
         candidate.contacts.iter().map(spot).collect()
@@ -154,5 +172,44 @@ impl Scan {
     }
 }
 
+impl FirstLook {
+    fn new(spots: &[Spot], network: &Network) -> Self {
+        let n = network.electrodes();
+        let pads = &network.electrodes_ohm;
+        let drive_v = network.drive_v;
+        // Differences of fields at electrodes, and what is alike for all places.
+        let constant = |g: usize, e: usize| pads[(g, g)] - pads[(e, g)] + network.on_resistance_ohm;
+        let directions = DMatrix::from_fn(n * n, n, |row, source| {
+            let (g, e) = (row / n, row % n);
+            match source + 1 == n {
+                true => drive_v * constant(g, e),
+                false => drive_v * (f64::from(u8::from(source == e)) - f64::from(u8::from(source == g))),
+            }
+        });
+        let sources = DMatrix::from_fn(n, spots.len(), |source, place| {
+            let field = &spots[place].electrodes_ohm;
+            if source + 1 == n { 1.0 } else { field[source] - field[n - 1] }
+        });
+        let factor = directions.qr();
+        let patterns = factor.r() * sources;
+        let chosen = patterns.select_columns(&paired(spots.len()));
+        let mean_ohm = |spot: &Spot| {
+            let load = |g: usize| pads[(g, g)] - 2.0 * spot.electrodes_ohm[g] + network.on_resistance_ohm;
+            (0..n).map(load).sum::<f64>() / n as f64
+        };
+        Self {
+            basis: factor.q(),
+            pairs: chosen.tr_mul(&chosen),
+            load_ohm: spots.iter().map(mean_ohm).collect(),
+            patterns,
+        }
+    }
+}
+
+/// Places of so many that are looked at in pairs.
+fn paired(places: usize) -> Vec<usize> {
+    (0..places).step_by(PAIR_STRIDE).collect()
+}
+
 /// Pairs with less than this share of the best gain so far are not kept.
-const KEPT: f64 = 0.8;
+const KEPT: f64 = 0.95;

@@ -43,7 +43,7 @@ impl Contacts {
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
         let target = Target::new(readings, &self.errors);
         let fitter = self.fitter();
-        let looks = self.scan.at_first(&fitter, &target);
+        let looks = self.scan.at_first(&self.network, &target);
         let first = self.scan.ones(&looks, STARTS, self.apart_m());
         let starts = first.iter().map(|candidate| self.scan.start(&fitter, &looks, candidate)).collect();
         Some(lowest(&fitter, starts, &target)?.cost / target.count().max(1) as f64)
@@ -80,7 +80,7 @@ impl Contacts {
 
     pub(super) fn search_anew(&self, target: &Target) -> Option<Explanation> {
         let fitter = self.fitter();
-        let looks = self.scan.at_first(&fitter, target);
+        let looks = self.scan.at_first(&self.network, target);
         let first = self.scan.ones(&looks, STARTS, self.apart_m());
         if first.first().is_none_or(|best| best.gain < WORTH_FIRST) {
             return None;
@@ -91,9 +91,11 @@ impl Contacts {
         if best.cost() > 1.2 * target.count() as f64 {
             best = better(best, self.discs(&one, target).map(Explanation::Discs));
         }
-        let pairs = self.scan.pairs(&looks, STARTS, self.apart_m()).iter().map(start).collect();
         let mut fits = vec![one];
-        let mut starts: Vec<Vec<FitSpot>> = pairs;
+        let mut starts: Vec<Vec<FitSpot>> = match explains(&best, target) {
+            true => Vec::new(),
+            false => self.scan.pairs(&looks, STARTS, self.apart_m()).iter().map(start).collect(),
+        };
         while fits.len() < self.settings.most && !explains(&best, target) {
             let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
             let Explanation::Spots(fit, _) = &more else { break };
@@ -121,7 +123,7 @@ impl Contacts {
         let is_near = last.cost < NEARLY * target.count() as f64;
         let correction_v = is_near.then(|| self.correction_v(last)).flatten();
         let corrected = correction_v.map_or_else(|| target.clone(), |correction_v| target.less(&correction_v));
-        let mut add = |fit: &Fit, of: &dyn Fn(&Looks) -> Vec<Candidate>| {
+        let mut add = |fit: &Fit, of: &dyn Fn(&Looks<'_>) -> Vec<Candidate>| {
             let looks = self.scan.beside(fitter, fit, &corrected);
             for candidate in of(&looks) {
                 starts.push(fit.spots.iter().cloned().chain(self.scan.start(fitter, &looks, &candidate)).collect());
