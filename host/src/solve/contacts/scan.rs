@@ -114,7 +114,7 @@ impl Scan {
     pub fn pairs(&self, looks: &Looks<'_>, count: usize, apart_m: f64) -> Vec<Candidate> {
         let places = paired(self.spots.len());
         let patterns = looks.patterns.select_columns(&places);
-        let products = looks.pairs.map_or_else(|| Cow::Owned(patterns.tr_mul(&patterns)), Cow::Borrowed);
+        let products = looks.pairs.map_or_else(|| Cow::Owned(patterns.transpose() * &patterns), Cow::Borrowed);
         let along = patterns.tr_mul(&looks.left);
         let mut all = Vec::new();
         let mut floor = 0.0;
@@ -199,7 +199,7 @@ impl FirstLook {
         };
         Self {
             basis: factor.q(),
-            pairs: chosen.tr_mul(&chosen),
+            pairs: chosen.transpose() * &chosen,
             load_ohm: spots.iter().map(mean_ohm).collect(),
             patterns,
         }
