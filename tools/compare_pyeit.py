@@ -6,7 +6,9 @@ and Jacobian included, Tikhonov's image of 256 readings on nodes. Frames are tim
 falls on both.
 
     python3 -m venv .venv && .venv/bin/pip install pyeit==1.2.4
-    .venv/bin/python tools/compare_pyeit.py
+    .venv/bin/python tools/compare_pyeit.py [SIZE [PROGRAM]]
+
+SIZE is pyEIT's mesh size (0.045 makes about 1800 nodes), PROGRAM the example `speed` where it is built already.
 """
 
 import json
@@ -29,8 +31,9 @@ FRAMES = 400
 
 
 def tactomo(nodes):
-    command = ["cargo", "run", "--release", "--quiet", "--package", "tactomo", "--example", "speed", "--", str(nodes)]
-    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    run = ["cargo", "run", "--release", "--quiet", "--package", "tactomo", "--example", "speed", "--"]
+    command = sys.argv[2:3] or run
+    return json.loads(subprocess.run([*command, str(nodes)], check=True, capture_output=True, text=True).stdout)
 
 
 def pyeit_set_up(size):

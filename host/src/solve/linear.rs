@@ -114,6 +114,9 @@ const OUTSIDE: f64 = 0.08;
 /// It counts where it is above so many deviations of noise.
 const OUTSIDE_NOISE: f64 = 3.0;
 
+/// Singular images that are added together: a pass over the image costs more than its sums.
+const TOGETHER: usize = 4;
+
 /// What is done to the readings before an image is made of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Force {
@@ -134,7 +137,9 @@ pub struct LinearImage {
     singular_values: Vec<f64>,
     /// `rank x electrodes^2`, row by row: from readings to coefficients.
     to_coefficients: Vec<f32>,
-    /// `nodes x rank`, column by column: from coefficients to the image (S/m2).
+    nodes: usize,
+    /// `nodes x rank`, column by column: from coefficients to the image (S/m2). With columns of zeros up to a multiple of
+    /// those that are added together.
     to_image: Vec<f32>,
 }
 
@@ -142,7 +147,10 @@ impl LinearImage {
     /// Makes it ready for a detector.
     pub fn new(jacobian: &Jacobian, decomposition: Decomposition) -> Self {
         let Decomposition { readings, singular_values, images } = decomposition;
-        let single = |matrix: &DMatrix<f64>| matrix.iter().map(|&value| value as f32).collect();
+        let single = |matrix: &DMatrix<f64>| matrix.iter().map(|&value| value as f32).collect::<Vec<f32>>();
+        let (nodes, rank) = images.shape();
+        let mut to_image = single(&images);
+        to_image.resize(nodes * rank.next_multiple_of(TOGETHER), 0.0);
         Self {
             electrodes: jacobian.electrodes(),
             drive_v: jacobian.detector.drive_v,
@@ -150,7 +158,8 @@ impl LinearImage {
             full_v: FULL * jacobian.detector.adc.full_scale_v.min(jacobian.detector.drive_v),
             singular_values,
             to_coefficients: single(&readings),
-            to_image: single(&images),
+            nodes,
+            to_image,
         }
     }
 
@@ -200,11 +209,13 @@ impl LinearImage {
 
     /// The image of so much of each of its singular images (S/m2 at each node).
     pub fn image_s_per_m2(&self, shares: &[f64]) -> Vec<f32> {
-        let nodes = self.to_image.len() / self.singular_values.len();
-        let mut image = vec![0.0f32; nodes];
-        for (&share, column) in shares.iter().zip(self.to_image.chunks_exact(nodes)) {
-            for (value, part) in image.iter_mut().zip(column) {
-                *value += share as f32 * part;
+        let mut image = vec![0.0f32; self.nodes];
+        for (shares, columns) in shares.chunks(TOGETHER).zip(self.to_image.chunks_exact(TOGETHER * self.nodes)) {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|column| &columns[column * self.nodes..][..self.nodes]);
+            let [share_a, share_b, share_c, share_d] =
+                [0, 1, 2, 3].map(|column| shares.get(column).map_or(0.0, |share| *share as f32));
+            for ((((value, a), b), c), d) in image.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+                *value += (share_a * a + share_b * b) + (share_c * c + share_d * d);
             }
         }
         image

@@ -13,12 +13,15 @@ const FURTHER_PEAK: f32 = 0.6;
 /// What stands out around a peak: above this share of it.
 const STANDS_OUT: f32 = 0.7;
 
+/// Sums that run side by side.
+const LANES: usize = 8;
+
 /// Finds contacts in images on one mesh.
 #[derive(Clone, Debug)]
 pub struct Locator {
     places_m: Vec<Place>,
     surface: Option<Surface>,
-    triangles: Vec<[u32; 3]>,
+    neighbours: Neighbours,
     areas_m2: Vec<f64>,
     /// Peaks nearer than this are one (m): the mean distance of electrodes, which is about what an image resolves.
     apart_m: f64,
@@ -33,7 +36,7 @@ impl Locator {
         Self {
             places_m: (0..mesh.nodes_m.len()).map(|node| mesh.place_m(node)).collect(),
             surface: detector.surface.clone(),
-            triangles: mesh.triangles.clone(),
+            neighbours: Neighbours::of(mesh),
             areas_m2: mesh.node_areas_m2.clone(),
             apart_m: (area_m2 / detector.electrodes.len() as f64).sqrt(),
             rest_v: NOISE_DEVIATIONS * detector.adc.deviation_v(),
@@ -53,40 +56,34 @@ impl Locator {
     /// The contacts at the peaks of an image (S/m2 at each node), the highest first.
     pub fn peaks(&self, image: &[f32]) -> Vec<FoundContact> {
         let peaks = self.peak_nodes(image);
-        let owners = self.nearest(&peaks);
-        peaks
-            .iter()
-            .enumerate()
-            .filter_map(|(owner, &peak)| self.contact_at(image, peak, |node| owners[node] == owner))
-            .collect()
+        // One peak owns all nodes.
+        let owners = if peaks.len() > 1 { self.nearest(&peaks) } else { Vec::new() };
+        let contact = |(owner, &peak): (usize, &usize)| {
+            self.contact_at(image, peak, |node| owners.get(node).is_none_or(|of| *of == owner))
+        };
+        peaks.iter().enumerate().filter_map(contact).collect()
     }
 
     /// Nodes that are highest within half of `apart_m` and apart from higher peaks, the highest first.
     fn peak_nodes(&self, image: &[f32]) -> Vec<usize> {
-        let highest = image.iter().copied().fold(0.0, f32::max);
-        let mut tops = self.tops(image);
-        tops.retain(|&node| image[node] > FURTHER_PEAK * highest);
+        let mut tops = self.tops(image, FURTHER_PEAK * highest(image));
         tops.sort_unstable_by(|&a, &b| image[b].total_cmp(&image[a]));
         let mut peaks: Vec<usize> = Vec::new();
         for node in tops {
-            if !self.is_on_a_slope(image, node) && self.is_apart(node, &peaks) {
+            if self.is_apart(node, &peaks) && !self.is_on_a_slope(image, node) {
                 peaks.push(node);
             }
         }
         peaks
     }
 
-    /// Nodes that no neighbour on the mesh exceeds.
-    fn tops(&self, image: &[f32]) -> Vec<usize> {
-        let mut is_top = vec![true; image.len()];
-        for triangle in &self.triangles {
-            let [a, b, c] = triangle.map(|node| node as usize);
-            for (one, other) in [(a, b), (b, c), (c, a)] {
-                is_top[one] &= image[one] >= image[other];
-                is_top[other] &= image[other] >= image[one];
-            }
-        }
-        (0..image.len()).filter(|&node| is_top[node]).collect()
+    /// Nodes above a floor that no neighbour on the mesh exceeds.
+    fn tops(&self, image: &[f32], floor: f32) -> Vec<usize> {
+        let is_top = |node: &usize| {
+            let value = image[*node];
+            value > floor && self.neighbours.of_node(*node).iter().all(|&other| image[other as usize] <= value)
+        };
+        (0..image.len()).filter(is_top).collect()
     }
 
     /// Whether there is a higher node near: then this one is on the slope of a hill.
@@ -118,8 +115,20 @@ impl Locator {
         let near_m2 = (0.75 * self.apart_m).powi(2);
         let near = |node: usize| own(node) && self.distance_m2(node, peak) < near_m2;
         let place = self.centroid(image, near, STANDS_OUT * image[peak])?;
-        let conductance_s = self.centroid(image, &own, 0.0)?.conductance_s;
-        Some(FoundContact { conductance_s, ..place })
+        Some(FoundContact { conductance_s: self.conductance_s(image, own), ..place })
+    }
+
+    /// Conductance (S) of what is above zero, over some of the nodes: in lanes, for it is summed over all in every frame.
+    fn conductance_s(&self, image: &[f32], among: impl Fn(usize) -> bool) -> f64 {
+        let mut sums = [0.0; LANES];
+        for (first, (values, areas_m2)) in image.chunks(LANES).zip(self.areas_m2.chunks(LANES)).enumerate() {
+            for (lane, (value, area_m2)) in values.iter().zip(areas_m2).enumerate() {
+                if among(first * LANES + lane) {
+                    sums[lane] += f64::from(value.max(0.0)) * area_m2;
+                }
+            }
+        }
+        sums.iter().sum()
     }
 
     /// Centroid and conductance of the part of an image above a floor, over some of the nodes.
@@ -137,5 +146,84 @@ impl Locator {
             let [x_m, y_m, z_m] = self.surface.as_ref().map_or(centroid, place);
             FoundContact { z_m, ..FoundContact::flat(x_m, y_m, sum) }
         })
+    }
+}
+
+/// The largest value, or zero if none is above.
+fn highest(image: &[f32]) -> f32 {
+    let mut largest = [0.0f32; LANES];
+    for values in image.chunks(LANES) {
+        for (largest, &value) in largest.iter_mut().zip(values) {
+            *largest = if value > *largest { value } else { *largest };
+        }
+    }
+    largest.into_iter().fold(0.0, f32::max)
+}
+
+/// The nodes that share a triangle with each node.
+#[derive(Clone, Debug)]
+struct Neighbours {
+    /// Where those of each node begin, and the end.
+    starts: Vec<usize>,
+    nodes: Vec<u32>,
+}
+
+impl Neighbours {
+    fn of(mesh: &ImageMesh) -> Self {
+        let sides = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let mut pairs: Vec<(u32, u32)> = sides.flat_map(|(one, other)| [(one, other), (other, one)]).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let start = |node: usize| pairs.partition_point(|(of, _)| (*of as usize) < node);
+        Self {
+            starts: (0..=mesh.nodes_m.len()).map(start).collect(),
+            nodes: pairs.iter().map(|(_, other)| *other).collect(),
+        }
+    }
+
+    fn of_node(&self, node: usize) -> &[u32] {
+        &self.nodes[self.starts[node]..self.starts[node + 1]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::samples;
+
+    #[test]
+    fn peaks_are_found_apart_and_share_the_conductance() {
+        let jacobian = samples::jacobian(2000);
+        let mesh = &jacobian.image_mesh;
+        let locator = Locator::new(mesh, &jacobian.detector);
+        let hills = [([0.015, 0.01], 1.0), ([-0.018, -0.012], 0.8), ([0.018, 0.01], 0.9), ([-0.02, 0.02], 0.5)];
+        let height = |at: &[f64; 2]| -> f64 {
+            let hill = |(middle, height): &([f64; 2], f64)| {
+                let square = (at[0] - middle[0]).powi(2) + (at[1] - middle[1]).powi(2);
+                height * (-square / (2.0 * 0.002f64.powi(2))).exp()
+            };
+            hills.iter().map(hill).fold(0.0, f64::max) - 0.01
+        };
+        let image: Vec<f32> = mesh.nodes_m.iter().map(|at| height(at) as f32).collect();
+        let found = locator.peaks(&image);
+        let [first, second] = found[..] else { panic!("{found:?}") };
+        // Near peaks are one, and low ones none.
+        assert!((first.x_m - 0.0165).abs() < 0.002 && (first.y_m - 0.01).abs() < 0.001, "{first:?}");
+        assert!((second.x_m + 0.018).hypot(second.y_m + 0.012) < 0.001, "{second:?}");
+        let whole = locator.whole(&image).map_or(f64::NAN, |whole| whole.conductance_s);
+        assert!(((first.conductance_s + second.conductance_s) / whole - 1.0).abs() < 1e-6, "{whole}");
+    }
+
+    #[test]
+    fn neighbours_are_those_of_the_triangles() {
+        let mesh = ImageMesh {
+            nodes_m: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [5.0, 5.0]],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            node_areas_m2: vec![0.2; 5],
+            ..ImageMesh::default()
+        };
+        let neighbours = Neighbours::of(&mesh);
+        let all: Vec<&[u32]> = (0..5).map(|node| neighbours.of_node(node)).collect();
+        assert_eq!(all, [&[1, 2, 3][..], &[0, 2], &[0, 1, 3], &[0, 2], &[]]);
     }
 }

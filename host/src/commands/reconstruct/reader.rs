@@ -9,7 +9,7 @@ use tactomo::frames::FrameFile;
 use tactomo::live::interpret;
 use tactomo::live::rest::{self, Rest};
 use tactomo::readings::Readings;
-use tactomo::solve::{Kernel, Lambda, Method, Presses, Problem, Solution, Solver};
+use tactomo::solve::{Guard, Kernel, Lambda, Method, Presses, Problem, Solution, Solver};
 use tactomo::study::{Setting, Variation};
 
 use super::Args;
@@ -166,10 +166,13 @@ fn measured(chosen: Detector, file: &FrameFile) -> anyhow::Result<Detector> {
     })
 }
 
-/// The solver, with a lambda if it is told.
+/// The solver, which leaves out electrodes that cannot be right; or, with a lambda that is told, of all electrodes.
 fn solver(method: Method, lambda: Option<Lambda>, problem: &Problem) -> anyhow::Result<Box<dyn Solver>> {
-    if lambda.is_some() && !Variation::has_lambda(method) {
-        bail!("the solver {} has no lambda; leave out --lambda", method.name());
+    match lambda.map(Setting::Lambda) {
+        None => Ok(Box::new(Guard::new(method, problem)?)),
+        Some(_) if !Variation::has_lambda(method) => {
+            bail!("the solver {} has no lambda; leave out --lambda", method.name())
+        }
+        setting => Ok(Variation { method, setting }.build(problem)?),
     }
-    Ok(Variation { method, setting: lambda.map(Setting::Lambda) }.build(problem)?)
 }
