@@ -48,7 +48,7 @@ pub struct Args {
 
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let (places, frames) = if args.quick { (2, 2) } else { (8, 3) };
+    let (places, frames) = if args.quick { (1, 2) } else { (5, 2) };
     let plan = Plan {
         detector: args.detector.get()?,
         methods: choice::methods(&args.solver),

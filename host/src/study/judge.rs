@@ -180,6 +180,8 @@ pub struct Summary {
     pub error_m: Option<f64>,
     /// Mean distance of contacts found (m).
     pub position_error_m: Option<f64>,
+    /// Share of frames with no contact missed and none invented.
+    pub count_right: Option<f64>,
     /// Contacts missed, a frame.
     pub missed: Option<f64>,
     /// Contacts invented, a frame.
@@ -244,6 +246,7 @@ impl Summary {
             not_finite: share(&|score| score.not_finite),
             error_m: mean(&|score| score.error_m),
             position_error_m: mean(&|score| score.position_error_m),
+            count_right: mean(&|score| Some(f64::from(u8::from(score.missed? + score.invented? == 0)))),
             missed: mean(&|score| score.missed.map(|count| count as f64)),
             invented: mean(&|score| score.invented.map(|count| count as f64)),
             conductance_error: median(scores.iter().filter_map(|score| score.conductance_error)),
@@ -315,7 +318,8 @@ mod tests {
         assert!(best.image.correlation.is_some_and(|correlation| correlation > 0.95), "{:?}", best.image);
         let worst = judge.score(&frame, &Solution::default()).unwrap();
         assert_eq!((worst.error_m, worst.missed), (Some(laboratory.reach_m()), Some(3)));
-        assert_eq!(Summary::of([&best, &worst]).missed, Some(1.5));
+        let summary = Summary::of([&best, &worst]);
+        assert_eq!((summary.missed, summary.count_right), (Some(1.5), Some(0.5)));
     }
 
     #[test]

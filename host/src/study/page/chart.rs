@@ -8,6 +8,8 @@ use super::label::Labels;
 
 /// Room around the plot: left, top, right, bottom (px).
 const ROOM: [f64; 4] = [58.0, 44.0, 14.0, 42.0];
+/// A chart wider than this has room for the names of all marks on one spot (px).
+const ROOMY: f64 = 350.0;
 /// Marks nearer than this have one label (px).
 const ONE_SPOT: f64 = 14.0;
 
@@ -202,13 +204,14 @@ impl Chart {
             let near = |spot: &&mut Spot| spot.class == series.class && distance(spot.at, at) < ONE_SPOT;
             match spots.iter_mut().find(near) {
                 Some(spot) => spot.add(&series.name, leads),
-                None => spots.push(Spot { at, class: series.class, text: series.name.clone(), leads }),
+                None => spots.push(Spot { at, class: series.class, names: vec![series.name.clone()], leads }),
             }
         }
         let small = self.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
         let mut labels = Labels::new(self.plot(), spots.iter().map(|spot| spot.at), small);
         for spot in &spots {
-            let place = labels.place(spot.at, &spot.text);
+            let text = spot.text(if self.size[0] > ROOMY { usize::MAX } else { 1 });
+            let place = labels.place(spot.at, &text);
             if place.is_far {
                 let (to, y) = (place.left + 4.0, place.baseline - 4.0);
                 _ = write!(svg, "<path class=\"lead\" d=\"M{:.1} {:.1}L{to:.1} {y:.1}\"/>", spot.at[0], spot.at[1]);
@@ -220,7 +223,7 @@ impl Chart {
                 if spot.leads { "" } else { " behind" },
                 place.left,
                 place.baseline,
-                escaped(&spot.text)
+                escaped(&text)
             );
         }
     }
@@ -230,15 +233,21 @@ impl Chart {
 struct Spot {
     at: [f64; 2],
     class: &'static str,
-    text: String,
+    names: Vec<String>,
     leads: bool,
 }
 
 impl Spot {
     fn add(&mut self, name: &str, leads: bool) {
-        self.text += " · ";
-        self.text += name;
+        self.names.push(name.to_owned());
         self.leads |= leads;
+    }
+
+    /// Names, the first ones if there are more than `most`, and how many are left out.
+    fn text(&self, most: usize) -> String {
+        let names = &self.names[..self.names.len().min(most)];
+        let left_out = self.names.len() - names.len();
+        names.join(" · ") + &if left_out > 0 { format!(" +{left_out}") } else { String::new() }
     }
 }
 

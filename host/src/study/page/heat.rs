@@ -33,6 +33,8 @@ pub struct Cell {
     pub level: Option<u8>,
     /// What it says.
     pub text: String,
+    /// What it says below that, smaller.
+    pub detail: String,
     /// Whether the method itself said that something is wrong.
     pub is_flagged: bool,
     /// What to tell when it is pointed at.
@@ -72,7 +74,7 @@ mod tests {
 
     #[test]
     fn cells_have_their_level_and_flag() {
-        let cell = |level, is_flagged| Cell { level, text: "3 <".to_owned(), is_flagged, tells: String::new() };
+        let cell = |level, is_flagged| Cell { level, text: "3 <".to_owned(), is_flagged, ..Cell::default() };
         let row = Row {
             name: "tikhonov".to_owned(),
             cells: vec![cell(Some(0), false), cell(Some(9), true), cell(None, false)],

@@ -72,6 +72,8 @@ pub struct CellReport {
     pub error_m: Option<f64>,
     /// Mean distance of contacts found (m).
     pub position_error_m: Option<f64>,
+    /// Share of frames with no contact missed and none invented.
+    pub count_right: Option<f64>,
     /// Contacts missed, a frame.
     pub missed: f64,
     /// Contacts invented, a frame.
@@ -103,6 +105,7 @@ impl CellReport {
         Self {
             error_m: summary.error_m,
             position_error_m: summary.position_error_m,
+            count_right: summary.count_right,
             missed: summary.missed.unwrap_or(0.0),
             invented: summary.invented.unwrap_or(0.0),
             conductance_error: summary.conductance_error,

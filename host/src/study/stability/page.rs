@@ -43,7 +43,7 @@ fn overview(report: &Report) -> String {
     Heat {
         title: format!("{}: first break of each solver", report.detector),
         note: "The mildest point of each sweep that breaks a solver: its error is above 15 % of the mean distance of electrodes and twice that at \
-               the harmless point, or it miscounts, slows down or answers no number. Where it holds: its largest error, mm."
+               the harmless point, or it miscounts, slows down or answers no number. Where it holds: its largest error."
             .to_owned(),
         columns: all.solvers.iter().map(|row| row.solver.clone()).collect(),
         rows: rows.collect(),
@@ -58,7 +58,8 @@ fn overview_cell(sweep: &SweepReport, solver: &str) -> Cell {
         let worst_m = cells().filter_map(|cell| cell.error_m).fold(0.0, f64::max);
         return Cell {
             level: cells().map(|cell| cell.level).max(),
-            text: format!("holds, {}", millimetres(worst_m)),
+            text: "holds".to_owned(),
+            detail: format!("{} mm", millimetres(worst_m)),
             ..Cell::default()
         };
     };
@@ -69,7 +70,8 @@ fn overview_cell(sweep: &SweepReport, solver: &str) -> Cell {
     };
     Cell {
         level: Some(level),
-        text: format!("{}, {}", found.at, found.how.name()),
+        text: found.at.clone(),
+        detail: found.how.name().to_owned(),
         is_flagged: found.is_told,
         tells: format!("holds at {:.0} % of the points", 100.0 * found.survives),
     }
@@ -102,9 +104,11 @@ fn cell(cell: &Option<CellReport>) -> Cell {
     Cell {
         level: Some(cell.level),
         text: number + &marks,
+        detail: String::new(),
         is_flagged: cell.is_told(),
         tells: format!(
-            "missed {:.2}, invented {:.2}, conductance off by {}, p99 {}, flagged in {:.0} % of frames",
+            "count right in {:.0} % of frames, missed {:.2}, invented {:.2}, conductance off by {}, p99 {}, flagged in {:.0} % of frames",
+            100.0 * cell.count_right.unwrap_or(0.0),
             cell.missed,
             cell.invented,
             cell.conductance_error.map_or_else(|| "–".to_owned(), |error| format!("{:.0} %", 100.0 * error)),

@@ -14,7 +14,7 @@ pub fn table(report: &Report) -> String {
             detector.reach_m * 1e3
         ));
         lines.push(format!(
-            "{:<32} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9} {:>6}",
+            "{:<32} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9} {:>6}",
             "solver",
             "median us",
             "p99 us",
@@ -22,6 +22,7 @@ pub fn table(report: &Report) -> String {
             "MB",
             "one mm",
             "several",
+            "count %",
             "missed",
             "invented",
             "conduct.",
@@ -32,7 +33,7 @@ pub fn table(report: &Report) -> String {
         lines.extend(detector.unavailable.iter().map(|why| format!("not tried: {why}")));
         lines.push(String::new());
     }
-    lines.push("one, several: mean error with contacts missed and invented; conduct.: relative error of one contact's; correl., Dice: images of".to_owned());
+    lines.push("one, several: mean error with contacts missed and invented; count: frames of several with none of either; conduct.: relative error of one contact's; correl., Dice: images of".to_owned());
     lines.push(format!("{}. --json has every figure of every scene.", names(Group::Shapes)));
     lines.join("\n")
 }
@@ -61,7 +62,7 @@ fn line(solver: &SolverReport) -> String {
     let (one, shapes) = (of(Group::One), of(Group::Shapes));
     let memory = solver.memory.map(|memory| memory.peak_bytes as f64 / 1e6);
     format!(
-        "{:<32} {:>9.1} {:>9.1} {:>9.2} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9} {:>6}",
+        "{:<32} {:>9.1} {:>9.1} {:>9.2} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9} {:>6}",
         label(solver),
         solver.all.time_us.median,
         solver.all.time_us.p99,
@@ -69,6 +70,7 @@ fn line(solver: &SolverReport) -> String {
         number(memory, 2),
         error_mm(Group::One),
         error_mm(Group::Several),
+        number(of(Group::Several).and_then(|summary| Some(100.0 * summary.count_right?)), 0),
         number(solver.all.missed, 2),
         number(solver.all.invented, 2),
         number(one.and_then(|summary| summary.conductance_error), 2),
