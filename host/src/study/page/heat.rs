@@ -64,7 +64,7 @@ impl Cell {
     fn write(&self, html: &mut String) {
         let class = self.level.map_or_else(|| "empty".to_owned(), |level| format!("h{}", level.min(4)));
         let flag = if self.is_flagged { "<b class=\"flag\" aria-label=\"flagged\">⚑</b>" } else { "" };
-        _ = write!(html, "<td class=\"{class}\" title=\"{}\">{}{flag}</td>", escaped(&self.tells), escaped(&self.text));
+        _ = write!(html, "<td class=\"{class}\" title=\"{}\">{}{flag}{detail}</td>", escaped(&self.tells), escaped(&self.text));
     }
 }
 
@@ -74,13 +74,13 @@ mod tests {
 
     #[test]
     fn cells_have_their_level_and_flag() {
-        let cell = |level, is_flagged| Cell { level, text: "3 <".to_owned(), is_flagged, ..Cell::default() };
+        let cell = |level, is_flagged| Cell { level, text: "3 <".to_owned(), detail: "m&n".to_owned(), is_flagged, ..Cell::default() };
         let row = Row {
             name: "tikhonov".to_owned(),
             cells: vec![cell(Some(0), false), cell(Some(9), true), cell(None, false)],
         };
         let html = Heat { columns: vec!["a".to_owned()], rows: vec![row], ..Heat::default() }.html();
-        for part in ["class=\"h0\"", "class=\"h4\"", "class=\"empty\"", "3 &lt;"] {
+        for part in ["class=\"h0\"", "class=\"h4\"", "class=\"empty\"", "3 &lt;", "<small>m&amp;n</small>"] {
             assert!(html.contains(part), "{part}");
         }
         assert_eq!(html.matches("⚑").count(), 1);

@@ -55,11 +55,11 @@ impl Breakdown {
 /// Where a method breaks first.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Break {
-    /// The mildest point that broke it.
+    /// The mildest point that broke it; of points alike, how many of how many did.
     pub at: String,
     /// How.
     pub how: Breakdown,
-    /// Whether it says so itself, by a flag in most frames of that point, or refuses.
+    /// Whether it says so itself, by a flag in most frames of that point or most points alike, or refuses.
     pub is_told: bool,
     /// Share of the points that it survives.
     pub survives: f64,
@@ -155,10 +155,18 @@ pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<Ce
         cell.broken = if harmless.is_useless() { Some(Breakdown::Never) } else { cell.judged(&harmless) };
     }
     let whole = cells.iter().flatten().filter(|cell| cell.broken.is_none()).count();
-    let first = |index: usize| Some((index, cells[index].as_ref()?.broken?));
-    let (index, how) = order.iter().find_map(|index| first(*index))?;
-    let is_told = cells[index].as_ref().is_some_and(CellReport::is_told);
-    Some(Break { at: labels[index].to_owned(), how, is_told, survives: whole as f64 / order.len() as f64 })
+    let survives = whole as f64 / order.len() as f64;
+    let broken = |index: &usize| Some((*index, cells[*index].as_ref().filter(|cell| cell.broken.is_some())?));
+    let (first, cell) = order.iter().find_map(broken)?;
+    // Points that are as bad as that one: a fault at one electrode after the other.
+    let alike: Vec<usize> = order.iter().copied().filter(|index| severities[*index] == severities[first]).collect();
+    let broken: Vec<_> = alike.iter().filter_map(broken).collect();
+    let told = broken.iter().filter(|(_, cell)| cell.is_told()).count();
+    let at = match alike.len() {
+        1 => labels[first].to_owned(),
+        count => format!("{} of {count}", broken.len()),
+    };
+    Some(Break { at, how: cell.broken?, is_told: 2 * told > broken.len(), survives })
 }
 
 #[cfg(test)]
@@ -182,6 +190,15 @@ mod tests {
             None,
             "within 0.15 of a distance"
         );
+    }
+
+    #[test]
+    fn of_points_alike_it_tells_how_many_break() {
+        let told = CellReport { flagged: 1.0, ..cell(9.0) };
+        let mut cells = [cell(0.1), cell(9.0), cell(0.2), told.clone(), told].map(Some);
+        let found = breaks(&["none", "0", "1", "2", "3"], &[0.0, 1.0, 1.0, 1.0, 1.0], &mut cells);
+        let expected = Break { at: "3 of 4".to_owned(), how: Breakdown::Error, is_told: true, survives: 0.4 };
+        assert_eq!(found, Some(expected));
     }
 
     #[test]

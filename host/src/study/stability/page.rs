@@ -54,6 +54,9 @@ fn overview(report: &Report) -> String {
 fn overview_cell(sweep: &SweepReport, solver: &str) -> Cell {
     let Some(row) = sweep.solvers.iter().find(|row| row.solver == solver) else { return Cell::default() };
     let cells = || row.cells.iter().flatten();
+    if cells().next().is_none() {
+        return cell(&None);
+    }
     let Some(found) = &row.breaks else {
         let worst_m = cells().filter_map(|cell| cell.error_m).fold(0.0, f64::max);
         return Cell {
