@@ -13,7 +13,7 @@ use super::output;
 /// Sweeps what can go wrong, from harmless to hopeless, and tells where each solver breaks, how, and whether it says so itself.
 ///
 /// Noise, converter, force, near contacts, edges, wrong thickness and conductivity, baselines under load, dead and exchanged
-/// electrodes, and more; and the Cramer-Rao bound beside what solvers reach. Takes some minutes, with --quick about a half.
+/// electrodes, and more; and the Cramer-Rao bound beside what solvers reach. Takes some minutes, with --quick about one.
 ///
 /// Examples:
 ///   tactomo stability --quick --out stability.html
@@ -48,7 +48,7 @@ pub struct Args {
 
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let (places, frames) = if args.quick { (1, 2) } else { (5, 2) };
+    let (places, frames) = if args.quick { (1, 2) } else { (3, 2) };
     let plan = Plan {
         detector: args.detector.get()?,
         methods: choice::methods(&args.solver),

@@ -140,6 +140,11 @@ impl Laboratory {
         Self { problem, model: name, ..self.again() }
     }
 
+    /// The same, inverted with some of the electrodes only.
+    pub fn inverted_with(&self, electrodes: &[usize]) -> Self {
+        Self { problem: self.problem.through(electrodes), ..self.again() }
+    }
+
     fn again(&self) -> Self {
         Self {
             detector: self.detector.clone(),

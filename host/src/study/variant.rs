@@ -3,7 +3,9 @@
 use std::fmt;
 
 use crate::forward::ForwardError;
-use crate::solve::{ContactSettings, Contacts, Lambda, Method, Problem, Solver, Tikhonov, Tsvd, Variant};
+use crate::solve::{
+    ContactSettings, Contacts, Lambda, Method, Nonlinear, NonlinearSettings, Problem, Solver, Tikhonov, Tsvd, Variant,
+};
 
 /// Shares of the largest singular value that are tried in place of the default, for lambda or where singular values are left out.
 const SHARES: [f64; 5] = [1e-3, 0.01, 0.1, 0.3, 1.0];
@@ -12,6 +14,9 @@ const RULES: [Setting; 3] =
     [Setting::Lambda(Lambda::Discrepancy(1.0)), Setting::Lambda(Lambda::LCurve), Setting::Lambda(Lambda::Gcv)];
 /// Most contacts that are tried in place of the default.
 const MOST: [usize; 3] = [1, 2, 3];
+
+/// Nodes of a nonlinear image that are tried in place of the default.
+const NODES: [usize; 2] = [100, 225];
 
 /// What a solver is made of, for charts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -75,6 +80,8 @@ pub enum Setting {
     Share(f64),
     /// Most contacts.
     Most(usize),
+    /// Nodes of the image that is fitted.
+    Nodes(usize),
 }
 
 impl fmt::Display for Setting {
@@ -88,6 +95,7 @@ impl fmt::Display for Setting {
             Self::Lambda(Lambda::Gcv) => write!(formatter, "lambda by GCV"),
             Self::Share(share) => write!(formatter, "share {share}"),
             Self::Most(most) => write!(formatter, "at most {most}"),
+            Self::Nodes(nodes) => write!(formatter, "{nodes} nodes"),
         }
     }
 }
@@ -104,6 +112,7 @@ impl Variation {
             Method::Tikhonov => lambdas(&SHARES).chain(RULES).collect(),
             _ if Self::has_lambda(method) => lambdas(&SHARES).collect(),
             Method::Tsvd => SHARES[..4].iter().map(|share| Setting::Share(*share)).collect(),
+            Method::Nonlinear => NODES.map(Setting::Nodes).to_vec(),
             Method::Contacts => MOST.map(Setting::Most).to_vec(),
             _ => Vec::new(),
         };
@@ -139,6 +148,9 @@ impl Variation {
             (Method::Tsvd, Some(Setting::Share(share))) => Box::new(Tsvd::new(jacobian, share)),
             (Method::Contacts, Some(Setting::Most(most))) => {
                 Box::new(Contacts::new(problem, ContactSettings { most, ..ContactSettings::of(problem) })?)
+            }
+            (Method::Nonlinear, Some(Setting::Nodes(nodes))) => {
+                Box::new(Nonlinear::new(problem, NonlinearSettings { nodes, ..NonlinearSettings::default() })?)
             }
             _ => self.method.build(problem)?,
         })

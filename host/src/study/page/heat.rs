@@ -64,7 +64,16 @@ impl Cell {
     fn write(&self, html: &mut String) {
         let class = self.level.map_or_else(|| "empty".to_owned(), |level| format!("h{}", level.min(4)));
         let flag = if self.is_flagged { "<b class=\"flag\" aria-label=\"flagged\">⚑</b>" } else { "" };
-        _ = write!(html, "<td class=\"{class}\" title=\"{}\">{}{flag}{detail}</td>", escaped(&self.tells), escaped(&self.text));
+        let detail = match self.detail.is_empty() {
+            true => String::new(),
+            false => format!("<small>{}</small>", escaped(&self.detail)),
+        };
+        _ = write!(
+            html,
+            "<td class=\"{class}\" title=\"{}\">{}{flag}{detail}</td>",
+            escaped(&self.tells),
+            escaped(&self.text)
+        );
     }
 }
 
@@ -74,7 +83,13 @@ mod tests {
 
     #[test]
     fn cells_have_their_level_and_flag() {
-        let cell = |level, is_flagged| Cell { level, text: "3 <".to_owned(), detail: "m&n".to_owned(), is_flagged, ..Cell::default() };
+        let cell = |level, is_flagged| Cell {
+            level,
+            text: "3 <".to_owned(),
+            detail: "m&n".to_owned(),
+            is_flagged,
+            ..Cell::default()
+        };
         let row = Row {
             name: "tikhonov".to_owned(),
             cells: vec![cell(Some(0), false), cell(Some(9), true), cell(None, false)],

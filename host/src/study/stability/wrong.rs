@@ -72,13 +72,13 @@ fn pad_radius_m(detector: &Detector) -> f64 {
 fn thickness(bench: &Bench) -> Result<Sweep, StudyError> {
     let what = ("Thickness not as told", "True thickness over the one in the model, at the same conductivity.");
     let of = |factor| bench.sound.with_truth(&thicker(&bench.sound.detector, factor));
-    firm(bench, what, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| factor.ln().abs(), of)
+    firm(bench, what, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
 }
 
 fn conductivity(bench: &Bench) -> Result<Sweep, StudyError> {
     let what = ("Conductivity not as told", "True conductivity over the one in the model.");
     let of = |factor| bench.sound.with_faults(&[Fault::Conductivity { factor }], 1);
-    firm(bench, what, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| factor.ln().abs(), of)
+    firm(bench, what, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
 }
 
 /// A laboratory of a detector so thin that the shell is right: the only model of uneven conductivity.
@@ -158,5 +158,5 @@ fn shell(bench: &Bench) -> Result<Sweep, StudyError> {
 fn nodes(bench: &Bench) -> Result<Sweep, StudyError> {
     let what = ("A finer or coarser image", "Nodes of the image that is inverted; 2000 are the default.");
     let of = |nodes| Ok(bench.sound.inverted_on(bench.sound.problem.model.on_image_of(nodes)?));
-    firm(bench, what, &NODES, |nodes| nodes.to_string(), |nodes| (nodes as f64 / 2000.0).ln().abs(), of)
+    firm(bench, what, &NODES, |nodes| nodes.to_string(), |nodes| (nodes as f64 - 2000.0).abs(), of)
 }
