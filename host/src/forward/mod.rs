@@ -27,6 +27,7 @@ pub use self::through::Through;
 use crate::detector::Detector;
 use crate::readings::Readings;
 use crate::scene::Contact;
+use crate::space;
 
 /// A model of a detector.
 pub trait ForwardModel: Send + Sync {
@@ -107,6 +108,13 @@ impl ImageMesh {
     pub fn place_m(&self, node: usize) -> [f64; 3] {
         let [x, y] = self.nodes_m[node];
         self.places_m.get(node).copied().unwrap_or([x, y, 0.0])
+    }
+
+    /// Area of each triangle (m2).
+    pub fn triangle_areas_m2(&self) -> Vec<f64> {
+        let area_m2 =
+            |triangle: &[u32; 3]| 0.5 * space::length(space::normal(triangle.map(|node| self.place_m(node as usize))));
+        self.triangles.iter().map(area_m2).collect()
     }
 
     /// An image that is zero but at some nodes.

@@ -76,7 +76,7 @@ fn factorise(mesh: &ImageMesh, length2_m2: f64) -> Option<Llt<u32, f64>> {
 }
 
 /// `int grad phi_i . grad phi_j` over a triangle: products of its edges over four times its area.
-fn stiffness(corners: [space::Place; 3]) -> [[f64; 3]; 3] {
+pub(super) fn stiffness(corners: [space::Place; 3]) -> [[f64; 3]; 3] {
     let [a, b, c] = corners;
     let opposite = [space::sub(c, b), space::sub(a, c), space::sub(b, a)];
     let four_areas_m2 = 2.0 * space::length(space::normal(corners));

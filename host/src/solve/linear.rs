@@ -82,7 +82,7 @@ fn subtract(matrix: &mut DMatrix<f64>, share: f64, i: usize, j: usize) {
 
 /// `electrodes^2 x electrodes`: readings (V) for each source. Source `i` is the field at electrode `i` less that at the last,
 /// summed over all conductance (A/V of contact times ohm); the last source is the total conductance (S).
-fn readings_of_sources(jacobian: &Jacobian) -> DMatrix<f64> {
+pub(super) fn readings_of_sources(jacobian: &Jacobian) -> DMatrix<f64> {
     let electrodes = jacobian.electrodes();
     let drive_v = jacobian.detector.drive_v;
     DMatrix::from_fn(electrodes * electrodes, electrodes, |row, source| {
@@ -96,7 +96,7 @@ fn readings_of_sources(jacobian: &Jacobian) -> DMatrix<f64> {
 }
 
 /// `nodes x electrodes`, `A Q'`: what a density of 1 S/m2 at each node gives to each source.
-fn sources_of_nodes(jacobian: &Jacobian) -> DMatrix<f64> {
+pub(super) fn sources_of_nodes(jacobian: &Jacobian) -> DMatrix<f64> {
     let electrodes = jacobian.electrodes();
     let fields = &jacobian.fields_ohm;
     let areas_m2 = &jacobian.image_mesh.node_areas_m2;

@@ -1,8 +1,8 @@
 //! The solvers by their names.
 
 use super::{
-    Auto, ContactSettings, Contacts, KernelSolver, Lambda, Nonlinear, NonlinearSettings, Problem, Solver, Tikhonov,
-    Tsvd, Variant,
+    Auto, Bsbl, ContactSettings, Contacts, KernelSolver, Lambda, Nonlinear, NonlinearSettings, Nonnegative, Problem,
+    Solver, Tikhonov, Tsvd, Tv, Variant,
 };
 use crate::forward::ForwardError;
 
@@ -23,6 +23,12 @@ pub enum Method {
     Noser,
     /// Smooth linear image.
     Laplace,
+    /// Linear image, never negative.
+    Nonnegative,
+    /// Linear image that keeps edges.
+    Tv,
+    /// Sparse image of few patches, from 16 looks.
+    Bsbl,
     /// Image by the full contact physics.
     Nonlinear,
     /// Regression from presses at known places.
@@ -31,12 +37,15 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 12] = [
         Self::Tikhonov,
         Self::TikhonovPaper,
         Self::Tsvd,
         Self::Noser,
         Self::Laplace,
+        Self::Nonnegative,
+        Self::Tv,
+        Self::Bsbl,
         Self::Nonlinear,
         Self::Kernel,
         Self::Contacts,
@@ -53,6 +62,9 @@ impl Method {
             Self::Tsvd => "tsvd",
             Self::Noser => "noser",
             Self::Laplace => "laplace",
+            Self::Nonnegative => "nonnegative",
+            Self::Tv => "tv",
+            Self::Bsbl => "bsbl",
             Self::Nonlinear => "nonlinear",
             Self::Kernel => "kernel",
         }
@@ -68,6 +80,9 @@ impl Method {
             Self::Tsvd => "linear image from the first singular images alone",
             Self::Noser => "linear image that makes up for places that readings hear less",
             Self::Laplace => "linear image with a prior of smoothness",
+            Self::Nonnegative => "linear image in which no conductance is negative",
+            Self::Tv => "linear image that keeps edges, by total variation",
+            Self::Bsbl => "image of few patches that all 16 grounds agree on, by sparse Bayesian learning",
             Self::Nonlinear => "image of conductance by the full contact physics, never negative",
             Self::Kernel => {
                 "one contact, by regression from presses at known places (simulated, unless real ones are told)"
@@ -89,6 +104,9 @@ impl Method {
             Self::Tsvd => Box::new(Tsvd::new(jacobian, Tsvd::SHARE)),
             Self::Noser => Box::new(Tikhonov::noser(jacobian, Lambda::default())),
             Self::Laplace => Box::new(Tikhonov::laplace(jacobian)?),
+            Self::Nonnegative => Box::new(Nonnegative::new(jacobian, Nonnegative::SHARE)),
+            Self::Tv => Box::new(Tv::new(problem)?),
+            Self::Bsbl => Box::new(Bsbl::new(problem)?),
             Self::Nonlinear => Box::new(Nonlinear::new(problem, NonlinearSettings::default())?),
             Self::Kernel => Box::new(KernelSolver::new(problem)?),
         })

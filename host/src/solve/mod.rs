@@ -4,6 +4,7 @@ use std::time::Duration;
 
 mod auto;
 mod balance;
+mod bsbl;
 mod contacts;
 mod guard;
 mod health;
@@ -15,6 +16,7 @@ mod linear;
 mod locate;
 mod method;
 mod nonlinear;
+mod nonnegative;
 mod noser;
 mod problem;
 #[cfg(test)]
@@ -22,8 +24,10 @@ mod samples;
 mod tikhonov;
 mod track;
 mod tsvd;
+mod tv;
 
 pub use self::auto::Auto;
+pub use self::bsbl::Bsbl;
 pub use self::contacts::{ContactSettings, Contacts};
 pub use self::guard::Guard;
 pub use self::health::{Ailment, ailing};
@@ -32,9 +36,11 @@ pub use self::lambda::Lambda;
 use self::lambda::Spectrum;
 pub use self::method::Method;
 pub use self::nonlinear::{Nonlinear, NonlinearSettings};
+pub use self::nonnegative::Nonnegative;
 pub use self::problem::Problem;
 pub use self::tikhonov::{Tikhonov, Variant};
 pub use self::tsvd::Tsvd;
+pub use self::tv::Tv;
 use crate::readings::Readings;
 
 /// A method that reads touch from the readings of a frame.
