@@ -22,7 +22,7 @@ const DIFFERENCE: f64 = 1e-3;
 const LONGEST_LOG: f64 = 0.7;
 /// After so many steps, a fit that still leaves this times what noise and model error make is given up.
 const PROBATION: usize = 5;
-const HOPELESS: f64 = 100.0;
+const HOPELESS: f64 = 30.0;
 /// Widest radius, in halves of the detector's shorter side: what is wider is an image's business.
 const WIDEST: f64 = 0.6;
 /// Tries of one step, and the share of the cost below which a step is the last.

@@ -54,7 +54,7 @@ pub struct ContactSettings {
 impl ContactSettings {
     /// For fingers on a detector: contacts of a sixth of the mean distance of its electrodes.
     pub fn of(problem: &Problem) -> Self {
-        Self { most: 5, radius_m: problem.spacing_m() / 6.0, model_error: 0.0005, pad_error: 0.03 }
+        Self { most: 5, radius_m: problem.spacing_m() / 6.0, model_error: 0.0007, pad_error: 0.03 }
     }
 }
 

@@ -20,7 +20,7 @@ const WARM_STEPS: usize = 4;
 const CORRECTED_STEPS: usize = 3;
 const CORRECTIONS: usize = 3;
 /// Steps of discs from spots, and from the frame before.
-const COLD_DISC_STEPS: usize = 15;
+const COLD_DISC_STEPS: usize = 12;
 const WARM_DISC_STEPS: usize = 3;
 /// Places that a fit starts from.
 const STARTS: usize = 3;
@@ -88,9 +88,6 @@ impl Contacts {
         let start = |candidate: &Candidate| self.scan.start(&fitter, &looks, candidate);
         let one = lowest(&fitter, first.iter().map(start).collect(), target)?;
         let mut best = self.correct(one.clone(), target, CORRECTIONS);
-        if best.cost() > 1.2 * target.count() as f64 {
-            best = better(best, self.discs(&one, target).map(Explanation::Discs));
-        }
         let mut fits = vec![one];
         let mut starts: Vec<Vec<FitSpot>> = match explains(&best, target) {
             true => Vec::new(),
@@ -99,7 +96,14 @@ impl Contacts {
         while fits.len() < self.settings.most && !explains(&best, target) {
             let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
             let Explanation::Spots(fit, _) = &more else { break };
-            fits.push(fit.clone());
+            let fit = fit.clone();
+            if score(&more) < score(&best)
+                && let Some(fewer) = fits.last()
+            {
+                // Before one more is believed, those that there are may be wider.
+                best = better(best, self.discs(fewer, target).map(Explanation::Discs));
+            }
+            fits.push(fit);
             let is_better = score(&more) < score(&best);
             if !is_better && fits.len() > 2 {
                 break;
