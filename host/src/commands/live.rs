@@ -9,11 +9,11 @@ use std::time::Duration;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::live::pipeline;
-use tactomo::live::plan::{Ends, MakeSolver, Plan, Summary};
+use tactomo::live::plan::{Ends, MakeSolver, Plan, Solving, Summary};
 use tactomo::live::server::{Scene, Server};
 use tactomo::live::session::Wish;
 use tactomo::live::{Request, Snapshot};
-use tactomo::solve::{Method, Problem};
+use tactomo::solve::{Guard, Method, Problem};
 use tactomo::source::Source;
 use tokio::sync::watch;
 
@@ -61,8 +61,8 @@ pub struct Args {
 pub struct PictureArgs {
     #[command(flatten)]
     pub detector: DetectorArgs,
-    /// Solver that reads the touch
-    #[arg(long, value_name = "NAME", default_value = "tikhonov")]
+    /// Solver that reads the touch; on the page another can be chosen
+    #[arg(long, value_name = "NAME", default_value = "auto")]
     pub solver: Method,
     /// Jacobian from `forward --save-jacobian`, instead of computing it
     #[arg(long, value_name = "FILE")]
@@ -138,7 +138,7 @@ fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
     let detector = show.detector.clone();
     Ok(Plan {
         wish: show.wish,
-        make_solver: Some(make_solver(show.picture.solver, problem)),
+        solving: Some(Solving { method: show.picture.solver, make: make_solver(problem) }),
         recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
         board_log: recording::board_log(show.elf.as_deref())?,
         press: show.mouse.take().map(|mouse| mouse.press),
@@ -147,8 +147,9 @@ fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
     })
 }
 
-fn make_solver(method: Method, problem: Problem) -> MakeSolver {
-    Box::new(move |detector| Ok(method.build(&problem.measured_as(detector))?))
+/// Makes solvers that leave out electrodes that cannot be right.
+fn make_solver(problem: Problem) -> MakeSolver {
+    Arc::new(move |method, detector| Ok(Box::new(Guard::new(method, &problem.measured_as(detector))?)))
 }
 
 /// The page, unless only the figures are wanted.
@@ -164,7 +165,6 @@ fn serve(
     let scene = Scene {
         detector: show.detector.clone(),
         mesh: problem.jacobian.image_mesh.clone(),
-        solver: show.picture.solver.name().to_owned(),
         source: show.source.name(),
         finger: show.mouse.as_ref().map(|mouse| mouse.finger),
     };

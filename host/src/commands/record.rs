@@ -38,7 +38,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let (mut source, _) = source::board(&args.board, &args.detector, &detector)?;
     let plan = Plan {
         wish: args.board.settings.wish(),
-        make_solver: None,
+        solving: None,
         recorder: recording::begin(Some(&args.file), &detector, source.name())?,
         board_log: BoardLog::unread(),
         press: None,

@@ -1,5 +1,7 @@
 //! From a board's frame to volts, and from volts to touch.
 
+use std::time::Duration;
+
 use tactomo_protocol::{Frame, Hello};
 
 use crate::detector::Detector;
@@ -100,6 +102,18 @@ impl Interpreter {
     /// Readings of the last frame (V), as measured.
     pub fn readings(&self) -> &Readings {
         &self.readings
+    }
+
+    /// Goes on with another solver; the readings at rest stay.
+    pub fn change_solver(&mut self, solver: Box<dyn Solver>) {
+        self.solver = Some(solver);
+    }
+
+    /// Asks the solver for answers [within a period](Solver::keep_within).
+    pub fn keep_within(&mut self, period: Option<Duration>) {
+        if let Some(solver) = &mut self.solver {
+            solver.keep_within(period);
+        }
     }
 
     /// Takes the readings at rest anew from the frames to come.

@@ -5,19 +5,22 @@
 
 pub mod board_log;
 pub mod interpret;
+pub mod pace;
 pub mod pipeline;
 pub mod plan;
 pub mod rest;
 pub mod sequence;
 pub mod server;
 pub mod session;
+pub mod solvers;
 pub mod statistics;
 
 use tactomo_protocol::{Hello, Status};
 
+use self::solvers::SolverState;
 use crate::readings::Readings;
 use crate::scene::Contact;
-use crate::solve::Solution;
+use crate::solve::{Method, Solution};
 
 /// What there is to show at a moment.
 #[derive(Clone, Debug, Default)]
@@ -28,6 +31,8 @@ pub struct Snapshot {
     pub hello: Option<Hello>,
     /// The newest frame, if one has come.
     pub frame: Option<FrameSnapshot>,
+    /// The solver, if there is to be one.
+    pub solver: Option<SolverState>,
     /// Counts since the start.
     pub statistics: Statistics,
 }
@@ -96,6 +101,8 @@ pub struct Latency {
 pub enum Request {
     /// Takes the readings at rest anew: nothing must press.
     Rezero,
+    /// Reads the touch by another method.
+    Solver(Method),
     /// Presses on the simulated detector here, instead of any earlier press.
     Press(Contact),
     /// Ends the press.

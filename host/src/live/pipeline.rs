@@ -9,13 +9,15 @@ use std::time::{Duration, Instant};
 use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Frame, Hello};
 
 use super::interpret::{self, Interpreter};
+use super::pace::Pace;
 use super::plan::{Ends, LiveError, Plan, Summary};
 use super::sequence::{Place, Sequence};
 use super::session::{self, GreetError, Session, Wish};
+use super::solvers::Solvers;
 use super::statistics::Meter;
 use super::{FrameSnapshot, LinkState, Request, Snapshot};
 use crate::detector::Detector;
-use crate::solve::{Solution, Solver};
+use crate::solve::{Method, Solution};
 use crate::source::{Link, Source};
 
 /// How long a board has to say Hello: opening the port may have reset it, and then it boots first.
@@ -26,6 +28,8 @@ const REOPEN_EVERY: Duration = Duration::from_millis(500);
 const PUBLISH_EVERY: Duration = Duration::from_millis(8);
 /// Longest time between two snapshots, so that the rate of a silent board falls.
 const PUBLISH_AT_LEAST: Duration = Duration::from_millis(250);
+/// Share of the time between frames that the solver may take: the rest is for receiving and publishing.
+const SOLVER_SHARE: f64 = 0.8;
 /// Bytes of one read: 40 ms at 921600 baud.
 const READ_BYTES: usize = 4096;
 
@@ -34,7 +38,7 @@ const READ_BYTES: usize = 4096;
 /// # Errors
 /// [`LiveError`] if the board cannot be used, or the recording not be kept.
 pub fn run(source: &mut dyn Source, plan: Plan, ends: Ends) -> Result<Summary, LiveError> {
-    let mut pipeline = Pipeline::new(plan, ends);
+    let mut pipeline = Pipeline::new(plan, ends, source.speed());
     let ended = pipeline.run(source);
     if let Err(error) = &ended {
         pipeline.enter(LinkState::Ended(error.to_string()));
@@ -61,8 +65,9 @@ struct Pipeline {
     ends: Ends,
     meter: Meter,
     sequence: Sequence,
+    pace: Pace,
     interpreter: Option<(Detector, Interpreter)>,
-    solver: String,
+    solvers: Option<Solvers>,
     /// When the first board said Hello.
     greeted: Option<Instant>,
     hello: Option<Hello>,
@@ -92,14 +97,15 @@ struct Talk {
 }
 
 impl Pipeline {
-    fn new(plan: Plan, ends: Ends) -> Self {
+    fn new(mut plan: Plan, ends: Ends, speed: f64) -> Self {
         Self {
+            solvers: plan.solving.take().map(Solvers::new),
             plan,
             ends,
             meter: Meter::default(),
             sequence: Sequence::default(),
+            pace: Pace::new(speed),
             interpreter: None,
-            solver: "none".to_owned(),
             greeted: None,
             hello: None,
             state: LinkState::Searching,
@@ -156,6 +162,7 @@ impl Pipeline {
         self.enter(LinkState::Waiting);
         while !self.is_over() {
             self.answer_requests();
+            self.change_solver();
             match talk.exchange(link, &mut buffer) {
                 Ok(count) => self.receive(&mut talk, link, &buffer[..count])?,
                 Err(error) => return lost(link, error, comes_back),
@@ -209,8 +216,8 @@ impl Pipeline {
         self.greeted.get_or_insert(now);
         let measured = interpret::as_measured(&self.plan.detector, &hello)?;
         if self.interpreter.as_ref().is_none_or(|(detector, _)| *detector != measured) {
-            let solver = self.make_solver(&measured)?;
-            let interpreter = Interpreter::new(&measured, solver);
+            let solver = self.solvers.as_ref().map(|solvers| solvers.make(&measured)).transpose();
+            let interpreter = Interpreter::new(&measured, solver.map_err(LiveError::MakeSolver)?);
             self.interpreter = Some((measured, interpreter));
         }
         if self.hello.as_ref() != Some(&hello) {
@@ -226,11 +233,13 @@ impl Pipeline {
         Ok(())
     }
 
-    fn make_solver(&mut self, detector: &Detector) -> Result<Option<Box<dyn Solver>>, LiveError> {
-        let Some(make) = &mut self.plan.make_solver else { return Ok(None) };
-        let solver = make(detector).map_err(LiveError::MakeSolver)?;
-        self.solver = solver.name().to_owned();
-        Ok(Some(solver))
+    /// Goes on with the solver that was asked for, once it is made.
+    fn change_solver(&mut self) {
+        let (Some(solvers), Some((detector, interpreter))) = (&mut self.solvers, &mut self.interpreter) else { return };
+        if let Some(solver) = solvers.ready(detector) {
+            interpreter.change_solver(solver);
+            interpreter.keep_within(solver_time(&self.pace));
+        }
     }
 
     fn frame(&mut self, talk: &mut Talk, frame: &Frame, received: Instant) -> Result<(), LiveError> {
@@ -242,6 +251,9 @@ impl Pipeline {
             return Ok(());
         };
         let place = self.sequence.place(&frame.head);
+        if self.pace.note(&place) {
+            interpreter.keep_within(solver_time(&self.pace));
+        }
         self.meter.frame(received, Instant::now(), place.dropped);
         self.newest = Some(Newest { frame: frame.head, place, solution });
         self.fresh = true;
@@ -257,10 +269,17 @@ impl Pipeline {
         while let Ok(request) = self.ends.requests.try_recv() {
             match (request, &self.plan.press, &mut self.interpreter) {
                 (Request::Rezero, _, Some((_, interpreter))) => interpreter.rezero(),
+                (Request::Solver(method), ..) => self.ask_for(method),
                 (Request::Press(contact), Some(press), _) => press(Some(contact)),
                 (Request::Release, Some(press), _) => press(None),
                 _ => {}
             }
+        }
+    }
+
+    fn ask_for(&mut self, method: Method) {
+        if let Some(solvers) = &mut self.solvers {
+            solvers.change(method, self.interpreter.as_ref().map(|(detector, _)| detector));
         }
     }
 
@@ -290,6 +309,7 @@ impl Pipeline {
             link: self.state.clone(),
             hello: self.hello.clone(),
             frame: frame.map(|(newest, (_, interpreter))| newest.snapshot(interpreter)),
+            solver: self.solvers.as_ref().map(Solvers::state),
             statistics,
         };
         self.ends.snapshots.send_replace(Arc::new(snapshot));
@@ -299,7 +319,7 @@ impl Pipeline {
         let statistics = self.meter.statistics(Instant::now());
         Summary {
             source,
-            solver: self.solver.clone(),
+            solver: self.solvers.as_ref().map_or("none", |solvers| solvers.state().method.name()).to_owned(),
             frames: statistics.frames,
             frames_per_s: self.meter.overall_frames_per_s(),
             dropped: statistics.dropped,
@@ -353,6 +373,11 @@ impl Talk {
         self.counted = corrupt;
         newly
     }
+}
+
+/// How long the solver may take for a frame.
+fn solver_time(pace: &Pace) -> Option<Duration> {
+    pace.period().map(|period| period.mul_f64(SOLVER_SHARE))
 }
 
 fn lost(link: &dyn Link, error: io::Error, comes_back: bool) -> Result<End, LiveError> {

@@ -15,11 +15,11 @@ use super::{Latency, Request, Snapshot};
 use crate::detector::Detector;
 use crate::record::{RecordError, Recorder};
 use crate::scene::Contact;
-use crate::solve::{SolveError, Solver};
+use crate::solve::{Method, SolveError, Solver};
 use crate::source::SourceError;
 
-/// Makes a solver for a detector.
-pub type MakeSolver = Box<dyn FnMut(&Detector) -> Result<Box<dyn Solver>, BoxError> + Send>;
+/// Makes the solver of a method for a detector; called in other threads too.
+pub type MakeSolver = Arc<dyn Fn(Method, &Detector) -> Result<Box<dyn Solver>, BoxError> + Send + Sync>;
 /// Presses on a simulated detector, or lets go.
 pub type Press = Box<dyn Fn(Option<Contact>) + Send>;
 /// Any error.
@@ -31,8 +31,8 @@ pub struct Plan {
     pub detector: Detector,
     /// Settings asked of the board.
     pub wish: Wish,
-    /// Makes the solver, once the board has said Hello; `None` only receives.
-    pub make_solver: Option<MakeSolver>,
+    /// What reads the touch; `None` only receives.
+    pub solving: Option<Solving>,
     /// Keeps the bytes.
     pub recorder: Option<Recorder>,
     /// Where the board's log goes.
@@ -41,6 +41,14 @@ pub struct Plan {
     pub press: Option<Press>,
     /// Time from Hello to the end; `None` for without end.
     pub seconds: Option<Duration>,
+}
+
+/// What reads the touch.
+pub struct Solving {
+    /// The method to begin with.
+    pub method: Method,
+    /// Makes its solver once the board has said Hello, and those of other methods when a page asks for them.
+    pub make: MakeSolver,
 }
 
 /// Where the pipeline meets the rest of the program.
@@ -58,7 +66,7 @@ pub struct Ends {
 pub struct Summary {
     /// Where the bytes came from.
     pub source: String,
-    /// Name of the solver; `none` if there was none.
+    /// Name of the solver in use at the end; `none` if there was none.
     pub solver: String,
     /// Frames received whole.
     pub frames: u64,

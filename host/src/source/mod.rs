@@ -44,6 +44,11 @@ pub trait Source: Send {
 
     /// Whether a lost link may come back, as a board's does when it is plugged in again.
     fn comes_back(&self) -> bool;
+
+    /// How many times faster than they were measured the bytes come; infinite where they wait for the reader.
+    fn speed(&self) -> f64 {
+        1.0
+    }
 }
 
 /// Why a source does not open.
@@ -128,6 +133,10 @@ impl Source for Recording {
 
     fn comes_back(&self) -> bool {
         false
+    }
+
+    fn speed(&self) -> f64 {
+        self.speed
     }
 }
 

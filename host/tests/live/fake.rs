@@ -151,7 +151,7 @@ pub fn plan() -> Plan {
     Plan {
         detector: Detector::preset(Detector::DEFAULT).unwrap(),
         wish: Wish::default(),
-        make_solver: None,
+        solving: None,
         recorder: None,
         board_log: BoardLog::unread(),
         press: None,

@@ -1,12 +1,14 @@
 //! Memory stays flat, however long the picture runs. For an hour's worth of frames:
 //! `TACTOMO_FRAMES=3600000 cargo test --release -p tactomo --test live memory -- --nocapture` (some minutes).
 
+use std::sync::Arc;
+
 use crate::fake::{FakeBoard, ends, plan};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
 use tactomo::live::pipeline;
-use tactomo::live::plan::{MakeSolver, Plan};
-use tactomo::solve::{Lambda, Tikhonov, Variant};
+use tactomo::live::plan::{MakeSolver, Plan, Solving};
+use tactomo::solve::{Lambda, Method, Tikhonov, Variant};
 use tactomo::source::Opened;
 
 /// Resident memory of this process (kB).
@@ -18,13 +20,14 @@ fn resident_kb() -> u64 {
 
 /// Resident memory (kB) after `frames` frames through the whole pipeline, a page looking on.
 fn resident_after(frames: u64) -> u64 {
-    let make_solver: MakeSolver = Box::new(|detector| {
+    let make: MakeSolver = Arc::new(|_, detector| {
         let jacobian = Jacobian::of(&Shell::new(detector)?);
         Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced)))
     });
+    let solving = Solving { method: Method::Tikhonov, make };
     let (ends, _page) = ends();
     let mut source = Opened::new(Box::new(FakeBoard { skip_every: 1000, junk_every: 1000, ..FakeBoard::new(frames) }));
-    let summary = pipeline::run(&mut source, Plan { make_solver: Some(make_solver), ..plan() }, ends).unwrap();
+    let summary = pipeline::run(&mut source, Plan { solving: Some(solving), ..plan() }, ends).unwrap();
     assert_eq!(summary.frames, frames);
     let resident_kb = resident_kb();
     eprintln!(

@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::live::plan::{LiveError, Plan};
+use tactomo::live::plan::{LiveError, MakeSolver, Plan, Solving};
 use tactomo::live::session::{GreetError, Wish, greet};
-use tactomo::live::{LinkState, Request, pipeline};
+use tactomo::live::{LinkState, Request, Snapshot, pipeline};
 use tactomo::record::{Header, Recorder};
 use tactomo::scene::Contact;
-use tactomo::solve::{Lambda, Tikhonov, Variant};
+use tactomo::solve::{Lambda, Method, Tikhonov, Variant};
 use tactomo::source::{Link, Opened, Recording};
 use tactomo_protocol::Settings;
 
@@ -21,11 +21,11 @@ fn opened(link: impl Link + 'static) -> Opened {
 }
 
 fn imaging() -> Plan {
-    let make_solver: tactomo::live::plan::MakeSolver = Box::new(|detector| {
+    let make: MakeSolver = Arc::new(|_, detector| {
         let jacobian = Jacobian::of(&Shell::with_nodes(detector, 500)?);
         Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced)))
     });
-    Plan { make_solver: Some(make_solver), ..plan() }
+    Plan { solving: Some(Solving { method: Method::Tikhonov, make }), ..plan() }
 }
 
 #[test]
@@ -120,6 +120,40 @@ fn a_recording_plays_as_it_was_received() {
     std::fs::remove_file(file).unwrap();
     assert_eq!((played.frames, played.dropped, played.corrupt), (live.frames, live.dropped, live.corrupt));
     assert_eq!(played.frames, 500);
+}
+
+#[test]
+fn the_solver_changes_while_frames_go_on() {
+    let make: MakeSolver = Arc::new(|method, detector| {
+        std::thread::sleep(Duration::from_millis(if method == Method::Noser { 200 } else { 0 }));
+        let jacobian = Jacobian::of(&Shell::with_nodes(detector, 300)?);
+        match method {
+            Method::Noser => Ok(Box::new(Tikhonov::noser(&jacobian, Lambda::default()))),
+            Method::Tsvd => Err("no images".into()),
+            _ => Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced))),
+        }
+    });
+    let plan = Plan { solving: Some(Solving { method: Method::Tikhonov, make }), ..plan() };
+    let (ends, other) = ends();
+    let runs = std::thread::spawn(move || pipeline::run(&mut opened(FakeBoard::new(u64::MAX)), plan, ends).unwrap());
+    let told = |wanted: &dyn Fn(&Snapshot) -> bool| loop {
+        let snapshot = other.snapshots.borrow().clone();
+        if wanted(&snapshot) {
+            return snapshot.statistics.frames;
+        }
+        assert!(!runs.is_finished());
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    told(&|snapshot| snapshot.frame.is_some());
+    other.requests.send(Request::Solver(Method::Noser)).unwrap();
+    let begun = told(&|snapshot| snapshot.solver.as_ref().is_some_and(|solver| solver.making == Some(Method::Noser)));
+    let changed = told(&|snapshot| snapshot.solver.as_ref().is_some_and(|solver| solver.method == Method::Noser));
+    assert!(changed > begun + 20, "{} frames while the solver was made", changed - begun);
+    other.requests.send(Request::Solver(Method::Tsvd)).unwrap();
+    told(&|snapshot| snapshot.solver.as_ref().is_some_and(|solver| solver.refused.is_some()));
+    other.stop();
+    let summary = runs.join().unwrap();
+    assert_eq!((summary.solver.as_str(), summary.dropped, summary.corrupt), ("noser", 0, 0));
 }
 
 /// A link that says the same once, and then nothing.

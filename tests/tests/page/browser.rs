@@ -4,17 +4,18 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use tactomo::scene::SceneName;
+use tactomo::simulate::Fault;
+use tactomo::solve::Method;
 use tokio::sync::{Mutex, MutexGuard};
 
-use crate::chromium::{self, Browser};
+use crate::chromium::{self, Browser, Told};
 use crate::live::Live;
 
 /// One browser at a time: each has several processes, and frame rates are compared.
 static TURN: Mutex<()> = Mutex::const_new(());
 
-/// How far from the contact the image may peak (mm). Between electrodes a linear image peaks at the nearest of them, up to 11 mm
-/// off on a pitch of 15 mm; the places pressed are three times as far apart.
-const PEAK_TOLERANCE_MM: f64 = 10.0;
+/// How far from the press the contact may be found (mm).
+const TOLERANCE_MM: f64 = 1.0;
 
 /// A browser in front of a simulated board.
 struct Stage {
@@ -25,12 +26,12 @@ struct Stage {
 
 impl Stage {
     /// Sets it up; `None` without a browser on this machine.
-    async fn set(scene: SceneName) -> Result<Option<Self>> {
+    async fn set(scene: SceneName, faults: &[Fault]) -> Result<Option<Self>> {
         if !chromium::is_here()? {
             return Ok(None);
         }
         let turn = TURN.lock().await;
-        let live = Live::start(scene)?;
+        let live = Live::start(scene, faults)?;
         let browser = Browser::open(&live.server.url()).await?;
         let stage = Self { live, browser, _turn: turn };
         let ready =
@@ -50,8 +51,11 @@ impl Stage {
 
 /// Runs `$body` with a [`Stage`] named `$stage`.
 macro_rules! on_stage {
-    ($scene:expr, $stage:ident, $body:block) => {{
-        let Some($stage) = Stage::set($scene).await? else { return Ok(()) };
+    ($scene:expr, $stage:ident, $body:block) => {
+        on_stage!($scene, &[], $stage, $body)
+    };
+    ($scene:expr, $faults:expr, $stage:ident, $body:block) => {{
+        let Some($stage) = Stage::set($scene, $faults).await? else { return Ok(()) };
         let outcome: Result<()> = async { $body }.await;
         $stage.end(outcome).await
     }};
@@ -63,9 +67,7 @@ async fn the_picture_follows_the_contact() -> Result<()> {
         for place in [[12.0, 9.0], [-14.0, 5.0], [3.0, -16.0]] {
             stage.live.press(place)?;
             let what = format!("a contact near {place:?}");
-            let near = stage
-                .browser
-                .until(&what, |told| told.number("contacts") > 0.0 && told.peak_from_mm(place) < PEAK_TOLERANCE_MM);
+            let near = stage.browser.until(&what, |told| told.is_pressed_at(place, TOLERANCE_MM));
             near.await?;
         }
         stage.live.mouse.press(None);
@@ -77,12 +79,9 @@ async fn the_picture_follows_the_contact() -> Result<()> {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_picture_moves_by_itself() -> Result<()> {
     on_stage!(SceneName::Wandering, stage, {
-        let first = stage.browser.until("a contact", |told| told.number("contacts") > 0.0).await?;
-        let place = [first.number("peakXMm"), first.number("peakYMm")];
-        stage
-            .browser
-            .until("a contact elsewhere", |told| told.number("contacts") > 0.0 && told.peak_from_mm(place) > 10.0)
-            .await?;
+        let first = stage.browser.until("a contact", |told| told.number("contacts") == 1.0).await?.places_mm();
+        let elsewhere = |told: &Told| told.number("contacts") == 1.0 && !told.is_pressed_at(first[0], 10.0);
+        stage.browser.until("a contact elsewhere", elsewhere).await?;
         Ok(())
     })
 }
@@ -93,9 +92,7 @@ async fn the_mouse_presses_where_it_is() -> Result<()> {
         for place in [[-10.0, 12.0], [16.0, -8.0]] {
             stage.browser.press(place).await?;
             let what = format!("a contact near {place:?}");
-            let near = stage
-                .browser
-                .until(&what, |told| told.number("contacts") > 0.0 && told.peak_from_mm(place) < PEAK_TOLERANCE_MM);
+            let near = stage.browser.until(&what, |told| told.is_pressed_at(place, TOLERANCE_MM));
             near.await?;
             stage.browser.release().await?;
             stage.browser.until("rest", |told| told.number("contacts") == 0.0).await?;
@@ -131,10 +128,7 @@ async fn both_follow(stage: &Stage, second: &Browser) -> Result<()> {
     for place in [[12.0, 12.0], [-12.0, -12.0]] {
         stage.live.press(place)?;
         for page in [&stage.browser, second] {
-            page.until("the contact", |told| {
-                told.number("contacts") > 0.0 && told.peak_from_mm(place) < PEAK_TOLERANCE_MM
-            })
-            .await?;
+            page.until("the contact", |told| told.is_pressed_at(place, TOLERANCE_MM)).await?;
         }
     }
     for page in [&stage.browser, second] {
@@ -164,24 +158,66 @@ async fn a_page_that_hangs_does_not_slow_the_board() -> Result<()> {
     })
 }
 
-/// Pictures for the README: `TACTOMO_SCREENSHOT=docs cargo test -p tactomo-tests --test page screenshot`.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn every_solver_can_be_chosen_while_frames_come() -> Result<()> {
+    on_stage!(SceneName::Rest, stage, {
+        stage.live.press([9.0, 7.0])?;
+        for method in Method::ALL {
+            let dropped = stage.live.statistics().dropped;
+            stage.browser.choose(method).await?;
+            let name = method.name();
+            let told = stage.browser.until(name, |told| told.text("solver") == name && told.text("making").is_empty());
+            let updates = told.await?.number("updates");
+            let shown = |told: &Told| {
+                told.number("updates") > updates + 5.0
+                    && (told.number("contacts") > 0.0 || told.text("image") == "true")
+            };
+            stage.browser.until(&format!("what {name} finds"), shown).await?;
+            eprintln!("{name}: {} frames dropped", stage.live.statistics().dropped - dropped);
+        }
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_broken_wire_is_told_and_its_electrode_crossed_out() -> Result<()> {
+    let faults = ["open:3".parse::<Fault>()?];
+    on_stage!(SceneName::Rest, &faults, stage, {
+        let place = [9.0, 7.0];
+        stage.live.press(place)?;
+        let told = |told: &Told| told.text("excluded") == "3" && told.is_pressed_at(place, TOLERANCE_MM);
+        stage.browser.until("electrode 3 left out", told).await?;
+        let script =
+            "return [document.getElementById('warnings').textContent, document.querySelectorAll('.excluded').length]";
+        let shown = stage.browser.client.execute(script, Vec::new()).await?;
+        ensure!(
+            shown[0].as_str().is_some_and(|text| text.contains("electrode 3 left out")) && shown[1] == 1,
+            "{shown}"
+        );
+        Ok(())
+    })
+}
+
+/// Pictures for the README: `TACTOMO_SCREENSHOT=$PWD/docs cargo test --workspace --test page screenshot`.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn screenshot() -> Result<()> {
     let Some(folder) = std::env::var_os("TACTOMO_SCREENSHOT") else { return Ok(()) };
-    // Tests run in their package's folder; a person means the workspace's.
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder);
+    let folder = std::path::Path::new(&folder);
+    picture(Method::Auto, "light", &folder.join("live.png")).await?;
+    picture(Method::Tikhonov, "dark", &folder.join("live-dark.png")).await
+}
+
+/// A picture of one contact.
+async fn picture(method: Method, theme: &str, file: &std::path::Path) -> Result<()> {
     on_stage!(SceneName::Rest, stage, {
         stage.live.press([9.0, 7.0])?;
-        tokio::time::sleep(Duration::from_secs(3)).await;
-        let button = stage.browser.client.find(fantoccini::Locator::Id("theme")).await?;
-        for _ in 0..2 {
-            let theme = stage.browser.told().await?.text("theme").to_owned();
-            let name = if theme == "dark" { "live-dark.png" } else { "live.png" };
-            std::fs::write(folder.join(name), stage.browser.client.screenshot().await?)
-                .context("the picture's folder")?;
-            button.click().await?;
-            tokio::time::sleep(Duration::from_millis(400)).await;
+        stage.browser.choose(method).await?;
+        if stage.browser.told().await?.text("theme") != theme {
+            stage.browser.client.find(fantoccini::Locator::Id("theme")).await?.click().await?;
         }
-        Ok(())
+        // Until the figures are those of a steady run.
+        tokio::time::sleep(Duration::from_secs(3)).await;
+        stage.browser.until("a contact", |told| told.number("contacts") == 1.0).await?;
+        std::fs::write(file, stage.browser.client.screenshot().await?).context("the picture's folder")
     })
 }

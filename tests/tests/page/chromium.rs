@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use fantoccini::actions::{InputSource, MouseActions, PointerAction};
-use fantoccini::{Client, ClientBuilder};
+use fantoccini::{Client, ClientBuilder, Locator};
 use hyper_util::client::legacy::connect::HttpConnector;
 use serde_json::{Value, json};
+use tactomo::solve::Method;
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -100,6 +101,12 @@ impl Browser {
         Ok(self.client.perform_actions(mouse).await?)
     }
 
+    /// Chooses a solver, as a person does in the list.
+    pub async fn choose(&self, method: Method) -> Result<()> {
+        let list = self.client.find(Locator::Id("method")).await?;
+        Ok(list.select_by_value(method.name()).await?)
+    }
+
     /// Lets go of the mouse's button.
     pub async fn release(&self) -> Result<()> {
         let mouse = MouseActions::new("mouse".to_owned())
@@ -133,9 +140,14 @@ impl Told {
         self.0[name].as_str().unwrap_or_default()
     }
 
-    /// Distance of the peak from a place (mm).
-    pub fn peak_from_mm(&self, [x_mm, y_mm]: [f64; 2]) -> f64 {
-        (self.number("peakXMm") - x_mm).hypot(self.number("peakYMm") - y_mm)
+    /// Places of the contacts (mm).
+    pub fn places_mm(&self) -> Vec<[f64; 2]> {
+        serde_json::from_str(self.text("placesMm")).unwrap_or_default()
+    }
+
+    /// Whether there is one contact, and that within `tolerance_mm` of a place (mm).
+    pub fn is_pressed_at(&self, [x_mm, y_mm]: [f64; 2], tolerance_mm: f64) -> bool {
+        matches!(self.places_mm()[..], [[x, y]] if (x - x_mm).hypot(y - y_mm) < tolerance_mm)
     }
 }
 

@@ -9,16 +9,14 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use tactomo::detector::Detector;
 use tactomo::forward::Auto;
-use tactomo::forward::jacobian::Jacobian;
 use tactomo::live::board_log::BoardLog;
-use tactomo::live::plan::{Ends, LiveError, Plan, Summary};
+use tactomo::live::plan::{Ends, LiveError, Plan, Solving, Summary};
 use tactomo::live::server::{self, Finger, Server};
 use tactomo::live::session::Wish;
 use tactomo::live::{Snapshot, Statistics, pipeline};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
-use tactomo::simulate::{Mouse, Simulation};
-use tactomo::solve::{Lambda, Solver, Tikhonov, Variant};
-
+use tactomo::simulate::{Fault, Mouse, Simulation};
+use tactomo::solve::{Guard, Method, Problem};
 use tactomo::source::Opened;
 use tactomo::source::simulated::{Options, SimulatedBoard};
 use tokio::sync::watch;
@@ -38,19 +36,18 @@ pub struct Live {
 }
 
 impl Live {
-    /// Starts it with a scene on the default detector.
-    pub fn start(scene: SceneName) -> Result<Self> {
+    /// Starts it with a scene on the default detector, with faults if asked, and the default solver.
+    pub fn start(scene: SceneName, faults: &[Fault]) -> Result<Self> {
         let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
         let hand = Hand::relative(&detector);
         let scene = Scene::new(scene, &detector, hand, 1);
-        let physics = Simulation::new(&detector, scene, &[], 1)?;
-        let model = Auto::new(&detector, None)?.model;
+        let physics = Simulation::new(&detector, scene, faults, 1)?;
+        let problem = Problem::new(Auto::new(&detector, None)?.model);
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
         let page = server::Scene {
             detector: detector.clone(),
-            mesh: model.image_mesh().clone(),
-            solver: "tikhonov".to_owned(),
+            mesh: problem.jacobian.image_mesh.clone(),
             source: "simulated board".to_owned(),
             finger: Some(Finger::from(touch(&hand, [0.0; 2])?)),
         };
@@ -58,7 +55,7 @@ impl Live {
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
         let mouse = physics.mouse();
-        let pipeline = Some(run(&detector, physics, Jacobian::of(&*model), ends)?);
+        let pipeline = Some(run(&detector, physics, problem, ends)?);
         Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 
@@ -100,7 +97,7 @@ fn touch(hand: &Hand, at_mm: [f64; 2]) -> Result<Contact> {
 fn run(
     detector: &Detector,
     physics: Simulation,
-    jacobian: Jacobian,
+    problem: Problem,
     ends: Ends,
 ) -> Result<JoinHandle<Result<Summary, LiveError>>> {
     let mouse = physics.mouse();
@@ -108,7 +105,10 @@ fn run(
     let plan = Plan {
         detector: detector.clone(),
         wish: Wish::default(),
-        make_solver: Some(Box::new(move |_| Ok(tikhonov(&jacobian)))),
+        solving: Some(Solving {
+            method: Method::Auto,
+            make: Arc::new(move |method, detector| Ok(Box::new(Guard::new(method, &problem.measured_as(detector))?))),
+        }),
         recorder: None,
         board_log: BoardLog::unread(),
         press: Some(Box::new(move |contact| mouse.press(contact))),
@@ -116,8 +116,4 @@ fn run(
     };
     let mut source = Opened::new(Box::new(board));
     Ok(std::thread::spawn(move || pipeline::run(&mut source, plan, ends)))
-}
-
-fn tikhonov(jacobian: &Jacobian) -> Box<dyn Solver> {
-    Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Balanced))
 }

@@ -11,7 +11,7 @@ use tactomo::live::server::{Finger, Scene, Server, ServerError};
 use tactomo::live::{FrameSnapshot, Request, Snapshot};
 use tactomo::readings::Readings;
 use tactomo::scene::Contact;
-use tactomo::solve::Solution;
+use tactomo::solve::{Method, Solution};
 use tokio::sync::watch;
 
 use crate::raw::{Heard, RawPage, ask, ask_socket};
@@ -29,7 +29,6 @@ fn scene(finger: Option<Finger>) -> Result<Scene> {
     Ok(Scene {
         detector: Detector::preset(Detector::DEFAULT).context("the default preset")?,
         mesh: ImageMesh::default(),
-        solver: "none".to_owned(),
         source: "a test".to_owned(),
         finger,
     })
@@ -104,7 +103,7 @@ fn a_foreign_page_cannot_open_the_socket() -> Result<()> {
 fn a_message_is_sent_when_the_last_was_taken() -> Result<()> {
     let rig = Rig::start(None)?;
     let mut page = RawPage::open(rig.server.port())?;
-    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"scene","layout":1,"#)));
+    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"scene","layout":2,"#)));
     assert!(page.is_silent_for(Duration::from_millis(400))?, "the scene was not taken");
     page.take()?;
     assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"status","#)));
@@ -151,7 +150,16 @@ fn nonsense_closes_its_page_and_no_other() -> Result<()> {
     let rig = Rig::start(None)?;
     let mut other = RawPage::open(rig.server.port())?;
     let long = format!("\"{}\"", "a".repeat(5000));
-    for text in ["", "taken", "{", r#""flash""#, r#"{"press":{"x_m":0}}"#, r#"{"press":{"x_m":0,"y_m":0}}"#, &long] {
+    for text in [
+        "",
+        "taken",
+        "{",
+        r#""flash""#,
+        r#"{"solver":"guess"}"#,
+        r#"{"press":{"x_m":0}}"#,
+        r#"{"press":{"x_m":0,"y_m":0}}"#,
+        &long,
+    ] {
         let mut page = RawPage::open(rig.server.port())?;
         page.say(text)?;
         ensure!(matches!(page.hear()?, Heard::Text(_)), "the scene comes first");
@@ -178,6 +186,8 @@ fn a_page_presses_on_the_detector_and_lets_go_when_it_leaves() -> Result<()> {
     assert_eq!(rig.request()?, Request::Press(contact), "0.031 m is off the detector");
     page.say("\"rezero\"")?;
     assert_eq!(rig.request()?, Request::Rezero);
+    page.say(r#"{"solver":"contacts"}"#)?;
+    assert_eq!(rig.request()?, Request::Solver(Method::Contacts));
     drop(page);
     assert_eq!(rig.request()?, Request::Release);
     Ok(())

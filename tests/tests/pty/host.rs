@@ -34,7 +34,7 @@ impl Host {
         let plan = Plan {
             detector: Detector::preset("square-60").unwrap(),
             wish: Wish::default(),
-            make_solver: None,
+            solving: None,
             recorder: None,
             board_log: BoardLog::unread(),
             press: None,

@@ -1,20 +1,26 @@
 // The live page: takes messages from the program and shows them.
 
+import { ContactTable } from "./contacts.js";
+import { MethodSelect } from "./method.js";
 import { Figures, linkText, showDetails, showState } from "./panel.js";
 import { Picture } from "./picture.js";
 import { listenForPresses } from "./press.js";
 import { Connection } from "./protocol.js";
 import { ReadingsMap } from "./readings.js";
 import { listenForTheme, theme } from "./theme.js";
+import { Verdict } from "./verdict.js";
 
 const REZERO_SHOWN_MS = 1500;
 
 const { dataset } = document.documentElement;
 const rezeroButton = document.getElementById("rezero");
 const figures = new Figures();
+const table = new ContactTable();
+const verdict = new Verdict();
 let scene = null;
 let picture = null;
 let readings = null;
+let method = null;
 let waiting = null;
 let rezeros = null;
 let rezeroing = false;
@@ -24,6 +30,7 @@ function start(message) {
   scene = message;
   picture = new Picture(scene, theme());
   readings = new ReadingsMap(scene, theme(), (g, e) => picture.highlight(g, e));
+  method = new MethodSelect(scene.solvers, (request) => connection.send(request));
   document.getElementById("plot").classList.toggle("pressable", scene.simulated);
   if (scene.simulated) listenForPresses(picture, (request) => connection.send(request));
   document.getElementById("plot").tabIndex = scene.simulated ? 0 : -1;
@@ -36,6 +43,7 @@ function showStatus(status) {
   figures.show(status);
   showDetails(scene, status.hello);
   showState(status.link.state, linkText(status.link));
+  method.show(status.solver, status.link.state === "streaming");
   rezeroButton.disabled = status.link.state !== "streaming";
   showRezero(status);
 }
@@ -61,6 +69,8 @@ function draw(now) {
   if (!update || !picture) return;
   picture.show(update, now);
   readings.show(update, now);
+  table.show(update, now);
+  verdict.show(update, method.explanation, now);
   dataset.sequence = String(update.sequence);
   dataset.received = String(update.frames);
   dataset.updates = String(Number(dataset.updates ?? 0) + 1);

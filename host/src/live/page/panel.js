@@ -58,7 +58,7 @@ function scanText({ settle_us: settle, averages, max_frames_per_s: most }) {
   return `settles ${settle} µs, ${average}${most ? `, at most ${most} frames/s` : ""}`;
 }
 
-/** Details that stay: who the board is, what the detector is, how the image is made. */
+/** Details that stay: who the board is, what the detector is. */
 export function showDetails(scene, hello) {
   const board = hello ? `${hello.board}, firmware ${hello.firmware}` : "not heard yet";
   const adc = hello ? `${hello.adc_bits} bits of ${fixed(hello.full_scale_v, 2)} V; drive ${fixed(hello.drive_v, 2)} V` : "";
@@ -69,11 +69,12 @@ export function showDetails(scene, hello) {
     ["Converter", adc],
     ["Scan", hello ? scanText(hello) : ""],
     ["Detector", `${scene.detector}, ${width} × ${height} mm, ${scene.electrodes.length} electrodes`],
-    ["Method", `${scene.solver}, ${count(scene.nodes_m.length)} nodes`],
+    ["Images", `${count(scene.nodes_m.length)} nodes`],
   ];
   document.getElementById("details").replaceChildren(
     ...rows.flatMap(([name, value]) => [element("dt", "", name), element("dd", "", value)]),
   );
+  document.getElementById("detector").textContent = `${scene.detector}, ${scene.electrodes.length} electrodes`;
   const badge = document.getElementById("source");
   badge.hidden = false;
   badge.textContent = scene.simulated ? "Simulated" : scene.source;

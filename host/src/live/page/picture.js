@@ -1,10 +1,11 @@
 // The image of the detector: colours on a canvas, and over it as SVG the outline, electrodes, contacts, axes and colour bar.
 
 import { colourMaps, css } from "./colours.js";
+import { markOf, sizeKey } from "./marks.js";
 import { Raster } from "./raster.js";
 import { StickyScale } from "./scale.js";
 import { gradient, label, line, svg } from "./svg.js";
-import { decimalsOf, fixed, millimetres, niceStep, prefixOf, ticks } from "./units.js";
+import { decimalsOf, fixed, niceStep, prefixOf, ticks } from "./units.js";
 
 const MARGIN = { left: 54, right: 92, top: 14, bottom: 46 };
 const BAR = { gap: 20, width: 14 };
@@ -20,7 +21,6 @@ export class Picture {
     this.box = document.getElementById("plot");
     this.canvas = document.getElementById("image");
     this.overlay = document.getElementById("overlay");
-    this.peakText = document.getElementById("peak");
     const [[left, bottom], [right, top]] = scene.bounds_m;
     this.sizeM = [right - left, top - bottom];
     const areaM2 = this.sizeM[0] * this.sizeM[1] / scene.electrodes.length;
@@ -31,25 +31,31 @@ export class Picture {
     this.blank = new Float32Array(scene.nodes_m.length);
     this.values = this.blank;
     this.contacts = [];
+    this.excluded = [];
     this.layOut();
   }
 
   /** Shows an update. */
-  show({ image, contacts }, now) {
+  show({ image, contacts, excluded }, now) {
+    const had = this.hasImage;
     // A method that finds contacts only sends no image.
     this.values = image.length === this.values.length ? image : this.blank;
     this.contacts = contacts;
-    this.#findPeak();
-    if (this.scale.take(this.peak.value, now)) this.#drawBar();
-    this.#paint();
+    this.largest = this.values.reduce((a, b) => Math.max(a, b), 0);
+    if (this.scale.take(this.largest, now) || had !== this.hasImage) this.#drawKey();
+    if (had || this.hasImage) this.#paint();
     this.#drawContacts();
+    this.#crossOut(excluded);
     this.#tell();
   }
 
+  /** Whether there is an image to show. */
+  get hasImage() { return this.values !== this.blank; }
+
   /** Fits the colours to the image of now. */
   fit(now) {
-    this.scale.fit(this.peak?.value ?? 0, now);
-    this.#drawBar();
+    this.scale.fit(this.largest ?? 0, now);
+    this.#drawKey();
     this.#paint();
   }
 
@@ -144,15 +150,18 @@ export class Picture {
       svg("circle", { r: 11 }), line(-17, 0, 17, 0, ""), line(0, -17, 0, 17, ""));
     const outline = svg("path", { d: this.#path(this.scene.outline_m), class: "outline" });
     this.overlay.replaceChildren(...this.#axes(), outline, ...this.pads, this.marks, this.cursor, this.bar);
-    this.#drawBar();
+    this.#drawKey();
     this.#drawContacts();
+    this.#crossOut(this.excluded);
   }
 
   #pad({ x_m: x, y_m: y, radius_m: radius }, i) {
     const size = radius * this.perM;
     const beside = size < 8;
     const number = label(beside ? size + 3 : 0, beside ? 0 : 0.5, String(i), "pad-number", beside ? "start" : "middle");
-    return svg("g", { class: "pad", transform: this.#at([x, y]) }, svg("circle", { r: size }), number);
+    const arm = 1.25 * Math.max(size, 6);
+    const cross = svg("path", { class: "cross", d: `M${-arm} ${-arm}L${arm} ${arm}M${-arm} ${arm}L${arm} ${-arm}` });
+    return svg("g", { class: "pad", transform: this.#at([x, y]) }, svg("circle", { r: size }), number, cross);
   }
 
   #axes() {
@@ -171,6 +180,12 @@ export class Picture {
     const titleY = label(0, 0, "y (mm)", "axis-text");
     titleY.setAttribute("transform", `translate(${this.left - 44} ${this.top + this.height / 2}) rotate(-90)`);
     return [...across, ...up, titleX, titleY];
+  }
+
+  // The colour bar of an image; without one, the key to the contacts' sizes.
+  #drawKey() {
+    if (this.hasImage) this.#drawBar();
+    else this.bar.replaceChildren(...sizeKey(this.scene.sheet_conductance_s, this.left + this.width + 52, this.top, this.height));
   }
 
   #drawBar() {
@@ -192,37 +207,26 @@ export class Picture {
     }), ...marks, title);
   }
 
-  #inBarUnits(value) {
-    const { factor, symbol } = prefixOf(this.scale.max);
-    return `${fixed(value / factor, decimalsOf(this.scale.max / factor) + 2)} ${symbol}S/m²`;
-  }
-
   #drawContacts() {
-    const strongest = Math.max(...this.contacts.map((contact) => contact.conductanceS));
-    this.marks.replaceChildren(...this.contacts.map(({ xM, yM, conductanceS }) => {
-      const radius = 6 + 6 * Math.sqrt(Math.max(0, conductanceS / strongest));
-      return svg("g", { class: "contact", transform: this.#at([xM, yM]) },
-        svg("circle", { r: radius }), line(-radius - 5, 0, radius + 5, 0, ""), line(0, -radius - 5, 0, radius + 5, ""));
+    const { sheet_conductance_s: sheetS } = this.scene;
+    this.marks.classList.toggle("over-image", this.hasImage);
+    this.marks.replaceChildren(...this.contacts.map((contact) => {
+      const mark = markOf(contact, sheetS, this.perM, this.left + this.width - this.#x(contact.xM));
+      mark.setAttribute("transform", this.#at([contact.xM, contact.yM]));
+      return mark;
     }));
   }
 
-  #findPeak() {
-    let [highest, lowest] = [0, 0];
-    for (let i = 1; i < this.values.length; i += 1) {
-      if (this.values[i] > this.values[highest]) highest = i;
-      if (this.values[i] < this.values[lowest]) lowest = i;
-    }
-    const [xM, yM] = this.scene.nodes_m[highest];
-    this.peak = { xM, yM, value: this.values[highest], lowest: this.values[lowest] };
+  #crossOut(excluded) {
+    this.excluded = excluded;
+    this.pads.forEach((pad, i) => pad.classList.toggle("excluded", excluded.includes(i)));
   }
 
   #tell() {
-    const { xM, yM, value, lowest } = this.peak;
-    this.peakText.textContent = this.contacts.length
-      ? `peak ${this.#inBarUnits(value)} at x ${millimetres(xM)}, y ${millimetres(yM)} mm` : "no touch";
+    const places = this.contacts.map(({ xM, yM }) => [xM, yM].map((m) => Number((m * 1e3).toFixed(3))));
     Object.assign(document.documentElement.dataset, {
-      peakXMm: (xM * 1e3).toFixed(2), peakYMm: (yM * 1e3).toFixed(2), peakSPerM2: value.toPrecision(5),
-      lowestSPerM2: lowest.toPrecision(5), scaleMaxSPerM2: String(this.scale.max), contacts: String(this.contacts.length),
+      contacts: String(this.contacts.length), placesMm: JSON.stringify(places), image: String(this.hasImage),
+      scaleMaxSPerM2: String(this.scale.max),
     });
   }
 }

@@ -1,34 +1,64 @@
-// What passes the socket. The program's side is `live/server/wire.rs`; the layout is described there and must be the same.
+// What passes the socket. The program's side is `live/server/wire.rs` and `live/server/update.rs`; the layout is described there and
+// must be the same.
 
 /** Version of the layout below; the scene carries the program's. */
-export const LAYOUT = 1;
+export const LAYOUT = 2;
 
-const HEADER_BYTES = 24;
+const HEAD_WORDS = 8;
+// From the lowest bit on.
+const FLAGS = ["saturated", "misfit", "unfinished"];
 
-/**
- * An update: six little-endian u32 (layout, sequence number of the frame, frames received so far, nodes, electrodes, contacts
- * found), then as little-endian f32 the image (S/m2, one a node), the readings (V, row g, column e), and the contacts found
- * (x in m, y in m, conductance in S, each).
- */
+const known = (value) => (Number.isNaN(value) ? null : value);
+const bitsOf = (word) => Array.from({ length: 32 }, (_, bit) => bit).filter((bit) => (word >>> bit) & 1);
+
+// Takes little-endian numbers from a buffer, one after the other.
+class Taker {
+  constructor(buffer) {
+    this.buffer = buffer;
+    this.view = new DataView(buffer);
+    this.offset = 0;
+  }
+
+  word() {
+    this.offset += 4;
+    return this.view.getUint32(this.offset - 4, true);
+  }
+
+  floats(length) {
+    this.offset += 4 * length;
+    return new Float32Array(this.buffer, this.offset - 4 * length, length);
+  }
+
+  text() {
+    return new TextDecoder().decode(new Uint8Array(this.buffer, this.offset));
+  }
+}
+
+function contact(taker) {
+  const id = taker.word() || null;
+  const [xM, yM, conductanceS, ...others] = taker.floats(9);
+  const [radiusM, forceN, xErrorM, yErrorM, correlation, errorS] = others.map(known);
+  return { id, xM, yM, conductanceS, radiusM, forceN, xErrorM, yErrorM, correlation, errorS };
+}
+
+function choice(text) {
+  const [what, why] = text.split("\n");
+  return why === undefined ? null : { what, why };
+}
+
+/** An update: the newest frame and what the solver says of it. What is not known is null. */
 export function decodeUpdate(buffer) {
-  const view = new DataView(buffer);
-  const [layout, sequence, frames, nodes, electrodes, contacts] =
-    Array.from({ length: 6 }, (_, i) => view.getUint32(4 * i, true));
+  const taker = new Taker(buffer);
+  const [layout, sequence, frames, nodes, electrodes, contacts, flags, excluded] =
+    Array.from({ length: HEAD_WORDS }, () => taker.word());
   if (layout !== LAYOUT) throw new Error("The program is of another version than this page: reload it.");
-  let offset = HEADER_BYTES;
-  const take = (length) => {
-    const part = new Float32Array(buffer, offset, length);
-    offset += 4 * length;
-    return part;
-  };
   return {
-    sequence, frames, electrodes,
-    image: take(nodes),
-    readings: take(electrodes * electrodes),
-    contacts: Array.from({ length: contacts }, () => {
-      const [xM, yM, conductanceS] = take(3);
-      return { xM, yM, conductanceS };
-    }),
+    sequence, frames, electrodes, flags: bitsOf(flags).map((bit) => FLAGS[bit]), excluded: bitsOf(excluded),
+    residual: known(taker.floats(1)[0]),
+    image: taker.floats(nodes),
+    readings: taker.floats(electrodes * electrodes),
+    contacts: Array.from({ length: contacts }, () => contact(taker)),
+    choice: choice(taker.text()),
   };
 }
 

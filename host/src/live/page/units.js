@@ -16,8 +16,15 @@ export const fixed = (value, decimals) => {
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", MINUS);
 };
 
-/** Metres as millimetres, one decimal, without the unit. */
-export const millimetres = (metres) => fixed(metres * 1e3, 1);
+/** Metres as millimetres, without the unit. */
+export const millimetres = (metres, decimals) => fixed(metres * 1e3, decimals);
+
+/** `value` with three significant digits, or so many, and the unit with an SI prefix. */
+export function withPrefix(value, unit, digits = 3) {
+  const { factor, symbol } = prefixOf(value);
+  const whole = Math.floor(Math.log10(Math.max(1, Math.abs(value / factor))) + 1e-6) + 1;
+  return `${fixed(value / factor, Math.max(0, digits - whole))}\u2009${symbol}${unit}`;
+}
 
 /** A count with thin spaces between thousands. */
 export const count = (value) => String(Math.round(value)).replace(/\B(?=(\d{3})+$)/g, "\u2009");

@@ -12,12 +12,15 @@ const SVG: &str = "image/svg+xml";
 /// Path, type and contents of a file.
 type Asset = (&'static str, &'static str, &'static str);
 
-const ASSETS: [Asset; 15] = [
+const ASSETS: [Asset; 19] = [
     ("/", HTML, include_str!("../page/index.html")),
     ("/style.css", CSS, include_str!("../page/style.css")),
     ("/icon.svg", SVG, include_str!("../page/icon.svg")),
     ("/app.js", SCRIPT, include_str!("../page/app.js")),
     ("/colours.js", SCRIPT, include_str!("../page/colours.js")),
+    ("/contacts.js", SCRIPT, include_str!("../page/contacts.js")),
+    ("/marks.js", SCRIPT, include_str!("../page/marks.js")),
+    ("/method.js", SCRIPT, include_str!("../page/method.js")),
     ("/panel.js", SCRIPT, include_str!("../page/panel.js")),
     ("/picture.js", SCRIPT, include_str!("../page/picture.js")),
     ("/press.js", SCRIPT, include_str!("../page/press.js")),
@@ -28,6 +31,7 @@ const ASSETS: [Asset; 15] = [
     ("/svg.js", SCRIPT, include_str!("../page/svg.js")),
     ("/theme.js", SCRIPT, include_str!("../page/theme.js")),
     ("/units.js", SCRIPT, include_str!("../page/units.js")),
+    ("/verdict.js", SCRIPT, include_str!("../page/verdict.js")),
 ];
 
 /// Answer to a request for `path`.

@@ -6,6 +6,7 @@
 mod assets;
 mod guard;
 mod socket;
+mod update;
 mod wire;
 
 use std::io;
@@ -48,8 +49,6 @@ pub struct Scene {
     pub detector: Detector,
     /// Places of the image.
     pub mesh: ImageMesh,
-    /// Name of the solver that makes the image.
-    pub solver: String,
     /// What a person calls the source: a port, a recording, the simulated board.
     pub source: String,
     /// What the mouse presses with, if the board is simulated.

@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
 
 use super::wire::{self, PageMessage};
-use super::{Finger, Shared};
+use super::{Finger, Shared, update};
 use crate::live::{Request, Snapshot};
 use crate::scene::Contact;
 
@@ -95,6 +95,7 @@ impl<'a> Page<'a> {
                 self.ask(Request::Rezero);
                 self.shared.rezeros.fetch_add(1, Ordering::Relaxed);
             }
+            PageMessage::Solver(method) => self.ask(Request::Solver(method)),
             PageMessage::Press { x_m, y_m } => {
                 let finger = self.shared.scene.finger.ok_or("only a simulated board can be pressed from the page")?;
                 self.press(finger, [x_m, y_m]);
@@ -136,7 +137,7 @@ impl<'a> Page<'a> {
         let snapshot = self.snapshots.borrow_and_update().clone();
         self.update_due = Instant::now() + UPDATE_INTERVAL;
         let frame = snapshot.frame.as_ref()?;
-        Some(Message::binary(wire::update(frame, snapshot.statistics.frames, &self.shared.scene.detector)))
+        Some(Message::binary(update::update(frame, snapshot.statistics.frames, &self.shared.scene.detector)))
     }
 }
 

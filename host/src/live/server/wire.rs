@@ -4,26 +4,19 @@
 //!
 //! - `scene`, JSON, once: what does not change while the program runs.
 //! - `status`, JSON, four times a second: the link, the board, the counts.
-//! - an update, binary, at most about sixty times a second: the newest frame. Little-endian throughout:
+//! - an update, binary, at most about sixty times a second: the newest frame, as in [`update`](super::update).
 //!
-//! | bytes | what |
-//! |---|---|
-//! | 6 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k` |
-//! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
-//! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
-//! | k x 3 x f32 | the contacts found: x (m), y (m), conductance (S) |
-//!
-//! Page to program, JSON: `"taken"`, `"rezero"`, `{"press": {"x_m": 0.01, "y_m": 0}}`, `"release"`.
+//! Page to program, JSON: `"taken"`, `"rezero"`, `{"solver": "auto"}`, `{"press": {"x_m": 0.01, "y_m": 0}}`, `"release"`.
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 use tactomo_protocol::Hello;
 
 use super::Scene;
-use crate::detector::Detector;
-use crate::live::{FrameSnapshot, Latency, LinkState, Snapshot};
-
-/// Version of the layout of updates; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 1;
+use super::update::LAYOUT;
+use crate::live::solvers::SolverState;
+use crate::live::{Latency, LinkState, Snapshot};
+use crate::solve::Method;
 
 /// What a page asks.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -33,10 +26,16 @@ pub(super) enum PageMessage {
     Taken,
     /// Takes the readings at rest anew.
     Rezero,
+    /// Reads the touch by the method of this name.
+    Solver(#[serde(deserialize_with = "method")] Method),
     /// Presses on the simulated detector, here (m).
     Press { x_m: f64, y_m: f64 },
     /// Ends the press.
     Release,
+}
+
+fn method<'de, D: Deserializer<'de>>(name: D) -> Result<Method, D::Error> {
+    String::deserialize(name)?.parse().map_err(D::Error::custom)
 }
 
 #[derive(Serialize)]
@@ -51,9 +50,15 @@ struct SceneMessage<'a> {
     triangles: Vec<[u32; 3]>,
     drive_v: f64,
     sheet_conductance_s: f64,
-    solver: &'a str,
+    solvers: Vec<SolverMessage>,
     source: &'a str,
     simulated: bool,
+}
+
+#[derive(Serialize)]
+struct SolverMessage {
+    name: &'static str,
+    explanation: &'static str,
 }
 
 #[derive(Serialize)]
@@ -83,10 +88,16 @@ pub(super) fn scene(scene: &Scene) -> serde_json::Result<String> {
         triangles: drawn_triangles(scene),
         drive_v: detector.drive_v,
         sheet_conductance_s: detector.sheet_conductance_s(),
-        solver: &scene.solver,
+        solvers: solvers(),
         source: &scene.source,
         simulated: scene.finger.is_some(),
     })
+}
+
+/// The solvers to choose from, those that do most first.
+fn solvers() -> Vec<SolverMessage> {
+    let message = |method: Method| SolverMessage { name: method.name(), explanation: method.explanation() };
+    Method::ALL.into_iter().rev().map(message).collect()
 }
 
 /// The triangles of the image that are drawn: on the map of a closed surface those about the lowest point are torn apart.
@@ -103,6 +114,7 @@ struct StatusMessage<'a> {
     r#type: &'static str,
     link: LinkMessage<'a>,
     hello: Option<HelloMessage<'a>>,
+    solver: Option<SolverStateMessage<'a>>,
     statistics: StatisticsMessage,
     rezeroing: bool,
     rezeros: u64,
@@ -128,6 +140,13 @@ struct HelloMessage<'a> {
 }
 
 #[derive(Serialize)]
+struct SolverStateMessage<'a> {
+    name: &'static str,
+    making: Option<&'static str>,
+    refused: Option<&'a str>,
+}
+
+#[derive(Serialize)]
 struct StatisticsMessage {
     frames: u64,
     frames_per_s: f64,
@@ -143,6 +162,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         r#type: "status",
         link: link(&snapshot.link),
         hello: snapshot.hello.as_ref().map(hello),
+        solver: snapshot.solver.as_ref().map(solver_state),
         statistics: StatisticsMessage {
             frames: counts.frames,
             frames_per_s: counts.frames_per_s,
@@ -153,6 +173,14 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         rezeroing: snapshot.frame.as_ref().is_some_and(|frame| frame.rezeroing),
         rezeros,
     })
+}
+
+fn solver_state(state: &SolverState) -> SolverStateMessage<'_> {
+    SolverStateMessage {
+        name: state.method.name(),
+        making: state.making.map(Method::name),
+        refused: state.refused.as_deref(),
+    }
 }
 
 fn link(link: &LinkState) -> LinkMessage<'_> {
@@ -180,27 +208,11 @@ fn hello(hello: &Hello) -> HelloMessage<'_> {
     }
 }
 
-/// An update.
-pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) -> Vec<u8> {
-    let image = frame.solution.image_s_per_m2.as_deref().unwrap_or_default();
-    let readings = frame.readings.volts().iter().map(|&volt| volt as f32);
-    let contacts = frame.solution.contacts.iter().flat_map(|found| {
-        let [x_m, y_m] = detector.map_m([found.x_m, found.y_m, found.z_m]);
-        [x_m, y_m, found.conductance_s]
-    });
-    let counts = [image.len(), frame.readings.electrodes(), frame.solution.contacts.len()];
-    // The page counts modulo 2^32.
-    let head = [LAYOUT, frame.sequence as u32, frames as u32].into_iter().chain(counts.map(|count| count as u32));
-    let values = image.iter().copied().chain(readings).chain(contacts.map(|value| value as f32));
-    head.flat_map(u32::to_le_bytes).chain(values.flat_map(f32::to_le_bytes)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detector::Detector;
     use crate::forward::ImageMesh;
-    use crate::readings::Readings;
-    use crate::solve::{FoundContact, Solution};
 
     fn small_scene() -> Scene {
         Scene {
@@ -211,35 +223,9 @@ mod tests {
                 triangles: vec![[0, 1, 2]],
                 node_areas_m2: vec![1e-5; 3],
             },
-            solver: "tikhonov".to_owned(),
             source: "a \"quoted\" port".to_owned(),
             finger: None,
         }
-    }
-
-    fn floats(bytes: &[u8]) -> Vec<f32> {
-        bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
-    }
-
-    #[test]
-    fn an_update_is_laid_out_as_documented() {
-        let contact = FoundContact::flat(0.25, -0.5, 2.0);
-        let frame = FrameSnapshot {
-            sequence: (7 << 32) + 9,
-            board_time_us: 0,
-            status: Default::default(),
-            readings: Readings::from_fn(2, |g, e| (2 * g + e) as f64),
-            solution: Solution {
-                image_s_per_m2: Some(vec![2.0, 4.0, -8.0]),
-                contacts: vec![contact],
-                ..Solution::default()
-            },
-            rezeroing: false,
-        };
-        let bytes = update(&frame, 300, &small_scene().detector);
-        let head: Vec<u8> = [LAYOUT, 9, 300, 3, 2, 1].into_iter().flat_map(u32::to_le_bytes).collect();
-        assert_eq!(bytes[..24], head);
-        assert_eq!(floats(&bytes[24..]), [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, -0.5, 2.0]);
     }
 
     #[test]
@@ -249,6 +235,8 @@ mod tests {
         assert_eq!(value["electrodes"].as_array().map(Vec::len), Some(16));
         assert_eq!(value["source"], "a \"quoted\" port");
         assert_eq!(value["simulated"], false);
+        assert_eq!(value["solvers"].as_array().map(Vec::len), Some(Method::ALL.len()));
+        assert_eq!(value["solvers"][0]["name"], "auto");
     }
 
     #[test]
@@ -257,6 +245,7 @@ mod tests {
         let press = parse(r#"{"press":{"x_m":0.01,"y_m":-2e-3}}"#);
         assert_eq!(press.ok(), Some(PageMessage::Press { x_m: 0.01, y_m: -2e-3 }));
         assert_eq!(parse(r#""rezero""#).ok(), Some(PageMessage::Rezero));
+        assert_eq!(parse(r#"{"solver":"noser"}"#).ok(), Some(PageMessage::Solver(Method::Noser)));
         for text in [
             "",
             "{}",
@@ -265,6 +254,7 @@ mod tests {
             r#""flash""#,
             r#"{"press":{}}"#,
             r#""press""#,
+            r#"{"solver":"guess"}"#,
             r#"{"press":{"x_m":1e999,"y_m":0}}"#,
             r#"{"press":{"x_m":0,"y_m":0,"z_m":0}}"#,
         ] {
