@@ -8,6 +8,12 @@ const SHOWN_EVERY_MS = 120;
 // Rows that there is place for.
 const ROWS = 5;
 
+// An error of place (mm): none known, or so large that its digits say nothing.
+function placeError(errors) {
+  if (!errors) return "";
+  return errors.longM < 0.1 ? millimetres(errors.longM, errors.longM < 1e-3 ? 2 : 1) : "> 100";
+}
+
 const cell = (name, kind, text) => {
   const made = document.createElement(name);
   made.className = kind;
@@ -27,7 +33,7 @@ function row(contact) {
   const id = cell("td", `id ${hueOf(contact.id)}`, contact.id ? String(contact.id) : "\u2013");
   made.append(id,
     cell("td", "", millimetres(contact.xM, 2)), cell("td", "", millimetres(contact.yM, 2)),
-    cell("td", "error", errors ? millimetres(errors.longM, errors.longM < 1e-3 ? 2 : 1) : ""),
+    cell("td", "error", placeError(errors)),
     cell("td", "", value), cell("td", "error", error));
   return made;
 }

@@ -12,6 +12,8 @@ const SMALLEST_SHARE = 0.01;
 // The ellipse holds the true place in 86 of 100 frames: two standard errors. Smaller ones (pixels) would hide in the centre's dot.
 const DEVIATIONS = 2;
 const SMALLEST_ELLIPSE = 4;
+// Larger ones say nothing, and a browser takes seconds for their dashes.
+const LARGEST_ELLIPSE = 2000;
 // Place for a value beside a contact (pixels).
 const LABEL_WIDTH = 86;
 
@@ -37,7 +39,8 @@ export function ellipseOf({ xErrorM, yErrorM, correlation }) {
 
 function ellipse(contact, perM) {
   const of = ellipseOf(contact);
-  if (!of || DEVIATIONS * of.longM * perM < SMALLEST_ELLIPSE) return [];
+  const long = of ? DEVIATIONS * of.longM * perM : 0;
+  if (long < SMALLEST_ELLIPSE || long > LARGEST_ELLIPSE) return [];
   const [rx, ry] = [of.longM, of.shortM].map((m) => (DEVIATIONS * m * perM).toFixed(1));
   return [svg("ellipse", { class: "uncertainty", rx, ry, transform: `rotate(${(-of.degrees).toFixed(1)})` })];
 }

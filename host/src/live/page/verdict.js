@@ -9,7 +9,7 @@ const REASON_STAYS_MS = 400;
 const WARNINGS = {
   saturated: ["saturated", "Readings at the end of the converter's range, or contacts that conduct so well that more would change nothing"],
   misfit: ["readings do not fit", "The readings are not what the model gives for what was found"],
-  unfinished: ["cut short to keep up", "A cheaper answer, or a search that stopped at its limit of steps"],
+  unfinished: ["cut short", "A cheaper answer, or a search that stopped at its limit of steps"],
 };
 
 function chip(kind, text, title) {
@@ -20,7 +20,7 @@ function chip(kind, text, title) {
   return made;
 }
 
-const leftText = (residual) => (residual === null ? "" : `; it leaves ${fixed(residual, 2)} of the noise`);
+const leftText = (residual) => (residual === null ? "" : `; it leaves ${fixed(residual, 1)} times the noise`);
 
 /** What the solver says of its answer. */
 export class Verdict {
