@@ -19,8 +19,10 @@ const NEWEST: f64 = 0.1;
 const RISE: f64 = 0.12;
 /// After so many frames that contacts did not explain, they are tried again; doubled each time, up to the second.
 const PATIENCE: [u32; 2] = [2, 64];
-/// Time that may be owed, in periods: so long may one frame take.
-const CREDIT: f64 = 20.0;
+/// A frame that takes longer than its period is paid back so many times: so few of them are late.
+const INTEREST: u32 = 3;
+/// Longest time that may be owed.
+const CREDIT: Duration = Duration::from_secs(1);
 
 /// Chooses the model of the scene.
 pub struct Auto {
@@ -150,7 +152,11 @@ impl Solver for Auto {
         let Some(period) = self.period else { return self.choose(readings) };
         let begin = Instant::now();
         let solution = if self.owed > period { self.cheapest(readings) } else { self.choose(readings) };
-        self.owed = (self.owed + begin.elapsed()).saturating_sub(period).min(period.mul_f64(CREDIT));
+        let took = begin.elapsed();
+        self.owed = match took.checked_sub(period) {
+            Some(late) => (self.owed + INTEREST * late).min(CREDIT),
+            None => self.owed.saturating_sub(period - took),
+        };
         solution
     }
 
@@ -164,6 +170,9 @@ impl Solver for Auto {
     }
 
     fn keep_within(&mut self, period: Option<Duration>) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.keep_within(period);
+        }
         self.period = period;
         self.owed = Duration::ZERO;
     }

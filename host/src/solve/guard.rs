@@ -29,6 +29,7 @@ pub struct Guard {
     /// What the last frames say, and how many of them.
     suspected: (Vec<(usize, Ailment)>, usize),
     misfits: usize,
+    period: Option<Duration>,
 }
 
 impl Guard {
@@ -45,6 +46,7 @@ impl Guard {
             excluded: Vec::new(),
             suspected: (Vec::new(), 0),
             misfits: 0,
+            period: None,
         })
     }
 
@@ -82,6 +84,7 @@ impl Guard {
             Ok(solver) => {
                 tracing::warn!("electrodes left out: {ailing:?}");
                 (self.solver, self.kept) = (solver, kept);
+                self.solver.keep_within(self.period);
                 self.excluded.extend(ailing);
                 self.excluded.sort_unstable();
             }
@@ -139,6 +142,7 @@ impl Solver for Guard {
     }
 
     fn keep_within(&mut self, period: Option<Duration>) {
+        self.period = period;
         self.solver.keep_within(period);
     }
 }

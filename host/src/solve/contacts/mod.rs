@@ -15,6 +15,8 @@ mod target;
 #[cfg(test)]
 mod tests;
 
+use std::time::Duration;
+
 use nalgebra::DMatrix;
 
 use self::discs::DiscFit;
@@ -35,6 +37,8 @@ const SCAN_NODES: usize = 600;
 const MOST_CONDUCTANCE: f64 = 300.0;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
 const FULL: f64 = 0.995;
+/// Frame periods that a search may take before it adds no more contacts.
+const SEARCH_PERIODS: u32 = 12;
 /// Mean square of what is left, in what noise and model error make, above which the readings do not fit.
 const MISFIT: f64 = 3.0;
 
@@ -68,6 +72,8 @@ pub struct Contacts {
     sheet_s: f64,
     spacing_m: f64,
     errors: Errors,
+    /// A search that has taken longer adds no more contacts; none for one that is always the same.
+    longest: Option<Duration>,
     last: Option<Explanation>,
     tracker: Tracker,
 }
@@ -145,6 +151,7 @@ impl Contacts {
             spacing_m: problem.spacing_m(),
             problem: problem.clone(),
             settings,
+            longest: None,
             last: None,
             tracker: Tracker::new(problem.spacing_m()),
         })
@@ -161,7 +168,9 @@ impl Contacts {
         self.last = match (effort, last) {
             (Effort::AsNeeded, last) => self.search(last, &target),
             (Effort::Anew, _) => self.search_anew(&target),
-            (Effort::FollowOnly, last) => last.and_then(|last| self.follow(last, &target)),
+            (Effort::FollowOnly, last) => {
+                last.and_then(|last| self.follow(last, &target)).filter(|found| !self.is_weak(found))
+            }
         };
         let mut solution = self.last.as_ref().map_or_else(Solution::default, |found| self.solution(found, &target));
         self.tracker.follow(&mut solution.contacts);
@@ -243,6 +252,10 @@ impl Solver for Contacts {
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         self.solve_with(readings, Effort::AsNeeded)
+    }
+
+    fn keep_within(&mut self, period: Option<Duration>) {
+        self.longest = period.map(|period| SEARCH_PERIODS * period);
     }
 
     fn reset(&mut self) {

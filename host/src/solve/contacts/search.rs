@@ -1,6 +1,10 @@
 //! How many contacts, and where each fit starts.
 
-use super::discs::{DiscFit, DiscFitter};
+use std::time::Instant;
+
+use nalgebra::DMatrix;
+
+use super::discs::{DiscFit, DiscFitter, PARAMETERS};
 use super::fit::{Fit, Fitter};
 use super::network::FitSpot;
 use super::scan::{Candidate, Looks};
@@ -33,8 +37,14 @@ const WORTH_FIRST: f64 = 60.0;
 const SPLIT: f64 = 0.25;
 /// Mean square of what is left below which a fit is nearly right.
 const NEARLY: f64 = 100.0;
+/// The same below which several contacts may only have to be wider.
+const HOPEFUL: f64 = 20.0;
+/// The same below which the search for more ends with the first one that does not pay.
+const ENOUGH: f64 = 2.0;
 /// The sum of squares may be this times that of the frame before.
 const WORSE: f64 = 1.3;
+/// Standard errors that spots may move before the forward model is asked again.
+const NEAR: f64 = 3.0;
 /// A contact is lost when the logarithm of its resistance is known no better than this.
 const WEAK: f64 = 0.2;
 
@@ -53,7 +63,7 @@ impl Contacts {
     pub(super) fn search(&self, last: Option<Explanation>, target: &Target) -> Option<Explanation> {
         let known = last.as_ref().map_or(f64::INFINITY, Explanation::cost);
         match last.and_then(|last| self.follow(last, target)) {
-            Some(found) if found.cost() <= (WORSE * known).max(target.count() as f64) && !is_weak(&found) => {
+            Some(found) if found.cost() <= (WORSE * known).max(target.count() as f64) && !self.is_weak(&found) => {
                 Some(found)
             }
             _ => self.search_anew(target),
@@ -65,7 +75,7 @@ impl Contacts {
         let found = match last {
             Explanation::Spots(fit, correction_v) => {
                 let moved = self.fitter().fit(fit.spots.clone(), &target.less(&correction_v), WARM_STEPS)?;
-                if is_near(&fit.spots, &moved.spots, self.settings.radius_m) {
+                if is_near(&fit.spots, &moved, self.settings.radius_m) {
                     Explanation::Spots(moved, correction_v)
                 } else {
                     self.correct(moved, target, 1)
@@ -79,6 +89,8 @@ impl Contacts {
     }
 
     pub(super) fn search_anew(&self, target: &Target) -> Option<Explanation> {
+        let begin = Instant::now();
+        let in_time = || self.longest.is_none_or(|longest| begin.elapsed() < longest);
         let fitter = self.fitter();
         let looks = self.scan.at_first(&self.network, target);
         let first = self.scan.ones(&looks, STARTS, self.apart_m());
@@ -93,19 +105,21 @@ impl Contacts {
             true => Vec::new(),
             false => self.scan.pairs(&looks, STARTS, self.apart_m()).iter().map(start).collect(),
         };
-        while fits.len() < self.settings.most && !explains(&best, target) {
+        while fits.len() < self.settings.most && !explains(&best, target) && in_time() {
             let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
             let Explanation::Spots(fit, _) = &more else { break };
             let fit = fit.clone();
+            let is_hopeful = |fewer: &Fit| fits.len() == 1 || fewer.cost < HOPEFUL * target.count() as f64;
             if score(&more) < score(&best)
-                && let Some(fewer) = fits.last()
+                && in_time()
+                && let Some(fewer) = fits.last().filter(|fewer| is_hopeful(fewer))
             {
                 // Before one more is believed, those that there are may be wider.
                 best = better(best, self.discs(fewer, target).map(Explanation::Discs));
             }
             fits.push(fit);
             let is_better = score(&more) < score(&best);
-            if !is_better && fits.len() > 2 {
+            if !is_better && fits.len() > 2 && best.cost() < ENOUGH * target.count() as f64 {
                 break;
             }
             best = better(best, Some(more));
@@ -199,6 +213,21 @@ impl Contacts {
         self.disc_fitter().fit(start.collect(), target, COLD_DISC_STEPS)
     }
 
+    /// Whether a contact is so weak that it may not be there.
+    pub(super) fn is_weak(&self, found: &Explanation) -> bool {
+        // Without a covariance, a contact does nothing that the readings tell.
+        let uncertain = |covariance: &Option<DMatrix<f64>>, log: usize| {
+            covariance.as_ref().is_none_or(|all| all[(log, log)] > WEAK * WEAK)
+        };
+        match found {
+            Explanation::Spots(fit, _) => (0..fit.spots.len()).any(|k| uncertain(&fit.covariance, 3 * k + 2)),
+            // That of a firm disc is not known well either: more of it would change little.
+            Explanation::Discs(fit) => fit.contacts.iter().enumerate().any(|(k, contact)| {
+                contact.conductance_s < self.sheet_s && uncertain(&fit.covariance, PARAMETERS * k + 2)
+            }),
+        }
+    }
+
     fn fitter(&self) -> Fitter<'_> {
         Fitter {
             network: &self.network,
@@ -252,16 +281,15 @@ fn explains(found: &Explanation, target: &Target) -> bool {
     found.cost() < 0.75 * target.count() as f64
 }
 
-/// Whether spots have moved so little that the forward model's correction still holds.
-fn is_near(before: &[FitSpot], after: &[FitSpot], radius_m: f64) -> bool {
-    before.iter().zip(after).all(|(before, after)| {
+/// Whether spots have moved so little that the forward model's correction still holds: it is some per cent of the readings, so it
+/// changes by as much of what the spots have moved.
+fn is_near(before: &[FitSpot], fit: &Fit, radius_m: f64) -> bool {
+    let error = |parameter: usize| {
+        fit.covariance.as_ref().map_or(0.0, |covariance| NEAR * covariance[(parameter, parameter)].max(0.0).sqrt())
+    };
+    before.iter().zip(&fit.spots).enumerate().all(|(k, (before, after))| {
         let moved_m = space::distance(before.spot.place_m, after.spot.place_m);
-        moved_m < 0.02 * radius_m && (before.ohm / after.ohm).ln().abs() < 0.005
+        let log = (before.ohm / after.ohm).ln().abs();
+        moved_m < error(3 * k).hypot(error(3 * k + 1)).max(0.02 * radius_m) && log < error(3 * k + 2).max(0.005)
     })
-}
-
-/// Whether a contact is so weak that it may not be there.
-fn is_weak(found: &Explanation) -> bool {
-    let Explanation::Spots(Fit { covariance: Some(covariance), spots, .. }, _) = found else { return false };
-    (0..spots.len()).any(|k| covariance[(3 * k + 2, 3 * k + 2)] > WEAK * WEAK)
 }
