@@ -116,22 +116,20 @@ impl Auto {
 
     /// The cheapest answer: contacts as they were, or the linear image.
     fn cheapest(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        let why = || "to keep up with the frames".to_owned();
         let followed = match &mut self.contacts {
             Some(contacts) if contacts.is_following() && self.skip == 0 => {
                 Some(contacts.solve_with(readings, Effort::FollowOnly)?)
             }
             _ => None,
         };
-        let mut solution = match followed {
-            Some(found) if !found.flags.misfit => {
-                let what = counted(found.contacts.len());
-                chosen(found, &what, why())
-            }
-            _ => chosen(self.linear.solve(readings)?, "linear image", why()),
-        };
-        solution.flags.unfinished = true;
-        Ok(solution)
+        if let Some(found) = followed.filter(|found| !found.flags.misfit && !found.contacts.is_empty()) {
+            let what = counted(found.contacts.len());
+            let left = found.residual.unwrap_or_default();
+            return Ok(chosen(found, &what, format!("followed, they leave {left:.2} of the noise")));
+        }
+        let mut linear = chosen(self.linear.solve(readings)?, "linear image", "to keep up with the frames".to_owned());
+        linear.flags.unfinished = true;
+        Ok(linear)
     }
 }
 
@@ -250,6 +248,11 @@ mod tests {
         let first = bench.touched(&contact);
         assert!(!first.flags.unfinished, "nothing is owed yet");
         let second = bench.touched(&contact);
-        assert!(second.flags.unfinished && second.contacts.len() == 1, "{second:?}");
+        let is_followed = second.choice.as_ref().is_some_and(|choice| choice.why.starts_with("followed"));
+        assert!(is_followed && second.contacts.len() == 1, "{second:?}");
+        // Two more fingers are more than following explains.
+        let more = [contact[0], Contact::flat(-0.012, -0.009, 0.0025, 5e-4), Contact::flat(-0.01, 0.015, 0.0025, 5e-4)];
+        let third = bench.touched(&more);
+        assert!(third.flags.unfinished && what(&third) == "linear image", "{third:?}");
     }
 }
