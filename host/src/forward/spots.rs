@@ -9,9 +9,6 @@ use crate::space::Place;
 
 /// Fields of spots on a detector.
 pub trait SpotFields: Send + Sync {
-    /// Radius of the contact that a spot stands for (m).
-    fn radius_m(&self) -> f64;
-
     /// The spot at the place of the detector that is nearest.
     fn spot(&self, place_m: Place) -> Spot;
 

@@ -93,10 +93,6 @@ struct SpotsThrough {
 }
 
 impl SpotFields for SpotsThrough {
-    fn radius_m(&self) -> f64 {
-        self.spots.radius_m()
-    }
-
     fn spot(&self, place_m: Place) -> Spot {
         let mut spot = self.spots.spot(place_m);
         let [by_first, by_second] = &mut spot.slopes_ohm_per_m;

@@ -10,7 +10,6 @@ use crate::space::Place;
 #[derive(Debug)]
 pub(super) struct SlabSpots {
     slab: Slab,
-    radius_m: f64,
     /// Field of a spot's own current but for walls, layers far below and pads (ohm).
     local_ohm: f64,
 }
@@ -23,7 +22,7 @@ impl SlabSpots {
         let spreading_s = slab.detector.layers.last().map_or(1.0, |layer| 4.0 * layer.top_s_per_m * radius_m);
         let basis = DiscBasis::of_degree(0);
         let local_ohm = (own.reduced(basis, 1.0, spreading_s)[(0, 0)] - 1.0) / spreading_s;
-        Self { slab, radius_m, local_ohm }
+        Self { slab, local_ohm }
     }
 
     fn corner_m(&self, spot: &Spot) -> [f64; 2] {
@@ -55,10 +54,6 @@ impl SlabSpots {
 }
 
 impl SpotFields for SlabSpots {
-    fn radius_m(&self) -> f64 {
-        self.radius_m
-    }
-
     fn spot(&self, place_m: Place) -> Spot {
         let half_m = self.slab.size_m.map(|size_m| size_m / 2.0);
         let [x_m, y_m] = [0, 1].map(|axis| place_m[axis].clamp(-half_m[axis], half_m[axis]));

@@ -23,6 +23,7 @@ use self::discs::DiscFit;
 use self::fit::Fit;
 use self::network::{FitSpot, Network};
 use self::scan::Scan;
+use self::search::Searched;
 use self::target::{Errors, Target};
 use super::track::Tracker;
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Solver, Uncertainty};
@@ -75,6 +76,8 @@ pub struct Contacts {
     /// A search that has taken longer adds no more contacts; none for one that is always the same.
     longest: Option<Duration>,
     last: Option<Explanation>,
+    /// Sum of squares that the last search left.
+    searched: f64,
     tracker: Tracker,
 }
 
@@ -153,6 +156,7 @@ impl Contacts {
             settings,
             longest: None,
             last: None,
+            searched: 0.0,
             tracker: Tracker::new(problem.spacing_m()),
         })
     }
@@ -165,13 +169,15 @@ impl Contacts {
         readings.check(self.network.electrodes())?;
         let target = Target::new(readings, &self.errors);
         let last = self.last.take();
-        self.last = match (effort, last) {
-            (Effort::AsNeeded, last) => self.search(last, &target),
-            (Effort::Anew, _) => self.search_anew(&target),
-            (Effort::FollowOnly, last) => {
-                last.and_then(|last| self.follow(last, &target)).filter(|found| !self.is_weak(found))
+        let Searched { found, searched } = match effort {
+            Effort::AsNeeded => self.search(last, self.searched, &target),
+            Effort::Anew => self.search_anew(&target),
+            Effort::FollowOnly => {
+                let followed = last.and_then(|last| self.follow(last, &target));
+                Searched { found: followed.filter(|found| !self.is_weak(found)), searched: self.searched }
             }
         };
+        (self.last, self.searched) = (found, searched);
         let mut solution = self.last.as_ref().map_or_else(Solution::default, |found| self.solution(found, &target));
         self.tracker.follow(&mut solution.contacts);
         Ok(solution)
@@ -259,7 +265,7 @@ impl Solver for Contacts {
     }
 
     fn reset(&mut self) {
-        self.last = None;
+        (self.last, self.searched) = (None, 0.0);
         self.tracker.reset();
     }
 }

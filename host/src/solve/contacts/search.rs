@@ -48,31 +48,42 @@ const NEAR: f64 = 3.0;
 /// A contact is lost when the logarithm of its resistance is known no better than this.
 const WEAK: f64 = 0.2;
 
+/// What a frame is, and the sum of squares that the search which found it left.
+pub(super) struct Searched {
+    pub found: Option<Explanation>,
+    pub searched: f64,
+}
+
 impl Contacts {
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
         let target = Target::new(readings, &self.errors);
-        let fitter = self.fitter();
         let looks = self.scan.at_first(&self.network, &target);
         let first = self.scan.ones(&looks, STARTS, self.apart_m());
-        let starts = first.iter().map(|candidate| self.scan.start(&fitter, &looks, candidate)).collect();
-        Some(lowest(&fitter, starts, &target)?.cost / target.count().max(1) as f64)
+        Some(self.lowest_of(&looks, &first, &target)?.cost / target.count().max(1) as f64)
     }
 
-    /// What explains a frame, from what explained the one before.
-    pub(super) fn search(&self, last: Option<Explanation>, target: &Target) -> Option<Explanation> {
-        let known = last.as_ref().map_or(f64::INFINITY, Explanation::cost);
-        match last.and_then(|last| self.follow(last, target)) {
-            Some(found) if found.cost() <= (WORSE * known).max(target.count() as f64) && !self.is_weak(&found) => {
-                Some(found)
-            }
-            _ => self.search_anew(target),
+    /// The best fit from some candidates.
+    fn lowest_of(&self, looks: &Looks<'_>, candidates: &[Candidate], target: &Target) -> Option<Fit> {
+        let fitter = self.fitter();
+        let starts = candidates.iter().map(|candidate| self.scan.start(&fitter, looks, candidate)).collect();
+        lowest(&fitter, starts, target)
+    }
+
+    /// What explains a frame, from what explained the one before; `searched` is the sum of squares that the last search left, to
+    /// which many small rises in a row add up.
+    pub(super) fn search(&self, last: Option<Explanation>, searched: f64, target: &Target) -> Searched {
+        let enough = (WORSE * searched).max(target.count() as f64);
+        let followed = last.and_then(|last| self.follow(last, target));
+        match followed.filter(|found| found.cost() <= enough && !self.is_weak(found)) {
+            Some(found) => Searched { found: Some(found), searched },
+            None => self.search_anew(target),
         }
     }
 
     /// The same contacts in the next frame; `None` if that makes no sense.
     pub(super) fn follow(&self, last: Explanation, target: &Target) -> Option<Explanation> {
-        let found = match last {
+        Some(match last {
             Explanation::Spots(fit, correction_v) => {
                 let moved = self.fitter().fit(fit.spots.clone(), &target.less(&correction_v), WARM_STEPS)?;
                 if is_near(&fit.spots, &moved, self.settings.radius_m) {
@@ -84,11 +95,16 @@ impl Contacts {
             Explanation::Discs(fit) => {
                 Explanation::Discs(self.disc_fitter().fit(fit.contacts, target, WARM_DISC_STEPS)?)
             }
-        };
-        Some(found)
+        })
     }
 
-    pub(super) fn search_anew(&self, target: &Target) -> Option<Explanation> {
+    /// What explains a frame, from nothing.
+    pub(super) fn search_anew(&self, target: &Target) -> Searched {
+        let found = self.explanation(target);
+        Searched { searched: found.as_ref().map_or(0.0, Explanation::cost), found }
+    }
+
+    fn explanation(&self, target: &Target) -> Option<Explanation> {
         let begin = Instant::now();
         let in_time = || self.longest.is_none_or(|longest| begin.elapsed() < longest);
         let fitter = self.fitter();
@@ -97,13 +113,15 @@ impl Contacts {
         if first.first().is_none_or(|best| best.gain < WORTH_FIRST) {
             return None;
         }
-        let start = |candidate: &Candidate| self.scan.start(&fitter, &looks, candidate);
-        let one = lowest(&fitter, first.iter().map(start).collect(), target)?;
+        let one = self.lowest_of(&looks, &first, target)?;
         let mut best = self.correct(one.clone(), target, CORRECTIONS);
         let mut fits = vec![one];
         let mut starts: Vec<Vec<FitSpot>> = match explains(&best, target) {
             true => Vec::new(),
-            false => self.scan.pairs(&looks, STARTS, self.apart_m()).iter().map(start).collect(),
+            false => {
+                let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
+                pairs.iter().map(|pair| self.scan.start(&fitter, &looks, pair)).collect()
+            }
         };
         while fits.len() < self.settings.most && !explains(&best, target) && in_time() {
             let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
