@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use nalgebra::DMatrix;
 use serde::Serialize;
-use tactomo::case::Case;
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
@@ -13,6 +12,7 @@ use tactomo::forward::{ForwardModel, touched_impedance_ohm};
 use tactomo::readings::Readings;
 use tactomo::scene::{Contact, SceneName, Touch};
 use tactomo::simulate::{self, Measurement};
+use tactomo::study::case::Case;
 
 use super::choice::{self, DetectorArgs, Model};
 use super::output;

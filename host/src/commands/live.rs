@@ -6,15 +6,15 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
+use tactomo::board::link::Source;
+use tactomo::board::session::Wish;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
-use tactomo::live::pipeline;
-use tactomo::live::plan::{Ends, MakeSolver, Plan, Solving, Summary};
-use tactomo::live::server::{Scene, Server};
-use tactomo::live::session::Wish;
-use tactomo::live::{Request, Snapshot};
+use tactomo::run::pipeline;
+use tactomo::run::plan::{Ends, MakeSolver, Plan, Solving, Summary};
+use tactomo::run::{Request, Snapshot};
+use tactomo::sink::page::{PageSetup, Server};
 use tactomo::solve::{Guard, Method, Problem};
-use tactomo::source::Source;
 use tokio::sync::watch;
 
 use super::choice::{DetectorArgs, Model};
@@ -162,7 +162,7 @@ fn serve(
     if show.picture.json {
         return Ok(None);
     }
-    let scene = Scene {
+    let scene = PageSetup {
         detector: show.detector.clone(),
         mesh: problem.jacobian.image_mesh.clone(),
         source: show.source.name(),

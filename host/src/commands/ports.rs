@@ -1,7 +1,7 @@
 //! `tactomo ports`: which serial ports there are, and which have a board.
 
-use tactomo::source::discover::{self, Probe};
-use tactomo::source::serial::DEFAULT_BAUD;
+use tactomo::board::link::discover::{self, Probe};
+use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo_protocol::Hello;
 
 use super::output;

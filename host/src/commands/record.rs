@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use tactomo::live::Snapshot;
-use tactomo::live::board_log::BoardLog;
-use tactomo::live::pipeline;
-use tactomo::live::plan::{Ends, Plan};
+use tactomo::board::board_log::BoardLog;
+use tactomo::run::Snapshot;
+use tactomo::run::pipeline;
+use tactomo::run::plan::{Ends, Plan};
 use tokio::sync::watch;
 
 use super::choice::DetectorArgs;

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use tactomo::board::board_log::{BoardLog, ElfError};
+use tactomo::board::record::{Header, RecordError, Recorder};
 use tactomo::detector::Detector;
-use tactomo::live::board_log::{BoardLog, ElfError};
-use tactomo::record::{Header, RecordError, Recorder};
 
 /// Begins a recording in a new file, if one is wanted.
 pub fn begin(file: Option<&Path>, detector: &Detector, source: String) -> Result<Option<Recorder>, RecordError> {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tactomo::live::session::Wish;
+use tactomo::board::session::Wish;
 
 use super::live::{self, PictureArgs, Show};
 use super::source;

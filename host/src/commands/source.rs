@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 
 use clap::ArgGroup;
+use tactomo::board::link::serial::DEFAULT_BAUD;
+use tactomo::board::link::{AnyBoard, NamedPort, Opened, Recording, Source};
+use tactomo::board::session::Wish;
+use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::detector::Detector;
-use tactomo::live::plan::Press;
-use tactomo::live::server::Finger;
-use tactomo::live::session::Wish;
+use tactomo::run::plan::Press;
 use tactomo::scene::SceneName;
 use tactomo::simulate::Simulation;
-use tactomo::source::serial::DEFAULT_BAUD;
-use tactomo::source::simulated::{Options, SimulatedBoard};
-use tactomo::source::{AnyBoard, NamedPort, Opened, Recording, Source};
+use tactomo::sink::page::Finger;
 
 use super::choice::DetectorArgs;
 use super::scene::SceneArgs;

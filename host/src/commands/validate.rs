@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use serde::Serialize;
-use tactomo::case::Case;
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{ForwardError, ForwardModel};
 use tactomo::solve::{Lambda, Method, Problem, Solver, Tikhonov, Variant};
-use tactomo::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
+use tactomo::study::case::Case;
+use tactomo::study::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
 
 use super::choice::Model;
 use super::output;

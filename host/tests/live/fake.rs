@@ -5,12 +5,12 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 
+use tactomo::board::board_log::BoardLog;
+use tactomo::board::link::{Link, Source, SourceError};
+use tactomo::board::session::Wish;
 use tactomo::detector::Detector;
-use tactomo::live::board_log::BoardLog;
-use tactomo::live::plan::{Ends, Plan};
-use tactomo::live::session::Wish;
-use tactomo::live::{Request, Snapshot};
-use tactomo::source::{Link, Source, SourceError};
+use tactomo::run::plan::{Ends, Plan};
+use tactomo::run::{Request, Snapshot};
 use tactomo_protocol::{
     BoardMessage, Command, CommandReceiver, FrameHead, Hello, MAX_WIRE, Settings, encode_board, encode_frame,
 };

@@ -4,12 +4,12 @@
 use std::sync::Arc;
 
 use crate::fake::{FakeBoard, ends, plan};
+use tactomo::board::link::Opened;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::live::pipeline;
-use tactomo::live::plan::{MakeSolver, Plan, Solving};
+use tactomo::run::pipeline;
+use tactomo::run::plan::{MakeSolver, Plan, Solving};
 use tactomo::solve::{Lambda, Method, Tikhonov, Variant};
-use tactomo::source::Opened;
 
 /// Resident memory of this process (kB).
 fn resident_kb() -> u64 {

@@ -3,15 +3,15 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use tactomo::board::link::{Link, Opened, Recording};
+use tactomo::board::record::{Header, Recorder};
+use tactomo::board::session::{GreetError, Wish, greet};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::live::plan::{LiveError, MakeSolver, Plan, Solving};
-use tactomo::live::session::{GreetError, Wish, greet};
-use tactomo::live::{LinkState, Request, Snapshot, pipeline};
-use tactomo::record::{Header, Recorder};
+use tactomo::run::plan::{LiveError, MakeSolver, Plan, Solving};
+use tactomo::run::{LinkState, Request, Snapshot, pipeline};
 use tactomo::scene::Contact;
 use tactomo::solve::{Lambda, Method, Tikhonov, Variant};
-use tactomo::source::{Link, Opened, Recording};
 use tactomo_protocol::Settings;
 
 use crate::fake::{FakeBoard, Links, ends, plan};
@@ -98,7 +98,7 @@ fn presses_reach_the_simulated_detector_and_the_stop_ends_the_run() {
     for request in [Request::Press(contact), Request::Release, Request::Rezero] {
         other.requests.send(request).unwrap();
     }
-    let press: tactomo::live::plan::Press = Box::new(move |contact| seen.lock().unwrap().push(contact));
+    let press: tactomo::run::plan::Press = Box::new(move |contact| seen.lock().unwrap().push(contact));
     let plan = Plan { press: Some(press), ..plan() };
     let runs = std::thread::spawn(move || pipeline::run(&mut opened(FakeBoard::new(u64::MAX)), plan, ends).unwrap());
     while pressed.lock().unwrap().len() < 2 {

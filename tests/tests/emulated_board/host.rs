@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use defmt_decoder::{DecodeError, Table};
-use tactomo::source::Link;
-use tactomo::source::serial::{DEFAULT_BAUD, SerialLink};
+use tactomo::board::link::Link;
+use tactomo::board::link::serial::{DEFAULT_BAUD, SerialLink};
 use tactomo_protocol::{BoardMessage, BoardReceiver, Command, Counters, Frame, Hello, MAX_COMMAND, encode_command};
 
 /// Longest wait for anything, on a machine under load.

@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use tactomo::board::link::Link;
+use tactomo::board::simulated::{Options, SimulatedBoard, SimulatedBoardError};
 use tactomo::detector::{Adc, Detector};
 use tactomo::readings::Readings;
 use tactomo::simulate::Physics;
-use tactomo::source::Link;
-use tactomo::source::simulated::{Options, SimulatedBoard, SimulatedBoardError};
 use tactomo_protocol::{BoardMessage, BoardReceiver, Command, Frame, Hello, Settings, Status, encode_command};
 
 /// Longest wait for what a test waits for.

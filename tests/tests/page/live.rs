@@ -7,18 +7,18 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
+use tactomo::board::board_log::BoardLog;
+use tactomo::board::link::Opened;
+use tactomo::board::session::Wish;
+use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::detector::Detector;
 use tactomo::forward::Auto;
-use tactomo::live::board_log::BoardLog;
-use tactomo::live::plan::{Ends, LiveError, Plan, Solving, Summary};
-use tactomo::live::server::{self, Finger, Server};
-use tactomo::live::session::Wish;
-use tactomo::live::{Snapshot, Statistics, pipeline};
+use tactomo::run::plan::{Ends, LiveError, Plan, Solving, Summary};
+use tactomo::run::{Snapshot, Statistics, pipeline};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
 use tactomo::simulate::{Fault, Mouse, Simulation};
+use tactomo::sink::page::{Finger, PageSetup, Server};
 use tactomo::solve::{Guard, Method, Problem};
-use tactomo::source::Opened;
-use tactomo::source::simulated::{Options, SimulatedBoard};
 use tokio::sync::watch;
 
 /// How firmly the mouse presses.
@@ -45,7 +45,7 @@ impl Live {
         let problem = Problem::new(Auto::new(&detector, None)?.model);
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
-        let page = server::Scene {
+        let page = PageSetup {
             detector: detector.clone(),
             mesh: problem.jacobian.image_mesh.clone(),
             source: "simulated board".to_owned(),

@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
-use tactomo::live::server::{Finger, Scene, Server, ServerError};
-use tactomo::live::{FrameSnapshot, Request, Snapshot};
 use tactomo::readings::Readings;
+use tactomo::run::{FrameSnapshot, Request, Snapshot};
 use tactomo::scene::Contact;
+use tactomo::sink::page::{Finger, PageSetup, Server, ServerError};
 use tactomo::solve::{Method, Solution};
 use tokio::sync::watch;
 
@@ -25,8 +25,8 @@ struct Rig {
     requests: Receiver<Request>,
 }
 
-fn scene(finger: Option<Finger>) -> Result<Scene> {
-    Ok(Scene {
+fn scene(finger: Option<Finger>) -> Result<PageSetup> {
+    Ok(PageSetup {
         detector: Detector::preset(Detector::DEFAULT).context("the default preset")?,
         mesh: ImageMesh::default(),
         source: "a test".to_owned(),

@@ -6,13 +6,13 @@ use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use tactomo::board::board_log::BoardLog;
+use tactomo::board::link::NamedPort;
+use tactomo::board::link::serial::DEFAULT_BAUD;
+use tactomo::board::session::Wish;
 use tactomo::detector::Detector;
-use tactomo::live::board_log::BoardLog;
-use tactomo::live::plan::{Ends, LiveError, Plan, Summary};
-use tactomo::live::session::Wish;
-use tactomo::live::{Request, Snapshot, pipeline};
-use tactomo::source::NamedPort;
-use tactomo::source::serial::DEFAULT_BAUD;
+use tactomo::run::plan::{Ends, LiveError, Plan, Summary};
+use tactomo::run::{Request, Snapshot, pipeline};
 use tokio::sync::watch;
 
 /// How long anything may take.

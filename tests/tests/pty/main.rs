@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 use board::Board;
 use host::Host;
 use serialport::SerialPort;
-use tactomo::live::LinkState;
-use tactomo::live::session::greet;
-use tactomo::source::serial::{DEFAULT_BAUD, SerialLink};
+use tactomo::board::link::serial::{DEFAULT_BAUD, SerialLink};
+use tactomo::board::session::greet;
+use tactomo::run::LinkState;
 use tactomo_protocol::{BoardMessage, Command, Fault};
 
 /// What a chip's boot loader says.

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, anyhow, bail};
+use tactomo::board::baseline::{self, Baseline};
+use tactomo::board::frames::FrameFile;
+use tactomo::board::measured;
 use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
-use tactomo::frames::FrameFile;
-use tactomo::live::interpret;
-use tactomo::live::rest::{self, Rest};
 use tactomo::readings::Readings;
 use tactomo::solve::{Guard, Kernel, Lambda, Method, Presses, Problem, Solution, Solver};
 use tactomo::study::{Setting, Variation};
@@ -18,7 +18,7 @@ use super::Args;
 pub struct Reader {
     path: PathBuf,
     file: FrameFile,
-    rest: Rest,
+    rest: Baseline,
     /// Frames that were read.
     count: usize,
     touch: Touch,
@@ -39,8 +39,8 @@ impl Reader {
             Some(presses) => taught(args, Presses::read(presses)?)?,
             None => solved(args)?,
         };
-        let at_rest = args.rest.unwrap_or(if file.board().is_some() { rest::FRAMES } else { 0 });
-        let rest = Rest::over(at_rest, file.channels());
+        let at_rest = args.rest.unwrap_or(if file.board().is_some() { baseline::FRAMES } else { 0 });
+        let rest = Baseline::over(at_rest, file.channels());
         Ok(Self { path: args.file.clone(), file, rest, count: 0, touch })
     }
 
@@ -161,7 +161,7 @@ fn measured(chosen: Detector, file: &FrameFile) -> anyhow::Result<Detector> {
         );
     }
     Ok(match file.board() {
-        Some(board) => interpret::as_measured(&chosen, board)?,
+        Some(board) => measured::as_measured(&chosen, board)?,
         None => chosen,
     })
 }

@@ -1,0 +1,180 @@
+//! Frames of readings in files: recordings of this program, and tables of any other.
+
+mod recorded;
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use tactomo_protocol::Hello;
+
+pub use self::recorded::Recorded;
+use crate::record::{self, RecordError};
+use tactomo_table::{Array, Table, TableError};
+
+/// Names that an array of readings may have in an NPZ file.
+const READINGS: [&str; 3] = ["readings_v", "readings", "volts"];
+
+/// Frames of a file, one after the other.
+pub enum FrameFile {
+    /// A recording, and the board that it was taken from.
+    Recording(Box<Recorded>),
+    /// Rows of a table: CSV, NPY or NPZ.
+    Table(Rows),
+}
+
+/// Rows of a table.
+pub struct Rows {
+    rows: std::vec::IntoIter<f64>,
+    channels: usize,
+}
+
+/// One frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileFrame {
+    /// Board time since the first frame (s), if the file tells.
+    pub time_s: Option<f64>,
+    /// Readings (V) in the order of the channels; of a detector row by row.
+    pub volts: Vec<f64>,
+}
+
+/// Why a file gives no frames.
+#[derive(Debug, thiserror::Error)]
+pub enum FramesError {
+    /// As a recording.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// As a table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// Its arrays are not readings.
+    #[error("{path}: {what}")]
+    Shape {
+        /// The file.
+        path: PathBuf,
+        /// What is there and what is needed.
+        what: String,
+    },
+    /// A recording that cannot be read on.
+    #[error("cannot read on in {path}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A recording that does not tell what its readings mean.
+    #[error(
+        "{path}: no board says Hello in this recording, so nobody knows what its frames mean; record it from the board's start"
+    )]
+    NoHello {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl FrameFile {
+    /// Opens a file: a recording, CSV, NPY or NPZ, by what is in it.
+    ///
+    /// A table has a frame a row, of as many numbers as there are channels (V), or a square a frame. One square alone is a frame
+    /// if it has as many numbers as are `expected`.
+    ///
+    /// # Errors
+    /// [`FramesError`], which says what is wrong with the file.
+    pub fn open(path: &Path, expected: Option<usize>) -> Result<Self, FramesError> {
+        if is_recording(path) {
+            return Ok(Self::Recording(Box::new(Recorded::open(path)?)));
+        }
+        let shape = |what| FramesError::Shape { path: path.to_owned(), what };
+        let array = Table::read(path)?.array(&READINGS).map_err(shape)?;
+        Rows::of(array, expected).map(Self::Table).map_err(shape)
+    }
+
+    /// The board that a recording was taken from.
+    pub fn board(&self) -> Option<&Hello> {
+        match self {
+            Self::Recording(recorded) => Some(recorded.board()),
+            Self::Table(_) => None,
+        }
+    }
+
+    /// Numbers in each frame.
+    pub fn channels(&self) -> usize {
+        match self {
+            Self::Recording(recorded) => usize::from(recorded.board().electrodes).pow(2),
+            Self::Table(rows) => rows.channels,
+        }
+    }
+
+    /// The next frame, or `None` at the end.
+    ///
+    /// # Errors
+    /// [`FramesError`] if the file cannot be read on.
+    pub fn next_frame(&mut self) -> Result<Option<FileFrame>, FramesError> {
+        match self {
+            Self::Recording(recorded) => recorded.next_frame(),
+            Self::Table(rows) => Ok(rows.next_frame()),
+        }
+    }
+}
+
+impl Rows {
+    /// Frames from an array: `frames x channels`, `frames x n x n`, or one frame alone, `channels` or `n x n`.
+    fn of(array: Array, expected: Option<usize>) -> Result<Self, String> {
+        let channels = match array.shape[..] {
+            [n, m] if n == m && Some(n * m) == expected => n * m,
+            [_, _] | [_, _, _] => array.columns(),
+            [channels] => channels,
+            _ => 0,
+        };
+        let square = array.shape.len() != 3 || array.shape[1] == array.shape[2];
+        if channels == 0 || array.values.is_empty() || !square {
+            return Err(format!(
+                "an array of {} is not frames: `frames x channels` or `frames x electrodes x electrodes` is needed",
+                array.shape_text()
+            ));
+        }
+        Ok(Self { rows: array.values.into_iter(), channels })
+    }
+
+    fn next_frame(&mut self) -> Option<FileFrame> {
+        let volts: Vec<f64> = self.rows.by_ref().take(self.channels).collect();
+        (volts.len() == self.channels).then_some(FileFrame { time_s: None, volts })
+    }
+}
+
+fn is_recording(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(record::MAGIC.len() as u64).read_to_end(&mut start));
+    read.is_ok() && start == record::MAGIC
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(array: Array) -> Result<Vec<Vec<f64>>, String> {
+        let mut rows = Rows::of(array, Some(16))?;
+        Ok(std::iter::from_fn(|| rows.next_frame()).map(|frame| frame.volts).collect())
+    }
+
+    fn array(shape: &[usize]) -> Array {
+        Array { shape: shape.to_vec(), values: (0..shape.iter().product()).map(|i: usize| i as f64).collect() }
+    }
+
+    #[test]
+    fn rows_and_squares_are_frames() {
+        assert_eq!(frames(array(&[2, 3])), Ok(vec![vec![0.0, 1.0, 2.0], vec![3.0, 4.0, 5.0]]));
+        assert_eq!(frames(array(&[4])).map(|frames| frames.len()), Ok(1));
+        assert_eq!(frames(array(&[4, 4])).map(|frames| frames.len()), Ok(1), "as many as are expected");
+        assert_eq!(frames(array(&[3, 3])).map(|frames| frames.len()), Ok(3));
+        assert_eq!(frames(array(&[3, 2, 2])).map(|frames| frames[2].clone()), Ok(vec![8.0, 9.0, 10.0, 11.0]));
+    }
+
+    #[test]
+    fn other_shapes_are_refused() {
+        for shape in [&[][..], &[0], &[2, 0], &[2, 2, 3], &[1, 1, 2, 2]] {
+            assert!(frames(array(shape)).unwrap_err().contains("is not frames"), "{shape:?}");
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! Boards: how bytes come from them, what they say, and what is kept of it.
+//!
+//! [`link`] brings bytes from a serial port, the [simulated board](simulated) or a [recording](record); [`session`] is the talk with a
+//! board, [`frames`] what its frames mean, [`baseline`] what they read with nothing on the detector. Nothing here knows of solvers.
+
+pub mod baseline;
+pub mod board_log;
+pub mod frames;
+pub mod link;
+pub mod measured;
+pub mod pace;
+pub mod record;
+pub mod sequence;
+pub mod session;
+pub mod simulated;

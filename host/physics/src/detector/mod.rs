@@ -1,0 +1,191 @@
+//! What a detector is: outline, layers, electrodes, and how it is measured.
+
+mod check;
+mod file;
+mod material;
+mod preset;
+pub mod surface;
+mod svg;
+
+pub use self::check::{ELECTRODES, Problem};
+pub use self::file::{FileError, TomlError};
+pub use self::material::{FOAMS, Foam, Stack};
+pub use self::surface::edges_of;
+pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
+pub use self::svg::short;
+use crate::geometry;
+
+/// A detection layer with its electrodes and the circuit that measures it.
+///
+/// Coordinates: x and y from the middle of the outline's bounding box, z up from the electrode side; metres.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Detector {
+    /// Preset or file name, for people.
+    pub name: String,
+    /// Edge of the layer; on a curved detector that of the flat map that it is drawn on.
+    pub outline: Outline,
+    /// The surface that the layer lies on, if that is not a plane.
+    pub surface: Option<Surface>,
+    /// Bottom (electrode side) first.
+    pub layers: Vec<Layer>,
+    /// In the order of the channels.
+    pub electrodes: Vec<Electrode>,
+    /// Contact impedance between pad and layer, in ohm square metres (ohm m2), of pads that have none of their own.
+    pub contact_impedance_ohm_m2: f64,
+    /// Voltage of the driving layer (V).
+    pub drive_v: f64,
+    /// Resistance of the multiplexer's closed switch (ohm).
+    pub on_resistance_ohm: f64,
+    /// How the voltages become numbers.
+    pub adc: Adc,
+}
+
+/// Closed polygons, without repeating the first corner (m).
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Outline {
+    /// Outer edge, counter-clockwise.
+    pub outer: Vec<[f64; 2]>,
+    /// Holes, clockwise.
+    pub holes: Vec<Vec<[f64; 2]>>,
+}
+
+/// One layer; its conductivity runs exponentially from bottom to top, as in eq. (11) of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Layer {
+    /// Thickness (m).
+    pub thickness_m: f64,
+    /// Conductivity at its bottom (S/m).
+    pub bottom_s_per_m: f64,
+    /// Conductivity at its top (S/m).
+    pub top_s_per_m: f64,
+}
+
+/// A round pad under the layer.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Electrode {
+    /// Centre, x (m).
+    pub x_m: f64,
+    /// Centre, y (m).
+    pub y_m: f64,
+    /// Centre, z (m): on a curved detector; zero on a flat one.
+    #[serde(default)]
+    pub z_m: f64,
+    /// Radius (m).
+    pub radius_m: f64,
+    /// Contact impedance (ohm m2), where it is not the detector's.
+    #[serde(default)]
+    pub contact_impedance_ohm_m2: Option<f64>,
+}
+
+/// The analogue-to-digital converter.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Adc {
+    /// Bits of one conversion.
+    pub bits: u8,
+    /// Voltage that code `2^bits` would stand for (V).
+    pub full_scale_v: f64,
+    /// Standard deviation of a conversion's noise, in codes (LSB).
+    pub noise_lsb: f64,
+}
+
+impl Adc {
+    /// Voltage of one code (V).
+    pub fn lsb_v(&self) -> f64 {
+        self.full_scale_v / 2f64.powi(i32::from(self.bits))
+    }
+
+    /// Standard deviation of a reading by noise and by rounding (V).
+    pub fn deviation_v(&self) -> f64 {
+        (self.noise_lsb.powi(2) + 1.0 / 12.0).sqrt() * self.lsb_v()
+    }
+}
+
+impl Detector {
+    /// Thickness of all layers together (m).
+    pub fn thickness_m(&self) -> f64 {
+        self.layers.iter().map(|layer| layer.thickness_m).sum()
+    }
+
+    /// Where a place is drawn (m): its x and y, but on a curved detector the point of its map.
+    pub fn map_m(&self, place_m: [f64; 3]) -> [f64; 2] {
+        self.surface.as_ref().map_or([place_m[0], place_m[1]], |surface| surface.map_m(place_m))
+    }
+
+    /// The place that is drawn at a point (m); `None` beside a curved detector.
+    pub fn place_m(&self, map_m: [f64; 2]) -> Option<[f64; 3]> {
+        match &self.surface {
+            Some(surface) => surface.place_m(map_m),
+            None => Some([map_m[0], map_m[1], 0.0]),
+        }
+    }
+
+    /// Contact impedance of one of its pads (ohm m2).
+    pub fn pad_impedance_ohm_m2(&self, pad: &Electrode) -> f64 {
+        pad.contact_impedance_ohm_m2.unwrap_or(self.contact_impedance_ohm_m2)
+    }
+
+    /// Conductivity integrated over the thickness (S per square): the natural unit of contact conductance.
+    pub fn sheet_conductance_s(&self) -> f64 {
+        self.layers.iter().map(Layer::sheet_conductance_s).sum()
+    }
+}
+
+impl Electrode {
+    /// Its centre (m).
+    pub fn place_m(&self) -> [f64; 3] {
+        [self.x_m, self.y_m, self.z_m]
+    }
+
+    /// A pad of a flat detector.
+    pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
+        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None }
+    }
+}
+
+impl Layer {
+    /// A layer of one conductivity.
+    pub fn uniform(thickness_m: f64, conductivity_s_per_m: f64) -> Self {
+        Self { thickness_m, bottom_s_per_m: conductivity_s_per_m, top_s_per_m: conductivity_s_per_m }
+    }
+
+    /// Integral of the conductivity over the thickness (S): thickness times the logarithmic mean of bottom and top.
+    pub fn sheet_conductance_s(&self) -> f64 {
+        let ratio = self.top_s_per_m / self.bottom_s_per_m;
+        let log = ratio.ln();
+        // Near 1 the quotient (ratio - 1) / ln(ratio) loses its digits; its series does not.
+        let mean = if log.abs() < 1e-4 { 1.0 + log / 2.0 + log * log / 6.0 } else { (ratio - 1.0) / log };
+        self.thickness_m * self.bottom_s_per_m * mean
+    }
+}
+
+impl Outline {
+    /// A rectangle about the origin (m).
+    pub fn rectangle(width_m: f64, height_m: f64) -> Self {
+        let (x, y) = (width_m / 2.0, height_m / 2.0);
+        Self { outer: vec![[-x, -y], [x, -y], [x, y], [-x, y]], holes: Vec::new() }
+    }
+
+    /// Width and height (m) if this is a rectangle about the origin, else `None`.
+    pub fn as_rectangle(&self) -> Option<[f64; 2]> {
+        let [x, y] = *self.outer.get(2)?;
+        (*self == Self::rectangle(2.0 * x, 2.0 * y)).then_some([2.0 * x, 2.0 * y])
+    }
+
+    /// Width and height of the bounding box (m).
+    pub fn size_m(&self) -> [f64; 2] {
+        let [low, high] = self.bounds();
+        [high[0] - low[0], high[1] - low[1]]
+    }
+
+    /// Corners of the bounding box: smallest and largest x and y (m).
+    pub fn bounds(&self) -> [[f64; 2]; 2] {
+        geometry::bounds(&self.outer)
+    }
+}
+
+impl Default for Adc {
+    /// The ESP32's, at its widest range.
+    fn default() -> Self {
+        Self { bits: 12, full_scale_v: 3.3, noise_lsb: 1.5 }
+    }
+}

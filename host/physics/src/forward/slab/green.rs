@@ -1,0 +1,358 @@
+//! Neumann function between points of one surface of the bare slab.
+//!
+//! `N(x, x') = sum_mn c_mn G(k_mn) cos cos cos cos / (Lx Ly)` converges slowly: `G ~ 1 / (sigma k)`. As in Ewald's sums,
+//! `G = G exp(-k^2 R^2 / 4) + G (1 - exp(-k^2 R^2 / 4))`. The first part has few modes, and as `cos a cos b` is a sum of two
+//! cosines it is four look-ups in one table. The second fades within a few `R` or thicknesses: a function of the distance
+//! alone, summed over those mirror images that are near.
+
+use std::f64::consts::PI;
+
+use realfft::RealFftPlanner;
+
+use super::disc::DiscSelf;
+use super::quadrature::panels;
+use super::spline::{Grid, Taps};
+use crate::forward::spots::Between;
+
+/// `k R` at which the smooth part's factor has fallen to 2e-5.
+const SMOOTH_END: f64 = 6.6;
+
+/// Table steps in a split length.
+const STEPS_IN_SPLIT: f64 = 4.0;
+
+/// Split lengths in which a singular point source is spread, so that sources may touch.
+const SPREAD_SHARE: f64 = 0.08;
+
+/// The near part is dropped where it has fallen to this share of `1 / (2 pi sigma R)`.
+const NEAR_END: f64 = 1e-5;
+
+/// Steps of the near part's table.
+const NEAR_STEPS: usize = 256;
+
+/// One surface of the slab.
+#[derive(Clone, Debug)]
+pub(super) struct SurfaceGreen {
+    size_m: [f64; 2],
+    split_m: f64,
+    grid: Grid,
+    smooth: Vec<f64>,
+    near: NearPart,
+    spectrum: NearSpectrum,
+}
+
+impl SurfaceGreen {
+    /// Makes the tables: `response` is the surface's potential per normal current density for a wave number, `floating` what
+    /// is left of it at zero, `sheet_s` the sheet conductance, `sigma` the conductivity at the surface.
+    pub fn new(
+        size_m: [f64; 2],
+        split_m: f64,
+        planner: &mut RealFftPlanner<f64>,
+        surface: &Surface<impl Fn(f64) -> f64>,
+    ) -> Self {
+        let grid = Grid::new(size_m, split_m / STEPS_IN_SPLIT);
+        let area_m2 = size_m[0] * size_m[1];
+        // The near part's own mean belongs to mode 0; the smooth part carries the rest of the floating response.
+        let mean = surface.floating - split_m * split_m / (4.0 * surface.sheet_s);
+        let amplitude = modes(&grid, SMOOTH_END / split_m, |count, k| {
+            count / area_m2 * if k > 0.0 { (surface.response)(k) * (-0.25 * (k * split_m).powi(2)).exp() } else { mean }
+        });
+        let smooth = grid.synthesise(planner, amplitude);
+        Self {
+            size_m,
+            split_m,
+            grid,
+            smooth,
+            near: NearPart::new(split_m, surface),
+            spectrum: NearSpectrum::new(split_m, surface),
+        }
+    }
+
+    /// Split length `R` (m).
+    pub fn split_m(&self) -> f64 {
+        self.split_m
+    }
+
+    /// Distance beyond which the near part is nothing (m).
+    pub fn reach_m(&self) -> f64 {
+        self.near.reach_m
+    }
+
+    /// Smooth part between two points (ohm); coordinates from the corner (m).
+    pub fn smooth_ohm(&self, a: [f64; 2], b: [f64; 2]) -> f64 {
+        let taps = |axis: usize| [self.grid.taps(axis, a[axis] - b[axis]), self.grid.taps(axis, a[axis] + b[axis])];
+        let (x, y) = (taps(0), taps(1));
+        let stride = self.grid.nodes(1);
+        let mut sum = 0.0;
+        for (row, y_weights) in &y {
+            // Four sums side by side, for the processor to do at once.
+            let mut lanes = [0.0; 4];
+            for (column, x_weights) in &x {
+                for (i, weight) in x_weights.iter().enumerate() {
+                    let start = (column + i) * stride + row;
+                    let line = &self.smooth[start..start + 4];
+                    lanes.iter_mut().zip(line).for_each(|(lane, value)| *lane += weight * value);
+                }
+            }
+            sum += lanes.iter().zip(y_weights).map(|(lane, weight)| lane * weight).sum::<f64>();
+        }
+        0.25 * sum
+    }
+
+    /// Smooth part between two points with its derivatives.
+    pub fn smooth(&self, a: [f64; 2], b: [f64; 2]) -> Between {
+        let taps = |axis: usize| {
+            [a[axis] - b[axis], a[axis] + b[axis]].map(|u_m| (self.grid.taps(axis, u_m), self.grid.slopes(axis, u_m)))
+        };
+        let (x, y) = (taps(0), taps(1));
+        let mut field = Between::default();
+        for (y_sign, (y_taps, y_slopes)) in [-1.0, 1.0].into_iter().zip(&y) {
+            for (x_sign, (x_taps, x_slopes)) in [-1.0, 1.0].into_iter().zip(&x) {
+                let [ohm, by_x, by_y] = self.smooth_part(x_taps, x_slopes, y_taps, y_slopes);
+                field.ohm += 0.25 * ohm;
+                for (axis, slope, sign) in [(0, by_x, x_sign), (1, by_y, y_sign)] {
+                    field.by_first[axis] += 0.25 * slope;
+                    field.by_second[axis] += 0.25 * sign * slope;
+                }
+            }
+        }
+        field
+    }
+
+    /// One of the four look-ups: value and derivatives along both directions.
+    fn smooth_part(&self, x: &Taps, x_slopes: &[f64; 4], y: &Taps, y_slopes: &[f64; 4]) -> [f64; 3] {
+        let stride = self.grid.nodes(1);
+        let (mut values, mut slopes) = ([0.0; 4], [0.0; 4]);
+        for (i, (weight, slope)) in x.1.iter().zip(x_slopes).enumerate() {
+            let start = (x.0 + i) * stride + y.0;
+            for (lane, value) in self.smooth[start..start + 4].iter().enumerate() {
+                values[lane] += weight * value;
+                slopes[lane] += slope * value;
+            }
+        }
+        let along = |lanes: &[f64; 4], weights: &[f64; 4]| lanes.iter().zip(weights).map(|(a, b)| a * b).sum::<f64>();
+        [along(&values, &y.1), along(&slopes, &y.1), along(&values, y_slopes)]
+    }
+
+    /// Near part at a distance (ohm), and its derivative (ohm/m).
+    pub fn near(&self, distance_m: f64) -> [f64; 2] {
+        self.near.with_slope(distance_m)
+    }
+
+    /// Near part at a distance (ohm).
+    pub fn near_ohm(&self, distance_m: f64) -> f64 {
+        self.near.at(distance_m)
+    }
+
+    /// Self-impedance of a disc on this surface, without the smooth part.
+    pub fn disc_self(&self, radius_m: f64) -> DiscSelf {
+        DiscSelf::new(radius_m, self.spectrum.sigma, |ln_k| self.spectrum.at(ln_k))
+    }
+
+    /// Mirror images that bring a disc at `b` within reach of a disc at `a`; `gap_m` is added to the reach.
+    pub fn images(&self, a: [f64; 2], b: [f64; 2], gap_m: f64) -> Vec<Image> {
+        let reach_m = self.reach_m() + gap_m;
+        // Along one direction: sign and offset.
+        let along = |axis: usize| {
+            let period_m = 2.0 * self.size_m[axis];
+            let turns = (reach_m / period_m) as i32 + 1;
+            (-turns..=turns)
+                .flat_map(move |turn| [[1.0, f64::from(turn) * period_m], [-1.0, f64::from(turn) * period_m]])
+                .filter(move |[sign, offset_m]| (a[axis] - (sign * b[axis] + offset_m)).abs() < reach_m)
+        };
+        let mut found = Vec::new();
+        for [sign_x, offset_x_m] in along(0) {
+            for [sign_y, offset_y_m] in along(1) {
+                let image = Image { sign: [sign_x, sign_y], offset_m: [offset_x_m, offset_y_m] };
+                let at = image.of(b);
+                if (a[0] - at[0]).powi(2) + (a[1] - at[1]).powi(2) < reach_m * reach_m {
+                    found.push(image);
+                }
+            }
+        }
+        found
+    }
+}
+
+/// One mirror image of the plane in the slab's walls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Image {
+    sign: [f64; 2],
+    offset_m: [f64; 2],
+}
+
+impl Image {
+    /// Where the image of a point is (m).
+    pub fn of(&self, point: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| self.sign[axis] * point[axis] + self.offset_m[axis])
+    }
+
+    /// Whether it is mirrored along each direction: -1, else 1.
+    pub fn sign(&self) -> [f64; 2] {
+        self.sign
+    }
+
+    /// Whether this is the point itself.
+    pub fn in_place(&self) -> bool {
+        self.sign == [1.0, 1.0] && self.offset_m == [0.0, 0.0]
+    }
+}
+
+/// A surface by its response.
+pub(super) struct Surface<F: Fn(f64) -> f64> {
+    /// Potential per normal current density (ohm m2) for a wave number (1/m).
+    pub response: F,
+    /// What is left of it at 0 after `1 / (sheet conductance k^2)` (ohm m2).
+    pub floating: f64,
+    /// Sheet conductance (S).
+    pub sheet_s: f64,
+    /// Conductivity at the surface (S/m).
+    pub sigma: f64,
+}
+
+/// Amplitudes of all modes of a grid up to `k_end`: `amplitude(count, k)`, where `count` is 1, 2 or 4.
+pub(super) fn modes(grid: &Grid, k_end: f64, amplitude: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    let width = grid.modes(1) + 1;
+    let mut all = vec![0.0; (grid.modes(0) + 1) * width];
+    for (i, value) in all.iter_mut().enumerate() {
+        let (m, n) = (i / width, i % width);
+        let k = grid.wave_number(0, m).hypot(grid.wave_number(1, n));
+        if k < k_end {
+            let count = if m == 0 { 1.0 } else { 2.0 } * if n == 0 { 1.0 } else { 2.0 };
+            *value = amplitude(count, k);
+        }
+    }
+    all
+}
+
+/// The near part by distance, as `r h(r)`, which is regular.
+#[derive(Clone, Debug)]
+struct NearPart {
+    reach_m: f64,
+    spread_m: f64,
+    values: Vec<f64>,
+}
+
+impl NearPart {
+    fn new(split_m: f64, surface: &Surface<impl Fn(f64) -> f64>) -> Self {
+        let spread_m = SPREAD_SHARE * split_m;
+        let spectrum = Spectrum::new(split_m, spread_m, surface);
+        let scale = NEAR_END / (2.0 * PI * surface.sigma * split_m);
+        let mut reach_m = 3.0 * split_m;
+        // Three points, so that a zero crossing is not taken for the end.
+        while reach_m < 30.0 * split_m
+            && [0.9, 1.0, 1.1].iter().any(|share| spectrum.near_ohm(share * reach_m).abs() > scale)
+        {
+            reach_m *= 1.15;
+        }
+        let step_m = reach_m / NEAR_STEPS as f64;
+        // Beyond the end the function is taken as nothing; the last step leads there.
+        let values = (0..NEAR_STEPS + 1)
+            .map(|i| if i < NEAR_STEPS { i as f64 * step_m * spectrum.near_ohm(i as f64 * step_m) } else { 0.0 })
+            .collect();
+        Self { reach_m, spread_m, values }
+    }
+
+    fn at(&self, distance_m: f64) -> f64 {
+        let distance_m = distance_m.max(self.spread_m);
+        let at = distance_m / self.reach_m * NEAR_STEPS as f64;
+        let cell = at as usize;
+        if cell >= NEAR_STEPS {
+            return 0.0;
+        }
+        let part = at - cell as f64;
+        (self.values[cell] * (1.0 - part) + self.values[cell + 1] * part) / distance_m
+    }
+
+    fn with_slope(&self, distance_m: f64) -> [f64; 2] {
+        let value = self.at(distance_m);
+        let steps_per_m = NEAR_STEPS as f64 / self.reach_m;
+        let cell = (distance_m * steps_per_m) as usize;
+        if cell >= NEAR_STEPS || distance_m <= self.spread_m {
+            return [value, 0.0];
+        }
+        let slope = (self.values[cell + 1] - self.values[cell]) * steps_per_m;
+        [value, (slope - value) / distance_m]
+    }
+}
+
+/// The near part by wave number, relative to the half-space's `1 / (sigma k)` and less it: a table over `ln k`.
+#[derive(Clone, Debug)]
+struct NearSpectrum {
+    sigma: f64,
+    first_ln_k: f64,
+    values: Vec<f64>,
+}
+
+/// Steps of that table, and how many of them make a factor of e.
+const SPECTRUM_STEPS: [usize; 2] = [512, 32];
+
+impl NearSpectrum {
+    fn new(split_m: f64, surface: &Surface<impl Fn(f64) -> f64>) -> Self {
+        let first_ln_k = -split_m.ln() - 8.0;
+        let values = (0..=SPECTRUM_STEPS[0])
+            .map(|i| {
+                let k = (first_ln_k + i as f64 / SPECTRUM_STEPS[1] as f64).exp();
+                (surface.response)(k) * surface.sigma * k * -(-0.25 * (k * split_m).powi(2)).exp_m1() - 1.0
+            })
+            .collect();
+        Self { sigma: surface.sigma, first_ln_k, values }
+    }
+
+    fn at(&self, ln_k: f64) -> f64 {
+        let at = ((ln_k - self.first_ln_k) * SPECTRUM_STEPS[1] as f64).clamp(0.0, SPECTRUM_STEPS[0] as f64 - 1.0);
+        let (cell, part) = (at as usize, at.fract());
+        self.values[cell] + (self.values[cell + 1] - self.values[cell]) * part
+    }
+}
+
+/// Quadrature of the near part's Hankel transform, less its `1 / (sigma k)`, which has a closed form.
+struct Spectrum {
+    split_m: f64,
+    sigma: f64,
+    /// Wave number (1/m) and weight.
+    rest: Vec<[f64; 2]>,
+}
+
+impl Spectrum {
+    fn new(split_m: f64, spread_m: f64, surface: &Surface<impl Fn(f64) -> f64>) -> Self {
+        let window = |k: f64| (-0.25 * (k * spread_m).powi(2)).exp() - (-0.25 * (k * split_m).powi(2)).exp();
+        // Eight points in a panel resolve J0(k r) over ten radians: fine panels where the layers speak, for a reach of ten
+        // split lengths and more, and wider ones for the tail that only a gradient has.
+        let edges: Vec<f64> = (0..16).map(|i| 0.5 * f64::from(i)).chain((8..=64).map(f64::from)).collect();
+        let all = panels(&edges, 8).into_iter().map(|[at, weight]| {
+            let k = at / split_m;
+            let rest = (surface.response)(k) - 1.0 / (surface.sigma * k);
+            [k, weight / split_m * k * rest * window(k) / (2.0 * PI)]
+        });
+        let negligible = 1e-9 / (2.0 * PI * surface.sigma * split_m);
+        let rest = all.filter(|[_, weight]| weight.abs() > negligible).collect();
+        Self { split_m, sigma: surface.sigma, rest }
+    }
+
+    fn near_ohm(&self, distance_m: f64) -> f64 {
+        let rest: f64 = self.rest.iter().map(|[k, weight]| weight * libm::j0(k * distance_m)).sum();
+        // The integral of exp(-k^2 R^2 / 4) J0(k r) over k.
+        let s = distance_m * distance_m / (2.0 * self.split_m * self.split_m);
+        let smooth = PI.sqrt() / self.split_m * scaled_bessel_i0(s);
+        rest + (1.0 / distance_m.max(1e-9 * self.split_m) - smooth) / (2.0 * PI * self.sigma)
+    }
+}
+
+/// `exp(-x) I0(x)`, by its power series or, for large `x`, its asymptotic one.
+fn scaled_bessel_i0(x: f64) -> f64 {
+    let mut term = 1.0;
+    let mut sum = 1.0;
+    if x < 18.0 {
+        for i in 1..80 {
+            term *= x * x / 4.0 / f64::from(i * i);
+            sum += term;
+        }
+        return sum * (-x).exp();
+    }
+    for i in 1..12 {
+        let odd = f64::from(2 * i - 1);
+        term *= odd * odd / (f64::from(8 * i) * x);
+        sum += term;
+    }
+    sum / (2.0 * PI * x).sqrt()
+}

@@ -1,0 +1,382 @@
+//! A rectangular detector in full: layers in depth, equipotential pads below, contacts on top.
+//!
+//! The slab is diagonal in cosine modes in the plane and exact in depth ([`layers`]). Its kernel between points of a surface
+//! is a look-up ([`kernel`]); pads and contacts are discs of a few densities ([`disc`]); the pads are eliminated once
+//! ([`pads`]), so that a contact costs a few look-ups and a small solve.
+
+mod disc;
+mod green;
+mod image;
+mod layers;
+mod pads;
+mod quadrature;
+mod spline;
+mod spots;
+#[cfg(test)]
+mod tests;
+
+use std::sync::OnceLock;
+
+use nalgebra::DMatrix;
+use realfft::RealFftPlanner;
+
+use self::disc::{DiscBasis, MAX_DEGREE};
+use self::green::{Surface, SurfaceGreen};
+use self::image::{CellFields, ImageGrid};
+use self::pads::{Across, Pad, PadFields, between, pad_impedances};
+use self::spots::SlabSpots;
+use super::contact::{ContactFields, ContactSystem, conducting_patches};
+use super::spots::SpotFields;
+use super::{ForwardError, ForwardModel, ImageMesh, check_image};
+use crate::detector::{Detector, Layer};
+use crate::scene::Contact;
+
+/// Nodes of the image unless said otherwise, about.
+const IMAGE_NODES: usize = 2000;
+
+/// The kernels' split length is at least this share of a pad's radius.
+const SPLIT_IN_PAD: f64 = 1.0;
+
+/// How finely a [`Slab`] is resolved: degrees of the polynomials that current densities are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resolution {
+    /// On the pads.
+    pub pad_degree: usize,
+    /// On contacts that are small against the thickness; wider ones get more.
+    pub contact_degree: usize,
+}
+
+impl Resolution {
+    /// Enough for readings within a few tenths of a per cent: against reference readings, one degree more changes nothing.
+    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2 };
+    /// Finer than any solver needs.
+    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4 };
+}
+
+/// A rectangular detector, layered in depth.
+#[derive(Clone, Debug)]
+pub struct Slab {
+    detector: Detector,
+    size_m: [f64; 2],
+    resolution: Resolution,
+    top: SurfaceGreen,
+    pads: PadFields,
+    image: Image,
+}
+
+/// The grid that images are on.
+#[derive(Clone, Debug)]
+struct Image {
+    grid: ImageGrid,
+    mesh: ImageMesh,
+    fields_ohm: DMatrix<f64>,
+    /// Made when the first image is asked for.
+    cells: OnceLock<CellFields>,
+}
+
+/// A contact, ready to be put into the system.
+struct Disc {
+    centre_m: [f64; 2],
+    radius_m: f64,
+    conductance_s: f64,
+    basis: &'static DiscBasis,
+    nodes: Vec<[f64; 2]>,
+    /// Of the pads' fields, means under the densities: `columns x densities`.
+    fields: DMatrix<f64>,
+}
+
+impl Slab {
+    /// Makes the model at the standard resolution.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the outline is not a rectangle, or a layer or an electrode makes no sense.
+    pub fn new(detector: &Detector) -> Result<Self, ForwardError> {
+        Self::with_resolution(detector, Resolution::STANDARD)
+    }
+
+    /// Makes the model at a resolution.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn with_resolution(detector: &Detector, resolution: Resolution) -> Result<Self, ForwardError> {
+        let wrong = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
+        let size_m = check(detector).map_err(wrong)?;
+        let mut planner = RealFftPlanner::new();
+        let pads = bare(detector, size_m, resolution, &mut planner)
+            .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
+        let top = SurfaceGreen::new(size_m, split_m(detector, size_m), &mut planner, &top_surface(detector));
+        let image = Image::new(ImageGrid::new(size_m, IMAGE_NODES), &pads);
+        Ok(Self { detector: detector.clone(), size_m, resolution, top, pads, image })
+    }
+
+    /// The same model with images of about `nodes` nodes instead of 2000; at least 9.
+    pub fn on_image(self, nodes: usize) -> Self {
+        Self { image: Image::new(ImageGrid::new(self.size_m, nodes), &self.pads), ..self }
+    }
+
+    fn cells(&self) -> &CellFields {
+        self.image.cells.get_or_init(|| {
+            let top = top_surface(&self.detector);
+            CellFields::new(self.image.grid, &self.pads, top.response, top.floating)
+        })
+    }
+
+    fn disc(&self, index: usize, contact: &Contact) -> Result<Disc, ForwardError> {
+        self.check_contact(contact).map_err(|what| ForwardError::Contact { index, what })?;
+        let centre_m = from_corner(self.size_m, [contact.x_m, contact.y_m]);
+        let basis = DiscBasis::of_degree(self.contact_degree(contact.radius_m));
+        let nodes = basis.nodes_m(centre_m, contact.radius_m);
+        let fields = self.pads.under_disc(basis, &nodes);
+        Ok(Disc { centre_m, radius_m: contact.radius_m, conductance_s: contact.conductance_s, basis, nodes, fields })
+    }
+
+    /// The smooth part of the kernel varies over a split length: a disc that is wider needs more degrees.
+    fn contact_degree(&self, radius_m: f64) -> usize {
+        let wider = (radius_m / self.top.split_m() - 1.0).max(0.0);
+        (self.resolution.contact_degree + (2.0 * wider).ceil() as usize).min(MAX_DEGREE)
+    }
+
+    /// Whether a contact can be on this detector, or what is wrong with it.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn check_contact(&self, contact: &Contact) -> Result<(), String> {
+        let inside = 2.0 * contact.x_m.abs() <= self.size_m[0] && 2.0 * contact.y_m.abs() <= self.size_m[1];
+        if !inside {
+            return Err(format!("its middle, {} {} m, is not on the detector", contact.x_m, contact.y_m));
+        }
+        if !(contact.radius_m > 0.0 && contact.radius_m <= self.size_m[0].max(self.size_m[1])) {
+            return Err(format!("its radius is {} m", contact.radius_m));
+        }
+        if !(contact.conductance_s >= 0.0 && contact.conductance_s.is_finite()) {
+            return Err(format!("its conductance is {} S", contact.conductance_s));
+        }
+        Ok(())
+    }
+
+    /// The nodes of an image that conduct, and their system.
+    fn touched(&self, image_s: &[f64]) -> Result<(Vec<usize>, ContactSystem<'_>), ForwardError> {
+        check_image(image_s, self.image.mesh.nodes_m.len())?;
+        let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
+        let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
+        let cross = self.image.fields_ohm.select_rows(&touched);
+        let patches = self.cells().between(&touched, &touched);
+        Ok((touched, conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)))
+    }
+
+    fn system(&self, discs: &[Disc]) -> ContactSystem<'_> {
+        let electrodes = self.pads.electrodes();
+        let size = discs.iter().map(|disc| disc.basis.len()).sum();
+        let mut fields = DMatrix::zeros(self.pads.columns(), size);
+        let mut cross_and_current = DMatrix::zeros(size, electrodes + 1);
+        let mut start = 0;
+        for disc in discs {
+            let scale = disc.conductance_s.sqrt();
+            cross_and_current[(start, electrodes)] = scale;
+            fields.columns_mut(start, disc.basis.len()).copy_from(&(&disc.fields * scale));
+            start += disc.basis.len();
+        }
+        cross_and_current.columns_mut(0, electrodes).tr_copy_from(&fields.rows(0, electrodes));
+        let corrections = fields.rows(electrodes, fields.nrows() - electrodes);
+        // The floating pads below are a short way for the current between contacts.
+        let mut contacts = -corrections.transpose() * corrections;
+        self.add_kernel(discs, &mut contacts);
+        ContactSystem { electrodes: &self.pads.electrodes_ohm, contacts, cross_and_current }
+    }
+
+    /// Adds what the kernel of the top gives, to the lower triangle.
+    fn add_kernel(&self, discs: &[Disc], contacts: &mut DMatrix<f64>) {
+        let mut row = 0;
+        for (i, disc) in discs.iter().enumerate() {
+            let mut column = 0;
+            for other in &discs[..=i] {
+                let scale = (disc.conductance_s * other.conductance_s).sqrt();
+                let mut block = self.block(disc, other, row == column) * scale;
+                if row == column {
+                    block += self.top.disc_self(disc.radius_m).reduced(disc.basis, 1.0, disc.conductance_s);
+                }
+                let mut view = contacts.view_mut((row, column), block.shape());
+                view += block;
+                column += other.basis.len();
+            }
+            row += disc.basis.len();
+        }
+    }
+
+    /// Impedances between the densities of two contacts without their own singular parts. Of contacts far apart, only the first
+    /// densities see each other.
+    fn block(&self, disc: &Disc, other: &Disc, same: bool) -> DMatrix<f64> {
+        let images = self.top.images(disc.centre_m, other.centre_m, disc.radius_m + other.radius_m);
+        if same {
+            return between(disc.basis, &disc.nodes, disc.basis, &disc.nodes, &self.top, &images, true);
+        }
+        let distance_m = (disc.centre_m[0] - other.centre_m[0]).hypot(disc.centre_m[1] - other.centre_m[1]);
+        let [far, far_other] = [disc, other].map(|disc| disc.basis.seen_from(disc.radius_m / distance_m));
+        let nodes = [(disc, far), (other, far_other)].map(|(disc, far)| far.nodes_m(disc.centre_m, disc.radius_m));
+        between(far, &nodes[0], far_other, &nodes[1], &self.top, &images, false)
+    }
+}
+
+impl ForwardModel for Slab {
+    fn name(&self) -> &'static str {
+        "slab"
+    }
+
+    fn detector(&self) -> &Detector {
+        &self.detector
+    }
+
+    fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
+        let discs = contacts
+            .iter()
+            .enumerate()
+            .map(|(index, contact)| self.disc(index, contact))
+            .collect::<Result<Vec<_>, _>>()?;
+        self.system(&discs).impedance_ohm().ok_or(ForwardError::NoContact)
+    }
+
+    fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
+        let (touched, system) = self.touched(image_s)?;
+        let mut solved = system.solve().ok_or(ForwardError::NoContact)?;
+        let scaled = |row: usize| image_s[touched[row]].sqrt();
+        solved.unknowns.row_iter_mut().enumerate().for_each(|(row, mut currents)| currents *= scaled(row));
+        let untouched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] == 0.0).collect();
+        let cells = self.cells();
+        let fields_ohm = &self.image.fields_ohm;
+        let mut elsewhere = fields_ohm.select_rows(&untouched) + cells.between(&untouched, &touched) * &solved.unknowns;
+        elsewhere.column_iter_mut().zip(&solved.constant_ohm).for_each(|(mut e, ohm)| e.add_scalar_mut(*ohm));
+        let mut nodes_ohm = DMatrix::zeros(image_s.len(), fields_ohm.ncols());
+        for (row, node) in touched.iter().enumerate() {
+            nodes_ohm.row_mut(*node).copy_from(&(solved.unknowns.row(row) / -image_s[*node]));
+        }
+        untouched.iter().enumerate().for_each(|(row, node)| nodes_ohm.row_mut(*node).copy_from(&elsewhere.row(row)));
+        Ok(ContactFields { impedance_ohm: solved.impedance_ohm, nodes_ohm })
+    }
+
+    fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
+        self.touched(image_s)?.1.impedance_ohm().ok_or(ForwardError::NoContact)
+    }
+
+    fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {
+        Ok(Box::new(self.clone().on_image(nodes)))
+    }
+
+    fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
+        Some(Box::new(SlabSpots::new(self.clone(), radius_m)))
+    }
+
+    fn image_mesh(&self) -> &ImageMesh {
+        &self.image.mesh
+    }
+
+    fn fields_ohm(&self) -> &DMatrix<f64> {
+        &self.image.fields_ohm
+    }
+
+    fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
+        let nodes: Vec<_> = (0..self.image.mesh.nodes_m.len()).collect();
+        Ok(self.cells().between(&nodes, &nodes))
+    }
+
+    fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
+        &self.pads.electrodes_ohm
+    }
+}
+
+/// Width and height of a detector that the model can be made for (m), or what is wrong with it.
+fn check(detector: &Detector) -> Result<[f64; 2], String> {
+    let size_m =
+        detector.outline.as_rectangle().ok_or("its outline is not a rectangle; use the shell for other outlines")?;
+    if detector.surface.is_some() {
+        return Err("it is curved; use the shell".to_owned());
+    }
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    let sound = |layer: &Layer| [layer.thickness_m, layer.bottom_s_per_m, layer.top_s_per_m].into_iter().all(positive);
+    if detector.layers.is_empty() {
+        return Err("it has no layer".to_owned());
+    }
+    if let Some(index) = detector.layers.iter().position(|layer| !sound(layer)) {
+        return Err(format!("layer {index} needs a thickness and conductivities above zero"));
+    }
+    if detector.electrodes.is_empty() {
+        return Err("it has no electrode".to_owned());
+    }
+    for (index, pad) in detector.electrodes.iter().enumerate() {
+        let inside =
+            [(pad.x_m, size_m[0]), (pad.y_m, size_m[1])].iter().all(|(at, size)| at.abs() + pad.radius_m <= size / 2.0);
+        if !(positive(pad.radius_m) && inside) {
+            return Err(format!("electrode {index} needs a radius above zero and a place inside the outline"));
+        }
+        let impedance_ohm_m2 = detector.pad_impedance_ohm_m2(pad);
+        if !(impedance_ohm_m2 >= 0.0 && impedance_ohm_m2.is_finite()) {
+            return Err(format!("the contact impedance of electrode {index} is below zero or not a number"));
+        }
+    }
+    Ok(size_m)
+}
+
+/// A place from the corner, given from the middle (m).
+fn from_corner(size_m: [f64; 2], at_m: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|axis| at_m[axis] + size_m[axis] / 2.0)
+}
+
+/// Length at which the kernels are split: short enough that the near part fades within a few thicknesses, long enough that
+/// the tables stay small, and that what bends the current on a pad is in the near part, which is resolved to high orders there.
+fn split_m(detector: &Detector, size_m: [f64; 2]) -> f64 {
+    let pad_m = detector.electrodes.iter().map(|pad| pad.radius_m).fold(0.0, f64::max);
+    (0.6 * detector.thickness_m()).min(0.05 * size_m[0].max(size_m[1])).max(SPLIT_IN_PAD * pad_m)
+}
+
+fn top_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {
+    Surface {
+        response: |k| layers::response(&detector.layers, k).tt,
+        floating: layers::floating_response(&detector.layers).tt,
+        sheet_s: detector.sheet_conductance_s(),
+        sigma: detector.layers.last().map_or(0.0, |layer| layer.top_s_per_m),
+    }
+}
+
+fn bottom_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {
+    Surface {
+        response: |k| layers::response(&detector.layers, k).bb,
+        floating: layers::floating_response(&detector.layers).bb,
+        sheet_s: detector.sheet_conductance_s(),
+        sigma: detector.layers.first().map_or(0.0, |layer| layer.bottom_s_per_m),
+    }
+}
+
+/// The bare slab with its pads eliminated.
+fn bare(
+    detector: &Detector,
+    size_m: [f64; 2],
+    resolution: Resolution,
+    planner: &mut RealFftPlanner<f64>,
+) -> Option<PadFields> {
+    let pads: Vec<_> = detector
+        .electrodes
+        .iter()
+        .map(|pad| Pad {
+            centre_m: from_corner(size_m, [pad.x_m, pad.y_m]),
+            radius_m: pad.radius_m,
+            contact_impedance_ohm_m2: detector.pad_impedance_ohm_m2(pad),
+        })
+        .collect();
+    let basis = DiscBasis::of_degree(resolution.pad_degree);
+    let split_m = split_m(detector, size_m);
+    let kernel = SurfaceGreen::new(size_m, split_m, planner, &bottom_surface(detector));
+    let impedances = pad_impedances(&pads, basis, &kernel);
+    let across = Across {
+        size_m,
+        thickness_m: detector.thickness_m(),
+        response: |k| layers::response(&detector.layers, k).tb,
+        floating: layers::floating_response(&detector.layers).tb,
+    };
+    PadFields::new(&pads, basis, &impedances, &across, planner)
+}
+
+impl Image {
+    fn new(grid: ImageGrid, pads: &PadFields) -> Self {
+        let fields_ohm = grid.means(pads, pads.electrodes()).transpose();
+        Self { grid, mesh: grid.mesh(), fields_ohm, cells: OnceLock::new() }
+    }
+}

@@ -1,0 +1,261 @@
+//! The bare slab seen through its pads: equipotential, floating, with contact impedance.
+//!
+//! The current densities of all pads, in the densities of [`super::disc`], obey `A q + f = V`: `A` the impedances between
+//! them, `f` the field of the contacts, `V` the pads' potentials. A pad is equipotential, so `V` only has the uniform
+//! densities; and those carry the electrodes' known currents. Eliminating all others leaves the electrodes' fields, and a
+//! correction of low rank to the kernel of the top, for the pads shorten the way of the contacts' current:
+//! `N(x, x') -> N(x, x') - w(x) . w(x')`.
+
+use nalgebra::{Cholesky, DMatrix};
+use realfft::RealFftPlanner;
+
+use super::disc::DiscBasis;
+use super::green::SurfaceGreen;
+use super::spline::Grid;
+
+/// `k T` at which the field across the slab has fallen to 3e-5.
+const ACROSS_END: f64 = 11.0;
+
+/// Table steps in a thickness: the finest mode that crosses the slab still fits.
+const STEPS_IN_THICKNESS: f64 = 3.6;
+
+/// Most table steps in a pad's radius, for layers that are thin against it: finer modes only matter at the pads' rims.
+const STEPS_IN_PAD: f64 = 10.0;
+
+/// A pad, from the corner (m).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pad {
+    pub centre_m: [f64; 2],
+    pub radius_m: f64,
+    pub contact_impedance_ohm_m2: f64,
+}
+
+impl Pad {
+    fn is_made_as(&self, other: &Self) -> bool {
+        self.radius_m == other.radius_m && self.contact_impedance_ohm_m2 == other.contact_impedance_ohm_m2
+    }
+}
+
+/// Impedances between all densities of all pads (ohm): pad by pad.
+pub(super) fn pad_impedances(pads: &[Pad], basis: &DiscBasis, kernel: &SurfaceGreen) -> DMatrix<f64> {
+    let size = basis.len();
+    let nodes: Vec<_> = pads.iter().map(|pad| basis.nodes_m(pad.centre_m, pad.radius_m)).collect();
+    let mut all = DMatrix::zeros(pads.len() * size, pads.len() * size);
+    let mut own: Option<(Pad, DMatrix<f64>)> = None;
+    for (e, pad) in pads.iter().enumerate() {
+        for (f, other) in pads.iter().enumerate().take(e + 1) {
+            let gap_m = pad.radius_m + other.radius_m;
+            let images = kernel.images(pad.centre_m, other.centre_m, gap_m);
+            let mut block = between(basis, &nodes[e], basis, &nodes[f], kernel, &images, e == f);
+            if e == f {
+                let local = own.take_if(|(like, _)| pad.is_made_as(like)).unwrap_or_else(|| {
+                    let area_m2 = std::f64::consts::PI * pad.radius_m * pad.radius_m;
+                    let local = kernel.disc_self(pad.radius_m);
+                    (*pad, local.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, 1.0))
+                });
+                block += &local.1;
+                own = Some(local);
+            }
+            all.view_mut((e * size, f * size), (size, size)).copy_from(&block);
+            all.view_mut((f * size, e * size), (size, size)).tr_copy_from(&block);
+        }
+    }
+    all
+}
+
+/// Impedances between the densities of two discs (ohm), by their points; a disc's own singular part is left out.
+pub(super) fn between(
+    basis: &DiscBasis,
+    nodes: &[[f64; 2]],
+    other_basis: &DiscBasis,
+    other_nodes: &[[f64; 2]],
+    kernel: &SurfaceGreen,
+    images: &[super::green::Image],
+    same: bool,
+) -> DMatrix<f64> {
+    let value = |a: [f64; 2], b: [f64; 2]| {
+        let near: f64 = images
+            .iter()
+            .filter(|image| !(same && image.in_place()))
+            .map(|image| {
+                let at = image.of(b);
+                kernel.near_ohm((a[0] - at[0]).hypot(a[1] - at[1]))
+            })
+            .sum();
+        kernel.smooth_ohm(a, b) + near
+    };
+    let mut points = DMatrix::zeros(nodes.len(), other_nodes.len());
+    for (j, &b) in other_nodes.iter().enumerate() {
+        let first = if same { j } else { 0 };
+        for (i, &a) in nodes.iter().enumerate().skip(first) {
+            points[(i, j)] = value(a, b);
+            if same {
+                points[(j, i)] = points[(i, j)];
+            }
+        }
+    }
+    basis.weights() * points * other_basis.weights().transpose()
+}
+
+/// Fields of the pads on the top, as a table of all of them at once.
+#[derive(Clone, Debug)]
+pub(super) struct PadFields {
+    grid: Grid,
+    electrodes: usize,
+    columns: usize,
+    /// Spline coefficients: all columns of a node together.
+    table: Vec<f32>,
+    /// Between the electrodes (ohm): `n x n`.
+    pub electrodes_ohm: DMatrix<f64>,
+}
+
+/// One mode of the fields across the slab.
+struct Mode {
+    m: usize,
+    n: usize,
+    amplitude: f64,
+}
+
+/// The way from the pads to the top.
+pub(super) struct Across<F: Fn(f64) -> f64> {
+    /// Length and width (m).
+    pub size_m: [f64; 2],
+    /// Thickness (m).
+    pub thickness_m: f64,
+    /// Potential at one surface per normal current density at the other (ohm m2) for a wave number (1/m).
+    pub response: F,
+    /// What is left of it at 0 (ohm m2).
+    pub floating: f64,
+}
+
+impl PadFields {
+    /// Eliminates the pads from `impedances`; `None` if they are not positive definite.
+    pub fn new(
+        pads: &[Pad],
+        basis: &DiscBasis,
+        impedances: &DMatrix<f64>,
+        across: &Across<impl Fn(f64) -> f64>,
+        planner: &mut RealFftPlanner<f64>,
+    ) -> Option<Self> {
+        let smallest_m = pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min);
+        let step_m = (across.thickness_m / STEPS_IN_THICKNESS).max(smallest_m / STEPS_IN_PAD);
+        let grid = Grid::new(across.size_m, step_m);
+        let modes = across.modes(&grid);
+        let size = basis.len();
+        let uniform: Vec<_> = (0..pads.len()).map(|pad| pad * size).collect();
+        let others: Vec<_> = (0..pads.len() * size).filter(|i| i % size != 0).collect();
+        let inner = impedances.select_rows(&others).select_columns(&others);
+        let lower = Cholesky::new(inner)?.unpack();
+        let inverse = lower.solve_lower_triangular(&DMatrix::identity(others.len(), others.len()))?;
+        let coupling = &inverse * impedances.select_rows(&others).select_columns(&uniform);
+        let electrodes_ohm = impedances.select_rows(&uniform).select_columns(&uniform) - coupling.tr_mul(&coupling);
+
+        let fields = pad_modes(pads, basis, &grid, &modes);
+        let correction = fields.select_columns(&others) * inverse.transpose();
+        let electrode_fields = fields.select_columns(&uniform) - &correction * coupling;
+        let columns = pads.len() + others.len();
+        let mut table = vec![0.0; grid.nodes(0) * grid.nodes(1) * columns];
+        let all = electrode_fields.column_iter().chain(correction.column_iter());
+        for (column, amplitudes) in all.enumerate() {
+            let mut amplitude = vec![0.0; (grid.modes(0) + 1) * (grid.modes(1) + 1)];
+            for (mode, value) in modes.iter().zip(amplitudes.iter()) {
+                amplitude[mode.m * (grid.modes(1) + 1) + mode.n] = *value;
+            }
+            let values = grid.synthesise(planner, amplitude);
+            for (node, value) in values.into_iter().enumerate() {
+                table[node * columns + column] = value as f32;
+            }
+        }
+        Some(Self { grid, electrodes: pads.len(), columns, table, electrodes_ohm })
+    }
+
+    /// Number of electrodes.
+    pub fn electrodes(&self) -> usize {
+        self.electrodes
+    }
+
+    /// Number of fields: of the electrodes and of the correction.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Fields at a point of the top, from the corner (m): first the electrodes' (ohm), then the correction's (square root of
+    /// ohm), `out.len()` of them.
+    pub fn sample(&self, at_m: [f64; 2], out: &mut [f32]) {
+        let ((x, x_weights), (y, y_weights)) = (self.grid.taps(0, at_m[0]), self.grid.taps(1, at_m[1]));
+        out.fill(0.0);
+        for (i, wx) in x_weights.iter().enumerate() {
+            for (j, wy) in y_weights.iter().enumerate() {
+                let node = (x + i) * self.grid.nodes(1) + y + j;
+                let weight = (wx * wy) as f32;
+                let values = &self.table[node * self.columns..][..out.len()];
+                out.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
+            }
+        }
+    }
+
+    /// All fields at a point of the top, as [`sample`](Self::sample) gives them, and their derivatives along both directions (per m).
+    pub fn sample_with_slopes(&self, at_m: [f64; 2]) -> [Vec<f32>; 3] {
+        let [x, y] = [0, 1].map(|axis| (self.grid.taps(axis, at_m[axis]), self.grid.slopes(axis, at_m[axis])));
+        let ((column, x_weights), x_slopes) = x;
+        let ((row, y_weights), y_slopes) = y;
+        let mut sums = [0, 1, 2].map(|_| vec![0.0f32; self.columns]);
+        for i in 0..4 {
+            for j in 0..4 {
+                let node = (column + i) * self.grid.nodes(1) + row + j;
+                let values = &self.table[node * self.columns..][..self.columns];
+                let weights = [x_weights[i] * y_weights[j], x_slopes[i] * y_weights[j], x_weights[i] * y_slopes[j]];
+                for (sum, weight) in sums.iter_mut().zip(weights) {
+                    let weight = weight as f32;
+                    sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
+                }
+            }
+        }
+        sums
+    }
+
+    /// Means of all columns of [`sample`](Self::sample) under the densities of a disc: `columns x densities`.
+    pub fn under_disc(&self, basis: &DiscBasis, nodes: &[[f64; 2]]) -> DMatrix<f64> {
+        let mut sample = vec![0.0_f32; self.columns];
+        let mut points = DMatrix::zeros(self.columns, nodes.len());
+        for (node, mut column) in nodes.iter().zip(points.column_iter_mut()) {
+            self.sample(*node, &mut sample);
+            column.iter_mut().zip(&sample).for_each(|(to, from)| *to = f64::from(*from));
+        }
+        points * basis.weights().transpose()
+    }
+}
+
+impl<F: Fn(f64) -> f64> Across<F> {
+    fn modes(&self, grid: &Grid) -> Vec<Mode> {
+        let area_m2 = self.size_m[0] * self.size_m[1];
+        let response = |m: usize, n: usize| {
+            let k = grid.wave_number(0, m).hypot(grid.wave_number(1, n));
+            let count = if m == 0 { 1.0 } else { 2.0 } * if n == 0 { 1.0 } else { 2.0 };
+            let value = if m + n == 0 { self.floating } else { (self.response)(k) };
+            (k * self.thickness_m < ACROSS_END).then(|| Mode { m, n, amplitude: count * value / area_m2 })
+        };
+        (0..=grid.modes(0))
+            .flat_map(|m| (0..=grid.modes(1)).filter_map(move |n| response(m, n)).collect::<Vec<_>>())
+            .collect()
+    }
+}
+
+/// Amplitudes of the field on the top of each density of each pad: `modes x densities`.
+fn pad_modes(pads: &[Pad], basis: &DiscBasis, grid: &Grid, modes: &[Mode]) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(modes.len(), pads.len() * basis.len());
+    for (e, pad) in pads.iter().enumerate() {
+        let nodes = basis.nodes_m(pad.centre_m, pad.radius_m);
+        let cosines = [0, 1].map(|axis| {
+            DMatrix::from_fn(nodes.len(), grid.modes(axis) + 1, |q, m| {
+                (grid.wave_number(axis, m) * nodes[q][axis]).cos()
+            })
+        });
+        let at_nodes = DMatrix::from_fn(nodes.len(), modes.len(), |q, i| {
+            modes[i].amplitude * cosines[0][(q, modes[i].m)] * cosines[1][(q, modes[i].n)]
+        });
+        let of_densities = basis.weights() * at_nodes;
+        all.view_mut((0, e * basis.len()), (modes.len(), basis.len())).tr_copy_from(&of_densities);
+    }
+    all
+}

@@ -1,0 +1,104 @@
+//! The live picture: from a board's bytes to an image, frame by frame.
+//!
+//! The pipeline runs in a thread of its own and publishes [`Snapshot`]s through a cell that keeps the latest only, so that a
+//! slow page never slows the board. Pages answer with [`Request`]s.
+
+pub mod interpret;
+pub mod pipeline;
+pub mod plan;
+pub mod solvers;
+pub mod statistics;
+
+use tactomo_protocol::{Hello, Status};
+
+use self::solvers::SolverState;
+use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
+use tactomo_touch::solve::{Method, Solution};
+
+/// What there is to show at a moment.
+#[derive(Clone, Debug, Default)]
+pub struct Snapshot {
+    /// How the link to the board fares.
+    pub link: LinkState,
+    /// Who the board is, once it has said so.
+    pub hello: Option<Hello>,
+    /// The newest frame, if one has come.
+    pub frame: Option<FrameSnapshot>,
+    /// The solver, if there is to be one.
+    pub solver: Option<SolverState>,
+    /// Counts since the start.
+    pub statistics: Statistics,
+}
+
+/// How the link to the board fares.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum LinkState {
+    /// No board is open yet.
+    #[default]
+    Searching,
+    /// The link is open and the board has not said Hello yet.
+    Waiting,
+    /// Frames come in.
+    Streaming,
+    /// The link was lost, for the reason given; it is tried again.
+    Lost(String),
+    /// The link has ended for good, for the reason given: the recording is over, the board speaks another protocol.
+    Ended(String),
+}
+
+/// One frame and what was made of it.
+#[derive(Clone, Debug)]
+pub struct FrameSnapshot {
+    /// Number of the scan since the board started, unwrapped.
+    pub sequence: u64,
+    /// Board time at the start of the scan, unwrapped, in microseconds (us).
+    pub board_time_us: u64,
+    /// What happened during the scan.
+    pub status: Status,
+    /// Readings as measured (V).
+    pub readings: Readings,
+    /// What the solver made of the readings less those at rest.
+    pub solution: Solution,
+    /// Whether the readings at rest are being taken anew.
+    pub rezeroing: bool,
+}
+
+/// Counts since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Statistics {
+    /// Frames received whole.
+    pub frames: u64,
+    /// Frames a second over the last second.
+    pub frames_per_s: f64,
+    /// Frames that the sequence numbers say are missing.
+    pub dropped: u64,
+    /// Stretches of bytes that were no message.
+    pub corrupt: u64,
+    /// From the last byte of a frame received to its image ready.
+    pub latency: Latency,
+}
+
+/// How the latencies are distributed, in microseconds (us).
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Latency {
+    /// Median.
+    pub p50: f64,
+    /// 99 of 100 are shorter.
+    pub p99: f64,
+    /// Longest.
+    pub max: f64,
+}
+
+/// What a page asks of the pipeline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request {
+    /// Takes the readings at rest anew: nothing must press.
+    Rezero,
+    /// Reads the touch by another method.
+    Solver(Method),
+    /// Presses on the simulated detector here, instead of any earlier press.
+    Press(Contact),
+    /// Ends the press.
+    Release,
+}

@@ -1,0 +1,3 @@
+//! Where touch goes: the page in the browser.
+
+pub mod page;

@@ -1,0 +1,56 @@
+//! The files of the page, held in the program.
+
+use axum::http::StatusCode;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const SVG: &str = "image/svg+xml";
+
+/// Path, type and contents of a file.
+type Asset = (&'static str, &'static str, &'static str);
+
+const ASSETS: [Asset; 19] = [
+    ("/", HTML, include_str!("web/index.html")),
+    ("/style.css", CSS, include_str!("web/style.css")),
+    ("/icon.svg", SVG, include_str!("web/icon.svg")),
+    ("/app.js", SCRIPT, include_str!("web/app.js")),
+    ("/colours.js", SCRIPT, include_str!("web/colours.js")),
+    ("/contacts.js", SCRIPT, include_str!("web/contacts.js")),
+    ("/marks.js", SCRIPT, include_str!("web/marks.js")),
+    ("/method.js", SCRIPT, include_str!("web/method.js")),
+    ("/panel.js", SCRIPT, include_str!("web/panel.js")),
+    ("/picture.js", SCRIPT, include_str!("web/picture.js")),
+    ("/press.js", SCRIPT, include_str!("web/press.js")),
+    ("/protocol.js", SCRIPT, include_str!("web/protocol.js")),
+    ("/raster.js", SCRIPT, include_str!("web/raster.js")),
+    ("/readings.js", SCRIPT, include_str!("web/readings.js")),
+    ("/scale.js", SCRIPT, include_str!("web/scale.js")),
+    ("/svg.js", SCRIPT, include_str!("web/svg.js")),
+    ("/theme.js", SCRIPT, include_str!("web/theme.js")),
+    ("/units.js", SCRIPT, include_str!("web/units.js")),
+    ("/verdict.js", SCRIPT, include_str!("web/verdict.js")),
+];
+
+/// Answer to a request for `path`.
+pub(super) fn answer(path: &str) -> Result<impl IntoResponse + use<>, StatusCode> {
+    let asset = ASSETS.iter().find(|asset| asset.0 == path).ok_or(StatusCode::NOT_FOUND)?;
+    Ok(([(CONTENT_TYPE, asset.1)], asset.2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_import_of_a_script_is_served() {
+        for (path, _, text) in ASSETS.iter().filter(|asset| asset.1 == SCRIPT) {
+            for line in text.lines().filter(|line| line.starts_with("import ")) {
+                let name = line.split('"').nth(1).and_then(|name| name.strip_prefix('.'));
+                assert!(name.is_some_and(|name| answer(name).is_ok()), "{path}: {line}");
+            }
+        }
+    }
+}

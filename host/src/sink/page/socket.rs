@@ -1,0 +1,158 @@
+//! One page's socket.
+
+use std::future::pending;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use tokio::sync::watch;
+use tokio::time::{Instant, sleep_until};
+
+use super::wire::{self, PageMessage};
+use super::{Finger, Shared, update};
+use crate::run::{Request, Snapshot};
+use tactomo_physics::scene::Contact;
+
+/// Least time between two updates: a little less than a screen's refresh, so that a page that asks at each refresh is served
+/// at each.
+const UPDATE_INTERVAL: Duration = Duration::from_millis(15);
+
+const STATUS_INTERVAL: Duration = Duration::from_millis(250);
+
+/// Talks to a page until it leaves.
+pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
+    let mut page = Page::new(shared);
+    let reason = page.talk(&mut socket).await;
+    if page.presses {
+        page.ask(Request::Release);
+    }
+    if let Some(reason) = reason {
+        let frame = CloseFrame { code: close_code::POLICY, reason: reason.into() };
+        // The page may be gone already.
+        let _ = socket.send(Message::Close(Some(frame))).await;
+    }
+}
+
+struct Page<'a> {
+    shared: &'a Shared,
+    snapshots: watch::Receiver<Arc<Snapshot>>,
+    /// Whether the page has dealt with the last message.
+    taken: bool,
+    update_due: Instant,
+    status_due: Instant,
+    /// Whether this page presses on the simulated detector.
+    presses: bool,
+}
+
+enum Turn {
+    Status,
+    Update,
+}
+
+impl<'a> Page<'a> {
+    fn new(shared: &'a Shared) -> Self {
+        let mut snapshots = shared.snapshots.clone();
+        snapshots.mark_changed();
+        let now = Instant::now();
+        Self { shared, snapshots, taken: false, update_due: now, status_due: now, presses: false }
+    }
+
+    /// Returns when the page has left, or with the reason to close.
+    async fn talk(&mut self, socket: &mut WebSocket) -> Option<&'static str> {
+        socket.send(Message::text(self.shared.scene_message.clone())).await.ok()?;
+        loop {
+            tokio::select! {
+                heard = socket.recv() => match heard?.ok()? {
+                    Message::Text(text) => if let Err(reason) = self.hear(&text) {
+                        return Some(reason);
+                    },
+                    Message::Binary(_) => return Some("pages send text only"),
+                    Message::Close(_) => return None,
+                    Message::Ping(_) | Message::Pong(_) => {}
+                },
+                turn = next_turn(&mut self.snapshots, self.update_due, self.status_due), if self.taken => {
+                    let message = match turn {
+                        Turn::Status => self.status(),
+                        Turn::Update => self.update(),
+                    };
+                    if let Some(message) = message {
+                        self.taken = false;
+                        // Waits here while the page does not read; nothing else waits for this.
+                        socket.send(message).await.ok()?;
+                    }
+                }
+            }
+        }
+    }
+
+    fn hear(&mut self, text: &str) -> Result<(), &'static str> {
+        let message =
+            serde_json::from_str(text).map_err(|_| "a message that this version does not know: reload the page")?;
+        match message {
+            PageMessage::Taken => self.taken = true,
+            PageMessage::Rezero => {
+                self.ask(Request::Rezero);
+                self.shared.rezeros.fetch_add(1, Ordering::Relaxed);
+            }
+            PageMessage::Solver(method) => self.ask(Request::Solver(method)),
+            PageMessage::Press { x_m, y_m } => {
+                let finger = self.shared.scene.finger.ok_or("only a simulated board can be pressed from the page")?;
+                self.press(finger, [x_m, y_m]);
+            }
+            PageMessage::Release => {
+                self.presses = false;
+                self.ask(Request::Release);
+            }
+        }
+        Ok(())
+    }
+
+    /// Presses there (m), if that is on the detector.
+    fn press(&mut self, finger: Finger, [x_m, y_m]: [f64; 2]) {
+        let detector = &self.shared.scene.detector;
+        let [low, high] = detector.outline.bounds();
+        let within = (low[0]..=high[0]).contains(&x_m) && (low[1]..=high[1]).contains(&y_m);
+        if let Some([x_m, y_m, z_m]) = detector.place_m([x_m, y_m]).filter(|_| within) {
+            self.presses = true;
+            let Finger { radius_m, conductance_s } = finger;
+            self.ask(Request::Press(Contact { x_m, y_m, z_m, radius_m, conductance_s }));
+        }
+    }
+
+    fn ask(&self, request: Request) {
+        if self.shared.requests.try_send(request).is_err() {
+            tracing::warn!("a request of the page was dropped: the pipeline does not take it");
+        }
+    }
+
+    fn status(&mut self) -> Option<Message> {
+        self.status_due = Instant::now() + STATUS_INTERVAL;
+        let rezeros = self.shared.rezeros.load(Ordering::Relaxed);
+        wire::status(&self.snapshots.borrow(), rezeros).ok().map(Message::text)
+    }
+
+    fn update(&mut self) -> Option<Message> {
+        // Cloned, so that the pipeline can publish the next while this one is encoded.
+        let snapshot = self.snapshots.borrow_and_update().clone();
+        self.update_due = Instant::now() + UPDATE_INTERVAL;
+        let frame = snapshot.frame.as_ref()?;
+        Some(Message::binary(update::update(frame, snapshot.statistics.frames, &self.shared.scene.detector)))
+    }
+}
+
+/// Waits for what the page is to get next. May be dropped at any time: nothing is lost.
+async fn next_turn(snapshots: &mut watch::Receiver<Arc<Snapshot>>, update_due: Instant, status_due: Instant) -> Turn {
+    let update = async {
+        sleep_until(update_due).await;
+        if snapshots.changed().await.is_err() {
+            // The pipeline has ended: the status says why, and there are no more frames.
+            pending().await
+        }
+    };
+    tokio::select! {
+        biased;
+        () = sleep_until(status_due) => Turn::Status,
+        () = update => Turn::Update,
+    }
+}

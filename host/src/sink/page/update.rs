@@ -1,0 +1,123 @@
+//! Updates: the newest frame, in bytes. The page's side is `page/protocol.js`.
+//!
+//! Little-endian throughout. What is not known is not a number.
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 8 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; flags: 1 saturated, 2 the readings do not fit, 4 unfinished; electrodes left out: bit `e` is electrode `e` |
+//! | f32 | what is left of the readings: root mean square, in standard deviations of the noise |
+//! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
+//! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
+//! | k x (u32, 9 x f32) | the contacts found: number from frame to frame, 0 if it has none; x, y (m); conductance (S); radius (m); force (N); standard errors of x and y (m), the correlation of these, standard error of the conductance (S) |
+//! | the rest | UTF-8: what was chosen, a line feed, why; nothing if the solver does not choose |
+
+use crate::run::FrameSnapshot;
+use tactomo_physics::detector::Detector;
+use tactomo_touch::solve::{Flags, FoundContact, Uncertainty};
+
+/// Version of the layout; a page of another version says that it must be reloaded.
+pub(super) const LAYOUT: u32 = 2;
+
+/// An update; `frames` received so far.
+pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) -> Vec<u8> {
+    let solution = &frame.solution;
+    let image = solution.image_s_per_m2.as_deref().unwrap_or_default();
+    let counts = [image.len(), frame.readings.electrodes(), solution.contacts.len()].map(|count| count as u32);
+    // The page counts modulo 2^32.
+    let head = [LAYOUT, frame.sequence as u32, frames as u32].into_iter().chain(counts).chain(flags(&solution.flags));
+    let readings = frame.readings.volts().iter().map(|&volt| volt as f32);
+    let values = std::iter::once(known(solution.residual)).chain(image.iter().copied()).chain(readings);
+    let mut bytes: Vec<u8> = head.flat_map(u32::to_le_bytes).chain(values.flat_map(f32::to_le_bytes)).collect();
+    for found in &solution.contacts {
+        bytes.extend(found.id.unwrap_or(0).to_le_bytes());
+        bytes.extend(contact(found, detector).into_iter().flat_map(f32::to_le_bytes));
+    }
+    if let Some(choice) = &solution.choice {
+        bytes.extend([choice.what.as_bytes(), b"\n", choice.why.as_bytes()].concat());
+    }
+    bytes
+}
+
+fn flags(flags: &Flags) -> [u32; 2] {
+    let bits = [flags.saturated, flags.misfit, flags.unfinished];
+    let told = bits.iter().enumerate().map(|(bit, set)| u32::from(*set) << bit).sum();
+    [told, flags.excluded.iter().filter_map(|e| 1_u32.checked_shl(*e as u32)).fold(0, |all, bit| all | bit)]
+}
+
+fn contact(found: &FoundContact, detector: &Detector) -> [f32; 9] {
+    let [x_m, y_m] = detector.map_m([found.x_m, found.y_m, found.z_m]).map(|metres| metres as f32);
+    let error = |of: fn(&Uncertainty) -> f64| known(found.uncertainty.as_ref().map(of));
+    // Errors in space are not those on the flat map of a curved detector.
+    let on_map = |of: fn(&Uncertainty) -> f64| if detector.surface.is_none() { error(of) } else { f32::NAN };
+    let [x_error_m, y_error_m] = [on_map(|errors| errors.x_m), on_map(|errors| errors.y_m)];
+    let [radius_m, force_n] = [known(found.radius_m), known(found.force_n)];
+    let correlation = on_map(|errors| errors.correlation);
+    let error_s = error(|errors| errors.conductance_s);
+    [x_m, y_m, found.conductance_s as f32, radius_m, force_n, x_error_m, y_error_m, correlation, error_s]
+}
+
+fn known(value: Option<f64>) -> f32 {
+    value.map_or(f32::NAN, |value| value as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_physics::readings::Readings;
+    use tactomo_touch::solve::{Choice, Solution};
+
+    fn bytes_of(solution: Solution) -> Vec<u8> {
+        let frame = FrameSnapshot {
+            sequence: (7 << 32) + 9,
+            board_time_us: 0,
+            status: Default::default(),
+            readings: Readings::from_fn(2, |g, e| (2 * g + e) as f64),
+            solution,
+            rezeroing: false,
+        };
+        update(&frame, 300, &Detector::preset(Detector::DEFAULT).unwrap())
+    }
+
+    fn words(bytes: &[u8]) -> Vec<u32> {
+        bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+    }
+
+    fn floats(bytes: &[u8]) -> Vec<f32> {
+        words(bytes).into_iter().map(f32::from_bits).collect()
+    }
+
+    #[test]
+    fn an_update_is_laid_out_as_documented() {
+        let errors = Uncertainty { x_m: 0.5, y_m: 0.25, correlation: -0.5, conductance_s: 4.0 };
+        let known = FoundContact {
+            id: Some(6),
+            radius_m: Some(1.5),
+            force_n: Some(3.0),
+            uncertainty: Some(errors),
+            ..FoundContact::flat(0.25, -0.5, 2.0)
+        };
+        let bytes = bytes_of(Solution {
+            image_s_per_m2: Some(vec![2.0, 4.0, -8.0]),
+            contacts: vec![known, FoundContact::flat(1.0, 2.0, 3.0)],
+            residual: Some(1.25),
+            flags: Flags { saturated: true, misfit: false, unfinished: true, excluded: vec![3, 31] },
+            choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
+        });
+        assert_eq!(words(&bytes[..32]), [LAYOUT, 9, 300, 3, 2, 2, 0b101, 1 << 31 | 1 << 3]);
+        assert_eq!(floats(&bytes[32..64]), [1.25, 2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0]);
+        assert_eq!(words(&bytes[64..68]), [6]);
+        assert_eq!(floats(&bytes[68..104]), [0.25, -0.5, 2.0, 1.5, 3.0, 0.5, 0.25, -0.5, 4.0]);
+        assert_eq!(words(&bytes[104..108]), [0]);
+        assert_eq!(floats(&bytes[108..120]), [1.0, 2.0, 3.0]);
+        assert!(floats(&bytes[120..144]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(&bytes[144..], "2 contacts\nµ".as_bytes());
+    }
+
+    #[test]
+    fn nothing_found_is_head_and_readings_alone() {
+        let bytes = bytes_of(Solution::default());
+        assert_eq!(words(&bytes[..32]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0]);
+        assert!(floats(&bytes[32..36])[0].is_nan());
+        assert_eq!(bytes.len(), 36 + 4 * 4);
+    }
+}

@@ -1,0 +1,123 @@
+//! How well any method can do: the Cramer-Rao bound of contacts under the converter's noise.
+
+use nalgebra::DMatrix;
+
+use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
+use tactomo_physics::scene::Contact;
+
+/// Step of a place, as a share of the contact's radius, and of a conductance, as a share of it.
+const STEP: f64 = 0.02;
+
+/// Smallest standard errors that an unbiased method can have for a contact.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Bound {
+    /// Of the place (m): the root of the sum of both coordinates' variances.
+    pub position_m: f64,
+    /// Of the conductance, as a share of it.
+    pub conductance: f64,
+}
+
+/// The Cramer-Rao bound of contacts of known number and radius, each with place and conductance unknown, from one frame of readings with
+/// independent normal noise of a standard deviation (V).
+///
+/// With `J` the derivatives of the readings by the unknowns, Fisher's information is `J'J / deviation^2`, and no unbiased estimate has
+/// a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of the model. `None` if the readings do not tell
+/// the unknowns apart.
+///
+/// # Errors
+/// [`ForwardError`] if a contact, or one a step beside it, is off the detector.
+pub fn cramer_rao(
+    model: &dyn ForwardModel,
+    contacts: &[Contact],
+    deviation_v: f64,
+) -> Result<Option<Vec<Bound>>, ForwardError> {
+    let jacobian_v = derivatives(model, contacts)?;
+    let information = jacobian_v.transpose() * jacobian_v / (deviation_v * deviation_v);
+    let Some(covariance) = information.cholesky().map(|factor| factor.inverse()) else { return Ok(None) };
+    let variance = |unknown: usize| covariance[(unknown, unknown)];
+    let of = |(index, contact): (usize, &Contact)| {
+        let scale_m = contact.radius_m;
+        let place = variance(3 * index) + variance(3 * index + 1);
+        Bound { position_m: scale_m * place.sqrt(), conductance: variance(3 * index + 2).sqrt() }
+    };
+    Ok(Some(contacts.iter().enumerate().map(of).collect()))
+}
+
+/// Derivatives of the readings (V) by x and y in radii and by the logarithm of the conductance of each contact: alike in size, so that
+/// the information is well scaled.
+fn derivatives(model: &dyn ForwardModel, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
+    let readings = |contacts: &[Contact]| Ok(readings_v(&model.impedance_ohm(contacts)?, model.detector()));
+    let electrodes = model.detector().electrodes.len();
+    let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, 3 * contacts.len());
+    for (unknown, mut column) in jacobian_v.column_iter_mut().enumerate() {
+        let stepped = |step: f64| {
+            let mut contacts = contacts.to_vec();
+            let contact = &mut contacts[unknown / 3];
+            match unknown % 3 {
+                0 => contact.x_m += step * contact.radius_m,
+                1 => contact.y_m += step * contact.radius_m,
+                _ => contact.conductance_s *= step.exp(),
+            }
+            readings(&contacts)
+        };
+        let (after, before) = (stepped(STEP)?, stepped(-STEP)?);
+        for (value, (after, before)) in column.iter_mut().zip(after.volts().iter().zip(before.volts())) {
+            *value = (after - before) / (2.0 * STEP);
+        }
+    }
+    Ok(jacobian_v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_physics::detector::Detector;
+    use tactomo_physics::forward::Slab;
+    use tactomo_physics::simulate::Noise;
+
+    fn slab() -> Slab {
+        Slab::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
+    }
+
+    fn firm(x_m: f64, y_m: f64) -> Contact {
+        let sheet_s = Detector::preset(Detector::DEFAULT).unwrap().sheet_conductance_s();
+        Contact::flat(x_m, y_m, 0.0015, 0.3 * sheet_s)
+    }
+
+    #[test]
+    fn errors_grow_with_noise_and_as_contacts_come_near() {
+        let slab = slab();
+        let of = |contacts: &[Contact], noise_v| cramer_rao(&slab, contacts, noise_v).unwrap().unwrap()[0];
+        let one = of(&[firm(0.004, 0.007)], 1e-3);
+        let noisy = of(&[firm(0.004, 0.007)], 2e-3);
+        assert!((noisy.position_m / one.position_m - 2.0).abs() < 1e-9);
+        assert!((noisy.conductance / one.conductance - 2.0).abs() < 1e-9);
+        let pair = |apart_m: f64| of(&[firm(0.004, 0.007), firm(0.004 + apart_m, 0.007)], 1e-3).position_m;
+        assert!(one.position_m < pair(0.02) && pair(0.02) < pair(0.009) && pair(0.009) < pair(0.004));
+    }
+
+    #[test]
+    fn contacts_on_one_spot_cannot_be_told_apart() {
+        let bound = cramer_rao(&slab(), &[firm(0.004, 0.007), firm(0.004, 0.007)], 1e-3).unwrap();
+        assert!(bound.as_ref().is_none_or(|bound| bound[0].position_m > 1.0), "{bound:?}");
+    }
+
+    /// Least squares of the linearised readings reaches the bound.
+    #[test]
+    fn least_squares_has_the_errors_that_the_bound_says() {
+        let (slab, contact, noise_v) = (slab(), firm(-0.011, 0.003), 1e-3);
+        let bound = cramer_rao(&slab, &[contact], noise_v).unwrap().unwrap()[0];
+        let jacobian_v = derivatives(&slab, &[contact]).unwrap();
+        let inverse = jacobian_v.clone().pseudo_inverse(1e-12).unwrap();
+        let mut noise = Noise::new(3);
+        let trials = 2000;
+        let squares: f64 = (0..trials)
+            .map(|_| {
+                let error = &inverse * DMatrix::from_fn(jacobian_v.nrows(), 1, |_, _| noise_v * noise.normal());
+                contact.radius_m.powi(2) * (error[0].powi(2) + error[1].powi(2))
+            })
+            .sum();
+        let found_m = (squares / f64::from(trials)).sqrt();
+        assert!((found_m / bound.position_m - 1.0).abs() < 0.06, "{found_m} {bound:?}");
+    }
+}

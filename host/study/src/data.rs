@@ -1,0 +1,259 @@
+//! What solvers are tried with: a detector, the model of it that is inverted, and frames from a finer one.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::scenes::electrode_distance_m;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, readings_v, touched_impedance_ohm};
+use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::{Contact, Touch};
+use tactomo_physics::simulate::{Fault, FaultError, Measurement, finer_model};
+use tactomo_touch::solve::{Problem, SolveError};
+
+/// Frames without contact that make the readings at rest, where those are not zero.
+const REST_FRAMES: u8 = 16;
+
+/// Why a study cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StudyError {
+    /// There is no such model.
+    #[error(transparent)]
+    Forward(#[from] ForwardError),
+    /// A fault cannot be.
+    #[error(transparent)]
+    Fault(#[from] FaultError),
+    /// A solver refused readings that fit its detector.
+    #[error("solver {solver}: {error}")]
+    Solve {
+        /// Name of the solver.
+        solver: String,
+        /// Why.
+        error: SolveError,
+    },
+    /// A detector on which not all scenes can be.
+    #[error("detector {detector} is curved: studies press flat detectors, where contacts of any shape have a model")]
+    Curved {
+        /// Its name.
+        detector: String,
+    },
+}
+
+/// What was there and what was read.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// What touched.
+    pub touches: Vec<Touch>,
+    /// The same as contacts, if all are discs.
+    pub contacts: Option<Vec<Contact>>,
+    /// Readings less those at rest (V).
+    pub readings: Readings,
+}
+
+/// A detector, what it is simulated with and what is inverted.
+pub struct Laboratory {
+    /// The detector as it is told.
+    pub detector: Detector,
+    /// What solvers get.
+    pub problem: Problem,
+    /// Time that the inverted model and its Jacobian took.
+    pub model_time: Duration,
+    /// Name of the inverted model.
+    pub model: String,
+    truth: Arc<dyn ForwardModel>,
+    /// The detector as it is measured in truth.
+    measured: Detector,
+    faults: Vec<Fault>,
+    /// Readings that are taken for those at rest (V).
+    baseline: Option<Readings>,
+}
+
+impl Laboratory {
+    /// A sound detector, inverted on the model that it needs.
+    ///
+    /// # Errors
+    /// [`StudyError`] if it is curved or cannot be modelled.
+    pub fn new(detector: &Detector) -> Result<Self, StudyError> {
+        if detector.surface.is_some() {
+            return Err(StudyError::Curved { detector: detector.name.clone() });
+        }
+        let start = Instant::now();
+        let model = Auto::new(detector, None)?.model;
+        let name = model.name().to_owned();
+        let problem = Problem::new(model);
+        let model_time = start.elapsed();
+        let truth = finer_model(detector, &[], 0)?.into();
+        Ok(Self {
+            detector: detector.clone(),
+            problem,
+            model_time,
+            model: name,
+            truth,
+            measured: detector.clone(),
+            faults: Vec::new(),
+            baseline: None,
+        })
+    }
+
+    /// The same detector, in truth with such faults. `seed` chooses what they leave open.
+    ///
+    /// # Errors
+    /// [`StudyError`] if it cannot have them.
+    pub fn with_faults(&self, faults: &[Fault], seed: u64) -> Result<Self, StudyError> {
+        let changes_model = |fault: &Fault| {
+            matches!(fault, Fault::ContactSpread { .. } | Fault::Conductivity { .. } | Fault::Uneven { .. })
+        };
+        let truth = match faults.iter().any(changes_model) {
+            true => finer_model(&self.detector, faults, seed)?.into(),
+            false => Arc::clone(&self.truth),
+        };
+        Ok(Self { truth, faults: faults.to_vec(), ..self.again() })
+    }
+
+    /// The same, in truth another detector than the one told: thicker, or noisier.
+    ///
+    /// # Errors
+    /// [`StudyError`] if it cannot be modelled.
+    pub fn with_truth(&self, detector: &Detector) -> Result<Self, StudyError> {
+        Ok(Self { truth: finer_model(detector, &[], 0)?.into(), measured: detector.clone(), ..self.again() })
+    }
+
+    /// The same, with readings under such contacts taken for those at rest.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a contact is off the detector.
+    pub fn with_baseline(&self, contacts: &[Contact]) -> Result<Self, StudyError> {
+        let readings = readings_v(&self.truth.impedance_ohm(contacts)?, &self.measured);
+        Ok(Self { baseline: Some(readings), ..self.again() })
+    }
+
+    /// The same readings, measured by another converter or drive, which solvers know of.
+    pub fn measured_as(&self, detector: &Detector) -> Self {
+        let problem = self.problem.measured_as(detector);
+        Self { detector: detector.clone(), measured: detector.clone(), problem, ..self.again() }
+    }
+
+    /// The same, inverted on another model.
+    pub fn inverted_on(&self, model: Box<dyn ForwardModel>) -> Self {
+        let name = model.name().to_owned();
+        let problem = Problem::new(model).measured_as(&self.detector);
+        Self { problem, model: name, ..self.again() }
+    }
+
+    /// The same, inverted with some of the electrodes only.
+    pub fn inverted_with(&self, electrodes: &[usize]) -> Self {
+        Self { problem: self.problem.through(electrodes), ..self.again() }
+    }
+
+    fn again(&self) -> Self {
+        Self {
+            detector: self.detector.clone(),
+            problem: self.problem.clone(),
+            model_time: self.model_time,
+            model: self.model.clone(),
+            truth: Arc::clone(&self.truth),
+            measured: self.measured.clone(),
+            faults: self.faults.clone(),
+            baseline: self.baseline.clone(),
+        }
+    }
+
+    /// What is taken for the readings at rest: those told, or the mean of a few frames without contact, where faults show in them.
+    fn rest(&self, measurement: &mut Measurement) -> Readings {
+        let electrodes = self.detector.electrodes.len();
+        let mut rest = self.baseline.clone().unwrap_or_else(|| Readings::from_fn(electrodes, |_, _| 0.0));
+        if self.baseline.is_none() && !self.faults.is_empty() {
+            for _ in 0..REST_FRAMES {
+                let frame = measurement.readings_v(None);
+                let share = |(sum, volts): (&mut f64, &f64)| *sum += volts / f64::from(REST_FRAMES);
+                rest.volts_mut().iter_mut().zip(frame.volts()).for_each(share);
+            }
+        }
+        rest
+    }
+
+    /// Mean distance of electrodes (m): contacts further from the truth are counted as missed and invented.
+    pub fn reach_m(&self) -> f64 {
+        electrode_distance_m(&self.detector)
+    }
+
+    /// Readings of touches, one frame after the other, at noise of a `seed`.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a touch is off the detector.
+    pub fn frames(&self, touches: &[Vec<Touch>], seed: u64) -> Result<Vec<Frame>, StudyError> {
+        let mut measurement = Measurement::new(&self.measured, &self.faults, seed)?;
+        let rest = self.rest(&mut measurement);
+        let mut frames: Vec<Frame> = Vec::with_capacity(touches.len());
+        let mut last = None;
+        for touches in touches {
+            let impedance_ohm = match last.take() {
+                Some((before, impedance_ohm)) if before == touches => impedance_ohm,
+                _ if touches.is_empty() => None,
+                _ => Some(touched_impedance_ohm(&*self.truth, touches)?),
+            };
+            let mut readings = measurement.readings_v(impedance_ohm.as_ref());
+            readings.volts_mut().iter_mut().zip(rest.volts()).for_each(|(volts, rest)| *volts -= rest);
+            let contacts = touches.iter().map(Touch::disc).collect();
+            frames.push(Frame { touches: touches.clone(), contacts, readings });
+            last = Some((touches, impedance_ohm));
+        }
+        Ok(frames)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenes::SceneKind;
+
+    fn laboratory() -> Laboratory {
+        Laboratory::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
+    }
+
+    fn readings(laboratory: &Laboratory, seed: u64) -> Readings {
+        let touches = SceneKind::Firm.frames(&laboratory.detector, 1, 1);
+        laboratory.frames(&touches, seed).unwrap().remove(0).readings
+    }
+
+    #[test]
+    fn readings_are_the_finer_models_with_noise_and_those_of_a_seed() {
+        let laboratory = laboratory();
+        let first = readings(&laboratory, 1);
+        assert_eq!(first, readings(&laboratory, 1));
+        assert_ne!(first, readings(&laboratory, 2));
+        let contact = SceneKind::Firm.frames(&laboratory.detector, 1, 1)[0][0].disc().unwrap();
+        let model = readings_v(&laboratory.problem.model.impedance_ohm(&[contact]).unwrap(), &laboratory.detector);
+        let off = first.volts().iter().zip(model.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off > 0.0 && off < 0.02 * model.largest_v() + 0.006, "{off}");
+    }
+
+    #[test]
+    fn a_wrong_sign_shows_in_the_readings_at_rest_and_is_taken_off() {
+        let laboratory = laboratory();
+        let wrong = laboratory.with_faults(&[Fault::Invert { channel: 3 }], 1).unwrap();
+        let (sound, wrong) = (readings(&laboratory, 1), readings(&wrong, 1));
+        assert!(sound.at(7, 3) > 0.02 && (wrong.at(7, 3) + sound.at(7, 3)).abs() < 0.02, "{}", wrong.at(7, 3));
+        assert!((wrong.at(7, 4) - sound.at(7, 4)).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_baseline_under_load_is_taken_off() {
+        let laboratory = laboratory();
+        let contact = SceneKind::Firm.frames(&laboratory.detector, 1, 1)[0][0].disc().unwrap();
+        let loaded = readings(&laboratory.with_baseline(&[contact]).unwrap(), 1);
+        assert!(loaded.volts().iter().all(|volts| volts.abs() < 0.01), "the same contact is no change");
+    }
+
+    #[test]
+    fn solvers_know_of_another_converter_but_not_of_a_wrong_detector() {
+        let laboratory = laboratory();
+        let mut other = laboratory.detector.clone();
+        other.adc.bits = 10;
+        assert_eq!(laboratory.measured_as(&other).problem.detector().adc.bits, 10);
+        other.layers[0].thickness_m *= 2.0;
+        let wrong = laboratory.with_truth(&other).unwrap();
+        assert_eq!(wrong.problem.detector(), &laboratory.detector);
+        assert_ne!(readings(&wrong, 1), readings(&laboratory, 1));
+    }
+}

@@ -1,0 +1,22 @@
+//! Studies of solvers: how speed and accuracy trade against each other, and where methods fail.
+//!
+//! Data always come from a [finer model](tactomo_physics::simulate::finer_model) than any that is inverted, through wires, noise and converter.
+
+mod bound;
+pub mod case;
+mod data;
+mod judge;
+mod machine;
+pub mod page;
+mod scenes;
+pub mod stability;
+pub mod tradeoff;
+pub mod validate;
+mod variant;
+
+pub use self::bound::{Bound, cramer_rao};
+pub use self::data::{Frame, Laboratory, StudyError};
+pub use self::judge::{Judge, Score, Summary};
+pub use self::machine::Machine;
+pub use self::scenes::{Group, SceneKind};
+pub use self::variant::{Family, Setting, Variation, family};

@@ -1,0 +1,368 @@
+//! Sweeps and how they are run.
+
+use std::sync::Arc;
+
+use super::bounds::{self, BoundReport};
+use super::breakdown::{Break, CellReport, breaks};
+use super::{faults, scenes, wrong};
+use crate::data::{Frame, Laboratory, StudyError};
+use crate::judge::{Judge, Summary};
+use crate::machine::Machine;
+use crate::scenes::SceneKind;
+use crate::variant::Variation;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::jacobian::Jacobian;
+use tactomo_physics::scene::{Contact, Hand, Touch};
+use tactomo_touch::solve::{Method, Problem, Solver};
+
+/// Lambda's sweep, in shares of the largest singular value.
+const LAMBDAS: [f64; 7] = [1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
+/// Of the points of a sweep, a quick study tries every so manieth, and the last.
+const QUICK_STEP: usize = 3;
+
+/// What is tried.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The detector.
+    pub detector: Detector,
+    /// Solvers.
+    pub methods: Vec<Method>,
+    /// Places of the contacts at each point.
+    pub places: usize,
+    /// Frames at each place.
+    pub frames: usize,
+    /// Where places and noise start.
+    pub seed: u64,
+    /// Whether only some of the points are tried.
+    pub quick: bool,
+}
+
+/// What came out.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Report {
+    /// Where it ran.
+    pub machine: Machine,
+    /// How to run it again.
+    pub command: String,
+    /// Name of the detector.
+    pub detector: String,
+    /// Mean distance of its electrodes (m): what a contact missed or invented counts.
+    pub reach_m: f64,
+    /// Seed.
+    pub seed: u64,
+    /// Places of the contacts at each point.
+    pub places: usize,
+    /// Frames at each place.
+    pub frames: usize,
+    /// The sweeps.
+    pub sweeps: Vec<SweepReport>,
+    /// What noise allows, beside what solvers reach.
+    pub bounds: BoundReport,
+}
+
+/// What came out of a sweep.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct SweepReport {
+    /// What was varied.
+    pub title: String,
+    /// How.
+    pub note: String,
+    /// The points.
+    pub points: Vec<PointReport>,
+    /// A row for each solver.
+    pub solvers: Vec<SolverRow>,
+}
+
+/// A point of a sweep.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct PointReport {
+    /// Its value, for people.
+    pub label: String,
+    /// How bad it is: the larger, the worse; the smallest is the harmless one. Only the order counts.
+    pub severity: f64,
+}
+
+/// What a solver made of a sweep.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct SolverRow {
+    /// Its name.
+    pub solver: String,
+    /// One for each point; `None` where the solver cannot be made for the model.
+    pub cells: Vec<Option<CellReport>>,
+    /// The mildest point at which it breaks, if it does.
+    pub breaks: Option<Break>,
+}
+
+/// Something that is varied.
+pub(super) struct Sweep {
+    pub title: &'static str,
+    pub note: String,
+    pub points: Vec<Point>,
+}
+
+/// A value of it.
+pub(super) struct Point {
+    pub label: String,
+    pub severity: f64,
+    pub laboratory: Laboratory,
+    /// Frames of each place.
+    pub places: Vec<Vec<Frame>>,
+    /// What solvers' lambda is set to.
+    pub lambda: Option<f64>,
+}
+
+/// What sweeps are made from.
+pub(super) struct Bench<'a> {
+    pub plan: &'a Plan,
+    /// The sound detector.
+    pub sound: Laboratory,
+}
+
+impl Bench<'_> {
+    /// Seeds of the places.
+    pub fn seeds(&self) -> Vec<u64> {
+        (0..self.plan.places as u64).map(|place| self.plan.seed.wrapping_mul(1_000_003).wrapping_add(place)).collect()
+    }
+
+    /// Of the values of a sweep, those that are tried.
+    pub fn some<'v, T>(&self, values: &'v [T]) -> impl Iterator<Item = &'v T> {
+        let quick = self.plan.quick;
+        let last = values.len().saturating_sub(1);
+        let kept = move |(index, _): &(usize, &T)| !quick || index % QUICK_STEP == 0 || *index == last;
+        values.iter().enumerate().filter(kept).map(|(_, value)| value)
+    }
+
+    /// A point at which a kind of scene touches.
+    pub fn point(
+        &self,
+        label: String,
+        severity: f64,
+        laboratory: Laboratory,
+        kind: SceneKind,
+    ) -> Result<Point, StudyError> {
+        let detector = self.sound.detector.clone();
+        self.touched(label, severity, laboratory, |seed| kind.frames(&detector, seed, 1).remove(0))
+    }
+
+    /// A point at which something touches that a seed chooses.
+    pub fn touched(
+        &self,
+        label: String,
+        severity: f64,
+        laboratory: Laboratory,
+        touches: impl Fn(u64) -> Vec<Touch>,
+    ) -> Result<Point, StudyError> {
+        let places = self
+            .seeds()
+            .into_iter()
+            .map(|seed| laboratory.frames(&vec![touches(seed); self.plan.frames], seed))
+            .collect::<Result<_, _>>()?;
+        Ok(Point { label, severity, laboratory, places, lambda: None })
+    }
+
+    /// The one contact of a kind of scene at a seed.
+    pub fn contact(&self, kind: SceneKind, seed: u64) -> Contact {
+        let touches = kind.frames(&self.sound.detector, seed, 1).remove(0);
+        let centre = || Hand::relative(&self.sound.detector).tip([0.0; 2], 1.0, 1.0);
+        let disc = touches.into_iter().next().unwrap_or_else(centre).disc();
+        disc.unwrap_or(Contact::flat(0.0, 0.0, 0.0, 0.0))
+    }
+}
+
+/// Makes some sweeps.
+type Maker = fn(&Bench) -> Result<Vec<Sweep>, StudyError>;
+
+/// Runs all sweeps. `progress` hears what is tried next.
+///
+/// # Errors
+/// [`StudyError`] if the detector cannot be modelled or is curved.
+pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result<Report, StudyError> {
+    let bench = Bench { plan, sound: Laboratory::new(&plan.detector)? };
+    let makers: [Maker; 4] = [scenes::sweeps, wrong::sweeps, lambda, faults::sweeps];
+    let mut trials = Trials::default();
+    let mut sweeps = Vec::new();
+    for make in makers {
+        for sweep in make(&bench)? {
+            progress(sweep.title);
+            sweeps.push(try_sweep(plan, sweep, &mut trials)?);
+        }
+    }
+    progress("bounds");
+    let bounds = bounds::report(&bench, &mut trials)?;
+    Ok(Report {
+        machine: Machine::this(),
+        command: command.to_owned(),
+        detector: plan.detector.name.clone(),
+        reach_m: bench.sound.reach_m(),
+        seed: plan.seed,
+        places: plan.places,
+        frames: plan.frames,
+        sweeps,
+        bounds,
+    })
+}
+
+fn lambda(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
+    let points = bench
+        .some(&LAMBDAS)
+        .map(|lambda| {
+            let laboratory = bench.sound.with_faults(&[], 0)?;
+            // Distance from the default, 0.03.
+            let severity = (lambda / 0.03).log10().abs();
+            let point = bench.point(format!("{lambda}"), severity, laboratory, SceneKind::Firm)?;
+            Ok(Point { lambda: Some(*lambda), ..point })
+        })
+        .collect::<Result<_, StudyError>>()?;
+    let note = "Of a firm contact; in shares of the largest singular value. Only of solvers that have one.";
+    Ok(vec![Sweep { title: "Lambda", note: note.to_owned(), points }])
+}
+
+fn try_sweep(plan: &Plan, sweep: Sweep, trials: &mut Trials) -> Result<SweepReport, StudyError> {
+    let has_lambda = sweep.points.iter().any(|point| point.lambda.is_some());
+    let methods = plan.methods.iter().filter(|method| !has_lambda || Variation::has_lambda(**method));
+    let solvers = methods
+        .map(|method| {
+            let cell = |point: &Point| {
+                let summary = trials.summary(*method, point)?;
+                Ok(summary.map(|summary| CellReport::of(&summary, point.laboratory.reach_m())))
+            };
+            let mut cells = sweep.points.iter().map(cell).collect::<Result<Vec<_>, StudyError>>()?;
+            let severities: Vec<f64> = sweep.points.iter().map(|point| point.severity).collect();
+            let labels: Vec<&str> = sweep.points.iter().map(|point| point.label.as_str()).collect();
+            let breaks = breaks(&labels, &severities, &mut cells);
+            Ok(SolverRow { solver: method.name().to_owned(), cells, breaks })
+        })
+        .collect::<Result<_, StudyError>>()?;
+    let point = |point: Point| PointReport { label: point.label, severity: point.severity };
+    Ok(SweepReport {
+        title: sweep.title.to_owned(),
+        note: sweep.note,
+        points: sweep.points.into_iter().map(point).collect(),
+        solvers,
+    })
+}
+
+/// Solvers and judges of the last problems, as long as they stay the same.
+#[derive(Default)]
+pub(super) struct Trials {
+    judge: Option<(Arc<Jacobian>, Judge)>,
+    solvers: Vec<Kept>,
+}
+
+/// A solver that is kept for the next point.
+struct Kept {
+    variation: Variation,
+    jacobian: Arc<Jacobian>,
+    /// None if it cannot be made for the model.
+    solver: Option<Box<dyn Solver>>,
+}
+
+/// Solvers that are kept at most.
+const MOST_KEPT: usize = 24;
+
+impl Trials {
+    /// What a solver makes of a point; `None` if it cannot be made for the model.
+    pub fn summary(&mut self, method: Method, point: &Point) -> Result<Option<Summary>, StudyError> {
+        let variation = match point.lambda {
+            Some(lambda) => Variation::with_lambda(method, lambda),
+            None => Variation::default_of(method),
+        };
+        let jacobian = &point.laboratory.problem.jacobian;
+        if !self.judge.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, jacobian)) {
+            self.judge = Some((Arc::clone(jacobian), Judge::new(&point.laboratory)));
+        }
+        let index = self.kept(variation, &point.laboratory.problem);
+        let (Some((_, judge)), Some(solver)) = (&mut self.judge, &mut self.solvers[index].solver) else {
+            return Ok(None);
+        };
+        let mut scores = Vec::new();
+        for frames in &point.places {
+            scores.extend(judge.run(&mut **solver, frames)?);
+        }
+        Ok(Some(Summary::of(&scores)))
+    }
+
+    /// Where a solver is kept; makes it if there is none.
+    fn kept(&mut self, variation: Variation, problem: &Problem) -> usize {
+        let same = |kept: &Kept| kept.variation == variation && Arc::ptr_eq(&kept.jacobian, &problem.jacobian);
+        if let Some(index) = self.solvers.iter().position(same) {
+            return index;
+        }
+        if self.solvers.len() >= MOST_KEPT {
+            self.solvers.remove(0);
+        }
+        let solver = variation.build(problem).ok();
+        self.solvers.push(Kept { variation, jacobian: Arc::clone(&problem.jacobian), solver });
+        self.solvers.len() - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::LazyLock;
+
+    use super::super::{page, table};
+    use super::*;
+
+    /// One run for all tests.
+    static REPORT: LazyLock<Report> = LazyLock::new(|| {
+        let plan = Plan {
+            detector: Detector::preset(Detector::DEFAULT).unwrap(),
+            methods: vec![Method::Tikhonov, Method::TikhonovPaper],
+            places: 1,
+            frames: 1,
+            seed: 2,
+            quick: true,
+        };
+        run(&plan, "tactomo <stability>", &mut |_| {}).unwrap()
+    });
+
+    #[test]
+    fn every_sweep_has_a_harmless_point_and_a_cell_for_each_solver_and_point() {
+        let report = &*REPORT;
+        assert!(report.sweeps.len() > 20);
+        for sweep in &report.sweeps {
+            let least = sweep.points.iter().map(|point| point.severity).fold(f64::INFINITY, f64::min);
+            assert_eq!(sweep.points.iter().filter(|point| point.severity == least).count(), 1, "{}", sweep.title);
+            assert!(sweep.points.len() > 2 && sweep.solvers.len() == 2, "{}", sweep.title);
+            for row in &sweep.solvers {
+                assert_eq!(row.cells.len(), sweep.points.len(), "{}", sweep.title);
+                assert!(
+                    row.cells.iter().flatten().all(|cell| cell.not_finite == 0.0 && cell.failed == 0.0),
+                    "{}",
+                    sweep.title
+                );
+            }
+        }
+        let breaks = |title: &str| {
+            let sweep = report.sweeps.iter().find(|sweep| sweep.title == title).unwrap();
+            sweep.solvers[0].breaks.clone()
+        };
+        assert!(breaks("Noise").is_some(), "nothing is found at 0 dB");
+        assert!(breaks("Contact impedances that differ").is_none(), "a linear image does not feel them");
+    }
+
+    #[test]
+    fn the_bound_is_below_what_a_linear_image_reaches() {
+        let report = &*REPORT;
+        for chart in &report.bounds.charts {
+            let (bound, solver) = (&chart.curves[0], &chart.curves[1]);
+            assert!(!bound.points.is_empty() && bound.solver.is_none(), "{}", chart.title);
+            // Of contacts that noise does not let one tell apart, any guess on the detector is nearer than the bound.
+            for [value, bound_m] in bound.points.iter().filter(|[_, bound_m]| *bound_m < 0.1 * report.reach_m) {
+                let reached = solver.points.iter().find(|point| point[0] == *value).unwrap();
+                assert!(*bound_m > 0.0 && *bound_m < reached[1], "{}: {bound_m} {reached:?}", chart.title);
+            }
+        }
+    }
+
+    #[test]
+    fn page_and_table_show_every_sweep() {
+        let report = &*REPORT;
+        let (page, table) = (page(report), table(report));
+        for sweep in &report.sweeps {
+            assert!(page.contains(&sweep.title) && table.contains(&sweep.title), "{}", sweep.title);
+        }
+        assert!(page.contains("tactomo &lt;stability&gt;") && page.contains("noise limit"));
+    }
+}

@@ -1,0 +1,162 @@
+//! Sweeps of what the model has wrong, and of what the program was told wrong.
+
+use super::sweep::{Bench, Sweep};
+use crate::data::{Laboratory, StudyError};
+use crate::scenes::SceneKind;
+use tactomo_physics::detector::{Adc, Detector, Layer};
+use tactomo_physics::forward::shell::Shell;
+use tactomo_physics::scene::Contact;
+use tactomo_physics::simulate::Fault;
+
+/// True thickness over the one told.
+const THICKNESSES: [f64; 9] = [0.5, 0.7, 0.85, 0.95, 1.0, 1.05, 1.15, 1.4, 2.0];
+/// True conductivity over the one told.
+const CONDUCTIVITIES: [f64; 7] = [0.5, 0.7, 0.9, 1.0, 1.1, 1.4, 2.0];
+/// Standard deviation of the logarithm of the conductivity, and of contact impedances.
+const UNEVEN: [f64; 5] = [0.0, 0.05, 0.1, 0.2, 0.4];
+const SPREADS: [f64; 5] = [0.0, 0.05, 0.2, 0.5, 1.0];
+/// Contact impedance for its spread (ohm m2): enough to be felt, a tenth of a sheet's resistance on a pad of 4 mm.
+const FELT_OHM_M2: f64 = 1e-3;
+/// Conductance of what pressed while the baseline was taken (sheet conductances).
+const BASELINES: [f64; 6] = [0.0, 0.003, 0.01, 0.03, 0.1, 0.3];
+/// Thickness of a detector that is read with the shell model, in radii of a pad.
+const SHELL_THICKNESSES: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
+/// Thickness at which the shell is right, in radii of a pad.
+const THIN: f64 = 0.1;
+/// Nodes of the image.
+const NODES: [usize; 6] = [2000, 5000, 900, 400, 200, 100];
+/// Noise over the one told.
+const NOISES: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
+/// Voltage above which the converter tells no more, as a share of the drive.
+const CLIPS: [f64; 6] = [1.0, 0.5, 0.3, 0.2, 0.1, 0.05];
+
+/// All of them.
+pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
+    [thickness, conductivity, uneven, spread, baseline, noise, clip, shell, nodes]
+        .into_iter()
+        .map(|make| make(bench))
+        .collect()
+}
+
+/// A sweep on a firm contact: how bad a value is, and the laboratory for it.
+fn firm<T: Copy>(
+    bench: &Bench,
+    (title, note): (&'static str, &str),
+    values: &[T],
+    label: impl Fn(T) -> String,
+    severity: impl Fn(T) -> f64,
+    laboratory: impl Fn(T) -> Result<Laboratory, StudyError>,
+) -> Result<Sweep, StudyError> {
+    let points = bench
+        .some(values)
+        .map(|value| bench.point(label(*value), severity(*value), laboratory(*value)?, SceneKind::Firm))
+        .collect::<Result<_, _>>()?;
+    Ok(Sweep { title, note: note.to_owned(), points })
+}
+
+/// A detector whose layers are thicker by a factor, of the same conductivity.
+fn thicker(detector: &Detector, factor: f64) -> Detector {
+    let layer = |layer: &Layer| Layer { thickness_m: factor * layer.thickness_m, ..*layer };
+    Detector { layers: detector.layers.iter().map(layer).collect(), ..detector.clone() }
+}
+
+/// A detector of another thickness (m).
+fn as_thick(detector: &Detector, thickness_m: f64) -> Detector {
+    thicker(detector, thickness_m / detector.thickness_m())
+}
+
+fn pad_radius_m(detector: &Detector) -> f64 {
+    detector.electrodes.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min)
+}
+
+fn thickness(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = ("Thickness not as told", "True thickness over the one in the model, at the same conductivity.");
+    let of = |factor| bench.sound.with_truth(&thicker(&bench.sound.detector, factor));
+    firm(bench, what, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
+}
+
+fn conductivity(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = ("Conductivity not as told", "True conductivity over the one in the model.");
+    let of = |factor| bench.sound.with_faults(&[Fault::Conductivity { factor }], 1);
+    firm(bench, what, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
+}
+
+/// A laboratory of a detector so thin that the shell is right: the only model of uneven conductivity.
+fn thin(bench: &Bench) -> Result<Laboratory, StudyError> {
+    let detector = &bench.sound.detector;
+    Laboratory::new(&as_thick(detector, THIN * pad_radius_m(detector)))
+}
+
+fn uneven(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = (
+        "Uneven conductivity",
+        "Standard deviation of its logarithm, over a quarter of the shorter side; on a detector so thin that the shell is right, \
+         the only model of it.",
+    );
+    let thin = thin(bench)?;
+    let of = |deviation| thin.with_faults(&[Fault::Uneven { deviation }], bench.plan.seed);
+    firm(bench, what, &UNEVEN, percent, |deviation| deviation, of)
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+fn spread(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = (
+        "Contact impedances that differ",
+        "Standard deviation of their logarithm, where pads have 1e-3 ohm m2, which the model has for all.",
+    );
+    let felt = Detector { contact_impedance_ohm_m2: FELT_OHM_M2, ..bench.sound.detector.clone() };
+    let felt = Laboratory::new(&felt)?;
+    let of = |deviation| felt.with_faults(&[Fault::ContactSpread { deviation }], bench.plan.seed);
+    firm(bench, what, &SPREADS, percent, |deviation| deviation, of)
+}
+
+fn baseline(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = (
+        "A baseline taken under load",
+        "Conductance of what pressed elsewhere while the readings at rest were taken, in sheet conductances; it lifts afterwards.",
+    );
+    let sheet_s = bench.sound.detector.sheet_conductance_s();
+    let load = bench.contact(SceneKind::Firm, bench.plan.seed.wrapping_add(77));
+    let of = |sheets| match sheets > 0.0 {
+        true => bench.sound.with_baseline(&[Contact { conductance_s: sheets * sheet_s, ..load }]),
+        false => bench.sound.with_faults(&[], 0),
+    };
+    firm(bench, what, &BASELINES, |sheets| format!("{sheets}"), |sheets| sheets, of)
+}
+
+fn noise(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = ("More noise than told", "Noise over that of the converter that solvers know.");
+    let adc = bench.sound.detector.adc;
+    let of = |factor: f64| {
+        let noisy = Adc { noise_lsb: factor * adc.noise_lsb, ..adc };
+        bench.sound.with_truth(&Detector { adc: noisy, ..bench.sound.detector.clone() })
+    };
+    firm(bench, what, &NOISES, |factor| format!("x {factor}"), |factor| factor, of)
+}
+
+fn clip(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = ("Readings that saturate", "Voltage above which the converter tells no more, as a share of the drive.");
+    let drive_v = bench.sound.detector.drive_v;
+    let of = |share| bench.sound.with_faults(&[Fault::Clip { range_v: [0.0, share * drive_v] }], 1);
+    firm(bench, what, &CLIPS, percent, |share: f64| -share, of)
+}
+
+fn shell(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = ("A thick detector read with the thin-shell model", "Thickness in radii of a pad.");
+    let detector = &bench.sound.detector;
+    let of = |radii| {
+        let detector = as_thick(detector, radii * pad_radius_m(detector));
+        let laboratory = Laboratory::new(&detector)?;
+        Ok(laboratory.inverted_on(Box::new(Shell::new(&detector)?)))
+    };
+    firm(bench, what, &SHELL_THICKNESSES, |radii| format!("{radii}"), |radii| radii, of)
+}
+
+fn nodes(bench: &Bench) -> Result<Sweep, StudyError> {
+    let what = ("A finer or coarser image", "Nodes of the image that is inverted; 2000 are the default.");
+    let of = |nodes| Ok(bench.sound.inverted_on(bench.sound.problem.model.on_image_of(nodes)?));
+    firm(bench, what, &NODES, |nodes| nodes.to_string(), |nodes| (nodes as f64 - 2000.0).abs(), of)
+}

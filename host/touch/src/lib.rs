@@ -1,0 +1,7 @@
+//! From readings back to touch, and how right that is.
+//!
+//! [`solve`] has the solvers, one file a method, one trait; [`metrics`] the figures that they are judged by. Neither knows of boards,
+//! ports or pages.
+
+pub mod metrics;
+pub mod solve;

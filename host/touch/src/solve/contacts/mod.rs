@@ -1,0 +1,271 @@
+//! A few contacts fitted to the full contact physics, off any grid.
+//!
+//! Each contact is a spot ([`network`]) with a place and a resistance; spots are fitted with exact derivatives ([`fit`]) from
+//! a look at all places ([`scan`]), one more at a time as long as the readings ask for more ([`search`]). What spots leave out
+//! of discs of contact is taken from the forward model at the contacts found, and the fit repeated: so the answer is that of
+//! the full model, at the cost of the small one. Where contacts of the usual radius cannot explain the readings, their radii
+//! are found too ([`discs`]). From one frame to the next the fit starts where it was.
+
+mod discs;
+mod fit;
+mod network;
+mod scan;
+mod search;
+mod target;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+use nalgebra::DMatrix;
+
+use self::discs::DiscFit;
+use self::fit::Fit;
+use self::network::{FitSpot, Network};
+use self::scan::Scan;
+use self::search::Searched;
+use self::target::{Errors, Target};
+use super::track::Tracker;
+use super::{Flags, FoundContact, Problem, Solution, SolveError, Solver, Uncertainty};
+use tactomo_physics::forward::ForwardError;
+use tactomo_physics::forward::spots::SpotFields;
+use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
+
+/// Nodes of the scan.
+const SCAN_NODES: usize = 600;
+/// Conductance of a contact in sheet conductances above which it is taken as saturated.
+const MOST_CONDUCTANCE: f64 = 300.0;
+/// Readings above this share of the converter's range, or of the drive, say nothing.
+const FULL: f64 = 0.995;
+/// Frame periods that a search may take before it adds no more contacts.
+const SEARCH_PERIODS: u32 = 12;
+/// Mean square of what is left, in what noise and model error make, above which the readings do not fit.
+const MISFIT: f64 = 3.0;
+
+/// How contacts are fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSettings {
+    /// Most contacts.
+    pub most: usize,
+    /// Radius that contacts are taken to have (m) where the readings do not tell.
+    pub radius_m: f64,
+    /// Error of the forward model, as a share of the largest reading.
+    pub model_error: f64,
+    /// Error of the model's, or the builder's, impedance of a pad, as a share of it.
+    pub pad_error: f64,
+}
+
+impl ContactSettings {
+    /// For fingers on a detector: contacts of a sixth of the mean distance of its electrodes.
+    pub fn of(problem: &Problem) -> Self {
+        Self { most: 5, radius_m: problem.spacing_m() / 6.0, model_error: 0.0007, pad_error: 0.03 }
+    }
+}
+
+/// Fits contacts.
+pub struct Contacts {
+    problem: Problem,
+    settings: ContactSettings,
+    network: Network,
+    fields: Box<dyn SpotFields>,
+    scan: Scan,
+    sheet_s: f64,
+    spacing_m: f64,
+    errors: Errors,
+    /// A search that has taken longer adds no more contacts; none for one that is always the same.
+    longest: Option<Duration>,
+    last: Option<Explanation>,
+    /// Sum of squares that the last search left.
+    searched: f64,
+    tracker: Tracker,
+}
+
+/// How much is tried for a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// Contacts are followed, and searched anew where that does not explain the readings.
+    AsNeeded,
+    /// They are searched anew.
+    Anew,
+    /// They are followed, whatever is left.
+    FollowOnly,
+}
+
+/// Contacts that explain a frame.
+#[derive(Clone, Debug)]
+enum Explanation {
+    /// Spots of the usual radius, and what the forward model's readings are over theirs (V).
+    Spots(Fit, Vec<f64>),
+    /// Discs.
+    Discs(DiscFit),
+}
+
+impl Explanation {
+    /// Sum of squares of the weighted residuals.
+    fn cost(&self) -> f64 {
+        match self {
+            Self::Spots(fit, _) => fit.cost,
+            Self::Discs(fit) => fit.cost,
+        }
+    }
+
+    /// Number of parameters that were fitted.
+    fn parameters(&self) -> usize {
+        match self {
+            Self::Spots(fit, _) => 3 * fit.spots.len(),
+            Self::Discs(fit) => discs::PARAMETERS * fit.contacts.len(),
+        }
+    }
+
+    fn is_settled(&self) -> bool {
+        match self {
+            Self::Spots(fit, _) => fit.settled,
+            Self::Discs(fit) => fit.settled,
+        }
+    }
+}
+
+impl Contacts {
+    /// Makes it ready for a problem.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the model has no spots.
+    pub fn new(problem: &Problem, settings: ContactSettings) -> Result<Self, ForwardError> {
+        let detector = problem.detector();
+        let fields = problem.model.spots(settings.radius_m).ok_or_else(|| ForwardError::Detector {
+            detector: detector.name.clone(),
+            what: format!("the {} has no fields of single contacts", problem.model.name()),
+        })?;
+        let coarse = problem.model.on_image_of(SCAN_NODES)?;
+        let network = Network::new(detector, problem.model.electrode_fields_ohm());
+        Ok(Self {
+            scan: Scan::new(coarse.image_mesh(), &*fields, &network),
+            network,
+            fields,
+            errors: Errors {
+                noise_v: detector.adc.deviation_v(),
+                model: settings.model_error,
+                pad: settings.pad_error,
+                drive_v: detector.drive_v,
+                full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
+            },
+            sheet_s: detector.sheet_conductance_s(),
+            spacing_m: problem.spacing_m(),
+            problem: problem.clone(),
+            settings,
+            longest: None,
+            last: None,
+            searched: 0.0,
+            tracker: Tracker::new(problem.spacing_m()),
+        })
+    }
+
+    /// Solves with a limit to what is tried.
+    ///
+    /// # Errors
+    /// As for [`Solver::solve`].
+    pub(super) fn solve_with(&mut self, readings: &Readings, effort: Effort) -> Result<Solution, SolveError> {
+        crate::solve::check(readings, self.network.electrodes())?;
+        let target = Target::new(readings, &self.errors);
+        let last = self.last.take();
+        let Searched { found, searched } = match effort {
+            Effort::AsNeeded => self.search(last, self.searched, &target),
+            Effort::Anew => self.search_anew(&target),
+            Effort::FollowOnly => {
+                let followed = last.and_then(|last| self.follow(last, &target));
+                Searched { found: followed.filter(|found| !self.is_weak(found)), searched: self.searched }
+            }
+        };
+        (self.last, self.searched) = (found, searched);
+        let mut solution = self.last.as_ref().map_or_else(Solution::default, |found| self.solution(found, &target));
+        self.tracker.follow(&mut solution.contacts);
+        Ok(solution)
+    }
+
+    /// Whether there are contacts to follow.
+    pub(super) fn is_following(&self) -> bool {
+        self.last.is_some()
+    }
+
+    fn contact(&self, spot: &FitSpot) -> Contact {
+        let [x_m, y_m, z_m] = spot.spot.place_m;
+        Contact { z_m, ..Contact::flat(x_m, y_m, self.settings.radius_m, self.conductance_s(spot)) }
+    }
+
+    /// Conductance of the contact of a spot (S).
+    fn conductance_s(&self, spot: &FitSpot) -> f64 {
+        1.0 / (spot.ohm - spot.spot.own_ohm).max(1.0 / self.most_s())
+    }
+
+    fn most_s(&self) -> f64 {
+        MOST_CONDUCTANCE * self.sheet_s
+    }
+
+    fn solution(&self, found: &Explanation, target: &Target) -> Solution {
+        let contacts = match found {
+            Explanation::Spots(fit, _) => {
+                let of = |(k, spot)| self.found_spot(spot, k, fit.covariance.as_ref());
+                fit.spots.iter().enumerate().map(of).collect()
+            }
+            Explanation::Discs(fit) => {
+                let of = |(k, contact)| found_disc(contact, k, fit.covariance.as_ref());
+                fit.contacts.iter().enumerate().map(of).collect::<Vec<_>>()
+            }
+        };
+        let freedom = target.count().saturating_sub(found.parameters()).max(1);
+        let left = found.cost() / freedom as f64;
+        let is_perfect = |contact: &FoundContact| contact.conductance_s > 0.9 * self.most_s();
+        let flags = Flags {
+            saturated: target.is_saturated() || contacts.iter().any(is_perfect),
+            misfit: left > MISFIT,
+            unfinished: !found.is_settled(),
+            excluded: Vec::new(),
+        };
+        let residual = Some(left.sqrt() * target.deviation_v() / self.errors.noise_v);
+        Solution { contacts, residual, flags, ..Solution::default() }
+    }
+
+    fn found_spot(&self, spot: &FitSpot, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
+        let [x_m, y_m, z_m] = spot.spot.place_m;
+        let conductance_s = self.conductance_s(spot);
+        // `C = 1 / (A - own)`, so `dC = -C^2 A d(ln A)`.
+        let per_log_s = conductance_s * conductance_s * spot.ohm;
+        let uncertainty = covariance.map(|all| uncertainty(all, 3 * k, 1.0, per_log_s));
+        FoundContact { z_m, uncertainty, ..FoundContact::flat(x_m, y_m, conductance_s) }
+    }
+}
+
+fn found_disc(contact: &Contact, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
+    let Contact { x_m, y_m, z_m, radius_m, conductance_s } = *contact;
+    let uncertainty = covariance.map(|all| uncertainty(all, discs::PARAMETERS * k, radius_m, conductance_s));
+    FoundContact { z_m, uncertainty, radius_m: Some(radius_m), ..FoundContact::flat(x_m, y_m, conductance_s) }
+}
+
+/// Standard errors from a covariance where a contact's parameters start: places in `metres`, then a logarithm of which one is
+/// `per_log_s` of conductance.
+fn uncertainty(covariance: &DMatrix<f64>, start: usize, metres: f64, per_log_s: f64) -> Uncertainty {
+    let of = |i: usize, j: usize| covariance[(start + i, start + j)];
+    let [x, y, log] = [0, 1, 2].map(|i| of(i, i).max(0.0).sqrt());
+    let correlation = (of(0, 1) / (x * y).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
+    Uncertainty { x_m: x * metres, y_m: y * metres, correlation, conductance_s: per_log_s * log }
+}
+
+impl Solver for Contacts {
+    fn name(&self) -> &'static str {
+        "contacts"
+    }
+
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
+        self.solve_with(readings, Effort::AsNeeded)
+    }
+
+    fn keep_within(&mut self, period: Option<Duration>) {
+        self.longest = period.map(|period| SEARCH_PERIODS * period);
+    }
+
+    fn reset(&mut self) {
+        (self.last, self.searched) = (None, 0.0);
+        self.tracker.reset();
+    }
+}

@@ -1,0 +1,215 @@
+//! Where contacts would explain most of what is left: a look at every place, and at every pair of places.
+
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::fit::{Fit, Fitter};
+use super::network::{FitSpot, Network};
+use super::target::{Target, dot};
+use crate::solve::balance;
+use tactomo_physics::forward::ImageMesh;
+use tactomo_physics::forward::spots::{Spot, SpotFields};
+use tactomo_physics::space;
+
+/// Every so many places one is looked at in pairs.
+const PAIR_STRIDE: usize = 2;
+
+/// Places that are looked at.
+#[derive(Clone, Debug)]
+pub(super) struct Scan {
+    spots: Vec<Spot>,
+    first: FirstLook,
+}
+
+/// What single light contacts do to the readings, which has as few dimensions as there are electrodes.
+#[derive(Clone, Debug)]
+struct FirstLook {
+    /// Orthonormal directions of readings: `electrodes^2 x electrodes`.
+    basis: DMatrix<f64>,
+    /// Change of the readings by conductance in these (V/S): a column for each place.
+    patterns: DMatrix<f64>,
+    /// Scalar products of the patterns of places that are looked at in pairs.
+    pairs: DMatrix<f64>,
+    /// Mean of `E[g][g] - 2 f + R` at each place (ohm).
+    load_ohm: Vec<f64>,
+}
+
+/// What contacts at all places would do to whitened readings, linearly, and what is to be explained.
+pub(super) struct Looks<'a> {
+    /// Whitened change of the readings by conductance (1/S): a column for each place.
+    patterns: Cow<'a, DMatrix<f64>>,
+    /// Scalar products of those that are looked at in pairs, if they are known.
+    pairs: Option<&'a DMatrix<f64>>,
+    /// Whitened readings that are left.
+    left: DVector<f64>,
+    /// Resistance besides that of a contact alone that its share of the readings stands for (ohm); none if there is none.
+    load_ohm: &'a [f64],
+    /// Gains are to be multiplied with this.
+    gain: f64,
+}
+
+/// Contacts to start from, and by how much they lower the sum of squares, in the linear theory.
+pub(super) struct Candidate {
+    /// Place in the scan, and conductance (S).
+    contacts: Vec<(usize, f64)>,
+    pub gain: f64,
+}
+
+impl Scan {
+    /// Looks at the nodes of a mesh.
+    pub fn new(mesh: &ImageMesh, fields: &dyn SpotFields, network: &Network) -> Self {
+        let spots: Vec<_> = (0..mesh.nodes_m.len()).map(|node| fields.spot(mesh.place_m(node))).collect();
+        Self { first: FirstLook::new(&spots, network), spots }
+    }
+
+    /// Looks for contacts where there are none yet.
+    ///
+    /// Balanced readings of one contact are exactly linear in the fields at its place (`solve::balance`), whatever its force and
+    /// whatever the pads' own impedances, so the scan finds it; the rows' mean load is `A - 2 f + E[g][g] + R`, which gives its
+    /// resistance `A`.
+    pub fn at_first(&self, network: &Network, target: &Target) -> Looks<'_> {
+        let mut volts = target.volts.clone();
+        balance::balance(&mut volts, network.electrodes(), network.drive_v);
+        Looks {
+            patterns: Cow::Borrowed(&self.first.patterns),
+            pairs: Some(&self.first.pairs),
+            left: self.first.basis.tr_mul(&DVector::from_vec(volts)),
+            load_ohm: &self.first.load_ohm,
+            gain: target.deviation_v().powi(-2),
+        }
+    }
+
+    /// Looks for more contacts beside those of a fit.
+    pub fn beside(&self, fitter: &Fitter<'_>, fit: &Fit, target: &Target) -> Looks<'_> {
+        let n = fitter.network.electrodes();
+        let mut patterns = DMatrix::zeros(n * n, self.spots.len());
+        for (mut column, spot) in patterns.column_iter_mut().zip(&self.spots) {
+            let potentials_ohm = fitter.network.potentials_ohm(&fit.solved, &fit.spots, spot, fitter.fields);
+            fitter.network.volts_per_s(&fit.solved, &potentials_ohm, column.as_mut_slice());
+            target.whiten(column.as_mut_slice());
+        }
+        Looks {
+            patterns: Cow::Owned(patterns),
+            pairs: None,
+            left: target.residuals(&fit.volts).into(),
+            load_ohm: &[],
+            gain: 1.0,
+        }
+    }
+
+    /// The best places for one contact, each apart from better ones.
+    pub fn ones(&self, looks: &Looks<'_>, count: usize, apart_m: f64) -> Vec<Candidate> {
+        let all = looks.patterns.column_iter().enumerate().filter_map(|(place, pattern)| {
+            let (along, square) = (dot(pattern.as_slice(), looks.left.as_slice()), pattern.norm_squared());
+            (along > 0.0).then(|| Candidate {
+                contacts: vec![(place, along / square)],
+                gain: looks.gain * along * along / square,
+            })
+        });
+        self.best(all.collect(), count, apart_m)
+    }
+
+    /// The best places for two contacts at once, over all pairs of a coarser choice of places.
+    pub fn pairs(&self, looks: &Looks<'_>, count: usize, apart_m: f64) -> Vec<Candidate> {
+        let places = paired(self.spots.len());
+        let patterns = looks.patterns.select_columns(&places);
+        let products = looks.pairs.map_or_else(|| Cow::Owned(patterns.transpose() * &patterns), Cow::Borrowed);
+        let along = patterns.tr_mul(&looks.left);
+        let mut all = Vec::new();
+        let mut floor = 0.0;
+        for i in 0..places.len() {
+            let (own_i, along_i) = (products[(i, i)], along[i]);
+            for j in 0..i {
+                let (own_j, cross) = (products[(j, j)], products[(j, i)]);
+                let (a, b) = (own_j * along_i - cross * along[j], own_i * along[j] - cross * along_i);
+                if a <= 0.0 || b <= 0.0 {
+                    continue;
+                }
+                let determinant = own_i * own_j - cross * cross;
+                let gain = looks.gain * (a * along_i + b * along[j]) / determinant;
+                if gain > floor {
+                    floor = floor.max(KEPT * gain);
+                    let contacts = vec![(places[i], a / determinant), (places[j], b / determinant)];
+                    all.push(Candidate { contacts, gain });
+                }
+            }
+        }
+        all.retain(|candidate| candidate.gain >= floor);
+        self.best(all, count, apart_m)
+    }
+
+    /// The spots of a candidate.
+    pub fn start(&self, fitter: &Fitter<'_>, looks: &Looks<'_>, candidate: &Candidate) -> Vec<FitSpot> {
+        let spot = |(place, conductance_s): &(usize, f64)| {
+            let spot = self.spots[*place].clone();
+            let load_ohm = looks.load_ohm.get(*place).copied().unwrap_or_default();
+            let ohm = (1.0 / conductance_s - load_ohm).max(spot.own_ohm);
+            fitter.spot(spot, ohm)
+        };
+        candidate.contacts.iter().map(spot).collect()
+    }
+
+    /// The best candidates, each with a contact that is apart from all of the better ones'.
+    fn best(&self, mut all: Vec<Candidate>, count: usize, apart_m: f64) -> Vec<Candidate> {
+        all.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut chosen: Vec<Candidate> = Vec::with_capacity(count);
+        for candidate in all {
+            if chosen.len() == count {
+                break;
+            }
+            let is_apart = |place: usize, other: &Candidate| {
+                let places = other.contacts.iter().map(|(other, _)| *other);
+                places
+                    .into_iter()
+                    .all(|other| space::distance(self.spots[place].place_m, self.spots[other].place_m) > apart_m)
+            };
+            if chosen.iter().all(|other| candidate.contacts.iter().any(|(place, _)| is_apart(*place, other))) {
+                chosen.push(candidate);
+            }
+        }
+        chosen
+    }
+}
+
+impl FirstLook {
+    fn new(spots: &[Spot], network: &Network) -> Self {
+        let n = network.electrodes();
+        let pads = &network.electrodes_ohm;
+        let drive_v = network.drive_v;
+        // Differences of fields at electrodes, and what is alike for all places.
+        let constant = |g: usize, e: usize| pads[(g, g)] - pads[(e, g)] + network.on_resistance_ohm;
+        let directions = DMatrix::from_fn(n * n, n, |row, source| {
+            let (g, e) = (row / n, row % n);
+            match source + 1 == n {
+                true => drive_v * constant(g, e),
+                false => drive_v * (f64::from(u8::from(source == e)) - f64::from(u8::from(source == g))),
+            }
+        });
+        let sources = DMatrix::from_fn(n, spots.len(), |source, place| {
+            let field = &spots[place].electrodes_ohm;
+            if source + 1 == n { 1.0 } else { field[source] - field[n - 1] }
+        });
+        let factor = directions.qr();
+        let patterns = factor.r() * sources;
+        let chosen = patterns.select_columns(&paired(spots.len()));
+        let mean_ohm = |spot: &Spot| {
+            let load = |g: usize| pads[(g, g)] - 2.0 * spot.electrodes_ohm[g] + network.on_resistance_ohm;
+            (0..n).map(load).sum::<f64>() / n as f64
+        };
+        Self {
+            basis: factor.q(),
+            pairs: chosen.transpose() * &chosen,
+            load_ohm: spots.iter().map(mean_ohm).collect(),
+            patterns,
+        }
+    }
+}
+
+/// Places of so many that are looked at in pairs.
+fn paired(places: usize) -> Vec<usize> {
+    (0..places).step_by(PAIR_STRIDE).collect()
+}
+
+/// Pairs with less than this share of the best gain so far are not kept.
+const KEPT: f64 = 0.95;

@@ -1,0 +1,313 @@
+//! How many contacts, and where each fit starts.
+
+use std::time::Instant;
+
+use nalgebra::DMatrix;
+
+use super::discs::{DiscFit, DiscFitter, PARAMETERS};
+use super::fit::{Fit, Fitter};
+use super::network::FitSpot;
+use super::scan::{Candidate, Looks};
+use super::target::Target;
+use super::{Contacts, Explanation};
+use tactomo_physics::forward::readings_v;
+use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
+use tactomo_physics::space::{self, Place};
+
+/// Steps from each of some starts, how many of them go on, steps of those, and steps from the frame before.
+const FIRST_STEPS: usize = 5;
+const FINALISTS: usize = 2;
+const COLD_STEPS: usize = 12;
+const WARM_STEPS: usize = 4;
+/// Steps after the readings were corrected, and how often they are.
+const CORRECTED_STEPS: usize = 3;
+const CORRECTIONS: usize = 3;
+/// Steps of discs from spots, and from the frame before.
+const COLD_DISC_STEPS: usize = 12;
+const WARM_DISC_STEPS: usize = 3;
+/// Places that a fit starts from.
+const STARTS: usize = 3;
+/// By how much each parameter has to lower the sum of squares: the Bayesian information criterion for 256 readings asks for
+/// 5.5; this leaves room for the many places that are looked at.
+const WORTH: f64 = 7.0;
+/// The same for there being any contact at all.
+const WORTH_FIRST: f64 = 60.0;
+/// Half the distance of two contacts that one is split into, in mean distances of electrodes.
+const SPLIT: f64 = 0.25;
+/// Mean square of what is left below which a fit is nearly right.
+const NEARLY: f64 = 100.0;
+/// The same below which several contacts may only have to be wider.
+const HOPEFUL: f64 = 20.0;
+/// The same below which the search for more ends with the first one that does not pay.
+const ENOUGH: f64 = 2.0;
+/// The sum of squares may be this times that of the frame before.
+const WORSE: f64 = 1.3;
+/// Standard errors that spots may move before the forward model is asked again.
+const NEAR: f64 = 3.0;
+/// A contact is lost when the logarithm of its resistance is known no better than this.
+const WEAK: f64 = 0.2;
+
+/// What a frame is, and the sum of squares that the search which found it left.
+pub(super) struct Searched {
+    pub found: Option<Explanation>,
+    pub searched: f64,
+}
+
+impl Contacts {
+    /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
+    pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
+        let target = Target::new(readings, &self.errors);
+        let looks = self.scan.at_first(&self.network, &target);
+        let first = self.scan.ones(&looks, STARTS, self.apart_m());
+        Some(self.lowest_of(&looks, &first, &target)?.cost / target.count().max(1) as f64)
+    }
+
+    /// The best fit from some candidates.
+    fn lowest_of(&self, looks: &Looks<'_>, candidates: &[Candidate], target: &Target) -> Option<Fit> {
+        let fitter = self.fitter();
+        let starts = candidates.iter().map(|candidate| self.scan.start(&fitter, looks, candidate)).collect();
+        lowest(&fitter, starts, target)
+    }
+
+    /// What explains a frame, from what explained the one before; `searched` is the sum of squares that the last search left, to
+    /// which many small rises in a row add up.
+    pub(super) fn search(&self, last: Option<Explanation>, searched: f64, target: &Target) -> Searched {
+        let enough = (WORSE * searched).max(target.count() as f64);
+        let followed = last.and_then(|last| self.follow(last, target));
+        match followed.filter(|found| found.cost() <= enough && !self.is_weak(found)) {
+            Some(found) => Searched { found: Some(found), searched },
+            None => self.search_anew(target),
+        }
+    }
+
+    /// The same contacts in the next frame; `None` if that makes no sense.
+    pub(super) fn follow(&self, last: Explanation, target: &Target) -> Option<Explanation> {
+        Some(match last {
+            Explanation::Spots(fit, correction_v) => {
+                let moved = self.fitter().fit(fit.spots.clone(), &target.less(&correction_v), WARM_STEPS)?;
+                if is_near(&fit.spots, &moved, self.settings.radius_m) {
+                    Explanation::Spots(moved, correction_v)
+                } else {
+                    self.correct(moved, target, 1)
+                }
+            }
+            Explanation::Discs(fit) => {
+                Explanation::Discs(self.disc_fitter().fit(fit.contacts, target, WARM_DISC_STEPS)?)
+            }
+        })
+    }
+
+    /// What explains a frame, from nothing.
+    pub(super) fn search_anew(&self, target: &Target) -> Searched {
+        let found = self.explanation(target);
+        Searched { searched: found.as_ref().map_or(0.0, Explanation::cost), found }
+    }
+
+    fn explanation(&self, target: &Target) -> Option<Explanation> {
+        let begin = Instant::now();
+        let in_time = || self.longest.is_none_or(|longest| begin.elapsed() < longest);
+        let fitter = self.fitter();
+        let looks = self.scan.at_first(&self.network, target);
+        let first = self.scan.ones(&looks, STARTS, self.apart_m());
+        if first.first().is_none_or(|best| best.gain < WORTH_FIRST) {
+            return None;
+        }
+        let one = self.lowest_of(&looks, &first, target)?;
+        let mut best = self.correct(one.clone(), target, CORRECTIONS);
+        let mut fits = vec![one];
+        let mut starts: Vec<Vec<FitSpot>> = match explains(&best, target) {
+            true => Vec::new(),
+            false => {
+                let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
+                pairs.iter().map(|pair| self.scan.start(&fitter, &looks, pair)).collect()
+            }
+        };
+        while fits.len() < self.settings.most && !explains(&best, target) && in_time() {
+            let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
+            let Explanation::Spots(fit, _) = &more else { break };
+            let fit = fit.clone();
+            let is_hopeful = |fewer: &Fit| fits.len() == 1 || fewer.cost < HOPEFUL * target.count() as f64;
+            if score(&more) < score(&best)
+                && in_time()
+                && let Some(fewer) = fits.last().filter(|fewer| is_hopeful(fewer))
+            {
+                // Before one more is believed, those that there are may be wider.
+                best = better(best, self.discs(fewer, target).map(Explanation::Discs));
+            }
+            fits.push(fit);
+            let is_better = score(&more) < score(&best);
+            if !is_better && fits.len() > 2 && best.cost() < ENOUGH * target.count() as f64 {
+                break;
+            }
+            best = better(best, Some(more));
+            starts = Vec::new();
+        }
+        Some(best)
+    }
+
+    /// One more contact than the last of some fits has: from starts, from that fit, and from two more than the fit before it has.
+    fn one_more(
+        &self,
+        fitter: &Fitter<'_>,
+        fits: &[Fit],
+        mut starts: Vec<Vec<FitSpot>>,
+        target: &Target,
+    ) -> Option<Explanation> {
+        let (last, before) = fits.split_last()?;
+        // What spots leave out of a wrong fit is of no use.
+        let is_near = last.cost < NEARLY * target.count() as f64;
+        let correction_v = is_near.then(|| self.correction_v(last)).flatten();
+        let corrected = correction_v.map_or_else(|| target.clone(), |correction_v| target.less(&correction_v));
+        let mut add = |fit: &Fit, of: &dyn Fn(&Looks<'_>) -> Vec<Candidate>| {
+            let looks = self.scan.beside(fitter, fit, &corrected);
+            for candidate in of(&looks) {
+                starts.push(fit.spots.iter().cloned().chain(self.scan.start(fitter, &looks, &candidate)).collect());
+            }
+        };
+        add(last, &|looks| self.scan.ones(looks, STARTS, self.apart_m()));
+        if let Some(before) = before.last() {
+            add(before, &|looks| self.scan.pairs(looks, STARTS, self.apart_m()));
+        }
+        starts.extend((0..last.spots.len()).flat_map(|k| self.split(fitter, &last.spots, k)));
+        Some(self.correct(lowest(fitter, starts, &corrected)?, target, CORRECTIONS))
+    }
+
+    /// Starts nearer to each other are one (m).
+    fn apart_m(&self) -> f64 {
+        self.spacing_m / 3.0
+    }
+
+    /// Starts with one contact taken for two beside each other, in some directions.
+    fn split(&self, fitter: &Fitter<'_>, spots: &[FitSpot], k: usize) -> Vec<Vec<FitSpot>> {
+        let half_m = SPLIT * self.spacing_m;
+        let directions = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]];
+        let start = |[a, b]: [f64; 2]| {
+            let spot = &spots[k];
+            let way = space::along(scaled(a, spot.spot.along[0]), b, spot.spot.along[1]);
+            let halves = [-half_m, half_m].map(|way_m| {
+                let place_m = space::along(spot.spot.place_m, way_m, way);
+                fitter.spot(self.fields.spot(place_m), 2.0 * spot.ohm)
+            });
+            let others = spots.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, spot)| spot.clone());
+            others.chain(halves).collect()
+        };
+        directions.map(start).into()
+    }
+
+    /// Repeats a fit with the forward model's readings, so many times or until they settle.
+    fn correct(&self, mut fit: Fit, target: &Target, times: usize) -> Explanation {
+        let mut used_v = vec![0.0; fit.volts.len()];
+        for _ in 0..times {
+            let Some(correction_v) = self.correction_v(&fit) else { break };
+            let changed_v = correction_v.iter().zip(&used_v).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let corrected = target.less(&correction_v);
+            let Some(next) = self.fitter().fit(fit.spots.clone(), &corrected, CORRECTED_STEPS) else { break };
+            (fit, used_v) = (next, correction_v);
+            if changed_v < 0.3 * self.errors.noise_v {
+                break;
+            }
+        }
+        Explanation::Spots(fit, used_v)
+    }
+
+    /// Readings of the forward model over those of the spots (V).
+    fn correction_v(&self, fit: &Fit) -> Option<Vec<f64>> {
+        let contacts: Vec<_> = fit.spots.iter().map(|spot| self.contact(spot)).collect();
+        let impedance_ohm = self.problem.model.impedance_ohm(&contacts).ok()?;
+        let exact = readings_v(&impedance_ohm, self.problem.detector());
+        Some(exact.volts().iter().zip(&fit.volts).map(|(exact, spots)| exact - spots).collect())
+    }
+
+    /// Discs with radii of their own, from where spots are.
+    fn discs(&self, fit: &Fit, target: &Target) -> Option<DiscFit> {
+        let start = fit.spots.iter().map(|spot| {
+            let contact = self.contact(spot);
+            // A contact that is better than perfect is a wider one.
+            let wider = (spot.spot.own_ohm / spot.ohm).max(1.0);
+            let conductance_s = contact.conductance_s.min(10.0 * self.sheet_s);
+            Contact { radius_m: wider * contact.radius_m, conductance_s, ..contact }
+        });
+        self.disc_fitter().fit(start.collect(), target, COLD_DISC_STEPS)
+    }
+
+    /// Whether a contact is so weak that it may not be there.
+    pub(super) fn is_weak(&self, found: &Explanation) -> bool {
+        // Without a covariance, a contact does nothing that the readings tell.
+        let uncertain = |covariance: &Option<DMatrix<f64>>, log: usize| {
+            covariance.as_ref().is_none_or(|all| all[(log, log)] > WEAK * WEAK)
+        };
+        match found {
+            Explanation::Spots(fit, _) => (0..fit.spots.len()).any(|k| uncertain(&fit.covariance, 3 * k + 2)),
+            // That of a firm disc is not known well either: more of it would change little.
+            Explanation::Discs(fit) => fit.contacts.iter().enumerate().any(|(k, contact)| {
+                contact.conductance_s < self.sheet_s && uncertain(&fit.covariance, PARAMETERS * k + 2)
+            }),
+        }
+    }
+
+    fn fitter(&self) -> Fitter<'_> {
+        Fitter {
+            network: &self.network,
+            fields: &*self.fields,
+            longest_m: self.spacing_m / 3.0,
+            sheet_ohm: 1.0 / self.sheet_s,
+        }
+    }
+
+    fn disc_fitter(&self) -> DiscFitter<'_> {
+        let detector = self.problem.detector();
+        DiscFitter {
+            model: &*self.problem.model,
+            usual_radius_m: self.settings.radius_m,
+            sheet_s: self.sheet_s,
+            half_m: detector.outline.size_m().map(|size_m| size_m / 2.0),
+            detector,
+        }
+    }
+}
+
+/// The fit of lowest cost over some starts: a few steps from each, then more from the best.
+fn lowest(fitter: &Fitter<'_>, starts: Vec<Vec<FitSpot>>, target: &Target) -> Option<Fit> {
+    let mut fits: Vec<_> = starts.into_iter().filter_map(|start| fitter.fit(start, target, FIRST_STEPS)).collect();
+    fits.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost));
+    fits.truncate(FINALISTS);
+    fits.into_iter()
+        .filter_map(|fit| fitter.fit(fit.spots, target, COLD_STEPS))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+/// Sum of squares with a price on each parameter: what is lower is believed.
+fn score(found: &Explanation) -> f64 {
+    found.cost() + WORTH * found.parameters() as f64
+}
+
+/// Which of two is believed.
+fn better(best: Explanation, other: Option<Explanation>) -> Explanation {
+    match other {
+        Some(other) if score(&other) < score(&best) => other,
+        _ => best,
+    }
+}
+
+fn scaled(share: f64, a: Place) -> Place {
+    space::along([0.0; 3], share, a)
+}
+
+/// Whether no more than noise and model error is left.
+fn explains(found: &Explanation, target: &Target) -> bool {
+    found.cost() < 0.75 * target.count() as f64
+}
+
+/// Whether spots have moved so little that the forward model's correction still holds: it is some per cent of the readings, so it
+/// changes by as much of what the spots have moved.
+fn is_near(before: &[FitSpot], fit: &Fit, radius_m: f64) -> bool {
+    let error = |parameter: usize| {
+        fit.covariance.as_ref().map_or(0.0, |covariance| NEAR * covariance[(parameter, parameter)].max(0.0).sqrt())
+    };
+    before.iter().zip(&fit.spots).enumerate().all(|(k, (before, after))| {
+        let moved_m = space::distance(before.spot.place_m, after.spot.place_m);
+        let log = (before.ohm / after.ohm).ln().abs();
+        moved_m < error(3 * k).hypot(error(3 * k + 1)).max(0.02 * radius_m) && log < error(3 * k + 2).max(0.005)
+    })
+}

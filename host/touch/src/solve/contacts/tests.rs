@@ -1,0 +1,147 @@
+//! Contacts put on a finer model than the one that is fitted, found again.
+
+use std::sync::LazyLock;
+
+use super::*;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
+use tactomo_physics::simulate::{Noise, measured};
+
+static PROBLEM: LazyLock<Problem> = LazyLock::new(|| {
+    let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector()).unwrap());
+    Problem::new(slab)
+});
+static FINE: LazyLock<Slab> = LazyLock::new(|| Slab::with_resolution(&detector(), Resolution::FINE).unwrap());
+
+fn detector() -> Detector {
+    let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+    detector.adc.noise_lsb = 1.5;
+    detector
+}
+
+fn solver() -> Contacts {
+    Contacts::new(&PROBLEM, ContactSettings::of(&PROBLEM)).unwrap()
+}
+
+/// A contact of so many sheet conductances.
+fn contact(x_m: f64, y_m: f64, sheets: f64) -> Contact {
+    Contact::flat(x_m, y_m, 0.0025, sheets * detector().sheet_conductance_s())
+}
+
+fn frame(contacts: &[Contact], noise: &mut Noise) -> Readings {
+    let detector = detector();
+    measured(&readings_v(&FINE.impedance_ohm(contacts).unwrap(), &detector), &detector.adc, noise)
+}
+
+/// The true contacts and those found for them, nearest first.
+fn matched(truth: &[Contact], found: &[FoundContact]) -> Vec<(Contact, FoundContact)> {
+    assert_eq!(truth.len(), found.len(), "{truth:?} {found:?}");
+    let apart = |a: &Contact, b: &FoundContact| (a.x_m - b.x_m).hypot(a.y_m - b.y_m);
+    let nearest =
+        |contact: &Contact| *found.iter().min_by(|a, b| apart(contact, a).total_cmp(&apart(contact, b))).unwrap();
+    truth.iter().map(|contact| (*contact, nearest(contact))).collect()
+}
+
+fn error_m((truth, found): &(Contact, FoundContact)) -> f64 {
+    (truth.x_m - found.x_m).hypot(truth.y_m - found.y_m)
+}
+
+#[test]
+fn the_readings_follow_their_derivatives() {
+    let solver = solver();
+    let fields = &*solver.fields;
+    let spots: Vec<_> = [([0.003, -0.008], 900.0), ([-0.012, 0.004], 2500.0), ([0.0271, 0.0262], 700.0)]
+        .map(|([x_m, y_m], ohm)| FitSpot { spot: fields.spot([x_m, y_m, 0.0]), ohm })
+        .into();
+    let solved = solver.network.solve(&spots, fields).unwrap();
+    let slopes = solver.network.slopes(&spots, &solved);
+    let step = 1e-5;
+    for (parameter, slope) in slopes.iter().enumerate() {
+        let volts = |step: f64| {
+            let mut moved = spots.clone();
+            let spot = &mut moved[parameter / 3];
+            match parameter % 3 {
+                2 => spot.ohm *= (step * 100.0).exp(),
+                axis => {
+                    let mut place_m = spot.spot.place_m;
+                    place_m[axis] += step;
+                    spot.spot = fields.spot(place_m);
+                }
+            }
+            solver.network.volts(&solver.network.solve(&moved, fields).unwrap())
+        };
+        let scale = if parameter % 3 == 2 { 100.0 } else { 1.0 };
+        let differences = volts(step).into_iter().zip(volts(-step)).map(|(a, b)| (a - b) / (2.0 * step * scale));
+        let largest = slope.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        for (difference, slope) in differences.zip(slope) {
+            assert!((difference - slope).abs() < 5e-3 * largest, "{parameter}: {difference} {slope} of {largest}");
+        }
+    }
+}
+
+#[test]
+fn one_contact_is_found_within_three_standard_errors_or_a_fiftieth_of_a_millimetre() {
+    let (mut solver, mut noise) = (solver(), Noise::new(1));
+    for (x_m, y_m) in [(0.0, 0.0), (0.013, 0.007), (-0.022, 0.02), (0.0075, 0.0075), (0.026, -0.003)] {
+        for sheets in [0.03, 0.3, 3.0] {
+            let truth = contact(x_m, y_m, sheets);
+            solver.reset();
+            let solution = solver.solve(&frame(&[truth], &mut noise)).unwrap();
+            let pair = matched(&[truth], &solution.contacts)[0];
+            let Uncertainty { x_m, y_m, conductance_s, .. } = pair.1.uncertainty.unwrap();
+            assert!(error_m(&pair) < 3.0 * x_m.hypot(y_m) + 2e-5, "{pair:?}");
+            let off_s = (pair.1.conductance_s - truth.conductance_s).abs();
+            assert!(off_s < 4.0 * conductance_s + 0.01 * truth.conductance_s, "{pair:?}");
+            assert!(!solution.flags.misfit && solution.residual.is_some_and(|left| left < 1.3), "{solution:?}");
+        }
+    }
+}
+
+#[test]
+fn three_contacts_are_counted_found_and_followed() {
+    let (mut solver, mut noise) = (solver(), Noise::new(2));
+    let at = |shift_m: f64| {
+        [
+            contact(0.012, 0.010 + shift_m, 0.4),
+            contact(-0.014, 0.003, 1.0 + 20.0 * shift_m),
+            contact(0.002, -0.018 - shift_m, 0.2),
+        ]
+    };
+    let first = solver.solve(&frame(&at(0.0), &mut noise)).unwrap();
+    let ids: Vec<_> = matched(&at(0.0), &first.contacts).iter().map(|(_, found)| found.id).collect();
+    for step in 1..30 {
+        let truth = at(1e-4 * f64::from(step));
+        let solution = solver.solve(&frame(&truth, &mut noise)).unwrap();
+        let pairs = matched(&truth, &solution.contacts);
+        assert!(pairs.iter().all(|pair| error_m(pair) < 6e-4), "step {step}: {pairs:?}");
+        assert_eq!(pairs.iter().map(|(_, found)| found.id).collect::<Vec<_>>(), ids, "step {step}");
+    }
+    let fewer = solver.solve(&frame(&at(0.003)[..2], &mut noise)).unwrap();
+    assert_eq!(fewer.contacts.len(), 2, "one let go: {fewer:?}");
+}
+
+#[test]
+fn a_wide_contact_is_one_with_its_radius() {
+    let truth = Contact { radius_m: 0.009, ..contact(0.004, 0.002, 4.0) };
+    let solution = solver().solve(&frame(&[truth], &mut Noise::new(3))).unwrap();
+    let pair = matched(&[truth], &solution.contacts)[0];
+    let radius_m = pair.1.radius_m.unwrap();
+    assert!(error_m(&pair) < 1e-4 && (radius_m / truth.radius_m - 1.0).abs() < 0.03, "{pair:?}");
+    assert!((pair.1.conductance_s / truth.conductance_s - 1.0).abs() < 0.05, "{pair:?}");
+}
+
+#[test]
+fn a_pad_that_is_not_as_the_model_has_it_does_not_matter() {
+    let mut rough = detector();
+    // Each pad's own impedance is about 1 kohm: some 3 % more or less.
+    for (e, electrode) in rough.electrodes.iter_mut().enumerate() {
+        let usual = rough.contact_impedance_ohm_m2;
+        electrode.contact_impedance_ohm_m2 = Some(usual + if e % 3 == 0 { 4e-4 } else { 0.0 });
+    }
+    let slab = Slab::with_resolution(&rough, Resolution::FINE).unwrap();
+    let truth = [contact(0.009, -0.011, 1.0), contact(-0.008, 0.004, 0.5)];
+    let exact = readings_v(&slab.impedance_ohm(&truth).unwrap(), &rough);
+    let solution = solver().solve(&measured(&exact, &rough.adc, &mut Noise::new(4))).unwrap();
+    let pairs = matched(&truth, &solution.contacts);
+    assert!(pairs.iter().all(|pair| error_m(pair) < 4e-4), "{pairs:?}");
+}

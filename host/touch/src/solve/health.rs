@@ -1,0 +1,135 @@
+//! Electrodes that cannot be right, by the readings alone.
+//!
+//! While `g` is grounded, `r[g][e] = 1 - V[g][e] / Vcc = Z[e][g] / D[g]` with one load `D[g]` for all `e`, and `Z` is symmetric.
+//! So the logarithms of `r[g][e] / r[e][g]` are differences of those of the loads: of 120 numbers 105 are a check that needs
+//! no model and no knowledge of what presses. A gain, a sign, an input that floats: each breaks the 15 numbers of its electrode.
+//! Two things do not break them and are seen otherwise: a broken wire lets everything rise to the drive when it should be
+//! grounded, and two wires that touch read the same.
+
+use tactomo_physics::readings::Readings;
+
+/// Smallest `1 - V / Vcc` that a logarithm is taken of.
+const SMALLEST: f64 = 0.02;
+/// Readings have to be this many deviations of the noise large before they say anything of a short or a broken wire.
+const TOUCHED: f64 = 40.0;
+/// Share of the drive that everything reaches when a broken wire is to be grounded.
+const UNGROUNDED: f64 = 0.97;
+/// Deviations of the noise within which two electrodes read the same.
+const SAME: f64 = 6.0;
+/// An electrode is wrong if the mean square of its numbers, in what noise makes of them, is above this ...
+const WRONG: f64 = 8.0;
+/// ... and without it that of the others is at most this share of it.
+const ALONE: f64 = 0.2;
+/// Error of the numbers besides noise: of a converter that is not quite even.
+const UNEVEN: f64 = 0.004;
+
+/// What frames say of electrodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ElectrodeFault {
+    /// Grounding it grounds nothing: its wire is broken.
+    Open,
+    /// It reads what another one reads.
+    Shorted,
+    /// Its wire is exchanged with another's.
+    Exchanged,
+    /// Its readings contradict those of all others.
+    Contradicting,
+}
+
+/// Electrodes that are wrong in a frame (V), each with what is wrong; `noise_v` is the deviation of a reading.
+pub fn faulty_electrodes(readings: &Readings, drive_v: f64, noise_v: f64) -> Vec<(usize, ElectrodeFault)> {
+    let n = readings.electrodes();
+    if readings.largest_v() < TOUCHED * noise_v {
+        return Vec::new();
+    }
+    let open: Vec<_> = (0..n).filter(|g| is_open(readings, *g, drive_v)).collect();
+    // Where everything is at the drive's potential, nothing is grounded: that is no electrode's fault alone.
+    if 2 * open.len() > n {
+        return Vec::new();
+    }
+    let sound: Vec<_> = (0..n).filter(|e| !open.contains(e)).collect();
+    let shorted = shorted(readings, &sound, noise_v);
+    let sound: Vec<_> = sound.into_iter().filter(|e| !shorted.contains(e)).collect();
+    let contradicting = contradicting(readings, sound, drive_v, noise_v);
+    let all = [
+        (open, ElectrodeFault::Open),
+        (shorted, ElectrodeFault::Shorted),
+        (contradicting, ElectrodeFault::Contradicting),
+    ];
+    let mut all: Vec<_> = all.into_iter().flat_map(|(list, fault)| list.into_iter().map(move |e| (e, fault))).collect();
+    all.sort_unstable();
+    all
+}
+
+/// Whether most others rise to the drive when `g` is to be grounded.
+fn is_open(readings: &Readings, g: usize, drive_v: f64) -> bool {
+    let n = readings.electrodes();
+    let risen = (0..n).filter(|e| *e != g && readings.at(g, *e) > UNGROUNDED * drive_v).count();
+    4 * risen > 3 * (n - 1)
+}
+
+/// Electrodes that read what another reads, whatever is grounded, though the others differ.
+fn shorted(readings: &Readings, sound: &[usize], noise_v: f64) -> Vec<usize> {
+    let spread_v =
+        |e: usize, f: usize| sound.iter().map(|g| (readings.at(*g, e) - readings.at(*g, f)).abs()).fold(0.0, f64::max);
+    let mut found = Vec::new();
+    for (i, e) in sound.iter().enumerate() {
+        for f in &sound[..i] {
+            // With one of them grounded the other is too, which no two pads apart ever are.
+            let grounded_v = readings.at(*e, *f).max(readings.at(*f, *e));
+            let row_v = sound.iter().map(|other| readings.at(*e, *other)).fold(0.0, f64::max);
+            if grounded_v < SAME * noise_v && row_v > TOUCHED * noise_v && spread_v(*e, *f) < SAME * noise_v {
+                found.extend([*e, *f]);
+            }
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// Electrodes without which the others agree: the worst first, as long as leaving it out helps.
+fn contradicting(readings: &Readings, mut sound: Vec<usize>, drive_v: f64, noise_v: f64) -> Vec<usize> {
+    let mut found = Vec::new();
+    while sound.len() > 4 && 4 * found.len() < readings.electrodes() {
+        let before = disagreement(readings, &sound, drive_v, noise_v);
+        if before < WRONG {
+            return found;
+        }
+        let without = |e: usize| sound.iter().copied().filter(|other| *other != e).collect::<Vec<_>>();
+        let scored = sound.iter().map(|e| (*e, disagreement(readings, &without(*e), drive_v, noise_v)));
+        let Some((worst, after)) = scored.min_by(|a, b| a.1.total_cmp(&b.1)) else { return found };
+        found.push(worst);
+        sound = without(worst);
+        if after < WRONG {
+            return if after < ALONE * before { found } else { Vec::new() };
+        }
+    }
+    // Nearly all contradict each other: that is no single electrode's fault.
+    Vec::new()
+}
+
+/// Mean square of what the logarithms are off, in what noise makes of them.
+fn disagreement(readings: &Readings, electrodes: &[usize], drive_v: f64, noise_v: f64) -> f64 {
+    let n = electrodes.len();
+    let ratio = |g: usize, e: usize| (1.0 - readings.at(g, e) / drive_v).max(SMALLEST);
+    let log = |i: usize, j: usize| {
+        let (g, e) = (electrodes[i], electrodes[j]);
+        (ratio(g, e) / ratio(e, g)).ln()
+    };
+    // Least squares: the load of each is a mean.
+    let loads: Vec<_> =
+        (0..n).map(|i| -(0..n).filter(|j| *j != i).map(|j| log(i, j)).sum::<f64>() / n as f64).collect();
+    let mut sum = 0.0;
+    for i in 0..n {
+        for j in 0..i {
+            let (g, e) = (electrodes[i], electrodes[j]);
+            let noise = noise_v / drive_v * ratio(g, e).recip().hypot(ratio(e, g).recip());
+            let log_deviation = noise.hypot(UNEVEN * log(i, j).abs());
+            sum += ((log(i, j) - (loads[j] - loads[i])) / log_deviation).powi(2);
+        }
+    }
+    let free = (n * (n - 1) / 2).saturating_sub(n - 1).max(1);
+    sum / free as f64
+}

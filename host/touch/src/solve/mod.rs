@@ -1,0 +1,191 @@
+//! From readings back to touch: one file a method, one trait.
+
+use std::time::Duration;
+
+mod auto;
+mod balance;
+mod bsbl;
+mod contacts;
+mod guard;
+mod health;
+mod interpolate;
+mod kernel;
+mod lambda;
+mod laplace;
+mod linear;
+mod locate;
+mod method;
+mod nonlinear;
+mod nonnegative;
+mod noser;
+mod problem;
+#[cfg(test)]
+mod samples;
+mod tikhonov;
+mod track;
+mod tsvd;
+mod tv;
+
+pub use self::auto::Auto;
+pub use self::bsbl::Bsbl;
+pub use self::contacts::{ContactSettings, Contacts};
+pub use self::guard::Guard;
+pub use self::health::{ElectrodeFault, faulty_electrodes};
+pub use self::kernel::{Kernel, KernelSolver, Press, Presses, PressesError, Strength, TeachError};
+pub use self::lambda::Lambda;
+use self::lambda::Spectrum;
+pub use self::method::Method;
+pub use self::nonlinear::{Nonlinear, NonlinearSettings};
+pub use self::nonnegative::Nonnegative;
+pub use self::problem::Problem;
+pub use self::tikhonov::{Tikhonov, Variant};
+pub use self::tsvd::Tsvd;
+pub use self::tv::Tv;
+use tactomo_physics::readings::Readings;
+
+/// A method that reads touch from the readings of a frame.
+pub trait Solver: Send {
+    /// Name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// What the readings, less the readings at rest, say of the contacts.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError>;
+
+    /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.
+    fn reset(&mut self) {}
+
+    /// Asks for answers that take no longer than this on the average; `None` for the best ones, however long they take, which is
+    /// how a solver begins.
+    fn keep_within(&mut self, period: Option<Duration>) {
+        let _ = period;
+    }
+}
+
+/// What a solver found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Solution {
+    /// Contact conductance per area at each node of the model's image mesh (S/m2), if the method makes an image. A density,
+    /// so that it does not change where the mesh is finer; times the nodes' areas, it is conductance (S).
+    pub image_s_per_m2: Option<Vec<f32>>,
+    /// Contacts found.
+    pub contacts: Vec<FoundContact>,
+    /// How far the readings are from those of what was found: root mean square, in standard deviations of the noise; if the
+    /// method predicts readings. About 1 where noise is all that is left.
+    pub residual: Option<f64>,
+    /// What to know before this is believed.
+    pub flags: Flags,
+    /// What was chosen and why, by a solver that chooses.
+    pub choice: Option<Choice>,
+}
+
+/// What to know before a solution is believed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Flags {
+    /// Readings are at an end of the converter's range, or contacts conduct so well that more would change nothing.
+    pub saturated: bool,
+    /// The readings are not what the model can give for what was found, by more than noise and the model's own error.
+    pub misfit: bool,
+    /// The method stopped before its end, to keep a limit of time or steps.
+    pub unfinished: bool,
+    /// Electrodes that were left out.
+    pub excluded: Vec<usize>,
+}
+
+/// What a solver chose.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Choice {
+    /// The model of the scene: `nothing`, `2 contacts`, `image`.
+    pub what: String,
+    /// Why, with the figures that decided.
+    pub why: String,
+}
+
+/// One contact found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct FoundContact {
+    /// Centre, x (m).
+    pub x_m: f64,
+    /// Centre, y (m).
+    pub y_m: f64,
+    /// Centre, z (m): on a curved detector; zero on a flat one.
+    #[serde(skip_serializing_if = "tactomo_physics::geometry::is_zero")]
+    pub z_m: f64,
+    /// Conductance (S).
+    pub conductance_s: f64,
+    /// Radius (m), where the readings tell it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_m: Option<f64>,
+    /// Force (N), on a calibrated detector.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<f64>,
+    /// Standard errors, of a method that knows them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<Uncertainty>,
+    /// The same number from frame to frame for the same contact, of a method that follows contacts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<u32>,
+}
+
+/// Standard errors of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Uncertainty {
+    /// Of x (m).
+    pub x_m: f64,
+    /// Of y (m).
+    pub y_m: f64,
+    /// Correlation of the errors of x and y, -1 to 1.
+    pub correlation: f64,
+    /// Of the conductance (S).
+    pub conductance_s: f64,
+}
+
+impl FoundContact {
+    /// A contact on a flat detector.
+    pub fn flat(x_m: f64, y_m: f64, conductance_s: f64) -> Self {
+        Self { x_m, y_m, conductance_s, ..Self::default() }
+    }
+}
+
+/// Why a solver cannot answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Readings of another number of electrodes.
+    #[error("readings of {found} electrodes, but the detector has {expected}")]
+    Electrodes {
+        /// In the readings.
+        found: usize,
+        /// In the detector.
+        expected: usize,
+    },
+    /// A reading that is not a number.
+    #[error("the reading of electrode {e} with electrode {g} grounded is not a finite number")]
+    NotFinite {
+        /// Grounded electrode.
+        g: usize,
+        /// Electrode read.
+        e: usize,
+    },
+}
+
+/// Checks that there is a finite number for each pair of `electrodes`.
+///
+/// # Errors
+/// [`SolveError`], which says what is wrong.
+pub fn check(readings: &Readings, electrodes: usize) -> Result<(), SolveError> {
+    check_count(readings, electrodes)?;
+    match readings.volts().iter().position(|volts| !volts.is_finite()) {
+        Some(index) => Err(SolveError::NotFinite { g: index / electrodes, e: index % electrodes }),
+        None => Ok(()),
+    }
+}
+
+/// Checks that there is a number for each pair of `electrodes`.
+fn check_count(readings: &Readings, electrodes: usize) -> Result<(), SolveError> {
+    match readings.electrodes() == electrodes {
+        true => Ok(()),
+        false => Err(SolveError::Electrodes { found: readings.electrodes(), expected: electrodes }),
+    }
+}

@@ -1,0 +1,60 @@
+//! What solvers are made for.
+
+use std::sync::Arc;
+
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::jacobian::Jacobian;
+use tactomo_physics::forward::{ForwardModel, Through};
+
+/// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
+#[derive(Clone)]
+pub struct Problem {
+    /// The model. Its fields do not depend on drive voltage and converter, so it serves any board.
+    pub model: Arc<dyn ForwardModel>,
+    /// The linear theory for the detector as measured, and the mesh that solvers' images are on.
+    pub jacobian: Arc<Jacobian>,
+}
+
+impl Problem {
+    /// The problem of a model, measured as its detector says.
+    pub fn new(model: impl Into<Arc<dyn ForwardModel>>) -> Self {
+        let model = model.into();
+        let jacobian = Arc::new(Jacobian::of(&*model));
+        Self { model, jacobian }
+    }
+
+    /// The same with another linear theory, on a mesh of its own.
+    pub fn with_jacobian(self, jacobian: Jacobian) -> Self {
+        Self { jacobian: Arc::new(jacobian), ..self }
+    }
+
+    /// The same with drive voltage, multiplexer and converter of `detector`.
+    pub fn measured_as(&self, detector: &Detector) -> Self {
+        self.clone().with_jacobian(Jacobian { detector: detector.clone(), ..(*self.jacobian).clone() })
+    }
+
+    /// The detector as measured.
+    pub fn detector(&self) -> &Detector {
+        &self.jacobian.detector
+    }
+
+    /// Mean distance of electrodes (m): the side of a square that each has for itself.
+    pub fn spacing_m(&self) -> f64 {
+        let area_m2: f64 = self.jacobian.image_mesh.node_areas_m2.iter().sum();
+        (area_m2 / self.detector().electrodes.len().max(1) as f64).sqrt()
+    }
+
+    /// The problem through some of its electrodes, in this order.
+    pub fn through(&self, kept: &[usize]) -> Self {
+        let mut detector = self.detector().clone();
+        detector.electrodes = kept.iter().map(|e| detector.electrodes[*e]).collect();
+        let jacobian = Jacobian {
+            detector,
+            fields_ohm: self.jacobian.fields_ohm.select_columns(kept),
+            electrode_fields_ohm: self.jacobian.electrode_fields_ohm.select_rows(kept).select_columns(kept),
+            ..(*self.jacobian).clone()
+        };
+        let model = Through::new(Arc::clone(&self.model), kept.to_vec());
+        Self { model: Arc::new(model), jacobian: Arc::new(jacobian) }
+    }
+}
