@@ -7,6 +7,9 @@ pub mod serial;
 use std::io;
 use std::path::PathBuf;
 
+use tactomo_physics::scene::{Contact, SceneName};
+use tactomo_physics::simulate::Fault;
+
 use crate::record::RecordError;
 use discover::NoBoard;
 use replay::ReplayLink;
@@ -28,6 +31,63 @@ pub trait Link: Send {
     /// # Errors
     /// If the link is gone or does not take bytes in time.
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Does what a person asks of a simulated detector or a recording; others have nothing to be asked.
+    fn control(&mut self, control: &Control) {
+        let _ = control;
+    }
+
+    /// What a person may ask of it, and how that stands.
+    fn playing(&self) -> Playing {
+        Playing::Board
+    }
+}
+
+/// What a person asks of a link that is no real board.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Control {
+    /// Presses on the simulated detector with these and no others; with none, lets go.
+    Press(Vec<Contact>),
+    /// Plays another scene on the simulated detector, from its beginning.
+    Scene(SceneName),
+    /// Gives the simulated detector these faults and no others.
+    Faults(Vec<Fault>),
+    /// Holds the recording, or goes on.
+    Pause(bool),
+    /// Goes on with the recording from here (s from its beginning).
+    Seek(f64),
+    /// Plays the recording so many times as fast as it was recorded; infinite for as fast as it can be read.
+    Speed(f64),
+    /// Begins the recording again where it ends, or not.
+    Loop(bool),
+}
+
+/// What a link plays, and what a person may ask of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Playing {
+    /// A real board: nothing.
+    #[default]
+    Board,
+    /// A simulated detector.
+    Simulated {
+        /// What touches it, beside the presses.
+        scene: SceneName,
+        /// What is wrong with it.
+        faults: Vec<Fault>,
+    },
+    /// A recording.
+    Recording {
+        /// Where it is (s from its beginning).
+        position_s: f64,
+        /// How long it is (s).
+        length_s: f64,
+        /// How many times as fast as it was recorded it is played.
+        speed: f64,
+        /// Whether it is held.
+        paused: bool,
+        /// Whether it begins again where it ends.
+        looped: bool,
+    },
 }
 
 /// Something that gives a [`Link`], and another one when that is lost.

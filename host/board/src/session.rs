@@ -16,7 +16,7 @@ const SILENCE: Duration = Duration::from_millis(1500);
 
 /// Settings of the scan that the user asks for; what is `None` stays as the board has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Wish {
+pub struct RequestedSettings {
     /// Wait between grounding an electrode and its first conversion, in microseconds (us).
     pub settle_us: Option<u16>,
     /// Base-2 logarithm of the conversions averaged into one reading.
@@ -25,8 +25,8 @@ pub struct Wish {
     pub max_frames_per_s: Option<u16>,
 }
 
-impl Wish {
-    /// The settings `now`, with the wish fulfilled.
+impl RequestedSettings {
+    /// The settings `now`, with those that are asked for.
     fn over(&self, now: Settings) -> Settings {
         Settings {
             settle_us: self.settle_us.unwrap_or(now.settle_us),
@@ -69,7 +69,7 @@ enum Stage {
 /// The talk with one board, from the opening of its link on.
 #[derive(Debug)]
 pub struct Session {
-    wish: Wish,
+    settings: RequestedSettings,
     stage: Stage,
     /// A command to be sent at once.
     due: Option<Command>,
@@ -79,8 +79,8 @@ pub struct Session {
 
 impl Session {
     /// The talk with a board of which nothing is known yet.
-    pub fn new(wish: Wish) -> Self {
-        Self { wish, stage: Stage::Asking, due: None, heard: None }
+    pub fn new(settings: RequestedSettings) -> Self {
+        Self { settings, stage: Stage::Asking, due: None, heard: None }
     }
 
     /// The command to send now, if any.
@@ -97,12 +97,12 @@ impl Session {
 
     /// Takes a Hello: an answer, or a board that has started anew and has to be told everything again.
     pub fn hello(&mut self, hello: &Hello, now: Instant) {
-        let wanted = self.wish.over(hello.settings);
+        let wanted = self.settings.over(hello.settings);
         let refused = self.stage == Stage::Configuring(wanted) && hello.settings != wanted;
         if hello.settings == wanted || refused {
             if refused {
                 tracing::warn!("the board keeps {:?} instead of {wanted:?}", hello.settings);
-                self.wish = Wish::default();
+                self.settings = RequestedSettings::default();
             }
             self.stage = Stage::Started;
             self.due = Some(Command::Start);
@@ -128,7 +128,7 @@ impl Session {
 pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError> {
     let begin = Instant::now();
     let mut receiver = BoardReceiver::default();
-    let mut session = Session::new(Wish::default());
+    let mut session = Session::new(RequestedSettings::default());
     let mut buffer = [0; 512];
     while Instant::now() < deadline {
         if let Some(command) = session.command(Instant::now()) {
@@ -190,7 +190,7 @@ mod tests {
     #[test]
     fn hello_is_asked_for_until_it_comes_and_then_the_board_is_started() {
         let begin = Instant::now();
-        let mut session = Session::new(Wish::default());
+        let mut session = Session::new(RequestedSettings::default());
         assert_eq!(session.command(begin), Some(Command::Hello));
         assert_eq!(session.command(begin), None);
         let later = begin + ASK_EVERY;
@@ -204,14 +204,14 @@ mod tests {
     #[test]
     fn wishes_are_sent_once_and_a_board_that_keeps_its_own_is_started_all_the_same() {
         let now = Instant::now();
-        let mut session = Session::new(Wish { settle_us: Some(70), ..Wish::default() });
+        let mut session = Session::new(RequestedSettings { settle_us: Some(70), ..RequestedSettings::default() });
         let wanted = Settings { settle_us: 70, ..Settings::default() };
         session.hello(&hello(Settings::default()), now);
         assert_eq!(session.command(now), Some(Command::Configure(wanted)));
         session.hello(&hello(wanted), now);
         assert_eq!(session.command(now), Some(Command::Start));
 
-        let mut session = Session::new(Wish { settle_us: Some(70), ..Wish::default() });
+        let mut session = Session::new(RequestedSettings { settle_us: Some(70), ..RequestedSettings::default() });
         session.hello(&hello(Settings::default()), now);
         session.command(now);
         session.hello(&hello(Settings::default()), now);
@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn a_board_that_says_hello_by_itself_is_started_again() {
         let now = Instant::now();
-        let mut session = Session::new(Wish::default());
+        let mut session = Session::new(RequestedSettings::default());
         session.hello(&hello(Settings::default()), now);
         session.command(now);
         session.frame(now);

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use tactomo::board::link::Source;
-use tactomo::board::session::Wish;
+use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::run::pipeline;
@@ -86,7 +86,7 @@ pub struct Show {
     /// What becomes of the bytes.
     pub picture: PictureArgs,
     /// Settings asked of the board.
-    pub wish: Wish,
+    pub settings: RequestedSettings,
     /// Time from Hello to the end.
     pub seconds: Option<Duration>,
     /// Where all bytes are kept.
@@ -102,9 +102,9 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         Some(file) => (source::recording(file, args.speed), None),
         None => source::board(&args.board, &args.picture.detector, &detector)?,
     };
-    let wish = args.board.settings.wish();
+    let settings = args.board.settings.requested();
     let Args { picture, seconds, record, elf, .. } = args;
-    show(Show { source, mouse, wish, detector, picture, seconds, record, elf })
+    show(Show { source, mouse, settings, detector, picture, seconds, record, elf })
 }
 
 /// Serves the page, or only counts, until the end.
@@ -137,7 +137,7 @@ fn problem(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Problem> {
 fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
     let detector = show.detector.clone();
     Ok(Plan {
-        wish: show.wish,
+        settings: show.settings,
         solving: Some(Solving { method: show.picture.solver, make: make_solver(problem) }),
         recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
         board_log: recording::board_log(show.elf.as_deref())?,

@@ -37,7 +37,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let detector = args.detector.get()?;
     let (mut source, _) = source::board(&args.board, &args.detector, &detector)?;
     let plan = Plan {
-        wish: args.board.settings.wish(),
+        settings: args.board.settings.requested(),
         solving: None,
         recorder: recording::begin(Some(&args.file), &detector, source.name())?,
         board_log: BoardLog::unread(),

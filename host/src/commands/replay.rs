@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tactomo::board::session::Wish;
+use tactomo::board::session::RequestedSettings;
 
 use super::live::{self, PictureArgs, Show};
 use super::source;
@@ -35,7 +35,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         mouse: None,
         detector: args.picture.detector.get()?,
         picture: args.picture,
-        wish: Wish::default(),
+        settings: RequestedSettings::default(),
         seconds: None,
         record: None,
         elf: args.elf,

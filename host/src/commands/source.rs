@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::ArgGroup;
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::link::{AnyBoard, NamedPort, Opened, Recording, Source};
-use tactomo::board::session::Wish;
+use tactomo::board::session::RequestedSettings;
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::detector::Detector;
 use tactomo::run::plan::Press;
@@ -65,8 +65,8 @@ impl BoardArgs {
 
 impl SettingsArgs {
     /// What is asked of the board.
-    pub fn wish(&self) -> Wish {
-        Wish { settle_us: self.settle_us, average_log2: self.average, max_frames_per_s: self.max_fps }
+    pub fn requested(&self) -> RequestedSettings {
+        RequestedSettings { settle_us: self.settle_us, average_log2: self.average, max_frames_per_s: self.max_fps }
     }
 }
 

@@ -9,11 +9,15 @@ pub mod plan;
 pub mod solvers;
 pub mod statistics;
 
+use std::path::PathBuf;
+use std::time::Instant;
+
+use tactomo_board::link::{Control, Playing};
+use tactomo_board::session::RequestedSettings;
 use tactomo_protocol::{Hello, Status};
 
 use self::solvers::SolverState;
 use tactomo_physics::readings::Readings;
-use tactomo_physics::scene::Contact;
 use tactomo_touch::solve::{Method, Solution};
 
 /// What there is to show at a moment.
@@ -29,6 +33,12 @@ pub struct Snapshot {
     pub solver: Option<SolverState>,
     /// Counts since the start.
     pub statistics: Statistics,
+    /// What the link plays, and what a person may ask of it.
+    pub playing: Playing,
+    /// The recording that is being kept, if one is.
+    pub recording: Option<PathBuf>,
+    /// What was asked for last and cannot be, for the person who asked.
+    pub refused: Option<String>,
 }
 
 /// How the link to the board fares.
@@ -54,6 +64,8 @@ pub struct FrameSnapshot {
     pub sequence: u64,
     /// Board time at the start of the scan, unwrapped, in microseconds (us).
     pub board_time_us: u64,
+    /// When its last byte came.
+    pub arrived: Instant,
     /// What happened during the scan.
     pub status: Status,
     /// Readings as measured (V).
@@ -71,12 +83,16 @@ pub struct Statistics {
     pub frames: u64,
     /// Frames a second over the last second.
     pub frames_per_s: f64,
-    /// Frames that the sequence numbers say are missing.
+    /// Frames that the sequence numbers say are missing: the link or the board lost them.
     pub dropped: u64,
+    /// Frames that came and were not solved by themselves, because newer ones had come.
+    pub skipped: u64,
+    /// Solved frames a second, over the last second.
+    pub solved_per_s: f64,
     /// Stretches of bytes that were no message.
     pub corrupt: u64,
-    /// From the last byte of a frame received to its image ready.
-    pub latency: Latency,
+    /// Age of answers when they are ready: since the last byte of their frame came.
+    pub age: Latency,
 }
 
 /// How the latencies are distributed, in microseconds (us).
@@ -90,15 +106,17 @@ pub struct Latency {
     pub max: f64,
 }
 
-/// What a page asks of the pipeline.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a page asks.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// Takes the readings at rest anew: nothing must press.
+    /// Takes the baseline anew: nothing must press.
     Rezero,
     /// Reads the touch by another method.
     Solver(Method),
-    /// Presses on the simulated detector here, instead of any earlier press.
-    Press(Contact),
-    /// Ends the press.
-    Release,
+    /// Asks the board for other settings.
+    Settings(RequestedSettings),
+    /// Begins to keep a recording in a new file, or ends it.
+    Record(bool),
+    /// Asks something of a simulated detector or a recording.
+    Control(Control),
 }

@@ -13,10 +13,11 @@ use super::plan::{Ends, LiveError, Plan, Summary};
 use super::solvers::Solvers;
 use super::statistics::Meter;
 use super::{FrameSnapshot, LinkState, Request, Snapshot};
+use tactomo_board::link::Control;
 use tactomo_board::link::{Link, Source};
 use tactomo_board::pace::Pace;
 use tactomo_board::sequence::{Place, Sequence};
-use tactomo_board::session::{self, GreetError, Session, Wish};
+use tactomo_board::session::{self, GreetError, RequestedSettings, Session};
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{Method, Solution};
 
@@ -82,6 +83,7 @@ struct Pipeline {
 struct Newest {
     frame: tactomo_protocol::FrameHead,
     place: Place,
+    arrived: Instant,
     solution: Solution,
 }
 
@@ -156,7 +158,7 @@ impl Pipeline {
 
     /// Talks with the board on `link` to the end.
     fn talk(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
-        let mut talk = Talk::new(self.plan.wish);
+        let mut talk = Talk::new(self.plan.settings);
         let mut buffer = [0; READ_BYTES];
         self.sequence.restart();
         self.enter(LinkState::Waiting);
@@ -255,7 +257,7 @@ impl Pipeline {
             interpreter.keep_within(solver_time(&self.pace));
         }
         self.meter.frame(received, Instant::now(), place.dropped);
-        self.newest = Some(Newest { frame: frame.head, place, solution });
+        self.newest = Some(Newest { frame: frame.head, place, arrived: received, solution });
         self.fresh = true;
         Ok(())
     }
@@ -270,8 +272,7 @@ impl Pipeline {
             match (request, &self.plan.press, &mut self.interpreter) {
                 (Request::Rezero, _, Some((_, interpreter))) => interpreter.rezero(),
                 (Request::Solver(method), ..) => self.ask_for(method),
-                (Request::Press(contact), Some(press), _) => press(Some(contact)),
-                (Request::Release, Some(press), _) => press(None),
+                (Request::Control(Control::Press(contacts)), Some(press), _) => press(contacts.first().copied()),
                 _ => {}
             }
         }
@@ -311,6 +312,7 @@ impl Pipeline {
             frame: frame.map(|(newest, (_, interpreter))| newest.snapshot(interpreter)),
             solver: self.solvers.as_ref().map(Solvers::state),
             statistics,
+            ..Snapshot::default()
         };
         self.ends.snapshots.send_replace(Arc::new(snapshot));
     }
@@ -324,7 +326,7 @@ impl Pipeline {
             frames_per_s: self.meter.overall_frames_per_s(),
             dropped: statistics.dropped,
             corrupt: statistics.corrupt,
-            latency_us: statistics.latency,
+            latency_us: statistics.age,
         }
     }
 }
@@ -334,6 +336,7 @@ impl Newest {
         FrameSnapshot {
             sequence: self.place.sequence,
             board_time_us: self.place.time_us,
+            arrived: self.arrived,
             status: self.frame.status,
             readings: interpreter.readings().clone(),
             solution: self.solution.clone(),
@@ -343,7 +346,7 @@ impl Newest {
 }
 
 impl Talk {
-    fn new(wish: Wish) -> Self {
+    fn new(wish: RequestedSettings) -> Self {
         Self {
             session: Session::new(wish),
             receiver: BoardReceiver::default(),

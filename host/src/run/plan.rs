@@ -13,7 +13,7 @@ use tactomo_board::board_log::BoardLog;
 use tactomo_board::link::SourceError;
 use tactomo_board::measured::Mismatch;
 use tactomo_board::record::{RecordError, Recorder};
-use tactomo_board::session::{GreetError, Wish};
+use tactomo_board::session::{GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::Contact;
 use tactomo_touch::solve::{Method, SolveError, Solver};
@@ -30,7 +30,7 @@ pub struct Plan {
     /// The detector that is connected; drive and ADC are the board's to tell.
     pub detector: Detector,
     /// Settings asked of the board.
-    pub wish: Wish,
+    pub settings: RequestedSettings,
     /// What reads the touch; `None` only receives.
     pub solving: Option<Solving>,
     /// Keeps the bytes.

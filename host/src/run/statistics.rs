@@ -64,7 +64,9 @@ impl Meter {
             frames_per_s,
             dropped: self.dropped,
             corrupt: self.corrupt,
-            latency: self.latency.summary_us(),
+            skipped: 0,
+            solved_per_s: frames_per_s,
+            age: self.latency.summary_us(),
         }
     }
 
@@ -176,7 +178,7 @@ mod tests {
         assert_eq!((statistics.frames, statistics.dropped, statistics.corrupt), (251, 1, 3));
         assert!((statistics.frames_per_s - 100.0).abs() < 1.5, "{}", statistics.frames_per_s);
         assert!((meter.overall_frames_per_s() - 100.0).abs() < 1e-6);
-        assert_eq!(statistics.latency.max, 20.0);
+        assert_eq!(statistics.age.max, 20.0);
         let quiet = meter.statistics(start + Duration::from_secs(60));
         assert!(quiet.frames_per_s < 2.0, "a silent board has no frame rate");
     }

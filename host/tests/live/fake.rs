@@ -7,7 +7,7 @@ use std::sync::{Arc, mpsc};
 
 use tactomo::board::board_log::BoardLog;
 use tactomo::board::link::{Link, Source, SourceError};
-use tactomo::board::session::Wish;
+use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, Plan};
 use tactomo::run::{Request, Snapshot};
@@ -150,7 +150,7 @@ impl Source for Links {
 pub fn plan() -> Plan {
     Plan {
         detector: Detector::preset(Detector::DEFAULT).unwrap(),
-        wish: Wish::default(),
+        settings: RequestedSettings::default(),
         solving: None,
         recorder: None,
         board_log: BoardLog::unread(),

@@ -3,9 +3,10 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use tactomo::board::link::{Link, Opened, Recording};
+use tactomo::board::link::Control;
+use tactomo::board::link::{Control, Link, Opened, Recording};
 use tactomo::board::record::{Header, Recorder};
-use tactomo::board::session::{GreetError, Wish, greet};
+use tactomo::board::session::{GreetError, RequestedSettings, greet};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
 use tactomo::run::plan::{LiveError, MakeSolver, Plan, Solving};
@@ -54,9 +55,9 @@ fn a_board_with_other_electrodes_than_the_detector_is_refused() {
 #[test]
 fn settings_that_are_asked_for_reach_the_board() {
     let settings = Settings { settle_us: 70, average_log2: 3, ..Settings::default() };
-    let wish = Wish { settle_us: Some(70), average_log2: Some(3), max_frames_per_s: None };
+    let wanted = RequestedSettings { settle_us: Some(70), average_log2: Some(3), max_frames_per_s: None };
     let (ends, other) = ends();
-    pipeline::run(&mut opened(FakeBoard::new(5)), Plan { wish, ..plan() }, ends).unwrap();
+    pipeline::run(&mut opened(FakeBoard::new(5)), Plan { settings: wanted, ..plan() }, ends).unwrap();
     assert_eq!(other.snapshots.borrow().hello.as_ref().unwrap().settings, settings);
 }
 
@@ -95,7 +96,8 @@ fn presses_reach_the_simulated_detector_and_the_stop_ends_the_run() {
     let seen = Arc::clone(&pressed);
     let (ends, other) = ends();
     let contact = Contact::flat(0.01, 0.0, 0.002, 1e-3);
-    for request in [Request::Press(contact), Request::Release, Request::Rezero] {
+    let press = |contacts: &[Contact]| Request::Control(Control::Press(contacts.to_vec()));
+    for request in [press(&[contact]), press(&[]), Request::Rezero] {
         other.requests.send(request).unwrap();
     }
     let press: tactomo::run::plan::Press = Box::new(move |contact| seen.lock().unwrap().push(contact));

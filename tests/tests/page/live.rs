@@ -9,7 +9,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use tactomo::board::board_log::BoardLog;
 use tactomo::board::link::Opened;
-use tactomo::board::session::Wish;
+use tactomo::board::session::RequestedSettings;
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::detector::Detector;
 use tactomo::forward::Auto;
@@ -104,7 +104,7 @@ fn run(
     let board = SimulatedBoard::start(detector, Box::new(physics), Options::default())?;
     let plan = Plan {
         detector: detector.clone(),
-        wish: Wish::default(),
+        settings: RequestedSettings::default(),
         solving: Some(Solving {
             method: Method::Auto,
             make: Arc::new(move |method, detector| Ok(Box::new(Guard::new(method, &problem.measured_as(detector))?))),

@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
+use tactomo::board::link::Control;
 use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
@@ -44,6 +45,7 @@ impl Rig {
 
     fn publish(&self, sequence: u64) {
         let frame = FrameSnapshot {
+            arrived: std::time::Instant::now(),
             sequence,
             board_time_us: 0,
             status: Default::default(),
@@ -183,13 +185,13 @@ fn a_page_presses_on_the_detector_and_lets_go_when_it_leaves() -> Result<()> {
     page.say(r#"{"press":{"x_m":0.031,"y_m":0}}"#)?;
     page.say(r#"{"press":{"x_m":0.01,"y_m":-0.02}}"#)?;
     let contact = Contact::flat(0.01, -0.02, 0.003, 1e-4);
-    assert_eq!(rig.request()?, Request::Press(contact), "0.031 m is off the detector");
+    assert_eq!(rig.request()?, Request::Control(Control::Press(vec![contact])), "0.031 m is off the detector");
     page.say("\"rezero\"")?;
     assert_eq!(rig.request()?, Request::Rezero);
     page.say(r#"{"solver":"contacts"}"#)?;
     assert_eq!(rig.request()?, Request::Solver(Method::Contacts));
     drop(page);
-    assert_eq!(rig.request()?, Request::Release);
+    assert_eq!(rig.request()?, Request::Control(Control::Press(Vec::new())));
     Ok(())
 }
 

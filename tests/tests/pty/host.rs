@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tactomo::board::board_log::BoardLog;
 use tactomo::board::link::NamedPort;
 use tactomo::board::link::serial::DEFAULT_BAUD;
-use tactomo::board::session::Wish;
+use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, LiveError, Plan, Summary};
 use tactomo::run::{Request, Snapshot, pipeline};
@@ -33,7 +33,7 @@ impl Host {
         let stop = Arc::new(AtomicBool::new(false));
         let plan = Plan {
             detector: Detector::preset("square-60").unwrap(),
-            wish: Wish::default(),
+            settings: RequestedSettings::default(),
             solving: None,
             recorder: None,
             board_log: BoardLog::unread(),

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use tactomo_board::link::Control;
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
 
@@ -25,7 +26,7 @@ pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
     let mut page = Page::new(shared);
     let reason = page.talk(&mut socket).await;
     if page.presses {
-        page.ask(Request::Release);
+        page.ask(Request::Control(Control::Press(Vec::new())));
     }
     if let Some(reason) = reason {
         let frame = CloseFrame { code: close_code::POLICY, reason: reason.into() };
@@ -102,7 +103,7 @@ impl<'a> Page<'a> {
             }
             PageMessage::Release => {
                 self.presses = false;
-                self.ask(Request::Release);
+                self.ask(Request::Control(Control::Press(Vec::new())));
             }
         }
         Ok(())
@@ -116,7 +117,8 @@ impl<'a> Page<'a> {
         if let Some([x_m, y_m, z_m]) = detector.place_m([x_m, y_m]).filter(|_| within) {
             self.presses = true;
             let Finger { radius_m, conductance_s } = finger;
-            self.ask(Request::Press(Contact { x_m, y_m, z_m, radius_m, conductance_s }));
+            let contact = Contact { x_m, y_m, z_m, radius_m, conductance_s };
+            self.ask(Request::Control(Control::Press(vec![contact])));
         }
     }
 

@@ -70,6 +70,7 @@ mod tests {
         let frame = FrameSnapshot {
             sequence: (7 << 32) + 9,
             board_time_us: 0,
+            arrived: std::time::Instant::now(),
             status: Default::default(),
             readings: Readings::from_fn(2, |g, e| (2 * g + e) as f64),
             solution,

@@ -168,7 +168,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
             frames_per_s: counts.frames_per_s,
             dropped: counts.dropped,
             corrupt: counts.corrupt,
-            latency_us: counts.latency,
+            latency_us: counts.age,
         },
         rezeroing: snapshot.frame.as_ref().is_some_and(|frame| frame.rezeroing),
         rezeros,
