@@ -3,7 +3,6 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use tactomo::board::link::Control;
 use tactomo::board::link::{Control, Link, Opened, Recording};
 use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::{GreetError, RequestedSettings, greet};
