@@ -1,43 +1,43 @@
 //! No more model than the scene needs.
 //!
 //! Nothing, one contact, two, up to five, an image: the first that explains the readings to within noise and the model's
-//! error is the answer, and the solution says which and why. Contacts are followed from frame to frame, which costs least,
-//! and searched anew only when they no longer explain the readings, or now and then, when their number may have changed by less than one
-//! frame's noise. Where frames come faster than the thorough answer, it is given now and then and a cheaper one between.
+//! error is the answer, and the solution says which and why. What is known is followed from frame to frame, which costs least,
+//! and searched anew only when it no longer explains the readings, or now and then.
 
-use std::time::{Duration, Instant};
+use std::sync::Arc;
 
-use super::contacts::Effort;
-use super::{Choice, ContactSettings, Contacts, Lambda, Problem, Solution, SolveError, Solver, Tikhonov, Variant};
-use super::{Nonlinear, NonlinearSettings};
+use super::contacts::{ContactFinder, ContactFollower, ContactSearcher};
+use super::follow::{Followed, Follower, Known, Lead, Parts, Searcher, follow_and_search};
+use super::{Choice, ContactSettings, Nonlinear, NonlinearSettings, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
-/// Weight of the newest frame in the mean residual of a scene.
-const NEWEST: f64 = 0.1;
-/// Rise of that mean over what the last search left, or over what noise alone leaves, that asks for a new search.
-const RISE: f64 = 0.12;
 /// After so many frames that contacts did not explain, they are tried again; doubled each time, up to the second.
 const PATIENCE: [u32; 2] = [2, 64];
-/// A frame that takes longer than its period is paid back so many times: so few of them are late.
-const INTEREST: u32 = 3;
-/// Longest time that may be owed.
-const CREDIT: Duration = Duration::from_secs(1);
 
 /// Chooses the model of the scene.
 pub struct Auto {
-    contacts: Option<Contacts>,
+    follower: AutoFollower,
+    searcher: AutoSearcher,
+}
+
+/// Follows whichever model was chosen last.
+struct AutoFollower {
+    contacts: Option<ContactFollower>,
     image: Nonlinear,
-    linear: Tikhonov,
-    /// Mean square residual after the last search, and its running mean.
-    searched: f64,
-    mean: f64,
+    /// Why an image is followed; `None` while contacts are.
+    imaged: Option<String>,
     /// Frames for which contacts are not tried, and how many it will be next time.
     skip: u32,
     patience: u32,
-    period: Option<Duration>,
-    /// Time that frames took beyond their period.
-    owed: Duration,
+}
+
+/// Chooses the model.
+struct AutoSearcher {
+    contacts: Option<ContactSearcher>,
+    image: Nonlinear,
+    /// What the image that was found last leaves.
+    residual: Option<f64>,
 }
 
 impl Auto {
@@ -46,99 +46,18 @@ impl Auto {
     /// # Errors
     /// [`ForwardError`] if the model cannot be had on a coarser image.
     pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
-        Ok(Self {
-            // A model without fields of single contacts has images only.
-            contacts: Contacts::new(problem, ContactSettings::of(problem)).ok(),
-            image: Nonlinear::new(problem, NonlinearSettings::default())?,
-            linear: Tikhonov::new(&problem.jacobian, Lambda::default(), Variant::Balanced),
-            searched: 0.0,
-            mean: 0.0,
+        // A model without fields of single contacts has images only.
+        let finder = ContactFinder::new(problem, ContactSettings::of(problem)).ok().map(Arc::new);
+        let image = Nonlinear::new(problem, NonlinearSettings::default())?;
+        let follower = AutoFollower {
+            contacts: finder.clone().map(ContactFollower::new),
+            image: image.clone(),
+            imaged: None,
             skip: 0,
             patience: PATIENCE[0],
-            period: None,
-            owed: Duration::ZERO,
-        })
-    }
-
-    /// The answer that the scene needs.
-    fn choose(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        if self.skip > 0 {
-            self.skip -= 1;
-            return self.image(readings, "contacts did not explain the frames before".to_owned());
-        }
-        let Some(found) = self.contacts(readings)? else {
-            return self.image(readings, "this model has no fields of single contacts".to_owned());
         };
-        if found.contacts.is_empty() {
-            self.patience = PATIENCE[0];
-            return Ok(chosen(found, "nothing", "no place's reading stands out of the noise".to_owned()));
-        }
-        let left = found.residual.unwrap_or_default();
-        if !found.flags.misfit {
-            self.patience = PATIENCE[0];
-            let what = counted(found.contacts.len());
-            return Ok(chosen(found, &what, format!("they leave {left:.2} of the noise")));
-        }
-        self.skip = self.patience;
-        self.patience = (2 * self.patience).min(PATIENCE[1]);
-        let why = format!("{} would leave {left:.1} of the noise", counted(found.contacts.len()));
-        let image = self.image(readings, why)?;
-        // An image that explains less than contacts do is no better.
-        match image.residual {
-            Some(residual) if residual > left => {
-                let what = counted(found.contacts.len());
-                Ok(chosen(found, &what, format!("they leave {left:.1} of the noise, an image {residual:.1}")))
-            }
-            _ => Ok(image),
-        }
+        Ok(Self { follower, searcher: AutoSearcher { contacts: finder.map(ContactSearcher::new), image, residual: None } })
     }
-
-    /// Contacts, searched anew when their residual has risen; `None` if there is no such solver.
-    fn contacts(&mut self, readings: &Readings) -> Result<Option<Solution>, SolveError> {
-        let Some(contacts) = &mut self.contacts else { return Ok(None) };
-        let followed = contacts.is_following();
-        let risen = followed && self.mean > (1.0 + RISE) * self.searched.max(1.0);
-        let found = contacts.solve_with(readings, if risen { Effort::Anew } else { Effort::AsNeeded })?;
-        let left = found.residual.unwrap_or_default().powi(2);
-        if risen || !followed {
-            (self.searched, self.mean) = (left, left);
-        } else {
-            self.mean += NEWEST * (left - self.mean);
-        }
-        Ok(Some(found))
-    }
-
-    fn image(&mut self, readings: &Readings, why: String) -> Result<Solution, SolveError> {
-        let image = self.image.solve(readings)?;
-        let left = image.residual.map_or_else(String::new, |left| format!("; an image leaves {left:.1}"));
-        Ok(chosen(image, "image", why + &left))
-    }
-
-    /// The cheapest answer: contacts as they were, or the linear image.
-    fn cheapest(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        let followed = match &mut self.contacts {
-            Some(contacts) if contacts.is_following() && self.skip == 0 => {
-                Some(contacts.solve_with(readings, Effort::FollowOnly)?)
-            }
-            _ => None,
-        };
-        if let Some(found) = followed.filter(|found| !found.flags.misfit && !found.contacts.is_empty()) {
-            let what = counted(found.contacts.len());
-            let left = found.residual.unwrap_or_default();
-            return Ok(chosen(found, &what, format!("followed, they leave {left:.2} of the noise")));
-        }
-        let mut linear = chosen(self.linear.solve(readings)?, "linear image", "to keep up with the frames".to_owned());
-        linear.flags.unfinished = true;
-        Ok(linear)
-    }
-}
-
-fn chosen(solution: Solution, what: &str, why: String) -> Solution {
-    Solution { choice: Some(Choice { what: what.to_owned(), why }), ..solution }
-}
-
-fn counted(contacts: usize) -> String {
-    if contacts == 1 { "1 contact".to_owned() } else { format!("{contacts} contacts") }
 }
 
 impl Solver for Auto {
@@ -147,15 +66,79 @@ impl Solver for Auto {
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        let Some(period) = self.period else { return self.choose(readings) };
-        let begin = Instant::now();
-        let solution = if self.owed > period { self.cheapest(readings) } else { self.choose(readings) };
-        let took = begin.elapsed();
-        self.owed = match took.checked_sub(period) {
-            Some(late) => (self.owed + INTEREST * late).min(CREDIT),
-            None => self.owed.saturating_sub(period - took),
+        follow_and_search(&mut self.follower, &mut self.searcher, readings)
+    }
+
+    fn reset(&mut self) {
+        self.follower.reset();
+        self.searcher.image.reset();
+    }
+
+    fn split(self: Box<Self>) -> Parts {
+        Parts { follower: Box::new(self.follower), searcher: Some(Box::new(self.searcher)) }
+    }
+}
+
+impl AutoFollower {
+    fn follow_image(&mut self, readings: &Readings, why: String) -> Result<Followed, SolveError> {
+        let (solution, is_lost) = self.image.follow(readings)?;
+        let search = is_lost || self.skip == 0;
+        self.skip = self.skip.saturating_sub(1);
+        let followed = Followed { solution: imaged(solution, &why), search };
+        self.imaged = Some(why);
+        Ok(followed)
+    }
+
+    fn follow_contacts(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
+        let Some(contacts) = &mut self.contacts else {
+            let search = !self.image.is_rest(readings);
+            return Ok(Followed { solution: nothing(Solution::default(), search), search });
         };
-        solution
+        let target = contacts.finder().target(readings)?;
+        let search = contacts.follow(&target);
+        Ok(Followed { solution: as_contacts(contacts.solution(&target), search), search })
+    }
+
+    fn rest(&mut self) {
+        (self.imaged, self.skip, self.patience) = (None, 0, PATIENCE[0]);
+    }
+}
+
+impl Follower for AutoFollower {
+    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
+        match self.imaged.take() {
+            Some(why) if !self.image.is_rest(readings) => self.follow_image(readings, why),
+            _ => self.follow_contacts(readings),
+        }
+    }
+
+    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+        match lead.0 {
+            Known::Image(descent, why) if !self.image.is_rest(readings) => {
+                self.image.go_on_from(Some(*descent));
+                self.skip = self.patience;
+                self.patience = (2 * self.patience).min(PATIENCE[1]);
+                if let Some(contacts) = &mut self.contacts {
+                    contacts.rest();
+                }
+                self.follow_image(readings, why)
+            }
+            known => {
+                self.rest();
+                let Some(contacts) = &mut self.contacts else { return self.follow_contacts(readings) };
+                let target = contacts.finder().target(readings)?;
+                contacts.adopt(Lead(known).into_contacts(), &target);
+                Ok(Followed { solution: as_contacts(contacts.solution(&target), false), search: false })
+            }
+        }
+    }
+
+    fn lead(&self) -> Lead {
+        match (&self.imaged, self.image.descent(), &self.contacts) {
+            (Some(why), Some(descent), _) => Lead(Known::Image(Box::new(descent.clone()), why.clone())),
+            (_, _, Some(contacts)) => Lead::of_contacts(contacts.found()),
+            _ => Lead::default(),
+        }
     }
 
     fn reset(&mut self) {
@@ -163,22 +146,86 @@ impl Solver for Auto {
             contacts.reset();
         }
         self.image.reset();
-        (self.skip, self.patience, self.owed) = (0, PATIENCE[0], Duration::ZERO);
-        (self.searched, self.mean) = (0.0, 0.0);
+        self.rest();
     }
+}
 
-    fn keep_within(&mut self, period: Option<Duration>) {
-        if let Some(contacts) = &mut self.contacts {
-            contacts.keep_within(period);
+impl Searcher for AutoSearcher {
+    fn search(&mut self, from: Lead, readings: &Readings) -> Result<Lead, SolveError> {
+        let Some(searcher) = &self.contacts else {
+            return self.search_image(from, readings, "this model has no fields of single contacts".to_owned());
+        };
+        let (contacts, from) = match from.0 {
+            Known::Contacts(contacts) => (Some(contacts), Lead::default()),
+            known => (None, Lead(known)),
+        };
+        let Some((found, solution)) = searcher.contacts(contacts, readings)? else { return Ok(Lead::default()) };
+        if !solution.flags.misfit {
+            return Ok(Lead::of_contacts(Some(found)));
         }
-        self.period = period;
-        self.owed = Duration::ZERO;
+        let left = solution.residual.unwrap_or_default();
+        let why = format!("{} would leave a residual of {left:.1} x noise", counted(solution.contacts.len()));
+        let image = self.search_image(from, readings, why)?;
+        // An image that explains less than contacts do is no better.
+        let is_better = self.residual.is_none_or(|residual| residual <= left);
+        Ok(if is_better { image } else { Lead::of_contacts(Some(found)) })
     }
+}
+
+impl AutoSearcher {
+    fn search_image(&mut self, from: Lead, readings: &Readings, why: String) -> Result<Lead, SolveError> {
+        if self.image.is_rest(readings) {
+            return Ok(Lead::default());
+        }
+        self.image.go_on_from(match from.0 {
+            Known::Image(descent, _) => Some(*descent),
+            Known::Nothing | Known::Contacts(_) => None,
+        });
+        self.residual = self.image.begin(readings)?.residual;
+        let image = self.image.descent().cloned();
+        Ok(image.map_or_else(Lead::default, |descent| Lead(Known::Image(Box::new(descent), why))))
+    }
+}
+
+/// The solution of contacts, and what it is.
+fn as_contacts(solution: Solution, search: bool) -> Solution {
+    if solution.contacts.is_empty() {
+        return nothing(solution, search);
+    }
+    let what = counted(solution.contacts.len());
+    let residual = solution.residual.unwrap_or_default();
+    let why = match search {
+        true => format!("residual {residual:.1} x noise; searching for a better answer"),
+        false => format!("residual {residual:.1} x noise"),
+    };
+    chosen(solution, what, why)
+}
+
+/// The solution of nothing; unless something stands out, and is searched.
+fn nothing(mut solution: Solution, search: bool) -> Solution {
+    solution.flags.unfinished |= search;
+    let why = if search { "something touches; searching where" } else { "no reading stands out of the noise" };
+    chosen(solution, "nothing".to_owned(), why.to_owned())
+}
+
+/// The solution of an image, and why it is one.
+fn imaged(solution: Solution, why: &str) -> Solution {
+    let residual = solution.residual.unwrap_or_default();
+    chosen(solution, "image".to_owned(), format!("residual {residual:.1} x noise; {why}"))
+}
+
+fn chosen(solution: Solution, what: String, why: String) -> Solution {
+    Solution { choice: Some(Choice { what, why }), ..solution }
+}
+
+fn counted(contacts: usize) -> String {
+    if contacts == 1 { "1 contact".to_owned() } else { format!("{contacts} contacts") }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::FoundContact;
     use tactomo_physics::detector::Detector;
     use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
     use tactomo_physics::scene::Contact;
@@ -206,8 +253,18 @@ mod tests {
         }
 
         fn touched(&mut self, contacts: &[Contact]) -> Solution {
+            let readings = self.measured(contacts);
+            self.auto.solve(&readings).unwrap()
+        }
+
+        fn measured(&mut self, contacts: &[Contact]) -> Readings {
             let exact = readings_v(&self.fine.impedance_ohm(contacts).unwrap(), &self.detector);
-            self.solve(&exact)
+            measured(&exact, &self.detector.adc, &mut self.noise)
+        }
+
+        fn problem(&self) -> Problem {
+            let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&self.detector).unwrap());
+            Problem::new(slab)
         }
     }
 
@@ -235,24 +292,50 @@ mod tests {
         let image = bench.solve(&exact);
         assert_eq!((what(&image), image.image_s_per_m2.is_some()), ("image", true), "{:?}", image.choice);
         let again = bench.touched(&[a]);
-        assert!(again.image_s_per_m2.is_some(), "contacts wait a few frames after they failed");
-        let late = (0..8).map(|_| bench.touched(&[a])).last().unwrap();
-        assert_eq!(what(&late), "1 contact");
+        assert_eq!(what(&again), "1 contact", "the image no longer explains anything");
     }
 
     #[test]
-    fn with_no_time_it_gives_the_cheapest_answer_and_says_so() {
+    fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
         let mut bench = Bench::new();
-        bench.auto.keep_within(Some(Duration::from_nanos(1)));
-        let contact = [Contact::flat(0.01, 0.004, 0.0025, 3e-4)];
-        let first = bench.touched(&contact);
-        assert!(!first.flags.unfinished, "nothing is owed yet");
-        let second = bench.touched(&contact);
-        let is_followed = second.choice.as_ref().is_some_and(|choice| choice.why.starts_with("followed"));
-        assert!(is_followed && second.contacts.len() == 1, "{second:?}");
-        // Two more fingers are more than following explains.
-        let more = [contact[0], Contact::flat(-0.012, -0.009, 0.0025, 5e-4), Contact::flat(-0.01, 0.015, 0.0025, 5e-4)];
-        let third = bench.touched(&more);
-        assert!(third.flags.unfinished && what(&third) == "linear image", "{third:?}");
+        let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+        let mut searcher = searcher.unwrap();
+        let moved = |x_m: f64| {
+            [Contact::flat(0.008 + x_m, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009 + x_m, 0.0025, 5e-4)]
+        };
+        let first = bench.measured(&moved(0.0));
+        let before = follower.follow(&first).unwrap();
+        assert!(before.search && before.solution.flags.unfinished && before.solution.contacts.is_empty());
+        let lead = searcher.search(follower.lead(), &first).unwrap();
+        // The answer comes when the contacts are 3 mm further on.
+        let after = follower.adopt(lead, &bench.measured(&moved(0.003))).unwrap();
+        assert_eq!((what(&after.solution), after.search), ("2 contacts", false), "{after:?}");
+        let ids: Vec<_> = after.solution.contacts.iter().map(|contact| contact.id).collect();
+        for step in 0..20 {
+            let truth = moved(0.003 + 1e-4 * f64::from(step));
+            let next = follower.follow(&bench.measured(&truth)).unwrap();
+            assert_eq!((what(&next.solution), next.search), ("2 contacts", false), "{next:?}");
+            assert_eq!(next.solution.contacts.iter().map(|contact| contact.id).collect::<Vec<_>>(), ids);
+            for contact in truth {
+                let off_m = |found: &FoundContact| (found.x_m - contact.x_m).hypot(found.y_m - contact.y_m);
+                assert!(next.solution.contacts.iter().any(|found| off_m(found) < 3e-4), "{next:?}");
+            }
+        }
+        let lifted = follower.follow(&bench.measured(&moved(0.005)[..1])).unwrap();
+        assert_eq!((what(&lifted.solution), lifted.search), ("1 contact", false), "a finger that lifts is gone at once: {lifted:?}");
+    }
+
+    #[test]
+    fn a_search_of_the_past_does_not_replace_what_explains_the_present() {
+        let mut bench = Bench::new();
+        let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+        let mut searcher = searcher.unwrap();
+        let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
+        let past = searcher.search(Lead::default(), &bench.measured(&[a])).unwrap();
+        let present = bench.measured(&[a, b]);
+        let lead = searcher.search(Lead::default(), &present).unwrap();
+        follower.adopt(lead, &present).unwrap();
+        let kept = follower.adopt(past, &bench.measured(&[a, b])).unwrap();
+        assert_eq!(what(&kept.solution), "2 contacts");
     }
 }

@@ -1,35 +1,24 @@
 //! Any solver, without the electrodes that cannot be right.
 
-use std::time::Duration;
-
-use super::health::{self, ElectrodeFault};
-use super::{ContactSettings, Contacts, Method, Problem, Solution, SolveError, Solver};
+use super::contacts::ContactSettings;
+use super::follow::{Followed, Follower, Lead, Parts, Searcher};
+use super::watch::{ElectrodeWatch, Look};
+use super::{Contacts, ElectrodeFault, Method, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
-/// Frames in a row that have to say the same of the electrodes before it is believed.
-const CONFIRMED: usize = 8;
-/// Frames in a row that do not fit after which a look is taken for exchanged wires: it takes as long as some hundred frames.
-const MISFITS: [usize; 3] = [16, 160, 1600];
 /// Mean square of what one contact leaves of the readings with two wires exchanged back, as a share of that before and in what noise
-/// makes, that tells.
+/// makes, that shows an exchange.
 const HEALED: f64 = 0.1;
 const FITS: f64 = 6.0;
-/// Fewest electrodes that are worth solving for.
-const FEWEST: usize = 5;
 
-/// A solver that leaves out electrodes that are open, shorted, exchanged or otherwise wrong, once it has seen that.
+/// A solver that leaves out electrodes that are open, shorted, exchanged or otherwise wrong, once it has seen that, and takes them back
+/// when they are healthy.
 pub struct Guard {
     method: Method,
     problem: Problem,
     solver: Box<dyn Solver>,
-    /// Electrodes that the solver is made for.
-    kept: Vec<usize>,
-    excluded: Vec<(usize, ElectrodeFault)>,
-    /// What the last frames say, and how many of them.
-    suspected: (Vec<(usize, ElectrodeFault)>, usize),
-    misfits: usize,
-    period: Option<Duration>,
+    watch: ElectrodeWatch,
 }
 
 impl Guard {
@@ -41,82 +30,21 @@ impl Guard {
         Ok(Self {
             solver: method.build(problem)?,
             method,
+            watch: ElectrodeWatch::new(problem.detector()),
             problem: problem.clone(),
-            kept: (0..problem.detector().electrodes.len()).collect(),
-            excluded: Vec::new(),
-            suspected: (Vec::new(), 0),
-            misfits: 0,
-            period: None,
         })
     }
 
     /// Electrodes that are left out, and why.
     pub fn excluded(&self) -> &[(usize, ElectrodeFault)] {
-        &self.excluded
+        self.watch.excluded()
     }
 
-    /// Takes note of what a frame says, and leaves electrodes out when it is sure.
-    fn watch(&mut self, readings: &Readings) {
-        let detector = self.problem.detector();
-        if readings.volts().iter().any(|volts| !volts.is_finite()) {
-            return;
+    fn rebuild(&mut self) {
+        match without(self.method, &self.problem, self.watch.excluded()) {
+            Ok(solver) => self.solver = solver,
+            Err(error) => tracing::warn!("there is no solver without the faulty electrodes: {error}"),
         }
-        let faulty = health::faulty_electrodes(&readings.of(&self.kept), detector.drive_v, detector.adc.deviation_v());
-        let faulty: Vec<_> = faulty.into_iter().map(|(place, fault)| (self.kept[place], fault)).collect();
-        let electrodes = |all: &[(usize, ElectrodeFault)]| all.iter().map(|(e, _)| *e).collect::<Vec<_>>();
-        if electrodes(&faulty) == electrodes(&self.suspected.0) {
-            self.suspected.1 += 1;
-        } else {
-            self.suspected = (faulty, 1);
-        }
-        if self.suspected.1 >= CONFIRMED && !self.suspected.0.is_empty() {
-            let (faulty, _) = std::mem::take(&mut self.suspected);
-            self.exclude(faulty);
-        }
-    }
-
-    fn exclude(&mut self, faulty: Vec<(usize, ElectrodeFault)>) {
-        let kept: Vec<_> = self.kept.iter().copied().filter(|e| faulty.iter().all(|(wrong, _)| wrong != e)).collect();
-        if kept.len() < FEWEST {
-            return;
-        }
-        match self.method.build(&self.problem.through(&kept)) {
-            Ok(solver) => {
-                tracing::warn!("electrodes left out: {faulty:?}");
-                (self.solver, self.kept) = (solver, kept);
-                self.solver.keep_within(self.period);
-                self.excluded.extend(faulty);
-                self.excluded.sort_unstable();
-            }
-            Err(error) => tracing::warn!("{faulty:?} look wrong, but there is no solver without them: {error}"),
-        }
-    }
-
-    /// Looks for two exchanged wires when frames keep not fitting: nothing but a model tells these.
-    fn look_for_exchange(&mut self, readings: &Readings, solution: &Solution) {
-        self.misfits = if solution.flags.misfit { self.misfits + 1 } else { 0 };
-        if !MISFITS.contains(&self.misfits) {
-            return;
-        }
-        if let Some(pair) = self.exchanged(readings) {
-            self.exclude(pair.map(|e| (e, ElectrodeFault::Exchanged)).into());
-        }
-    }
-
-    /// The exchange of two wires that makes the readings those of one contact.
-    fn exchanged(&self, readings: &Readings) -> Option<[usize; 2]> {
-        let settings = ContactSettings { most: 1, ..ContactSettings::of(&self.problem) };
-        let contacts = Contacts::new(&self.problem.through(&self.kept), settings).ok()?;
-        let residual = |order: &[usize]| contacts.left_by_one(&readings.of(order));
-        let before = residual(&self.kept)?;
-        let pairs = (0..self.kept.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-        let scored = pairs.filter_map(|(i, j)| {
-            let mut order = self.kept.clone();
-            order.swap(i, j);
-            Some((residual(&order)?, [self.kept[j], self.kept[i]]))
-        });
-        let (after, pair) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (after < FITS && after < HEALED * before).then_some(pair)
     }
 }
 
@@ -127,29 +55,171 @@ impl Solver for Guard {
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         super::check_count(readings, self.problem.detector().electrodes.len())?;
-        self.watch(readings);
-        let mut solution = match self.kept.len() == readings.electrodes() {
-            true => self.solver.solve(readings)?,
-            false => self.solver.solve(&readings.of(&self.kept))?,
-        };
-        self.look_for_exchange(readings, &solution);
-        solution.flags.excluded = self.excluded.iter().map(|(e, _)| *e).collect();
+        if self.watch.note(readings) {
+            self.rebuild();
+        }
+        let solution = self.solver.solve(readings)?;
+        if let Some(look) = self.watch.look(&solution) {
+            let found = look.run(&self.problem, self.watch.excluded(), readings);
+            if self.watch.conclude(look, found) {
+                self.rebuild();
+                return self.solver.solve(readings);
+            }
+        }
         Ok(solution)
     }
 
     fn reset(&mut self) {
         self.solver.reset();
     }
+}
 
-    fn keep_within(&mut self, period: Option<Duration>) {
-        self.period = period;
-        self.solver.keep_within(period);
+/// The solver of a method for the electrodes that are not excluded; it takes the readings of all.
+///
+/// # Errors
+/// [`ForwardError`] if the solver cannot be made.
+pub fn without(
+    method: Method,
+    problem: &Problem,
+    excluded: &[(usize, ElectrodeFault)],
+) -> Result<Box<dyn Solver>, ForwardError> {
+    if excluded.is_empty() {
+        return method.build(problem);
     }
+    let kept = kept(problem.detector().electrodes.len(), excluded);
+    let solver = method.build(&problem.through(&kept))?;
+    let excluded = excluded.iter().map(|(electrode, _)| *electrode).collect();
+    Ok(Box::new(Without { solver, lens: Lens { kept, excluded } }))
+}
+
+/// Electrodes that are not excluded.
+fn kept(electrodes: usize, excluded: &[(usize, ElectrodeFault)]) -> Vec<usize> {
+    (0..electrodes).filter(|electrode| excluded.iter().all(|(wrong, _)| wrong != electrode)).collect()
+}
+
+/// Sees some electrodes of readings.
+#[derive(Clone)]
+struct Lens {
+    kept: Vec<usize>,
+    excluded: Vec<usize>,
+}
+
+impl Lens {
+    fn readings(&self, all: &Readings) -> Result<Readings, SolveError> {
+        super::check_count(all, self.kept.len() + self.excluded.len())?;
+        Ok(all.of(&self.kept))
+    }
+
+    fn flagged(&self, mut solution: Solution) -> Solution {
+        solution.flags.excluded.clone_from(&self.excluded);
+        solution
+    }
+}
+
+/// A solver behind a lens.
+struct Without {
+    solver: Box<dyn Solver>,
+    lens: Lens,
+}
+
+impl Solver for Without {
+    fn name(&self) -> &'static str {
+        self.solver.name()
+    }
+
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
+        self.solver.solve(&self.lens.readings(readings)?).map(|solution| self.lens.flagged(solution))
+    }
+
+    fn reset(&mut self) {
+        self.solver.reset();
+    }
+
+    fn split(self: Box<Self>) -> Parts {
+        let Parts { follower, searcher } = self.solver.split();
+        let lens = self.lens.clone();
+        let searcher = searcher.map(|half| Box::new(Half { half, lens }) as Box<dyn Searcher>);
+        Parts { follower: Box::new(Half { half: follower, lens: self.lens }), searcher }
+    }
+}
+
+/// Half a solver behind a lens.
+struct Half<T: ?Sized> {
+    lens: Lens,
+    half: Box<T>,
+}
+
+impl Follower for Half<dyn Follower> {
+    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
+        let followed = self.half.follow(&self.lens.readings(readings)?)?;
+        Ok(Followed { solution: self.lens.flagged(followed.solution), ..followed })
+    }
+
+    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+        let followed = self.half.adopt(lead, &self.lens.readings(readings)?)?;
+        Ok(Followed { solution: self.lens.flagged(followed.solution), ..followed })
+    }
+
+    fn lead(&self) -> Lead {
+        self.half.lead()
+    }
+
+    fn reset(&mut self) {
+        self.half.reset();
+    }
+}
+
+impl Searcher for Half<dyn Searcher> {
+    fn search(&mut self, from: Lead, readings: &Readings) -> Result<Lead, SolveError> {
+        self.half.search(from, &self.lens.readings(readings)?)
+    }
+}
+
+impl Look {
+    /// Looks, for some 100 ms: the pair of wires that is exchanged, or no longer is.
+    pub fn run(
+        self,
+        problem: &Problem,
+        excluded: &[(usize, ElectrodeFault)],
+        readings: &Readings,
+    ) -> Option<[usize; 2]> {
+        let electrodes = problem.detector().electrodes.len();
+        match self {
+            Self::Exchanged => exchanged(problem, &kept(electrodes, excluded), readings),
+            Self::Healed(pair) => {
+                let others: Vec<_> = excluded.iter().copied().filter(|(wrong, _)| !pair.contains(wrong)).collect();
+                let kept = kept(electrodes, &others);
+                let left = one_contact(problem, &kept)?.left_by_one(&readings.of(&kept))?;
+                (left < FITS).then_some(pair)
+            }
+        }
+    }
+}
+
+fn one_contact(problem: &Problem, kept: &[usize]) -> Option<Contacts> {
+    let settings = ContactSettings { most: 1, ..ContactSettings::of(problem) };
+    Contacts::new(&problem.through(kept), settings).ok()
+}
+
+/// The exchange of two wires that makes the readings those of one contact.
+fn exchanged(problem: &Problem, kept: &[usize], readings: &Readings) -> Option<[usize; 2]> {
+    let contacts = one_contact(problem, kept)?;
+    let residual = |order: &[usize]| contacts.left_by_one(&readings.of(order));
+    let before = residual(kept)?;
+    let pairs = (0..kept.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let scored = pairs.filter_map(|(i, j)| {
+        let mut order = kept.to_vec();
+        order.swap(i, j);
+        Some((residual(&order)?, [kept[j], kept[i]]))
+    });
+    let (after, pair) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (after < FITS && after < HEALED * before).then_some(pair)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::DMatrix;
     use tactomo_physics::detector::Detector;
     use tactomo_physics::forward::{ForwardModel, Resolution, Slab};
     use tactomo_physics::scene::Contact;
@@ -210,5 +280,48 @@ mod tests {
         let (excluded, last) = guarded(Method::Contacts, &["swap:5,6"], 20);
         assert_eq!(excluded, [(5, ElectrodeFault::Exchanged), (6, ElectrodeFault::Exchanged)]);
         assert_found(&last, 2e-4);
+    }
+
+    #[test]
+    fn an_electrode_that_is_healthy_again_comes_back() {
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        detector.adc.noise_lsb = 1.5;
+        let mut guard = Guard::new(Method::Tikhonov, &Problem::of(&detector).unwrap()).unwrap();
+        let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
+        let firm = fine.impedance_ohm(&[CONTACT]).unwrap();
+        let light = fine.impedance_ohm(&[Contact { conductance_s: 1e-5, ..CONTACT }]).unwrap();
+        let mut broken = Measurement::new(&detector, &["gain:4:0.8".parse().unwrap()], 5).unwrap();
+        let mut sound = Measurement::new(&detector, &[], 6).unwrap();
+        let mut excluded_after = |board: &mut Measurement, impedance_ohm: &DMatrix<f64>, frames: usize| {
+            (0..frames).for_each(|_| drop(guard.solve(&board.readings_v(Some(impedance_ohm))).unwrap()));
+            guard.excluded().to_vec()
+        };
+        assert_eq!(excluded_after(&mut broken, &firm, 20), [(4, ElectrodeFault::Contradicting)]);
+        assert_eq!(excluded_after(&mut broken, &light, 500).len(), 1, "a light touch does not show it healthy");
+        assert_eq!(excluded_after(&mut broken, &firm, 500).len(), 1);
+        assert_eq!(excluded_after(&mut sound, &firm, 100), []);
+    }
+
+    #[test]
+    fn no_healthy_electrode_is_left_out_whatever_presses() {
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        detector.adc.noise_lsb = 1.5;
+        let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
+        let mut board = Measurement::new(&detector, &[], 7).unwrap();
+        let mut watch = ElectrodeWatch::new(&detector);
+        let mut random = fastrand::Rng::with_seed(8);
+        for scene in 0..300 {
+            let contacts: Vec<_> = (0..random.usize(1..=5))
+                .map(|_| {
+                    let [x_m, y_m] = [0, 1].map(|_| 0.058 * (random.f64() - 0.5));
+                    Contact::flat(x_m, y_m, 0.001 + 0.005 * random.f64(), 1e-5 * 10f64.powf(4.0 * random.f64()))
+                })
+                .collect();
+            // Discs that overlap are no contacts of the model.
+            let Ok(impedance_ohm) = fine.impedance_ohm(&contacts) else { continue };
+            for _ in 0..20 {
+                assert!(!watch.note(&board.readings_v(Some(&impedance_ohm))), "{scene}: {:?} {contacts:?}", watch.excluded());
+            }
+        }
     }
 }

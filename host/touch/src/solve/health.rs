@@ -6,6 +6,8 @@
 //! Two things do not break them and are seen otherwise: a broken wire lets everything rise to the drive when it should be
 //! grounded, and two wires that touch read the same.
 
+use std::fmt;
+
 use tactomo_physics::readings::Readings;
 
 /// Smallest `1 - V / Vcc` that a logarithm is taken of.
@@ -37,16 +39,28 @@ pub enum ElectrodeFault {
     Contradicting,
 }
 
-/// Electrodes that are wrong in a frame (V), each with what is wrong; `noise_v` is the deviation of a reading.
-pub fn faulty_electrodes(readings: &Readings, drive_v: f64, noise_v: f64) -> Vec<(usize, ElectrodeFault)> {
+impl fmt::Display for ElectrodeFault {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Open => "its wire is broken",
+            Self::Shorted => "it reads the same as another: their wires touch",
+            Self::Exchanged => "its wire is exchanged with another's",
+            Self::Contradicting => "its readings contradict those of all others",
+        })
+    }
+}
+
+/// Electrodes that are wrong in a frame (V), each with what is wrong; `noise_v` is the deviation of a reading. `None` where readings are too
+/// small to show anything.
+pub fn faulty_electrodes(readings: &Readings, drive_v: f64, noise_v: f64) -> Option<Vec<(usize, ElectrodeFault)>> {
     let n = readings.electrodes();
     if readings.largest_v() < TOUCHED * noise_v {
-        return Vec::new();
+        return None;
     }
     let open: Vec<_> = (0..n).filter(|g| is_open(readings, *g, drive_v)).collect();
     // Where everything is at the drive's potential, nothing is grounded: that is no electrode's fault alone.
     if 2 * open.len() > n {
-        return Vec::new();
+        return None;
     }
     let sound: Vec<_> = (0..n).filter(|e| !open.contains(e)).collect();
     let shorted = shorted(readings, &sound, noise_v);
@@ -59,7 +73,7 @@ pub fn faulty_electrodes(readings: &Readings, drive_v: f64, noise_v: f64) -> Vec
     ];
     let mut all: Vec<_> = all.into_iter().flat_map(|(list, fault)| list.into_iter().map(move |e| (e, fault))).collect();
     all.sort_unstable();
-    all
+    Some(all)
 }
 
 /// Whether most others rise to the drive when `g` is to be grounded.

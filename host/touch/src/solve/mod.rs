@@ -1,11 +1,10 @@
 //! From readings back to touch: one file a method, one trait.
 
-use std::time::Duration;
-
 mod auto;
 mod balance;
 mod bsbl;
 mod contacts;
+mod follow;
 mod guard;
 mod health;
 mod interpolate;
@@ -25,14 +24,17 @@ mod tikhonov;
 mod track;
 mod tsvd;
 mod tv;
+mod watch;
 
 pub use self::auto::Auto;
 pub use self::bsbl::Bsbl;
 pub use self::contacts::{ContactSettings, Contacts};
-pub use self::guard::Guard;
+pub use self::follow::{Followed, Follower, Lead, Parts, Searcher};
+pub use self::guard::{Guard, without};
 pub use self::health::{ElectrodeFault, faulty_electrodes};
 pub use self::kernel::{Kernel, KernelSolver, Press, Presses, PressesError, Strength, TeachError};
 pub use self::lambda::Lambda;
+use self::follow::Direct;
 use self::lambda::Spectrum;
 pub use self::method::Method;
 pub use self::nonlinear::{Nonlinear, NonlinearSettings};
@@ -41,10 +43,11 @@ pub use self::problem::Problem;
 pub use self::tikhonov::{Tikhonov, Variant};
 pub use self::tsvd::Tsvd;
 pub use self::tv::Tv;
+pub use self::watch::{ElectrodeWatch, Look};
 use tactomo_physics::readings::Readings;
 
 /// A method that reads touch from the readings of a frame.
-pub trait Solver: Send {
+pub trait Solver: Send + 'static {
     /// Name on the command line.
     fn name(&self) -> &'static str;
 
@@ -57,10 +60,9 @@ pub trait Solver: Send {
     /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.
     fn reset(&mut self) {}
 
-    /// Asks for answers that take no longer than this on the average; `None` for the best ones, however long they take, which is
-    /// how a solver begins.
-    fn keep_within(&mut self, period: Option<Duration>) {
-        let _ = period;
+    /// The halves of it that a live picture runs side by side: by default all of it in the follower.
+    fn split(self: Box<Self>) -> Parts {
+        Parts { follower: Box::new(Direct(self)), searcher: None }
     }
 }
 

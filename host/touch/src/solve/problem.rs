@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
-use tactomo_physics::forward::{ForwardModel, Through};
+use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, Through};
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -21,6 +21,14 @@ impl Problem {
         let model = model.into();
         let jacobian = Arc::new(Jacobian::of(&*model));
         Self { model, jacobian }
+    }
+
+    /// The problem of a detector, with the model that it needs.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if there is no model of it.
+    pub fn of(detector: &Detector) -> Result<Self, ForwardError> {
+        Ok(Self::new(Auto::new(detector, None)?.model))
     }
 
     /// The same with another linear theory, on a mesh of its own.

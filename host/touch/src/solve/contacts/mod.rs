@@ -11,11 +11,10 @@ mod fit;
 mod network;
 mod scan;
 mod search;
+mod solver;
 mod target;
 #[cfg(test)]
 mod tests;
-
-use std::time::Duration;
 
 use nalgebra::DMatrix;
 
@@ -23,10 +22,10 @@ use self::discs::DiscFit;
 use self::fit::Fit;
 use self::network::{FitSpot, Network};
 use self::scan::Scan;
-use self::search::Searched;
+pub use self::solver::Contacts;
+pub(super) use self::solver::{ContactFollower, ContactSearcher};
 use self::target::{Errors, Target};
-use super::track::Tracker;
-use super::{Flags, FoundContact, Problem, Solution, SolveError, Solver, Uncertainty};
+use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::readings::Readings;
@@ -38,8 +37,6 @@ const SCAN_NODES: usize = 600;
 const MOST_CONDUCTANCE: f64 = 300.0;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
 const FULL: f64 = 0.995;
-/// Frame periods that a search may take before it adds no more contacts.
-const SEARCH_PERIODS: u32 = 12;
 /// Mean square of what is left, in what noise and model error make, above which the readings do not fit.
 const MISFIT: f64 = 3.0;
 
@@ -63,8 +60,8 @@ impl ContactSettings {
     }
 }
 
-/// Fits contacts.
-pub struct Contacts {
+/// What finds contacts: the same for all frames, and shared by the threads that follow and search.
+pub(super) struct ContactFinder {
     problem: Problem,
     settings: ContactSettings,
     network: Network,
@@ -73,24 +70,11 @@ pub struct Contacts {
     sheet_s: f64,
     spacing_m: f64,
     errors: Errors,
-    /// A search that has taken longer adds no more contacts; none for one that is always the same.
-    longest: Option<Duration>,
-    last: Option<Explanation>,
-    /// Sum of squares that the last search left.
-    searched: f64,
-    tracker: Tracker,
 }
 
-/// How much is tried for a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Effort {
-    /// Contacts are followed, and searched anew where that does not explain the readings.
-    AsNeeded,
-    /// They are searched anew.
-    Anew,
-    /// They are followed, whatever is left.
-    FollowOnly,
-}
+/// Contacts that explain a frame, for another frame to go on from.
+#[derive(Clone, Debug)]
+pub(super) struct Found(Explanation);
 
 /// Contacts that explain a frame.
 #[derive(Clone, Debug)]
@@ -126,7 +110,7 @@ impl Explanation {
     }
 }
 
-impl Contacts {
+impl ContactFinder {
     /// Makes it ready for a problem.
     ///
     /// # Errors
@@ -154,38 +138,28 @@ impl Contacts {
             spacing_m: problem.spacing_m(),
             problem: problem.clone(),
             settings,
-            longest: None,
-            last: None,
-            searched: 0.0,
-            tracker: Tracker::new(problem.spacing_m()),
         })
     }
 
-    /// Solves with a limit to what is tried.
+    /// What a frame's readings are fitted as.
     ///
     /// # Errors
-    /// As for [`Solver::solve`].
-    pub(super) fn solve_with(&mut self, readings: &Readings, effort: Effort) -> Result<Solution, SolveError> {
-        crate::solve::check(readings, self.network.electrodes())?;
-        let target = Target::new(readings, &self.errors);
-        let last = self.last.take();
-        let Searched { found, searched } = match effort {
-            Effort::AsNeeded => self.search(last, self.searched, &target),
-            Effort::Anew => self.search_anew(&target),
-            Effort::FollowOnly => {
-                let followed = last.and_then(|last| self.follow(last, &target));
-                Searched { found: followed.filter(|found| !self.is_weak(found)), searched: self.searched }
-            }
-        };
-        (self.last, self.searched) = (found, searched);
-        let mut solution = self.last.as_ref().map_or_else(Solution::default, |found| self.solution(found, &target));
-        self.tracker.follow(&mut solution.contacts);
-        Ok(solution)
+    /// [`SolveError`] if they cannot be those of the detector.
+    pub fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
+        super::check(readings, self.network.electrodes())?;
+        Ok(Target::new(readings, &self.errors))
     }
 
-    /// Whether there are contacts to follow.
-    pub(super) fn is_following(&self) -> bool {
-        self.last.is_some()
+    /// What is known where there is no contact.
+    pub fn nothing(&self, target: &Target) -> Solution {
+        let squares: f64 = target.volts.iter().map(|volts| (volts / self.errors.noise_v).powi(2)).sum();
+        let residual = Some((squares / target.volts.len().max(1) as f64).sqrt());
+        Solution { residual, ..Solution::default() }
+    }
+
+    /// Readings that are left to noise, which is the sum of squares that noise alone leaves.
+    fn freedom(&self, found: &Explanation, target: &Target) -> f64 {
+        target.count().saturating_sub(found.parameters()).max(1) as f64
     }
 
     fn contact(&self, spot: &FitSpot) -> Contact {
@@ -213,8 +187,7 @@ impl Contacts {
                 fit.contacts.iter().enumerate().map(of).collect::<Vec<_>>()
             }
         };
-        let freedom = target.count().saturating_sub(found.parameters()).max(1);
-        let left = found.cost() / freedom as f64;
+        let left = found.cost() / self.freedom(found, target);
         let is_perfect = |contact: &FoundContact| contact.conductance_s > 0.9 * self.most_s();
         let flags = Flags {
             saturated: target.is_saturated() || contacts.iter().any(is_perfect),
@@ -249,23 +222,4 @@ fn uncertainty(covariance: &DMatrix<f64>, start: usize, metres: f64, per_log_s: 
     let [x, y, log] = [0, 1, 2].map(|i| of(i, i).max(0.0).sqrt());
     let correlation = (of(0, 1) / (x * y).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
     Uncertainty { x_m: x * metres, y_m: y * metres, correlation, conductance_s: per_log_s * log }
-}
-
-impl Solver for Contacts {
-    fn name(&self) -> &'static str {
-        "contacts"
-    }
-
-    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        self.solve_with(readings, Effort::AsNeeded)
-    }
-
-    fn keep_within(&mut self, period: Option<Duration>) {
-        self.longest = period.map(|period| SEARCH_PERIODS * period);
-    }
-
-    fn reset(&mut self) {
-        (self.last, self.searched) = (None, 0.0);
-        self.tracker.reset();
-    }
 }

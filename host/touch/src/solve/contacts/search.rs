@@ -1,7 +1,5 @@
 //! How many contacts, and where each fit starts.
 
-use std::time::Instant;
-
 use nalgebra::DMatrix;
 
 use super::discs::{DiscFit, DiscFitter, PARAMETERS};
@@ -9,7 +7,7 @@ use super::fit::{Fit, Fitter};
 use super::network::FitSpot;
 use super::scan::{Candidate, Looks};
 use super::target::Target;
-use super::{Contacts, Explanation};
+use super::{ContactFinder, Explanation};
 use tactomo_physics::forward::readings_v;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
@@ -32,7 +30,7 @@ const STARTS: usize = 3;
 /// 5.5; this leaves room for the many places that are looked at.
 const WORTH: f64 = 7.0;
 /// The same for there being any contact at all.
-const WORTH_FIRST: f64 = 60.0;
+pub(super) const WORTH_FIRST: f64 = 60.0;
 /// Half the distance of two contacts that one is split into, in mean distances of electrodes.
 const SPLIT: f64 = 0.25;
 /// Mean square of what is left below which a fit is nearly right.
@@ -42,19 +40,13 @@ const HOPEFUL: f64 = 20.0;
 /// The same below which the search for more ends with the first one that does not pay.
 const ENOUGH: f64 = 2.0;
 /// The sum of squares may be this times that of the frame before.
-const WORSE: f64 = 1.3;
+pub(super) const WORSE: f64 = 1.3;
 /// Standard errors that spots may move before the forward model is asked again.
 const NEAR: f64 = 3.0;
 /// A contact is lost when the logarithm of its resistance is known no better than this.
 const WEAK: f64 = 0.2;
 
-/// What a frame is, and the sum of squares that the search which found it left.
-pub(super) struct Searched {
-    pub found: Option<Explanation>,
-    pub searched: f64,
-}
-
-impl Contacts {
+impl ContactFinder {
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
         let target = Target::new(readings, &self.errors);
@@ -70,15 +62,53 @@ impl Contacts {
         lowest(&fitter, starts, target)
     }
 
-    /// What explains a frame, from what explained the one before; `searched` is the sum of squares that the last search left, to
-    /// which many small rises in a row add up.
-    pub(super) fn search(&self, last: Option<Explanation>, searched: f64, target: &Target) -> Searched {
-        let enough = (WORSE * searched).max(target.count() as f64);
-        let followed = last.and_then(|last| self.follow(last, target));
-        match followed.filter(|found| found.cost() <= enough && !self.is_weak(found)) {
-            Some(found) => Searched { found: Some(found), searched },
-            None => self.search_anew(target),
+    /// Whether there is any contact at all, as far as single ones tell.
+    pub fn stands_out(&self, target: &Target) -> bool {
+        let looks = self.scan.at_first(&self.network, target);
+        self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= WORTH_FIRST)
+    }
+
+    /// What explains a frame, from what explains it so far: one contact more if that is all it takes, else from nothing.
+    pub(super) fn search(&self, from: Option<&Explanation>, target: &Target) -> Option<Explanation> {
+        match from.and_then(|from| self.with_one_more(from, target)) {
+            Some(found) => Some(found),
+            None => self.explanation(target),
         }
+    }
+
+    /// The contacts of an explanation and one more, if these explain all.
+    fn with_one_more(&self, from: &Explanation, target: &Target) -> Option<Explanation> {
+        let Explanation::Spots(fit, _) = from else { return None };
+        let is_room = !fit.spots.is_empty() && fit.spots.len() < self.settings.most;
+        let is_short = is_room && !explains(from, target);
+        let more = is_short.then(|| self.one_more(&self.fitter(), std::slice::from_ref(fit), Vec::new(), target))??;
+        (explains(&more, target) && !self.is_weak(&more)).then_some(more)
+    }
+
+    /// An explanation of some frames ago, brought to this one.
+    pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+        match found {
+            Explanation::Spots(fit, correction_v) => {
+                let moved = self.fitter().fit(fit.spots, &target.less(&correction_v), COLD_STEPS)?;
+                Some(self.correct(moved, target, CORRECTIONS))
+            }
+            Explanation::Discs(fit) => {
+                self.disc_fitter().fit(fit.contacts, target, COLD_DISC_STEPS).map(Explanation::Discs)
+            }
+        }
+    }
+
+    /// The explanation without the contacts that may not be there, fitted again, if the readings ask for no more.
+    pub(super) fn without_weak(&self, found: &Explanation, target: &Target) -> Option<Explanation> {
+        let Explanation::Spots(fit, correction_v) = found else { return None };
+        let is_sure = |k: &usize| !is_uncertain(fit.covariance.as_ref(), 3 * k + 2);
+        let sure: Vec<_> = (0..fit.spots.len()).filter(is_sure).map(|k| fit.spots[k].clone()).collect();
+        if sure.is_empty() {
+            return None;
+        }
+        let fewer = self.fitter().fit(sure, &target.less(correction_v), WARM_STEPS)?;
+        let fewer = self.correct(fewer, target, 1);
+        (score(&fewer) < score(found)).then_some(fewer)
     }
 
     /// The same contacts in the next frame; `None` if that makes no sense.
@@ -99,14 +129,7 @@ impl Contacts {
     }
 
     /// What explains a frame, from nothing.
-    pub(super) fn search_anew(&self, target: &Target) -> Searched {
-        let found = self.explanation(target);
-        Searched { searched: found.as_ref().map_or(0.0, Explanation::cost), found }
-    }
-
     fn explanation(&self, target: &Target) -> Option<Explanation> {
-        let begin = Instant::now();
-        let in_time = || self.longest.is_none_or(|longest| begin.elapsed() < longest);
         let fitter = self.fitter();
         let looks = self.scan.at_first(&self.network, target);
         let first = self.scan.ones(&looks, STARTS, self.apart_m());
@@ -123,13 +146,12 @@ impl Contacts {
                 pairs.iter().map(|pair| self.scan.start(&fitter, &looks, pair)).collect()
             }
         };
-        while fits.len() < self.settings.most && !explains(&best, target) && in_time() {
+        while fits.len() < self.settings.most && !explains(&best, target) {
             let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
             let Explanation::Spots(fit, _) = &more else { break };
             let fit = fit.clone();
             let is_hopeful = |fewer: &Fit| fits.len() == 1 || fewer.cost < HOPEFUL * target.count() as f64;
             if score(&more) < score(&best)
-                && in_time()
                 && let Some(fewer) = fits.last().filter(|fewer| is_hopeful(fewer))
             {
                 // Before one more is believed, those that there are may be wider.
@@ -233,15 +255,14 @@ impl Contacts {
 
     /// Whether a contact is so weak that it may not be there.
     pub(super) fn is_weak(&self, found: &Explanation) -> bool {
-        // Without a covariance, a contact does nothing that the readings tell.
-        let uncertain = |covariance: &Option<DMatrix<f64>>, log: usize| {
-            covariance.as_ref().is_none_or(|all| all[(log, log)] > WEAK * WEAK)
-        };
         match found {
-            Explanation::Spots(fit, _) => (0..fit.spots.len()).any(|k| uncertain(&fit.covariance, 3 * k + 2)),
+            Explanation::Spots(fit, _) => {
+                (0..fit.spots.len()).any(|k| is_uncertain(fit.covariance.as_ref(), 3 * k + 2))
+            }
             // That of a firm disc is not known well either: more of it would change little.
             Explanation::Discs(fit) => fit.contacts.iter().enumerate().any(|(k, contact)| {
-                contact.conductance_s < self.sheet_s && uncertain(&fit.covariance, PARAMETERS * k + 2)
+                contact.conductance_s < self.sheet_s
+                    && is_uncertain(fit.covariance.as_ref(), PARAMETERS * k + 2)
             }),
         }
     }
@@ -278,7 +299,7 @@ fn lowest(fitter: &Fitter<'_>, starts: Vec<Vec<FitSpot>>, target: &Target) -> Op
 }
 
 /// Sum of squares with a price on each parameter: what is lower is believed.
-fn score(found: &Explanation) -> f64 {
+pub(super) fn score(found: &Explanation) -> f64 {
     found.cost() + WORTH * found.parameters() as f64
 }
 
@@ -288,6 +309,11 @@ fn better(best: Explanation, other: Option<Explanation>) -> Explanation {
         Some(other) if score(&other) < score(&best) => other,
         _ => best,
     }
+}
+
+/// Whether a logarithm is hardly known; without a covariance, a contact does nothing that the readings show.
+fn is_uncertain(covariance: Option<&DMatrix<f64>>, log: usize) -> bool {
+    covariance.is_none_or(|all| all[(log, log)] > WEAK * WEAK)
 }
 
 fn scaled(share: f64, a: Place) -> Place {

@@ -25,10 +25,10 @@ pub(super) struct Errors {
 
 /// Readings with what their errors are like.
 #[derive(Clone, Debug)]
-pub(super) struct Target {
+pub(in crate::solve) struct Target {
     electrodes: usize,
     /// Readings, less what spots cannot say (V).
-    pub volts: Vec<f64>,
+    pub(super) volts: Vec<f64>,
     /// One over the standard deviation of each (1/V); zero leaves a reading out.
     weights: Vec<f64>,
     /// `q`, row by row, times the root of `k`.
@@ -37,7 +37,7 @@ pub(super) struct Target {
 
 impl Target {
     /// The target of some readings.
-    pub fn new(readings: &Readings, errors: &Errors) -> Self {
+    pub(super) fn new(readings: &Readings, errors: &Errors) -> Self {
         let electrodes = readings.electrodes();
         let deviation_v = errors.noise_v.hypot(errors.model * readings.largest_v());
         let weight = |volts: &f64| if *volts < errors.full_v { 1.0 / deviation_v } else { 0.0 };

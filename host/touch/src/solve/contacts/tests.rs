@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use super::*;
+use crate::solve::Solver;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::simulate::{Noise, measured};
@@ -49,6 +50,7 @@ fn error_m((truth, found): &(Contact, FoundContact)) -> f64 {
 #[test]
 fn the_readings_follow_their_derivatives() {
     let solver = solver();
+    let solver = solver.finder();
     let fields = &*solver.fields;
     let spots: Vec<_> = [([0.003, -0.008], 900.0), ([-0.012, 0.004], 2500.0), ([0.0271, 0.0262], 700.0)]
         .map(|([x_m, y_m], ohm)| FitSpot { spot: fields.spot([x_m, y_m, 0.0]), ohm })

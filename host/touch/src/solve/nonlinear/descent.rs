@@ -43,7 +43,7 @@ pub(super) struct Scene {
 }
 
 /// An image on the way, with its fields.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(super) struct Image {
     /// Roots of the conductances.
     pub roots: DVector<f64>,
@@ -51,12 +51,14 @@ pub(super) struct Image {
 }
 
 /// How far a descent came.
-#[derive(Clone)]
-pub(super) struct Descent {
-    pub image: Image,
+#[derive(Clone, Debug)]
+pub(in crate::solve) struct Descent {
+    pub(super) image: Image,
     damping: Option<f64>,
     /// Whether further steps would gain little.
-    pub settled: bool,
+    pub(super) settled: bool,
+    /// Mean square that it left when it was last begun anew.
+    pub(super) begun: f64,
 }
 
 impl Scene {
@@ -85,12 +87,17 @@ impl Scene {
 
 impl Descent {
     /// Begins at an image.
-    pub fn new(image: Image) -> Self {
-        Self { image, damping: None, settled: false }
+    pub(super) fn new(image: Image) -> Self {
+        Self { image, damping: None, settled: false, begun: f64::INFINITY }
+    }
+
+    /// The same image with the damping of a first step.
+    pub(super) fn cooled(self) -> Self {
+        Self::new(self.image)
     }
 
     /// Steps until it settles or has looked at so many images.
-    pub fn run(&mut self, scene: &Scene, target: &Target, mut looks: usize) {
+    pub(super) fn run(&mut self, scene: &Scene, target: &Target, mut looks: usize) {
         self.settled = false;
         let mut now = scene.sum(target, &self.image);
         while looks > 0 && !self.settled {

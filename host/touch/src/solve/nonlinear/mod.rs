@@ -7,9 +7,12 @@
 mod data;
 mod descent;
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
-use self::descent::{Descent, Scene};
+pub(super) use self::descent::Descent;
+use self::descent::Scene;
 use super::interpolate::Interpolation;
 use super::locate::Locator;
 use super::{Flags, Problem, Solution, SolveError, Solver};
@@ -22,6 +25,9 @@ const FULL: f64 = 0.995;
 const EVEN: [f64; 12] = [0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.25, 0.5];
 /// Mean square of what is left, in what noise and model error make, above which the readings do not fit.
 const MISFIT: f64 = 3.0;
+/// What is left may be so many times what the last fresh start left before the next one: jumping presses leave hundreds of times as much,
+/// a scene that moves 2 mm a frame twice as much.
+const LOST: f64 = 4.0;
 
 /// How an image is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,8 +51,15 @@ impl Default for NonlinearSettings {
     }
 }
 
-/// Makes an image by the full contact physics.
+/// Makes an image by the full contact physics. Clones share what does not change from frame to frame.
+#[derive(Clone)]
 pub struct Nonlinear {
+    shared: Arc<Shared>,
+    last: Option<Descent>,
+}
+
+/// What does not change from frame to frame.
+struct Shared {
     settings: NonlinearSettings,
     scene: Scene,
     to_image: Interpolation,
@@ -58,7 +71,6 @@ pub struct Nonlinear {
     full_v: f64,
     /// Readings at even contact, for each of [`EVEN`].
     even: Vec<Readings>,
-    last: Option<Descent>,
 }
 
 /// Readings to fit.
@@ -68,12 +80,12 @@ struct Target {
     weights: Vec<f64>,
 }
 
-impl Nonlinear {
+impl Shared {
     /// Makes it ready for a problem.
     ///
     /// # Errors
     /// [`ForwardError`] if the model cannot give a coarse image.
-    pub fn new(problem: &Problem, settings: NonlinearSettings) -> Result<Self, ForwardError> {
+    fn new(problem: &Problem, settings: NonlinearSettings) -> Result<Self, ForwardError> {
         let coarse = problem.model.on_image_of(settings.nodes)?;
         let detector = problem.detector().clone();
         let mesh = coarse.image_mesh();
@@ -88,7 +100,13 @@ impl Nonlinear {
         let scene = Scene { patches, detector, unit_s, sparsity: settings.sparsity };
         let even = EVEN.iter().filter_map(|&root| scene.image(DVector::from_element(areas_m2.len(), root)));
         let even = even.map(|image| readings_v(&image.fields.impedance_ohm, &scene.detector)).collect();
-        Ok(Self { settings, scene, to_image, areas_m2, locator, noise_v, full_v, even, last: None })
+        Ok(Self { settings, scene, to_image, areas_m2, locator, noise_v, full_v, even })
+    }
+
+    /// What is fitted, if the readings can be those of the detector.
+    fn checked(&self, readings: &Readings) -> Result<Target, SolveError> {
+        super::check(readings, self.scene.detector.electrodes.len())?;
+        Ok(self.target(readings))
     }
 
     fn target(&self, readings: &Readings) -> Target {
@@ -110,12 +128,17 @@ impl Nonlinear {
         self.scene.image(DVector::from_element(self.areas_m2.len(), nearest)).map(Descent::new)
     }
 
+    /// Mean square of what an image leaves, in deviations.
+    fn left(&self, descent: &Descent, target: &Target) -> f64 {
+        self.scene.misfit(target, &descent.image.fields) / target.counted().max(1) as f64
+    }
+
     fn solution(&self, descent: &Descent, target: &Target) -> Solution {
         let image_s = self.scene.image_s(&descent.image.roots);
         let densities: Vec<f32> = image_s.iter().zip(&self.areas_m2).map(|(s, area_m2)| (s / area_m2) as f32).collect();
         let image = self.to_image.apply(&densities);
-        let counted = target.weights.iter().filter(|&&weight| weight > 0.0).count();
-        let left = self.scene.misfit(target, &descent.image.fields) / counted.max(1) as f64;
+        let counted = target.counted();
+        let left = self.left(descent, target);
         let deviation_v = 1.0 / target.weights.iter().copied().fold(0.0, f64::max).max(1.0);
         let flags = Flags {
             saturated: counted < target.volts.len(),
@@ -142,26 +165,80 @@ impl Nonlinear {
     }
 }
 
+impl Target {
+    /// Readings that say something.
+    fn counted(&self) -> usize {
+        self.weights.iter().filter(|weight| **weight > 0.0).count()
+    }
+}
+
+impl Nonlinear {
+    /// Makes it ready for a problem.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if the model cannot give a coarse image.
+    pub fn new(problem: &Problem, settings: NonlinearSettings) -> Result<Self, ForwardError> {
+        Ok(Self { shared: Arc::new(Shared::new(problem, settings)?), last: None })
+    }
+
+    /// Goes on with the image of the frame before; whether it no longer explains the readings as the last one that was begun anew did.
+    pub(super) fn follow(&mut self, readings: &Readings) -> Result<(Solution, bool), SolveError> {
+        let target = self.shared.checked(readings)?;
+        let Some(mut descent) = self.last.take() else { return Ok((self.shared.nothing(&target), true)) };
+        descent.run(&self.shared.scene, &target, self.shared.settings.looks);
+        let solution = self.shared.solution(&descent, &target);
+        let left = self.shared.left(&descent, &target);
+        // The warm start has to be given up: what is left is no noise, and much more than a fresh start left.
+        let is_lost = left > MISFIT && left > LOST * descent.begun;
+        self.last = Some(descent);
+        Ok((solution, is_lost))
+    }
+
+    /// Finds the image anew, from even contact or from where the last one is, whichever is nearer.
+    pub(super) fn begin(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
+        let target = self.shared.checked(readings)?;
+        let shared = &self.shared;
+        let last = self.last.take().map(Descent::cooled);
+        let nearer = |a: &Descent, b: &Descent| shared.left(a, &target).total_cmp(&shared.left(b, &target));
+        let Some(mut descent) = shared.begin(&target).into_iter().chain(last).min_by(nearer) else {
+            return Ok(shared.nothing(&target));
+        };
+        descent.run(&shared.scene, &target, shared.settings.first_looks);
+        descent.begun = shared.left(&descent, &target);
+        let solution = shared.solution(&descent, &target);
+        self.last = Some(descent);
+        Ok(solution)
+    }
+
+    /// The image that is followed.
+    pub(super) fn descent(&self) -> Option<&Descent> {
+        self.last.as_ref()
+    }
+
+    /// Goes on from an image of some frames ago.
+    pub(super) fn go_on_from(&mut self, descent: Option<Descent>) {
+        self.last = descent;
+    }
+
+    /// Whether readings are no more than noise and quantisation.
+    pub(super) fn is_rest(&self, readings: &Readings) -> bool {
+        self.shared.locator.is_rest(readings)
+    }
+}
+
 impl Solver for Nonlinear {
     fn name(&self) -> &'static str {
         "nonlinear"
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        crate::solve::check(readings, self.scene.detector.electrodes.len())?;
-        let last = self.last.take();
-        let target = self.target(readings);
-        if self.locator.is_rest(readings) {
-            return Ok(self.nothing(&target));
+        let target = self.shared.checked(readings)?;
+        if self.is_rest(readings) {
+            self.last = None;
+            return Ok(self.shared.nothing(&target));
         }
-        let looks = if last.is_some() { self.settings.looks } else { self.settings.first_looks };
-        let Some(mut descent) = last.or_else(|| self.begin(&target)) else {
-            return Ok(self.nothing(&target));
-        };
-        descent.run(&self.scene, &target, looks);
-        let solution = self.solution(&descent, &target);
-        self.last = Some(descent);
-        Ok(solution)
+        let (solution, is_lost) = self.follow(readings)?;
+        if is_lost { self.begin(readings) } else { Ok(solution) }
     }
 
     fn reset(&mut self) {
@@ -227,6 +304,26 @@ mod tests {
         assert!(first.flags.unfinished);
         let later = (0..5).map(|_| solver.solve(&readings).unwrap().residual.unwrap()).last().unwrap();
         assert!(later < first.residual.unwrap(), "{later}");
+    }
+
+    #[test]
+    fn a_press_elsewhere_leaves_nothing_of_the_one_before() {
+        let problem = problem();
+        let mut solver = Nonlinear::new(&problem, NonlinearSettings::default()).unwrap();
+        let places = [[0.018, 0.015], [-0.02, 0.004], [0.003, -0.02], [-0.015, 0.02]];
+        for [x_m, y_m] in places {
+            let press = Touch::flat([x_m, y_m], Shape::Disc { radius_m: 0.005 }, 3.0 * detector().sheet_conductance_s());
+            let image = solver.solve(&readings(&[press])).unwrap().image_s_per_m2.unwrap();
+            let mesh = &problem.jacobian.image_mesh;
+            let of = |node: usize| f64::from(image[node]) * mesh.node_areas_m2[node];
+            let is_far = |node: &usize| {
+                let [x, y] = mesh.nodes_m[*node];
+                (x - x_m).hypot(y - y_m) > 0.015
+            };
+            let far_s: f64 = (0..image.len()).filter(is_far).map(of).sum();
+            let all_s: f64 = (0..image.len()).map(of).sum();
+            assert!(far_s < 0.02 * all_s, "{far_s} of {all_s} S are elsewhere");
+        }
     }
 
     #[test]

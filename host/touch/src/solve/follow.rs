@@ -1,0 +1,123 @@
+//! Two halves of a solver: one that follows what is known from frame to frame, fast, and one that searches thoroughly, slowly.
+//!
+//! Offline they take turns on every frame. Live, each has a thread of its own: the follower answers at the board's rate, and goes on from
+//! what a search has found once that explains the present better.
+
+use super::contacts::Found;
+use super::nonlinear::Descent;
+use super::{Solution, SolveError, Solver};
+use tactomo_physics::readings::Readings;
+
+/// Follows what is known from frame to frame.
+pub trait Follower: Send {
+    /// The answer for the next frame.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError>;
+
+    /// Goes on from what a search has found, if that explains these readings better than what is followed; the answer for these
+    /// readings.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError>;
+
+    /// What is followed: where a search may begin.
+    fn lead(&self) -> Lead;
+
+    /// Forgets the frames before.
+    fn reset(&mut self);
+}
+
+/// Searches what explains a frame.
+pub trait Searcher: Send {
+    /// What explains `readings`; `from` is what was followed up to now, and explains them partly.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn search(&mut self, from: Lead, readings: &Readings) -> Result<Lead, SolveError>;
+}
+
+/// The answer of a follower.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Followed {
+    /// What is known now.
+    pub solution: Solution,
+    /// Whether a search may find something better.
+    pub search: bool,
+}
+
+/// The halves of a solver.
+pub struct Parts {
+    /// Answers at once.
+    pub follower: Box<dyn Follower>,
+    /// Answers thoroughly; none where the follower's answers are.
+    pub searcher: Option<Box<dyn Searcher>>,
+}
+
+/// What a frame was explained by, for another frame to go on from.
+#[derive(Clone, Debug, Default)]
+pub struct Lead(pub(super) Known);
+
+/// What is known of a scene.
+#[derive(Clone, Debug, Default)]
+pub(super) enum Known {
+    /// No contact.
+    #[default]
+    Nothing,
+    /// Contacts.
+    Contacts(Found),
+    /// An image, and why it is not contacts.
+    Image(Box<Descent>, String),
+}
+
+impl Lead {
+    /// Contacts, or nothing.
+    pub(super) fn of_contacts(found: Option<Found>) -> Self {
+        Self(found.map_or(Known::Nothing, Known::Contacts))
+    }
+
+    /// The contacts, if it is contacts.
+    pub(super) fn into_contacts(self) -> Option<Found> {
+        match self.0 {
+            Known::Contacts(found) => Some(found),
+            Known::Nothing | Known::Image(..) => None,
+        }
+    }
+}
+
+/// One frame by both halves, one after the other: the thorough answer.
+pub(super) fn follow_and_search(
+    follower: &mut dyn Follower,
+    searcher: &mut dyn Searcher,
+    readings: &Readings,
+) -> Result<Solution, SolveError> {
+    let followed = follower.follow(readings)?;
+    if !followed.search {
+        return Ok(followed.solution);
+    }
+    let lead = searcher.search(follower.lead(), readings)?;
+    Ok(follower.adopt(lead, readings)?.solution)
+}
+
+/// A solver whose every answer is thorough, as a follower.
+pub(super) struct Direct<S: ?Sized>(pub Box<S>);
+
+impl<S: Solver + ?Sized> Follower for Direct<S> {
+    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
+        Ok(Followed { solution: self.0.solve(readings)?, search: false })
+    }
+
+    fn adopt(&mut self, _lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+        self.follow(readings)
+    }
+
+    fn lead(&self) -> Lead {
+        Lead::default()
+    }
+
+    fn reset(&mut self) {
+        self.0.reset();
+    }
+}

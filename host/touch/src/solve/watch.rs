@@ -1,0 +1,173 @@
+//! Which electrodes cannot be right, from frame to frame.
+//!
+//! One frame's verdict ([`health`]) is believed after some frames in a row, so that no single frame costs an electrode. An electrode that
+//! was left out comes back after many frames that would have shown its fault and do not: with readings as large as when it was found.
+
+use super::health::{self, ElectrodeFault};
+use super::Solution;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
+
+/// Frames in a row that have to say the same of the electrodes before it is believed.
+const CONFIRMED: u32 = 8;
+/// Frames in a row that have to show nothing of a fault before its electrode comes back: 50 ms at 1200 frames/s; doubled each time that it
+/// is left out again, up to the second.
+const HEALTHY: [u32; 2] = [64, 64 << 10];
+/// With electrodes left out, every so many frames are judged: a verdict on a faulty frame takes 0.1 ms.
+const STRIDE: u32 = 8;
+/// Share of the largest reading at which a fault was found from which readings would show it again.
+const AS_LARGE: f64 = 0.7;
+/// Frames in a row that do not fit after which a look is taken for exchanged wires: it takes as long as some hundred frames.
+const MISFITS: [u32; 3] = [16, 160, 1600];
+/// Frames with contacts after which exchanged wires are looked at again.
+const LOOK_AGAIN: u32 = 1200;
+/// Fewest electrodes that are worth solving for.
+const FEWEST: usize = 5;
+
+/// Watches readings for faulty electrodes.
+#[derive(Clone, Debug)]
+pub struct ElectrodeWatch {
+    electrodes: usize,
+    drive_v: f64,
+    noise_v: f64,
+    excluded: Vec<(usize, ElectrodeFault)>,
+    /// Largest reading at which each electrode was found faulty (V), how many frames have shown it healthy since, and how many have to.
+    cases: Vec<Case>,
+    suspected: Vec<(usize, ElectrodeFault)>,
+    /// Frames in a row that have the same suspicion.
+    seen: u32,
+    skipped: u32,
+    misfits: u32,
+    touched: u32,
+}
+
+/// An electrode's history.
+#[derive(Clone, Copy, Debug)]
+struct Case {
+    found_at_v: f64,
+    healthy: u32,
+    needed: u32,
+}
+
+/// A look with the forward model for what readings alone do not show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// Whether two wires are exchanged.
+    Exchanged,
+    /// Whether two that were are no longer.
+    Healed([usize; 2]),
+}
+
+impl ElectrodeWatch {
+    /// Watches a detector, as measured.
+    pub fn new(detector: &Detector) -> Self {
+        let electrodes = detector.electrodes.len();
+        Self {
+            electrodes,
+            drive_v: detector.drive_v,
+            noise_v: detector.adc.deviation_v(),
+            excluded: Vec::new(),
+            cases: vec![Case { found_at_v: 0.0, healthy: 0, needed: HEALTHY[0] }; electrodes],
+            suspected: Vec::new(),
+            seen: 0,
+            skipped: 0,
+            misfits: 0,
+            touched: 0,
+        }
+    }
+
+    /// Electrodes that are left out, and why.
+    pub fn excluded(&self) -> &[(usize, ElectrodeFault)] {
+        &self.excluded
+    }
+
+    /// Takes note of a frame's readings (V), less the baseline; whether other electrodes are left out now.
+    pub fn note(&mut self, readings: &Readings) -> bool {
+        self.skipped += 1;
+        if !self.excluded.is_empty() && self.suspected.is_empty() && self.skipped < STRIDE {
+            return false;
+        }
+        self.skipped = 0;
+        if readings.electrodes() != self.electrodes || readings.volts().iter().any(|volts| !volts.is_finite()) {
+            return false;
+        }
+        let Some(faulty) = health::faulty_electrodes(readings, self.drive_v, self.noise_v) else { return false };
+        let largest_v = readings.largest_v();
+        let is_back = self.take_back(&faulty, largest_v);
+        let is_out = self.suspect(faulty, largest_v);
+        is_back || is_out
+    }
+
+    /// Counts frames that would have shown a fault and do not, and takes electrodes back.
+    fn take_back(&mut self, faulty: &[(usize, ElectrodeFault)], largest_v: f64) -> bool {
+        let before = self.excluded.len();
+        let cases = &mut self.cases;
+        self.excluded.retain(|(electrode, fault)| {
+            let case = &mut cases[*electrode];
+            if faulty.iter().any(|(wrong, _)| wrong == electrode) {
+                case.healthy = 0;
+            } else if *fault != ElectrodeFault::Exchanged && largest_v > AS_LARGE * case.found_at_v {
+                case.healthy += STRIDE;
+            }
+            let is_healthy = case.healthy >= case.needed;
+            if is_healthy {
+                tracing::info!("electrode {electrode} is healthy again ({fault})");
+                *case = Case { found_at_v: 0.0, healthy: 0, needed: (2 * case.needed).min(HEALTHY[1]) };
+            }
+            !is_healthy
+        });
+        self.excluded.len() < before
+    }
+
+    /// Leaves out what enough frames in a row have shown.
+    fn suspect(&mut self, mut faulty: Vec<(usize, ElectrodeFault)>, largest_v: f64) -> bool {
+        faulty.retain(|(electrode, _)| self.excluded.iter().all(|(known, _)| known != electrode));
+        self.seen = if faulty == self.suspected { self.seen + 1 } else { 1 };
+        self.suspected = faulty;
+        if self.seen < CONFIRMED || self.suspected.is_empty() {
+            return false;
+        }
+        let found = std::mem::take(&mut self.suspected);
+        self.exclude(found, largest_v)
+    }
+
+    fn exclude(&mut self, found: Vec<(usize, ElectrodeFault)>, largest_v: f64) -> bool {
+        if self.electrodes < FEWEST + self.excluded.len() + found.len() {
+            return false;
+        }
+        for (electrode, fault) in &found {
+            tracing::warn!("electrode {electrode} is left out: {fault}");
+            self.cases[*electrode].found_at_v = largest_v;
+        }
+        self.excluded.extend(found);
+        self.excluded.sort_unstable();
+        true
+    }
+
+    /// What to look for after this answer, if anything.
+    pub fn look(&mut self, solution: &Solution) -> Option<Look> {
+        self.misfits = if solution.flags.misfit { self.misfits + 1 } else { 0 };
+        self.touched = (self.touched + u32::from(!solution.contacts.is_empty())) % LOOK_AGAIN;
+        if MISFITS.contains(&self.misfits) {
+            return Some(Look::Exchanged);
+        }
+        let is_exchanged = |(electrode, fault): &(usize, ElectrodeFault)| {
+            (*fault == ElectrodeFault::Exchanged).then_some(*electrode)
+        };
+        let mut exchanged = self.excluded.iter().filter_map(is_exchanged);
+        let pair = exchanged.next().zip(exchanged.next())?;
+        (self.touched == LOOK_AGAIN - 1).then_some(Look::Healed(pair.into()))
+    }
+
+    /// Takes what a look has found; whether other electrodes are left out now.
+    pub fn conclude(&mut self, look: Look, found: Option<[usize; 2]>) -> bool {
+        match (look, found) {
+            (_, None) => false,
+            (Look::Exchanged, Some(pair)) => self.exclude(pair.map(|e| (e, ElectrodeFault::Exchanged)).into(), 0.0),
+            (Look::Healed(_), Some(pair)) => {
+                self.excluded.retain(|(electrode, _)| !pair.contains(electrode));
+                true
+            }
+        }
+    }
+}
