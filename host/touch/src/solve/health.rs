@@ -10,8 +10,10 @@ use std::fmt;
 
 use tactomo_physics::readings::Readings;
 
-/// Smallest `1 - V / Vcc` that a logarithm is taken of.
+/// Smallest `1 - V / Vcc` that a logarithm is taken of: noise of 1.5 LSB is 3 % of it.
 const SMALLEST: f64 = 0.02;
+/// Sweeps for the loads: a test holds them against healthy boards under firm presses.
+const SWEEPS: usize = 8;
 /// Readings have to be this many deviations of the noise large before they say anything of a short or a broken wire.
 const TOUCHED: f64 = 40.0;
 /// Share of the drive that everything reaches when a broken wire is to be grounded.
@@ -124,26 +126,68 @@ fn contradicting(readings: &Readings, mut sound: Vec<usize>, drive_v: f64, noise
     Vec::new()
 }
 
+/// Logarithms of two electrodes' ratios, and how much they count.
+#[derive(Clone, Copy, Default)]
+struct Pair {
+    log: f64,
+    /// One over the square of its deviation; zero where a reading at the drive makes it say nothing.
+    weight: f64,
+}
+
 /// Mean square of what the logarithms are off, in what noise makes of them.
 fn disagreement(readings: &Readings, electrodes: &[usize], drive_v: f64, noise_v: f64) -> f64 {
     let n = electrodes.len();
-    let ratio = |g: usize, e: usize| (1.0 - readings.at(g, e) / drive_v).max(SMALLEST);
-    let log = |i: usize, j: usize| {
-        let (g, e) = (electrodes[i], electrodes[j]);
-        (ratio(g, e) / ratio(e, g)).ln()
-    };
-    // Least squares: the load of each is a mean.
-    let loads: Vec<_> =
-        (0..n).map(|i| -(0..n).filter(|j| *j != i).map(|j| log(i, j)).sum::<f64>() / n as f64).collect();
-    let mut sum = 0.0;
+    let mut pairs = vec![Pair::default(); n * n];
     for i in 0..n {
         for j in 0..i {
-            let (g, e) = (electrodes[i], electrodes[j]);
-            let noise = noise_v / drive_v * ratio(g, e).recip().hypot(ratio(e, g).recip());
-            let log_deviation = noise.hypot(UNEVEN * log(i, j).abs());
-            sum += ((log(i, j) - (loads[j] - loads[i])) / log_deviation).powi(2);
+            let pair = pair(readings, electrodes[i], electrodes[j], drive_v, noise_v);
+            pairs[i * n + j] = pair;
+            pairs[j * n + i] = Pair { log: -pair.log, ..pair };
         }
     }
-    let free = (n * (n - 1) / 2).saturating_sub(n - 1).max(1);
-    sum / free as f64
+    let loads = loads(&pairs, n);
+    let (mut sum, mut counted) = (0.0, 0_usize);
+    for i in 0..n {
+        for j in 0..i {
+            let pair = pairs[i * n + j];
+            sum += pair.weight * (pair.log - (loads[j] - loads[i])).powi(2);
+            counted += usize::from(pair.weight > 0.0);
+        }
+    }
+    sum / counted.saturating_sub(n - 1).max(1) as f64
+}
+
+/// What the readings of two electrodes say.
+fn pair(readings: &Readings, g: usize, e: usize, drive_v: f64, noise_v: f64) -> Pair {
+    let ratios = [readings.at(g, e), readings.at(e, g)].map(|volts| 1.0 - volts / drive_v);
+    // A pad all but at the drive's potential says only that something conducts well; one above it cannot be.
+    if ratios.iter().any(|ratio| ratio.abs() < SMALLEST) {
+        return Pair::default();
+    }
+    let [there, back] = ratios.map(|ratio| ratio.max(SMALLEST));
+    let log = (there / back).ln();
+    let noise = noise_v / drive_v * there.recip().hypot(back.recip());
+    Pair { log, weight: noise.hypot(UNEVEN * log.abs()).powi(-2) }
+}
+
+/// Logarithm of each electrode's load but for a common constant: where all pairs count, means are the least squares; else some sweeps of
+/// means over those that do are near enough.
+fn loads(pairs: &[Pair], n: usize) -> Vec<f64> {
+    let row = |i: usize| &pairs[i * n..(i + 1) * n];
+    let mut loads: Vec<_> = (0..n).map(|i| -row(i).iter().map(|pair| pair.log).sum::<f64>() / n as f64).collect();
+    // Those on the diagonal never count.
+    if pairs.iter().filter(|pair| pair.weight == 0.0).count() == n {
+        return loads;
+    }
+    for _ in 0..SWEEPS {
+        for i in 0..n {
+            let counted = row(i).iter().zip(&loads).filter(|(pair, _)| pair.weight > 0.0);
+            let (sum, count) =
+                counted.fold((0.0, 0.0), |(sum, count), (pair, load)| (sum + load - pair.log, count + 1.0));
+            if count > 0.0 {
+                loads[i] = sum / count;
+            }
+        }
+    }
+    loads
 }
