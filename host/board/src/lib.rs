@@ -8,7 +8,6 @@ pub mod board_log;
 pub mod frames;
 pub mod link;
 pub mod measured;
-pub mod pace;
 pub mod record;
 pub mod sequence;
 pub mod session;

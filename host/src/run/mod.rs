@@ -1,22 +1,31 @@
-//! The live picture: from a board's bytes to an image, frame by frame.
+//! The live picture: from a board's bytes to touch, frame by frame, in three threads.
 //!
-//! The pipeline runs in a thread of its own and publishes [`Snapshot`]s through a cell that keeps the latest only, so that a
-//! slow page never slows the board. Pages answer with [`Request`]s.
+//! The [reader](reader) takes bytes, stamps them, hands them to the recording and decodes them; it never solves and never waits for a
+//! disk, a page or a solver. The [follower] answers to the newest frame, at the board's rate where the solver allows. The [searcher]
+//! finds thorough answers, from which the follower goes on once they explain the present better. What there is to show is published as
+//! [`Snapshot`]s through a cell that keeps the latest only, so that a slow page slows nothing. Pages answer with [`Request`]s.
 
-pub mod interpret;
-pub mod pipeline;
+mod follower;
+mod inbox;
+mod maker;
+mod notice;
 pub mod plan;
-pub mod solvers;
-pub mod statistics;
+mod reader;
+mod searcher;
+mod statistics;
+mod steady;
+
+pub use self::inbox::Taken;
+pub use self::maker::{Order, SolverState};
+pub use self::reader::run;
 
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use tactomo_board::link::{Control, Playing};
 use tactomo_board::session::RequestedSettings;
 use tactomo_protocol::{Hello, Status};
 
-use self::solvers::SolverState;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{Method, Solution};
 
@@ -39,6 +48,8 @@ pub struct Snapshot {
     pub recording: Option<PathBuf>,
     /// What was asked for last and cannot be, for the person who asked.
     pub refused: Option<String>,
+    /// What a person should know of the readings, in a sentence.
+    pub notice: Option<String>,
 }
 
 /// How the link to the board fares.
@@ -51,6 +62,8 @@ pub enum LinkState {
     Waiting,
     /// Frames come in.
     Streaming,
+    /// The board answers and sends no frames, for the reason given.
+    Silent(String),
     /// The link was lost, for the reason given; it is tried again.
     Lost(String),
     /// The link has ended for good, for the reason given: the recording is over, the board speaks another protocol.
@@ -70,10 +83,21 @@ pub struct FrameSnapshot {
     pub status: Status,
     /// Readings as measured (V).
     pub readings: Readings,
-    /// What the solver made of the readings less those at rest.
+    /// What the solver made of the readings less the baseline.
     pub solution: Solution,
-    /// Whether the readings at rest are being taken anew.
+    /// Whether the baseline is being taken.
     pub rezeroing: bool,
+}
+
+/// An answer, for those who take each.
+#[derive(Clone, Copy, Debug)]
+pub struct SolvedFrame<'a> {
+    /// Its frame.
+    pub frame: &'a Taken,
+    /// The answer.
+    pub solution: &'a Solution,
+    /// Since the frame's last byte came.
+    pub age: Duration,
 }
 
 /// Counts since the start.
@@ -87,12 +111,16 @@ pub struct Statistics {
     pub dropped: u64,
     /// Frames that came and were not solved by themselves, because newer ones had come.
     pub skipped: u64,
-    /// Solved frames a second, over the last second.
+    /// Answers.
+    pub solved: u64,
+    /// Answers a second, over the last second.
     pub solved_per_s: f64,
     /// Stretches of bytes that were no message.
     pub corrupt: u64,
     /// Age of answers when they are ready: since the last byte of their frame came.
     pub age: Latency,
+    /// Time that answers took, since their frame was taken up.
+    pub latency: Latency,
 }
 
 /// How the latencies are distributed, in microseconds (us).

@@ -1,4 +1,4 @@
-//! What the pipeline is to do, and what comes of it.
+//! What a run is to do, and what comes of it.
 
 use std::io;
 use std::sync::Arc;
@@ -8,24 +8,26 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 
-use super::{Latency, Request, Snapshot};
+use super::{Latency, Order, Request, Snapshot, SolvedFrame};
 use tactomo_board::board_log::BoardLog;
 use tactomo_board::link::SourceError;
 use tactomo_board::measured::Mismatch;
 use tactomo_board::record::{RecordError, Recorder};
 use tactomo_board::session::{GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
-use tactomo_physics::scene::Contact;
-use tactomo_touch::solve::{Method, SolveError, Solver};
+use tactomo_physics::readings::Readings;
+use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
 
-/// Makes the solver of a method for a detector; called in other threads too.
-pub type MakeSolver = Arc<dyn Fn(Method, &Detector) -> Result<Box<dyn Solver>, BoxError> + Send + Sync>;
-/// Presses on a simulated detector, or lets go.
-pub type Press = Box<dyn Fn(Option<Contact>) + Send>;
+/// Makes the solver that is ordered; called in other threads.
+pub type MakeSolver = Arc<dyn Fn(&Order) -> Result<Box<dyn Solver>, BoxError> + Send + Sync>;
+/// Looks for exchanged wires in readings (V) less the baseline, with the forward model of an order's detector; called in another thread.
+pub type LookAtWires = Arc<dyn Fn(&Order, Look, &Readings) -> Option<[usize; 2]> + Send + Sync>;
+/// Begins a recording in a new file.
+pub type BeginRecording = Box<dyn FnMut() -> Result<Recorder, RecordError> + Send>;
 /// Any error.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 
-/// What the pipeline is to do.
+/// What the run is to do.
 pub struct Plan {
     /// The detector that is connected; drive and ADC are the board's to tell.
     pub detector: Detector,
@@ -37,10 +39,18 @@ pub struct Plan {
     pub recorder: Option<Recorder>,
     /// Where the board's log goes.
     pub board_log: BoardLog,
-    /// Who is told of presses, if the detector is simulated.
-    pub press: Option<Press>,
+    /// Begins a recording when a page asks for one.
+    pub begin_recording: Option<BeginRecording>,
+    /// Who takes each answer.
+    pub listeners: Vec<Box<dyn Listener>>,
     /// Time from Hello to the end; `None` for without end.
     pub seconds: Option<Duration>,
+}
+
+/// Who takes each answer. It must not wait: the follower does while it works.
+pub trait Listener: Send {
+    /// Takes an answer.
+    fn solved(&mut self, solved: &SolvedFrame<'_>);
 }
 
 /// What reads the touch.
@@ -49,19 +59,37 @@ pub struct Solving {
     pub method: Method,
     /// Makes its solver once the board has said Hello, and those of other methods when a page asks for them.
     pub make: MakeSolver,
+    /// Looks for exchanged wires.
+    pub look_at_wires: LookAtWires,
 }
 
-/// Where the pipeline meets the rest of the program.
+impl Solving {
+    /// Reads the touch of a problem's detector by a method.
+    pub fn new(method: Method, problem: Problem) -> Self {
+        let looked_at = problem.clone();
+        Self {
+            method,
+            make: Arc::new(move |order| {
+                Ok(solve::without(order.method, &problem.measured_as(&order.detector), &order.excluded)?)
+            }),
+            look_at_wires: Arc::new(move |order, look, readings| {
+                look.run(&looked_at.measured_as(&order.detector), &order.excluded, readings)
+            }),
+        }
+    }
+}
+
+/// Where the run meets the rest of the program.
 pub struct Ends {
     /// Where snapshots go.
     pub snapshots: watch::Sender<Arc<Snapshot>>,
     /// Where requests come from.
     pub requests: mpsc::Receiver<Request>,
-    /// Set to end the pipeline.
+    /// Set to end the run.
     pub stop: Arc<AtomicBool>,
 }
 
-/// What a run of the pipeline has come to.
+/// What a run of the run has come to.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Summary {
     /// Where the bytes came from.
@@ -72,15 +100,21 @@ pub struct Summary {
     pub frames: u64,
     /// Frames a second, from the first to the last.
     pub frames_per_s: f64,
-    /// Frames that the sequence numbers say are missing.
+    /// Frames that the sequence numbers say are missing: the link or the board lost them.
     pub dropped: u64,
+    /// Frames that came and were not answered by themselves, because newer ones had come.
+    pub skipped: u64,
+    /// Answers.
+    pub solved: u64,
     /// Stretches of bytes that were no message, since the board's Hello.
     pub corrupt: u64,
-    /// From the last byte of a frame received to its image ready, in microseconds (us).
+    /// Time that answers took, since their frame was taken up, in microseconds (us).
     pub latency_us: Latency,
+    /// Age of answers when they are ready, since the last byte of their frame came, in microseconds (us).
+    pub age_us: Latency,
 }
 
-/// Why the pipeline cannot go on.
+/// Why the run cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
     /// The source does not open.
@@ -111,6 +145,12 @@ pub enum LiveError {
     /// The solver cannot answer.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// A thread of the run cannot be started.
+    #[error("cannot start a thread")]
+    Thread(#[source] io::Error),
+    /// The thread that solves has panicked; the message is on stderr.
+    #[error("the solver panicked: this is a mistake in the program, please report it with the message above")]
+    Panicked,
     /// The recording cannot be kept.
     #[error(transparent)]
     Record(#[from] RecordError),

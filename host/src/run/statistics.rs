@@ -1,4 +1,4 @@
-//! Counts, rate and latency of the frames, in bounded memory.
+//! Counts, rates and ages of frames and answers, in bounded memory.
 
 use std::time::{Duration, Instant};
 
@@ -11,41 +11,49 @@ const RATE_OVER: Duration = Duration::from_secs(1);
 const MANTISSA_BITS: u32 = 5;
 const BUCKETS: usize = ((u64::BITS - MANTISSA_BITS + 1) as usize) << MANTISSA_BITS;
 
-/// Counts what is received.
+/// Counts what is received and what becomes of it.
 #[derive(Debug, Default)]
 pub struct Meter {
     dropped: u64,
     corrupt: u64,
+    skipped: u64,
+    received: Rate,
+    solved: Rate,
+    age: Histogram,
     latency: Histogram,
-    span: Option<Span>,
+}
+
+/// Counts events, and how many there are a second.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rate {
+    count: u64,
+    /// When the first and the newest came.
+    span: Option<(Instant, Instant)>,
     recent: Option<Recent>,
 }
 
-/// When the first and the newest frame came.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    first: Instant,
-    last: Instant,
-}
-
-/// Frames since `since`, and the rate over the time before.
+/// Events since `since`, and the rate over the time before.
 #[derive(Clone, Copy, Debug)]
 struct Recent {
     since: Instant,
-    frames: u64,
+    events: u64,
     per_s: f64,
 }
 
 impl Meter {
-    /// Counts a frame whose last byte came at `received` and whose image was ready at `ready`, after `dropped` missing ones.
-    pub fn frame(&mut self, received: Instant, ready: Instant, dropped: u64) {
+    /// Counts a frame whose last byte came at `received`, after `dropped` missing ones.
+    pub fn frame(&mut self, received: Instant, dropped: u64) {
         self.dropped += dropped;
-        self.latency.add(ready.duration_since(received).as_nanos() as u64);
-        let first = self.span.map_or(received, |span| span.first);
-        self.span = Some(Span { first, last: received });
-        let recent = self.recent.get_or_insert(Recent { since: received, frames: 0, per_s: 0.0 });
-        recent.frames += 1;
-        recent.advance(received);
+        self.received.add(received);
+    }
+
+    /// Counts an answer, `latency` after its frame was taken up and `age` after its last byte came; `came` frames had come since the
+    /// answer before, none if it is a better one to the same frame.
+    pub fn solved(&mut self, came: u32, age: Duration, latency: Duration) {
+        self.skipped += u64::from(came.saturating_sub(1));
+        self.solved.add(Instant::now());
+        self.age.add(age.as_nanos() as u64);
+        self.latency.add(latency.as_nanos() as u64);
     }
 
     /// Counts stretches of bytes that were no message.
@@ -55,26 +63,46 @@ impl Meter {
 
     /// All of it at a moment.
     pub fn statistics(&mut self, now: Instant) -> Statistics {
-        let frames_per_s = self.recent.as_mut().map_or(0.0, |recent| {
-            recent.advance(now);
-            recent.per_s
-        });
         Statistics {
-            frames: self.latency.count,
-            frames_per_s,
+            frames: self.received.count,
+            frames_per_s: self.received.recent_per_s(now),
             dropped: self.dropped,
+            skipped: self.skipped,
+            solved: self.solved.count,
+            solved_per_s: self.solved.recent_per_s(now),
             corrupt: self.corrupt,
-            skipped: 0,
-            solved_per_s: frames_per_s,
-            age: self.latency.summary_us(),
+            age: self.age.summary_us(),
+            latency: self.latency.summary_us(),
         }
     }
 
     /// Frames a second from the first frame to the newest.
     pub fn overall_frames_per_s(&self) -> f64 {
-        let Some(Span { first, last }) = self.span else { return 0.0 };
+        self.received.overall_per_s()
+    }
+}
+
+impl Rate {
+    fn add(&mut self, at: Instant) {
+        self.count += 1;
+        let first = self.span.map_or(at, |(first, _)| first);
+        self.span = Some((first, at));
+        let recent = self.recent.get_or_insert(Recent { since: at, events: 0, per_s: 0.0 });
+        recent.events += 1;
+        recent.advance(at);
+    }
+
+    fn recent_per_s(&mut self, now: Instant) -> f64 {
+        self.recent.as_mut().map_or(0.0, |recent| {
+            recent.advance(now);
+            recent.per_s
+        })
+    }
+
+    fn overall_per_s(&self) -> f64 {
+        let Some((first, last)) = self.span else { return 0.0 };
         let seconds = last.duration_since(first).as_secs_f64();
-        if seconds > 0.0 { (self.latency.count - 1) as f64 / seconds } else { 0.0 }
+        if seconds > 0.0 { (self.count - 1) as f64 / seconds } else { 0.0 }
     }
 }
 
@@ -82,7 +110,7 @@ impl Recent {
     fn advance(&mut self, now: Instant) {
         let elapsed = now.duration_since(self.since);
         if elapsed >= RATE_OVER {
-            *self = Self { since: now, frames: 0, per_s: self.frames as f64 / elapsed.as_secs_f64() };
+            *self = Self { since: now, events: 0, per_s: self.events as f64 / elapsed.as_secs_f64() };
         }
     }
 }
@@ -166,19 +194,21 @@ mod tests {
     }
 
     #[test]
-    fn rates_and_counts_are_told() {
+    fn rates_counts_and_ages() {
         let mut meter = Meter::default();
         let start = Instant::now();
         for i in 0..=250 {
-            let received = start + Duration::from_millis(10 * i);
-            meter.frame(received, received + Duration::from_micros(20), u64::from(i == 7));
+            meter.frame(start + Duration::from_millis(10 * i), u64::from(i == 7));
         }
+        meter.solved(3, Duration::from_micros(70), Duration::from_micros(20));
+        meter.solved(0, Duration::from_micros(90), Duration::from_micros(20));
         meter.corrupt(3);
         let statistics = meter.statistics(start + Duration::from_millis(2500));
         assert_eq!((statistics.frames, statistics.dropped, statistics.corrupt), (251, 1, 3));
+        assert_eq!((statistics.solved, statistics.skipped), (2, 2));
         assert!((statistics.frames_per_s - 100.0).abs() < 1.5, "{}", statistics.frames_per_s);
         assert!((meter.overall_frames_per_s() - 100.0).abs() < 1e-6);
-        assert_eq!(statistics.age.max, 20.0);
+        assert_eq!((statistics.age.max, statistics.latency.max), (90.0, 20.0));
         let quiet = meter.statistics(start + Duration::from_secs(60));
         assert!(quiet.frames_per_s < 2.0, "a silent board has no frame rate");
     }

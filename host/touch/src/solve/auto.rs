@@ -56,7 +56,10 @@ impl Auto {
             skip: 0,
             patience: PATIENCE[0],
         };
-        Ok(Self { follower, searcher: AutoSearcher { contacts: finder.map(ContactSearcher::new), image, residual: None } })
+        Ok(Self {
+            follower,
+            searcher: AutoSearcher { contacts: finder.map(ContactSearcher::new), image, residual: None },
+        })
     }
 }
 
@@ -322,7 +325,11 @@ mod tests {
             }
         }
         let lifted = follower.follow(&bench.measured(&moved(0.005)[..1])).unwrap();
-        assert_eq!((what(&lifted.solution), lifted.search), ("1 contact", false), "a finger that lifts is gone at once: {lifted:?}");
+        assert_eq!(
+            (what(&lifted.solution), lifted.search),
+            ("1 contact", false),
+            "a finger that lifts is gone at once: {lifted:?}"
+        );
     }
 
     #[test]

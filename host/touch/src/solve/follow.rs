@@ -56,6 +56,13 @@ pub struct Parts {
     pub searcher: Option<Box<dyn Searcher>>,
 }
 
+impl Parts {
+    /// All of a solver in the follower: every answer is thorough.
+    pub fn whole(solver: Box<dyn Solver>) -> Self {
+        Self { follower: Box::new(Direct(solver)), searcher: None }
+    }
+}
+
 /// What a frame was explained by, for another frame to go on from.
 #[derive(Clone, Debug, Default)]
 pub struct Lead(pub(super) Known);

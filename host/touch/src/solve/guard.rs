@@ -320,7 +320,11 @@ mod tests {
             // Discs that overlap are no contacts of the model.
             let Ok(impedance_ohm) = fine.impedance_ohm(&contacts) else { continue };
             for _ in 0..20 {
-                assert!(!watch.note(&board.readings_v(Some(&impedance_ohm))), "{scene}: {:?} {contacts:?}", watch.excluded());
+                assert!(
+                    !watch.note(&board.readings_v(Some(&impedance_ohm))),
+                    "{scene}: {:?} {contacts:?}",
+                    watch.excluded()
+                );
             }
         }
     }

@@ -3,8 +3,8 @@
 //! One frame's verdict ([`health`]) is believed after some frames in a row, so that no single frame costs an electrode. An electrode that
 //! was left out comes back after many frames that would have shown its fault and do not: with readings as large as when it was found.
 
-use super::health::{self, ElectrodeFault};
 use super::Solution;
+use super::health::{self, ElectrodeFault};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 
@@ -151,9 +151,8 @@ impl ElectrodeWatch {
         if MISFITS.contains(&self.misfits) {
             return Some(Look::Exchanged);
         }
-        let is_exchanged = |(electrode, fault): &(usize, ElectrodeFault)| {
-            (*fault == ElectrodeFault::Exchanged).then_some(*electrode)
-        };
+        let is_exchanged =
+            |(electrode, fault): &(usize, ElectrodeFault)| (*fault == ElectrodeFault::Exchanged).then_some(*electrode);
         let mut exchanged = self.excluded.iter().filter_map(is_exchanged);
         let pair = exchanged.next().zip(exchanged.next())?;
         (self.touched == LOOK_AGAIN - 1).then_some(Look::Healed(pair.into()))

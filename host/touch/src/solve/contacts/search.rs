@@ -261,8 +261,7 @@ impl ContactFinder {
             }
             // That of a firm disc is not known well either: more of it would change little.
             Explanation::Discs(fit) => fit.contacts.iter().enumerate().any(|(k, contact)| {
-                contact.conductance_s < self.sheet_s
-                    && is_uncertain(fit.covariance.as_ref(), PARAMETERS * k + 2)
+                contact.conductance_s < self.sheet_s && is_uncertain(fit.covariance.as_ref(), PARAMETERS * k + 2)
             }),
         }
     }

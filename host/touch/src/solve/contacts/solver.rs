@@ -156,11 +156,7 @@ impl ContactSearcher {
     }
 
     /// The contacts that explain the readings, and the solution that they are; `None` if nothing touches.
-    pub fn contacts(
-        &self,
-        from: Option<Found>,
-        readings: &Readings,
-    ) -> Result<Option<(Found, Solution)>, SolveError> {
+    pub fn contacts(&self, from: Option<Found>, readings: &Readings) -> Result<Option<(Found, Solution)>, SolveError> {
         let target = self.finder.target(readings)?;
         let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target);
         Ok(found.map(|found| {

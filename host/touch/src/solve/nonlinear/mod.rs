@@ -312,7 +312,8 @@ mod tests {
         let mut solver = Nonlinear::new(&problem, NonlinearSettings::default()).unwrap();
         let places = [[0.018, 0.015], [-0.02, 0.004], [0.003, -0.02], [-0.015, 0.02]];
         for [x_m, y_m] in places {
-            let press = Touch::flat([x_m, y_m], Shape::Disc { radius_m: 0.005 }, 3.0 * detector().sheet_conductance_s());
+            let press =
+                Touch::flat([x_m, y_m], Shape::Disc { radius_m: 0.005 }, 3.0 * detector().sheet_conductance_s());
             let image = solver.solve(&readings(&[press])).unwrap().image_s_per_m2.unwrap();
             let mesh = &problem.jacobian.image_mesh;
             let of = |node: usize| f64::from(image[node]) * mesh.node_areas_m2[node];

@@ -1,0 +1,219 @@
+//! Frames on their way from the reader to the follower: the newest first, and of what stands still the mean.
+//!
+//! A follower that is busy finds, when it comes back, the newest frame and not a queue. Frames that it could not take by themselves are
+//! not lost for accuracy: as long as they differ by no more than noise, their mean is what it gets.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
+use tactomo_protocol::Status;
+use tactomo_touch::solve::{Lead, Look, Method, Parts, Solver};
+
+use super::maker::Made;
+use super::steady::Steady;
+
+/// A frame, or the mean of some that stood still.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Taken {
+    /// Readings (V): of the newest frame as measured.
+    pub newest: Readings,
+    /// The mean of the last frames as far as they stood still (V).
+    pub mean: Readings,
+    /// How many frames that is the mean of.
+    pub averaged: u32,
+    /// Frames that came since the last one was taken, this one included.
+    pub came: u32,
+    /// Number of the newest frame since the board started, unwrapped.
+    pub sequence: u64,
+    /// Board time at its start, unwrapped, in microseconds (us).
+    pub board_time_us: u64,
+    /// When its last byte came.
+    pub arrived: Instant,
+    /// What happened while it was scanned.
+    pub status: Status,
+}
+
+/// What wakes the follower.
+pub enum Event {
+    /// The board has said who it is: the detector, as it measures it.
+    Board(Arc<Detector>),
+    /// The baseline is to be taken anew.
+    Rezero,
+    /// A solver is made.
+    Solver(Made),
+    /// A search has ended.
+    Searched(Searched),
+    /// A look for exchanged wires has ended, with the pair that it is about.
+    Looked(Look, Option<[usize; 2]>),
+    /// Another method is to read the touch.
+    Method(Method),
+    /// A frame.
+    Frame(Taken),
+    /// Nothing for a while.
+    Quiet,
+    /// There is nothing more to come.
+    Closed,
+}
+
+/// What a search has found.
+pub struct Searched {
+    /// Of which solver: the number of those that were made before it.
+    pub solver: u64,
+    /// What it has found.
+    pub lead: Lead,
+}
+
+/// Where frames and everything else that the follower has to know wait for it.
+pub struct Inbox {
+    state: Mutex<State>,
+    changed: Condvar,
+    /// Whether the reader waits until each frame is taken.
+    waits: bool,
+}
+
+#[derive(Default)]
+struct State {
+    events: std::collections::VecDeque<Event>,
+    pending: Option<Taken>,
+    steady: Option<Steady>,
+    closed: bool,
+}
+
+impl Inbox {
+    /// An empty one; with `waits`, the reader waits until each frame is taken, as for a recording that is read as fast as it can be.
+    pub fn new(waits: bool) -> Self {
+        Self { state: Mutex::default(), changed: Condvar::new(), waits }
+    }
+
+    /// The halves of a solver, as they are used here: where no frame is skipped, all of it answers to each.
+    pub fn parts_of(&self, solver: Box<dyn Solver>) -> Parts {
+        if self.waits { Parts::whole(solver) } else { solver.split() }
+    }
+
+    /// Puts something in that is not a frame.
+    pub fn put(&self, event: Event) {
+        self.lock().events.push_back(event);
+        self.changed.notify_all();
+    }
+
+    /// Puts a frame in, in place of one that was not taken; `noise_v` is the deviation of a reading.
+    pub fn put_frame(&self, frame: Taken, noise_v: f64) {
+        let mut state = self.lock();
+        if self.waits {
+            while state.pending.is_some() && !state.closed {
+                state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            }
+        }
+        state.add(frame, noise_v);
+        drop(state);
+        self.changed.notify_all();
+    }
+
+    /// What there is to do next, waiting at most `patience` for it. Frames wait while they are not wanted.
+    pub fn take(&self, patience: Duration, frames: bool) -> Event {
+        let nothing = |state: &mut State| {
+            let is_frame = frames && state.pending.is_some();
+            !is_frame && state.events.is_empty() && !state.closed
+        };
+        let waited = self.changed.wait_timeout_while(self.lock(), patience, nothing);
+        let mut state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        if let Some(event) = state.events.pop_front() {
+            return event;
+        }
+        let Some(frame) = state.pending.take_if(|_| frames) else {
+            return if state.closed { Event::Closed } else { Event::Quiet };
+        };
+        drop(state);
+        self.changed.notify_all();
+        Event::Frame(frame)
+    }
+
+    /// Says that nothing more comes, or that nobody takes it.
+    pub fn close(&self) {
+        self.lock().closed = true;
+        self.changed.notify_all();
+    }
+
+    /// Whether it was closed.
+    pub fn is_closed(&self) -> bool {
+        self.lock().closed
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn add(&mut self, mut frame: Taken, noise_v: f64) {
+        if let (Some(pending), Some(steady)) = (self.pending.take(), &mut self.steady) {
+            steady.add(frame.newest.volts(), noise_v);
+            frame.came += pending.came;
+            frame.averaged = steady.count();
+            frame.mean = pending.mean;
+            frame.mean.volts_mut().copy_from_slice(steady.mean_v());
+        } else {
+            self.steady = Some(Steady::of(frame.newest.volts()));
+        }
+        self.pending = Some(frame);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(volts: f64, sequence: u64) -> Taken {
+        let readings = Readings::from_fn(4, |_, _| volts);
+        Taken {
+            newest: readings.clone(),
+            mean: readings,
+            averaged: 1,
+            came: 1,
+            sequence,
+            board_time_us: 0,
+            arrived: Instant::now(),
+            status: Status::default(),
+        }
+    }
+
+    fn taken(inbox: &Inbox) -> Option<Taken> {
+        match inbox.take(Duration::ZERO, true) {
+            Event::Frame(frame) => Some(frame),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn the_newest_comes_first_and_what_stands_still_is_averaged() {
+        let inbox = Inbox::new(false);
+        (0..4_u64).for_each(|i| inbox.put_frame(frame(0.100 + 0.001 * i as f64, i), 0.002));
+        let still = taken(&inbox).unwrap();
+        assert_eq!((still.sequence, still.came, still.averaged), (3, 4, 4));
+        assert!((still.mean.at(1, 2) - 0.1015).abs() < 1e-12 && (still.newest.at(1, 2) - 0.103).abs() < 1e-12);
+        assert!(taken(&inbox).is_none());
+        for (volts, sequence) in [(0.1, 4), (0.1, 5), (0.3, 6)] {
+            inbox.put_frame(frame(volts, sequence), 0.002);
+        }
+        let moved = taken(&inbox).unwrap();
+        assert_eq!((moved.came, moved.averaged, moved.mean.at(0, 1)), (3, 1, 0.3), "a press is no noise");
+    }
+
+    #[test]
+    fn a_reader_that_waits_loses_no_frame() {
+        let inbox = Arc::new(Inbox::new(true));
+        let reader = {
+            let inbox = Arc::clone(&inbox);
+            std::thread::spawn(move || (0..200).for_each(|i| inbox.put_frame(frame(0.1, i), 0.002)))
+        };
+        for i in 0..200 {
+            let frame = std::iter::repeat_with(|| taken(&inbox)).flatten().next().unwrap();
+            assert_eq!((frame.sequence, frame.came), (i, 1));
+        }
+        reader.join().unwrap();
+        inbox.close();
+        assert!(matches!(inbox.take(Duration::ZERO, true), Event::Closed));
+    }
+}

@@ -1,0 +1,376 @@
+//! The thread that receives: it reads, stamps, records, decodes and counts, and never waits for anything else.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tactomo_board::link::{Link, Source};
+use tactomo_board::measured::{self, Volts};
+use tactomo_board::sequence::Sequence;
+use tactomo_board::session::{self, GreetError, Session};
+use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
+use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Frame, Hello};
+
+use super::follower::FollowThread;
+use super::inbox::{Event, Inbox, Taken};
+use super::notice::NoticeBoard;
+use super::plan::{Ends, LiveError, Plan, Summary};
+use super::{LinkState, Request};
+
+/// How long a board has to say Hello: opening the port may have reset it, and then it boots first.
+const PATIENCE: Duration = Duration::from_secs(6);
+/// Time between two tries to open a link that was lost.
+const REOPEN_EVERY: Duration = Duration::from_millis(500);
+/// Bytes of one read: 40 ms at 921600 baud.
+const READ_BYTES: usize = 4096;
+
+/// Runs until the time is over, the recording ends, or it is told to stop. A board that is lost is waited for.
+///
+/// # Errors
+/// [`LiveError`] if the board cannot be used, its readings not be solved, or the recording not be kept.
+pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summary, LiveError> {
+    let Ends { snapshots, requests, stop } = ends;
+    let inbox = Arc::new(Inbox::new(source.speed().is_infinite()));
+    let notice = Arc::new(NoticeBoard::new(snapshots));
+    let solving = plan.solving.take();
+    let listeners = std::mem::take(&mut plan.listeners);
+    let started = solving.map(|solving| FollowThread::start(solving, &inbox, &notice, listeners)).transpose();
+    let follower = started.map_err(LiveError::Thread)?;
+    let mut reader = Reader {
+        plan,
+        requests,
+        stop,
+        inbox: Arc::clone(&inbox),
+        notice: Arc::clone(&notice),
+        follows: follower.is_some(),
+        sequence: Sequence::default(),
+        board: None,
+        greeted: None,
+    };
+    let ended = reader.run(source);
+    inbox.close();
+    let solved = follower.map_or(Ok(()), FollowThread::join);
+    // What ended the solving also ended the reading; a failure to keep the recording counts for more than either.
+    let recorder = reader.plan.recorder.take();
+    let ended = recorder.map_or(Ok(()), |recorder| Ok(recorder.finish()?)).and(solved).and(ended);
+    if let Err(error) = &ended {
+        notice.publish(|snapshot| snapshot.link = LinkState::Ended(error.to_string()));
+    }
+    ended.map(|source| summary(&notice, source))
+}
+
+fn summary(notice: &NoticeBoard, source: String) -> Summary {
+    let (statistics, frames_per_s) =
+        notice.count(|meter| (meter.statistics(Instant::now()), meter.overall_frames_per_s()));
+    Summary {
+        source,
+        solver: notice.solver_name().to_owned(),
+        frames: statistics.frames,
+        frames_per_s,
+        dropped: statistics.dropped,
+        skipped: statistics.skipped,
+        solved: statistics.solved,
+        corrupt: statistics.corrupt,
+        latency_us: statistics.latency,
+        age_us: statistics.age,
+    }
+}
+
+/// How the talk on a link ended.
+enum End {
+    /// Time is over, or the user has enough.
+    Stopped,
+    /// There is nothing more to come.
+    Over(String),
+    /// The link is lost and may come back.
+    Lost(String),
+}
+
+struct Reader {
+    plan: Plan,
+    requests: std::sync::mpsc::Receiver<Request>,
+    stop: Arc<std::sync::atomic::AtomicBool>,
+    inbox: Arc<Inbox>,
+    notice: Arc<NoticeBoard>,
+    /// Whether anybody takes the frames.
+    follows: bool,
+    sequence: Sequence,
+    board: Option<Board>,
+    /// When the first board said Hello.
+    greeted: Option<Instant>,
+}
+
+/// Who has said Hello, and what its frames mean.
+struct Board {
+    hello: Hello,
+    detector: Arc<Detector>,
+    volts: Volts,
+    noise_v: f64,
+}
+
+/// One link, from its opening on.
+struct Talk {
+    session: Session,
+    receiver: BoardReceiver,
+    opened: Instant,
+    /// Stretches of junk until the board said Hello; `None` before.
+    junk: Option<u64>,
+    /// Corrupt stretches that were counted.
+    counted: u64,
+}
+
+impl Reader {
+    /// Returns the name of the last link.
+    fn run(&mut self, source: &mut dyn Source) -> Result<String, LiveError> {
+        let mut link = source.open()?;
+        loop {
+            match self.talk(link.as_mut(), source.comes_back())? {
+                End::Stopped => return Ok(link.name()),
+                End::Over(reason) => {
+                    tracing::info!("{reason}");
+                    self.enter(LinkState::Ended(reason));
+                    return Ok(link.name());
+                }
+                End::Lost(reason) => {
+                    tracing::warn!("{}: {reason}; waiting for it to come back", link.name());
+                    self.enter(LinkState::Lost(reason));
+                    let name = link.name();
+                    drop(link); // A port that stays open keeps its name from the board that is plugged in again.
+                    match self.reopen(source) {
+                        Some(again) => link = again,
+                        None => return Ok(name),
+                    }
+                }
+            }
+        }
+    }
+
+    /// Opens the source again as soon as that is possible; `None` if the run ends before.
+    fn reopen(&mut self, source: &mut dyn Source) -> Option<Box<dyn Link>> {
+        while !self.is_over() {
+            match source.open() {
+                Ok(link) => return Some(link),
+                Err(error) => tracing::debug!("{error}"),
+            }
+            self.answer_requests(None);
+            self.notice.keep_fresh();
+            thread::sleep(REOPEN_EVERY);
+        }
+        None
+    }
+
+    /// Talks with the board on `link` to the end.
+    fn talk(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
+        let mut talk = Talk::new(self.plan.settings);
+        let mut buffer = [0; READ_BYTES];
+        self.sequence.restart();
+        self.enter(LinkState::Waiting);
+        while !self.is_over() {
+            self.answer_requests(Some((&mut *link, &mut talk)));
+            match talk.exchange(link, &mut buffer) {
+                Ok(count) => self.receive(&mut talk, link, &buffer[..count])?,
+                Err(error) => return lost(link, error, comes_back),
+            }
+            if comes_back && talk.is_in_vain() {
+                return self.unanswered(&talk, link);
+            }
+            self.show_link(link, &talk);
+        }
+        Ok(End::Stopped)
+    }
+
+    /// No board has answered: at the start that is an error, later it may come back.
+    fn unanswered(&self, talk: &Talk, link: &dyn Link) -> Result<End, LiveError> {
+        let error =
+            GreetError::Silent { seconds: PATIENCE.as_secs(), junk_bytes: talk.receiver.counters().dropped_bytes };
+        if self.greeted.is_some() {
+            return Ok(End::Lost(error.to_string()));
+        }
+        Err(LiveError::Greet { link: link.name(), error })
+    }
+
+    fn receive(&mut self, talk: &mut Talk, link: &dyn Link, bytes: &[u8]) -> Result<(), LiveError> {
+        let received = Instant::now();
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        if let Some(recorder) = &mut self.plan.recorder {
+            recorder.push(bytes)?;
+        }
+        let mut input = bytes;
+        while let Some(message) = talk.receiver.receive(&mut input) {
+            match message {
+                Ok(BoardMessage::Frame(frame)) => self.frame(talk, &frame, received),
+                Ok(BoardMessage::Hello(hello)) => self.hello(talk, hello, received)?,
+                Ok(BoardMessage::Log(log)) => self.plan.board_log.take(&log.0),
+                Ok(BoardMessage::Fault(fault)) => tracing::warn!("the board says: {}", session::explain(&fault)),
+                Err(error @ DecodeError::Version(_)) => {
+                    return Err(LiveError::Greet { link: link.name(), error: GreetError::Version(error) });
+                }
+                Err(_) => {}
+            }
+        }
+        let corrupt = talk.newly_corrupt();
+        self.notice.count(|meter| meter.corrupt(corrupt));
+        Ok(())
+    }
+
+    fn hello(&mut self, talk: &mut Talk, hello: Hello, now: Instant) -> Result<(), LiveError> {
+        talk.session.hello(&hello, now);
+        talk.junk.get_or_insert(talk.receiver.counters().corrupt);
+        self.greeted.get_or_insert(now);
+        let known = self.board.as_ref();
+        if known.is_none_or(|board| board.hello != hello) {
+            let Hello { board, firmware_version, electrodes, .. } = &hello;
+            tracing::info!("board {board} with firmware {firmware_version}: {electrodes} electrodes");
+            let measured = Arc::new(measured::as_measured(&self.plan.detector, &hello)?);
+            let detector = match known {
+                Some(board) if board.detector == measured => Arc::clone(&board.detector),
+                _ => {
+                    self.inbox.put(Event::Board(Arc::clone(&measured)));
+                    measured
+                }
+            };
+            let noise_v = detector.adc.deviation_v();
+            self.notice.change(|snapshot| snapshot.hello = Some(hello.clone()));
+            self.board = Some(Board { volts: Volts::of(&hello), hello, detector, noise_v });
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self, talk: &mut Talk, frame: &Frame, received: Instant) {
+        // Before Hello nobody knows what the readings mean.
+        let (Some(board), Some(_)) = (&self.board, talk.junk) else { return };
+        talk.session.frame(received);
+        let Some(volts) = board.volts.of_frame(frame) else {
+            return self.notice.count(|meter| meter.corrupt(1));
+        };
+        let place = self.sequence.place(&frame.head);
+        self.notice.count(|meter| meter.frame(received, place.dropped));
+        if !self.follows {
+            return;
+        }
+        let electrodes = usize::from(board.hello.electrodes);
+        let mut newest = Readings::from_fn(electrodes, |_, _| 0.0);
+        newest.volts_mut().iter_mut().zip(volts).for_each(|(to, volts)| *to = volts);
+        let taken = Taken {
+            mean: newest.clone(),
+            newest,
+            averaged: 1,
+            came: 1,
+            sequence: place.sequence,
+            board_time_us: place.time_us,
+            arrived: received,
+            status: frame.head.status,
+        };
+        self.inbox.put_frame(taken, board.noise_v);
+    }
+
+    fn is_over(&self) -> bool {
+        let timed_out = self.plan.seconds.zip(self.greeted).is_some_and(|(limit, begin)| begin.elapsed() >= limit);
+        timed_out || self.stop.load(Ordering::Relaxed) || self.inbox.is_closed()
+    }
+
+    fn answer_requests(&mut self, mut open: Option<(&mut dyn Link, &mut Talk)>) {
+        while let Ok(request) = self.requests.try_recv() {
+            match request {
+                Request::Rezero => self.inbox.put(Event::Rezero),
+                Request::Solver(method) => self.inbox.put(Event::Method(method)),
+                Request::Settings(settings) => {
+                    self.plan.settings = settings;
+                    if let Some((_, talk)) = &mut open {
+                        talk.session.request(settings);
+                    }
+                }
+                Request::Record(true) => self.begin_recording(),
+                Request::Record(false) => self.end_recording(),
+                Request::Control(control) => {
+                    if let Some((link, _)) = &mut open {
+                        link.control(&control);
+                    }
+                }
+            }
+        }
+    }
+
+    fn begin_recording(&mut self) {
+        let (None, Some(begin)) = (&self.plan.recorder, &mut self.plan.begin_recording) else { return };
+        let begun = begin();
+        self.notice.change(|snapshot| {
+            snapshot.refused = begun.as_ref().err().map(ToString::to_string);
+            snapshot.recording = begun.as_ref().ok().map(|recorder| recorder.path().to_owned());
+        });
+        self.plan.recorder = begun.ok();
+    }
+
+    fn end_recording(&mut self) {
+        let Some(recorder) = self.plan.recorder.take() else { return };
+        let ended = recorder.finish();
+        self.notice.change(|snapshot| {
+            snapshot.recording = None;
+            snapshot.refused = ended.err().map(|error| error.to_string());
+        });
+    }
+
+    /// Shows how the link fares.
+    fn show_link(&mut self, link: &dyn Link, talk: &Talk) {
+        if talk.junk.is_some() {
+            self.enter(LinkState::Streaming);
+        }
+        let playing = link.playing();
+        self.notice.change(|snapshot| snapshot.playing = playing);
+        if !self.follows {
+            self.notice.keep_fresh();
+        }
+    }
+
+    fn enter(&self, state: LinkState) {
+        if self.notice.link() != state {
+            self.notice.publish(|snapshot| snapshot.link = state);
+        }
+    }
+}
+
+impl Talk {
+    fn new(wish: RequestedSettings) -> Self {
+        Self {
+            session: Session::new(wish),
+            receiver: BoardReceiver::default(),
+            opened: Instant::now(),
+            junk: None,
+            counted: 0,
+        }
+    }
+
+    /// Sends what is due and reads what has come; returns the number of bytes.
+    fn exchange(&mut self, link: &mut dyn Link, buffer: &mut [u8]) -> io::Result<usize> {
+        if let Some(command) = self.session.command(Instant::now()) {
+            session::send(link, &command)?;
+        }
+        link.read(buffer)
+    }
+
+    fn is_in_vain(&self) -> bool {
+        self.junk.is_none() && self.opened.elapsed() >= PATIENCE
+    }
+
+    /// Corrupt stretches since the last time this was asked; boot text before Hello is none.
+    fn newly_corrupt(&mut self) -> u64 {
+        let Some(junk) = self.junk else { return 0 };
+        let corrupt = self.receiver.counters().corrupt - junk;
+        let newly = corrupt - self.counted;
+        self.counted = corrupt;
+        newly
+    }
+}
+
+fn lost(link: &dyn Link, error: io::Error, comes_back: bool) -> Result<End, LiveError> {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => Ok(End::Over(error.to_string())),
+        _ if comes_back => Ok(End::Lost(error.to_string())),
+        _ => Err(LiveError::Link { link: link.name(), source: error }),
+    }
+}

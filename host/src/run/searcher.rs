@@ -1,0 +1,111 @@
+//! The thread that searches: thorough answers, always on the newest frame that the follower had when it was free.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
+
+use tactomo_physics::readings::Readings;
+use tactomo_touch::solve::{Lead, Look, Searcher};
+
+use super::inbox::{Event, Inbox, Searched};
+use super::maker::Order;
+use super::plan::LookAtWires;
+
+/// What the thread is asked.
+enum Job {
+    /// To search with another solver's half from now on.
+    Solver { solver: u64, half: Option<Box<dyn Searcher>> },
+    /// To search what explains readings.
+    Search { from: Lead, readings: Readings },
+    /// To look for exchanged wires.
+    Look { order: Order, look: Look, readings: Readings },
+}
+
+/// The searching thread, seen from the follower: it does one thing at a time.
+pub(super) struct SearchThread {
+    jobs: Option<Sender<Job>>,
+    thread: Option<JoinHandle<()>>,
+    busy: bool,
+    solver: u64,
+}
+
+impl SearchThread {
+    /// Starts it; what it finds goes to `inbox`.
+    pub fn start(inbox: Arc<Inbox>, look: LookAtWires) -> std::io::Result<Self> {
+        let (jobs, queue) = channel();
+        let thread = thread::Builder::new().name("searcher".to_owned()).spawn(move || work(&queue, &inbox, &look))?;
+        Ok(Self { jobs: Some(jobs), thread: Some(thread), busy: false, solver: 0 })
+    }
+
+    /// Searches with this half from now on; what is still searched with another is thrown away.
+    pub fn change_solver(&mut self, half: Option<Box<dyn Searcher>>) {
+        self.solver += 1;
+        self.send(Job::Solver { solver: self.solver, half });
+    }
+
+    /// Whether it has something to do.
+    pub fn is_busy(&self) -> bool {
+        self.busy
+    }
+
+    /// Searches what explains `readings`, of which `from` explains a part.
+    pub fn search(&mut self, from: Lead, readings: Readings) {
+        self.busy = true;
+        self.send(Job::Search { from, readings });
+    }
+
+    /// Looks for exchanged wires.
+    pub fn look(&mut self, order: Order, look: Look, readings: Readings) {
+        self.busy = true;
+        self.send(Job::Look { order, look, readings });
+    }
+
+    /// Takes what has come from it: the lead, unless another solver is in use by now.
+    pub fn receive(&mut self, searched: Searched) -> Option<Lead> {
+        self.busy = false;
+        (searched.solver == self.solver).then_some(searched.lead)
+    }
+
+    /// Takes note that a look has ended.
+    pub fn looked(&mut self) {
+        self.busy = false;
+    }
+
+    fn send(&self, job: Job) {
+        if let Some(jobs) = &self.jobs
+            && jobs.send(job).is_err()
+        {
+            tracing::error!("the searching thread has ended; answers stay as they are followed");
+        }
+    }
+}
+
+impl Drop for SearchThread {
+    fn drop(&mut self) {
+        drop(self.jobs.take());
+        // A panic of the thread was reported when it happened.
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+fn work(jobs: &Receiver<Job>, inbox: &Inbox, look_at_wires: &LookAtWires) {
+    let (mut solver, mut half): (u64, Option<Box<dyn Searcher>>) = (0, None);
+    while let Ok(job) = jobs.recv() {
+        if inbox.is_closed() {
+            return;
+        }
+        match job {
+            Job::Solver { solver: of, half: next } => (solver, half) = (of, next),
+            Job::Search { from, readings } => {
+                let found = half.as_mut().map(|half| half.search(from, &readings));
+                // Readings that cannot be were refused by the follower before.
+                let lead = found.and_then(Result::ok).unwrap_or_default();
+                inbox.put(Event::Searched(Searched { solver, lead }));
+            }
+            Job::Look { order, look, readings } => {
+                let found = look_at_wires(&order, look, &readings);
+                inbox.put(Event::Looked(look, found));
+            }
+        }
+    }
+}
