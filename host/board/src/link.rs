@@ -8,7 +8,7 @@ use std::io;
 use std::path::PathBuf;
 
 use tactomo_physics::scene::{Contact, SceneName};
-use tactomo_physics::simulate::Fault;
+use tactomo_physics::simulate::{Fault, SimulationError};
 
 use crate::record::RecordError;
 use discover::NoBoard;
@@ -32,14 +32,24 @@ pub trait Link: Send {
     /// If the link is gone or does not take bytes in time.
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Does what a person asks of a simulated detector or a recording; others have nothing to be asked.
-    fn control(&mut self, control: &Control) {
+    /// Does what a person asks of a simulated detector or a recording; a real board has nothing to be asked.
+    ///
+    /// # Errors
+    /// [`ControlError`] if that cannot be: everything then stays as it was.
+    fn control(&mut self, control: &Control) -> Result<(), ControlError> {
         let _ = control;
+        Err(ControlError::Board)
     }
 
     /// What a person may ask of it, and how that stands.
     fn playing(&self) -> Playing {
         Playing::Board
+    }
+
+    /// Whether what was read last does not follow what was read before: a recording goes on elsewhere, and nothing between is missing.
+    /// To be asked after each read; then it is false until the next jump.
+    fn jumped(&mut self) -> bool {
+        false
     }
 }
 
@@ -62,10 +72,36 @@ pub enum Control {
     Loop(bool),
 }
 
+/// Why what a person asks of a link cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ControlError {
+    /// Of a real board.
+    #[error("this is a real board: only simulated detectors and recordings can be controlled from here")]
+    Board,
+    /// Of a recording.
+    #[error("this is a recording: nothing can press on it; `tactomo live --simulate` has a detector to press on")]
+    Recording,
+    /// Of a simulated detector.
+    #[error("this is a simulated detector, not a recording: it cannot be paused, moved or played at another speed")]
+    Simulated,
+    /// A simulated detector whose physics are given from outside.
+    #[error("this simulated detector has readings of its own: nothing can press on it")]
+    Fixed,
+    /// A place that is none.
+    #[error("a recording can go on at a number of seconds only")]
+    Seek,
+    /// A speed that is none.
+    #[error("a speed has to be above 0, but {0} was asked for")]
+    Speed(f64),
+    /// A scene or a fault that the simulated detector cannot have.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+}
+
 /// What a link plays, and what a person may ask of it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Playing {
-    /// A real board: nothing.
+    /// A real board, or one whose physics are given from outside: nothing.
     #[default]
     Board,
     /// A simulated detector.
@@ -87,6 +123,8 @@ pub enum Playing {
         paused: bool,
         /// Whether it begins again where it ends.
         looped: bool,
+        /// Whether it is at its end, and stays there until it is asked to go on elsewhere.
+        ended: bool,
     },
 }
 
@@ -179,6 +217,8 @@ pub struct Recording {
     pub path: PathBuf,
     /// How many times faster than it was recorded; infinite for as fast as it can be read.
     pub speed: f64,
+    /// Whether it stays open at its end, for a person who may seek back; otherwise it is over then.
+    pub stays_open: bool,
 }
 
 impl Source for Recording {
@@ -187,7 +227,7 @@ impl Source for Recording {
     }
 
     fn open(&mut self) -> Result<Box<dyn Link>, SourceError> {
-        Ok(Box::new(ReplayLink::open(&self.path, self.speed)?))
+        Ok(Box::new(ReplayLink::open(&self.path, self.speed, self.stays_open)?))
     }
 
     fn comes_back(&self) -> bool {

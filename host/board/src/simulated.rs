@@ -16,9 +16,9 @@ use tactomo_firmware::{Activity, Adc, Board32, Identity, NewBoardError, Parts};
 
 use self::circuit::{AddressPin, Circuit, SimulatedChip, SimulatedSampler};
 use self::line::{BoardEnd, Line};
-use crate::link::Link;
+use crate::link::{Control, ControlError, Link, Playing};
 use tactomo_physics::detector::Detector;
-use tactomo_physics::simulate::Physics;
+use tactomo_physics::simulate::{Controls, Physics, Simulation};
 
 /// How far the board's clock may run ahead within a frame before the thread sleeps.
 const AHEAD: Duration = Duration::from_millis(5);
@@ -60,8 +60,8 @@ pub enum SimulatedBoardError {
         /// Why not.
         source: NewBoardError,
     },
-    /// The protocol tells voltages as whole millivolts up to 65535.
-    #[error("detector `{detector}`: {field} is {volts} V; the board tells the host 0.001 V to 65.535 V")]
+    /// The protocol has voltages as whole millivolts up to 65535.
+    #[error("detector `{detector}`: {field} is {volts} V; a board can report 0.001 V to 65.535 V")]
     Voltage {
         /// Name of the detector.
         detector: String,
@@ -76,13 +76,29 @@ pub enum SimulatedBoardError {
 }
 
 /// The host's end of a simulated board's line; the board stops when this is dropped.
-#[derive(Debug)]
 pub struct SimulatedBoard {
     line: Arc<Line>,
+    /// `None` if the physics are given from outside.
+    controls: Option<Controls>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl SimulatedBoard {
+    /// Starts the firmware on a board with a simulation of `detector`, of which presses, scene and faults can be [changed](Control).
+    ///
+    /// # Errors
+    /// [`SimulatedBoardError`] if the firmware or the protocol cannot carry the detector.
+    pub fn simulate(
+        detector: &Detector,
+        simulation: Simulation,
+        options: Options,
+    ) -> Result<Self, SimulatedBoardError> {
+        let controls = simulation.controls();
+        let mut board = Self::start(detector, Box::new(simulation), options)?;
+        board.controls = Some(controls);
+        Ok(board)
+    }
+
     /// Starts the firmware on a board with `detector`, which answers to touch as `physics` says.
     ///
     /// # Errors
@@ -99,7 +115,7 @@ impl SimulatedBoard {
             let line = Arc::clone(&line);
             thread::Builder::new().name("simulated board".to_owned()).spawn(move || run(board, &circuit, &line))
         };
-        Ok(Self { line, thread: Some(thread.map_err(SimulatedBoardError::Thread)?) })
+        Ok(Self { line, controls: None, thread: Some(thread.map_err(SimulatedBoardError::Thread)?) })
     }
 }
 
@@ -114,6 +130,29 @@ impl Link for SimulatedBoard {
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.line.down.put_all_within(bytes, WRITE_WAIT)
+    }
+
+    fn control(&mut self, control: &Control) -> Result<(), ControlError> {
+        let Some(controls) = &self.controls else { return Err(ControlError::Fixed) };
+        match control {
+            Control::Press(contacts) => controls.press(contacts.clone()),
+            Control::Scene(name) => controls.play(*name)?,
+            Control::Faults(faults) => {
+                let failed = |error| tracing::warn!("the detector cannot have these faults: {error}");
+                controls.set_faults(faults.clone(), failed)?;
+            }
+            Control::Pause(_) | Control::Seek(_) | Control::Speed(_) | Control::Loop(_) => {
+                return Err(ControlError::Simulated);
+            }
+        }
+        Ok(())
+    }
+
+    fn playing(&self) -> Playing {
+        match &self.controls {
+            Some(controls) => Playing::Simulated { scene: controls.scene(), faults: controls.faults() },
+            None => Playing::Board,
+        }
     }
 }
 

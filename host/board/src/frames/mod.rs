@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use tactomo_protocol::Hello;
 
-pub use self::recorded::Recorded;
+pub use self::recorded::{Recorded, RecordingLoss};
 use crate::record::{self, RecordError};
 use tactomo_table::{Array, Table, TableError};
 
@@ -32,7 +32,7 @@ pub struct Rows {
 /// One frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileFrame {
-    /// Board time since the first frame (s), if the file tells.
+    /// Board time since the first frame (s), if that is known.
     pub time_s: Option<f64>,
     /// Readings (V) in the order of the channels; of a detector row by row.
     pub volts: Vec<f64>,
@@ -63,9 +63,9 @@ pub enum FramesError {
         /// What the system says.
         source: io::Error,
     },
-    /// A recording that does not tell what its readings mean.
+    /// A recording that does not say what its readings mean.
     #[error(
-        "{path}: no board says Hello in this recording, so nobody knows what its frames mean; record it from the board's start"
+        "{path}: no board says Hello in this recording, so it is not known what its frames mean; record it from the board's start"
     )]
     NoHello {
         /// The file.
@@ -94,6 +94,22 @@ impl FrameFile {
     pub fn board(&self) -> Option<&Hello> {
         match self {
             Self::Recording(recorded) => Some(recorded.board()),
+            Self::Table(_) => None,
+        }
+    }
+
+    /// What is damaged or missing in a recording, as far as it was read; nothing is known of a table.
+    pub fn loss(&self) -> Option<RecordingLoss> {
+        match self {
+            Self::Recording(recorded) => Some(recorded.loss()),
+            Self::Table(_) => None,
+        }
+    }
+
+    /// What a recording says about itself.
+    pub fn header(&self) -> Option<&record::Header> {
+        match self {
+            Self::Recording(recorded) => Some(recorded.header()),
             Self::Table(_) => None,
         }
     }
@@ -146,7 +162,7 @@ impl Rows {
 fn is_recording(path: &Path) -> bool {
     let mut start = Vec::new();
     let read = File::open(path).and_then(|file| file.take(record::MAGIC.len() as u64).read_to_end(&mut start));
-    read.is_ok() && start == record::MAGIC
+    read.is_ok() && record::is_recording(&start)
 }
 
 #[cfg(test)]

@@ -1,27 +1,68 @@
 //! Frames of a recording, as fast as they can be read.
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use tactomo_protocol::{BoardMessage, BoardReceiver, Frame, Hello};
 
 use super::{FileFrame, FramesError};
-use crate::record::{Header, RecordReader};
+use crate::measured::Volts;
+use crate::record::{Header, Loss, RecordReader};
 use crate::sequence::Sequence;
 
 /// A recording.
 pub struct Recorded {
     path: PathBuf,
-    reader: RecordReader<BufReader<File>>,
+    reader: RecordReader<File>,
     receiver: BoardReceiver,
     chunk: Vec<u8>,
     board: Hello,
+    volts: Volts,
     sequence: Sequence,
+    /// Stretches of junk before the board said Hello, which are no loss.
+    junk: u64,
+    lost: RecordingLoss,
     /// Board time of the first frame (us).
     first_us: Option<u64>,
     frames: VecDeque<FileFrame>,
+}
+
+/// What is damaged or missing in a recording, as far as it was read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RecordingLoss {
+    /// What is damaged in the file.
+    pub file: Loss,
+    /// Stretches of bytes that are no message of the board.
+    pub corrupt: u64,
+    /// Frames that are missing by their numbers: lost in the file, on the line, or by the board.
+    pub missing_frames: u64,
+    /// Frames of a board with another number of electrodes than the first one, which are left out.
+    pub other_frames: u64,
+}
+
+impl RecordingLoss {
+    /// Whether anything is damaged or missing.
+    pub fn is_any(&self) -> bool {
+        *self != Self::default()
+    }
+}
+
+impl fmt::Display for RecordingLoss {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let count = |count: u64, one: &str, many: &str| {
+            (count > 0).then(|| format!("{count} {}", if count == 1 { one } else { many }))
+        };
+        let parts = [
+            count(self.missing_frames, "frame is missing", "frames are missing"),
+            self.file.is_any().then(|| self.file.to_string()),
+            count(self.corrupt, "message is corrupt", "messages are corrupt"),
+            count(self.other_frames, "frame is of another board", "frames are of another board"),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        if parts.is_empty() { write!(f, "nothing is missing") } else { write!(f, "{}", parts.join("; ")) }
+    }
 }
 
 impl Recorded {
@@ -40,9 +81,12 @@ impl Recorded {
                 let mut recorded = Self {
                     path: path.to_owned(),
                     reader,
+                    junk: receiver.counters().corrupt,
                     receiver,
                     chunk: rest,
+                    volts: Volts::of(&board),
                     board,
+                    lost: RecordingLoss::default(),
                     sequence: Sequence::default(),
                     first_us: None,
                     frames: VecDeque::new(),
@@ -63,6 +107,12 @@ impl Recorded {
         &self.board
     }
 
+    /// What is damaged or missing, as far as it was read.
+    pub fn loss(&self) -> RecordingLoss {
+        let corrupt = self.receiver.counters().corrupt - self.junk;
+        RecordingLoss { file: self.reader.loss(), corrupt, ..self.lost }
+    }
+
     pub(super) fn next_frame(&mut self) -> Result<Option<FileFrame>, FramesError> {
         loop {
             if let Some(frame) = self.frames.pop_front() {
@@ -80,30 +130,28 @@ impl Recorded {
         let chunk = std::mem::take(&mut self.chunk);
         let mut input = &chunk[..];
         while let Some(message) = self.receiver.receive(&mut input) {
-            if let Ok(BoardMessage::Frame(frame)) = message
-                && frame.readings.len() == usize::from(self.board.electrodes).pow(2)
-            {
-                let frame = self.in_volts(&frame);
-                self.frames.push_back(frame);
+            if let Ok(BoardMessage::Frame(frame)) = message {
+                match self.in_volts(&frame) {
+                    Some(frame) => self.frames.push_back(frame),
+                    None => self.lost.other_frames += 1,
+                }
             }
         }
         self.chunk = chunk;
     }
 
-    fn in_volts(&mut self, frame: &Frame) -> FileFrame {
-        let time_us = self.sequence.place(&frame.head).time_us;
-        let first_us = *self.first_us.get_or_insert(time_us);
-        let bits = i32::from(self.board.adc_bits) + i32::from(frame.head.fraction_bits);
-        let unit_v = f64::from(self.board.adc_full_scale_mv) * 1e-3 / 2f64.powi(bits);
-        FileFrame {
-            time_s: Some(time_us.saturating_sub(first_us) as f64 * 1e-6),
-            volts: frame.readings.iter().map(|&units| f64::from(units) * unit_v).collect(),
-        }
+    /// Readings and time of a frame; `None` if it is of a board with other electrodes.
+    fn in_volts(&mut self, frame: &Frame) -> Option<FileFrame> {
+        let volts = self.volts.of_frame(frame)?.collect();
+        let place = self.sequence.place(&frame.head);
+        self.lost.missing_frames += place.dropped;
+        let first_us = *self.first_us.get_or_insert(place.time_us);
+        Some(FileFrame { time_s: Some(place.time_us.saturating_sub(first_us) as f64 * 1e-6), volts })
     }
 }
 
 /// The next chunk; `false` at the end.
-fn read(reader: &mut RecordReader<BufReader<File>>, chunk: &mut Vec<u8>, path: &Path) -> Result<bool, FramesError> {
+fn read(reader: &mut RecordReader<File>, chunk: &mut Vec<u8>, path: &Path) -> Result<bool, FramesError> {
     let read = reader.next_into(chunk).map_err(|source| FramesError::Read { path: path.to_owned(), source })?;
     Ok(read.is_some())
 }
@@ -158,6 +206,9 @@ mod tests {
         let frames: Vec<_> = std::iter::from_fn(|| file.next_frame().unwrap()).collect();
         let of = |time_s: f64, volts: f64| FileFrame { time_s: Some(time_s), volts: vec![volts; 16] };
         assert_eq!(frames.len(), 3);
+        let loss = file.loss().unwrap();
+        assert_eq!((loss.missing_frames, loss.corrupt, loss.other_frames), (4, 1, 0));
+        assert_eq!(loss.to_string(), "4 frames are missing; 1 message is corrupt");
         for (found, expected) in frames.iter().zip([of(0.0, 0.05), of(0.001, 0.02), of(0.006, 0.0)]) {
             assert!((found.time_s.unwrap() - expected.time_s.unwrap()).abs() < 1e-12, "{found:?}");
             assert!((found.volts[5] - expected.volts[5]).abs() < 1e-12, "{found:?}");
@@ -165,8 +216,8 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_without_hello_is_told() {
-        let told = recorded("no-hello", &[frame(1, 1)]).err().map(|error| error.to_string());
-        assert!(told.is_some_and(|told| told.contains("no board says Hello")));
+    fn a_recording_without_hello_is_refused() {
+        let refusal = recorded("no-hello", &[frame(1, 1)]).err().map(|error| error.to_string());
+        assert!(refusal.is_some_and(|refusal| refusal.contains("no board says Hello")));
     }
 }

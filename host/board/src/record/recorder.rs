@@ -1,32 +1,55 @@
 //! Keeps a recording while it is made, off the thread that receives.
 
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
+
+use tactomo_protocol::{BoardMessage, Hello, MAX_WIRE, encode_board};
 
 use super::{Header, RecordError, RecordWriter};
 
 /// What is not yet with the system is lost when the program is killed: at most this much.
 const FLUSH_EVERY: Duration = Duration::from_millis(200);
 
-/// Chunks that may wait for a slow disk; the receiver then waits too, as no byte may be lost.
-const QUEUE: usize = 4096;
+/// Bytes that may wait for a slow disk. A board on USB at 3000 frames/s sends 1.2 MB/s: a disk may then stall for 200 s, longer than any
+/// that is not broken. More would only take the memory of a machine that cannot keep up.
+const MAX_WAITING: usize = 256 << 20;
 
-/// Writes what it is given to a file, in a thread of its own.
+/// Bytes, and when they came (us from the start).
+type Chunk = (u64, Vec<u8>);
+
+/// Writes what it is given to a file, in a thread of its own: nothing here waits for the disk but [`finish`](Self::finish) and dropping it.
 #[derive(Debug)]
 pub struct Recorder {
     path: PathBuf,
     began: Instant,
-    chunks: SyncSender<(u64, Vec<u8>)>,
-    /// `None` once it has failed.
+    /// Time of what was pushed last (us): times never fall.
+    last_us: u64,
+    /// Whether bytes up to the end of a packet are still to be left out.
+    in_packet: bool,
+    /// `None` once no more is taken.
+    chunks: Option<Sender<Chunk>>,
+    /// Bytes that wait for the disk.
+    waiting: Arc<AtomicUsize>,
+    most_waiting: usize,
+    /// `None` once its error is reported.
+    writer: Option<JoinHandle<io::Result<()>>>,
+}
+
+/// A recording of which the rest is being written.
+#[derive(Debug)]
+pub struct Closing {
+    path: PathBuf,
     writer: Option<JoinHandle<io::Result<()>>>,
 }
 
 impl Recorder {
-    /// Begins a recording in a new file.
+    /// Begins a recording in a new file, before the board says Hello.
     ///
     /// # Errors
     /// [`RecordError`] if the file cannot be written, or is there already: no recording is overwritten.
@@ -35,49 +58,159 @@ impl Recorder {
         let file = BufWriter::new(File::create_new(path).map_err(open)?);
         let mut writer = RecordWriter::new(file, header).map_err(open)?;
         writer.flush().map_err(open)?;
-        let (chunks, queue) = sync_channel(QUEUE);
-        let writer = thread::Builder::new().name("recorder".to_owned()).spawn(|| keep(writer, queue)).map_err(open)?;
-        Ok(Self { path: path.to_owned(), began: Instant::now(), chunks, writer: Some(writer) })
+        Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)
     }
 
-    /// Adds bytes that came just now.
+    /// Begins a recording in a new file while frames come from a board that has said `hello`. The recording begins with that, twice, so
+    /// that damage to one does not cost the meaning of all frames; what comes before the end of the packet under way is left out.
     ///
     /// # Errors
-    /// [`RecordError::Write`] if the file takes no more.
-    pub fn push(&mut self, bytes: &[u8]) -> Result<(), RecordError> {
-        let time_us = self.began.elapsed().as_micros() as u64;
-        if self.chunks.send((time_us, bytes.to_vec())).is_ok() {
+    /// [`RecordError`] as of [`create`](Self::create).
+    pub fn create_with_hello(path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
+        let mut recorder = Self::create(path, header)?;
+        let mut wire = [0; MAX_WIRE];
+        let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire).map_err(|error| RecordError::Write {
+            path: path.to_owned(),
+            source: io::Error::new(io::ErrorKind::InvalidInput, error),
+        })?;
+        for _ in 0..2 {
+            recorder.push(&wire[..length], recorder.began)?;
+        }
+        recorder.in_packet = true;
+        Ok(recorder)
+    }
+
+    fn start<W: Write + Send + 'static>(
+        path: &Path,
+        writer: RecordWriter<W>,
+        sync: impl FnOnce(&W) -> io::Result<()> + Send + 'static,
+        most_waiting: usize,
+    ) -> io::Result<Self> {
+        let (chunks, queue) = channel();
+        let waiting = Arc::new(AtomicUsize::new(0));
+        let left = Arc::clone(&waiting);
+        let writer =
+            thread::Builder::new().name("recorder".to_owned()).spawn(move || keep(writer, &queue, &left, sync))?;
+        Ok(Self {
+            path: path.to_owned(),
+            began: Instant::now(),
+            last_us: 0,
+            in_packet: false,
+            chunks: Some(chunks),
+            waiting,
+            most_waiting,
+            writer: Some(writer),
+        })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Adds bytes that came at `arrived`; never waits.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if the file takes no more, [`RecordError::TooSlow`] if 256 MB wait for the disk. What came before is
+    /// kept; nothing more is taken.
+    pub fn push(&mut self, bytes: &[u8], arrived: Instant) -> Result<(), RecordError> {
+        let bytes = self.from_packet(bytes);
+        if bytes.is_empty() {
             return Ok(());
         }
-        self.join()
+        if self.chunks.is_some() && self.waiting.load(Relaxed) + bytes.len() > self.most_waiting {
+            self.chunks = None;
+            return Err(RecordError::TooSlow {
+                path: self.path.clone(),
+                waiting_mb: self.most_waiting >> 20,
+                seconds: self.last_us as f64 * 1e-6,
+            });
+        }
+        self.last_us = self.last_us.max(arrived.saturating_duration_since(self.began).as_micros() as u64);
+        self.waiting.fetch_add(bytes.len(), Relaxed);
+        let is_taken = self.chunks.as_ref().is_some_and(|chunks| chunks.send((self.last_us, bytes.to_vec())).is_ok());
+        if is_taken {
+            return Ok(());
+        }
+        self.chunks = None;
+        // It has ended by itself, so this does not wait.
+        outcome(&self.path, self.writer.take().filter(JoinHandle::is_finished))
+    }
+
+    /// `bytes` without those of a packet that began before the recording did.
+    fn from_packet<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
+        if !self.in_packet {
+            return bytes;
+        }
+        let Some(end) = bytes.iter().position(|byte| *byte == 0) else { return &[] };
+        self.in_packet = false;
+        &bytes[end + 1..]
+    }
+
+    /// Takes no more; the rest is written while the caller goes on.
+    pub fn close(mut self) -> Closing {
+        self.chunks = None;
+        Closing { path: self.path.clone(), writer: self.writer.take() }
     }
 
     /// Writes what is left and closes the file.
     ///
     /// # Errors
     /// [`RecordError::Write`] if not everything could be kept.
-    pub fn finish(mut self) -> Result<(), RecordError> {
-        // The writer stops when its queue closes.
-        self.chunks = sync_channel(0).0;
-        self.join()
-    }
-
-    fn join(&mut self) -> Result<(), RecordError> {
-        let written = match self.writer.take().map(JoinHandle::join) {
-            Some(Ok(written)) => written,
-            Some(Err(_)) => Err(io::Error::other("the recorder panicked")),
-            None => Err(io::Error::other("it failed before")),
-        };
-        written.map_err(|source| RecordError::Write { path: self.path.clone(), source })
+    pub fn finish(self) -> Result<(), RecordError> {
+        self.close().wait()
     }
 }
 
+impl Drop for Recorder {
+    /// Writes what is left.
+    fn drop(&mut self) {
+        self.chunks = None;
+        if let Some(Err(error)) = self.writer.take().map(|writer| outcome(&self.path, Some(writer))) {
+            tracing::warn!("{error}");
+        }
+    }
+}
+
+impl Closing {
+    /// Whether all is written, so that [`wait`](Self::wait) does not wait.
+    pub fn is_done(&self) -> bool {
+        self.writer.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// Waits until all is written.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if not everything could be kept.
+    pub fn wait(self) -> Result<(), RecordError> {
+        outcome(&self.path, self.writer)
+    }
+}
+
+/// What came of the writing thread.
+fn outcome(path: &Path, writer: Option<JoinHandle<io::Result<()>>>) -> Result<(), RecordError> {
+    let written = match writer.map(JoinHandle::join) {
+        Some(Ok(written)) => written,
+        Some(Err(_)) => Err(io::Error::other("the thread that writes it has panicked")),
+        None => Err(io::Error::other("it has failed before")),
+    };
+    written.map_err(|source| RecordError::Write { path: path.to_owned(), source })
+}
+
 /// Writes the queue until it closes.
-fn keep(mut writer: RecordWriter<BufWriter<File>>, queue: Receiver<(u64, Vec<u8>)>) -> io::Result<()> {
+fn keep<W: Write>(
+    mut writer: RecordWriter<W>,
+    queue: &Receiver<Chunk>,
+    waiting: &AtomicUsize,
+    sync: impl FnOnce(&W) -> io::Result<()>,
+) -> io::Result<()> {
     let mut flushed = Instant::now();
     loop {
         match queue.recv_timeout(FLUSH_EVERY) {
-            Ok((time_us, bytes)) => writer.write(time_us, &bytes)?,
+            Ok((time_us, bytes)) => {
+                writer.write(time_us, &bytes)?;
+                waiting.fetch_sub(bytes.len(), Relaxed);
+            }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
         }
@@ -87,37 +220,98 @@ fn keep(mut writer: RecordWriter<BufWriter<File>>, queue: Receiver<(u64, Vec<u8>
         }
     }
     writer.flush()?;
-    writer.get_ref().get_ref().sync_all()
+    sync(writer.get_ref())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::record::RecordReader;
+    use std::sync::mpsc;
+
+    fn path(name: &str) -> PathBuf {
+        std::env::temp_dir().join(format!("tactomo-{}-{name}", std::process::id()))
+    }
+
+    fn chunks(path: &Path) -> Vec<Chunk> {
+        let mut reader = RecordReader::open(path).unwrap();
+        let mut bytes = Vec::new();
+        std::iter::from_fn(|| reader.next_into(&mut bytes).unwrap().map(|time_us| (time_us, bytes.clone()))).collect()
+    }
 
     #[test]
-    fn what_is_pushed_is_in_the_file_and_no_file_is_overwritten() {
-        let path = std::env::temp_dir().join(format!("tactomo-{}-recorder", std::process::id()));
+    fn what_is_pushed_is_in_the_file_with_its_times_and_no_file_is_overwritten() {
+        let path = path("recorder");
         let mut recorder = Recorder::create(&path, &Header::default()).unwrap();
-        recorder.push(b"one").unwrap();
-        recorder.push(b"two").unwrap();
+        let began = recorder.began;
+        recorder.push(b"one", began + Duration::from_micros(1500)).unwrap();
+        recorder.push(b"two", began + Duration::from_micros(900)).unwrap();
         recorder.finish().unwrap();
-        let mut reader = RecordReader::open(&path).unwrap();
-        let mut bytes = Vec::new();
-        assert!(reader.next_into(&mut bytes).unwrap().is_some());
-        assert_eq!(bytes, b"one");
+        assert_eq!(chunks(&path), [(1500, b"one".to_vec()), (1500, b"two".to_vec())], "times never fall");
         let again = Recorder::create(&path, &Header::default());
         assert!(matches!(again, Err(RecordError::Open { .. })));
         std::fs::remove_file(path).unwrap();
     }
 
     #[test]
+    fn a_recorder_that_is_dropped_has_written_all() {
+        let path = path("dropped");
+        let mut recorder = Recorder::create(&path, &Header::default()).unwrap();
+        recorder.push(b"one", Instant::now()).unwrap();
+        drop(recorder);
+        assert_eq!(chunks(&path)[0].1, b"one");
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
     #[cfg(target_os = "linux")]
     fn a_full_disk_is_an_error() {
-        let writer = RecordWriter::new(BufWriter::new(File::create("/dev/full").unwrap()), &Header::default()).unwrap();
-        let (chunks, queue) = sync_channel(QUEUE);
-        chunks.send((0, vec![0; 100_000])).unwrap();
-        drop(chunks);
-        assert!(keep(writer, queue).is_err());
+        let full = File::create("/dev/full").unwrap();
+        let writer = RecordWriter { out: BufWriter::new(full), chunk: Vec::new() };
+        let mut recorder = Recorder::start(Path::new("full"), writer, |_| Ok(()), MAX_WAITING).unwrap();
+        let error = loop {
+            if let Err(error) = recorder.push(&[0; 10_000], Instant::now()) {
+                break error;
+            }
+        };
+        let RecordError::Write { source, .. } = &error else { panic!("{error:?}") };
+        assert!(error.to_string().contains("what came before is kept") && !source.to_string().is_empty(), "{error}");
+        assert!(recorder.push(b"more", Instant::now()).is_err());
+    }
+
+    /// A disk that takes nothing before it is let go.
+    struct Stalled(mpsc::Receiver<()>, Vec<u8>);
+
+    impl Write for Stalled {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let _ = self.0.recv();
+            self.1.extend(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_disk_that_stalls_holds_up_nobody_and_ends_the_recording_when_too_much_waits() {
+        let (go, stall) = mpsc::channel();
+        let (kept, written) = mpsc::channel();
+        let writer = RecordWriter { out: Stalled(stall, Vec::new()), chunk: Vec::new() };
+        let sync = move |disk: &Stalled| kept.send(disk.1.len()).map_err(io::Error::other);
+        let mut recorder = Recorder::start(Path::new("slow"), writer, sync, 10_000).unwrap();
+        let begin = Instant::now();
+        for _ in 0..10 {
+            recorder.push(&[7; 1000], Instant::now()).unwrap();
+        }
+        let error = recorder.push(&[7], Instant::now()).unwrap_err();
+        assert!(begin.elapsed() < Duration::from_secs(1), "pushing waited");
+        assert!(error.to_string().contains("the disk is too slow"), "{error}");
+        let closing = recorder.close();
+        assert!(!closing.is_done());
+        drop(go);
+        closing.wait().unwrap();
+        assert!(written.recv().unwrap() > 10_000, "what was taken before is kept");
     }
 }

@@ -114,11 +114,21 @@ pub(super) struct SimulatedSampler {
     readings: Option<Readings>,
     /// Writes to the address lines when the last scan began.
     begun_at_write: u64,
+    /// When the first scan began: the scene begins with it, however long the host took to start the board.
+    first_scan: Option<Duration>,
 }
 
 impl SimulatedSampler {
     pub(super) fn new(circuit: &Arc<Circuit>, physics: Box<dyn Physics>, adc: Adc, seed: u64) -> Self {
-        Self { circuit: Arc::clone(circuit), physics, adc, noise: Noise::new(seed), readings: None, begun_at_write: 0 }
+        Self {
+            circuit: Arc::clone(circuit),
+            physics,
+            adc,
+            noise: Noise::new(seed),
+            readings: None,
+            begun_at_write: 0,
+            first_scan: None,
+        }
     }
 
     /// Asks for the pad voltages anew, as they were at that moment, if electrode 0 was grounded since the last time: a scan
@@ -130,7 +140,8 @@ impl SimulatedSampler {
             self.readings = None;
         }
         let begun = Duration::from_nanos(self.circuit.written_ns.load(Relaxed));
-        self.readings.get_or_insert_with(|| self.physics.readings_v(begun.as_secs_f64()))
+        let first = *self.first_scan.get_or_insert(begun);
+        self.readings.get_or_insert_with(|| self.physics.readings_v((begun - first).as_secs_f64()))
     }
 
     /// The code nearest to a voltage (V), with noise.

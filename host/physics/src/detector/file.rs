@@ -123,9 +123,29 @@ impl Detector {
         Self::from_toml_in(Path::new(""), text, name)
     }
 
+    /// Reads a detector from TOML, with the text of an OBJ file ([`Surface::to_obj`]) in place of the file that the TOML names.
+    ///
+    /// # Errors
+    /// [`TomlError`] with field, line and what is allowed.
+    pub fn from_toml_and_obj(text: &str, obj: &str, name: &str) -> Result<Self, TomlError> {
+        Self::from_toml_with(text, name, &|file, unit| {
+            let surface = Surface::parse(obj.as_bytes(), "surface.obj", unit);
+            let mut surface = surface.map_err(|error| surface_problem(file, error))?;
+            file.clone_into(&mut surface.file);
+            Ok(surface)
+        })
+    }
+
     fn from_toml_in(folder: &Path, text: &str, name: &str) -> Result<Self, TomlError> {
+        Self::from_toml_with(text, name, &|file, unit| {
+            let path = folder.join(file);
+            Surface::read(&path, file, unit).map_err(|error| surface_problem(&path.display().to_string(), error))
+        })
+    }
+
+    fn from_toml_with(text: &str, name: &str, surface: &ReadSurface) -> Result<Self, TomlError> {
         let document: Document = toml::from_str(text).map_err(TomlError::Toml)?;
-        let checked = document.into_detector(folder, name).and_then(|detector| detector.check().map(|()| detector));
+        let checked = document.into_detector(surface, name).and_then(|detector| detector.check().map(|()| detector));
         checked.map_err(|problem| TomlError::Field { line: line_of(text, &problem.field), problem })
     }
 
@@ -211,14 +231,14 @@ impl Layer {
 }
 
 impl Document {
-    fn into_detector(self, folder: &Path, name: &str) -> Result<Detector, Problem> {
+    fn into_detector(self, read_surface: &ReadSurface, name: &str) -> Result<Detector, Problem> {
         let (outline, surface, shift_m) = match (self.outline, self.surface) {
             (Some(outline), None) if self.surface_unit.is_none() => {
                 let (outline, shift_m) = outline.into_outline()?;
                 (outline, None, shift_m)
             }
             (None, Some(file)) => {
-                let surface = read_surface(folder, &file, self.surface_unit.as_deref())?;
+                let surface = read_surface(&file, self.surface_unit.as_deref().unwrap_or("mm"))?;
                 let moved_m = surface.moved_m;
                 (surface.outline(), Some(surface), moved_m)
             }
@@ -296,13 +316,12 @@ impl AdcTable {
     }
 }
 
-/// Reads a surface from a file named relative to a folder.
-fn read_surface(folder: &Path, file: &str, unit: Option<&str>) -> Result<Surface, Problem> {
-    let path = folder.join(file);
-    Surface::read(&path, file, unit.unwrap_or("mm")).map_err(|error| {
-        let field = if matches!(error, SurfaceError::Unit(_)) { "surface_unit" } else { "surface" };
-        Problem::new(field, format!("{}: {error}", path.display()))
-    })
+/// Gives the surface of a file's name and unit.
+type ReadSurface<'a> = dyn Fn(&str, &str) -> Result<Surface, Problem> + 'a;
+
+fn surface_problem(path: &str, error: SurfaceError) -> Problem {
+    let field = if matches!(error, SurfaceError::Unit(_)) { "surface_unit" } else { "surface" };
+    Problem::new(field, format!("{path}: {error}"))
 }
 
 fn read_text(path: &Path) -> io::Result<String> {

@@ -132,6 +132,11 @@ impl Scene {
         Self { name, hand, half_size_m, places, phase: TAU * random.f64(), surface: detector.surface.clone() }
     }
 
+    /// Its name.
+    pub fn name(&self) -> SceneName {
+        self.name
+    }
+
     /// The hand that presses.
     pub fn hand(&self) -> &Hand {
         &self.hand

@@ -6,6 +6,7 @@
 mod board;
 mod built;
 mod circuit;
+mod controls;
 mod fault;
 mod measure;
 mod measurement;
@@ -13,8 +14,9 @@ mod noise;
 
 use crate::readings::Readings;
 
-pub use board::{Mouse, Simulation, SimulationError, finer_model};
+pub use board::{Simulation, SimulationError, finer_model};
 pub use built::{as_built, uneven_shell};
+pub use controls::Controls;
 pub use fault::{Fault, FaultError};
 pub use measure::{code, measured};
 pub use measurement::Measurement;
@@ -22,6 +24,6 @@ pub use noise::Noise;
 
 /// What the simulated board measures.
 pub trait Physics: Send {
-    /// Pad voltages of a whole frame (V), before the converter, at `time_s` seconds after the start.
+    /// Pad voltages of a whole frame (V), before the converter, at `time_s` seconds after the first frame.
     fn readings_v(&mut self, time_s: f64) -> Readings;
 }

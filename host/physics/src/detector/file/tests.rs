@@ -201,6 +201,23 @@ fn examples_are_read_and_written_alike() {
 }
 
 #[test]
+fn a_curved_detector_is_whole_with_its_surface_as_text() {
+    let detector = Detector::read(&example("fingertip.toml")).unwrap();
+    let surface = detector.surface.as_ref().unwrap();
+    let again = Detector::from_toml_and_obj(&detector.to_toml(), &surface.to_obj(), "else").unwrap();
+    let read = again.surface.as_ref().unwrap();
+    assert_eq!((&again.name, &read.triangles, &read.file), (&detector.name, &surface.triangles, &surface.file));
+    for (ours, theirs) in read.nodes_m.iter().zip(&surface.nodes_m) {
+        assert!(space::distance(*ours, *theirs) < 1e-15);
+    }
+    for (ours, theirs) in again.electrodes.iter().zip(&detector.electrodes) {
+        assert!(space::distance(ours.place_m(), theirs.place_m()) < 1e-12);
+    }
+    let wrong = Detector::from_toml_and_obj(&detector.to_toml(), "v 1 2", "else").unwrap_err().to_string();
+    assert!(wrong.contains("surface"), "{wrong}");
+}
+
+#[test]
 fn errors_of_surfaces_name_electrode_file_and_unit() {
     let path = example("fingertip.toml");
     let text = std::fs::read_to_string(&path).unwrap();

@@ -9,6 +9,7 @@ mod tests;
 mod topology;
 mod weld;
 
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -98,6 +99,23 @@ impl Surface {
         surface.check().map_err(SurfaceError::Shape)?;
         surface.map = Map::of(&mut surface).map_err(SurfaceError::Shape)?;
         Ok(surface)
+    }
+
+    /// The text of an OBJ file in its [unit](Self::unit), where it was drawn: what [`parse`](Self::parse) makes this surface of, to
+    /// rounding.
+    pub fn to_obj(&self) -> String {
+        let unit_m = UNITS.iter().find(|(name, _)| *name == self.unit).map_or(1.0, |(_, unit_m)| *unit_m);
+        let [x_m, y_m] = self.moved_m;
+        let mut text = String::new();
+        for [x, y, z] in &self.nodes_m {
+            let [x, y, z] = [x - x_m, y - y_m, *z].map(|at_m| at_m / unit_m);
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "v {x:?} {y:?} {z:?}");
+        }
+        for [a, b, c] in &self.triangles {
+            let _ = writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1);
+        }
+        text
     }
 
     /// Nodes and triangles: all that matters to a model.

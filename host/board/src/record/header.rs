@@ -1,0 +1,75 @@
+//! What a recording says about itself.
+
+use std::fmt;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use tactomo_physics::detector::Detector;
+
+use super::RecordError;
+
+/// What a recording says about itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Header {
+    /// Name of the detector it was taken from; empty if that is not known.
+    pub detector: String,
+    /// That detector as TOML; recordings of version 1 do not have it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detector_toml: Option<String>,
+    /// The surface of a curved detector as the text of an OBJ file, in place of the file that the TOML names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface_obj: Option<String>,
+    /// Where the bytes came from.
+    pub source: String,
+    /// Seconds since 1970 at its start (s).
+    pub started_unix_s: u64,
+    /// Whatever else a person wants to remember.
+    #[serde(default)]
+    pub notes: String,
+}
+
+impl Header {
+    /// For a recording of a detector, from a source of such a name, that begins at that time (s since 1970).
+    pub fn of(detector: &Detector, source: String, started_unix_s: u64) -> Self {
+        Self {
+            detector: detector.name.clone(),
+            detector_toml: Some(detector.to_toml()),
+            surface_obj: detector.surface.as_ref().map(|surface| surface.to_obj()),
+            source,
+            started_unix_s,
+            notes: String::new(),
+        }
+    }
+
+    /// The detector that the recording was taken from; `None` if the header does not hold it. `path` is the recording, for errors.
+    ///
+    /// # Errors
+    /// [`RecordError::Detector`] if it holds something that is no detector.
+    pub fn detector(&self, path: &Path) -> Result<Option<Detector>, RecordError> {
+        let Some(toml) = &self.detector_toml else { return Ok(None) };
+        let detector = match &self.surface_obj {
+            Some(obj) => Detector::from_toml_and_obj(toml, obj, &self.detector),
+            None => Detector::from_toml(toml, &self.detector),
+        };
+        detector.map(Some).map_err(|source| RecordError::Detector { path: path.to_owned(), source })
+    }
+
+    /// Whether `detector` is the one of the recording; where the header holds only a name, whether that is the same.
+    pub fn is_of(&self, detector: &Detector) -> bool {
+        let other = Self::of(detector, String::new(), 0);
+        match &self.detector_toml {
+            Some(toml) => Some(toml) == other.detector_toml.as_ref() && self.surface_obj == other.surface_obj,
+            None => self.detector == other.detector,
+        }
+    }
+}
+
+impl fmt::Display for Header {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self == &Self::default() {
+            return write!(f, "it does not say where it was recorded");
+        }
+        write!(f, "detector {}, recorded from {}", self.detector, self.source)?;
+        if self.notes.is_empty() { Ok(()) } else { write!(f, " ({})", self.notes) }
+    }
+}

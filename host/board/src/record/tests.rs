@@ -1,0 +1,249 @@
+//! Files that are whole, cut and damaged.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use proptest::prelude::*;
+
+use super::format::{CRC, put_leb128};
+use super::*;
+
+type Chunks = Vec<(u64, Vec<u8>)>;
+
+fn header() -> Header {
+    Header { detector: "square-60".into(), source: "test".into(), started_unix_s: 1, notes: "ä".into(), ..Header::default() }
+}
+
+/// The recording, and where its headers and each chunk end.
+fn written(chunks: &Chunks) -> (Vec<u8>, Vec<usize>) {
+    let mut writer = RecordWriter::new(Vec::new(), &header()).unwrap();
+    let mut ends = vec![writer.get_ref().len()];
+    for (time_us, bytes) in chunks {
+        writer.write(*time_us, bytes).unwrap();
+        ends.push(writer.get_ref().len());
+    }
+    (writer.out, ends)
+}
+
+/// The same as version 1 had it.
+fn written_in_version_1(chunks: &Chunks) -> (Vec<u8>, Vec<usize>) {
+    let closed = |mut bytes: Vec<u8>| {
+        bytes.extend(CRC.checksum(&bytes).to_le_bytes());
+        bytes
+    };
+    let json = serde_json::to_vec(&header()).unwrap();
+    let mut file = [&MAGIC[..], &closed([&[1][..], &(json.len() as u16).to_le_bytes(), &json].concat())].concat();
+    let mut ends = vec![file.len()];
+    for (time_us, bytes) in chunks {
+        let mut chunk = Vec::new();
+        put_leb128(*time_us, &mut chunk);
+        put_leb128(bytes.len() as u64, &mut chunk);
+        chunk.extend(bytes);
+        file.extend(closed(chunk));
+        ends.push(file.len());
+    }
+    (file, ends)
+}
+
+fn open(file: &[u8]) -> Result<RecordReader<Cursor<&[u8]>>, RecordError> {
+    RecordReader::new(Cursor::new(file), Path::new("some.file"))
+}
+
+fn rest(reader: &mut RecordReader<Cursor<&[u8]>>) -> Chunks {
+    let mut bytes = Vec::new();
+    std::iter::from_fn(|| reader.next_into(&mut bytes).unwrap().map(|time_us| (time_us, bytes.clone()))).collect()
+}
+
+fn read(file: &[u8]) -> Option<(Chunks, Loss)> {
+    let mut reader = open(file).ok()?;
+    Some((rest(&mut reader), reader.loss()))
+}
+
+/// Chunks with times that never fall.
+fn any_chunks(count: std::ops::Range<usize>) -> impl Strategy<Value = Chunks> {
+    prop::collection::vec((0u64..10_000_000, prop::collection::vec(any::<u8>(), 1..300)), count).prop_map(|mut chunks| {
+        chunks.sort();
+        chunks
+    })
+}
+
+#[test]
+fn long_reads_are_cut_and_come_back_whole() {
+    let bytes: Vec<u8> = (0..200_000u32).map(|i| i as u8).collect();
+    let (chunks, loss) = read(&written(&vec![(9, bytes.clone())]).0).unwrap();
+    assert_eq!((chunks.len(), loss), (4, Loss::default()));
+    assert_eq!(chunks.into_iter().flat_map(|chunk| chunk.1).collect::<Vec<_>>(), bytes);
+}
+
+#[test]
+fn other_files_and_newer_recordings_are_refused() {
+    let refusal = |file: &[u8]| open(file).unwrap_err();
+    assert!(matches!(refusal(b"a letter to somebody"), RecordError::NotARecording { .. }));
+    assert!(matches!(refusal(b""), RecordError::NotARecording { .. }));
+    assert!(matches!(refusal(&MAGIC), RecordError::NotARecording { .. }));
+    let newer = [&MAGIC[..], &[3], b"whatever it may be"].concat();
+    assert!(refusal(&newer).to_string().contains("version 3"));
+}
+
+#[test]
+fn both_headers_damaged_cost_what_they_said_and_no_chunk() {
+    let chunks = vec![(3, b"first".to_vec()), (9, b"second".to_vec())];
+    let (mut file, ends) = written(&chunks);
+    let length = (ends[0] - MAGIC.len() - 1) / 2;
+    for copy in 0..2 {
+        file[MAGIC.len() + 1 + copy * length + 30] ^= 1;
+    }
+    let mut reader = open(&file).unwrap();
+    assert_eq!(reader.header(), &Header::default());
+    assert_eq!(rest(&mut reader), chunks);
+    assert_eq!(reader.loss().header, HeaderDamage::Lost);
+    assert!(reader.loss().to_string().contains("its header is lost"));
+}
+
+#[test]
+fn the_detector_is_in_the_recording_a_curved_one_with_its_surface() {
+    use tactomo_physics::detector::Detector;
+    let preset = Detector::preset("fingertip-10").unwrap();
+    let header = Header::of(&preset, "test".into(), 7);
+    let file = RecordWriter::new(Vec::new(), &header).unwrap().out;
+    let read = open(&file).unwrap().header().clone();
+    assert_eq!(read.detector(Path::new("x")).unwrap().as_ref(), Some(&preset));
+    assert!(read.is_of(&preset) && !read.is_of(&Detector::preset("square-60").unwrap()));
+
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/detectors/fingertip.toml");
+    let curved = Detector::read(&path).unwrap();
+    let file = RecordWriter::new(Vec::new(), &Header::of(&curved, "test".into(), 7)).unwrap().out;
+    let read = open(&file).unwrap().header().clone();
+    let again = read.detector(Path::new("x")).unwrap().unwrap();
+    assert_eq!(again.surface.as_ref().map(|s| &s.triangles), curved.surface.as_ref().map(|s| &s.triangles));
+    assert!(read.is_of(&curved));
+
+    let old = open(&written_in_version_1(&Vec::new()).0).unwrap().header().clone();
+    assert!(old.detector(Path::new("x")).unwrap().is_none(), "the name alone tells no detector");
+    let wrong = Header { detector_toml: Some("drive_v = \"two\"".into()), ..old };
+    let error = wrong.detector(Path::new("some.file")).unwrap_err().to_string();
+    assert!(error.contains("some.file") && error.contains("--detector"), "{error}");
+}
+
+/// The chunks that were not damaged have to come back, in order; in place of the damaged one there may be one of the same length.
+fn assert_others_survive(kept: &Chunks, chunks: &Chunks, victim: Option<usize>) -> Result<(), TestCaseError> {
+    let others: Chunks = chunks.iter().enumerate().filter(|(i, _)| Some(*i) != victim).map(|(_, c)| c.clone()).collect();
+    let mut without = kept.clone();
+    if let Some(victim) = victim.filter(|_| kept.len() == chunks.len()) {
+        let salvaged = without.remove(victim);
+        prop_assert_eq!(salvaged.1.len(), chunks[victim].1.len());
+    }
+    prop_assert_eq!(without, others);
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn what_is_written_is_read(chunks in any_chunks(0..8)) {
+        for file in [written(&chunks).0, written_in_version_1(&chunks).0] {
+            prop_assert_eq!(read(&file), Some((chunks.clone(), Loss::default())));
+            let reader = open(&file).unwrap();
+            prop_assert_eq!(reader.header(), &header());
+        }
+    }
+
+    #[test]
+    fn a_file_that_was_cut_keeps_every_whole_chunk(chunks in any_chunks(0..8), cut in any::<prop::sample::Index>()) {
+        let copy = (written(&Vec::new()).0.len() - MAGIC.len() - 1) / 2;
+        for (version, (file, ends)) in [(1, written_in_version_1(&chunks)), (2, written(&chunks))] {
+            let cut = cut.index(file.len() + 1);
+            let whole = ends.iter().filter(|end| **end <= cut).count();
+            let Some(last_end) = whole.checked_sub(1).map(|last| ends[last]) else {
+                let expects_none = version == 1 || cut < ends[0] - copy;
+                prop_assert_eq!(read(&file[..cut]).map(|read| read.0), (!expects_none).then(Vec::new), "cut inside the header");
+                continue;
+            };
+            let (kept, loss) = read(&file[..cut]).unwrap();
+            prop_assert_eq!(&kept[..], &chunks[..whole - 1]);
+            prop_assert_eq!(loss, Loss { tail_bytes: (cut - last_end) as u64, ..Loss::default() });
+        }
+    }
+
+    #[test]
+    fn one_flipped_bit_anywhere_costs_its_chunk_alone_and_is_counted(
+        chunks in any_chunks(1..8),
+        at in any::<prop::sample::Index>(),
+        bit in 0..8u32,
+    ) {
+        for (mut file, ends) in [written(&chunks), written_in_version_1(&chunks)] {
+            let at = at.index(file.len());
+            file[at] ^= 1u8 << bit;
+            let victim = ends.iter().position(|end| at < *end).unwrap_or_default().checked_sub(1);
+            let (kept, loss) = read(&file).unwrap();
+            assert_others_survive(&kept, &chunks, victim)?;
+            prop_assert!(loss.is_any(), "at {} of {}", at, file.len());
+            match victim {
+                None => prop_assert!(loss.header != HeaderDamage::None && loss.damaged_chunks == 0, "{:?}", loss),
+                // A last chunk that claims to be longer than the file looks like one that was cut.
+                Some(victim) => prop_assert!(
+                    loss.damaged_chunks == 1 || victim + 1 == chunks.len() && loss.tail_bytes > 0, "{:?}", loss
+                ),
+            }
+        }
+    }
+
+    #[test]
+    fn bytes_that_are_put_in_or_taken_out_cost_their_chunk_alone(
+        chunks in any_chunks(1..8),
+        at in any::<prop::sample::Index>(),
+        junk in prop::collection::vec(any::<u8>(), 0..100),
+        taken in 0..60usize,
+    ) {
+        for (mut file, ends) in [written(&chunks), written_in_version_1(&chunks)] {
+            let at = ends[0] + at.index(file.len() - ends[0]);
+            let victim = ends.iter().position(|end| at < *end).unwrap_or_default() - 1;
+            // Within one chunk, so that it is known which.
+            let taken = taken.min(ends[victim + 1] - at);
+            file.splice(at..at + taken, junk.iter().copied());
+            let (kept, _) = read(&file).unwrap();
+            let others: Chunks = [&chunks[..victim], &chunks[victim + 1..]].concat();
+            let found = others.iter().all(|chunk| kept.contains(chunk));
+            prop_assert!(found, "{} of {} kept", kept.len(), chunks.len());
+        }
+    }
+
+    #[test]
+    fn any_bytes_are_read_without_panic(tail in prop::collection::vec(any::<u8>(), 0..2000)) {
+        prop_assert!(read(&tail).is_none());
+        for mut file in [written(&Vec::new()).0, written_in_version_1(&Vec::new()).0] {
+            file.extend(&tail);
+            let (chunks, _) = read(&file).unwrap();
+            prop_assert!(chunks.iter().map(|chunk| chunk.1.len()).sum::<usize>() <= tail.len());
+        }
+    }
+
+    #[test]
+    fn seeking_finds_the_first_chunk_of_a_time(
+        count in 1..200u64,
+        length in 1..5000usize,
+        to in any::<prop::sample::Index>(),
+        damage in prop::option::of(any::<prop::sample::Index>()),
+    ) {
+        let chunks: Chunks = (0..count).map(|i| (i * 1000, vec![i as u8; length])).collect();
+        for (mut file, ends) in [written(&chunks), written_in_version_1(&chunks)] {
+            let to = to.index(chunks.len() + 1) as u64;
+            let victim = damage.map(|damage| damage.index(chunks.len()));
+            if let Some(victim) = victim {
+                file[ends[victim]] ^= 0x10; // Mark or time.
+            }
+            let mut reader = open(&file).unwrap();
+            let last = chunks.iter().enumerate().rev().find(|(i, _)| Some(*i) != victim).map(|(_, chunk)| chunk.0);
+            prop_assert_eq!(reader.last_time_us().unwrap(), last);
+            reader.seek(to * 1000).unwrap();
+            let mut bytes = Vec::new();
+            let expected = chunks.iter().enumerate().find(|(i, _)| *i as u64 >= to && Some(*i) != victim);
+            prop_assert_eq!(reader.next_into(&mut bytes).unwrap(), expected.map(|(_, chunk)| chunk.0));
+            reader.rewind().unwrap();
+            prop_assert!(rest(&mut reader).len() + 1 >= chunks.len());
+            let loss = reader.loss();
+            reader.rewind().unwrap();
+            rest(&mut reader);
+            prop_assert_eq!(reader.loss(), loss, "what is read again is not counted again");
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Writes a recording.
+
+use std::io::{self, Write};
+
+use super::format::{Kind, MAX_CHUNK, MAX_HEADER, put_chunk};
+use super::{Header, MAGIC, VERSION};
+
+/// Writes a recording.
+#[derive(Debug)]
+pub struct RecordWriter<W: Write> {
+    pub(super) out: W,
+    /// The chunk as it goes out, kept to be filled again.
+    pub(super) chunk: Vec<u8>,
+}
+
+impl<W: Write> RecordWriter<W> {
+    /// Begins a recording.
+    ///
+    /// # Errors
+    /// If `out` takes no bytes, or the header is longer than 16 MiB.
+    pub fn new(mut out: W, header: &Header) -> io::Result<Self> {
+        let json = serde_json::to_vec(header)?;
+        if json.len() > MAX_HEADER {
+            let what = "the detector's surface has too many triangles for a recording: simplify its mesh";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+        }
+        let mut start = MAGIC.to_vec();
+        start.push(VERSION);
+        put_chunk(Kind::Header, 0, &json, &mut start);
+        put_chunk(Kind::Header, 0, &json, &mut start);
+        out.write_all(&start)?;
+        Ok(Self { out, chunk: Vec::new() })
+    }
+
+    /// Adds bytes that came `time_us` after the start (us), not before those that are written already.
+    ///
+    /// # Errors
+    /// If `out` takes no bytes.
+    pub fn write(&mut self, time_us: u64, bytes: &[u8]) -> io::Result<()> {
+        for bytes in bytes.chunks(MAX_CHUNK) {
+            self.chunk.clear();
+            put_chunk(Kind::Data, time_us, bytes, &mut self.chunk);
+            self.out.write_all(&self.chunk)?;
+        }
+        Ok(())
+    }
+
+    /// Hands everything to the system.
+    ///
+    /// # Errors
+    /// If `out` takes no bytes.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
+    /// What is written to.
+    pub fn get_ref(&self) -> &W {
+        &self.out
+    }
+}
