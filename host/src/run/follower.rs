@@ -196,6 +196,7 @@ impl Desk {
                 let Parts { follower, searcher } = self.inbox.parts_of(solver);
                 self.search.change_solver(searcher);
                 seat.follower = Some(follower);
+                self.inbox.set_ready();
                 self.rest = Rest::default();
             }
             (Err(error), Some(Seat { follower: None, .. })) => return Err(LiveError::MakeSolver(error)),

@@ -78,6 +78,7 @@ struct State {
     events: std::collections::VecDeque<Event>,
     pending: Option<Taken>,
     steady: Option<Steady>,
+    ready: bool,
     closed: bool,
 }
 
@@ -128,6 +129,18 @@ impl Inbox {
         drop(state);
         self.changed.notify_all();
         Event::Frame(frame)
+    }
+
+    /// Says that there is a solver.
+    pub fn set_ready(&self) {
+        self.lock().ready = true;
+        self.changed.notify_all();
+    }
+
+    /// Waits until there is a solver, or there will be none.
+    pub fn wait_until_ready(&self) {
+        let waiting = |state: &mut State| !state.ready && !state.closed;
+        drop(self.changed.wait_while(self.lock(), waiting));
     }
 
     /// Says that nothing more comes, or that nobody takes it.

@@ -15,6 +15,7 @@ use tactomo_board::measured::Mismatch;
 use tactomo_board::record::{RecordError, Recorder};
 use tactomo_board::session::{GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
+use tactomo_protocol::Hello;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
 
@@ -22,8 +23,8 @@ use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
 pub type MakeSolver = Arc<dyn Fn(&Order) -> Result<Box<dyn Solver>, BoxError> + Send + Sync>;
 /// Looks for exchanged wires in readings (V) less the baseline, with the forward model of an order's detector; called in another thread.
 pub type LookAtWires = Arc<dyn Fn(&Order, Look, &Readings) -> Option<[usize; 2]> + Send + Sync>;
-/// Begins a recording in a new file.
-pub type BeginRecording = Box<dyn FnMut() -> Result<Recorder, RecordError> + Send>;
+/// Begins a recording in a new file, of a board that has said Hello.
+pub type BeginRecording = Box<dyn FnMut(&Hello) -> Result<Recorder, RecordError> + Send>;
 /// Any error.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 

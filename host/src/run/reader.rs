@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use tactomo_board::link::{Link, Source};
 use tactomo_board::measured::{self, Volts};
+use tactomo_board::record::{Closing, RecordError, Recorder};
 use tactomo_board::sequence::Sequence;
 use tactomo_board::session::{self, GreetError, Session};
 use tactomo_physics::detector::Detector;
@@ -24,6 +25,8 @@ use super::{LinkState, Request};
 const PATIENCE: Duration = Duration::from_secs(6);
 /// Time between two tries to open a link that was lost.
 const REOPEN_EVERY: Duration = Duration::from_millis(500);
+/// What is shown of a board that answers and sends no frames.
+const MUTE: &str = "The board answers but sends no frames. Press its reset button; if that does not help, flash the firmware anew.";
 /// Bytes of one read: 40 ms at 921600 baud.
 const READ_BYTES: usize = 4096;
 
@@ -39,6 +42,11 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     let listeners = std::mem::take(&mut plan.listeners);
     let started = solving.map(|solving| FollowThread::start(solving, &inbox, &notice, listeners)).transpose();
     let follower = started.map_err(LiveError::Thread)?;
+    if follower.is_some() {
+        // Most boards measure as the detector's description says, so their first frame finds a solver.
+        inbox.put(Event::Board(Arc::new(plan.detector.clone())));
+        inbox.wait_until_ready();
+    }
     let mut reader = Reader {
         plan,
         requests,
@@ -49,13 +57,15 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         sequence: Sequence::default(),
         board: None,
         greeted: None,
+        closing: Vec::new(),
+        lost: None,
     };
+    reader.show_recording();
     let ended = reader.run(source);
     inbox.close();
     let solved = follower.map_or(Ok(()), FollowThread::join);
     // What ended the solving also ended the reading; a failure to keep the recording counts for more than either.
-    let recorder = reader.plan.recorder.take();
-    let ended = recorder.map_or(Ok(()), |recorder| Ok(recorder.finish()?)).and(solved).and(ended);
+    let ended = reader.finish_recordings().and(solved).and(ended);
     if let Err(error) = &ended {
         notice.publish(|snapshot| snapshot.link = LinkState::Ended(error.to_string()));
     }
@@ -101,6 +111,9 @@ struct Reader {
     board: Option<Board>,
     /// When the first board said Hello.
     greeted: Option<Instant>,
+    /// Recordings that were ended and are still written, and why one failed.
+    closing: Vec<Closing>,
+    lost: Option<RecordError>,
 }
 
 /// Who has said Hello, and what its frames mean.
@@ -120,6 +133,8 @@ struct Talk {
     junk: Option<u64>,
     /// Corrupt stretches that were counted.
     counted: u64,
+    /// Whether no frame has come since a jump.
+    landing: bool,
 }
 
 impl Reader {
@@ -171,7 +186,13 @@ impl Reader {
         while !self.is_over() {
             self.answer_requests(Some((&mut *link, &mut talk)));
             match talk.exchange(link, &mut buffer) {
-                Ok(count) => self.receive(&mut talk, link, &buffer[..count])?,
+                Ok(count) => {
+                    if link.jumped() {
+                        self.sequence.restart();
+                        talk.jumped();
+                    }
+                    self.receive(&mut talk, link, &buffer[..count])?;
+                }
                 Err(error) => return lost(link, error, comes_back),
             }
             if comes_back && talk.is_in_vain() {
@@ -197,16 +218,17 @@ impl Reader {
         if bytes.is_empty() {
             return Ok(());
         }
-        if let Some(recorder) = &mut self.plan.recorder {
-            recorder.push(bytes)?;
-        }
+        self.keep(bytes, received)?;
         let mut input = bytes;
         while let Some(message) = talk.receiver.receive(&mut input) {
             match message {
                 Ok(BoardMessage::Frame(frame)) => self.frame(talk, &frame, received),
                 Ok(BoardMessage::Hello(hello)) => self.hello(talk, hello, received)?,
                 Ok(BoardMessage::Log(log)) => self.plan.board_log.take(&log.0),
-                Ok(BoardMessage::Fault(fault)) => tracing::warn!("the board says: {}", session::explain(&fault)),
+                Ok(BoardMessage::Fault(fault)) => {
+                    tracing::warn!("the board says: {}", session::explain(&fault));
+                    talk.session.fault(&fault);
+                }
                 Err(error @ DecodeError::Version(_)) => {
                     return Err(LiveError::Greet { link: link.name(), error: GreetError::Version(error) });
                 }
@@ -215,6 +237,23 @@ impl Reader {
         }
         let corrupt = talk.newly_corrupt();
         self.notice.count(|meter| meter.corrupt(corrupt));
+        Ok(())
+    }
+
+    /// Hands bytes to the recording. Where that fails, the picture goes on; without one there is nothing else to do.
+    fn keep(&mut self, bytes: &[u8], received: Instant) -> Result<(), LiveError> {
+        let Some(recorder) = &mut self.plan.recorder else { return Ok(()) };
+        let Err(error) = recorder.push(bytes, received) else { return Ok(()) };
+        if !self.follows {
+            return Err(error.into());
+        }
+        tracing::error!("{error}");
+        self.plan.recorder = None;
+        self.notice.change(|snapshot| {
+            snapshot.recording = None;
+            snapshot.refused = Some(error.to_string());
+        });
+        self.lost.get_or_insert(error);
         Ok(())
     }
 
@@ -227,16 +266,13 @@ impl Reader {
             let Hello { board, firmware_version, electrodes, .. } = &hello;
             tracing::info!("board {board} with firmware {firmware_version}: {electrodes} electrodes");
             let measured = Arc::new(measured::as_measured(&self.plan.detector, &hello)?);
-            let detector = match known {
-                Some(board) if board.detector == measured => Arc::clone(&board.detector),
-                _ => {
-                    self.inbox.put(Event::Board(Arc::clone(&measured)));
-                    measured
-                }
-            };
-            let noise_v = detector.adc.deviation_v();
+            let solved = known.map_or(&self.plan.detector, |board| &board.detector);
+            if *solved != *measured {
+                self.inbox.put(Event::Board(Arc::clone(&measured)));
+            }
+            let noise_v = measured.adc.deviation_v();
             self.notice.change(|snapshot| snapshot.hello = Some(hello.clone()));
-            self.board = Some(Board { volts: Volts::of(&hello), hello, detector, noise_v });
+            self.board = Some(Board { volts: Volts::of(&hello), hello, detector: measured, noise_v });
         }
         Ok(())
     }
@@ -245,6 +281,7 @@ impl Reader {
         // Before Hello nobody knows what the readings mean.
         let (Some(board), Some(_)) = (&self.board, talk.junk) else { return };
         talk.session.frame(received);
+        talk.landing = false;
         let Some(volts) = board.volts.of_frame(frame) else {
             return self.notice.count(|meter| meter.corrupt(1));
         };
@@ -288,9 +325,8 @@ impl Reader {
                 Request::Record(true) => self.begin_recording(),
                 Request::Record(false) => self.end_recording(),
                 Request::Control(control) => {
-                    if let Some((link, _)) = &mut open {
-                        link.control(&control);
-                    }
+                    let refused = open.as_mut().and_then(|(link, _)| link.control(&control).err());
+                    self.notice.change(|snapshot| snapshot.refused = refused.map(|error| error.to_string()));
                 }
             }
         }
@@ -298,7 +334,8 @@ impl Reader {
 
     fn begin_recording(&mut self) {
         let (None, Some(begin)) = (&self.plan.recorder, &mut self.plan.begin_recording) else { return };
-        let begun = begin();
+        let Some(board) = &self.board else { return };
+        let begun = begin(&board.hello);
         self.notice.change(|snapshot| {
             snapshot.refused = begun.as_ref().err().map(ToString::to_string);
             snapshot.recording = begun.as_ref().ok().map(|recorder| recorder.path().to_owned());
@@ -308,17 +345,32 @@ impl Reader {
 
     fn end_recording(&mut self) {
         let Some(recorder) = self.plan.recorder.take() else { return };
-        let ended = recorder.finish();
-        self.notice.change(|snapshot| {
-            snapshot.recording = None;
-            snapshot.refused = ended.err().map(|error| error.to_string());
-        });
+        self.closing.push(recorder.close());
+        self.notice.change(|snapshot| (snapshot.recording, snapshot.refused) = (None, None));
+    }
+
+    fn show_recording(&self) {
+        let path = self.plan.recorder.as_ref().map(|recorder| recorder.path().to_owned());
+        self.notice.change(|snapshot| snapshot.recording = path);
+    }
+
+    /// Writes what is left of all recordings.
+    fn finish_recordings(&mut self) -> Result<(), LiveError> {
+        let last = self.plan.recorder.take().map(Recorder::close);
+        let finished: Vec<_> = self.closing.drain(..).chain(last).map(Closing::wait).collect();
+        let lost = self.lost.take().map_or(Ok(()), Err);
+        Ok(finished.into_iter().fold(lost, Result::and)?)
     }
 
     /// Shows how the link fares.
     fn show_link(&mut self, link: &dyn Link, talk: &Talk) {
-        if talk.junk.is_some() {
+        if talk.session.is_mute(Instant::now()) {
+            self.enter(LinkState::Silent(MUTE.to_owned()));
+        } else if talk.junk.is_some() {
             self.enter(LinkState::Streaming);
+        }
+        if let Some(refusal) = talk.session.refusal() {
+            self.notice.change(|snapshot| snapshot.refused = Some(refusal.to_string()));
         }
         let playing = link.playing();
         self.notice.change(|snapshot| snapshot.playing = playing);
@@ -335,13 +387,14 @@ impl Reader {
 }
 
 impl Talk {
-    fn new(wish: RequestedSettings) -> Self {
+    fn new(settings: session::RequestedSettings) -> Self {
         Self {
-            session: Session::new(wish),
+            session: Session::new(settings),
             receiver: BoardReceiver::default(),
             opened: Instant::now(),
             junk: None,
             counted: 0,
+            landing: false,
         }
     }
 
@@ -357,9 +410,20 @@ impl Talk {
         self.junk.is_none() && self.opened.elapsed() >= PATIENCE
     }
 
+    /// Forgets the packet under way: what follows it is elsewhere.
+    fn jumped(&mut self) {
+        self.receiver = BoardReceiver::default();
+        (self.junk, self.counted, self.landing) = (self.junk.map(|_| 0), 0, true);
+    }
+
     /// Corrupt stretches since the last time this was asked; boot text before Hello is none.
     fn newly_corrupt(&mut self) -> u64 {
         let Some(junk) = self.junk else { return 0 };
+        if self.landing {
+            // The rest of a packet that a jump has landed in is none.
+            self.counted = self.receiver.counters().corrupt;
+            return 0;
+        }
         let corrupt = self.receiver.counters().corrupt - junk;
         let newly = corrupt - self.counted;
         self.counted = corrupt;

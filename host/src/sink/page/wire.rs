@@ -14,7 +14,7 @@ use tactomo_protocol::Hello;
 
 use super::PageSetup;
 use super::update::LAYOUT;
-use crate::run::solvers::SolverState;
+use crate::run::SolverState;
 use crate::run::{Latency, LinkState, Snapshot};
 use tactomo_touch::solve::Method;
 
@@ -188,6 +188,7 @@ fn link(link: &LinkState) -> LinkMessage<'_> {
         LinkState::Searching => ("searching", None),
         LinkState::Waiting => ("waiting", None),
         LinkState::Streaming => ("streaming", None),
+        LinkState::Silent(reason) => ("silent", Some(reason.as_str())),
         LinkState::Lost(reason) => ("lost", Some(reason.as_str())),
         LinkState::Ended(reason) => ("ended", Some(reason.as_str())),
     };

@@ -1,0 +1,96 @@
+//! A run of the live threads on the simulated board, with every answer and every byte kept.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::Duration;
+
+use tactomo::board::board_log::BoardLog;
+use tactomo::board::link::Opened;
+use tactomo::board::record::{Header, Recorder};
+use tactomo::board::session::RequestedSettings;
+use tactomo::board::simulated::{Options, SimulatedBoard};
+use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
+use tactomo::run::{Snapshot, SolvedFrame};
+use tactomo::scene::{Hand, Scene, SceneName, Touch};
+use tactomo::simulate::Simulation;
+use tactomo::solve::{Method, Problem, Solution};
+use tokio::sync::watch;
+
+/// Time of the scene from which on answers count (s).
+const SETTLED_S: f64 = 0.2;
+/// Seed of scene, noise and faults.
+const SEED: u64 = 1;
+
+/// An answer, and the frame that it is of.
+pub struct Answer {
+    /// Number of the frame.
+    pub sequence: u64,
+    /// Time of the scene (s).
+    pub time_s: f64,
+    pub solution: Solution,
+}
+
+/// What a run has come to.
+pub struct Live {
+    pub answers: Vec<Answer>,
+    pub summary: Summary,
+    pub recording: PathBuf,
+    scene: Scene,
+}
+
+struct Keeper(Arc<Mutex<Vec<(u64, u64, Solution)>>>);
+
+impl Listener for Keeper {
+    fn solved(&mut self, solved: &SolvedFrame<'_>) {
+        self.0.lock().unwrap().push((solved.frame.sequence, solved.frame.board_time_us, solved.solution.clone()));
+    }
+}
+
+impl Live {
+    /// Runs a solver on a scene for so long.
+    pub fn run(problem: &Problem, method: Method, name: SceneName, seconds: f64) -> Self {
+        let detector = problem.detector().clone();
+        let scene = Scene::new(name, &detector, Hand::relative(&detector), SEED);
+        let simulation = Simulation::new(&detector, scene.clone(), &[], SEED).unwrap();
+        let board = SimulatedBoard::simulate(&detector, simulation, Options { seed: SEED, ..Options::default() });
+        let recording = std::env::temp_dir().join(format!("tactomo-{}-{}-{name}.tactomo", std::process::id(), method.name()));
+        let header = Header::of(&detector, "simulated board".to_owned(), 0);
+        let kept = Arc::new(Mutex::new(Vec::new()));
+        let plan = Plan {
+            detector,
+            settings: RequestedSettings::default(),
+            solving: Some(Solving::new(method, problem.clone())),
+            recorder: Some(Recorder::create(&recording, &header).unwrap()),
+            begin_recording: None,
+            listeners: vec![Box::new(Keeper(Arc::clone(&kept)))],
+            board_log: BoardLog::unread(),
+            seconds: Some(Duration::from_secs_f64(seconds)),
+        };
+        let (snapshots, _page) = watch::channel(Arc::new(Snapshot::default()));
+        let (_requests, requests) = mpsc::sync_channel(1);
+        let ends = Ends { snapshots, requests, stop: Arc::default() };
+        let summary = tactomo::run::run(&mut Opened::new(Box::new(board.unwrap())), plan, ends).unwrap();
+        let kept = std::mem::take(&mut *kept.lock().unwrap());
+        // Scene time begins with the first frame.
+        let first_us = kept.first().map_or(0, |(sequence, time_us, _)| time_us - sequence * 832);
+        let answer = |(sequence, time_us, solution): (u64, u64, Solution)| Answer {
+            sequence,
+            time_s: (time_us - first_us) as f64 * 1e-6,
+            solution,
+        };
+        let answers = kept.into_iter().map(answer).filter(|answer| answer.time_s > SETTLED_S).collect();
+        Self { answers, summary, recording, scene }
+    }
+
+    /// What truly touched at each answer's time.
+    pub fn truths(&self) -> Vec<Vec<Touch>> {
+        self.answers.iter().map(|answer| self.scene.at(answer.time_s)).collect()
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        // It may be gone already.
+        let _ = std::fs::remove_file(&self.recording);
+    }
+}

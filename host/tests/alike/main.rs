@@ -1,0 +1,63 @@
+//! What live says is what offline says of the same bytes: every solver behind a board of 1200 frames/s, with scenes that press from the
+//! first frame on. `TACTOMO_ALIKE=all cargo test --release -p tactomo --test alike -- --nocapture` takes every solver and every scene, and
+//! prints the table.
+#![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
+
+mod live;
+mod offline;
+mod score;
+
+use tactomo::detector::Detector;
+use tactomo::scene::SceneName;
+use tactomo::solve::{Method, Problem};
+
+use self::live::Live;
+use self::score::Score;
+
+/// Solvers whose every answer takes some milliseconds: offline they are asked about the frames alone that live has answered.
+const SLOW: [Method; 4] = [Method::Nonlinear, Method::Tv, Method::Bsbl, Method::Nonnegative];
+
+fn detector() -> Detector {
+    let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+    detector.adc.noise_lsb = 1.5;
+    detector
+}
+
+/// Runs a solver on a scene both ways; whether live is as good as offline.
+fn is_alike(problem: &Problem, method: Method, scene: SceneName, seconds: f64) -> bool {
+    let live = Live::run(problem, method, scene, seconds);
+    let offline = offline::answers(problem, method, &live);
+    let truth = live.truths();
+    let [live_score, offline_score] =
+        [&live.answers, &offline].map(|answers| Score::of(problem, &truth, answers.iter().map(|answer| &answer.solution)));
+    let summary = &live.summary;
+    let alike = live_score.is_as_good_as(&offline_score) && summary.dropped == 0 && summary.corrupt == 0;
+    println!(
+        "{:<15} {:<15} live {live_score}  offline {offline_score}  age p50 {:>6.2} p99 {:>6.2} ms, answer p99 {:>6.2} ms, {:>5} answers{}",
+        method.name(),
+        scene.to_string(),
+        summary.age_us.p50 * 1e-3,
+        summary.age_us.p99 * 1e-3,
+        summary.latency_us.p99 * 1e-3,
+        live.answers.len(),
+        if alike { "" } else { "  <- worse" }
+    );
+    alike
+}
+
+#[test]
+fn live_says_what_offline_says() {
+    let problem = Problem::of(&detector()).unwrap();
+    let all = std::env::var("TACTOMO_ALIKE").is_ok_and(|what| what == "all");
+    let mut worse = Vec::new();
+    for scene in SceneName::ALL {
+        for method in Method::ALL {
+            let is_chosen = matches!(scene, SceneName::Several | SceneName::Ring | SceneName::Moving);
+            let is_usual = method == Method::Auto || is_chosen && method != Method::Kernel;
+            if (all || is_usual) && !is_alike(&problem, method, scene, if all { 3.0 } else { 1.0 }) {
+                worse.push((method.name(), scene.to_string()));
+            }
+        }
+    }
+    assert!(worse.is_empty(), "live is worse than offline: {worse:?}");
+}

@@ -1,0 +1,68 @@
+//! How good answers are.
+
+use std::fmt;
+
+use tactomo::metrics::{Comparison, Matching, truth_s_per_m2};
+use tactomo::scene::{Contact, Touch};
+use tactomo::solve::{Problem, Solution};
+
+/// Contacts farther off than this are others (m).
+const REACH_M: f64 = 0.010;
+/// Smoothing of images before they are compared (m).
+const SMOOTHING_M: f64 = 0.002;
+/// Images are compared in every so many answers.
+const IMAGE_STRIDE: usize = 20;
+
+/// How good answers are, in the mean.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Score {
+    /// Share of answers with the right number of contacts.
+    count_right: f64,
+    /// Error of the places of contacts that were found (m).
+    error_m: f64,
+    /// Correlation of images with the truth.
+    correlation: f64,
+    images: usize,
+}
+
+impl Score {
+    /// The score of answers against what truly touched.
+    pub fn of<'a>(problem: &Problem, truths: &[Vec<Touch>], solutions: impl Iterator<Item = &'a Solution>) -> Self {
+        let mesh = &problem.jacobian.image_mesh;
+        let comparison = Comparison::new(mesh, SMOOTHING_M);
+        let (mut score, mut matched, mut answers) = (Self::default(), 0, 0);
+        for (truth, solution) in truths.iter().zip(solutions) {
+            let contacts: Vec<Contact> = truth.iter().filter_map(Touch::disc).collect();
+            score.count_right += f64::from(u8::from(contacts.len() == solution.contacts.len()));
+            if let Some(error_m) = Matching::within(REACH_M, &contacts, &solution.contacts).position_error_m() {
+                score.error_m += error_m;
+                matched += 1;
+            }
+            if let Some(image) = solution.image_s_per_m2.as_ref().filter(|_| answers % IMAGE_STRIDE == 0) {
+                let truth = truth_s_per_m2(mesh, truth).unwrap();
+                score.correlation += comparison.of(&truth, image).correlation.unwrap_or_default();
+                score.images += 1;
+            }
+            answers += 1;
+        }
+        score.count_right /= f64::from(answers.max(1) as u32);
+        score.error_m /= f64::from(matched.max(1));
+        score.correlation /= score.images.max(1) as f64;
+        score
+    }
+
+    /// Whether it is as good, within 10 %.
+    pub fn is_as_good_as(&self, other: &Self) -> bool {
+        self.count_right > 0.9 * other.count_right - 0.01
+            && self.error_m < 1.1 * other.error_m + 5e-5
+            && (other.images == 0 || self.images > 0 && self.correlation > 0.9 * other.correlation - 0.01)
+    }
+}
+
+impl fmt::Display for Score {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { count_right, error_m, correlation, images } = self;
+        write!(formatter, "{:>3.0} % {:>5.2} mm", 100.0 * count_right, 1e3 * error_m)?;
+        if *images > 0 { write!(formatter, " r {correlation:>4.2}") } else { write!(formatter, "       ") }
+    }
+}
