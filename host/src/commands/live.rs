@@ -13,12 +13,12 @@ use tactomo::forward::jacobian::Jacobian;
 use tactomo::run::pipeline;
 use tactomo::run::plan::{Ends, MakeSolver, Plan, Solving, Summary};
 use tactomo::run::{Request, Snapshot};
-use tactomo::sink::page::{PageSetup, Server};
+use tactomo::sink::page::{Finger, PageSetup, Server};
 use tactomo::solve::{Guard, Method, Problem};
 use tokio::sync::watch;
 
 use super::choice::{DetectorArgs, Model};
-use super::source::{self, BoardArgs, Mouse};
+use super::source::{self, BoardArgs};
 use super::{interrupt, output, recording};
 
 /// Requests of pages that may wait.
@@ -79,8 +79,8 @@ pub struct PictureArgs {
 pub struct Show {
     /// Where the bytes come from.
     pub source: Box<dyn Source>,
-    /// The mouse's way to the detector, if that is simulated.
-    pub mouse: Option<Mouse>,
+    /// What the mouse presses with, if the detector is simulated.
+    pub finger: Option<Finger>,
     /// The detector that is connected.
     pub detector: Detector,
     /// What becomes of the bytes.
@@ -97,14 +97,14 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let detector = args.picture.detector.get()?;
-    let (source, mouse) = match args.replay {
-        Some(file) => (source::recording(file, args.speed), None),
+    let detector = source::detector(&args.picture.detector, args.replay.as_deref())?;
+    let (source, finger) = match args.replay {
+        Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &args.picture.detector, &detector)?,
     };
     let settings = args.board.settings.requested();
     let Args { picture, seconds, record, elf, .. } = args;
-    show(Show { source, mouse, settings, detector, picture, seconds, record, elf })
+    show(Show { source, finger, settings, detector, picture, seconds, record, elf })
 }
 
 /// Serves the page, or only counts, until the end.
@@ -141,7 +141,6 @@ fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
         solving: Some(Solving { method: show.picture.solver, make: make_solver(problem) }),
         recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
         board_log: recording::board_log(show.elf.as_deref())?,
-        press: show.mouse.take().map(|mouse| mouse.press),
         seconds: show.seconds,
         detector,
     })
@@ -166,7 +165,7 @@ fn serve(
         detector: show.detector.clone(),
         mesh: problem.jacobian.image_mesh.clone(),
         source: show.source.name(),
-        finger: show.mouse.as_ref().map(|mouse| mouse.finger),
+        finger: show.finger,
     };
     let server = Server::start(show.picture.http_port, scene, snapshots, requests)?;
     eprintln!("live picture: {}", server.url());

@@ -14,9 +14,12 @@ use super::choice::DetectorArgs;
 use super::source::{self, BoardArgs};
 use super::{interrupt, live, recording};
 
-/// Keeps the bytes of a board in a new file.
+/// Keeps the bytes of a board in a new file, with the detector that they came from.
 ///
-/// Example: tactomo record touch.tactomo --seconds 30
+/// Examples:
+///   tactomo record touch.tactomo --seconds 30
+///   tactomo record touch.tactomo --port /dev/ttyUSB0 --detector my.toml --average 4
+///   tactomo record touch.tactomo --simulate --scene five-fingers --seconds 10
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -41,7 +44,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         solving: None,
         recorder: recording::begin(Some(&args.file), &detector, source.name())?,
         board_log: BoardLog::unread(),
-        press: None,
         seconds: args.seconds,
         detector,
     };

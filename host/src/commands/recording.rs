@@ -10,8 +10,7 @@ use tactomo::detector::Detector;
 /// Begins a recording in a new file, if one is wanted.
 pub fn begin(file: Option<&Path>, detector: &Detector, source: String) -> Result<Option<Recorder>, RecordError> {
     let started_unix_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let header = Header { detector: detector.name.clone(), source, started_unix_s, notes: String::new() };
-    file.map(|file| Recorder::create(file, &header)).transpose()
+    file.map(|file| Recorder::create(file, &Header::of(detector, source, started_unix_s))).transpose()
 }
 
 /// Where the board's log goes: printed with the texts of the firmware file `elf`, or only noticed.

@@ -13,7 +13,6 @@ use super::plan::{Ends, LiveError, Plan, Summary};
 use super::solvers::Solvers;
 use super::statistics::Meter;
 use super::{FrameSnapshot, LinkState, Request, Snapshot};
-use tactomo_board::link::Control;
 use tactomo_board::link::{Link, Source};
 use tactomo_board::pace::Pace;
 use tactomo_board::sequence::{Place, Sequence};
@@ -149,7 +148,7 @@ impl Pipeline {
                 Ok(link) => return Some(link),
                 Err(error) => tracing::debug!("{error}"),
             }
-            self.answer_requests();
+            self.answer_requests(None);
             self.publish();
             thread::sleep(REOPEN_EVERY);
         }
@@ -163,10 +162,15 @@ impl Pipeline {
         self.sequence.restart();
         self.enter(LinkState::Waiting);
         while !self.is_over() {
-            self.answer_requests();
+            self.answer_requests(Some((&mut *link, &mut talk.session)));
             self.change_solver();
             match talk.exchange(link, &mut buffer) {
-                Ok(count) => self.receive(&mut talk, link, &buffer[..count])?,
+                Ok(count) => {
+                    if link.jumped() {
+                        self.sequence.restart();
+                    }
+                    self.receive(&mut talk, link, &buffer[..count])?;
+                }
                 Err(error) => return lost(link, error, comes_back),
             }
             if comes_back && talk.is_in_vain() {
@@ -193,7 +197,7 @@ impl Pipeline {
             return Ok(());
         }
         if let Some(recorder) = &mut self.plan.recorder {
-            recorder.push(bytes)?;
+            recorder.push(bytes, received)?;
         }
         let mut input = bytes;
         while let Some(message) = talk.receiver.receive(&mut input) {
@@ -201,7 +205,10 @@ impl Pipeline {
                 Ok(BoardMessage::Frame(frame)) => self.frame(talk, &frame, received)?,
                 Ok(BoardMessage::Hello(hello)) => self.hello(talk, hello, received)?,
                 Ok(BoardMessage::Log(log)) => self.plan.board_log.take(&log.0),
-                Ok(BoardMessage::Fault(fault)) => tracing::warn!("the board says: {}", session::explain(&fault)),
+                Ok(BoardMessage::Fault(fault)) => {
+                    talk.session.fault(&fault);
+                    tracing::warn!("the board says: {}", session::explain(&fault));
+                }
                 Err(error @ DecodeError::Version(_)) => {
                     return Err(LiveError::Greet { link: link.name(), error: GreetError::Version(error) });
                 }
@@ -267,12 +274,17 @@ impl Pipeline {
         timed_out || self.ends.stop.load(Ordering::Relaxed)
     }
 
-    fn answer_requests(&mut self) {
+    fn answer_requests(&mut self, mut open: Option<(&mut dyn Link, &mut Session)>) {
         while let Ok(request) = self.ends.requests.try_recv() {
-            match (request, &self.plan.press, &mut self.interpreter) {
+            match (request, &mut open, &mut self.interpreter) {
                 (Request::Rezero, _, Some((_, interpreter))) => interpreter.rezero(),
                 (Request::Solver(method), ..) => self.ask_for(method),
-                (Request::Control(Control::Press(contacts)), Some(press), _) => press(contacts.first().copied()),
+                (Request::Settings(settings), Some((_, session)), _) => session.request(settings),
+                (Request::Control(control), Some((link, _)), _) => {
+                    if let Err(error) = link.control(&control) {
+                        tracing::warn!("{error}");
+                    }
+                }
                 _ => {}
             }
         }

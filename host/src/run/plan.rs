@@ -15,13 +15,10 @@ use tactomo_board::measured::Mismatch;
 use tactomo_board::record::{RecordError, Recorder};
 use tactomo_board::session::{GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
-use tactomo_physics::scene::Contact;
 use tactomo_touch::solve::{Method, SolveError, Solver};
 
 /// Makes the solver of a method for a detector; called in other threads too.
 pub type MakeSolver = Arc<dyn Fn(Method, &Detector) -> Result<Box<dyn Solver>, BoxError> + Send + Sync>;
-/// Presses on a simulated detector, or lets go.
-pub type Press = Box<dyn Fn(Option<Contact>) + Send>;
 /// Any error.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 
@@ -37,8 +34,6 @@ pub struct Plan {
     pub recorder: Option<Recorder>,
     /// Where the board's log goes.
     pub board_log: BoardLog,
-    /// Who is told of presses, if the detector is simulated.
-    pub press: Option<Press>,
     /// Time from Hello to the end; `None` for without end.
     pub seconds: Option<Duration>,
 }

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, mpsc};
+use std::sync::{Arc, Mutex, mpsc};
 
 use tactomo::board::board_log::BoardLog;
-use tactomo::board::link::{Link, Source, SourceError};
+use tactomo::board::link::{Control, ControlError, Link, Source, SourceError};
 use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, Plan};
@@ -32,6 +32,8 @@ pub struct FakeBoard {
     pub streaming: bool,
     pub sent: u64,
     pub sequence: u64,
+    /// What was asked of it.
+    pub asked: Arc<Mutex<Vec<Control>>>,
 }
 
 impl FakeBoard {
@@ -48,6 +50,7 @@ impl FakeBoard {
             streaming: false,
             sent: 0,
             sequence: 0,
+            asked: Arc::default(),
         }
     }
 
@@ -118,6 +121,11 @@ impl Link for FakeBoard {
         Ok(count)
     }
 
+    fn control(&mut self, control: &Control) -> Result<(), ControlError> {
+        self.asked.lock().unwrap().push(control.clone());
+        Ok(())
+    }
+
     fn write_all(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         while let Some(Ok(command)) = self.receiver.receive(&mut bytes) {
             self.obey(command);
@@ -154,7 +162,6 @@ pub fn plan() -> Plan {
         solving: None,
         recorder: None,
         board_log: BoardLog::unread(),
-        press: None,
         seconds: None,
     }
 }

@@ -1,6 +1,6 @@
 //! The pipeline from bytes to snapshots, on a board of bytes only.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
 use tactomo::board::link::{Control, Link, Opened, Recording};
@@ -91,23 +91,22 @@ fn a_board_that_says_nothing_of_use_is_given_up() {
 
 #[test]
 fn presses_reach_the_simulated_detector_and_the_stop_ends_the_run() {
-    let pressed = Arc::new(Mutex::new(Vec::new()));
-    let seen = Arc::clone(&pressed);
+    let board = FakeBoard::new(u64::MAX);
+    let asked = Arc::clone(&board.asked);
     let (ends, other) = ends();
     let contact = Contact::flat(0.01, 0.0, 0.002, 1e-3);
-    let press = |contacts: &[Contact]| Request::Control(Control::Press(contacts.to_vec()));
-    for request in [press(&[contact]), press(&[]), Request::Rezero] {
+    let presses = [Control::Press(vec![contact]), Control::Press(Vec::new())];
+    for request in presses.clone().map(Request::Control) {
         other.requests.send(request).unwrap();
     }
-    let press: tactomo::run::plan::Press = Box::new(move |contact| seen.lock().unwrap().push(contact));
-    let plan = Plan { press: Some(press), ..plan() };
-    let runs = std::thread::spawn(move || pipeline::run(&mut opened(FakeBoard::new(u64::MAX)), plan, ends).unwrap());
-    while pressed.lock().unwrap().len() < 2 {
+    other.requests.send(Request::Rezero).unwrap();
+    let runs = std::thread::spawn(move || pipeline::run(&mut opened(board), plan(), ends).unwrap());
+    while asked.lock().unwrap().len() < 2 {
         std::thread::yield_now();
     }
     other.stop();
     runs.join().unwrap();
-    assert_eq!(*pressed.lock().unwrap(), [Some(contact), None]);
+    assert_eq!(*asked.lock().unwrap(), presses);
 }
 
 #[test]
@@ -116,7 +115,7 @@ fn a_recording_plays_as_it_was_received() {
     let recorder = Recorder::create(&file, &Header::default()).unwrap();
     let board = FakeBoard { skip_every: 7, junk_every: 9, ..FakeBoard::new(500) };
     let live = pipeline::run(&mut opened(board), Plan { recorder: Some(recorder), ..plan() }, ends().0).unwrap();
-    let mut recording = Recording { path: file.clone(), speed: f64::INFINITY };
+    let mut recording = Recording { path: file.clone(), speed: f64::INFINITY, stays_open: false };
     let played = pipeline::run(&mut recording, plan(), ends().0).unwrap();
     std::fs::remove_file(file).unwrap();
     assert_eq!((played.frames, played.dropped, played.corrupt), (live.frames, live.dropped, live.corrupt));

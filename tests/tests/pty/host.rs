@@ -37,7 +37,6 @@ impl Host {
             solving: None,
             recorder: None,
             board_log: BoardLog::unread(),
-            press: None,
             seconds: None,
         };
         let ends = Ends { snapshots: snapshot, requests, stop: Arc::clone(&stop) };
