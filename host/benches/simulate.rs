@@ -26,12 +26,12 @@ fn frame(bencher: Bencher, name: &str) {
     let hand = Hand::relative(&detector);
     let scene = Scene::new(name, &detector, hand, 1);
     let mut simulation = Simulation::new(&detector, scene, &[], 1).unwrap_or_else(|error| panic!("{error}"));
-    let mouse = simulation.mouse();
+    let controls = simulation.controls();
     let mut x_m = -0.02;
     simulation.readings_v(1.0);
     bencher.bench_local(|| {
         x_m += 1e-5;
-        mouse.press(hand.tip([x_m, 0.01], 0.3, 1.0).disc());
+        controls.press(hand.tip([x_m, 0.01], 0.3, 1.0).disc().into_iter().collect());
         simulation.readings_v(black_box(1.0))
     });
 }

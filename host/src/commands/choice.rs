@@ -1,7 +1,9 @@
 //! Arguments that several commands share: detector, model, contacts.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::Context;
+use tactomo::board::record::Header;
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{Auto, ForwardError, ForwardModel, Slab};
@@ -40,9 +42,9 @@ impl Model {
 /// Which detector.
 #[derive(Clone, Debug, clap::Args)]
 pub struct DetectorArgs {
-    /// Detector: name of a preset, or a TOML file
-    #[arg(long, value_name = "NAME|FILE", value_parser = detector, default_value = Detector::DEFAULT)]
-    pub detector: Chosen,
+    /// Detector: name of a preset, or a TOML file; unless given, that of the recording that is read, or square-60
+    #[arg(long, value_name = "NAME|FILE", value_parser = detector)]
+    pub detector: Option<Chosen>,
     /// Foam that the detector is made of, or stack of foams with the upper one first, as in `BC`
     #[arg(long, value_name = "A..D|STACK")]
     pub material: Option<Stack>,
@@ -81,22 +83,72 @@ pub fn methods(chosen: &[Method]) -> Vec<Method> {
 }
 
 impl DetectorArgs {
-    /// What the detector is made of, if that is known: presets are of sample A, a file does not tell how soft its layers are.
+    /// What the detector is made of, if that is known: presets are of sample A, a file does not say how soft its layers are.
     pub fn foams(&self) -> Option<Stack> {
         match &self.detector {
-            Chosen::Preset(_) => self.material.clone().or_else(|| "A".parse().ok()),
-            Chosen::File(_) => self.material.clone(),
+            None | Some(Chosen::Preset(_)) => self.material.clone().or_else(|| "A".parse().ok()),
+            Some(Chosen::File(_)) => self.material.clone(),
         }
     }
 
-    /// The detector, in the material that is asked for.
+    /// The detector, or the default one, in the material that is asked for.
     pub fn get(&self) -> anyhow::Result<Detector> {
-        let detector = self.detector.get()?;
+        let preset = || Detector::preset(Detector::DEFAULT).context("the default detector is no preset");
+        self.in_material(self.detector.as_ref().map_or_else(preset, Chosen::get)?)
+    }
+
+    /// The detector for the recording `path` with such a header: its own, unless another one or another material is given. A line on stderr
+    /// says where what is used is not what the recording says.
+    pub fn of_recording(&self, path: &Path, header: &Header) -> anyhow::Result<Detector> {
+        if self.detector.is_none() {
+            let recorded = self.in_material(recorded(path, header)?)?;
+            if !header.is_of(&recorded) && self.material.is_some() {
+                eprintln!(
+                    "{} was recorded on another material than the one that --material gives, which is used",
+                    path.display()
+                );
+            }
+            return Ok(recorded);
+        }
+        let detector = self.get()?;
+        if !header.detector.is_empty() && !header.is_of(&detector) {
+            let (path, was) = (path.display(), &header.detector);
+            match *was == detector.name {
+                true => {
+                    eprintln!("{path} was recorded on another {was} than the one that --detector gives, which is used")
+                }
+                false => eprintln!("{path} was recorded on {was}; it is read as {}, as --detector asks", detector.name),
+            }
+        }
+        Ok(detector)
+    }
+
+    fn in_material(&self, detector: Detector) -> anyhow::Result<Detector> {
         match &self.material {
             Some(stack) => detector.in_material(stack).map_err(anyhow::Error::msg),
             None => Ok(detector),
         }
     }
+}
+
+/// The detector that a recording was taken from; of an old one, which has only its name, the preset of that name.
+fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
+    if let Some(detector) = header.detector(path)? {
+        return Ok(detector);
+    }
+    let (path, name) = (path.display(), &header.detector);
+    if name.is_empty() {
+        eprintln!(
+            "{path} does not say its detector: it is read as {}; --detector chooses another one",
+            Detector::DEFAULT
+        );
+        return Detector::preset(Detector::DEFAULT).context("the default detector is no preset");
+    }
+    let preset = Detector::preset(name).with_context(|| {
+        format!("{path} was recorded on {name}, but by an older program, which kept only that name: give the detector's file with --detector")
+    })?;
+    eprintln!("{path} has only the name of its detector: the preset {name} is used; --detector chooses another one");
+    Ok(preset)
 }
 
 /// A preset by its name, or a file.

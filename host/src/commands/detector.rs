@@ -99,7 +99,7 @@ fn table(list: &List) -> String {
 }
 
 fn show(args: ShowArgs) -> anyhow::Result<()> {
-    let detector = DetectorArgs { detector: args.detector, material: args.material }.get()?;
+    let detector = DetectorArgs { detector: Some(args.detector), material: args.material }.get()?;
     if let Some(path) = &args.svg {
         std::fs::write(path, detector.to_svg()).with_context(|| format!("cannot write {}", path.display()))?;
         eprintln!("drew {} in {}", detector.name, path.display());

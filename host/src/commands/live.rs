@@ -10,15 +10,15 @@ use tactomo::board::link::Source;
 use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
-use tactomo::run::pipeline;
-use tactomo::run::plan::{Ends, MakeSolver, Plan, Solving, Summary};
+use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
 use tactomo::run::{Request, Snapshot};
-use tactomo::sink::page::{PageSetup, Server};
-use tactomo::solve::{Guard, Method, Problem};
+use tactomo::sink::page::{Finger, PageSetup, Server};
+use tactomo::sink::stream::Stream;
+use tactomo::solve::{Method, Problem};
 use tokio::sync::watch;
 
 use super::choice::{DetectorArgs, Model};
-use super::source::{self, BoardArgs, Mouse};
+use super::source::{self, BoardArgs};
 use super::{interrupt, output, recording};
 
 /// Requests of pages that may wait.
@@ -51,6 +51,9 @@ pub struct Args {
     /// Keeps all bytes that come in a new file
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
+    /// Writes each answer as a line of JSON to a new file, or to stdout with `-`: `{time_s, sequence, contacts, choice, flags, age_us}`
+    #[arg(long, value_name = "FILE|-")]
+    pub stream: Option<PathBuf>,
     /// ELF file of the board's firmware, to print its log
     #[arg(long, value_name = "FILE")]
     pub elf: Option<PathBuf>,
@@ -70,7 +73,7 @@ pub struct PictureArgs {
     /// Port of the page on 127.0.0.1; 0 for any
     #[arg(long, value_name = "PORT")]
     pub http_port: Option<u16>,
-    /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, corrupt, latency_us}` at the end as JSON
+    /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, skipped, solved, corrupt, latency_us, age_us}` at the end as JSON
     #[arg(long)]
     pub json: bool,
 }
@@ -79,8 +82,8 @@ pub struct PictureArgs {
 pub struct Show {
     /// Where the bytes come from.
     pub source: Box<dyn Source>,
-    /// The mouse's way to the detector, if that is simulated.
-    pub mouse: Option<Mouse>,
+    /// What the mouse presses with, if the detector is simulated.
+    pub finger: Option<Finger>,
     /// The detector that is connected.
     pub detector: Detector,
     /// What becomes of the bytes.
@@ -91,20 +94,22 @@ pub struct Show {
     pub seconds: Option<Duration>,
     /// Where all bytes are kept.
     pub record: Option<PathBuf>,
+    /// Where each answer is written.
+    pub stream: Option<PathBuf>,
     /// ELF file of the board's firmware.
     pub elf: Option<PathBuf>,
 }
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let detector = args.picture.detector.get()?;
-    let (source, mouse) = match args.replay {
-        Some(file) => (source::recording(file, args.speed), None),
+    let detector = source::detector(&args.picture.detector, args.replay.as_deref())?;
+    let (source, finger) = match args.replay {
+        Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &args.picture.detector, &detector)?,
     };
     let settings = args.board.settings.requested();
-    let Args { picture, seconds, record, elf, .. } = args;
-    show(Show { source, mouse, settings, detector, picture, seconds, record, elf })
+    let Args { picture, seconds, record, stream, elf, .. } = args;
+    show(Show { source, finger, settings, detector, picture, seconds, record, stream, elf })
 }
 
 /// Serves the page, or only counts, until the end.
@@ -117,7 +122,7 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
     let plan = plan(&mut show, problem)?;
     // The page may outlive the pipeline, so the snapshots have a sender here too.
     let ends = Ends { snapshots: snapshots.clone(), requests, stop: Arc::clone(&stop) };
-    let summary = pipeline::run(&mut *show.source, plan, ends)?;
+    let summary = tactomo::run::run(&mut *show.source, plan, ends)?;
     report(&summary, show.picture.json)?;
     if server.is_some() && show.seconds.is_none() {
         wait(&stop);
@@ -136,20 +141,17 @@ fn problem(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Problem> {
 
 fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
     let detector = show.detector.clone();
+    let stream = show.stream.as_deref().map(Stream::create).transpose()?;
     Ok(Plan {
         settings: show.settings,
-        solving: Some(Solving { method: show.picture.solver, make: make_solver(problem) }),
+        solving: Some(Solving::new(show.picture.solver, problem)),
         recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
+        begin_recording: Some(recording::on_request(detector.clone(), show.source.name())),
+        listeners: stream.into_iter().map(|stream| Box::new(stream) as Box<dyn Listener>).collect(),
         board_log: recording::board_log(show.elf.as_deref())?,
-        press: show.mouse.take().map(|mouse| mouse.press),
         seconds: show.seconds,
-        detector,
+        ..Plan::new(detector)
     })
-}
-
-/// Makes solvers that leave out electrodes that cannot be right.
-fn make_solver(problem: Problem) -> MakeSolver {
-    Arc::new(move |method, detector| Ok(Box::new(Guard::new(method, &problem.measured_as(detector))?)))
 }
 
 /// The page, unless only the figures are wanted.
@@ -166,7 +168,7 @@ fn serve(
         detector: show.detector.clone(),
         mesh: problem.jacobian.image_mesh.clone(),
         source: show.source.name(),
-        finger: show.mouse.as_ref().map(|mouse| mouse.finger),
+        finger: show.finger,
     };
     let server = Server::start(show.picture.http_port, scene, snapshots, requests)?;
     eprintln!("live picture: {}", server.url());
@@ -193,10 +195,16 @@ fn report(summary: &Summary, json: bool) -> anyhow::Result<()> {
 
 /// A summary in a line.
 pub fn sentence(summary: &Summary) -> String {
-    let Summary { source, frames, frames_per_s, dropped, corrupt, latency_us, .. } = summary;
+    let Summary { source, frames, frames_per_s, dropped, skipped, corrupt, solved, age_us, .. } = summary;
+    let received =
+        format!("{source}: {frames} frames, {frames_per_s:.0} a second, {dropped} dropped, {corrupt} corrupt");
+    if *solved == 0 {
+        return received;
+    }
     format!(
-        "{source}: {frames} frames, {frames_per_s:.0} a second, {dropped} dropped, {corrupt} corrupt; byte to image p50 \
-         {:.0} us, p99 {:.0} us, at most {:.0} us",
-        latency_us.p50, latency_us.p99, latency_us.max
+        "{received}; {solved} answers, {skipped} frames skipped by the solver; age of answers p50 {:.2} ms, p99 {:.2} ms, at most {:.2} ms",
+        age_us.p50 * 1e-3,
+        age_us.p99 * 1e-3,
+        age_us.max * 1e-3
     )
 }

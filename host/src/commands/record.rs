@@ -4,9 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use tactomo::board::board_log::BoardLog;
 use tactomo::run::Snapshot;
-use tactomo::run::pipeline;
 use tactomo::run::plan::{Ends, Plan};
 use tokio::sync::watch;
 
@@ -14,9 +12,12 @@ use super::choice::DetectorArgs;
 use super::source::{self, BoardArgs};
 use super::{interrupt, live, recording};
 
-/// Keeps the bytes of a board in a new file.
+/// Keeps the bytes of a board in a new file, with the detector that they came from.
 ///
-/// Example: tactomo record touch.tactomo --seconds 30
+/// Examples:
+///   tactomo record touch.tactomo --seconds 30
+///   tactomo record touch.tactomo --port /dev/ttyUSB0 --detector my.toml --average 4
+///   tactomo record touch.tactomo --simulate --scene five-fingers --seconds 10
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -38,17 +39,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let (mut source, _) = source::board(&args.board, &args.detector, &detector)?;
     let plan = Plan {
         settings: args.board.settings.requested(),
-        solving: None,
         recorder: recording::begin(Some(&args.file), &detector, source.name())?,
-        board_log: BoardLog::unread(),
-        press: None,
         seconds: args.seconds,
-        detector,
+        ..Plan::new(detector)
     };
     let (snapshots, _) = watch::channel(Arc::new(Snapshot::default()));
     let (_, requests) = mpsc::sync_channel(1);
     let ends = Ends { snapshots, requests, stop: interrupt::flag()? };
-    let summary = pipeline::run(&mut *source, plan, ends)?;
+    let summary = tactomo::run::run(&mut *source, plan, ends)?;
     eprintln!("{}; kept in {}", live::sentence(&summary), args.file.display());
     Ok(())
 }

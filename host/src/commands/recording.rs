@@ -6,12 +6,24 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use tactomo::board::board_log::{BoardLog, ElfError};
 use tactomo::board::record::{Header, RecordError, Recorder};
 use tactomo::detector::Detector;
+use tactomo::run::plan::BeginRecording;
 
 /// Begins a recording in a new file, if one is wanted.
 pub fn begin(file: Option<&Path>, detector: &Detector, source: String) -> Result<Option<Recorder>, RecordError> {
-    let started_unix_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let header = Header { detector: detector.name.clone(), source, started_unix_s, notes: String::new() };
-    file.map(|file| Recorder::create(file, &header)).transpose()
+    file.map(|file| Recorder::create(file, &Header::of(detector, source, now_unix_s()))).transpose()
+}
+
+/// Begins recordings in new files of the working directory, named by the time, as often as a page asks for one.
+pub fn on_request(detector: Detector, source: String) -> BeginRecording {
+    Box::new(move |hello| {
+        let started_unix_s = now_unix_s();
+        let header = Header::of(&detector, source.clone(), started_unix_s);
+        Recorder::create_with_hello(Path::new(&format!("touch-{started_unix_s}.tactomo")), &header, hello)
+    })
+}
+
+fn now_unix_s() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }
 
 /// Where the board's log goes: printed with the texts of the firmware file `elf`, or only noticed.

@@ -7,10 +7,11 @@ use tactomo::board::session::RequestedSettings;
 use super::live::{self, PictureArgs, Show};
 use super::source;
 
-/// Plays a recording: the same as `live --replay`.
+/// Plays a recording, on the detector that it was taken from: the same as `live --replay`.
 ///
 /// Examples:
 ///   tactomo replay touch.tactomo
+///   tactomo replay touch.tactomo --speed 0.25
 ///   tactomo replay touch.tactomo --speed max --json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -23,6 +24,9 @@ pub struct Args {
     speed: f64,
     #[command(flatten)]
     picture: PictureArgs,
+    /// Writes each answer as a line of JSON to a new file, or to stdout with `-`
+    #[arg(long, value_name = "FILE|-")]
+    stream: Option<PathBuf>,
     /// ELF file of the board's firmware, to print its log
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
@@ -31,13 +35,14 @@ pub struct Args {
 /// Plays it.
 pub fn run(args: Args) -> anyhow::Result<()> {
     live::show(Show {
-        source: source::recording(args.file, args.speed),
-        mouse: None,
-        detector: args.picture.detector.get()?,
+        detector: source::detector(&args.picture.detector, Some(&args.file))?,
+        source: source::recording(args.file, args.speed, !args.picture.json),
+        finger: None,
         picture: args.picture,
         settings: RequestedSettings::default(),
         seconds: None,
         record: None,
+        stream: args.stream,
         elf: args.elf,
     })
 }

@@ -1,14 +1,14 @@
 //! Arguments that choose where the bytes come from.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ArgGroup;
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::link::{AnyBoard, NamedPort, Opened, Recording, Source};
+use tactomo::board::record::RecordReader;
 use tactomo::board::session::RequestedSettings;
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::detector::Detector;
-use tactomo::run::plan::Press;
 use tactomo::scene::SceneName;
 use tactomo::simulate::Simulation;
 use tactomo::sink::page::Finger;
@@ -70,36 +70,34 @@ impl SettingsArgs {
     }
 }
 
-/// The mouse's way to a simulated detector.
-pub struct Mouse {
-    /// Who is told of presses.
-    pub press: Press,
-    /// What it presses with.
-    pub finger: Finger,
-}
-
-/// The board that is chosen, and the mouse's way to it if it is simulated.
+/// The board that is chosen, and what the mouse presses with on a simulated one.
 pub fn board(
     args: &BoardArgs,
     chosen: &DetectorArgs,
     detector: &Detector,
-) -> anyhow::Result<(Box<dyn Source>, Option<Mouse>)> {
+) -> anyhow::Result<(Box<dyn Source>, Option<Finger>)> {
     if !args.simulate {
         return Ok((args.serial(), None));
     }
     let scene = args.scene.scene(SceneName::Wandering, chosen.foams(), detector)?;
     let finger = scene.hand().tip([0.0; 2], MOUSE_FIRMNESS, 1.0).disc().map(Finger::from);
     let seed = args.scene.seed();
-    let physics = Simulation::new(detector, scene, &args.scene.fault, seed)?;
-    let mouse = physics.mouse();
-    let link = SimulatedBoard::start(detector, Box::new(physics), Options { seed, ..Options::default() })?;
-    let press: Press = Box::new(move |contact| mouse.press(contact));
-    Ok((Box::new(Opened::new(Box::new(link))), finger.map(|finger| Mouse { press, finger })))
+    let simulation = Simulation::new(detector, scene, &args.scene.fault, seed)?;
+    let link = SimulatedBoard::simulate(detector, simulation, Options { seed, ..Options::default() })?;
+    Ok((Box::new(Opened::new(Box::new(link))), finger))
 }
 
-/// A recording to be played.
-pub fn recording(path: PathBuf, speed: f64) -> Box<dyn Source> {
-    Box::new(Recording { path, speed })
+/// A recording to be played; for a person who watches it stays open at its end.
+pub fn recording(path: PathBuf, speed: f64, is_watched: bool) -> Box<dyn Source> {
+    Box::new(Recording { path, speed, stays_open: is_watched && speed.is_finite() })
+}
+
+/// The detector that is chosen; unless one is given, that of the recording `replay`, if one is played.
+pub fn detector(chosen: &DetectorArgs, replay: Option<&Path>) -> anyhow::Result<Detector> {
+    match replay {
+        Some(path) => chosen.of_recording(path, RecordReader::open(path)?.header()),
+        None => chosen.get(),
+    }
 }
 
 /// A speed above zero, or `max`.

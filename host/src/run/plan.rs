@@ -15,8 +15,8 @@ use tactomo_board::measured::Mismatch;
 use tactomo_board::record::{RecordError, Recorder};
 use tactomo_board::session::{GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
-use tactomo_protocol::Hello;
 use tactomo_physics::readings::Readings;
+use tactomo_protocol::Hello;
 use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
 
 /// Makes the solver that is ordered; called in other threads.
@@ -46,6 +46,22 @@ pub struct Plan {
     pub listeners: Vec<Box<dyn Listener>>,
     /// Time from Hello to the end; `None` for without end.
     pub seconds: Option<Duration>,
+}
+
+impl Plan {
+    /// Receives the frames of a detector, without end, and does nothing else.
+    pub fn new(detector: Detector) -> Self {
+        Self {
+            detector,
+            settings: RequestedSettings::default(),
+            solving: None,
+            recorder: None,
+            begin_recording: None,
+            listeners: Vec::new(),
+            board_log: BoardLog::unread(),
+            seconds: None,
+        }
+    }
 }
 
 /// Who takes each answer. It must not wait: the follower does while it works.

@@ -26,7 +26,8 @@ const PATIENCE: Duration = Duration::from_secs(6);
 /// Time between two tries to open a link that was lost.
 const REOPEN_EVERY: Duration = Duration::from_millis(500);
 /// What is shown of a board that answers and sends no frames.
-const MUTE: &str = "The board answers but sends no frames. Press its reset button; if that does not help, flash the firmware anew.";
+const MUTE: &str =
+    "The board answers but sends no frames. Press its reset button; if that does not help, flash the firmware anew.";
 /// Bytes of one read: 40 ms at 921600 baud.
 const READ_BYTES: usize = 4096;
 

@@ -1,3 +1,4 @@
-//! Where touch goes: the page in the browser.
+//! Where touch goes: the page in the browser, and lines of JSON.
 
 pub mod page;
+pub mod stream;

@@ -4,10 +4,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
-use tactomo::board::board_log::BoardLog;
 use tactomo::board::link::Opened;
 use tactomo::board::record::{Header, Recorder};
-use tactomo::board::session::RequestedSettings;
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
 use tactomo::run::{Snapshot, SolvedFrame};
@@ -53,18 +51,16 @@ impl Live {
         let scene = Scene::new(name, &detector, Hand::relative(&detector), SEED);
         let simulation = Simulation::new(&detector, scene.clone(), &[], SEED).unwrap();
         let board = SimulatedBoard::simulate(&detector, simulation, Options { seed: SEED, ..Options::default() });
-        let recording = std::env::temp_dir().join(format!("tactomo-{}-{}-{name}.tactomo", std::process::id(), method.name()));
+        let recording =
+            std::env::temp_dir().join(format!("tactomo-{}-{}-{name}.tactomo", std::process::id(), method.name()));
         let header = Header::of(&detector, "simulated board".to_owned(), 0);
         let kept = Arc::new(Mutex::new(Vec::new()));
         let plan = Plan {
-            detector,
-            settings: RequestedSettings::default(),
             solving: Some(Solving::new(method, problem.clone())),
             recorder: Some(Recorder::create(&recording, &header).unwrap()),
-            begin_recording: None,
             listeners: vec![Box::new(Keeper(Arc::clone(&kept)))],
-            board_log: BoardLog::unread(),
             seconds: Some(Duration::from_secs_f64(seconds)),
+            ..Plan::new(detector)
         };
         let (snapshots, _page) = watch::channel(Arc::new(Snapshot::default()));
         let (_requests, requests) = mpsc::sync_channel(1);

@@ -28,8 +28,8 @@ fn is_alike(problem: &Problem, method: Method, scene: SceneName, seconds: f64) -
     let live = Live::run(problem, method, scene, seconds);
     let offline = offline::answers(problem, method, &live);
     let truth = live.truths();
-    let [live_score, offline_score] =
-        [&live.answers, &offline].map(|answers| Score::of(problem, &truth, answers.iter().map(|answer| &answer.solution)));
+    let [live_score, offline_score] = [&live.answers, &offline]
+        .map(|answers| Score::of(problem, &truth, answers.iter().map(|answer| &answer.solution)));
     let summary = &live.summary;
     let alike = live_score.is_as_good_as(&offline_score) && summary.dropped == 0 && summary.corrupt == 0;
     println!(

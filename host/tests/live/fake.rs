@@ -3,14 +3,13 @@
 use std::collections::VecDeque;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, mpsc};
+use std::sync::{Arc, Mutex, mpsc};
 
-use tactomo::board::board_log::BoardLog;
-use tactomo::board::link::{Link, Source, SourceError};
-use tactomo::board::session::RequestedSettings;
+use tactomo::board::link::{Control, ControlError, Link, Source, SourceError};
 use tactomo::detector::Detector;
-use tactomo::run::plan::{Ends, Plan};
+use tactomo::run::plan::{Ends, MakeSolver, Plan, Solving};
 use tactomo::run::{Request, Snapshot};
+use tactomo::solve::Method;
 use tactomo_protocol::{
     BoardMessage, Command, CommandReceiver, FrameHead, Hello, MAX_WIRE, Settings, encode_board, encode_frame,
 };
@@ -32,6 +31,8 @@ pub struct FakeBoard {
     pub streaming: bool,
     pub sent: u64,
     pub sequence: u64,
+    /// What was asked of it.
+    pub asked: Arc<Mutex<Vec<Control>>>,
 }
 
 impl FakeBoard {
@@ -48,6 +49,7 @@ impl FakeBoard {
             streaming: false,
             sent: 0,
             sequence: 0,
+            asked: Arc::default(),
         }
     }
 
@@ -118,11 +120,38 @@ impl Link for FakeBoard {
         Ok(count)
     }
 
+    fn control(&mut self, control: &Control) -> Result<(), ControlError> {
+        self.asked.lock().unwrap().push(control.clone());
+        Ok(())
+    }
+
     fn write_all(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         while let Some(Ok(command)) = self.receiver.receive(&mut bytes) {
             self.obey(command);
         }
         Ok(())
+    }
+}
+
+/// A board whose frames wait for whoever takes them, so that each is answered.
+pub struct Patient(pub Option<FakeBoard>);
+
+impl Source for Patient {
+    fn name(&self) -> String {
+        "patient board".to_owned()
+    }
+
+    fn open(&mut self) -> Result<Box<dyn Link>, SourceError> {
+        let board = self.0.take().ok_or_else(|| SourceError::Ended(self.name()))?;
+        Ok(Box::new(board))
+    }
+
+    fn comes_back(&self) -> bool {
+        false
+    }
+
+    fn speed(&self) -> f64 {
+        f64::INFINITY
     }
 }
 
@@ -148,15 +177,7 @@ impl Source for Links {
 
 /// A plan for the default detector that finds nothing.
 pub fn plan() -> Plan {
-    Plan {
-        detector: Detector::preset(Detector::DEFAULT).unwrap(),
-        settings: RequestedSettings::default(),
-        solving: None,
-        recorder: None,
-        board_log: BoardLog::unread(),
-        press: None,
-        seconds: None,
-    }
+    Plan::new(Detector::preset(Detector::DEFAULT).unwrap())
 }
 
 /// The other side of a pipeline's ends.
@@ -179,4 +200,9 @@ pub fn ends() -> (Ends, Other) {
     let stop = Arc::new(AtomicBool::new(false));
     let ends = Ends { snapshots: snapshot, requests, stop: Arc::clone(&stop) };
     (ends, Other { snapshots, requests: request, stop })
+}
+
+/// Solves by what a test makes.
+pub fn solving(make: MakeSolver) -> Solving {
+    Solving { method: Method::Tikhonov, make, look_at_wires: Arc::new(|_, _, _| None) }
 }

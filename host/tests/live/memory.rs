@@ -3,13 +3,11 @@
 
 use std::sync::Arc;
 
-use crate::fake::{FakeBoard, ends, plan};
-use tactomo::board::link::Opened;
+use crate::fake::{FakeBoard, Patient, ends, plan, solving};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::run::pipeline;
-use tactomo::run::plan::{MakeSolver, Plan, Solving};
-use tactomo::solve::{Lambda, Method, Tikhonov, Variant};
+use tactomo::run::plan::{MakeSolver, Plan};
+use tactomo::solve::{Lambda, Tikhonov, Variant};
 
 /// Resident memory of this process (kB).
 fn resident_kb() -> u64 {
@@ -20,14 +18,14 @@ fn resident_kb() -> u64 {
 
 /// Resident memory (kB) after `frames` frames through the whole pipeline, a page looking on.
 fn resident_after(frames: u64) -> u64 {
-    let make: MakeSolver = Arc::new(|_, detector| {
-        let jacobian = Jacobian::of(&Shell::new(detector)?);
+    let make: MakeSolver = Arc::new(|order| {
+        let jacobian = Jacobian::of(&Shell::new(&order.detector)?);
         Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced)))
     });
-    let solving = Solving { method: Method::Tikhonov, make };
+
     let (ends, _page) = ends();
-    let mut source = Opened::new(Box::new(FakeBoard { skip_every: 1000, junk_every: 1000, ..FakeBoard::new(frames) }));
-    let summary = pipeline::run(&mut source, Plan { solving: Some(solving), ..plan() }, ends).unwrap();
+    let mut source = Patient(Some(FakeBoard { skip_every: 1000, junk_every: 1000, ..FakeBoard::new(frames) }));
+    let summary = tactomo::run::run(&mut source, Plan { solving: Some(solving(make)), ..plan() }, ends).unwrap();
     assert_eq!(summary.frames, frames);
     let resident_kb = resident_kb();
     eprintln!(

@@ -1,6 +1,6 @@
-//! The pipeline from bytes to snapshots, on a board of bytes only.
+//! A run from bytes to snapshots, on a board of bytes only.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Duration;
 
 use tactomo::board::link::{Control, Link, Opened, Recording};
@@ -8,31 +8,31 @@ use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::{GreetError, RequestedSettings, greet};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::run::plan::{LiveError, MakeSolver, Plan, Solving};
-use tactomo::run::{LinkState, Request, Snapshot, pipeline};
+use tactomo::run::plan::{LiveError, MakeSolver, Plan};
+use tactomo::run::{LinkState, Request, Snapshot};
 use tactomo::scene::Contact;
 use tactomo::solve::{Lambda, Method, Tikhonov, Variant};
 use tactomo_protocol::Settings;
 
-use crate::fake::{FakeBoard, Links, ends, plan};
+use crate::fake::{FakeBoard, Links, Patient, ends, plan, solving};
 
 fn opened(link: impl Link + 'static) -> Opened {
     Opened::new(Box::new(link))
 }
 
 fn imaging() -> Plan {
-    let make: MakeSolver = Arc::new(|_, detector| {
-        let jacobian = Jacobian::of(&Shell::with_nodes(detector, 500)?);
+    let make: MakeSolver = Arc::new(|order| {
+        let jacobian = Jacobian::of(&Shell::with_nodes(&order.detector, 500)?);
         Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced)))
     });
-    Plan { solving: Some(Solving { method: Method::Tikhonov, make }), ..plan() }
+    Plan { solving: Some(solving(make)), ..plan() }
 }
 
 #[test]
 fn frames_become_images_and_everything_is_counted() {
     let board = FakeBoard { skip_every: 10, junk_every: 25, ..FakeBoard::new(1000) };
     let (ends, other) = ends();
-    let summary = pipeline::run(&mut opened(board), imaging(), ends).unwrap();
+    let summary = tactomo::run::run(&mut Patient(Some(board)), imaging(), ends).unwrap();
     assert_eq!((summary.source.as_str(), summary.solver.as_str()), ("fake board", "tikhonov"));
     assert_eq!((summary.frames, summary.dropped, summary.corrupt), (1000, 100, 40));
     assert!(summary.latency_us.p50 > 0.0 && summary.latency_us.p50 <= summary.latency_us.max);
@@ -47,7 +47,7 @@ fn frames_become_images_and_everything_is_counted() {
 #[test]
 fn a_board_with_other_electrodes_than_the_detector_is_refused() {
     let board = FakeBoard { electrodes: 8, ..FakeBoard::new(10) };
-    let error = pipeline::run(&mut opened(board), plan(), ends().0).unwrap_err();
+    let error = tactomo::run::run(&mut opened(board), plan(), ends().0).unwrap_err();
     assert!(matches!(error, LiveError::Mismatch(_)), "{error:?}");
 }
 
@@ -56,27 +56,27 @@ fn settings_that_are_asked_for_reach_the_board() {
     let settings = Settings { settle_us: 70, average_log2: 3, ..Settings::default() };
     let wanted = RequestedSettings { settle_us: Some(70), average_log2: Some(3), max_frames_per_s: None };
     let (ends, other) = ends();
-    pipeline::run(&mut opened(FakeBoard::new(5)), Plan { settings: wanted, ..plan() }, ends).unwrap();
+    tactomo::run::run(&mut opened(FakeBoard::new(5)), Plan { settings: wanted, ..plan() }, ends).unwrap();
     assert_eq!(other.snapshots.borrow().hello.as_ref().unwrap().settings, settings);
 }
 
 #[test]
 fn a_board_that_is_unplugged_is_waited_for() {
     let lost = FakeBoard { breaks: true, ..FakeBoard::new(50) };
-    let summary = pipeline::run(&mut Links(vec![lost, FakeBoard::new(70)]), plan(), ends().0).unwrap();
+    let summary = tactomo::run::run(&mut Links(vec![lost, FakeBoard::new(70)]), plan(), ends().0).unwrap();
     assert_eq!((summary.frames, summary.dropped), (120, 0));
 }
 
 #[test]
 fn a_link_that_cannot_come_back_is_an_error() {
     let lost = FakeBoard { breaks: true, ..FakeBoard::new(50) };
-    let error = pipeline::run(&mut opened(lost), plan(), ends().0).unwrap_err();
+    let error = tactomo::run::run(&mut opened(lost), plan(), ends().0).unwrap_err();
     assert!(matches!(error, LiveError::Link { .. }), "{error:?}");
 }
 
 #[test]
 fn a_board_of_a_newer_protocol_is_refused() {
-    let error = pipeline::run(&mut opened(Says(newer_hello())), plan(), ends().0).unwrap_err();
+    let error = tactomo::run::run(&mut opened(Says(newer_hello())), plan(), ends().0).unwrap_err();
     let LiveError::Greet { error: GreetError::Version(_), .. } = &error else { panic!("{error:?}") };
     assert!(error.to_string().contains("version 2"), "{error}");
 }
@@ -91,23 +91,22 @@ fn a_board_that_says_nothing_of_use_is_given_up() {
 
 #[test]
 fn presses_reach_the_simulated_detector_and_the_stop_ends_the_run() {
-    let pressed = Arc::new(Mutex::new(Vec::new()));
-    let seen = Arc::clone(&pressed);
+    let board = FakeBoard::new(u64::MAX);
+    let asked = Arc::clone(&board.asked);
     let (ends, other) = ends();
     let contact = Contact::flat(0.01, 0.0, 0.002, 1e-3);
-    let press = |contacts: &[Contact]| Request::Control(Control::Press(contacts.to_vec()));
-    for request in [press(&[contact]), press(&[]), Request::Rezero] {
+    let presses = [Control::Press(vec![contact]), Control::Press(Vec::new())];
+    for request in presses.clone().map(Request::Control) {
         other.requests.send(request).unwrap();
     }
-    let press: tactomo::run::plan::Press = Box::new(move |contact| seen.lock().unwrap().push(contact));
-    let plan = Plan { press: Some(press), ..plan() };
-    let runs = std::thread::spawn(move || pipeline::run(&mut opened(FakeBoard::new(u64::MAX)), plan, ends).unwrap());
-    while pressed.lock().unwrap().len() < 2 {
+    other.requests.send(Request::Rezero).unwrap();
+    let runs = std::thread::spawn(move || tactomo::run::run(&mut opened(board), plan(), ends).unwrap());
+    while asked.lock().unwrap().len() < 2 {
         std::thread::yield_now();
     }
     other.stop();
     runs.join().unwrap();
-    assert_eq!(*pressed.lock().unwrap(), [Some(contact), None]);
+    assert_eq!(*asked.lock().unwrap(), presses);
 }
 
 #[test]
@@ -115,9 +114,9 @@ fn a_recording_plays_as_it_was_received() {
     let file = std::env::temp_dir().join(format!("tactomo-{}-pipeline", std::process::id()));
     let recorder = Recorder::create(&file, &Header::default()).unwrap();
     let board = FakeBoard { skip_every: 7, junk_every: 9, ..FakeBoard::new(500) };
-    let live = pipeline::run(&mut opened(board), Plan { recorder: Some(recorder), ..plan() }, ends().0).unwrap();
-    let mut recording = Recording { path: file.clone(), speed: f64::INFINITY };
-    let played = pipeline::run(&mut recording, plan(), ends().0).unwrap();
+    let live = tactomo::run::run(&mut opened(board), Plan { recorder: Some(recorder), ..plan() }, ends().0).unwrap();
+    let mut recording = Recording { path: file.clone(), speed: f64::INFINITY, stays_open: false };
+    let played = tactomo::run::run(&mut recording, plan(), ends().0).unwrap();
     std::fs::remove_file(file).unwrap();
     assert_eq!((played.frames, played.dropped, played.corrupt), (live.frames, live.dropped, live.corrupt));
     assert_eq!(played.frames, 500);
@@ -125,18 +124,20 @@ fn a_recording_plays_as_it_was_received() {
 
 #[test]
 fn the_solver_changes_while_frames_go_on() {
-    let make: MakeSolver = Arc::new(|method, detector| {
+    let make: MakeSolver = Arc::new(|order| {
+        let method = order.method;
         std::thread::sleep(Duration::from_millis(if method == Method::Noser { 200 } else { 0 }));
-        let jacobian = Jacobian::of(&Shell::with_nodes(detector, 300)?);
+        let jacobian = Jacobian::of(&Shell::with_nodes(&order.detector, 300)?);
         match method {
             Method::Noser => Ok(Box::new(Tikhonov::noser(&jacobian, Lambda::default()))),
             Method::Tsvd => Err("no images".into()),
             _ => Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced))),
         }
     });
-    let plan = Plan { solving: Some(Solving { method: Method::Tikhonov, make }), ..plan() };
+    let plan = Plan { solving: Some(solving(make)), ..plan() };
     let (ends, other) = ends();
-    let runs = std::thread::spawn(move || pipeline::run(&mut opened(FakeBoard::new(u64::MAX)), plan, ends).unwrap());
+    let runs =
+        std::thread::spawn(move || tactomo::run::run(&mut opened(FakeBoard::new(u64::MAX)), plan, ends).unwrap());
     let told = |wanted: &dyn Fn(&Snapshot) -> bool| loop {
         let snapshot = other.snapshots.borrow().clone();
         if wanted(&snapshot) {

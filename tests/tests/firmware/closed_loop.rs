@@ -88,10 +88,13 @@ fn readings_equal_the_voltages_of_the_moment_to_half_a_code() {
         let mut host = Host::start(&detector(bits, 0.0), Table, Options::default());
         host.send(Command::Configure(Settings { average_log2, ..Settings::default() }));
         host.send(Command::Start);
-        for frame in host.frames(50) {
+        let frames = host.frames(50);
+        let first = frames[0].head;
+        assert_eq!(first.sequence, 0, "time begins with the first frame");
+        for frame in frames {
             let code_v = 3.3 / f64::from(1u32 << bits);
             let unit_v = code_v / f64::from(1 << frame.head.fraction_bits);
-            let time_s = f64::from(frame.head.time_us) * 1e-6;
+            let time_s = f64::from(frame.head.time_us - first.time_us) * 1e-6;
             for (i, reading) in frame.readings.iter().enumerate() {
                 let missed_v = f64::from(*reading) * unit_v - voltage_v(time_s, i / 16, i % 16);
                 // The head tells time to a microsecond, in which the voltages move by up to 60 uV.

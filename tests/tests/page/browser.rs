@@ -70,7 +70,7 @@ async fn the_picture_follows_the_contact() -> Result<()> {
             let near = stage.browser.until(&what, |told| told.is_pressed_at(place, TOLERANCE_MM));
             near.await?;
         }
-        stage.live.mouse.press(None);
+        stage.live.mouse.press(Vec::new());
         stage.browser.until("rest", |told| told.number("contacts") == 0.0).await?;
         Ok(())
     })

@@ -7,18 +7,16 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use tactomo::board::board_log::BoardLog;
 use tactomo::board::link::Opened;
-use tactomo::board::session::RequestedSettings;
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::detector::Detector;
 use tactomo::forward::Auto;
 use tactomo::run::plan::{Ends, LiveError, Plan, Solving, Summary};
-use tactomo::run::{Snapshot, Statistics, pipeline};
+use tactomo::run::{Snapshot, Statistics};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
-use tactomo::simulate::{Fault, Mouse, Simulation};
+use tactomo::simulate::{Controls, Fault, Simulation};
 use tactomo::sink::page::{Finger, PageSetup, Server};
-use tactomo::solve::{Guard, Method, Problem};
+use tactomo::solve::{Method, Problem};
 use tokio::sync::watch;
 
 /// How firmly the mouse presses.
@@ -28,7 +26,7 @@ const FIRMNESS: f64 = 0.2;
 pub struct Live {
     pub server: Server,
     /// What presses beside the scene.
-    pub mouse: Mouse,
+    pub mouse: Controls,
     hand: Hand,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     stop: Arc<AtomicBool>,
@@ -54,14 +52,14 @@ impl Live {
         let server = Server::start(Some(0), page, receiver.clone(), sender)?;
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
-        let mouse = physics.mouse();
+        let mouse = physics.controls();
         let pipeline = Some(run(&detector, physics, problem, ends)?);
         Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 
     /// Presses here (mm), as if by itself.
     pub fn press(&self, at_mm: [f64; 2]) -> Result<()> {
-        self.mouse.press(Some(touch(&self.hand, at_mm)?));
+        self.mouse.press(vec![touch(&self.hand, at_mm)?]);
         Ok(())
     }
 
@@ -100,20 +98,8 @@ fn run(
     problem: Problem,
     ends: Ends,
 ) -> Result<JoinHandle<Result<Summary, LiveError>>> {
-    let mouse = physics.mouse();
-    let board = SimulatedBoard::start(detector, Box::new(physics), Options::default())?;
-    let plan = Plan {
-        detector: detector.clone(),
-        settings: RequestedSettings::default(),
-        solving: Some(Solving {
-            method: Method::Auto,
-            make: Arc::new(move |method, detector| Ok(Box::new(Guard::new(method, &problem.measured_as(detector))?))),
-        }),
-        recorder: None,
-        board_log: BoardLog::unread(),
-        press: Some(Box::new(move |contact| mouse.press(contact))),
-        seconds: None,
-    };
+    let board = SimulatedBoard::simulate(detector, physics, Options::default())?;
+    let plan = Plan { solving: Some(Solving::new(Method::Auto, problem)), ..Plan::new(detector.clone()) };
     let mut source = Opened::new(Box::new(board));
-    Ok(std::thread::spawn(move || pipeline::run(&mut source, plan, ends)))
+    Ok(std::thread::spawn(move || tactomo::run::run(&mut source, plan, ends)))
 }

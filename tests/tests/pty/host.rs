@@ -6,13 +6,11 @@ use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tactomo::board::board_log::BoardLog;
 use tactomo::board::link::NamedPort;
 use tactomo::board::link::serial::DEFAULT_BAUD;
-use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, LiveError, Plan, Summary};
-use tactomo::run::{Request, Snapshot, pipeline};
+use tactomo::run::{Request, Snapshot};
 use tokio::sync::watch;
 
 /// How long anything may take.
@@ -31,18 +29,10 @@ impl Host {
         let (snapshot, snapshots) = watch::channel(Arc::default());
         let (_requests, requests) = mpsc::channel();
         let stop = Arc::new(AtomicBool::new(false));
-        let plan = Plan {
-            detector: Detector::preset("square-60").unwrap(),
-            settings: RequestedSettings::default(),
-            solving: None,
-            recorder: None,
-            board_log: BoardLog::unread(),
-            press: None,
-            seconds: None,
-        };
+        let plan = Plan::new(Detector::preset("square-60").unwrap());
         let ends = Ends { snapshots: snapshot, requests, stop: Arc::clone(&stop) };
         let mut source = NamedPort { port: port.to_str().unwrap().to_owned(), baud: DEFAULT_BAUD };
-        let thread = thread::spawn(move || pipeline::run(&mut source, plan, ends));
+        let thread = thread::spawn(move || tactomo::run::run(&mut source, plan, ends));
         Self { snapshots, stop, thread, _requests }
     }
 

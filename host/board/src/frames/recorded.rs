@@ -161,6 +161,7 @@ mod tests {
     use super::*;
     use crate::frames::FrameFile;
     use crate::record::RecordWriter;
+    use proptest::prelude::*;
     use tactomo_protocol::{FrameHead, MAX_WIRE, Settings, encode_board, encode_frame};
 
     fn hello() -> Vec<u8> {
@@ -212,6 +213,39 @@ mod tests {
         for (found, expected) in frames.iter().zip([of(0.0, 0.05), of(0.001, 0.02), of(0.006, 0.0)]) {
             assert!((found.time_s.unwrap() - expected.time_s.unwrap()).abs() < 1e-12, "{found:?}");
             assert!((found.volts[5] - expected.volts[5]).abs() < 1e-12, "{found:?}");
+        }
+    }
+
+    /// The frames of a file by their times, and what is lost of it.
+    fn times_s(file: &mut FrameFile) -> (Vec<f64>, RecordingLoss) {
+        let times = std::iter::from_fn(|| file.next_frame().unwrap()).filter_map(|frame| frame.time_s).collect();
+        (times, file.loss().unwrap())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+
+        /// A recording begun by [`Recorder::create_with_hello`](crate::record::Recorder): Hello twice, then four frames a chunk.
+        #[test]
+        fn one_flipped_bit_costs_a_chunk_of_frames_at_most_and_never_without_a_word(
+            at in any::<prop::sample::Index>(),
+            bit in 0..8u32,
+        ) {
+            let path = std::env::temp_dir().join(format!("tactomo-{}-frames-flip", std::process::id()));
+            let mut writer = RecordWriter::new(Vec::new(), &Header::default()).unwrap();
+            let stream: Vec<Vec<u8>> = (0..80).map(|i| frame(i, 100)).collect();
+            writer.write(0, &hello()).unwrap();
+            writer.write(0, &hello()).unwrap();
+            stream.chunks(4).for_each(|frames| writer.write(1, &frames.concat()).unwrap());
+            let mut file = writer.get_ref().clone();
+            let at = at.index(file.len());
+            file[at] ^= 1u8 << bit;
+            std::fs::write(&path, file).unwrap();
+            let (times, loss) = times_s(&mut FrameFile::open(&path, None).unwrap());
+            prop_assert!(times.len() >= 76, "{} of 80 frames", times.len());
+            prop_assert!(loss.is_any(), "at {}", at);
+            // What is missing at the very beginning or end has no frame after it to say so; the file does.
+            prop_assert!(loss.missing_frames + times.len() as u64 == 80 || loss.file.is_any());
         }
     }
 

@@ -86,7 +86,7 @@ impl<R: Read> RecordReader<R> {
             let begin = self.window.offset();
             let (chunk, is_whole) = match parse(&mut self.window, self.version)? {
                 Parsed::Whole(chunk) => (chunk, true),
-                Parsed::Damaged(chunk) if follows(&mut self.window, self.version, chunk.length)? => {
+                Parsed::Damaged(chunk) if is_one_chunk(&mut self.window, self.version, chunk.length)? => {
                     self.count(begin + chunk.length as u64, |loss| loss.damaged_chunks += 1);
                     (chunk, false)
                 }
@@ -306,6 +306,22 @@ fn parse<R: Read>(window: &mut Window<R>, version: Version) -> io::Result<Parsed
             parsed => return Ok(parsed),
         }
     }
+}
+
+/// Whether a damaged chunk is so long as it claims: a chunk or the end of the file follows, and it swallows no whole one.
+fn is_one_chunk<R: Read>(window: &mut Window<R>, version: Version, length: usize) -> io::Result<bool> {
+    if !follows(window, version, length)? {
+        return Ok(false);
+    }
+    let bytes = &window.held()[..length];
+    let mut at = version.skip(bytes);
+    while at < length {
+        if matches!(version.parse(&bytes[at..]), Parsed::Whole(_)) {
+            return Ok(false);
+        }
+        at += version.skip(&bytes[at..]);
+    }
+    Ok(true)
 }
 
 /// Whether a chunk, or the end of the file, follows `length` bytes ahead.

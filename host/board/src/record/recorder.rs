@@ -69,9 +69,8 @@ impl Recorder {
     pub fn create_with_hello(path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
         let mut recorder = Self::create(path, header)?;
         let mut wire = [0; MAX_WIRE];
-        let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire).map_err(|error| RecordError::Write {
-            path: path.to_owned(),
-            source: io::Error::new(io::ErrorKind::InvalidInput, error),
+        let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire).map_err(|error| {
+            RecordError::Write { path: path.to_owned(), source: io::Error::new(io::ErrorKind::InvalidInput, error) }
         })?;
         for _ in 0..2 {
             recorder.push(&wire[..length], recorder.began)?;

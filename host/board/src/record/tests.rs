@@ -11,7 +11,13 @@ use super::*;
 type Chunks = Vec<(u64, Vec<u8>)>;
 
 fn header() -> Header {
-    Header { detector: "square-60".into(), source: "test".into(), started_unix_s: 1, notes: "ä".into(), ..Header::default() }
+    Header {
+        detector: "square-60".into(),
+        source: "test".into(),
+        started_unix_s: 1,
+        notes: "ä".into(),
+        ..Header::default()
+    }
 }
 
 /// The recording, and where its headers and each chunk end.
@@ -61,10 +67,12 @@ fn read(file: &[u8]) -> Option<(Chunks, Loss)> {
 
 /// Chunks with times that never fall.
 fn any_chunks(count: std::ops::Range<usize>) -> impl Strategy<Value = Chunks> {
-    prop::collection::vec((0u64..10_000_000, prop::collection::vec(any::<u8>(), 1..300)), count).prop_map(|mut chunks| {
-        chunks.sort();
-        chunks
-    })
+    prop::collection::vec((0u64..10_000_000, prop::collection::vec(any::<u8>(), 1..300)), count).prop_map(
+        |mut chunks| {
+            chunks.sort();
+            chunks
+        },
+    )
 }
 
 #[test]
@@ -127,7 +135,8 @@ fn the_detector_is_in_the_recording_a_curved_one_with_its_surface() {
 
 /// The chunks that were not damaged have to come back, in order; in place of the damaged one there may be one of the same length.
 fn assert_others_survive(kept: &Chunks, chunks: &Chunks, victim: Option<usize>) -> Result<(), TestCaseError> {
-    let others: Chunks = chunks.iter().enumerate().filter(|(i, _)| Some(*i) != victim).map(|(_, c)| c.clone()).collect();
+    let others: Chunks =
+        chunks.iter().enumerate().filter(|(i, _)| Some(*i) != victim).map(|(_, c)| c.clone()).collect();
     let mut without = kept.clone();
     if let Some(victim) = victim.filter(|_| kept.len() == chunks.len()) {
         let salvaged = without.remove(victim);

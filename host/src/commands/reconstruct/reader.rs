@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, anyhow, bail};
-use tactomo::board::baseline::{self, Baseline};
+use tactomo::board::baseline::Baseline;
 use tactomo::board::frames::FrameFile;
 use tactomo::board::measured;
 use tactomo::detector::Detector;
@@ -19,6 +19,8 @@ pub struct Reader {
     path: PathBuf,
     file: FrameFile,
     rest: Baseline,
+    /// Frames still to come that are the baseline and nothing else, because the user said so.
+    given: u32,
     /// Frames that were read.
     count: usize,
     touch: Touch,
@@ -27,7 +29,7 @@ pub struct Reader {
 /// What solves frames.
 enum Touch {
     /// A solver for a detector, as the file's board measures it, and the places of its images.
-    Solver { solver: Box<dyn Solver>, electrodes: usize, mesh: ImageMesh },
+    Solver { solver: Box<dyn Solver>, detector: Box<Detector>, mesh: ImageMesh },
     /// A kernel that presses in a file have taught, for whatever they were made on.
     Kernel(Box<Kernel>),
 }
@@ -39,16 +41,20 @@ impl Reader {
             Some(presses) => taught(args, Presses::read(presses)?)?,
             None => solved(args)?,
         };
-        let at_rest = args.rest.unwrap_or(if file.board().is_some() { baseline::FRAMES } else { 0 });
-        let rest = Baseline::over(at_rest, file.channels());
-        Ok(Self { path: args.file.clone(), file, rest, count: 0, touch })
+        // That of a recording is taken as live takes it, while its frames are solved.
+        let rest = match (&touch, args.rest) {
+            (Touch::Solver { detector, .. }, None) if file.board().is_some() => Baseline::new(detector),
+            (_, frames) => Baseline::over(frames.unwrap_or(0), file.channels()),
+        };
+        Ok(Self { path: args.file.clone(), given: args.rest.unwrap_or(0), file, rest, count: 0, touch })
     }
 
     /// Time (s) and readings (V) of the next frame that is not at rest.
     pub fn next_frame(&mut self) -> anyhow::Result<Option<(Option<f64>, Vec<f64>)>> {
         while let Some(frame) = self.file.next_frame()? {
             self.count += 1;
-            if !self.rest.is_renewing() {
+            if self.given == 0 {
+                self.rest.add(&frame.volts, 1);
                 let mut touch_v = frame.volts.clone();
                 self.rest.subtract(&frame.volts, &mut touch_v);
                 return Ok(Some((frame.time_s, touch_v)));
@@ -56,7 +62,8 @@ impl Reader {
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
                 bail!("{}: at rest, there are readings that are no finite numbers", self.place());
             }
-            self.rest.add(&frame.volts);
+            self.rest.add(&frame.volts, 1);
+            self.given -= 1;
         }
         Ok(None)
     }
@@ -64,8 +71,9 @@ impl Reader {
     /// What a frame's readings say (V, less those at rest).
     pub fn solve(&mut self, readings_v: Vec<f64>) -> anyhow::Result<Solution> {
         match &mut self.touch {
-            Touch::Solver { solver, electrodes, .. } => {
-                let readings = Readings::new(*electrodes, readings_v).context("a frame of another length")?;
+            Touch::Solver { solver, detector, .. } => {
+                let readings =
+                    Readings::new(detector.electrodes.len(), readings_v).context("a frame of another length")?;
                 Ok(solver.solve(&readings)?)
             }
             Touch::Kernel(kernel) => match kernel.press(&readings_v) {
@@ -146,7 +154,7 @@ fn solved(args: &Args) -> anyhow::Result<(FrameFile, Touch)> {
     }
     let problem = Problem::new(args.model.build(&detector, None)?);
     let solver = solver(args.solver, args.lambda, &problem)?;
-    Ok((file, Touch::Solver { solver, electrodes, mesh: problem.jacobian.image_mesh.clone() }))
+    Ok((file, Touch::Solver { solver, detector: Box::new(detector), mesh: problem.jacobian.image_mesh.clone() }))
 }
 
 /// The detector as the board of a recording measures it; of a table, as it is.
