@@ -64,7 +64,9 @@ pub enum RecordError {
         path: PathBuf,
     },
     /// A newer format.
-    #[error("{path} is a recording in version {found} of the format; this program reads versions 1 and {VERSION}: update it")]
+    #[error(
+        "{path} is a recording in version {found} of the format; this program reads versions 1 and {VERSION}: update it"
+    )]
     Version {
         /// The file.
         path: PathBuf,

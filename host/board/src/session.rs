@@ -101,8 +101,9 @@ impl fmt::Display for Refusal {
         let parts = [
             (wanted.settle_us != kept.settle_us)
                 .then(|| format!("a settle time of {} us instead of {} us", kept.settle_us, wanted.settle_us)),
-            (wanted.average_log2 != kept.average_log2)
-                .then(|| format!("an average over {} instead of {} conversions", conversions(kept), conversions(wanted))),
+            (wanted.average_log2 != kept.average_log2).then(|| {
+                format!("an average over {} instead of {} conversions", conversions(kept), conversions(wanted))
+            }),
             (wanted.max_frames_per_s != kept.max_frames_per_s)
                 .then(|| format!("{} instead of {}", rate(kept), rate(wanted))),
         ];

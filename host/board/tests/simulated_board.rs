@@ -166,7 +166,8 @@ fn presses_scenes_and_faults_come_while_frames_go_on() {
 
     let begin = host.frames.len();
     host.board.control(&Control::Faults(vec!["gain:4:0.5".parse().unwrap()])).unwrap();
-    let has_fault = |host: &Host| matches!(host.board.playing(), Playing::Simulated { faults, .. } if faults.len() == 1);
+    let has_fault =
+        |host: &Host| matches!(host.board.playing(), Playing::Simulated { faults, .. } if faults.len() == 1);
     host.exchange_until("the fault", has_fault);
     host.frames_more(20);
     let steps = host.frames[begin..].windows(2).map(|pair| pair[1].head.time_us - pair[0].head.time_us);

@@ -103,7 +103,10 @@ impl DetectorArgs {
         if self.detector.is_none() {
             let recorded = self.in_material(recorded(path, header)?)?;
             if !header.is_of(&recorded) && self.material.is_some() {
-                eprintln!("{} was recorded on another material than the one that --material gives, which is used", path.display());
+                eprintln!(
+                    "{} was recorded on a detector of another material; it is read as of the one that --material gives",
+                    path.display()
+                );
             }
             return Ok(recorded);
         }
@@ -111,7 +114,9 @@ impl DetectorArgs {
         if !header.detector.is_empty() && !header.is_of(&detector) {
             let (path, was) = (path.display(), &header.detector);
             match *was == detector.name {
-                true => eprintln!("{path} was recorded on another {was} than the one that --detector gives, which is used"),
+                true => {
+                    eprintln!("{path} was recorded on another {was} than the one that --detector gives, which is used")
+                }
                 false => eprintln!("{path} was recorded on {was}; it is read as {}, as --detector asks", detector.name),
             }
         }
@@ -133,7 +138,10 @@ fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
     }
     let (path, name) = (path.display(), &header.detector);
     if name.is_empty() {
-        eprintln!("{path} does not say its detector: it is read as {}; --detector chooses another one", Detector::DEFAULT);
+        eprintln!(
+            "{path}: its header is lost or does not name the detector, so it is read as {}; --detector chooses another one",
+            Detector::DEFAULT
+        );
         return Detector::preset(Detector::DEFAULT).context("the default detector is no preset");
     }
     let preset = Detector::preset(name).with_context(|| {

@@ -1,7 +1,6 @@
 //! What `live` and `record` keep, and the board's log.
 
 use std::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use tactomo::board::board_log::{BoardLog, ElfError};
 use tactomo::board::record::{Header, RecordError, Recorder};
@@ -9,8 +8,7 @@ use tactomo::detector::Detector;
 
 /// Begins a recording in a new file, if one is wanted.
 pub fn begin(file: Option<&Path>, detector: &Detector, source: String) -> Result<Option<Recorder>, RecordError> {
-    let started_unix_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    file.map(|file| Recorder::create(file, &Header::of(detector, source, started_unix_s))).transpose()
+    file.map(|file| Recorder::create(file, &Header::now(detector, source))).transpose()
 }
 
 /// Where the board's log goes: printed with the texts of the firmware file `elf`, or only noticed.

@@ -160,8 +160,8 @@ fn read(reader: &mut RecordReader<File>, chunk: &mut Vec<u8>, path: &Path) -> Re
 mod tests {
     use super::*;
     use crate::frames::FrameFile;
-    use proptest::prelude::*;
     use crate::record::RecordWriter;
+    use proptest::prelude::*;
     use tactomo_protocol::{FrameHead, MAX_WIRE, Settings, encode_board, encode_frame};
 
     fn hello() -> Vec<u8> {

@@ -76,11 +76,14 @@ impl Version {
     /// Looks for a chunk at the front of `bytes`.
     pub(super) fn parse(self, bytes: &[u8]) -> Parsed {
         let Some(kind) = self.kind(bytes) else {
-            let may_be = self == Self::Two && bytes.len() <= MARK.len() && MARK.starts_with(&bytes[..bytes.len().min(MARK.len())]);
+            let may_be = self == Self::Two
+                && bytes.len() <= MARK.len()
+                && MARK.starts_with(&bytes[..bytes.len().min(MARK.len())]);
             return if may_be { Parsed::Short(MARK.len() + 1) } else { Parsed::Nothing };
         };
         let start = if self == Self::Two { MARK.len() + 1 } else { 0 };
-        let number = |at: usize| leb128(bytes.get(at..).unwrap_or_default()).map(|(value, length)| (value, at + length));
+        let number =
+            |at: usize| leb128(bytes.get(at..).unwrap_or_default()).map(|(value, length)| (value, at + length));
         let (time_us, at) = match number(start) {
             Ok(found) => found,
             Err(parsed) => return parsed.within(bytes.len()),

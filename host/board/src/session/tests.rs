@@ -138,7 +138,10 @@ fn a_board_that_answers_and_sends_no_frames_is_mute_until_one_comes() {
         now += Duration::from_millis(10);
     }
     let waited = now - begin;
-    assert!(asked >= 2 && waited >= MUTE_AFTER && waited < MUTE_AFTER + Duration::from_millis(100), "{asked} {waited:?}");
+    assert!(
+        asked >= 2 && waited >= MUTE_AFTER && waited < MUTE_AFTER + Duration::from_millis(100),
+        "{asked} {waited:?}"
+    );
     session.frame(now);
     assert!(!session.is_mute(now + 2 * MUTE_AFTER), "silence after frames is another thing: the frame rate says so");
 }

@@ -202,7 +202,10 @@ mod tests {
             longest = longest.max(frame.elapsed());
             assert!(begin.elapsed() < Duration::from_secs(60));
         }
-        assert!(longest < begin.elapsed() / 2 || begin.elapsed() < Duration::from_millis(20), "a frame waited {longest:?}");
+        assert!(
+            longest < begin.elapsed() / 2 || begin.elapsed() < Duration::from_millis(20),
+            "a frame waited {longest:?}"
+        );
         assert_eq!(controls.faults(), fault("gain:4:0.5"));
         let faulty = simulation.readings_v(0.0);
         assert_eq!(faulty.at(0, 4), 0.5 * whole.at(0, 4));
