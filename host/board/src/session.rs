@@ -15,16 +15,16 @@ const ASK_EVERY: Duration = Duration::from_millis(250);
 /// A board that was started and sends no frame for this long is asked again.
 const SILENCE: Duration = Duration::from_millis(1500);
 
-/// Time between two sendings of settings that the board has not confirmed: it answers within a scan and the time of a Hello on the line,
-/// but a restart of the board (0.3 to 1 s) swallows them.
+/// Time between two sendings of settings that the board has not confirmed. It obeys between two rows of a scan, of which the longest (16 x 256
+/// conversions of 40 us, 66 ms to settle) takes 0.23 s; but one that is just starting, or a flipped bit on the line, loses them.
 const CONFIGURE_EVERY: Duration = Duration::from_millis(500);
-/// How often they are sent before they count as refused, a restart between included.
+/// How often they are sent before they count as refused: 2.5 s, in which a board has started anew, too.
 const CONFIGURE_TRIES: u32 = 5;
 
 /// A started board that sends no frame for this long, and the time of its slowest frame, is [mute](Session::is_mute): by then it was asked
 /// again twice, and a chip that had just restarted would have answered.
 pub const MUTE_AFTER: Duration = Duration::from_secs(4);
-/// No board takes longer for a conversion: the ESP32 takes 25 to 45 us, the averaging loop included.
+/// No board takes longer for a conversion: the slowest, the ESP32-C3, takes about 40 us (docs/hardware.md).
 const CONVERSION: Duration = Duration::from_micros(50);
 
 /// What a [mute](Session::is_mute) board means and what to do, for people.

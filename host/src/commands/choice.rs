@@ -104,7 +104,7 @@ impl DetectorArgs {
             let recorded = self.in_material(recorded(path, header)?)?;
             if !header.is_of(&recorded) && self.material.is_some() {
                 eprintln!(
-                    "{} was recorded on another material than the one that --material gives, which is used",
+                    "{} was recorded on a detector of another material; it is read as of the one that --material gives",
                     path.display()
                 );
             }
@@ -139,7 +139,7 @@ fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
     let (path, name) = (path.display(), &header.detector);
     if name.is_empty() {
         eprintln!(
-            "{path} does not say its detector: it is read as {}; --detector chooses another one",
+            "{path}: its header is lost or does not name the detector, so it is read as {}; --detector chooses another one",
             Detector::DEFAULT
         );
         return Detector::preset(Detector::DEFAULT).context("the default detector is no preset");

@@ -1,7 +1,6 @@
 //! What `live` and `record` keep, and the board's log.
 
 use std::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use tactomo::board::board_log::{BoardLog, ElfError};
 use tactomo::board::record::{Header, RecordError, Recorder};
@@ -10,20 +9,16 @@ use tactomo::run::plan::BeginRecording;
 
 /// Begins a recording in a new file, if one is wanted.
 pub fn begin(file: Option<&Path>, detector: &Detector, source: String) -> Result<Option<Recorder>, RecordError> {
-    file.map(|file| Recorder::create(file, &Header::of(detector, source, now_unix_s()))).transpose()
+    file.map(|file| Recorder::create(file, &Header::now(detector, source))).transpose()
 }
 
 /// Begins recordings in new files of the working directory, named by the time, as often as a page asks for one.
 pub fn on_request(detector: Detector, source: String) -> BeginRecording {
     Box::new(move |hello| {
-        let started_unix_s = now_unix_s();
-        let header = Header::of(&detector, source.clone(), started_unix_s);
-        Recorder::create_with_hello(Path::new(&format!("touch-{started_unix_s}.tactomo")), &header, hello)
+        let header = Header::now(&detector, source.clone());
+        let name = format!("touch-{}.tactomo", header.started_unix_s);
+        Recorder::create_with_hello(Path::new(&name), &header, hello)
     })
-}
-
-fn now_unix_s() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }
 
 /// Where the board's log goes: printed with the texts of the firmware file `elf`, or only noticed.

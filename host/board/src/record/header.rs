@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use tactomo_physics::detector::Detector;
@@ -39,6 +40,12 @@ impl Header {
             started_unix_s,
             notes: String::new(),
         }
+    }
+
+    /// The same for a recording that begins now.
+    pub fn now(detector: &Detector, source: String) -> Self {
+        let started_unix_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+        Self::of(detector, source, started_unix_s)
     }
 
     /// The detector that the recording was taken from; `None` if the header does not hold it. `path` is the recording, for errors.

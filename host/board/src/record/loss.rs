@@ -7,8 +7,8 @@ use std::fmt;
 pub struct Loss {
     /// The header.
     pub header: HeaderDamage,
-    /// Damaged chunks. Several in a row count as one where it cannot be said how many they are.
-    pub damaged_chunks: u64,
+    /// Places where it is damaged: a chunk each, or several in a row where it cannot be said how many they are.
+    pub damaged_places: u64,
     /// Bytes of the file that were left out because of that. Those of damaged chunks that were handed out all the same are not among them.
     pub left_out_bytes: u64,
     /// Bytes at the end that are no whole chunk: the recording was cut off there.
@@ -39,14 +39,14 @@ impl fmt::Display for Loss {
         let mut parts = Vec::new();
         match self.header {
             HeaderDamage::None => {}
-            HeaderDamage::Repaired => parts.push("its header is damaged, but could be repaired".to_owned()),
+            HeaderDamage::Repaired => parts.push("its header is damaged, but nothing of it is lost".to_owned()),
             HeaderDamage::Lost => parts.push("its header is lost, and with it the detector".to_owned()),
         }
-        match self.damaged_chunks {
+        match self.damaged_places {
             0 => {}
-            chunks => {
-                let plural = if chunks == 1 { "" } else { "s" };
-                parts.push(format!("{chunks} damaged chunk{plural} ({} bytes left out)", self.left_out_bytes));
+            places => {
+                let plural = if places == 1 { "" } else { "s" };
+                parts.push(format!("it is damaged in {places} place{plural} ({} bytes left out)", self.left_out_bytes));
             }
         }
         if self.tail_bytes > 0 {

@@ -87,7 +87,7 @@ impl<R: Read> RecordReader<R> {
             let (chunk, is_whole) = match parse(&mut self.window, self.version)? {
                 Parsed::Whole(chunk) => (chunk, true),
                 Parsed::Damaged(chunk) if is_one_chunk(&mut self.window, self.version, chunk.length)? => {
-                    self.count(begin + chunk.length as u64, |loss| loss.damaged_chunks += 1);
+                    self.count(begin + chunk.length as u64, |loss| loss.damaged_places += 1);
                     (chunk, false)
                 }
                 parsed => {
@@ -120,7 +120,7 @@ impl<R: Read> RecordReader<R> {
         self.count(self.window.offset(), |loss| match found {
             None if may_be_cut => loss.tail_bytes += passed,
             _ => {
-                loss.damaged_chunks += 1;
+                loss.damaged_places += 1;
                 loss.left_out_bytes += passed;
             }
         });

@@ -113,7 +113,7 @@ impl Recorder {
     /// [`RecordError::Write`] if the file takes no more, [`RecordError::TooSlow`] if 256 MB wait for the disk. What came before is
     /// kept; nothing more is taken.
     pub fn push(&mut self, bytes: &[u8], arrived: Instant) -> Result<(), RecordError> {
-        let bytes = self.from_packet(bytes);
+        let bytes = self.without_first_packet(bytes);
         if bytes.is_empty() {
             return Ok(());
         }
@@ -137,7 +137,7 @@ impl Recorder {
     }
 
     /// `bytes` without those of a packet that began before the recording did.
-    fn from_packet<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
+    fn without_first_packet<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
         if !self.in_packet {
             return bytes;
         }

@@ -187,12 +187,32 @@ proptest! {
             assert_others_survive(&kept, &chunks, victim)?;
             prop_assert!(loss.is_any(), "at {} of {}", at, file.len());
             match victim {
-                None => prop_assert!(loss.header != HeaderDamage::None && loss.damaged_chunks == 0, "{:?}", loss),
+                None => prop_assert!(loss.header != HeaderDamage::None && loss.damaged_places == 0, "{:?}", loss),
                 // A last chunk that claims to be longer than the file looks like one that was cut.
                 Some(victim) => prop_assert!(
-                    loss.damaged_chunks == 1 || victim + 1 == chunks.len() && loss.tail_bytes > 0, "{:?}", loss
+                    loss.damaged_places == 1 || victim + 1 == chunks.len() && loss.tail_bytes > 0, "{:?}", loss
                 ),
             }
+        }
+    }
+
+    #[test]
+    fn several_flipped_bits_cost_their_chunks_alone(
+        chunks in any_chunks(2..10),
+        flips in prop::collection::vec((any::<prop::sample::Index>(), 0..8u32), 1..6),
+    ) {
+        for (mut file, ends) in [written(&chunks), written_in_version_1(&chunks)] {
+            let mut victims = Vec::new();
+            for (at, bit) in &flips {
+                let at = ends[0] + at.index(file.len() - ends[0]);
+                file[at] ^= 1u8 << bit;
+                victims.push(ends.iter().position(|end| at < *end).unwrap_or_default() - 1);
+            }
+            let (kept, loss) = read(&file).unwrap();
+            let survive = chunks.iter().enumerate().all(|(i, chunk)| victims.contains(&i) || kept.contains(chunk));
+            prop_assert!(survive, "{} of {} kept, {:?} damaged", kept.len(), chunks.len(), victims);
+            // Two flips may undo each other.
+            prop_assert!(loss.is_any() || kept == chunks);
         }
     }
 
@@ -217,12 +237,16 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_read_without_panic(tail in prop::collection::vec(any::<u8>(), 0..2000)) {
+    fn any_bytes_are_read_without_panic(tail in prop::collection::vec(any::<u8>(), 0..2000), to_us in any::<u64>()) {
         prop_assert!(read(&tail).is_none());
         for mut file in [written(&Vec::new()).0, written_in_version_1(&Vec::new()).0] {
             file.extend(&tail);
             let (chunks, _) = read(&file).unwrap();
             prop_assert!(chunks.iter().map(|chunk| chunk.1.len()).sum::<usize>() <= tail.len());
+            let mut reader = open(&file).unwrap();
+            reader.last_time_us().unwrap();
+            reader.seek(to_us).unwrap();
+            prop_assert!(rest(&mut reader).len() <= chunks.len());
         }
     }
 

@@ -62,7 +62,7 @@ fn the_end_is_calm_and_says_what_is_damaged() {
     file[at] ^= 1;
     std::fs::write(&path, file).unwrap();
     let mut link = ReplayLink::open(&path, f64::INFINITY, false).unwrap();
-    assert_eq!(end(&mut link), "the recording is over; 1 damaged chunk (0 bytes left out)");
+    assert_eq!(end(&mut link), "the recording is over; it is damaged in 1 place (0 bytes left out)");
     std::fs::remove_file(path).unwrap();
 }
 
