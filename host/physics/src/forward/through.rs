@@ -102,6 +102,14 @@ impl SpotFields for SpotsThrough {
         spot
     }
 
+    fn footing(&self, place_m: Place) -> (Place, [Place; 2]) {
+        self.spots.footing(place_m)
+    }
+
+    fn places_m(&self, count: usize) -> Vec<Place> {
+        self.spots.places_m(count)
+    }
+
     fn between(&self, a: &Spot, b: &Spot) -> Between {
         self.spots.between(a, b)
     }

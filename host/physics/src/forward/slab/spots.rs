@@ -2,8 +2,9 @@
 
 use super::disc::DiscBasis;
 use super::green::Image;
+use super::image::ImageGrid;
 use super::{Slab, from_corner};
-use crate::forward::spots::{Between, Spot, SpotFields};
+use crate::forward::spots::{Between, MOST_PLACES, Spot, SpotFields};
 use crate::space::Place;
 
 /// Spots of a slab.
@@ -55,22 +56,34 @@ impl SlabSpots {
 
 impl SpotFields for SlabSpots {
     fn spot(&self, place_m: Place) -> Spot {
-        let half_m = self.slab.size_m.map(|size_m| size_m / 2.0);
-        let [x_m, y_m] = [0, 1].map(|axis| place_m[axis].clamp(-half_m[axis], half_m[axis]));
-        let corner_m = from_corner(self.slab.size_m, [x_m, y_m]);
+        let (place_m, along) = self.footing(place_m);
+        let corner_m = from_corner(self.slab.size_m, [place_m[0], place_m[1]]);
         let pads = &self.slab.pads;
         let sampled = pads.sample_with_slopes(corner_m);
         let electrodes = pads.electrodes();
         let fields = |all: &[f32]| all[..electrodes].iter().map(|ohm| f64::from(*ohm)).collect();
         let square: f64 = sampled[0][electrodes..].iter().map(|value| f64::from(*value).powi(2)).sum();
         Spot {
-            place_m: [x_m, y_m, 0.0],
-            along: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            place_m,
+            along,
             electrodes_ohm: fields(&sampled[0]),
             slopes_ohm_per_m: [fields(&sampled[1]), fields(&sampled[2])],
             own_ohm: self.local_ohm + self.kernel(corner_m, corner_m, true).ohm - square,
             inner: sampled.map(|mut all| all.split_off(electrodes)),
+            share: 1.0,
+            ..Spot::default()
         }
+    }
+
+    fn footing(&self, place_m: Place) -> (Place, [Place; 2]) {
+        let half_m = self.slab.size_m.map(|size_m| size_m / 2.0);
+        let [x_m, y_m] = [0, 1].map(|axis| place_m[axis].clamp(-half_m[axis], half_m[axis]));
+        ([x_m, y_m, 0.0], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    }
+
+    fn places_m(&self, count: usize) -> Vec<Place> {
+        let mesh = ImageGrid::new(self.slab.size_m, count.min(MOST_PLACES)).mesh();
+        mesh.nodes_m.iter().map(|[x_m, y_m]| [*x_m, *y_m, 0.0]).collect()
     }
 
     fn between(&self, a: &Spot, b: &Spot) -> Between {

@@ -32,8 +32,8 @@ use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-/// Nodes of the scan.
-const SCAN_NODES: usize = 600;
+/// Places of the scan.
+const SCAN_PLACES: usize = 600;
 /// Conductance of a contact in sheet conductances above which it is taken as saturated.
 const MOST_CONDUCTANCE: f64 = 300.0;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
@@ -137,10 +137,9 @@ impl Contacts {
             detector: detector.name.clone(),
             what: format!("the {} has no fields of single contacts", problem.model.name()),
         })?;
-        let coarse = problem.model.on_image_of(SCAN_NODES)?;
         let network = Network::new(detector, problem.model.electrode_fields_ohm());
         Ok(Self {
-            scan: Scan::new(coarse.image_mesh(), &*fields, &network),
+            scan: Scan::new(&*fields, &network, SCAN_PLACES),
             network,
             fields,
             errors: Errors {
