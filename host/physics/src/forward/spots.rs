@@ -5,6 +5,7 @@
 //! smooth in the place, so that a solver can take it from [`ForwardModel::impedance_ohm`](super::ForwardModel::impedance_ohm)
 //! as a correction.
 
+use crate::geometry::Point;
 use crate::space::Place;
 
 /// Most places of [`SpotFields::places_m`].
@@ -49,6 +50,9 @@ pub struct Spot {
     pub share_slopes_per_m: [f64; 2],
     /// What the model needs besides: values, and derivatives along both directions.
     pub(super) inner: [Vec<f32>; 3],
+    /// The middle of the part that is on the detector, in coordinates of the model's (m), and its derivatives along both directions.
+    pub(super) middle_m: Point,
+    pub(super) middle_by: [Point; 2],
     /// Fields of currents between joined electrodes (square root of ohm), and derivatives along both directions.
     pub(super) joined: [Vec<f64>; 3],
 }

@@ -68,6 +68,8 @@ pub(super) fn cover(
     mut visit: impl FnMut(u32, f64),
 ) -> bool {
     let mut touches = false;
+    let unit = geometry::disc([0.0; 2], 1.0, corners);
+    let mut disc = unit.clone();
     // Within this circle everything is inside the polygon.
     let inner_m = radius_m * (std::f64::consts::PI / corners as f64).cos();
     for triangle in locator.near(centre, 1.01 * radius_m) {
@@ -83,7 +85,9 @@ pub(super) fn cover(
             touches = true;
             continue;
         }
-        let disc = geometry::disc(middle, share * radius_m, corners);
+        for (corner, unit) in disc.iter_mut().zip(&unit) {
+            *corner = [0, 1].map(|axis| middle[axis] + share * radius_m * unit[axis]);
+        }
         let Some(integrals_m2) = geometry::shape_integrals_m2(&disc, places) else { continue };
         triangle.into_iter().zip(integrals_m2).for_each(|(node, integral_m2)| visit(node, integral_m2));
         touches = true;

@@ -1,23 +1,22 @@
 //! How well single contacts are found on detectors of any shape at 12 bits and 1.5 LSB of noise, each from a cold start and then
 //! followed as it moves, on readings of a finer model than the one that is fitted.
 //!
-//! `cargo run --release --example contacts_anywhere -- [TRIALS]`, by default 40.
+//! `cargo run --release -p tactomo-touch --example contacts_anywhere -- [TRIALS]`, by default 40.
 
 use std::path::Path;
 use std::time::Instant;
 
-use tactomo::detector::{Detector, Layer};
-use tactomo::forward::spots::SpotFields;
-use tactomo::forward::{Auto, ForwardModel, readings_v};
-use tactomo::scene::Contact;
-use tactomo::simulate::{Noise, finer_model, measured};
-use tactomo::solve::{ContactSettings, Contacts, Problem, Solver};
-use tactomo::space;
+use tactomo_physics::detector::{Detector, Layer};
+use tactomo_physics::forward::{Auto, readings_v};
+use tactomo_physics::scene::Contact;
+use tactomo_physics::simulate::{Noise, finer_model, measured};
+use tactomo_touch::solve::{ContactSettings, Contacts, Problem, Solver};
+use tactomo_physics::space;
 
 /// Length of a step of a contact that is followed, in radii.
 const STEP: f64 = 0.1;
 
-fn main() -> anyhow::Result<()> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let trials = std::env::args().nth(1).map_or(Ok(40), |count| count.parse())?;
     println!(
         "{:<16} {:>7} {:>22} {:>16} {:>10} {:>10} {:>10} {:>12}",
@@ -31,12 +30,12 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn detectors() -> anyhow::Result<Vec<Detector>> {
-    let preset = |name: &str| Detector::preset(name).ok_or_else(|| anyhow::anyhow!("no preset {name}"));
+fn detectors() -> Result<Vec<Detector>, Box<dyn std::error::Error>> {
+    let preset = |name: &str| Detector::preset(name).ok_or_else(|| format!("no preset {name}"));
     let mut thin = preset("square-60")?;
     thin.layers = vec![Layer::uniform(0.0004, 0.2273)];
     thin.name = "thin shell".to_owned();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/detectors");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/detectors");
     let example = |name: &str| Detector::read(&folder.join(name));
     let mut all = vec![thin, example("l-shape.toml")?, example("fingertip.toml")?, preset("square-60")?];
     all.iter_mut().for_each(|detector| detector.adc.noise_lsb = 1.5);
@@ -48,14 +47,14 @@ fn width_m(detector: &Detector) -> f64 {
     detector.outline.size_m().into_iter().fold(0.0, f64::max)
 }
 
-fn report(detector: &Detector, sheets: f64, trials: usize) -> anyhow::Result<()> {
+fn report(detector: &Detector, sheets: f64, trials: usize) -> Result<(), Box<dyn std::error::Error>> {
     let fine = finer_model(detector, &[], 1)?;
     let problem = Problem::new(Auto::new(detector, None)?.model);
     let settings = ContactSettings::of(&problem);
     let begin = Instant::now();
     let mut solver = Contacts::new(&problem, settings)?;
     let made_ms = 1e3 * begin.elapsed().as_secs_f64();
-    let fields = problem.model.spots(settings.radius_m).ok_or_else(|| anyhow::anyhow!("no spots"))?;
+    let fields = problem.model.spots(settings.radius_m).ok_or("no spots")?;
     let (mut places, mut noise) = (fastrand::Rng::with_seed(21), Noise::new(8));
     let (mut right, mut errors, mut off, mut cold, mut step, mut forward) =
         (0, Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
