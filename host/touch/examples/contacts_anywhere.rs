@@ -14,7 +14,7 @@ use tactomo_touch::solve::{ContactSettings, Contacts, Problem, Solver};
 use tactomo_physics::space;
 
 /// Length of a step of a contact that is followed, in radii.
-const STEP: f64 = 0.1;
+const STEP: f64 = 0.03;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let trials = std::env::args().nth(1).map_or(Ok(40), |count| count.parse())?;
@@ -58,9 +58,16 @@ fn report(detector: &Detector, sheets: f64, trials: usize) -> Result<(), Box<dyn
     let (mut places, mut noise) = (fastrand::Rng::with_seed(21), Noise::new(8));
     let (mut right, mut errors, mut off, mut cold, mut step, mut forward) =
         (0, Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let nodes = &problem.model.image_mesh().nodes_m;
+    let mesh = problem.model.image_mesh();
+    let areas_m2 = mesh.triangle_areas_m2();
+    let area_m2: f64 = areas_m2.iter().sum();
     for _ in 0..trials {
-        let at = problem.model.image_mesh().place_m(places.usize(..nodes.len()));
+        let mut left_m2 = area_m2 * places.f64();
+        let triangle = areas_m2.iter().position(|part_m2| {
+            left_m2 -= part_m2;
+            left_m2 <= 0.0
+        });
+        let at = space::middle(mesh.triangles[triangle.unwrap_or_default()].map(|node| mesh.place_m(node as usize)));
         let (mut place_m, along) = fields.footing(at);
         let conductance_s = sheets * detector.sheet_conductance_s();
         solver.reset();

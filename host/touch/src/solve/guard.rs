@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::health::{self, ElectrodeFault};
 use super::{ContactSettings, Contacts, Method, Problem, Solution, SolveError, Solver};
-use tactomo_physics::forward::ForwardError;
+use tactomo_physics::forward::{ForwardError, Joint};
 use tactomo_physics::readings::Readings;
 
 /// Frames in a row that have to say the same of the electrodes before it is believed.
@@ -26,6 +26,8 @@ pub struct Guard {
     /// Electrodes that the solver is made for.
     kept: Vec<usize>,
     excluded: Vec<(usize, ElectrodeFault)>,
+    /// Electrodes whose wires touch.
+    joints: Vec<Joint>,
     /// What the last frames say, and how many of them.
     suspected: (Vec<(usize, ElectrodeFault)>, usize),
     misfits: usize,
@@ -44,6 +46,7 @@ impl Guard {
             problem: problem.clone(),
             kept: (0..problem.detector().electrodes.len()).collect(),
             excluded: Vec::new(),
+            joints: Vec::new(),
             suspected: (Vec::new(), 0),
             misfits: 0,
             period: None,
@@ -71,19 +74,27 @@ impl Guard {
         }
         if self.suspected.1 >= CONFIRMED && !self.suspected.0.is_empty() {
             let (faulty, _) = std::mem::take(&mut self.suspected);
-            self.exclude(faulty);
+            let joints = joints(&faulty, readings, self.problem.detector().drive_v);
+            self.exclude(faulty, &joints);
         }
     }
 
-    fn exclude(&mut self, faulty: Vec<(usize, ElectrodeFault)>) {
-        let kept: Vec<_> = self.kept.iter().copied().filter(|e| faulty.iter().all(|(wrong, _)| wrong != e)).collect();
+    /// Leaves electrodes out. Of those that are joined, the first stands for all of them.
+    fn exclude(&mut self, faulty: Vec<(usize, ElectrodeFault)>, joints: &[Joint]) {
+        let stays = |e: usize| {
+            faulty.iter().all(|(wrong, _)| *wrong != e)
+                || (joints.iter().any(|joint| joint.electrodes[0] == e)
+                    && joints.iter().all(|joint| joint.electrodes[1] != e))
+        };
+        let kept: Vec<_> = self.kept.iter().copied().filter(|e| stays(*e)).collect();
+        let joints: Vec<_> = self.joints.iter().chain(joints).copied().collect();
         if kept.len() < FEWEST {
             return;
         }
-        match self.method.build(&self.problem.through(&kept)) {
+        match self.method.build(&self.problem.through(&kept, &joints)) {
             Ok(solver) => {
                 tracing::warn!("electrodes left out: {faulty:?}");
-                (self.solver, self.kept) = (solver, kept);
+                (self.solver, self.kept, self.joints) = (solver, kept, joints);
                 self.solver.keep_within(self.period);
                 self.excluded.extend(faulty);
                 self.excluded.sort_unstable();
@@ -99,14 +110,14 @@ impl Guard {
             return;
         }
         if let Some(pair) = self.exchanged(readings) {
-            self.exclude(pair.map(|e| (e, ElectrodeFault::Exchanged)).into());
+            self.exclude(pair.map(|e| (e, ElectrodeFault::Exchanged)).into(), &[]);
         }
     }
 
     /// The exchange of two wires that makes the readings those of one contact.
     fn exchanged(&self, readings: &Readings) -> Option<[usize; 2]> {
         let settings = ContactSettings { most: 1, ..ContactSettings::of(&self.problem) };
-        let contacts = Contacts::new(&self.problem.through(&self.kept), settings).ok()?;
+        let contacts = Contacts::new(&self.problem.through(&self.kept, &self.joints), settings).ok()?;
         let residual = |order: &[usize]| contacts.left_by_one(&readings.of(order));
         let before = residual(&self.kept)?;
         let pairs = (0..self.kept.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
@@ -118,6 +129,25 @@ impl Guard {
         let (after, pair) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
         (after < FITS && after < HEALED * before).then_some(pair)
     }
+}
+
+/// Which shorted electrodes are joined to which: each to the first that reads the same as it.
+fn joints(faulty: &[(usize, ElectrodeFault)], readings: &Readings, drive_v: f64) -> Vec<Joint> {
+    let shorted: Vec<_> =
+        faulty.iter().filter(|(_, fault)| *fault == ElectrodeFault::Shorted).map(|(e, _)| *e).collect();
+    let apart_v = |a: usize, b: usize| {
+        (0..readings.electrodes()).map(|g| (readings.at(g, a) - readings.at(g, b)).abs()).fold(0.0, f64::max)
+    };
+    let mut all: Vec<Joint> = Vec::new();
+    for (place, e) in shorted.iter().enumerate() {
+        let first = shorted[..place].iter().copied().min_by(|a, b| apart_v(*a, *e).total_cmp(&apart_v(*b, *e)));
+        let best_v = shorted.iter().filter(|f| *f != e).map(|f| apart_v(*f, *e)).fold(drive_v, f64::min);
+        if let Some(first) = first.filter(|first| apart_v(*first, *e) <= 2.0 * best_v) {
+            let root = all.iter().find(|joint| joint.electrodes[1] == first).map_or(first, |joint| joint.electrodes[0]);
+            all.push(Joint::short(root, *e));
+        }
+    }
+    all
 }
 
 impl Solver for Guard {
@@ -200,9 +230,43 @@ mod tests {
             let (excluded, last) = guarded(Method::Contacts, faults, 20);
             assert_eq!(excluded, expected, "{faults:?}");
             assert_eq!(last.flags.excluded, expected.iter().map(|(e, _)| *e).collect::<Vec<_>>());
-            // Wires that touch carry current past the layer, which the model without them does not know.
-            assert_found(&last, if faults[0].starts_with("short") { 3e-3 } else { 2e-4 });
+            assert_found(&last, 2e-4);
         }
+    }
+
+    #[test]
+    fn shorted_electrodes_are_joined_in_pairs_and_in_rows() {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let slab = Slab::new(&detector).unwrap().on_image(200);
+        let faults: Vec<Fault> = ["short:2,7", "short:9,3", "short:7,12"].map(|fault| fault.parse().unwrap()).into();
+        let mut board = Measurement::new(&detector, &faults, 5).unwrap();
+        let readings = board.pad_voltages(Some(&slab.impedance_ohm(&[CONTACT]).unwrap()));
+        let faulty = [2, 3, 7, 9, 12].map(|e| (e, ElectrodeFault::Shorted));
+        let found = joints(&faulty, &readings, 2.0);
+        assert_eq!(found, [[2, 7], [3, 9], [2, 12]].map(|[a, b]| Joint::short(a, b)));
+    }
+
+    #[test]
+    fn contacts_near_shorted_electrodes_stay_where_they_are() {
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        detector.adc.noise_lsb = 1.5;
+        let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
+        let mut guard = Guard::new(Method::Contacts, &Problem::new(slab)).unwrap();
+        let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
+        let mut board = Measurement::new(&detector, &["short:2,7".parse().unwrap()], 5).unwrap();
+        // Beside the two pads, one after another, once the guard knows.
+        let pads = [detector.electrodes[2], detector.electrodes[7]];
+        for (turn, pad) in pads.iter().cycle().take(12).enumerate() {
+            let way = std::f64::consts::TAU * turn as f64 / 12.0;
+            let truth = Contact::flat(pad.x_m + 0.003 * way.cos(), pad.y_m + 0.003 * way.sin(), 0.0025, 6e-4);
+            let impedance_ohm = fine.impedance_ohm(&[truth]).unwrap();
+            let frames = if turn == 0 { 20 } else { 2 };
+            let last = (0..frames).map(|_| guard.solve(&board.readings_v(Some(&impedance_ohm))).unwrap()).last().unwrap();
+            let [found] = last.contacts[..] else { panic!("{truth:?} {:?}", last.contacts) };
+            let off_m = (found.x_m - truth.x_m).hypot(found.y_m - truth.y_m);
+            assert!(off_m < 5e-4, "{truth:?} {found:?}: {off_m}");
+        }
+        assert_eq!(guard.kept.len(), 15);
     }
 
     #[test]

@@ -9,6 +9,9 @@
 mod discs;
 mod fit;
 mod network;
+#[cfg(test)]
+mod places_tests;
+mod radii;
 mod scan;
 mod search;
 mod target;
@@ -22,6 +25,7 @@ use nalgebra::DMatrix;
 use self::discs::DiscFit;
 use self::fit::Fit;
 use self::network::{FitSpot, Network};
+use self::radii::Radii;
 use self::scan::Scan;
 use self::search::Searched;
 use self::target::{Errors, Target};
@@ -72,6 +76,8 @@ pub struct Contacts {
     scan: Scan,
     sheet_s: f64,
     spacing_m: f64,
+    /// Widest radius of a disc (m).
+    widest_m: f64,
     errors: Errors,
     /// A search that has taken longer adds no more contacts; none for one that is always the same.
     longest: Option<Duration>,
@@ -95,8 +101,8 @@ pub(super) enum Effort {
 /// Contacts that explain a frame.
 #[derive(Clone, Debug)]
 enum Explanation {
-    /// Spots of the usual radius, and what the forward model's readings are over theirs (V).
-    Spots(Fit, Vec<f64>),
+    /// Spots, what the forward model's readings of contacts of these radii are over theirs (V), and the radii.
+    Spots(Fit, Vec<f64>, Radii),
     /// Discs.
     Discs(DiscFit),
 }
@@ -105,7 +111,7 @@ impl Explanation {
     /// Sum of squares of the weighted residuals.
     fn cost(&self) -> f64 {
         match self {
-            Self::Spots(fit, _) => fit.cost,
+            Self::Spots(fit, ..) => fit.cost,
             Self::Discs(fit) => fit.cost,
         }
     }
@@ -113,14 +119,14 @@ impl Explanation {
     /// Number of parameters that were fitted.
     fn parameters(&self) -> usize {
         match self {
-            Self::Spots(fit, _) => 3 * fit.spots.len(),
+            Self::Spots(fit, ..) => 3 * fit.spots.len(),
             Self::Discs(fit) => discs::PARAMETERS * fit.contacts.len(),
         }
     }
 
     fn is_settled(&self) -> bool {
         match self {
-            Self::Spots(fit, _) => fit.settled,
+            Self::Spots(fit, ..) => fit.settled,
             Self::Discs(fit) => fit.settled,
         }
     }
@@ -151,6 +157,7 @@ impl Contacts {
             },
             sheet_s: detector.sheet_conductance_s(),
             spacing_m: problem.spacing_m(),
+            widest_m: discs::widest_m(problem),
             problem: problem.clone(),
             settings,
             longest: None,
@@ -187,14 +194,14 @@ impl Contacts {
         self.last.is_some()
     }
 
-    fn contact(&self, spot: &FitSpot) -> Contact {
+    fn contact(&self, spot: &FitSpot, radius_m: f64) -> Contact {
         let [x_m, y_m, z_m] = spot.spot.place_m;
-        Contact { z_m, ..Contact::flat(x_m, y_m, self.settings.radius_m, self.conductance_s(spot)) }
+        Contact { z_m, ..Contact::flat(x_m, y_m, radius_m, self.conductance_s(spot)) }
     }
 
-    /// Conductance of the contact of a spot (S).
+    /// Conductance of the contact of a spot (S), of which what is beyond an edge does nothing.
     fn conductance_s(&self, spot: &FitSpot) -> f64 {
-        1.0 / (spot.ohm - spot.spot.own_ohm).max(1.0 / self.most_s())
+        1.0 / (spot.ohm - spot.spot.own_ohm).max(1.0 / self.most_s()) / spot.spot.share
     }
 
     fn most_s(&self) -> f64 {
@@ -203,8 +210,12 @@ impl Contacts {
 
     fn solution(&self, found: &Explanation, target: &Target) -> Solution {
         let contacts = match found {
-            Explanation::Spots(fit, _) => {
-                let of = |(k, spot)| self.found_spot(spot, k, fit.covariance.as_ref());
+            Explanation::Spots(fit, _, radii) => {
+                let covariance = fit.covariance.as_ref().map(|covariance| radii.widened(covariance));
+                let of = |(k, spot)| {
+                    let found = self.found_spot(spot, k, covariance.as_ref());
+                    FoundContact { radius_m: radii.known_m(k), ..found }
+                };
                 fit.spots.iter().enumerate().map(of).collect()
             }
             Explanation::Discs(fit) => {
@@ -228,9 +239,7 @@ impl Contacts {
     fn found_spot(&self, spot: &FitSpot, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
         let [x_m, y_m, z_m] = spot.spot.place_m;
         let conductance_s = self.conductance_s(spot);
-        // `C = 1 / (A - own)`, so `dC = -C^2 A d(ln A)`.
-        let per_log_s = conductance_s * conductance_s * spot.ohm;
-        let uncertainty = covariance.map(|all| uncertainty(all, 3 * k, 1.0, per_log_s));
+        let uncertainty = covariance.map(|all| radii::uncertainty(all, k, spot, conductance_s));
         FoundContact { z_m, uncertainty, ..FoundContact::flat(x_m, y_m, conductance_s) }
     }
 }
