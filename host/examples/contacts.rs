@@ -171,7 +171,7 @@ impl Bench {
         let mut errors_m = Vec::new();
         for dead in [None].into_iter().chain(all.iter().copied().map(Some)) {
             let kept: Vec<_> = all.iter().copied().filter(|e| Some(*e) != dead).collect();
-            let mut solver = self.method.build(&self.problem.through(&kept))?;
+            let mut solver = self.method.build(&self.problem.through(&kept, &[]))?;
             (self.places, self.noise) = (fastrand::Rng::with_seed(5), Noise::new(9));
             let mut sum_m = 0.0;
             for _ in 0..self.trials {

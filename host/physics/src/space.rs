@@ -93,6 +93,11 @@ impl Frame {
         Self { origin: corners[0], axes: [first, cross(up, first)], up }
     }
 
+    /// Unit vectors of the plane's two directions.
+    pub fn axes(&self) -> [Place; 2] {
+        self.axes
+    }
+
     /// A place's foot in the plane.
     pub fn flat(&self, at: Place) -> [f64; 2] {
         self.axes.map(|axis| dot(sub(at, self.origin), axis))

@@ -265,7 +265,7 @@ impl Desk {
 impl Seat {
     /// The solver of a method for this detector as it is.
     fn order(&self, method: Method) -> Order {
-        Order { method, detector: Arc::clone(&self.detector), excluded: self.watch.excluded().to_vec() }
+        Order { method, detector: Arc::clone(&self.detector), faulty: self.watch.faulty().clone() }
     }
 
     fn keep_steady(&mut self, touch: &Readings) {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::thread;
 
 use tactomo_physics::detector::Detector;
-use tactomo_touch::solve::{ElectrodeFault, Method, Solver};
+use tactomo_touch::solve::{FaultyElectrodes, Method, Solver};
 
 use super::inbox::{Event, Inbox};
 use super::plan::{BoxError, MakeSolver, Solving};
@@ -28,7 +28,7 @@ pub struct Order {
     /// The detector, as measured.
     pub detector: Arc<Detector>,
     /// Electrodes that are left out, and why.
-    pub excluded: Vec<(usize, ElectrodeFault)>,
+    pub faulty: FaultyElectrodes,
 }
 
 /// A solver that was ordered, or why there is none.
@@ -158,7 +158,7 @@ mod tests {
     }
 
     fn order(method: Method) -> Order {
-        Order { method, detector: Arc::new(Detector::preset(Detector::DEFAULT).unwrap()), excluded: Vec::new() }
+        Order { method, detector: Arc::new(Detector::preset(Detector::DEFAULT).unwrap()), faulty: FaultyElectrodes::default() }
     }
 
     fn next(maker: &mut Maker, inbox: &Inbox) -> Result<Option<&'static str>, String> {

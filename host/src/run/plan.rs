@@ -87,10 +87,10 @@ impl Solving {
         Self {
             method,
             make: Arc::new(move |order| {
-                Ok(solve::without(order.method, &problem.measured_as(&order.detector), &order.excluded)?)
+                Ok(solve::without(order.method, &problem.measured_as(&order.detector), &order.faulty)?)
             }),
             look_at_wires: Arc::new(move |order, look, readings| {
-                look.run(&looked_at.measured_as(&order.detector), &order.excluded, readings)
+                look.run(&looked_at.measured_as(&order.detector), &order.faulty, readings)
             }),
         }
     }

@@ -142,7 +142,7 @@ impl Laboratory {
 
     /// The same, inverted with some of the electrodes only.
     pub fn inverted_with(&self, electrodes: &[usize]) -> Self {
-        Self { problem: self.problem.through(electrodes), ..self.again() }
+        Self { problem: self.problem.through(electrodes, &[]), ..self.again() }
     }
 
     fn again(&self) -> Self {

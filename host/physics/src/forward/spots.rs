@@ -5,7 +5,11 @@
 //! smooth in the place, so that a solver can take it from [`ForwardModel::impedance_ohm`](super::ForwardModel::impedance_ohm)
 //! as a correction.
 
+use crate::geometry::Point;
 use crate::space::Place;
+
+/// Most places of [`SpotFields::places_m`].
+pub const MOST_PLACES: usize = 640;
 
 /// Fields of spots on a detector.
 pub trait SpotFields: Send + Sync {
@@ -14,6 +18,12 @@ pub trait SpotFields: Send + Sync {
 
     /// Field of one spot at another, and its derivatives.
     fn between(&self, a: &Spot, b: &Spot) -> Between;
+
+    /// The place of the detector that is nearest to another (m), and unit vectors of two directions along the surface there.
+    fn footing(&self, place_m: Place) -> (Place, [Place; 2]);
+
+    /// About so many places, at most [`MOST_PLACES`], spread over the detector (m).
+    fn places_m(&self, count: usize) -> Vec<Place>;
 
     /// Field between two spots alone (ohm).
     fn between_ohm(&self, a: &Spot, b: &Spot) -> f64 {
@@ -34,8 +44,17 @@ pub struct Spot {
     pub slopes_ohm_per_m: [Vec<f64>; 2],
     /// Field of its own current, mean over the contact (ohm).
     pub own_ohm: f64,
+    /// Part of the contact that is on the detector: the rest, beyond an edge, touches nothing.
+    pub share: f64,
+    /// Its derivatives along the two directions (1/m).
+    pub share_slopes_per_m: [f64; 2],
     /// What the model needs besides: values, and derivatives along both directions.
     pub(super) inner: [Vec<f32>; 3],
+    /// The middle of the part that is on the detector, in coordinates of the model's (m), and its derivatives along both directions.
+    pub(super) middle_m: Point,
+    pub(super) middle_by: [Point; 2],
+    /// Fields of currents between joined electrodes (square root of ohm), and derivatives along both directions.
+    pub(super) joined: [Vec<f64>; 3],
 }
 
 /// Field of a spot at another.

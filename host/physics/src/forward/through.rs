@@ -1,11 +1,14 @@
-//! A model seen through some of its electrodes.
+//! A model seen through some of its electrodes, some of which may be joined.
 //!
-//! A pad that is neither grounded nor read floats, as it does in every model: so the fields of the others are what they were.
+//! A pad that is neither grounded nor read floats, as it does in every model: so the fields of the others are what they were. One
+//! that is joined to another carries what current makes their potentials alike ([`super::joined`]): the two are one electrode, and
+//! it is enough to keep one of them, to be grounded and read.
 
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use super::joined::{Exchanges, Joint};
 use super::spots::{Between, Spot, SpotFields};
 use super::{ContactFields, ForwardError, ForwardModel, ImageMesh};
 use crate::detector::Detector;
@@ -16,22 +19,31 @@ use crate::space::Place;
 pub struct Through {
     model: Arc<dyn ForwardModel>,
     kept: Vec<usize>,
+    joints: Vec<Joint>,
+    /// Of the bare detector.
+    exchanges: Exchanges,
     detector: Detector,
     fields_ohm: DMatrix<f64>,
     electrode_fields_ohm: DMatrix<f64>,
 }
 
 impl Through {
-    /// The model through the electrodes `kept`, in this order.
+    /// The model through the electrodes `kept`, in this order, with some of all its electrodes joined.
     ///
     /// # Panics
     /// If there is no such electrode.
-    pub fn new(model: Arc<dyn ForwardModel>, kept: Vec<usize>) -> Self {
+    pub fn new(model: Arc<dyn ForwardModel>, kept: Vec<usize>, joints: Vec<Joint>) -> Self {
         let mut detector = model.detector().clone();
         detector.electrodes = kept.iter().map(|e| detector.electrodes[*e]).collect();
-        let fields_ohm = model.fields_ohm().select_columns(&kept);
-        let electrode_fields_ohm = square(model.electrode_fields_ohm(), &kept);
-        Self { model, kept, detector, fields_ohm, electrode_fields_ohm }
+        let exchanges = Exchanges::new(model.electrode_fields_ohm(), &joints);
+        let fields_ohm = exchanges.applied(model.fields_ohm()).select_columns(&kept);
+        let electrode_fields_ohm = square(&exchanges.applied(model.electrode_fields_ohm()), &kept);
+        Self { model, kept, joints, exchanges, detector, fields_ohm, electrode_fields_ohm }
+    }
+
+    /// What is seen of an impedance matrix of all electrodes.
+    fn seen(&self, impedance_ohm: &DMatrix<f64>) -> DMatrix<f64> {
+        square(&Exchanges::new(impedance_ohm, &self.joints).applied(impedance_ohm), &self.kept)
     }
 }
 
@@ -45,19 +57,20 @@ impl ForwardModel for Through {
     }
 
     fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
-        Ok(square(&self.model.impedance_ohm(contacts)?, &self.kept))
+        Ok(self.seen(&self.model.impedance_ohm(contacts)?))
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
         let all = self.model.image_fields(image_s)?;
+        let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);
         Ok(ContactFields {
-            impedance_ohm: square(&all.impedance_ohm, &self.kept),
-            nodes_ohm: all.nodes_ohm.select_columns(&self.kept),
+            impedance_ohm: self.seen(&all.impedance_ohm),
+            nodes_ohm: nodes_ohm.select_columns(&self.kept),
         })
     }
 
     fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
-        Ok(square(&self.model.image_impedance_ohm(image_s)?, &self.kept))
+        Ok(self.seen(&self.model.image_impedance_ohm(image_s)?))
     }
 
     fn image_mesh(&self) -> &ImageMesh {
@@ -65,12 +78,12 @@ impl ForwardModel for Through {
     }
 
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {
-        Ok(Box::new(Self::new(self.model.on_image_of(nodes)?.into(), self.kept.clone())))
+        Ok(Box::new(Self::new(self.model.on_image_of(nodes)?.into(), self.kept.clone(), self.joints.clone())))
     }
 
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
         let spots = self.model.spots(radius_m)?;
-        Some(Box::new(SpotsThrough { spots, kept: self.kept.clone() }))
+        Some(Box::new(SpotsThrough { spots, kept: self.kept.clone(), exchanges: self.exchanges.clone() }))
     }
 
     fn fields_ohm(&self) -> &DMatrix<f64> {
@@ -78,7 +91,8 @@ impl ForwardModel for Through {
     }
 
     fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
-        self.model.node_fields_ohm()
+        let at = self.exchanges.at(self.model.fields_ohm());
+        Ok(self.model.node_fields_ohm()? - &at * at.transpose())
     }
 
     fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
@@ -90,25 +104,46 @@ impl ForwardModel for Through {
 struct SpotsThrough {
     spots: Box<dyn SpotFields>,
     kept: Vec<usize>,
+    exchanges: Exchanges,
 }
 
 impl SpotFields for SpotsThrough {
     fn spot(&self, place_m: Place) -> Spot {
         let mut spot = self.spots.spot(place_m);
         let [by_first, by_second] = &mut spot.slopes_ohm_per_m;
-        for all in [&mut spot.electrodes_ohm, by_first, by_second] {
+        for (all, joined) in [&mut spot.electrodes_ohm, by_first, by_second].into_iter().zip(&mut spot.joined) {
+            *joined = self.exchanges.apply(all);
             *all = self.kept.iter().map(|e| all[*e]).collect();
         }
+        spot.own_ohm -= product(&spot.joined[0], &spot.joined[0]);
         spot
     }
 
+    fn footing(&self, place_m: Place) -> (Place, [Place; 2]) {
+        self.spots.footing(place_m)
+    }
+
+    fn places_m(&self, count: usize) -> Vec<Place> {
+        self.spots.places_m(count)
+    }
+
     fn between(&self, a: &Spot, b: &Spot) -> Between {
-        self.spots.between(a, b)
+        let mut field = self.spots.between(a, b);
+        field.ohm -= product(&a.joined[0], &b.joined[0]);
+        for axis in 0..2 {
+            field.by_first[axis] -= product(&a.joined[1 + axis], &b.joined[0]);
+            field.by_second[axis] -= product(&a.joined[0], &b.joined[1 + axis]);
+        }
+        field
     }
 
     fn between_ohm(&self, a: &Spot, b: &Spot) -> f64 {
-        self.spots.between_ohm(a, b)
+        self.spots.between_ohm(a, b) - product(&a.joined[0], &b.joined[0])
     }
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn square(matrix: &DMatrix<f64>, kept: &[usize]) -> DMatrix<f64> {
@@ -118,14 +153,16 @@ fn square(matrix: &DMatrix<f64>, kept: &[usize]) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::forward::Slab;
+    use crate::forward::contact::conducting_patches;
+    use crate::forward::{Patches, Slab, readings_v};
+    use crate::simulate::{Fault, Measurement};
 
     #[test]
     fn what_some_electrodes_see_is_part_of_what_all_do() -> Result<(), ForwardError> {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
         let all: Arc<dyn ForwardModel> = Arc::new(Slab::new(&detector)?);
         let kept = vec![5, 0, 9];
-        let some = Through::new(Arc::clone(&all), kept.clone());
+        let some = Through::new(Arc::clone(&all), kept.clone(), Vec::new());
         let contact = [Contact::flat(0.004, -0.007, 0.002, 1e-3)];
         let [few, many] = [&some as &dyn ForwardModel, &*all].map(|model| model.impedance_ohm(&contact).unwrap());
         assert_eq!((few.nrows(), few[(0, 2)], few[(1, 1)]), (3, many[(5, 9)], many[(0, 0)]));
@@ -133,6 +170,51 @@ mod tests {
         let [few, many] = [few, many].map(|spots| spots.spot([0.004, -0.007, 0.0]));
         assert_eq!(few.electrodes_ohm, [5, 0, 9].map(|e| many.electrodes_ohm[e]));
         assert_eq!((few.own_ohm, some.fields_ohm().ncols(), some.detector().electrodes.len()), (many.own_ohm, 3, 3));
+        Ok(())
+    }
+
+    #[test]
+    fn joined_pads_are_the_short_that_a_board_has() -> Result<(), ForwardError> {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let all: Arc<dyn ForwardModel> = Arc::new(Slab::new(&detector)?.on_image(200));
+        let contacts = [Contact::flat(0.006, 0.012, 0.0025, 1e-3), Contact::flat(-0.016, -0.003, 0.002, 2e-4)];
+        let kept: Vec<_> = (0..16).filter(|e| *e != 7 && *e != 9).collect();
+        let joints = vec![Joint::short(2, 7), Joint { electrodes: [4, 9], ohm: 35.0 }];
+        let some = Through::new(Arc::clone(&all), kept.clone(), joints);
+        let faults: Vec<Fault> = ["short:2,7", "short:4,9:35"].map(|fault| fault.parse().unwrap()).into();
+        let mut board = Measurement::new(&detector, &faults, 1).unwrap();
+        let expected = board.pad_voltages(Some(&all.impedance_ohm(&contacts)?)).of(&kept);
+        let found = readings_v(&some.impedance_ohm(&contacts)?, some.detector());
+        let off = found.volts().iter().zip(expected.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-9, "{off}");
+        Ok(())
+    }
+
+    #[test]
+    fn fields_of_joined_pads_make_the_readings_of_spots_and_images() -> Result<(), ForwardError> {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let all: Arc<dyn ForwardModel> = Arc::new(Slab::new(&detector)?.on_image(200));
+        let kept: Vec<_> = (0..15).collect();
+        let some = Through::new(all, kept, vec![Joint::short(2, 15), Joint::short(15, 2), Joint::short(3, 2)]);
+        // An image by the fields of the bare detector, and by the full model.
+        let image_s = some.image_mesh().image_with([(70, 2e-4), (120, 1e-3)]);
+        let patches = Patches::of(&some)?.fields(&image_s).unwrap();
+        let full = some.image_fields(&image_s)?;
+        assert!((&patches.impedance_ohm - &full.impedance_ohm).amax() < 1e-6 * full.impedance_ohm.amax());
+        assert!((&patches.nodes_ohm - &full.nodes_ohm).amax() < 1e-6 * full.nodes_ohm.amax());
+        // Two spots by theirs.
+        let contacts = [Contact::flat(0.006, 0.012, 0.002, 1e-5), Contact::flat(-0.016, -0.003, 0.002, 2e-5)];
+        let fields = some.spots(0.002).unwrap();
+        let spots = contacts.map(|at| fields.spot([at.x_m, at.y_m, 0.0]));
+        let cross = DMatrix::from_fn(2, 15, |k, e| spots[k].electrodes_ohm[e]);
+        let between = DMatrix::from_fn(2, 2, |k, l| {
+            if k == l { spots[k].own_ohm } else { fields.between_ohm(&spots[k], &spots[l]) }
+        });
+        let found = conducting_patches(some.electrode_fields_ohm(), &cross, between, &contacts.map(|at| at.conductance_s));
+        let [found, expected] = [found.impedance_ohm().unwrap(), some.impedance_ohm(&contacts)?];
+        let [found, expected] = [found, expected].map(|z| readings_v(&z, some.detector()));
+        let off = found.volts().iter().zip(expected.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 0.01 * expected.largest_v(), "{}", off / expected.largest_v());
         Ok(())
     }
 }

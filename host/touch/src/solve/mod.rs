@@ -43,7 +43,7 @@ pub use self::problem::Problem;
 pub use self::tikhonov::{Tikhonov, Variant};
 pub use self::tsvd::Tsvd;
 pub use self::tv::Tv;
-pub use self::watch::{ElectrodeWatch, Look};
+pub use self::watch::{ElectrodeWatch, FaultyElectrodes, Look};
 use tactomo_physics::readings::Readings;
 
 /// A method that reads touch from the readings of a frame.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
-use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, Through};
+use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Through};
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -52,17 +52,20 @@ impl Problem {
         (area_m2 / self.detector().electrodes.len().max(1) as f64).sqrt()
     }
 
-    /// The problem through some of its electrodes, in this order.
-    pub fn through(&self, kept: &[usize]) -> Self {
+    /// The problem through some of its electrodes, in this order, with some of all its electrodes joined. Joined electrodes are one:
+    /// one of them is kept.
+    pub fn through(&self, kept: &[usize], joints: &[Joint]) -> Self {
         let mut detector = self.detector().clone();
         detector.electrodes = kept.iter().map(|e| detector.electrodes[*e]).collect();
+        let pads = &self.jacobian.electrode_fields_ohm;
+        let exchanges = Exchanges::new(pads, joints);
         let jacobian = Jacobian {
             detector,
-            fields_ohm: self.jacobian.fields_ohm.select_columns(kept),
-            electrode_fields_ohm: self.jacobian.electrode_fields_ohm.select_rows(kept).select_columns(kept),
+            fields_ohm: exchanges.applied(&self.jacobian.fields_ohm).select_columns(kept),
+            electrode_fields_ohm: exchanges.applied(pads).select_rows(kept).select_columns(kept),
             ..(*self.jacobian).clone()
         };
-        let model = Through::new(Arc::clone(&self.model), kept.to_vec());
+        let model = Through::new(Arc::clone(&self.model), kept.to_vec(), joints.to_vec());
         Self { model: Arc::new(model), jacobian: Arc::new(jacobian) }
     }
 }

@@ -6,6 +6,7 @@
 use super::Solution;
 use super::health::{self, ElectrodeFault};
 use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::Joint;
 use tactomo_physics::readings::Readings;
 
 /// Frames in a row that have to say the same of the electrodes before it is believed.
@@ -24,13 +25,41 @@ const LOOK_AGAIN: u32 = 1200;
 /// Fewest electrodes that are worth solving for.
 const FEWEST: usize = 5;
 
+/// Electrodes that are left out, and what of that the fields have to know.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FaultyElectrodes {
+    /// Each, with what is wrong.
+    pub faults: Vec<(usize, ElectrodeFault)>,
+    /// Those whose wires touch: the first of them stands for all.
+    pub joints: Vec<Joint>,
+}
+
+impl FaultyElectrodes {
+    /// Electrodes of so many that solvers are made for: those that are not faulty, and of joined ones the first.
+    pub fn kept(&self, electrodes: usize) -> Vec<usize> {
+        let is_first = |electrode: usize| {
+            self.joints.iter().any(|joint| joint.electrodes[0] == electrode)
+                && self.joints.iter().all(|joint| joint.electrodes[1] != electrode)
+        };
+        let is_faulty = |electrode: usize| self.faults.iter().any(|(wrong, _)| *wrong == electrode);
+        (0..electrodes).filter(|electrode| !is_faulty(*electrode) || is_first(*electrode)).collect()
+    }
+
+    /// The same without some of them.
+    pub fn but(&self, healthy: &[usize]) -> Self {
+        let faults = self.faults.iter().copied().filter(|(wrong, _)| !healthy.contains(wrong)).collect();
+        let is_left = |joint: &Joint| joint.electrodes.iter().all(|electrode| !healthy.contains(electrode));
+        Self { faults, joints: self.joints.iter().copied().filter(is_left).collect() }
+    }
+}
+
 /// Watches readings for faulty electrodes.
 #[derive(Clone, Debug)]
 pub struct ElectrodeWatch {
     electrodes: usize,
     drive_v: f64,
     noise_v: f64,
-    excluded: Vec<(usize, ElectrodeFault)>,
+    faulty: FaultyElectrodes,
     /// Largest reading at which each electrode was found faulty (V), how many frames have shown it healthy since, and how many have to.
     cases: Vec<Case>,
     suspected: Vec<(usize, ElectrodeFault)>,
@@ -66,7 +95,7 @@ impl ElectrodeWatch {
             electrodes,
             drive_v: detector.drive_v,
             noise_v: detector.adc.deviation_v(),
-            excluded: Vec::new(),
+            faulty: FaultyElectrodes::default(),
             cases: vec![Case { found_at_v: 0.0, healthy: 0, needed: HEALTHY[0] }; electrodes],
             suspected: Vec::new(),
             seen: 0,
@@ -77,14 +106,14 @@ impl ElectrodeWatch {
     }
 
     /// Electrodes that are left out, and why.
-    pub fn excluded(&self) -> &[(usize, ElectrodeFault)] {
-        &self.excluded
+    pub fn faulty(&self) -> &FaultyElectrodes {
+        &self.faulty
     }
 
     /// Takes note of a frame's readings (V), less the baseline; whether other electrodes are left out now.
     pub fn note(&mut self, readings: &Readings) -> bool {
         self.skipped += 1;
-        if !self.excluded.is_empty() && self.suspected.is_empty() && self.skipped < STRIDE {
+        if !self.faulty.faults.is_empty() && self.suspected.is_empty() && self.skipped < STRIDE {
             return false;
         }
         self.skipped = 0;
@@ -94,53 +123,54 @@ impl ElectrodeWatch {
         let Some(faulty) = health::faulty_electrodes(readings, self.drive_v, self.noise_v) else { return false };
         let largest_v = readings.largest_v();
         let is_back = self.take_back(&faulty, largest_v);
-        let is_out = self.suspect(faulty, largest_v);
+        let is_out = self.suspect(faulty, readings);
         is_back || is_out
     }
 
     /// Counts frames that would have shown a fault and do not, and takes electrodes back.
     fn take_back(&mut self, faulty: &[(usize, ElectrodeFault)], largest_v: f64) -> bool {
-        let before = self.excluded.len();
-        let cases = &mut self.cases;
-        self.excluded.retain(|(electrode, fault)| {
-            let case = &mut cases[*electrode];
+        let mut back = Vec::new();
+        for (electrode, fault) in &self.faulty.faults {
+            let case = &mut self.cases[*electrode];
             if faulty.iter().any(|(wrong, _)| wrong == electrode) {
                 case.healthy = 0;
             } else if *fault != ElectrodeFault::Exchanged && largest_v > AS_LARGE * case.found_at_v {
                 case.healthy += STRIDE;
             }
-            let is_healthy = case.healthy >= case.needed;
-            if is_healthy {
-                tracing::info!("electrode {electrode} is healthy again ({fault})");
+            if case.healthy >= case.needed {
+                tracing::info!("electrode {electrode} is healthy again; before, {fault}");
                 *case = Case { found_at_v: 0.0, healthy: 0, needed: (2 * case.needed).min(HEALTHY[1]) };
+                back.push(*electrode);
             }
-            !is_healthy
-        });
-        self.excluded.len() < before
+        }
+        self.faulty = self.faulty.but(&back);
+        !back.is_empty()
     }
 
     /// Leaves out what enough frames in a row have shown.
-    fn suspect(&mut self, mut faulty: Vec<(usize, ElectrodeFault)>, largest_v: f64) -> bool {
-        faulty.retain(|(electrode, _)| self.excluded.iter().all(|(known, _)| known != electrode));
+    fn suspect(&mut self, mut faulty: Vec<(usize, ElectrodeFault)>, readings: &Readings) -> bool {
+        faulty.retain(|(electrode, _)| self.faulty.faults.iter().all(|(known, _)| known != electrode));
         self.seen = if faulty == self.suspected { self.seen + 1 } else { 1 };
         self.suspected = faulty;
         if self.seen < CONFIRMED || self.suspected.is_empty() {
             return false;
         }
         let found = std::mem::take(&mut self.suspected);
-        self.exclude(found, largest_v)
+        let joints = joints(&found, readings, self.drive_v);
+        self.exclude(found, joints, readings.largest_v())
     }
 
-    fn exclude(&mut self, found: Vec<(usize, ElectrodeFault)>, largest_v: f64) -> bool {
-        if self.electrodes < FEWEST + self.excluded.len() + found.len() {
+    fn exclude(&mut self, found: Vec<(usize, ElectrodeFault)>, joints: Vec<Joint>, largest_v: f64) -> bool {
+        if self.electrodes < FEWEST + self.faulty.faults.len() + found.len() {
             return false;
         }
         for (electrode, fault) in &found {
             tracing::warn!("electrode {electrode} is left out: {fault}");
             self.cases[*electrode].found_at_v = largest_v;
         }
-        self.excluded.extend(found);
-        self.excluded.sort_unstable();
+        self.faulty.faults.extend(found);
+        self.faulty.faults.sort_unstable();
+        self.faulty.joints.extend(joints);
         true
     }
 
@@ -153,7 +183,7 @@ impl ElectrodeWatch {
         }
         let is_exchanged =
             |(electrode, fault): &(usize, ElectrodeFault)| (*fault == ElectrodeFault::Exchanged).then_some(*electrode);
-        let mut exchanged = self.excluded.iter().filter_map(is_exchanged);
+        let mut exchanged = self.faulty.faults.iter().filter_map(is_exchanged);
         let pair = exchanged.next().zip(exchanged.next())?;
         (self.touched == LOOK_AGAIN - 1).then_some(Look::Healed(pair.into()))
     }
@@ -162,11 +192,32 @@ impl ElectrodeWatch {
     pub fn conclude(&mut self, look: Look, found: Option<[usize; 2]>) -> bool {
         match (look, found) {
             (_, None) => false,
-            (Look::Exchanged, Some(pair)) => self.exclude(pair.map(|e| (e, ElectrodeFault::Exchanged)).into(), 0.0),
+            (Look::Exchanged, Some(pair)) => {
+                self.exclude(pair.map(|e| (e, ElectrodeFault::Exchanged)).into(), Vec::new(), 0.0)
+            }
             (Look::Healed(_), Some(pair)) => {
-                self.excluded.retain(|(electrode, _)| !pair.contains(electrode));
+                self.faulty = self.faulty.but(&pair);
                 true
             }
         }
     }
+}
+
+/// Which shorted electrodes are joined to which: each to the first that reads the same as it.
+pub(super) fn joints(faulty: &[(usize, ElectrodeFault)], readings: &Readings, drive_v: f64) -> Vec<Joint> {
+    let shorted: Vec<_> =
+        faulty.iter().filter(|(_, fault)| *fault == ElectrodeFault::Shorted).map(|(e, _)| *e).collect();
+    let apart_v = |a: usize, b: usize| {
+        (0..readings.electrodes()).map(|g| (readings.at(g, a) - readings.at(g, b)).abs()).fold(0.0, f64::max)
+    };
+    let mut all: Vec<Joint> = Vec::new();
+    for (place, e) in shorted.iter().enumerate() {
+        let first = shorted[..place].iter().copied().min_by(|a, b| apart_v(*a, *e).total_cmp(&apart_v(*b, *e)));
+        let best_v = shorted.iter().filter(|f| *f != e).map(|f| apart_v(*f, *e)).fold(drive_v, f64::min);
+        if let Some(first) = first.filter(|first| apart_v(*first, *e) <= 2.0 * best_v) {
+            let root = all.iter().find(|joint| joint.electrodes[1] == first).map_or(first, |joint| joint.electrodes[0]);
+            all.push(Joint::short(root, *e));
+        }
+    }
+    all
 }

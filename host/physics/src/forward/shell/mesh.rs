@@ -12,7 +12,9 @@ use std::f64::consts::TAU;
 
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
+use super::contact::Footing;
 use super::facets;
+use super::locate::Locator;
 use crate::detector::{Detector, Electrode, Outline};
 use crate::forward::ForwardError;
 use crate::geometry::{self, Point};
@@ -142,11 +144,7 @@ impl Mesh {
 
     /// Middle of a triangle (m).
     pub fn centroid_m(&self, triangle: [u32; 3]) -> Place {
-        let corner = |node: u32| {
-            let [x, y] = self.nodes_m[node as usize];
-            self.places_m.get(node as usize).copied().unwrap_or([x, y, 0.0])
-        };
-        let [a, b, c] = triangle.map(corner);
+        let [a, b, c] = triangle.map(|node| self.place_m(node));
         [0, 1, 2].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0)
     }
 
@@ -167,12 +165,12 @@ impl Mesh {
 
     /// The centre of a contact moved up or down onto a curved surface, not along it, and the surface's normal there; on a plane
     /// the centre and no normal. `None` farther than `reach_m` from the surface.
-    pub fn footing(&self, centre: Place, reach_m: f64) -> Option<(Place, Place)> {
+    pub(super) fn footing(&self, locator: &Locator, centre: Place, reach_m: f64) -> Option<Footing> {
         if self.places_m.is_empty() {
             return Some((centre, [0.0; 3]));
         }
-        let near = self.triangles.iter().filter(|triangle| !self.is_apart(**triangle, centre, reach_m));
-        let corners = near.map(|triangle| triangle.map(|node| self.places_m[node as usize]));
+        let near = locator.near(centre, reach_m);
+        let corners = near.into_iter().map(|triangle| self.triangles[triangle as usize].map(|node| self.place_m(node)));
         let away_m = |corners: [Place; 3]| space::distance(space::nearest_on_triangle(centre, corners), centre);
         let (away_m, corners) = corners.map(|corners| (away_m(corners), corners)).min_by(|a, b| a.0.total_cmp(&b.0))?;
         let normal = space::normal(corners);

@@ -7,23 +7,29 @@
 mod contact;
 mod facets;
 mod inverse;
+mod locate;
 mod mesh;
+mod spots;
+#[cfg(test)]
+mod spots_tests;
 #[cfg(test)]
 mod surface_tests;
 mod system;
 #[cfg(test)]
 mod tests;
 
-use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use faer::Mat;
 use nalgebra::DMatrix;
 
 use self::inverse::Inverse;
+use self::locate::Locator;
 pub use self::mesh::Mesh;
+use self::spots::{ShellSpots, SpotTable};
 use self::system::{Factor, Singular, System};
 use super::contact::{ContactFields, conducting_patches};
+use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Electrode};
 use crate::scene::Contact;
@@ -40,12 +46,29 @@ const MOST_TOUCHED: usize = 400;
 pub struct Shell {
     detector: Detector,
     mesh: Mesh,
+    locator: Locator,
     image_mesh: ImageMesh,
     system: System,
     fields_ohm: DMatrix<f64>,
     electrode_fields_ohm: DMatrix<f64>,
-    /// Fields between single nodes and pads; made when first contacts are small enough to ask for them.
-    inverse: OnceLock<Option<Inverse>>,
+    /// Fields between single nodes; made when first contacts are small enough to ask for them.
+    between_nodes: OnceLock<Option<BetweenNodes>>,
+    /// Tables of spots, by radius (m).
+    spots: Mutex<Vec<(f64, Arc<SpotTable>)>>,
+}
+
+/// Neumann functions between single nodes.
+struct BetweenNodes {
+    inverse: Inverse,
+    /// Means of the inverse's columns over the detector (ohm), and the mean of these: what takes them to a mean of zero.
+    means_ohm: Vec<f64>,
+    mean_ohm: f64,
+}
+
+impl BetweenNodes {
+    fn ohm(&self, i: usize, j: usize) -> f64 {
+        self.inverse.element(i, j) - self.means_ohm[i] - self.means_ohm[j] + self.mean_ohm
+    }
 }
 
 impl Shell {
@@ -85,8 +108,9 @@ impl Shell {
         let node_areas_m2 = mesh.node_areas_m2();
         // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.
         let factor = system.factorise([(system.pad(0), sheet_conductance_s)]).map_err(singular)?;
-        let pads = system.pad(0)..system.pad(system.pads());
-        let (fields_ohm, electrode_fields_ohm) = floating_fields_ohm(&factor, &system, &node_areas_m2, pads);
+        let into_pad = |pad: usize| vec![(system.pad(pad) as u32, 1.0)];
+        let (fields_ohm, electrode_fields_ohm) =
+            floating_fields_ohm(&factor, &system, &node_areas_m2, system.pads(), into_pad);
         let image_mesh = ImageMesh {
             nodes_m: mesh.nodes_m.clone(),
             places_m: mesh.places_m.clone(),
@@ -95,12 +119,14 @@ impl Shell {
         };
         Ok(Self {
             detector: detector.clone(),
+            locator: Locator::new(&mesh),
             mesh,
             image_mesh,
             system,
             fields_ohm,
             electrode_fields_ohm,
-            inverse: OnceLock::new(),
+            between_nodes: OnceLock::new(),
+            spots: Mutex::new(Vec::new()),
         })
     }
 
@@ -111,14 +137,48 @@ impl Shell {
         if touched.len() > MOST_TOUCHED {
             return None;
         }
-        let ground = (self.system.pad(0), self.detector.sheet_conductance_s());
-        let inverse = self.inverse.get_or_init(|| self.system.inverse(ground).ok()).as_ref()?;
-        let pad = |e: usize| self.system.pad(e);
-        let pads = symmetric(self.system.pads(), |e, g| inverse.element(pad(e), pad(g)));
-        let cross = DMatrix::from_fn(touched.len(), pads.ncols(), |k, e| inverse.element(touched[k], pad(e)));
-        let nodes = symmetric(touched.len(), |k, l| inverse.element(touched[k], touched[l]));
+        let fields = self.between_nodes.get_or_init(|| self.between_nodes().ok()).as_ref()?;
+        let cross = self.fields_ohm.select_rows(&touched);
+        let nodes = symmetric(touched.len(), |k, l| fields.ohm(touched[k], touched[l]));
         let conductances_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
-        conducting_patches(&pads, &cross, nodes, &conductances_s).impedance_ohm()
+        conducting_patches(&self.electrode_fields_ohm, &cross, nodes, &conductances_s).impedance_ohm()
+    }
+
+    fn between_nodes(&self) -> Result<BetweenNodes, Singular> {
+        let inverse = self.system.inverse(self.ground())?;
+        let areas_m2 = &self.image_mesh.node_areas_m2;
+        let area_m2: f64 = areas_m2.iter().sum();
+        let evenly = |i: usize| areas_m2.get(i).map_or(0.0, |node_area_m2| node_area_m2 / area_m2);
+        let currents_a = Mat::from_fn(self.system.pad(self.system.pads()), 1, |i, _| evenly(i));
+        let (nodes_ohm, _) = self.system.factorise([self.ground()])?.solve(currents_a);
+        let mean_ohm = nodes_ohm.iter().enumerate().map(|(i, ohm)| evenly(i) * ohm).sum();
+        Ok(BetweenNodes { inverse, means_ohm: nodes_ohm.as_slice().to_vec(), mean_ohm })
+    }
+
+    /// A pad grounded by some conductance (S): with no net current none flows there, and the solution is the floating one.
+    fn ground(&self) -> (usize, f64) {
+        (self.system.pad(0), self.detector.sheet_conductance_s())
+    }
+
+    /// Neumann functions at the nodes (ohm) of currents that add up to 1 A each, given by node and share.
+    fn floating_fields_ohm(
+        &self,
+        count: usize,
+        into: impl Fn(usize) -> Vec<(u32, f64)>,
+    ) -> Result<DMatrix<f64>, ForwardError> {
+        let factor = self.system.factorise([self.ground()]).map_err(|_| singular(&self.detector))?;
+        Ok(floating_fields_ohm(&factor, &self.system, &self.image_mesh.node_areas_m2, count, into).0)
+    }
+
+    /// The table of spots of a radius (m), which is made once.
+    fn spot_table(&self, radius_m: f64) -> Option<Arc<SpotTable>> {
+        let mut tables = self.spots.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, table)) = tables.iter().find(|(radius, _)| *radius == radius_m) {
+            return Some(Arc::clone(table));
+        }
+        let table = Arc::new(SpotTable::new(self, radius_m).ok()?);
+        tables.push((radius_m, Arc::clone(&table)));
+        Some(table)
     }
 
     /// Contact conductance that each node gets from discs of contact (S).
@@ -126,7 +186,7 @@ impl Shell {
     /// # Errors
     /// [`ForwardError::Contact`] if a contact is off the detector or no positive disc.
     pub fn node_conductances_s(&self, contacts: &[Contact]) -> Result<Vec<f64>, ForwardError> {
-        contact::node_conductances_s(&self.mesh, contacts)
+        contact::node_conductances_s(&self.mesh, &self.locator, contacts)
     }
 }
 
@@ -164,8 +224,8 @@ impl ForwardModel for Shell {
         Ok(Box::new(Self::with_nodes(&self.detector, nodes)?))
     }
 
-    fn spots(&self, _radius_m: f64) -> Option<Box<dyn crate::forward::spots::SpotFields>> {
-        None
+    fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
+        Some(Box::new(ShellSpots(self.spot_table(radius_m)?)))
     }
 
     fn image_mesh(&self) -> &ImageMesh {
@@ -177,11 +237,7 @@ impl ForwardModel for Shell {
     }
 
     fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
-        let ground = (self.system.pad(0), self.detector.sheet_conductance_s());
-        let singular = |_| singular(&self.detector);
-        let factor = self.system.factorise([ground]).map_err(singular)?;
-        let nodes = self.mesh.nodes_m.len();
-        Ok(floating_fields_ohm(&factor, &self.system, &self.image_mesh.node_areas_m2, 0..nodes).0)
+        self.floating_fields_ohm(self.mesh.nodes_m.len(), |node| vec![(node as u32, 1.0)])
     }
 
     fn electrode_fields_ohm(&self) -> &DMatrix<f64> {
@@ -215,20 +271,23 @@ fn singular(detector: &Detector) -> ForwardError {
     }
 }
 
-/// Neumann functions of some unknowns, at nodes and at pads: 1 A into each, out evenly all over, mean zero. So they are symmetric.
+/// Neumann functions of some currents, at nodes and at pads: 1 A into the unknowns that `into` gives with their shares, out evenly
+/// all over, mean zero. So they are symmetric.
 fn floating_fields_ohm(
     factor: &Factor,
     system: &System,
     node_areas_m2: &[f64],
-    into: Range<usize>,
+    count: usize,
+    into: impl Fn(usize) -> Vec<(u32, f64)>,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let area_m2: f64 = node_areas_m2.iter().sum();
-    let currents_a = Mat::from_fn(system.pad(system.pads()), into.len(), |i, j| {
-        let out = node_areas_m2.get(i).map_or(0.0, |node_area_m2| node_area_m2 / area_m2);
-        f64::from(u8::from(i == into.start + j)) - out
-    });
+    let out_a = |i: usize| node_areas_m2.get(i).map_or(0.0, |node_area_m2| node_area_m2 / area_m2);
+    let mut currents_a = Mat::from_fn(system.pad(system.pads()), count, |i, _| -out_a(i));
+    for column in 0..count {
+        into(column).into_iter().for_each(|(unknown, share)| currents_a[(unknown as usize, column)] += share);
+    }
     let (mut nodes, mut electrodes) = factor.solve(currents_a);
-    for column in 0..into.len() {
+    for column in 0..count {
         let sum: f64 = nodes.column(column).iter().zip(node_areas_m2).map(|(ohm, area)| ohm * area).sum();
         nodes.column_mut(column).add_scalar_mut(-sum / area_m2);
         electrodes.column_mut(column).add_scalar_mut(-sum / area_m2);

@@ -109,7 +109,18 @@ impl DiscBasis {
 
     /// The points on a disc (m).
     pub fn nodes_m(&self, centre_m: [f64; 2], radius_m: f64) -> Vec<[f64; 2]> {
-        self.nodes.iter().map(|node| [0, 1].map(|axis| centre_m[axis] + radius_m * node[axis])).collect()
+        self.mapped_nodes_m(centre_m, radius_m, |node| node)
+    }
+
+    /// The same points, moved within the unit disc.
+    pub fn mapped_nodes_m(
+        &self,
+        centre_m: [f64; 2],
+        radius_m: f64,
+        map: impl Fn([f64; 2]) -> [f64; 2],
+    ) -> Vec<[f64; 2]> {
+        let place = |node: [f64; 2]| [0, 1].map(|axis| centre_m[axis] + radius_m * node[axis]);
+        self.nodes.iter().map(|node| place(map(*node))).collect()
     }
 }
 

@@ -4,6 +4,7 @@
 //! is a look-up ([`kernel`]); pads and contacts are discs of a few densities ([`disc`]); the pads are eliminated once
 //! ([`pads`]), so that a contact costs a few look-ups and a small solve.
 
+mod cut;
 mod disc;
 mod green;
 mod image;
@@ -20,6 +21,7 @@ use std::sync::OnceLock;
 use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 
+use self::cut::CutDisc;
 use self::disc::{DiscBasis, MAX_DEGREE};
 use self::green::{Surface, SurfaceGreen};
 use self::image::{CellFields, ImageGrid};
@@ -78,7 +80,10 @@ struct Image {
 struct Disc {
     centre_m: [f64; 2],
     radius_m: f64,
+    /// Of the part on the detector (S), and the radius of a whole disc of its area (m).
     conductance_s: f64,
+    own_radius_m: f64,
+    cut: Option<CutDisc>,
     basis: &'static DiscBasis,
     nodes: Vec<[f64; 2]>,
     /// Of the pads' fields, means under the densities: `columns x densities`.
@@ -125,9 +130,20 @@ impl Slab {
         self.check_contact(contact).map_err(|what| ForwardError::Contact { index, what })?;
         let centre_m = from_corner(self.size_m, [contact.x_m, contact.y_m]);
         let basis = DiscBasis::of_degree(self.contact_degree(contact.radius_m));
-        let nodes = basis.nodes_m(centre_m, contact.radius_m);
+        let cut = CutDisc::new(self.size_m, centre_m, contact.radius_m);
+        let share = cut.map_or(1.0, |cut| cut.share());
+        let nodes = disc_nodes_m(basis, centre_m, contact.radius_m, cut);
         let fields = self.pads.under_disc(basis, &nodes);
-        Ok(Disc { centre_m, radius_m: contact.radius_m, conductance_s: contact.conductance_s, basis, nodes, fields })
+        Ok(Disc {
+            centre_m,
+            radius_m: contact.radius_m,
+            conductance_s: share * contact.conductance_s,
+            own_radius_m: share.sqrt() * contact.radius_m,
+            cut,
+            basis,
+            nodes,
+            fields,
+        })
     }
 
     /// The smooth part of the kernel varies over a split length: a disc that is wider needs more degrees.
@@ -193,7 +209,7 @@ impl Slab {
                 let scale = (disc.conductance_s * other.conductance_s).sqrt();
                 let mut block = self.block(disc, other, row == column) * scale;
                 if row == column {
-                    block += self.top.disc_self(disc.radius_m).reduced(disc.basis, 1.0, disc.conductance_s);
+                    block += self.top.disc_self(disc.own_radius_m).reduced(disc.basis, 1.0, disc.conductance_s);
                 }
                 let mut view = contacts.view_mut((row, column), block.shape());
                 view += block;
@@ -212,7 +228,7 @@ impl Slab {
         }
         let distance_m = (disc.centre_m[0] - other.centre_m[0]).hypot(disc.centre_m[1] - other.centre_m[1]);
         let [far, far_other] = [disc, other].map(|disc| disc.basis.seen_from(disc.radius_m / distance_m));
-        let nodes = [(disc, far), (other, far_other)].map(|(disc, far)| far.nodes_m(disc.centre_m, disc.radius_m));
+        let nodes = [(disc, far), (other, far_other)].map(|(disc, far)| disc_nodes_m(far, disc.centre_m, disc.radius_m, disc.cut));
         between(far, &nodes[0], far_other, &nodes[1], &self.top, &images, false)
     }
 }
@@ -313,6 +329,14 @@ fn check(detector: &Detector) -> Result<[f64; 2], String> {
         }
     }
     Ok(size_m)
+}
+
+/// The points of a basis on a disc, or on what walls leave of it (m).
+fn disc_nodes_m(basis: &DiscBasis, centre_m: [f64; 2], radius_m: f64, cut: Option<CutDisc>) -> Vec<[f64; 2]> {
+    match cut {
+        Some(cut) => basis.mapped_nodes_m(centre_m, radius_m, |node| cut.map(node)),
+        None => basis.nodes_m(centre_m, radius_m),
+    }
 }
 
 /// A place from the corner, given from the middle (m).

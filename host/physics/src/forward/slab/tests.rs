@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::detector::{Electrode, Outline};
-use crate::forward::readings_v;
+use crate::forward::{readings_v, spots};
+use crate::readings::Readings;
 use crate::forward::shell::Shell;
 
 fn square(thickness_m: f64, radius_m: f64) -> Detector {
@@ -99,6 +100,71 @@ fn the_thin_limit_is_the_shell() {
     });
     // What the shell lacks is the resistance across, in proportion to the thickness.
     assert!(errors[1] < 0.02 && errors[1] < 0.5 * errors[0], "{errors:?}");
+}
+
+#[test]
+fn discs_cut_by_walls_are_those_of_the_shell() {
+    let mut detector = square(0.00025, 0.002);
+    detector.layers[0] = Layer::uniform(0.00025, 0.3e-3 / 0.00025);
+    let (slab, shell) = (Slab::new(&detector).unwrap(), Shell::with_nodes(&detector, 8000).unwrap());
+    let both = |press: &[Contact]| [&slab as &dyn ForwardModel, &shell].map(|model| model.impedance_ohm(press).unwrap());
+    // Away from the wall, the two are as far apart as the thickness makes them.
+    let [inner, inner_shell] = both(&[contact(0.0, -0.012, 0.003, 1e-4)]);
+    let usual = apart(&detector, &inner_shell, &inner);
+    for (x_m, y_m) in [(0.0, -0.0295), (0.013, 0.03), (-0.0282, 0.007), (0.0285, 0.0291), (-0.03, 0.03)] {
+        let [cut, cut_shell] = both(&[contact(x_m, y_m, 0.003, 1e-4)]);
+        let off = apart(&detector, &cut_shell, &cut);
+        assert!(off < usual + 0.01, "{x_m} {y_m}: {off}, {usual} elsewhere");
+    }
+}
+
+#[test]
+fn discs_go_on_into_walls_without_a_jump() {
+    let detector = square(0.005, 0.002);
+    let slab = Slab::new(&detector).unwrap();
+    let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
+    let readings = |model: &Slab, y_m: f64| {
+        readings_v(&model.impedance_ohm(&[contact(0.003, y_m, 0.0025, 5e-4)]).unwrap(), &detector)
+    };
+    let off = |a: &Readings, b: &Readings| {
+        a.volts().iter().zip(b.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / b.largest_v()
+    };
+    let steps: Vec<_> = (0..60).map(|i| 0.0265 + 6e-5 * f64::from(i)).map(|y_m| readings(&slab, y_m)).collect();
+    let changes: Vec<_> = steps.windows(2).map(|pair| off(&pair[0], &pair[1])).collect();
+    assert!(changes.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 4e-3), "{changes:?}");
+    // The conductance of what is left counts: half a disc is half of it.
+    for y_m in [0.027, 0.0285, 0.0295, 0.03] {
+        assert!(off(&readings(&slab, y_m), &readings(&fine, y_m)) < 0.01, "{y_m}");
+    }
+}
+
+#[test]
+fn slopes_of_spots_near_walls_are_those_of_their_fields() {
+    let slab = Slab::new(&square(0.005, 0.002)).unwrap();
+    let spots = slab.spots(0.0025).unwrap();
+    let other = spots.spot([0.02, -0.021, 0.0]);
+    for at in [[0.003, 0.0293, 0.0], [-0.0264, 0.001, 0.0], [0.0284, 0.0277, 0.0], [0.0, -0.0299, 0.0]] {
+        let spot = spots.spot(at);
+        for axis in 0..2 {
+            let step_m = 1e-5;
+            let moved = |way_m: f64| {
+                let mut at = at;
+                at[axis] += way_m;
+                spots.spot(at)
+            };
+            let [before, after] = [-step_m, step_m].map(moved);
+            let slope = |of: &dyn Fn(&spots::Spot) -> f64| (of(&after) - of(&before)) / (2.0 * step_m);
+            let largest = spot.slopes_ohm_per_m.iter().flatten().copied().fold(0.0, |a: f64, b| a.max(b.abs()));
+            for e in 0..16 {
+                let off = slope(&|spot| spot.electrodes_ohm[e]) - spot.slopes_ohm_per_m[axis][e];
+                assert!(off.abs() < 0.02 * largest, "{at:?} {axis} {e}: {off} of {largest}");
+            }
+            let off = slope(&|spot| spots.between_ohm(&other, spot)) - spots.between(&other, &spot).by_second[axis];
+            assert!(off.abs() < 0.02 * largest, "{at:?} {axis}: {off} of {largest}");
+            let off = slope(&|spot| spot.share) - spot.share_slopes_per_m[axis];
+            assert!(off.abs() * 0.0025 < 1e-3, "{at:?} {axis}: {off}");
+        }
+    }
 }
 
 #[test]

@@ -6,14 +6,17 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::target::{Target, dot};
+use crate::solve::Problem;
 use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardModel, readings_v};
 use tactomo_physics::scene::Contact;
+use tactomo_physics::space;
 
 /// Parameters of a disc: x, y, logarithm of the conductance, logarithm of the radius.
 pub(super) const PARAMETERS: usize = 4;
 /// Standard deviation of the logarithm of a radius before anything is read: a factor of two or so.
-const RADIUS_DEVIATION: f64 = 0.7;
+pub(super) const RADIUS_DEVIATION: f64 = 0.7;
 /// The same of a conductance around the sheet's: nearly nothing is known.
 const CONDUCTANCE_DEVIATION: f64 = 4.0;
 /// Differences, in radii for places.
@@ -23,7 +26,8 @@ const LONGEST_LOG: f64 = 0.7;
 /// After so many steps, a fit that still leaves this times what noise and model error make is given up.
 const PROBATION: usize = 5;
 const HOPELESS: f64 = 30.0;
-/// Widest radius, in halves of the detector's shorter side: what is wider is an image's business.
+/// Widest radius, in halves of the side of a square of the detector's area, or of its outline's shorter side: what is wider is an
+/// image's business.
 const WIDEST: f64 = 0.6;
 /// Tries of one step, and the share of the cost below which a step is the last.
 const TRIES: usize = 4;
@@ -45,10 +49,19 @@ pub(super) struct DiscFitter<'a> {
     pub model: &'a dyn ForwardModel,
     pub usual_radius_m: f64,
     pub sheet_s: f64,
-    /// Half the size of the detector (m).
-    pub half_m: [f64; 2],
+    /// Where a disc may be.
+    pub fields: &'a dyn SpotFields,
+    /// Widest radius (m).
+    pub widest_m: f64,
     /// The detector as measured.
     pub detector: &'a Detector,
+}
+
+/// Widest radius of a disc on a detector (m).
+pub(super) fn widest_m(problem: &Problem) -> f64 {
+    let area_m2: f64 = problem.jacobian.image_mesh.node_areas_m2.iter().sum();
+    let [width_m, height_m] = problem.detector().outline.size_m();
+    0.5 * WIDEST * area_m2.sqrt().min(width_m).min(height_m)
 }
 
 impl DiscFitter<'_> {
@@ -111,12 +124,16 @@ impl DiscFitter<'_> {
         let moved = |(contact, [by_x, by_y, by_s, by_m]): (&Contact, &[f64; PARAMETERS])| {
             let shorten = (2.0 / by_x.hypot(*by_y)).min(1.0) * contact.radius_m;
             let limited = |log: f64| log.clamp(-LONGEST_LOG, LONGEST_LOG).exp();
+            let place_m = [contact.x_m, contact.y_m, contact.z_m];
+            let (place_m, [first, second]) = self.fields.footing(place_m);
+            let place_m = space::along(space::along(place_m, shorten * by_x, first), shorten * by_y, second);
+            let [x_m, y_m, z_m] = self.fields.footing(place_m).0;
             Contact {
-                x_m: (contact.x_m + shorten * by_x).clamp(-self.half_m[0], self.half_m[0]),
-                y_m: (contact.y_m + shorten * by_y).clamp(-self.half_m[1], self.half_m[1]),
+                x_m,
+                y_m,
+                z_m,
                 conductance_s: contact.conductance_s * limited(*by_s),
-                radius_m: (contact.radius_m * limited(*by_m)).min(WIDEST * self.half_m[0].min(self.half_m[1])),
-                ..*contact
+                radius_m: (contact.radius_m * limited(*by_m)).min(self.widest_m),
             }
         };
         at.iter().zip(steps).map(moved).collect()

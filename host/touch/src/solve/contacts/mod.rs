@@ -9,6 +9,9 @@
 mod discs;
 mod fit;
 mod network;
+#[cfg(test)]
+mod places_tests;
+mod radii;
 mod scan;
 mod search;
 mod solver;
@@ -21,6 +24,7 @@ use nalgebra::DMatrix;
 use self::discs::DiscFit;
 use self::fit::Fit;
 use self::network::{FitSpot, Network};
+use self::radii::Radii;
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(super) use self::solver::{ContactFollower, ContactSearcher};
@@ -31,8 +35,8 @@ use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-/// Nodes of the scan.
-const SCAN_NODES: usize = 600;
+/// Places of the scan.
+const SCAN_PLACES: usize = 600;
 /// Conductance of a contact in sheet conductances above which it is taken as saturated.
 const MOST_CONDUCTANCE: f64 = 300.0;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
@@ -69,6 +73,8 @@ pub(super) struct ContactFinder {
     scan: Scan,
     sheet_s: f64,
     spacing_m: f64,
+    /// Widest radius of a disc (m).
+    widest_m: f64,
     errors: Errors,
 }
 
@@ -79,8 +85,8 @@ pub(super) struct Found(Explanation);
 /// Contacts that explain a frame.
 #[derive(Clone, Debug)]
 enum Explanation {
-    /// Spots of the usual radius, and what the forward model's readings are over theirs (V).
-    Spots(Fit, Vec<f64>),
+    /// Spots, what the forward model's readings of contacts of these radii are over theirs (V), and the radii.
+    Spots(Fit, Vec<f64>, Radii),
     /// Discs.
     Discs(DiscFit),
 }
@@ -89,7 +95,7 @@ impl Explanation {
     /// Sum of squares of the weighted residuals.
     fn cost(&self) -> f64 {
         match self {
-            Self::Spots(fit, _) => fit.cost,
+            Self::Spots(fit, ..) => fit.cost,
             Self::Discs(fit) => fit.cost,
         }
     }
@@ -97,14 +103,14 @@ impl Explanation {
     /// Number of parameters that were fitted.
     fn parameters(&self) -> usize {
         match self {
-            Self::Spots(fit, _) => 3 * fit.spots.len(),
+            Self::Spots(fit, ..) => 3 * fit.spots.len(),
             Self::Discs(fit) => discs::PARAMETERS * fit.contacts.len(),
         }
     }
 
     fn is_settled(&self) -> bool {
         match self {
-            Self::Spots(fit, _) => fit.settled,
+            Self::Spots(fit, ..) => fit.settled,
             Self::Discs(fit) => fit.settled,
         }
     }
@@ -121,10 +127,9 @@ impl ContactFinder {
             detector: detector.name.clone(),
             what: format!("the {} has no fields of single contacts", problem.model.name()),
         })?;
-        let coarse = problem.model.on_image_of(SCAN_NODES)?;
         let network = Network::new(detector, problem.model.electrode_fields_ohm());
         Ok(Self {
-            scan: Scan::new(coarse.image_mesh(), &*fields, &network),
+            scan: Scan::new(&*fields, &network, SCAN_PLACES),
             network,
             fields,
             errors: Errors {
@@ -136,6 +141,7 @@ impl ContactFinder {
             },
             sheet_s: detector.sheet_conductance_s(),
             spacing_m: problem.spacing_m(),
+            widest_m: discs::widest_m(problem),
             problem: problem.clone(),
             settings,
         })
@@ -162,14 +168,14 @@ impl ContactFinder {
         target.count().saturating_sub(found.parameters()).max(1) as f64
     }
 
-    fn contact(&self, spot: &FitSpot) -> Contact {
+    fn contact(&self, spot: &FitSpot, radius_m: f64) -> Contact {
         let [x_m, y_m, z_m] = spot.spot.place_m;
-        Contact { z_m, ..Contact::flat(x_m, y_m, self.settings.radius_m, self.conductance_s(spot)) }
+        Contact { z_m, ..Contact::flat(x_m, y_m, radius_m, self.conductance_s(spot)) }
     }
 
-    /// Conductance of the contact of a spot (S).
+    /// Conductance of the contact of a spot (S), of which what is beyond an edge does nothing.
     fn conductance_s(&self, spot: &FitSpot) -> f64 {
-        1.0 / (spot.ohm - spot.spot.own_ohm).max(1.0 / self.most_s())
+        1.0 / (spot.ohm - spot.spot.own_ohm).max(1.0 / self.most_s()) / spot.spot.share
     }
 
     fn most_s(&self) -> f64 {
@@ -178,8 +184,12 @@ impl ContactFinder {
 
     fn solution(&self, found: &Explanation, target: &Target) -> Solution {
         let contacts = match found {
-            Explanation::Spots(fit, _) => {
-                let of = |(k, spot)| self.found_spot(spot, k, fit.covariance.as_ref());
+            Explanation::Spots(fit, _, radii) => {
+                let covariance = fit.covariance.as_ref().map(|covariance| radii.widened(covariance));
+                let of = |(k, spot)| {
+                    let found = self.found_spot(spot, k, covariance.as_ref());
+                    FoundContact { radius_m: radii.known_m(k), ..found }
+                };
                 fit.spots.iter().enumerate().map(of).collect()
             }
             Explanation::Discs(fit) => {
@@ -202,9 +212,7 @@ impl ContactFinder {
     fn found_spot(&self, spot: &FitSpot, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
         let [x_m, y_m, z_m] = spot.spot.place_m;
         let conductance_s = self.conductance_s(spot);
-        // `C = 1 / (A - own)`, so `dC = -C^2 A d(ln A)`.
-        let per_log_s = conductance_s * conductance_s * spot.ohm;
-        let uncertainty = covariance.map(|all| uncertainty(all, 3 * k, 1.0, per_log_s));
+        let uncertainty = covariance.map(|all| radii::uncertainty(all, k, spot, conductance_s));
         FoundContact { z_m, uncertainty, ..FoundContact::flat(x_m, y_m, conductance_s) }
     }
 }

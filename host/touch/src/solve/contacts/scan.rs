@@ -8,7 +8,6 @@ use super::fit::{Fit, Fitter};
 use super::network::{FitSpot, Network};
 use super::target::{Target, dot};
 use crate::solve::balance;
-use tactomo_physics::forward::ImageMesh;
 use tactomo_physics::forward::spots::{Spot, SpotFields};
 use tactomo_physics::space;
 
@@ -57,9 +56,9 @@ pub(super) struct Candidate {
 }
 
 impl Scan {
-    /// Looks at the nodes of a mesh.
-    pub fn new(mesh: &ImageMesh, fields: &dyn SpotFields, network: &Network) -> Self {
-        let spots: Vec<_> = (0..mesh.nodes_m.len()).map(|node| fields.spot(mesh.place_m(node))).collect();
+    /// Looks at about so many places.
+    pub fn new(fields: &dyn SpotFields, network: &Network, places: usize) -> Self {
+        let spots: Vec<_> = fields.places_m(places).into_iter().map(|place_m| fields.spot(place_m)).collect();
         Self { first: FirstLook::new(&spots, network), spots }
     }
 

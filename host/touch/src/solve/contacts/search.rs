@@ -5,10 +5,10 @@ use nalgebra::DMatrix;
 use super::discs::{DiscFit, DiscFitter, PARAMETERS};
 use super::fit::{Fit, Fitter};
 use super::network::FitSpot;
+use super::radii::Radii;
 use super::scan::{Candidate, Looks};
 use super::target::Target;
 use super::{ContactFinder, Explanation};
-use tactomo_physics::forward::readings_v;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::space::{self, Place};
@@ -18,9 +18,9 @@ const FIRST_STEPS: usize = 5;
 const FINALISTS: usize = 2;
 const COLD_STEPS: usize = 12;
 const WARM_STEPS: usize = 4;
-/// Steps after the readings were corrected, and how often they are.
+/// Steps after the readings were corrected, and how often they are at most: in corners, where spots are worst, five times do.
 const CORRECTED_STEPS: usize = 3;
-const CORRECTIONS: usize = 3;
+const CORRECTIONS: usize = 8;
 /// Steps of discs from spots, and from the frame before.
 const COLD_DISC_STEPS: usize = 12;
 const WARM_DISC_STEPS: usize = 3;
@@ -70,15 +70,13 @@ impl ContactFinder {
 
     /// What explains a frame, from what explains it so far: one contact more if that is all it takes, else from nothing.
     pub(super) fn search(&self, from: Option<&Explanation>, target: &Target) -> Option<Explanation> {
-        match from.and_then(|from| self.with_one_more(from, target)) {
-            Some(found) => Some(found),
-            None => self.explanation(target),
-        }
+        let found = from.and_then(|from| self.with_one_more(from, target)).or_else(|| self.explanation(target));
+        found.map(|found| self.with_radii(found, target))
     }
 
     /// The contacts of an explanation and one more, if these explain all.
     fn with_one_more(&self, from: &Explanation, target: &Target) -> Option<Explanation> {
-        let Explanation::Spots(fit, _) = from else { return None };
+        let Explanation::Spots(fit, ..) = from else { return None };
         let is_room = !fit.spots.is_empty() && fit.spots.len() < self.settings.most;
         let is_short = is_room && !explains(from, target);
         let more = is_short.then(|| self.one_more(&self.fitter(), std::slice::from_ref(fit), Vec::new(), target))??;
@@ -88,9 +86,9 @@ impl ContactFinder {
     /// An explanation of some frames ago, brought to this one.
     pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
         match found {
-            Explanation::Spots(fit, correction_v) => {
+            Explanation::Spots(fit, correction_v, radii) => {
                 let moved = self.fitter().fit(fit.spots, &target.less(&correction_v), COLD_STEPS)?;
-                Some(self.correct(moved, target, CORRECTIONS))
+                Some(self.correct(moved, &radii, target, CORRECTIONS))
             }
             Explanation::Discs(fit) => {
                 self.disc_fitter().fit(fit.contacts, target, COLD_DISC_STEPS).map(Explanation::Discs)
@@ -100,26 +98,27 @@ impl ContactFinder {
 
     /// The explanation without the contacts that may not be there, fitted again, if the readings ask for no more.
     pub(super) fn without_weak(&self, found: &Explanation, target: &Target) -> Option<Explanation> {
-        let Explanation::Spots(fit, correction_v) = found else { return None };
+        let Explanation::Spots(fit, correction_v, radii) = found else { return None };
         let is_sure = |k: &usize| !is_uncertain(fit.covariance.as_ref(), 3 * k + 2);
-        let sure: Vec<_> = (0..fit.spots.len()).filter(is_sure).map(|k| fit.spots[k].clone()).collect();
+        let sure: Vec<_> = (0..fit.spots.len()).filter(is_sure).collect();
         if sure.is_empty() {
             return None;
         }
-        let fewer = self.fitter().fit(sure, &target.less(correction_v), WARM_STEPS)?;
-        let fewer = self.correct(fewer, target, 1);
+        let spots = sure.iter().map(|k| fit.spots[*k].clone()).collect();
+        let fewer = self.fitter().fit(spots, &target.less(correction_v), WARM_STEPS)?;
+        let fewer = self.correct(fewer, &radii.of(&sure), target, 1);
         (score(&fewer) < score(found)).then_some(fewer)
     }
 
     /// The same contacts in the next frame; `None` if that makes no sense.
     pub(super) fn follow(&self, last: Explanation, target: &Target) -> Option<Explanation> {
         Some(match last {
-            Explanation::Spots(fit, correction_v) => {
+            Explanation::Spots(fit, correction_v, radii) => {
                 let moved = self.fitter().fit(fit.spots.clone(), &target.less(&correction_v), WARM_STEPS)?;
                 if is_near(&fit.spots, &moved, self.settings.radius_m) {
-                    Explanation::Spots(moved, correction_v)
+                    Explanation::Spots(moved, correction_v, radii)
                 } else {
-                    self.correct(moved, target, 1)
+                    self.correct(moved, &radii, target, 1)
                 }
             }
             Explanation::Discs(fit) => {
@@ -137,7 +136,7 @@ impl ContactFinder {
             return None;
         }
         let one = self.lowest_of(&looks, &first, target)?;
-        let mut best = self.correct(one.clone(), target, CORRECTIONS);
+        let mut best = self.correct(one.clone(), &self.usual(1), target, CORRECTIONS);
         let mut fits = vec![one];
         let mut starts: Vec<Vec<FitSpot>> = match explains(&best, target) {
             true => Vec::new(),
@@ -148,7 +147,7 @@ impl ContactFinder {
         };
         while fits.len() < self.settings.most && !explains(&best, target) {
             let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
-            let Explanation::Spots(fit, _) = &more else { break };
+            let Explanation::Spots(fit, ..) = &more else { break };
             let fit = fit.clone();
             let is_hopeful = |fewer: &Fit| fits.len() == 1 || fewer.cost < HOPEFUL * target.count() as f64;
             if score(&more) < score(&best)
@@ -179,7 +178,7 @@ impl ContactFinder {
         let (last, before) = fits.split_last()?;
         // What spots leave out of a wrong fit is of no use.
         let is_near = last.cost < NEARLY * target.count() as f64;
-        let correction_v = is_near.then(|| self.correction_v(last)).flatten();
+        let correction_v = is_near.then(|| self.correction_v(last, &self.usual(last.spots.len()))).flatten();
         let corrected = correction_v.map_or_else(|| target.clone(), |correction_v| target.less(&correction_v));
         let mut add = |fit: &Fit, of: &dyn Fn(&Looks<'_>) -> Vec<Candidate>| {
             let looks = self.scan.beside(fitter, fit, &corrected);
@@ -192,7 +191,9 @@ impl ContactFinder {
             add(before, &|looks| self.scan.pairs(looks, STARTS, self.apart_m()));
         }
         starts.extend((0..last.spots.len()).flat_map(|k| self.split(fitter, &last.spots, k)));
-        Some(self.correct(lowest(fitter, starts, &corrected)?, target, CORRECTIONS))
+        let fit = lowest(fitter, starts, &corrected)?;
+        let radii = self.usual(fit.spots.len());
+        Some(self.correct(fit, &radii, target, CORRECTIONS))
     }
 
     /// Starts nearer to each other are one (m).
@@ -218,10 +219,10 @@ impl ContactFinder {
     }
 
     /// Repeats a fit with the forward model's readings, so many times or until they settle.
-    fn correct(&self, mut fit: Fit, target: &Target, times: usize) -> Explanation {
+    pub(super) fn correct(&self, mut fit: Fit, radii: &Radii, target: &Target, times: usize) -> Explanation {
         let mut used_v = vec![0.0; fit.volts.len()];
         for _ in 0..times {
-            let Some(correction_v) = self.correction_v(&fit) else { break };
+            let Some(correction_v) = self.correction_v(&fit, radii) else { break };
             let changed_v = correction_v.iter().zip(&used_v).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             let corrected = target.less(&correction_v);
             let Some(next) = self.fitter().fit(fit.spots.clone(), &corrected, CORRECTED_STEPS) else { break };
@@ -230,21 +231,25 @@ impl ContactFinder {
                 break;
             }
         }
-        Explanation::Spots(fit, used_v)
+        Explanation::Spots(fit, used_v, radii.clone())
     }
 
     /// Readings of the forward model over those of the spots (V).
-    fn correction_v(&self, fit: &Fit) -> Option<Vec<f64>> {
-        let contacts: Vec<_> = fit.spots.iter().map(|spot| self.contact(spot)).collect();
-        let impedance_ohm = self.problem.model.impedance_ohm(&contacts).ok()?;
-        let exact = readings_v(&impedance_ohm, self.problem.detector());
-        Some(exact.volts().iter().zip(&fit.volts).map(|(exact, spots)| exact - spots).collect())
+    fn correction_v(&self, fit: &Fit, radii: &Radii) -> Option<Vec<f64>> {
+        let contact = |(k, spot)| self.contact(spot, radii.radius_m(k));
+        let exact_v = self.exact_v(&fit.spots.iter().enumerate().map(contact).collect::<Vec<_>>())?;
+        Some(exact_v.iter().zip(&fit.volts).map(|(exact, spots)| exact - spots).collect())
+    }
+
+    /// Radii as is usual.
+    fn usual(&self, count: usize) -> Radii {
+        Radii::usual(self.settings.radius_m, count)
     }
 
     /// Discs with radii of their own, from where spots are.
     fn discs(&self, fit: &Fit, target: &Target) -> Option<DiscFit> {
         let start = fit.spots.iter().map(|spot| {
-            let contact = self.contact(spot);
+            let contact = self.contact(spot, self.settings.radius_m);
             // A contact that is better than perfect is a wider one.
             let wider = (spot.spot.own_ohm / spot.ohm).max(1.0);
             let conductance_s = contact.conductance_s.min(10.0 * self.sheet_s);
@@ -256,7 +261,7 @@ impl ContactFinder {
     /// Whether a contact is so weak that it may not be there.
     pub(super) fn is_weak(&self, found: &Explanation) -> bool {
         match found {
-            Explanation::Spots(fit, _) => {
+            Explanation::Spots(fit, ..) => {
                 (0..fit.spots.len()).any(|k| is_uncertain(fit.covariance.as_ref(), 3 * k + 2))
             }
             // That of a firm disc is not known well either: more of it would change little.
@@ -281,7 +286,8 @@ impl ContactFinder {
             model: &*self.problem.model,
             usual_radius_m: self.settings.radius_m,
             sheet_s: self.sheet_s,
-            half_m: detector.outline.size_m().map(|size_m| size_m / 2.0),
+            fields: &*self.fields,
+            widest_m: self.widest_m,
             detector,
         }
     }
