@@ -2,11 +2,14 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{Auto, ForwardError, ForwardModel, Slab};
 use tactomo::scene::Contact;
 use tactomo::solve::Method;
+
+use super::output::message;
 
 /// Which forward model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -25,7 +28,7 @@ impl Model {
         match self {
             Self::Auto => {
                 let Auto { model, reason } = Auto::new(detector, nodes)?;
-                eprintln!("model of {}: {}, for {reason}", detector.name, model.name());
+                message!("model of {}: {}, for {reason}", detector.name, model.name());
                 Ok(model)
             }
             Self::Shell => {
@@ -75,9 +78,10 @@ pub fn detectors(chosen: &[Chosen], otherwise: &[&str]) -> anyhow::Result<Vec<De
     }
 }
 
-/// The solvers that were chosen, or all.
-pub fn methods(chosen: &[Method]) -> Vec<Method> {
-    if chosen.is_empty() { Method::ALL.to_vec() } else { chosen.to_vec() }
+/// Parses the name of a solver; `--help` lists all of them with what they are for.
+pub fn method() -> impl TypedValueParser<Value = Method> {
+    let values = Method::ALL.map(|method| PossibleValue::new(method.name()).help(method.explanation()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<Method>())
 }
 
 impl DetectorArgs {

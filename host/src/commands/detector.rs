@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use serde::Serialize;
 use tactomo::detector::{Detector, FOAMS, Foam, Stack, short};
 
 use super::choice::{self, Chosen, DetectorArgs};
-use super::output;
+use super::output::{self, NewFile, message};
 
 /// Lists, shows and checks detectors.
 ///
@@ -52,6 +51,9 @@ struct ShowArgs {
     /// Draws it in an SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    /// Replaces the file if it exists
+    #[arg(long, requires = "svg", visible_alias = "force")]
+    overwrite: bool,
     /// Prints it as a TOML file
     #[arg(long, conflicts_with = "json")]
     toml: bool,
@@ -101,8 +103,8 @@ fn table(list: &List) -> String {
 fn show(args: ShowArgs) -> anyhow::Result<()> {
     let detector = DetectorArgs { detector: args.detector, material: args.material }.get()?;
     if let Some(path) = &args.svg {
-        std::fs::write(path, detector.to_svg()).with_context(|| format!("cannot write {}", path.display()))?;
-        eprintln!("drew {} in {}", detector.name, path.display());
+        NewFile::new(path, args.overwrite)?.write(detector.to_svg())?;
+        message!("drew {} in {}", detector.name, path.display());
     }
     let text = match (args.toml, args.json) {
         (true, _) => detector.to_toml().trim_end().to_owned(),

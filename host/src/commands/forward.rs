@@ -15,7 +15,7 @@ use tactomo::simulate::{self, Measurement};
 use tactomo::study::case::Case;
 
 use super::choice::{self, DetectorArgs, Model};
-use super::output;
+use super::output::{self, NewFile, message};
 use super::scene::{self, Press, SceneArgs};
 
 /// Computes the readings of a detector for given contacts, or saves its Jacobian.
@@ -61,6 +61,9 @@ pub struct Args {
     /// Saves the Jacobian to a file, for `live --jacobian`
     #[arg(long, value_name = "FILE")]
     save_jacobian: Option<PathBuf>,
+    /// Replaces the file if it exists
+    #[arg(long, requires = "save_jacobian")]
+    overwrite: bool,
     /// Prints `{model, detector, image_nodes, touches, faults, readings_v, impedance_ohm}` as JSON
     #[arg(long)]
     json: bool,
@@ -86,10 +89,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         !touches.is_empty() || args.save_jacobian.is_some(),
         "nothing to compute: give --contact, --press, --touches, --scene (with something that touches then), --case or --save-jacobian"
     );
+    let jacobian = NewFile::optional(args.save_jacobian.as_ref(), args.overwrite)?;
     let model = model(args, &detector)?;
-    if let Some(path) = &args.save_jacobian {
-        Jacobian::of(&*model).save(path)?;
-        eprintln!("saved the Jacobian of {} ({}) to {}", detector.name, model.name(), path.display());
+    if let (Some(file), Some(path)) = (jacobian, &args.save_jacobian) {
+        Jacobian::of(&*model).save(file.unfinished_path())?;
+        file.finish()?;
+        message!("saved the Jacobian of {} ({}) to {}", detector.name, model.name(), path.display());
     }
     if touches.is_empty() {
         return Ok(());

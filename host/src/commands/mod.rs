@@ -5,7 +5,7 @@ mod detector;
 mod forward;
 mod interrupt;
 mod live;
-mod output;
+pub mod output;
 mod ports;
 mod reconstruct;
 mod record;
@@ -14,6 +14,7 @@ mod replay;
 mod scene;
 mod source;
 mod stability;
+mod study;
 mod tradeoff;
 mod validate;
 

@@ -4,7 +4,7 @@ use tactomo::board::link::discover::{self, Probe};
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo_protocol::Hello;
 
-use super::output;
+use super::output::{self, message};
 
 /// Lists the serial ports, and asks each USB port whether it has a board.
 ///
@@ -24,7 +24,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let ports = discover::ports();
     if ports.is_empty() {
-        eprintln!("no serial ports: is the board plugged in, with a cable that carries data?");
+        message!("no serial ports: is the board plugged in, with a cable that carries data?");
         return Ok(());
     }
     if args.no_probe {

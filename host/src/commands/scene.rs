@@ -9,6 +9,8 @@ use tactomo::hertz::{Hertz, POISSON, SURFACE_DEPTH_M, Skin};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
+use super::output::message;
+
 /// Seed unless said otherwise.
 const SEED: u64 = 1;
 
@@ -65,7 +67,7 @@ impl SceneArgs {
         let radius_m = self.tip.map_or_else(|| Fingertip::fitting_m(detector), |tip_mm| tip_mm * 1e-3);
         let hand = Hand::in_newtons(detector, Fingertip { hertz: self.hertz(foams, detector)?, force_n, radius_m });
         if let Some(beyond) = hand.beyond(1.0, 1.0) {
-            eprintln!("beyond Hertz's theory at {force_n} N: {beyond}");
+            message!("beyond Hertz's theory at {force_n} N: {beyond}");
         }
         Ok(hand)
     }
@@ -94,7 +96,7 @@ impl Press {
     pub fn touch(&self, hertz: &Hertz) -> Touch {
         let imprint = hertz.ball(self.radius_m, self.force_n);
         if let Some(beyond) = imprint.beyond {
-            eprintln!("beyond Hertz's theory at {} N: {beyond}", self.force_n);
+            message!("beyond Hertz's theory at {} N: {beyond}", self.force_n);
         }
         let shape = Shape::Disc { radius_m: imprint.half_width_m };
         let [x_m, y_m, z_m] = self.place_m;

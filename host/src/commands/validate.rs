@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use serde::Serialize;
+use tactomo::forward::ForwardModel;
 use tactomo::forward::shell::Shell;
-use tactomo::forward::{ForwardError, ForwardModel};
-use tactomo::solve::{Lambda, Method, Problem, Solver, Tikhonov, Variant};
+use tactomo::solve::{Lambda, Method, Parameter, Problem};
 use tactomo::study::case::Case;
 use tactomo::study::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
 
-use super::choice::Model;
+use super::choice::{self, Model};
 use super::output;
 
 /// Compares models and solvers with reference cases.
@@ -42,10 +42,10 @@ pub struct Args {
     /// How often each solver is tried, with new noise each time
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     trials: u32,
-    /// Solver to try; all, if none is given
-    #[arg(long, value_name = "NAME")]
+    /// Solver to try; give it again for more [default: all]
+    #[arg(long, value_name = "NAME", value_parser = choice::method(), hide_possible_values = true)]
     solver: Vec<Method>,
-    /// Tikhonov's lambda, as a share of the largest singular value
+    /// Lambda of the solvers that have one, as a share of the largest singular value
     #[arg(long, value_name = "SHARE", value_parser = positive)]
     lambda: Option<f64>,
     /// Prints `{cases: [...]}` as JSON
@@ -77,11 +77,12 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
         "shell" => Box::new(Shell::new(&case.detector)?),
         _ => forward,
     };
+    let lambda = args.lambda.map(|share| Parameter::Lambda(Lambda::Relative(share)));
     let trials = Trials { noise_lsb: args.noise_lsb, seed: args.seed, count: args.trials as usize };
     let problem = Problem::new(model);
     let solvers = Method::ALL.iter().filter(|m| args.solver.is_empty() || args.solver.contains(m));
     let solvers = solvers
-        .map(|method| Ok(try_solver(case, &mut *build(*method, &problem, args.lambda)?, &trials)?))
+        .map(|method| Ok(try_solver(case, &mut *method.build_with(&problem, lambda)?, &trials)?))
         .collect::<anyhow::Result<Vec<_>>>()?;
     Ok(CaseReport {
         case: case.detector.name.clone(),
@@ -91,15 +92,6 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
         reference_error: case.mesh_error_v / case.readings.largest_v(),
         solvers,
     })
-}
-
-fn build(method: Method, problem: &Problem, lambda: Option<f64>) -> Result<Box<dyn Solver>, ForwardError> {
-    let tikhonov = |lambda, variant| Ok(Box::new(Tikhonov::new(&problem.jacobian, lambda, variant)) as Box<dyn Solver>);
-    match (method, lambda.map(Lambda::Relative)) {
-        (Method::Tikhonov, Some(lambda)) => tikhonov(lambda, Variant::Balanced),
-        (Method::TikhonovPaper, Some(lambda)) => tikhonov(lambda, Variant::Paper),
-        _ => method.build(problem),
-    }
 }
 
 fn noise(text: &str) -> Result<f64, String> {

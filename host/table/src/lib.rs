@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+pub use self::csv::CsvWriter;
 pub use self::npz::NpzWriter;
 
 /// Longest file that is read (bytes).

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tactomo_protocol::{BoardMessage, BoardReceiver, Frame, Hello};
 
 use super::{FileFrame, FramesError};
-use crate::record::{Header, RecordReader};
+use crate::record::{Header, Loss, RecordReader};
 use crate::sequence::Sequence;
 
 /// A recording.
@@ -63,6 +63,11 @@ impl Recorded {
         &self.board
     }
 
+    /// What of the file could not be read so far.
+    pub fn loss(&self) -> Loss {
+        self.reader.loss()
+    }
+
     pub(super) fn next_frame(&mut self) -> Result<Option<FileFrame>, FramesError> {
         loop {
             if let Some(frame) = self.frames.pop_front() {
@@ -91,12 +96,14 @@ impl Recorded {
     }
 
     fn in_volts(&mut self, frame: &Frame) -> FileFrame {
-        let time_us = self.sequence.place(&frame.head).time_us;
-        let first_us = *self.first_us.get_or_insert(time_us);
+        let place = self.sequence.place(&frame.head);
+        let first_us = *self.first_us.get_or_insert(place.time_us);
         let bits = i32::from(self.board.adc_bits) + i32::from(frame.head.fraction_bits);
         let unit_v = f64::from(self.board.adc_full_scale_mv) * 1e-3 / 2f64.powi(bits);
         FileFrame {
-            time_s: Some(time_us.saturating_sub(first_us) as f64 * 1e-6),
+            time_s: Some(place.time_us.saturating_sub(first_us) as f64 * 1e-6),
+            sequence: Some(place.sequence),
+            lost_before: place.dropped,
             volts: frame.readings.iter().map(|&units| f64::from(units) * unit_v).collect(),
         }
     }
@@ -156,11 +163,13 @@ mod tests {
         let mut file = recorded("whole", &chunks).unwrap();
         assert_eq!((file.channels(), file.board().map(|board| board.drive_mv)), (16, Some(1500)));
         let frames: Vec<_> = std::iter::from_fn(|| file.next_frame().unwrap()).collect();
-        let of = |time_s: f64, volts: f64| FileFrame { time_s: Some(time_s), volts: vec![volts; 16] };
         assert_eq!(frames.len(), 3);
-        for (found, expected) in frames.iter().zip([of(0.0, 0.05), of(0.001, 0.02), of(0.006, 0.0)]) {
-            assert!((found.time_s.unwrap() - expected.time_s.unwrap()).abs() < 1e-12, "{found:?}");
-            assert!((found.volts[5] - expected.volts[5]).abs() < 1e-12, "{found:?}");
+        for (found, (time_s, sequence, lost_before, volts)) in
+            frames.iter().zip([(0.0, 3, 0, 0.05), (0.001, 4, 0, 0.02), (0.006, 9, 4, 0.0)])
+        {
+            assert!((found.time_s.unwrap() - time_s).abs() < 1e-12, "{found:?}");
+            assert!(found.volts.iter().all(|found_v: &f64| (found_v - volts).abs() < 1e-12), "{found:?}");
+            assert_eq!((found.sequence, found.lost_before), (Some(sequence), lost_before));
         }
     }
 

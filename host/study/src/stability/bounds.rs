@@ -3,7 +3,7 @@
 use super::scenes::{APART, pair};
 use super::sweep::{Bench, Trials};
 use crate::bound::cramer_rao;
-use crate::data::StudyError;
+use crate::experiment::StudyError;
 use crate::scenes::SceneKind;
 use tactomo_physics::scene::{Contact, Touch};
 

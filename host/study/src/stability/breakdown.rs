@@ -1,6 +1,6 @@
 //! What counts as broken.
 
-use crate::judge::Summary;
+use crate::score::Summary;
 
 /// Error from which a method is broken, in mean distances of electrodes, and in errors at the harmless point.
 const BROKEN_SHARE: f64 = 0.15;
@@ -60,7 +60,7 @@ pub struct Break {
     /// How.
     pub how: Breakdown,
     /// Whether it says so itself, by a flag in most frames of that point or most points alike, or refuses.
-    pub is_told: bool,
+    pub is_reported: bool,
     /// Share of the points that it survives.
     pub survives: f64,
 }
@@ -120,7 +120,7 @@ impl CellReport {
     }
 
     /// Whether the solver itself says that something is wrong.
-    pub fn is_told(&self) -> bool {
+    pub fn is_reported(&self) -> bool {
         self.flagged >= MOST || self.failed >= MOST
     }
 
@@ -161,18 +161,18 @@ pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<Ce
     // Points that are as bad as that one: a fault at one electrode after the other.
     let alike: Vec<usize> = order.iter().copied().filter(|index| severities[*index] == severities[first]).collect();
     let broken: Vec<_> = alike.iter().filter_map(broken).collect();
-    let told = broken.iter().filter(|(_, cell)| cell.is_told()).count();
+    let told = broken.iter().filter(|(_, cell)| cell.is_reported()).count();
     let at = match alike.len() {
         1 => labels[first].to_owned(),
         count => format!("{} of {count}", broken.len()),
     };
-    Some(Break { at, how: cell.broken?, is_told: 2 * told > broken.len(), survives })
+    Some(Break { at, how: cell.broken?, is_reported: 2 * told > broken.len(), survives })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::Times;
+    use crate::score::Times;
 
     fn cell(error_mm: f64) -> CellReport {
         let time_us = Times { median: 10.0, p99: 20.0, max: 30.0 };
@@ -183,7 +183,7 @@ mod tests {
     fn a_method_breaks_where_its_error_first_grows_beyond_twice_the_harmless_one() {
         let mut cells = [9.0, 3.0, 7.0, 5.0].map(|mm| Some(cell(mm)));
         let found = breaks(&["a", "b", "c", "d"], &[3.0, 0.0, 2.0, 1.0], &mut cells);
-        let expected = Break { at: "c".to_owned(), how: Breakdown::Error, is_told: false, survives: 0.5 };
+        let expected = Break { at: "c".to_owned(), how: Breakdown::Error, is_reported: false, survives: 0.5 };
         assert_eq!(found, Some(expected));
         assert_eq!(
             breaks(&["a", "b"], &[0.0, 1.0], &mut [Some(cell(0.1)), Some(cell(2.0))]),
@@ -197,7 +197,7 @@ mod tests {
         let told = CellReport { flagged: 1.0, ..cell(9.0) };
         let mut cells = [cell(0.1), cell(9.0), cell(0.2), told.clone(), told].map(Some);
         let found = breaks(&["none", "0", "1", "2", "3"], &[0.0, 1.0, 1.0, 1.0, 1.0], &mut cells);
-        let expected = Break { at: "3 of 4".to_owned(), how: Breakdown::Error, is_told: true, survives: 0.4 };
+        let expected = Break { at: "3 of 4".to_owned(), how: Breakdown::Error, is_reported: true, survives: 0.4 };
         assert_eq!(found, Some(expected));
     }
 
@@ -211,7 +211,7 @@ mod tests {
     fn what_is_worst_is_named() {
         let broken = |worse: CellReport| {
             breaks(&["a", "", "b"], &[0.0, -1.0, 1.0], &mut [Some(cell(0.1)), None, Some(worse)])
-                .map(|at| (at.how, at.is_told))
+                .map(|at| (at.how, at.is_reported))
         };
         let flagged = CellReport { not_finite: 0.1, missed: 1.0, flagged: 0.9, ..cell(9.0) };
         assert_eq!(broken(flagged), Some((Breakdown::NotFinite, true)));

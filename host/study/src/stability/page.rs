@@ -3,7 +3,6 @@
 use super::bounds::{BoundChart, BoundCurve};
 use super::{Breakdown, CellReport, Report, SolverRow, SweepReport};
 use crate::page::{Axis, Cell, Chart, Heat, Mark, Row, Series, Unit, html, machine};
-use crate::variant::family;
 use tactomo_touch::solve::Method;
 
 /// Errors below this show there (m).
@@ -75,7 +74,7 @@ fn overview_cell(sweep: &SweepReport, solver: &str) -> Cell {
         level: Some(level),
         text: found.at.clone(),
         detail: found.how.name().to_owned(),
-        is_flagged: found.is_told,
+        is_flagged: found.is_reported,
         tells: format!("holds at {:.0} % of the points", 100.0 * found.survives),
     }
 }
@@ -108,7 +107,7 @@ fn cell(cell: &Option<CellReport>) -> Cell {
         level: Some(cell.level),
         text: number + &marks,
         detail: String::new(),
-        is_flagged: cell.is_told(),
+        is_flagged: cell.is_reported(),
         tells: format!(
             "count right in {:.0} % of frames, missed {:.2}, invented {:.2}, conductance off by {}, p99 {}, flagged in {:.0} % of frames",
             100.0 * cell.count_right.unwrap_or(0.0),
@@ -159,7 +158,7 @@ fn curve(curve: &BoundCurve) -> Series {
     let mark = |[x, y]: &[f64; 2]| Mark { x: *x, y: *y, tells: format!("{}: {}", x, Unit::Metres.text(*y)) };
     Series {
         name: curve.solver.clone().unwrap_or_else(|| "noise limit".to_owned()),
-        class: method.map_or("bound", |method| family(method).class()),
+        class: method.map_or("bound", |method| method.family().class()),
         marks: curve.points.iter().map(mark).collect(),
         main: curve.points.len() / 2,
         is_joined: true,

@@ -14,7 +14,7 @@ pub fn table(report: &Report) -> String {
                     "breaks at {:<10} {:<10} {:<14} holds at {:.0} % of the points",
                     found.at,
                     found.how.name(),
-                    if found.is_told { "and says so" } else { "and is silent" },
+                    if found.is_reported { "and says so" } else { "and is silent" },
                     100.0 * found.survives
                 ),
             };

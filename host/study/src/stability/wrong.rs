@@ -1,7 +1,7 @@
 //! Sweeps of what the model has wrong, and of what the program was told wrong.
 
 use super::sweep::{Bench, Sweep};
-use crate::data::{Laboratory, StudyError};
+use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
 use tactomo_physics::detector::{Adc, Detector, Layer};
 use tactomo_physics::forward::shell::Shell;
@@ -38,18 +38,18 @@ pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
         .collect()
 }
 
-/// A sweep on a firm contact: how bad a value is, and the laboratory for it.
+/// A sweep on a firm contact: how bad a value is, and the experiment for it.
 fn firm<T: Copy>(
     bench: &Bench,
     (title, note): (&'static str, &str),
     values: &[T],
     label: impl Fn(T) -> String,
     severity: impl Fn(T) -> f64,
-    laboratory: impl Fn(T) -> Result<Laboratory, StudyError>,
+    experiment: impl Fn(T) -> Result<Experiment, StudyError>,
 ) -> Result<Sweep, StudyError> {
     let points = bench
         .some(values)
-        .map(|value| bench.point(label(*value), severity(*value), laboratory(*value)?, SceneKind::Firm))
+        .map(|value| bench.point(label(*value), severity(*value), experiment(*value)?, SceneKind::Firm))
         .collect::<Result<_, _>>()?;
     Ok(Sweep { title, note: note.to_owned(), points })
 }
@@ -81,10 +81,10 @@ fn conductivity(bench: &Bench) -> Result<Sweep, StudyError> {
     firm(bench, what, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
 }
 
-/// A laboratory of a detector so thin that the shell is right: the only model of uneven conductivity.
-fn thin(bench: &Bench) -> Result<Laboratory, StudyError> {
+/// A experiment of a detector so thin that the shell is right: the only model of uneven conductivity.
+fn thin(bench: &Bench) -> Result<Experiment, StudyError> {
     let detector = &bench.sound.detector;
-    Laboratory::new(&as_thick(detector, THIN * pad_radius_m(detector)))
+    Experiment::new(&as_thick(detector, THIN * pad_radius_m(detector)))
 }
 
 fn uneven(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -108,7 +108,7 @@ fn spread(bench: &Bench) -> Result<Sweep, StudyError> {
         "Standard deviation of their logarithm, where pads have 1e-3 ohm m2, which the model has for all.",
     );
     let felt = Detector { contact_impedance_ohm_m2: FELT_OHM_M2, ..bench.sound.detector.clone() };
-    let felt = Laboratory::new(&felt)?;
+    let felt = Experiment::new(&felt)?;
     let of = |deviation| felt.with_faults(&[Fault::ContactSpread { deviation }], bench.plan.seed);
     firm(bench, what, &SPREADS, percent, |deviation| deviation, of)
 }
@@ -149,8 +149,8 @@ fn shell(bench: &Bench) -> Result<Sweep, StudyError> {
     let detector = &bench.sound.detector;
     let of = |radii| {
         let detector = as_thick(detector, radii * pad_radius_m(detector));
-        let laboratory = Laboratory::new(&detector)?;
-        Ok(laboratory.inverted_on(Box::new(Shell::new(&detector)?)))
+        let experiment = Experiment::new(&detector)?;
+        Ok(experiment.inverted_on(Box::new(Shell::new(&detector)?)))
     };
     firm(bench, what, &SHELL_THICKNESSES, |radii| format!("{radii}"), |radii| radii, of)
 }

@@ -2,9 +2,9 @@
 
 use super::table::{label, names, number};
 use super::{DetectorReport, Group, Report, SceneKind, SolverReport};
-use crate::judge::Summary;
 use crate::page::{Axis, Chart, Mark, Series, Unit, escaped, folded, html, machine, table};
-use crate::variant::Family;
+use crate::score::Summary;
+use tactomo_touch::solve::Family;
 
 /// Errors below this show there (m).
 const FLOOR_M: f64 = 1e-5;
@@ -37,16 +37,9 @@ pub fn picture(report: &Report) -> String {
 fn legend(report: &Report) -> String {
     let solvers = || report.detectors.iter().flat_map(|detector| &detector.solvers);
     let mut items = String::new();
-    for (family, name) in [
-        (Family::Paper, "the paper's"),
-        (Family::Linear, "linear images"),
-        (Family::Image, "images under a constraint or the full physics"),
-        (Family::Contacts, "a few contacts"),
-        (Family::Learned, "learned from presses"),
-        (Family::Auto, "chooses by itself"),
-    ] {
+    for family in Family::ALL {
         if solvers().any(|solver| solver.family == family) {
-            items += &format!("<li class=\"{}\">{name}</li>", family.class());
+            items += &format!("<li class=\"{}\">{}</li>", family.class(), family.title());
         }
     }
     format!("<ul class=\"legend\">{items}</ul>")

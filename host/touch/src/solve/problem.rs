@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
-use tactomo_physics::forward::{ForwardModel, Through};
+use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, Through};
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -16,6 +16,14 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// The problem of a detector, on the model that it needs: see [`Auto`].
+    ///
+    /// # Errors
+    /// [`ForwardError`] if the detector cannot be modelled.
+    pub fn of(detector: &Detector) -> Result<Self, ForwardError> {
+        Ok(Self::new(Auto::new(detector, None)?.model))
+    }
+
     /// The problem of a model, measured as its detector says.
     pub fn new(model: impl Into<Arc<dyn ForwardModel>>) -> Self {
         let model = model.into();

@@ -51,7 +51,7 @@ pub struct Frame {
 }
 
 /// A detector, what it is simulated with and what is inverted.
-pub struct Laboratory {
+pub struct Experiment {
     /// The detector as it is told.
     pub detector: Detector,
     /// What solvers get.
@@ -68,7 +68,7 @@ pub struct Laboratory {
     baseline: Option<Readings>,
 }
 
-impl Laboratory {
+impl Experiment {
     /// A sound detector, inverted on the model that it needs.
     ///
     /// # Errors
@@ -207,53 +207,53 @@ mod tests {
     use super::*;
     use crate::scenes::SceneKind;
 
-    fn laboratory() -> Laboratory {
-        Laboratory::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
+    fn experiment() -> Experiment {
+        Experiment::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
     }
 
-    fn readings(laboratory: &Laboratory, seed: u64) -> Readings {
-        let touches = SceneKind::Firm.frames(&laboratory.detector, 1, 1);
-        laboratory.frames(&touches, seed).unwrap().remove(0).readings
+    fn readings(experiment: &Experiment, seed: u64) -> Readings {
+        let touches = SceneKind::Firm.frames(&experiment.detector, 1, 1);
+        experiment.frames(&touches, seed).unwrap().remove(0).readings
     }
 
     #[test]
     fn readings_are_the_finer_models_with_noise_and_those_of_a_seed() {
-        let laboratory = laboratory();
-        let first = readings(&laboratory, 1);
-        assert_eq!(first, readings(&laboratory, 1));
-        assert_ne!(first, readings(&laboratory, 2));
-        let contact = SceneKind::Firm.frames(&laboratory.detector, 1, 1)[0][0].disc().unwrap();
-        let model = readings_v(&laboratory.problem.model.impedance_ohm(&[contact]).unwrap(), &laboratory.detector);
+        let experiment = experiment();
+        let first = readings(&experiment, 1);
+        assert_eq!(first, readings(&experiment, 1));
+        assert_ne!(first, readings(&experiment, 2));
+        let contact = SceneKind::Firm.frames(&experiment.detector, 1, 1)[0][0].disc().unwrap();
+        let model = readings_v(&experiment.problem.model.impedance_ohm(&[contact]).unwrap(), &experiment.detector);
         let off = first.volts().iter().zip(model.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off > 0.0 && off < 0.02 * model.largest_v() + 0.006, "{off}");
     }
 
     #[test]
     fn a_wrong_sign_shows_in_the_readings_at_rest_and_is_taken_off() {
-        let laboratory = laboratory();
-        let wrong = laboratory.with_faults(&[Fault::Invert { channel: 3 }], 1).unwrap();
-        let (sound, wrong) = (readings(&laboratory, 1), readings(&wrong, 1));
+        let experiment = experiment();
+        let wrong = experiment.with_faults(&[Fault::Invert { channel: 3 }], 1).unwrap();
+        let (sound, wrong) = (readings(&experiment, 1), readings(&wrong, 1));
         assert!(sound.at(7, 3) > 0.02 && (wrong.at(7, 3) + sound.at(7, 3)).abs() < 0.02, "{}", wrong.at(7, 3));
         assert!((wrong.at(7, 4) - sound.at(7, 4)).abs() < 0.02);
     }
 
     #[test]
     fn a_baseline_under_load_is_taken_off() {
-        let laboratory = laboratory();
-        let contact = SceneKind::Firm.frames(&laboratory.detector, 1, 1)[0][0].disc().unwrap();
-        let loaded = readings(&laboratory.with_baseline(&[contact]).unwrap(), 1);
+        let experiment = experiment();
+        let contact = SceneKind::Firm.frames(&experiment.detector, 1, 1)[0][0].disc().unwrap();
+        let loaded = readings(&experiment.with_baseline(&[contact]).unwrap(), 1);
         assert!(loaded.volts().iter().all(|volts| volts.abs() < 0.01), "the same contact is no change");
     }
 
     #[test]
     fn solvers_know_of_another_converter_but_not_of_a_wrong_detector() {
-        let laboratory = laboratory();
-        let mut other = laboratory.detector.clone();
+        let experiment = experiment();
+        let mut other = experiment.detector.clone();
         other.adc.bits = 10;
-        assert_eq!(laboratory.measured_as(&other).problem.detector().adc.bits, 10);
+        assert_eq!(experiment.measured_as(&other).problem.detector().adc.bits, 10);
         other.layers[0].thickness_m *= 2.0;
-        let wrong = laboratory.with_truth(&other).unwrap();
-        assert_eq!(wrong.problem.detector(), &laboratory.detector);
-        assert_ne!(readings(&wrong, 1), readings(&laboratory, 1));
+        let wrong = experiment.with_truth(&other).unwrap();
+        assert_eq!(wrong.problem.detector(), &experiment.detector);
+        assert_ne!(readings(&wrong, 1), readings(&experiment, 1));
     }
 }
