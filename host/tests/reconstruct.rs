@@ -303,7 +303,7 @@ fn wrong_files_are_told() {
         (nan.name(), "frame 1: the reading of electrode 5 with electrode 3 grounded is not a finite number"),
         (text.name(), "line 2, column 1: `how are you?` is not a number"),
         (typo.name(), "line 1, column 3: `O.1` is not a number; to name the columns"),
-        (broken.name(), "no NPZ file"),
+        (broken.name(), "not an NPZ file"),
         (recording.name(), "is not a recording of tactomo, or its header is damaged"),
         ("no/such.csv", "cannot read no/such.csv: No such file"),
     ] {

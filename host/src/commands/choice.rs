@@ -14,11 +14,11 @@ use super::output::message;
 /// Which forward model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Model {
-    /// The one that the detector needs, and says why.
+    /// Chooses shell or slab by the detector, and prints why.
     Auto,
-    /// Thin shell of triangles: any outline, no thickness.
+    /// Thin shell of triangles: any outline or curved surface; for thin layers.
     Shell,
-    /// Layers in full depth: rectangles only.
+    /// Layers in three dimensions: rectangles only.
     Slab,
 }
 
@@ -28,7 +28,7 @@ impl Model {
         match self {
             Self::Auto => {
                 let Auto { model, reason } = Auto::new(detector, nodes)?;
-                message!("model of {}: {}, for {reason}", detector.name, model.name());
+                message!("model of {}: {}, since {reason}", detector.name, model.name());
                 Ok(model)
             }
             Self::Shell => {
@@ -46,7 +46,7 @@ pub struct DetectorArgs {
     /// Detector: name of a preset, or a TOML file
     #[arg(long, value_name = "NAME|FILE", value_parser = detector, default_value = Detector::DEFAULT)]
     pub detector: Chosen,
-    /// Foam that the detector is made of, or stack of foams with the upper one first, as in `BC`
+    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC
     #[arg(long, value_name = "A..D|STACK")]
     pub material: Option<Stack>,
 }
@@ -85,7 +85,7 @@ pub fn method() -> impl TypedValueParser<Value = Method> {
 }
 
 impl DetectorArgs {
-    /// What the detector is made of, if that is known: presets are of sample A, a file does not tell how soft its layers are.
+    /// What the detector is made of, if that is known: presets are of sample A, a file does not say how soft its layers are.
     pub fn foams(&self) -> Option<Stack> {
         match &self.detector {
             Chosen::Preset(_) => self.material.clone().or_else(|| "A".parse().ok()),
@@ -113,7 +113,7 @@ pub fn detector(name: &str) -> Result<Chosen, String> {
         return Ok(Chosen::File(path));
     }
     let names = Detector::preset_names().collect::<Vec<_>>().join(", ");
-    Err(format!("no such detector; there are {names}, and files such as my.toml"))
+    Err(format!("there is no preset of that name; choose one of {names}, or a file such as my.toml"))
 }
 
 /// A contact from `x_mm,y_mm,radius_mm,conductance_s`, with `z_mm` after `y_mm` on a curved detector.

@@ -24,7 +24,7 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Action {
-    /// Lists the presets, and the foams that `--material` takes
+    /// Lists the presets, and the foams for `--material`
     List {
         /// Prints `{detectors, foams}` as JSON
         #[arg(long)]
@@ -32,7 +32,7 @@ enum Action {
     },
     /// Shows a detector
     Show(ShowArgs),
-    /// Checks files; the first one that is no detector is an error
+    /// Checks detector files
     Check {
         /// TOML files
         #[arg(required = true, value_name = "FILE")]
@@ -45,10 +45,10 @@ struct ShowArgs {
     /// Name of a preset, or a TOML file
     #[arg(value_name = "NAME|FILE", value_parser = choice::detector, default_value = Detector::DEFAULT)]
     detector: Chosen,
-    /// Foam, or stack of foams with the upper one first, as in `BC`
+    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC
     #[arg(long, value_name = "A..D|STACK")]
     material: Option<Stack>,
-    /// Draws it in an SVG file
+    /// Draws it into an SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Replaces the file if it exists

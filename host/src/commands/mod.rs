@@ -20,7 +20,7 @@ mod validate;
 
 use clap::{Parser, Subcommand};
 
-/// Live pictures of touch from a tomographic tactile sensor, and its simulator.
+/// Shows touch on a tomographic tactile sensor, live, from recordings or simulated.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
 pub struct Cli {

@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-/// Prints a message on stderr, as `eprintln!` does, but without a panic where nobody reads it.
+/// Prints a message on stderr, as `eprintln!` does, but without a panic where stderr is closed.
 macro_rules! message {
     ($($text:tt)*) => { $crate::commands::output::print_message(format_args!($($text)*)) };
 }
 pub(crate) use message;
 
-/// Prints a line or lines on stderr. Where that is closed there is nobody to hear of it.
+/// Prints a line or lines on stderr. Where stderr is closed, nobody reads it.
 pub fn print_message(text: Arguments) {
     drop(writeln!(io::stderr(), "{text}"));
 }

@@ -6,16 +6,16 @@ use tactomo_protocol::Hello;
 
 use super::output::{self, message};
 
-/// Lists the serial ports, and asks each USB port whether it has a board.
+/// Lists the serial ports, and which USB ports have a board.
 ///
 /// Example: tactomo ports
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
-    /// Lists only: opening a port resets many boards
+    /// Lists the ports without opening them: opening resets many boards
     #[arg(long)]
     no_probe: bool,
-    /// Bits a second of the serial ports
+    /// Baud rate of the serial ports
     #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     baud: u32,
 }

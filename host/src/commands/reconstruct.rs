@@ -17,11 +17,12 @@ use self::writer::Writer;
 use super::choice::{self, DetectorArgs, Model};
 use super::output::message;
 
-/// Finds contacts and images in the readings of a file: a recording, or a table of numbers (CSV, NPY or NPZ).
+/// Finds contacts and images in a recording, or in a table of readings (CSV, NPY or NPZ).
 ///
-/// A table has one frame a row: the readings in volts, electrode by electrode for each grounded electrode, 256 for 16 electrodes.
-/// An array may also be frames x 16 x 16; in an NPZ file it is called readings_v. The mean of the first frames, the baseline, is
-/// subtracted: see --rest.
+/// A table has one frame per row: the readings in volts, electrode by electrode for each
+/// grounded electrode, 256 for 16 electrodes. An array may also be frames x 16 x 16; in an NPZ
+/// file it is called readings_v. The baseline, the mean of the first frames, is subtracted: see
+/// --rest.
 ///
 /// Examples:
 ///   tactomo reconstruct touch.tactomo --solver nonlinear --json

@@ -6,10 +6,11 @@ use super::choice::DetectorArgs;
 use super::output::{self, NewFile, message};
 use super::study::StudyArgs;
 
-/// Sweeps what can go wrong, from harmless to hopeless, and tells where each solver breaks, how, and whether it says so itself.
+/// Finds where each solver breaks, how, and whether it reports it.
 ///
-/// Noise, converter, force, near contacts, edges, wrong thickness and conductivity, baselines under load, dead and exchanged
-/// electrodes, and more; and the Cramer-Rao bound beside what solvers reach. Takes some minutes, with --quick about one.
+/// Varied are noise, converter, force, the distance of two contacts and of edges, thickness and
+/// conductivity, the baseline, faulty electrodes and more; and errors are compared with the
+/// Cramer-Rao bound. Takes some minutes, with --quick about one.
 ///
 /// Examples:
 ///   tactomo stability --quick --out stability.html

@@ -12,10 +12,10 @@ use crate::heap::HEAP;
 /// Detectors unless others are asked for: the default, a thin narrow one, a large one of 32 electrodes, and a very thin small one.
 const DETECTORS: [&str; 4] = ["square-60", "strip-13x60", "display-140x70", "fingertip-10"];
 
-/// Charts the time a frame takes against the error, for every solver, over scenes from nothing to a hand.
+/// Charts time per frame against error for every solver, on scenes from no touch to a hand.
 ///
-/// Readings are simulated on a finer model than any that is inverted, with the converter's noise and steps. Takes some minutes, with
-/// --quick about 20 seconds. Let nothing else run meanwhile.
+/// Readings are simulated on a finer model than the ones inverted, with the converter's noise
+/// and steps. Takes some minutes, with --quick about 20 seconds. Let nothing else run meanwhile.
 ///
 /// Examples:
 ///   tactomo tradeoff --quick --out tradeoff.html
@@ -23,12 +23,12 @@ const DETECTORS: [&str; 4] = ["square-60", "strip-13x60", "display-140x70", "fin
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
-    /// Detector: name of a preset, or a TOML file; give it again for more. Else a set of four, with --quick square-60
+    /// Detector: name of a preset, or a TOML file; give it again for more [default: four presets, with --quick square-60]
     #[arg(long, value_name = "NAME|FILE", value_parser = choice::detector)]
     detector: Vec<Chosen>,
     #[command(flatten)]
     study: StudyArgs,
-    /// Writes the first detector's charts alone
+    /// Writes a page with the first detector's charts only, for a document
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
 }

@@ -15,8 +15,8 @@ use super::output;
 
 /// Compares models and solvers with reference cases.
 ///
-/// The forward model computes the readings of each case; solvers, on that model's image mesh (of the default size), read
-/// the contacts from the readings that the case gives.
+/// The forward model computes the readings of each case, to compare with the ones in the file;
+/// the solvers find contacts from the readings in the file.
 ///
 /// Examples:
 ///   tactomo validate reference/slab/*.json --noise-lsb 1.5 --trials 20
@@ -30,16 +30,16 @@ pub struct Args {
     /// Forward model
     #[arg(long, value_enum, default_value = "auto")]
     model: Model,
-    /// Nodes of the shell's mesh for the forward comparison, about
+    /// Approximate number of nodes of the shell's mesh, to compare readings
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     nodes: u32,
-    /// Adds noise of so many LSB to quantised readings
+    /// Quantises the readings and adds noise of this standard deviation (LSB)
     #[arg(long, value_name = "LSB", value_parser = noise)]
     noise_lsb: Option<f64>,
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How often each solver is tried, with new noise each time
+    /// Trials of each solver, with new noise each
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     trials: u32,
     /// Solver to try; give it again for more [default: all]
@@ -97,14 +97,14 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
 fn noise(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(lsb) if (0.0..1e6).contains(&lsb) => Ok(lsb),
-        _ => Err("a number of LSB is needed, zero or above".to_owned()),
+        _ => Err("a number of LSB is needed, 0 or more".to_owned()),
     }
 }
 
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(share) if share > 0.0 && f64::is_finite(share) => Ok(share),
-        _ => Err("a number above zero is needed".to_owned()),
+        _ => Err("a number above 0 is needed".to_owned()),
     }
 }
 

@@ -14,7 +14,7 @@ const SLOW_US: f64 = 10_000.0;
 const SLOW_FACTOR: f64 = 10.0;
 /// Errors up to such shares of the mean distance of electrodes are of level 0, 1, 2, 3; above, 4.
 const LEVELS: [f64; 4] = [0.03, 0.1, 0.3, 0.6];
-/// Share of frames from which something is said to be so.
+/// Share of frames from which a solver counts as refusing, or as flagging: most of them.
 const MOST: f64 = 0.5;
 
 /// How a method breaks.
@@ -59,7 +59,7 @@ pub struct Break {
     pub at: String,
     /// How.
     pub how: Breakdown,
-    /// Whether it says so itself, by a flag in most frames of that point or most points alike, or refuses.
+    /// Whether the solver reports it itself, by a flag in most frames of that point or of most points alike, or by refusing.
     pub is_reported: bool,
     /// Share of the points that it survives.
     pub survives: f64,
@@ -146,7 +146,7 @@ impl CellReport {
     }
 }
 
-/// Judges the cells of a row, and tells where it breaks first.
+/// Judges the cells of a row, and finds where it breaks first.
 pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<CellReport>]) -> Option<Break> {
     let mut order: Vec<usize> = (0..cells.len()).filter(|index| cells[*index].is_some()).collect();
     order.sort_by(|a, b| severities[*a].total_cmp(&severities[*b]));
@@ -161,12 +161,12 @@ pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<Ce
     // Points that are as bad as that one: a fault at one electrode after the other.
     let alike: Vec<usize> = order.iter().copied().filter(|index| severities[*index] == severities[first]).collect();
     let broken: Vec<_> = alike.iter().filter_map(broken).collect();
-    let told = broken.iter().filter(|(_, cell)| cell.is_reported()).count();
+    let reported = broken.iter().filter(|(_, cell)| cell.is_reported()).count();
     let at = match alike.len() {
         1 => labels[first].to_owned(),
         count => format!("{} of {count}", broken.len()),
     };
-    Some(Break { at, how: cell.broken?, is_reported: 2 * told > broken.len(), survives })
+    Some(Break { at, how: cell.broken?, is_reported: 2 * reported > broken.len(), survives })
 }
 
 #[cfg(test)]
@@ -193,9 +193,9 @@ mod tests {
     }
 
     #[test]
-    fn of_points_alike_it_tells_how_many_break() {
-        let told = CellReport { flagged: 1.0, ..cell(9.0) };
-        let mut cells = [cell(0.1), cell(9.0), cell(0.2), told.clone(), told].map(Some);
+    fn of_points_alike_it_counts_how_many_break() {
+        let flagged = CellReport { flagged: 1.0, ..cell(9.0) };
+        let mut cells = [cell(0.1), cell(9.0), cell(0.2), flagged.clone(), flagged].map(Some);
         let found = breaks(&["none", "0", "1", "2", "3"], &[0.0, 1.0, 1.0, 1.0, 1.0], &mut cells);
         let expected = Break { at: "3 of 4".to_owned(), how: Breakdown::Error, is_reported: true, survives: 0.4 };
         assert_eq!(found, Some(expected));

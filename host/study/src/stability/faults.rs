@@ -20,12 +20,12 @@ const KINDS: [Kind; 5] = [
     ("A channel of the wrong gain", "0.8 of the voltage.", |channel, _| Fault::Gain { channel, factor: 0.8 }),
 ];
 
-/// Electrodes that a quick study tries: every so manieth.
+/// A quick study tries every fifth electrode.
 const QUICK_STEP: usize = 5;
 /// Frames that the guard has seen before electrodes are left out as it says.
 const SEEN: usize = 48;
 /// The kinds, from the first, that are also tried with what the guard finds left out, and the solver that it guards meanwhile: an exchange is looked
-/// for where that keeps telling of a misfit, which `kernel` does soon; all others the readings tell by themselves.
+/// for where that keeps flagging a misfit, which `kernel` does soon; all others show in the readings alone.
 const GUARDED: [(&str, Method); 3] = [
     ("A dead electrode, left out", Method::TikhonovPaper),
     ("Two electrodes shorted, left out", Method::TikhonovPaper),
@@ -83,7 +83,7 @@ fn found_wrong(point: &Point, method: Method) -> Result<Vec<usize>, StudyError> 
     let Some(frame) = point.places.first().and_then(|frames| frames.first()) else { return Ok(Vec::new()) };
     let mut guard = Guard::new(method, &point.experiment.problem)?;
     for frame in point.experiment.frames(&vec![frame.touches.clone(); SEEN], 1)? {
-        // Readings that it refuses tell it nothing.
+        // It learns nothing from readings that it refuses.
         drop(guard.solve(&frame.readings));
     }
     Ok(guard.excluded().iter().map(|(electrode, _)| *electrode).collect())

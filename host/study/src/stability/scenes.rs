@@ -168,7 +168,7 @@ fn apart_firm(bench: &Bench) -> Result<Sweep, StudyError> {
         bench,
         SceneKind::Firm,
         "Distance of two firm contacts",
-        "0.3 sheet conductances each. What is not told apart is missed.",
+        "0.3 sheet conductances each. Two that are found as one count as one missed.",
     )
 }
 
@@ -224,7 +224,7 @@ fn width(bench: &Bench) -> Result<Sweep, StudyError> {
     touched(bench, "Radius of a wide contact", "Of 0.3 sheet conductances in all.", &RADII, label, touches)
 }
 
-/// A second press that lowers the signal of the first: nearer to where the current leaves than to where it is heard.
+/// A second press that lowers the signal of the first: nearer to where the current leaves than to where it is measured.
 fn lowered(bench: &Bench) -> Result<Sweep, StudyError> {
     let seeds = bench.seeds();
     let ranked = seeds.iter().map(|seed| by_signal(bench, *seed)).collect::<Result<Vec<_>, _>>()?;

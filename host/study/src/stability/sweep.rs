@@ -17,7 +17,7 @@ use tactomo_touch::solve::{Method, ParameterKind, Problem, Solver};
 
 /// Lambda's sweep, in shares of the largest singular value.
 const LAMBDAS: [f64; 7] = [1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
-/// Of the points of a sweep, a quick study tries every so manieth, and the last.
+/// Of the points of a sweep, a quick study tries every third, and the last.
 const QUICK_STEP: usize = 3;
 
 /// What is tried.
@@ -172,7 +172,7 @@ impl Bench<'_> {
 /// Makes some sweeps.
 type Maker = fn(&Bench) -> Result<Vec<Sweep>, StudyError>;
 
-/// Runs all sweeps. `progress` hears what is tried next.
+/// Runs all sweeps. `progress` is called with what is tried next.
 ///
 /// # Errors
 /// [`StudyError`] if the detector cannot be modelled or is curved.
@@ -349,7 +349,7 @@ mod tests {
         for chart in &report.bounds.charts {
             let (bound, solver) = (&chart.curves[0], &chart.curves[1]);
             assert!(!bound.points.is_empty() && bound.solver.is_none(), "{}", chart.title);
-            // Of contacts that noise does not let one tell apart, any guess on the detector is nearer than the bound.
+            // Of contacts that cannot be separated in the noise, any guess on the detector is nearer than the bound.
             for [value, bound_m] in bound.points.iter().filter(|[_, bound_m]| *bound_m < 0.1 * report.reach_m) {
                 let reached = solver.points.iter().find(|point| point[0] == *value).unwrap();
                 assert!(*bound_m > 0.0 && *bound_m < reached[1], "{}: {bound_m} {reached:?}", chart.title);

@@ -143,7 +143,7 @@ impl SolverReport {
     }
 }
 
-/// Tries all. `progress` hears what is tried next.
+/// Tries all solvers on all detectors. `progress` is called with what is tried next.
 ///
 /// # Errors
 /// [`StudyError`] if a detector cannot be modelled or is curved.
