@@ -4,12 +4,30 @@
 //! Arrows run one way: [`detector`], [`scene`], [`forward`] and [`simulate`] (physics) <- [`solve`] and [`metrics`] (touch) <- [`run`] ->
 //! [`board`], with [`sink`] behind `run` and [`study`] on touch alone. Each of them is a package of its own in the repository, and this one
 //! gives them all. Units are SI, and in the names.
+//!
+//! From a detector to contacts:
+//!
+//! ```
+//! use tactomo::{detector::Detector, forward::readings_v, scene::Contact, simulate, solve::{Method, Problem}};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let detector = Detector::default(); // or Detector::read("my.toml".as_ref())?
+//! // In place of a board: the readings of a light press, by a finer model than the one that is inverted.
+//! let press = Contact::flat(0.009, -0.006, 0.003, 2e-4);
+//! let impedance_ohm = simulate::finer_model(&detector, &[], 0)?.impedance_ohm(&[press])?;
+//! let readings = readings_v(&impedance_ohm, &detector);
+//!
+//! let mut solver = Method::Contacts.build(&Problem::of(&detector)?)?;
+//! let found = solver.solve(&readings)?.contacts[0];
+//! assert!((found.x_m - press.x_m).hypot(found.y_m - press.y_m) < 1e-3);
+//! # Ok(())
+//! # }
+//! ```
 
 pub use tactomo_board as board;
 pub use tactomo_physics::{detector, forward, hertz, readings, scene, simulate};
 pub use tactomo_study as study;
 pub use tactomo_table as table;
-pub use tactomo_touch::{metrics, solve};
+pub use tactomo_touch::{metrics, schema, solve};
 
 pub mod run;
 pub mod sink;

@@ -2,6 +2,8 @@
 //!
 //! Machine output goes to stdout, everything else to stderr. Exit codes: 0 done, 1 failed, 2 used wrongly.
 
+#![warn(clippy::print_stdout, clippy::print_stderr, reason = "they panic where a pipe is closed; see commands::output")]
+
 mod commands;
 mod heap;
 
@@ -19,7 +21,7 @@ fn main() -> ExitCode {
     match commands::run(cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            commands::output::print_message(format_args!("error: {error:#}"));
             ExitCode::FAILURE
         }
     }
@@ -27,5 +29,10 @@ fn main() -> ExitCode {
 
 fn print_log_on_stderr() {
     let colours = std::io::stderr().is_terminal();
-    tracing_subscriber::fmt().with_writer(std::io::stderr).with_ansi(colours).with_target(false).without_time().init();
+    tracing_subscriber::fmt()
+        .with_writer(|| commands::output::Stderr)
+        .with_ansi(colours)
+        .with_target(false)
+        .without_time()
+        .init();
 }

@@ -17,7 +17,9 @@ fn failure(args: &[&str]) -> (Option<i32>, String) {
 
 #[test]
 fn every_command_has_a_help_with_an_example() {
-    for command in ["live", "ports", "record", "replay", "forward", "validate", "reconstruct", "detector"] {
+    for command in
+        ["live", "ports", "record", "replay", "forward", "validate", "reconstruct", "detector", "tradeoff", "stability"]
+    {
         let output = tactomo(&[command, "--help"]);
         let text = String::from_utf8(output.stdout).unwrap();
         assert_eq!(output.status.code(), Some(0));
@@ -53,6 +55,7 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
 #[test]
 fn what_fails_exits_with_1_and_says_what_to_do() {
     let text = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    let elf = if cfg!(feature = "log") { "is not the ELF file of a firmware" } else { "--features log" };
     for (args, told) in [
         (&["live", "--port", "/dev/ttyNOT7", "--json"][..], "there is no serial port /dev/ttyNOT7"),
         (&["live", "--port", "/dev/null", "--json"], "/dev/null is not a serial port; `tactomo ports`"),
@@ -64,13 +67,70 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         (&["forward", "--scene", "single", "--fault", "swap:3,16"], "swap:3,16: there is no electrode 16"),
         (&["forward", "--model", "slab", "--scene", "single", "--fault", "uneven:0.2"], "leave out --model slab"),
         (&["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"], "Poisson's ratio is 0.6"),
-        (&["live", "--port", "/dev/null", "--elf", text, "--json"], "is not the ELF file of a firmware"),
+        (&["live", "--port", "/dev/null", "--elf", text, "--json"], elf),
         (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
+        (&["tradeoff", "--quick", "--out", text], "exists already: give another name, or --overwrite"),
+        (&["tradeoff", "--quick", "--picture", text], "exists already: give another name, or --overwrite"),
+        (&["stability", "--quick", "--out", text], "exists already: give another name, or --overwrite"),
+        (&["detector", "show", "--svg", text], "exists already: give another name, or --overwrite"),
+        (&["forward", "--save-jacobian", text], "exists already: give another name, or --overwrite"),
+        (
+            &["stability", "--quick", "--out", "no/such/folder/a.html"],
+            "cannot write no/such/folder/a.html: No such file",
+        ),
     ] {
         let (code, message) = failure(args);
         assert_eq!(code, Some(1), "{args:?}: {message}");
         assert!(message.contains(told), "{args:?}: {message}");
     }
+}
+
+/// Runs a command whose stdout, or stderr, or both are pipes that nobody reads any more.
+fn with_closed(args: &[&str], [stdout, stderr]: [bool; 2]) -> (Option<i32>, String) {
+    let pipe = |is_closed: bool| {
+        let (reader, writer) = std::io::pipe().unwrap();
+        (if is_closed { None } else { Some(reader) }, writer)
+    };
+    let (stdout_reader, stdout) = pipe(stdout);
+    let (stderr_reader, stderr) = pipe(stderr);
+    let mut child =
+        Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).stdout(stdout).stderr(stderr).spawn().unwrap();
+    let drained = std::thread::spawn(move || stdout_reader.map(std::io::read_to_string));
+    let messages = stderr_reader.map_or_else(String::new, |reader| std::io::read_to_string(reader).unwrap());
+    drop(drained.join().unwrap());
+    (child.wait().unwrap().code(), messages)
+}
+
+#[test]
+fn pipes_that_are_closed_end_the_program_without_a_panic() {
+    const PANICKED: i32 = 101;
+    let commands: [&[&str]; 6] = [
+        &["detector", "list"],
+        &["forward", "--contact", "0,0,2,1e-3"],
+        &["live", "--simulate", "--seconds", "0.3", "--json"],
+        &["replay", "no/such.tactomo", "--json"],
+        &["reconstruct", "no/such.csv"],
+        &["live", "--port", "/dev/null", "--json"],
+    ];
+    for args in commands {
+        let (unread, _) = with_closed(args, [false, false]);
+        for closed in [[true, false], [false, true], [true, true]] {
+            let (code, messages) = with_closed(args, closed);
+            assert_eq!(code, unread, "{args:?} with stdout and stderr closed: {closed:?}");
+            assert!(code != Some(PANICKED) && !messages.contains("panicked"), "{args:?}: {messages}");
+        }
+    }
+}
+
+#[test]
+fn reconstruct_ends_quietly_when_nobody_reads_on() {
+    let path = std::env::temp_dir().join(format!("tactomo-unread-{}.csv", std::process::id()));
+    let frame = ["0.001"; 256].join(",") + "\n";
+    std::fs::write(&path, frame.repeat(2000)).unwrap();
+    let (code, messages) = with_closed(&["reconstruct", path.to_str().unwrap(), "--json"], [true, false]);
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(code, Some(0), "{messages}");
+    assert!(!messages.contains("2000 frames"), "it went on for nobody: {messages}");
 }
 
 #[test]

@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use tactomo::board::record::{Header, RecordWriter};
+use tactomo::schema::{CONTACT_COLUMNS, csv_heads};
 use tactomo::table::{NpzWriter, Table};
+use tactomo_protocol::{BoardMessage, FrameHead, Hello, MAX_WIRE, encode_board, encode_frame};
 
 const PLACE_MM: [f64; 2] = [9.0, -6.0];
 
@@ -109,12 +112,135 @@ fn what_is_found_goes_into_files() {
     }
     let text = std::fs::read_to_string(&table.0).unwrap();
     let columns: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
-    assert_eq!(columns, [18; 3], "{text}");
+    assert_eq!(columns, [csv_heads().len(); 3], "{text}");
     let Table::Arrays(arrays) = Table::read(&archive.0).unwrap() else { panic!("no arrays") };
-    let shape = |name: &str| arrays.iter().find(|(array, _)| array == name).unwrap().1.shape.clone();
-    assert_eq!(shape("frame"), [2]);
-    assert_eq!(shape("contact_frame_x_y_z_m_conductance_s_force_n"), [1, 6]);
-    assert_eq!(shape("image_s_per_m2"), [2, shape("node_x_y_z_m")[0]]);
+    let array = |name: &str| arrays.iter().find(|(array, _)| array == name).unwrap().1.clone();
+    assert_eq!(array("frame").values, [0.0, 1.0]);
+    assert_eq!(array("contact_frame").values, [1.0]);
+    assert_eq!(array("image_s_per_m2").shape, [array("image_frame").values.len(), array("node_x_y_z_m").shape[0]]);
+}
+
+/// A CSV file as rows of cells by the names of their columns.
+fn cells(file: &Temporary) -> Vec<Vec<(String, String)>> {
+    let text = std::fs::read_to_string(&file.0).unwrap();
+    let split = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+    let mut lines = text.lines().map(split);
+    let heads = lines.next().unwrap();
+    lines.map(|row| heads.iter().cloned().zip(row).collect()).collect()
+}
+
+#[test]
+fn json_csv_and_npz_have_every_figure_of_a_contact_and_agree() {
+    let file = Temporary::with("figures.csv", csv(&vec![readings(); 3]));
+    let [table, archive] = ["figures-out.csv", "figures-out.npz"].map(Temporary::new);
+    let arguments = ["--solver", "contacts"];
+    let found = lines(&[&[file.name()], &arguments[..]].concat());
+    for out in [&table, &archive] {
+        let arguments = [&["reconstruct", file.name()], &arguments[..], &["--out", out.name()]].concat();
+        assert_eq!(tactomo(&arguments).status.code(), Some(0));
+    }
+    let rows = cells(&table);
+    let Table::Arrays(arrays) = Table::read(&archive.0).unwrap() else { panic!("no arrays") };
+    assert_eq!((found.len(), rows.len()), (3, 3));
+    // JSON is read to the last digit but one.
+    let near = |one: f64, other: f64| (one - other).abs() <= 1e-12 * other.abs();
+    for (line, row) in found.iter().zip(&rows) {
+        let index = line["frame"].as_u64().unwrap() as usize;
+        for column in &CONTACT_COLUMNS {
+            let name = format!("contact_{}", column.name);
+            let in_archive = arrays.iter().find(|(array, _)| *array == name).unwrap().1.values[index];
+            let in_table = &row.iter().find(|(head, _)| head == column.name).unwrap().1;
+            match line["contacts"][0].get(column.name).and_then(Value::as_f64) {
+                Some(value) => {
+                    let in_table: f64 = in_table.parse().unwrap();
+                    assert!(near(in_table, value) && in_table == in_archive, "{name}: {value} {in_table} {in_archive}");
+                }
+                None if column.name == "z_m" => assert_eq!((in_table.as_str(), in_archive), ("0", 0.0)),
+                None => assert!(in_table.is_empty() && in_archive.is_nan(), "{name}"),
+            }
+        }
+    }
+    let contact = &found[2]["contacts"][0];
+    for name in ["id", "sigma_x_m", "sigma_y_m", "correlation", "sigma_conductance_s"] {
+        assert!(contact[name].is_number(), "{name}: {contact}");
+    }
+}
+
+#[test]
+fn files_are_replaced_only_with_force_and_never_the_one_that_is_read() {
+    let file = Temporary::with("force-in.csv", csv(&[readings()]));
+    let out = Temporary::with("force-out.csv", "precious");
+    let run = |more: &[&str]| tactomo(&[&["reconstruct", file.name(), "--out"], more].concat());
+    let refused = run(&[out.name()]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("exists already: give another name, or --overwrite"));
+    assert_eq!(std::fs::read_to_string(&out.0).unwrap(), "precious");
+    let input = std::fs::read(&file.0).unwrap();
+    let itself = run(&[file.name(), "--force"]);
+    assert!(String::from_utf8_lossy(&itself.stderr).contains("is the file that is read"));
+    assert_eq!(std::fs::read(&file.0).unwrap(), input);
+    assert_eq!(run(&[out.name(), "--overwrite"]).status.code(), Some(0));
+    assert!(std::fs::read_to_string(&out.0).unwrap().starts_with("frame,"));
+    // What breaks in the middle leaves the file that was there.
+    let nan = Temporary::with("force-nan.csv", csv(&[readings(), vec![f64::NAN; 256]]));
+    let before = std::fs::read(&out.0).unwrap();
+    let broken = tactomo(&["reconstruct", nan.name(), "--out", out.name(), "--force"]);
+    assert_eq!(broken.status.code(), Some(1));
+    assert_eq!(std::fs::read(&out.0).unwrap(), before);
+}
+
+#[test]
+fn millivolts_are_refused_as_volts_and_read_as_what_they_are() {
+    let millivolts: Vec<f64> = readings().iter().map(|volts| volts * 1e3).collect();
+    let file = Temporary::with("millivolts.csv", csv(&[vec![0.0; 256], millivolts]));
+    let refused = tactomo(&["reconstruct", file.name(), "--json"]);
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(message.contains("are these millivolts? Give --unit mV"), "{message}");
+    assert!(refused.stdout.is_empty(), "no contact is reported of readings that cannot be");
+    assert_found(&lines(&[file.name(), "--unit", "mV"])[1]);
+}
+
+/// A recording of a board's Hello and of still frames with these numbers, one a chunk.
+fn recording_of(name: &str, numbers: impl Iterator<Item = u16>) -> Temporary {
+    let file = Temporary::new(name);
+    let header = Header { detector: "square-60".to_owned(), ..Header::default() };
+    let mut writer = RecordWriter::new(std::fs::File::create(&file.0).unwrap(), &header).unwrap();
+    let mut wire = [0; MAX_WIRE];
+    let length = encode_board(&BoardMessage::Hello(Hello::example(16)), &mut wire).unwrap();
+    writer.write(0, &wire[..length]).unwrap();
+    for sequence in numbers {
+        let head = FrameHead { sequence, time_us: 1000 * u32::from(sequence), ..FrameHead::default() };
+        let length = encode_frame(head, &[3; 256], &mut wire).unwrap();
+        writer.write(1000 * u64::from(sequence), &wire[..length]).unwrap();
+    }
+    writer.flush().unwrap();
+    file
+}
+
+#[test]
+fn frames_missing_in_a_recording_are_reported() {
+    let run = |file: &Temporary| {
+        let output = tactomo(&["reconstruct", file.name(), "--json"]);
+        assert_eq!(output.status.code(), Some(0));
+        let lines: Vec<Value> =
+            String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        (lines, String::from_utf8(output.stderr).unwrap())
+    };
+    let (_, messages) = run(&recording_of("whole.tactomo", 0..60));
+    assert!(!messages.contains("warning"), "{messages}");
+    let (lines, messages) = run(&recording_of("gap.tactomo", (0..40).chain(340..360)));
+    assert!(messages.contains("300 frames are missing (83.3 %), at 1 places"), "{messages}");
+    let of = |sequence: u64| lines.iter().find(|line| line["sequence"] == sequence).unwrap();
+    assert_eq!((&of(340)["lost_before"], of(340)["frame"].as_u64()), (&Value::from(300), Some(40)));
+    assert!(of(341).get("lost_before").is_none());
+    let file = recording_of("damaged.tactomo", 0..60);
+    let mut bytes = std::fs::read(&file.0).unwrap();
+    let middle = bytes.len() * 3 / 4;
+    bytes[middle] ^= 0x10;
+    std::fs::write(&file.0, bytes).unwrap();
+    let (_, messages) = run(&file);
+    assert!(messages.contains("warning") && messages.contains("1 chunks of the file are damaged"), "{messages}");
 }
 
 #[test]
@@ -152,7 +278,7 @@ fn a_kernel_learns_from_presses_on_any_channels() {
         assert!((contact[key].as_f64().unwrap() - truth).abs() < 0.05, "{key}: {contact}");
     }
     let other = tactomo(&["reconstruct", file.name(), "--presses", presses.name()]);
-    assert!(String::from_utf8_lossy(&other.stderr).contains("choose `--solver kernel`"));
+    assert!(String::from_utf8_lossy(&other.stderr).contains("give --solver kernel"));
 }
 
 #[test]
@@ -163,6 +289,8 @@ fn wrong_files_are_told() {
     let few = Temporary::with("few.csv", some(vec![0.1; 255]));
     let nan = Temporary::with("nan.csv", some(nan));
     let text = Temporary::with("letter.csv", "Dear reader,\nhow are you?");
+    let typo =
+        Temporary::with("typo.csv", csv(&[vec![0.1; 256], vec![0.1; 256]]).replacen("0.1,0.1,0.1", "0.1,0.1,O.1", 1));
     let broken = Temporary::with("broken.npz", b"PK\x03\x04 and no more");
     let recording = Temporary::with("cut.tactomo", b"\x89TCTO\r\n\x1a\x01");
     let told = |file: &str, more: &[&str]| {
@@ -171,10 +299,11 @@ fn wrong_files_are_told() {
         String::from_utf8(output.stderr).unwrap()
     };
     for (file, expected) in [
-        (few.name(), "has frames of 255 numbers, but the detector square-60 has 16 electrodes: 256 are needed"),
+        (few.name(), "has 255 readings a frame, but the detector square-60 with its 16 electrodes needs 256"),
         (nan.name(), "frame 1: the reading of electrode 5 with electrode 3 grounded is not a finite number"),
-        (text.name(), "line 2, column 1: `how` is not a number"),
-        (broken.name(), "no NPZ file"),
+        (text.name(), "line 2, column 1: `how are you?` is not a number"),
+        (typo.name(), "line 1, column 3: `O.1` is not a number; to name the columns"),
+        (broken.name(), "not an NPZ file"),
         (recording.name(), "is not a recording of tactomo, or its header is damaged"),
         ("no/such.csv", "cannot read no/such.csv: No such file"),
     ] {
@@ -183,7 +312,9 @@ fn wrong_files_are_told() {
     }
     let folder = Path::new(few.name()).parent().unwrap().to_str().unwrap();
     assert!(told(folder, &[]).contains("cannot read"));
-    assert!(told(few.name(), &["--out", "contacts.xls"]).contains("256 are needed"));
+    assert!(told(few.name(), &["--out", "contacts.xls"]).contains("needs 256"));
     assert!(told(nan.name(), &["--out", "contacts.xls"]).contains(".csv, .npz, .json or .jsonl"));
-    assert!(told(nan.name(), &["--solver", "contacts", "--lambda", "0.1"]).contains("has no lambda"));
+    assert!(
+        told(nan.name(), &["--solver", "contacts", "--lambda", "0.1"]).contains("has no lambda: leave out --lambda")
+    );
 }

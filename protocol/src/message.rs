@@ -64,6 +64,22 @@ pub struct Hello {
     pub settings: Settings,
 }
 
+#[cfg(feature = "test-support")]
+impl Hello {
+    /// What a board with an ESP32 says, of so many electrodes: 12 bits of 3.3 V, a drive of 2 V. For tests.
+    pub fn example(electrodes: u8) -> Self {
+        Self {
+            firmware_version: "0.1.0".try_into().unwrap_or_default(),
+            board: "test".try_into().unwrap_or_default(),
+            electrodes,
+            adc_bits: 12,
+            adc_full_scale_mv: 3300,
+            drive_mv: 2000,
+            settings: Settings::default(),
+        }
+    }
+}
+
 impl Hello {
     /// Whether the values are within the protocol's limits: 4 to 32 electrodes, 1 to 16 bits, voltages above zero,
     /// [settings](Settings::is_valid) that a board may take.

@@ -62,18 +62,10 @@ impl Volts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tactomo_protocol::{FrameHead, Settings};
+    use tactomo_protocol::FrameHead;
 
     fn hello(electrodes: u8) -> Hello {
-        Hello {
-            firmware_version: "0.1.0".try_into().unwrap_or_default(),
-            board: "test".try_into().unwrap_or_default(),
-            electrodes,
-            adc_bits: 10,
-            adc_full_scale_mv: 1024,
-            drive_mv: 1500,
-            settings: Settings::default(),
-        }
+        Hello { adc_bits: 10, adc_full_scale_mv: 1024, drive_mv: 1500, ..Hello::example(electrodes) }
     }
 
     #[test]

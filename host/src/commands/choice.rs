@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tactomo::board::record::Header;
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::shell::Shell;
@@ -10,14 +11,16 @@ use tactomo::forward::{Auto, ForwardError, ForwardModel, Slab};
 use tactomo::scene::Contact;
 use tactomo::solve::Method;
 
+use super::output::message;
+
 /// Which forward model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Model {
-    /// The one that the detector needs, and says why.
+    /// Chooses shell or slab by the detector, and prints why.
     Auto,
-    /// Thin shell of triangles: any outline, no thickness.
+    /// Thin shell of triangles: any outline or curved surface; for thin layers.
     Shell,
-    /// Layers in full depth: rectangles only.
+    /// Layers in three dimensions: rectangles only.
     Slab,
 }
 
@@ -27,7 +30,7 @@ impl Model {
         match self {
             Self::Auto => {
                 let Auto { model, reason } = Auto::new(detector, nodes)?;
-                eprintln!("model of {}: {}, for {reason}", detector.name, model.name());
+                message!("model of {}: {}, since {reason}", detector.name, model.name());
                 Ok(model)
             }
             Self::Shell => {
@@ -45,7 +48,7 @@ pub struct DetectorArgs {
     /// Detector: name of a preset, or a TOML file; unless given, that of the recording that is read, or square-60
     #[arg(long, value_name = "NAME|FILE", value_parser = detector)]
     pub detector: Option<Chosen>,
-    /// Foam that the detector is made of, or stack of foams with the upper one first, as in `BC`
+    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC
     #[arg(long, value_name = "A..D|STACK")]
     pub material: Option<Stack>,
 }
@@ -77,9 +80,10 @@ pub fn detectors(chosen: &[Chosen], otherwise: &[&str]) -> anyhow::Result<Vec<De
     }
 }
 
-/// The solvers that were chosen, or all.
-pub fn methods(chosen: &[Method]) -> Vec<Method> {
-    if chosen.is_empty() { Method::ALL.to_vec() } else { chosen.to_vec() }
+/// Parses the name of a solver; `--help` lists all of them with what they are for.
+pub fn method() -> impl TypedValueParser<Value = Method> {
+    let values = Method::ALL.map(|method| PossibleValue::new(method.name()).help(method.explanation()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<Method>())
 }
 
 impl DetectorArgs {
@@ -103,7 +107,7 @@ impl DetectorArgs {
         if self.detector.is_none() {
             let recorded = self.in_material(recorded(path, header)?)?;
             if !header.is_of(&recorded) && self.material.is_some() {
-                eprintln!(
+                message!(
                     "{} was recorded on a detector of another material; it is read as of the one that --material gives",
                     path.display()
                 );
@@ -115,9 +119,9 @@ impl DetectorArgs {
             let (path, was) = (path.display(), &header.detector);
             match *was == detector.name {
                 true => {
-                    eprintln!("{path} was recorded on another {was} than the one that --detector gives, which is used")
+                    message!("{path} was recorded on another {was} than the one that --detector gives, which is used")
                 }
-                false => eprintln!("{path} was recorded on {was}; it is read as {}, as --detector asks", detector.name),
+                false => message!("{path} was recorded on {was}; it is read as {}, as --detector asks", detector.name),
             }
         }
         Ok(detector)
@@ -138,7 +142,7 @@ fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
     }
     let (path, name) = (path.display(), &header.detector);
     if name.is_empty() {
-        eprintln!(
+        message!(
             "{path}: its header is lost or does not name the detector, so it is read as {}; --detector chooses another one",
             Detector::DEFAULT
         );
@@ -147,7 +151,7 @@ fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
     let preset = Detector::preset(name).with_context(|| {
         format!("{path} was recorded on {name}, but by an older program, which kept only that name: give the detector's file with --detector")
     })?;
-    eprintln!("{path} has only the name of its detector: the preset {name} is used; --detector chooses another one");
+    message!("{path} has only the name of its detector: the preset {name} is used; --detector chooses another one");
     Ok(preset)
 }
 
@@ -161,7 +165,7 @@ pub fn detector(name: &str) -> Result<Chosen, String> {
         return Ok(Chosen::File(path));
     }
     let names = Detector::preset_names().collect::<Vec<_>>().join(", ");
-    Err(format!("no such detector; there are {names}, and files such as my.toml"))
+    Err(format!("there is no preset of that name; choose one of {names}, or a file such as my.toml"))
 }
 
 /// A contact from `x_mm,y_mm,radius_mm,conductance_s`, with `z_mm` after `y_mm` on a curved detector.

@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
 use serde::Serialize;
 use tactomo::detector::{Detector, FOAMS, Foam, Stack, short};
 
 use super::choice::{self, Chosen, DetectorArgs};
-use super::output;
+use super::output::{self, NewFile, message};
 
 /// Lists, shows and checks detectors.
 ///
@@ -25,7 +24,7 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Action {
-    /// Lists the presets, and the foams that `--material` takes
+    /// Lists the presets, and the foams for `--material`
     List {
         /// Prints `{detectors, foams}` as JSON
         #[arg(long)]
@@ -33,7 +32,7 @@ enum Action {
     },
     /// Shows a detector
     Show(ShowArgs),
-    /// Checks files; the first one that is no detector is an error
+    /// Checks detector files
     Check {
         /// TOML files
         #[arg(required = true, value_name = "FILE")]
@@ -46,12 +45,15 @@ struct ShowArgs {
     /// Name of a preset, or a TOML file
     #[arg(value_name = "NAME|FILE", value_parser = choice::detector, default_value = Detector::DEFAULT)]
     detector: Chosen,
-    /// Foam, or stack of foams with the upper one first, as in `BC`
+    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC
     #[arg(long, value_name = "A..D|STACK")]
     material: Option<Stack>,
-    /// Draws it in an SVG file
+    /// Draws it into an SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    /// Replaces the file if it exists
+    #[arg(long, requires = "svg", visible_alias = "force")]
+    overwrite: bool,
     /// Prints it as a TOML file
     #[arg(long, conflicts_with = "json")]
     toml: bool,
@@ -101,8 +103,8 @@ fn table(list: &List) -> String {
 fn show(args: ShowArgs) -> anyhow::Result<()> {
     let detector = DetectorArgs { detector: Some(args.detector), material: args.material }.get()?;
     if let Some(path) = &args.svg {
-        std::fs::write(path, detector.to_svg()).with_context(|| format!("cannot write {}", path.display()))?;
-        eprintln!("drew {} in {}", detector.name, path.display());
+        NewFile::new(path, args.overwrite)?.write(detector.to_svg())?;
+        message!("drew {} in {}", detector.name, path.display());
     }
     let text = match (args.toml, args.json) {
         (true, _) => detector.to_toml().trim_end().to_owned(),

@@ -15,7 +15,7 @@ use tactomo::simulate::{self, Measurement};
 use tactomo::study::case::Case;
 
 use super::choice::{self, DetectorArgs, Model};
-use super::output;
+use super::output::{self, NewFile, message};
 use super::scene::{self, Press, SceneArgs};
 
 /// Computes the readings of a detector for given contacts, or saves its Jacobian.
@@ -30,13 +30,13 @@ use super::scene::{self, Press, SceneArgs};
 pub struct Args {
     #[command(flatten)]
     detector: DetectorArgs,
-    /// Takes detector and contacts from a case file instead
+    /// Takes detector and contacts from a case file (see `validate`)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["detector", "material"])]
     case: Option<PathBuf>,
-    /// A contact (millimetres and siemens); give it again for more
+    /// A contact, in millimetres and siemens; give it again for more
     #[arg(long, value_name = "X,Y,RADIUS,CONDUCTANCE", value_parser = choice::contact, allow_hyphen_values = true)]
     contact: Vec<Contact>,
-    /// A ball pressed on the detector (millimetres and newtons); give it again for more
+    /// A ball pressed on the detector, in millimetres and newtons; give it again for more
     #[arg(long, value_name = "X,Y,RADIUS,FORCE", value_parser = scene::press, allow_hyphen_values = true)]
     press: Vec<Press>,
     /// Touches of any shape, as `--json` prints them: a list of `{centre_m, shape, conductance_s}`, with shapes
@@ -46,21 +46,24 @@ pub struct Args {
     touches: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Moment of the scene (s)
+    /// Time in the scene (s)
     #[arg(long, value_name = "SECONDS", default_value = "1", requires = "scene")]
     time: f64,
-    /// Gives readings as the converter does, with its noise and in its steps
+    /// Adds the converter's noise and rounds to its steps
     #[arg(long)]
     measured: bool,
     /// Forward model
     #[arg(long, value_enum, default_value = "auto")]
     model: Model,
-    /// Nodes of the shell's mesh, about
+    /// Approximate number of nodes of the shell's mesh
     #[arg(long, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     nodes: Option<u32>,
     /// Saves the Jacobian to a file, for `live --jacobian`
     #[arg(long, value_name = "FILE")]
     save_jacobian: Option<PathBuf>,
+    /// Replaces the file if it exists
+    #[arg(long, requires = "save_jacobian")]
+    overwrite: bool,
     /// Prints `{model, detector, image_nodes, touches, faults, readings_v, impedance_ohm}` as JSON
     #[arg(long)]
     json: bool,
@@ -84,12 +87,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let (detector, touches) = touched(args)?;
     ensure!(
         !touches.is_empty() || args.save_jacobian.is_some(),
-        "nothing to compute: give --contact, --press, --touches, --scene (with something that touches then), --case or --save-jacobian"
+        "nothing to compute: give --contact, --press, --touches, --scene (at a time when something touches), --case or --save-jacobian"
     );
+    let jacobian = NewFile::optional(args.save_jacobian.as_ref(), args.overwrite)?;
     let model = model(args, &detector)?;
-    if let Some(path) = &args.save_jacobian {
-        Jacobian::of(&*model).save(path)?;
-        eprintln!("saved the Jacobian of {} ({}) to {}", detector.name, model.name(), path.display());
+    if let (Some(file), Some(path)) = (jacobian, &args.save_jacobian) {
+        Jacobian::of(&*model).save(file.unfinished_path())?;
+        file.finish()?;
+        message!("saved the Jacobian of {} ({}) to {}", detector.name, model.name(), path.display());
     }
     if touches.is_empty() {
         return Ok(());

@@ -18,6 +18,7 @@ use tactomo::solve::{Method, Problem};
 use tokio::sync::watch;
 
 use super::choice::{DetectorArgs, Model};
+use super::output::message;
 use super::source::{self, BoardArgs};
 use super::{interrupt, output, recording};
 
@@ -171,14 +172,14 @@ fn serve(
         finger: show.finger,
     };
     let server = Server::start(show.picture.http_port, scene, snapshots, requests)?;
-    eprintln!("live picture: {}", server.url());
+    message!("live picture: {}", server.url());
     Ok(Some(server))
 }
 
 /// Waits for Ctrl-C: the last picture stays on the page.
 fn wait(stop: &AtomicBool) {
     if !stop.load(Ordering::Relaxed) {
-        eprintln!("the page stays open until Ctrl-C");
+        message!("the page stays open until Ctrl-C");
     }
     while !stop.load(Ordering::Relaxed) {
         thread::sleep(Duration::from_millis(50));
@@ -189,7 +190,7 @@ fn report(summary: &Summary, json: bool) -> anyhow::Result<()> {
     if json {
         return Ok(output::print(&serde_json::to_string(summary)?)?);
     }
-    eprintln!("{}", sentence(summary));
+    message!("{}", sentence(summary));
     Ok(())
 }
 

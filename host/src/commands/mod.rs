@@ -5,7 +5,7 @@ mod detector;
 mod forward;
 mod interrupt;
 mod live;
-mod output;
+pub mod output;
 mod ports;
 mod reconstruct;
 mod record;
@@ -14,12 +14,13 @@ mod replay;
 mod scene;
 mod source;
 mod stability;
+mod study;
 mod tradeoff;
 mod validate;
 
 use clap::{Parser, Subcommand};
 
-/// Live pictures of touch from a tomographic tactile sensor, and its simulator.
+/// Shows touch on a tomographic tactile sensor, live, from recordings or simulated.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
 pub struct Cli {

@@ -1,12 +1,123 @@
-//! Machine output and tables, on stdout.
+//! What the program prints, and the files that it writes.
+//!
+//! Machine output and tables go to stdout, messages to stderr. Whoever reads them may have seen enough and close the pipe, as `head`
+//! does: that is no error, and nothing here panics of it.
 
-use std::io::{self, ErrorKind, Write};
+use std::fmt::Arguments;
+use std::fs::File;
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
 
-/// Prints a line or lines. A reader that has seen enough and closed the pipe, as `head` does, is no error.
+use anyhow::{Context, bail};
+
+/// Prints a message on stderr, as `eprintln!` does, but without a panic where stderr is closed.
+macro_rules! message {
+    ($($text:tt)*) => { $crate::commands::output::print_message(format_args!($($text)*)) };
+}
+pub(crate) use message;
+
+/// Prints a line or lines on stderr. Where stderr is closed, nobody reads it.
+pub fn print_message(text: Arguments) {
+    drop(writeln!(io::stderr(), "{text}"));
+}
+
+/// Prints a line or lines on stdout.
 pub fn print(text: &str) -> io::Result<()> {
-    match writeln!(io::stdout(), "{text}") {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        result => result,
+    unless_closed(writeln!(io::stdout(), "{text}")).map(drop)
+}
+
+/// Whether anybody still reads what was written.
+pub fn unless_closed(written: io::Result<()>) -> io::Result<bool> {
+    match written {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+        written => written.map(|()| true),
+    }
+}
+
+/// Stderr for the log, which must not fail: a log that cannot be written is reported on stderr by a panic.
+pub struct Stderr;
+
+impl Write for Stderr {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        drop(io::stderr().write_all(bytes));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A file to write. It has its name only once it is complete, and replaces another one only if that is wanted.
+#[derive(Debug)]
+pub struct NewFile {
+    path: PathBuf,
+    /// Where it is written until it is complete.
+    unfinished: PathBuf,
+}
+
+impl NewFile {
+    /// Checks that a file can be written, before the work for it begins. `overwrite` replaces one that exists.
+    pub fn new(path: &Path, overwrite: bool) -> anyhow::Result<Self> {
+        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if path.is_dir() {
+            bail!("cannot write {}: it is a folder", path.display());
+        }
+        // A device or a pipe is written to, not replaced.
+        if path.exists() && !path.is_file() {
+            return Ok(Self { unfinished: path.clone(), path });
+        }
+        if path.exists() && !overwrite {
+            bail!("{} exists already: give another name, or --overwrite to replace it", path.display());
+        }
+        let mut unfinished = path.clone().into_os_string();
+        unfinished.push(".unfinished");
+        let file = Self { path, unfinished: unfinished.into() };
+        file.create()?;
+        Ok(file)
+    }
+
+    /// The same for a file that may be wanted.
+    pub fn optional(path: Option<&PathBuf>, overwrite: bool) -> anyhow::Result<Option<Self>> {
+        path.map(|path| Self::new(path, overwrite)).transpose()
+    }
+
+    /// Where to write until it is complete.
+    pub fn unfinished_path(&self) -> &Path {
+        &self.unfinished
+    }
+
+    /// Opens it for writing.
+    pub fn create(&self) -> anyhow::Result<BufWriter<File>> {
+        let file = File::create(&self.unfinished).with_context(|| format!("cannot write {}", self.path.display()))?;
+        Ok(BufWriter::new(file))
+    }
+
+    /// Gives it its name; it is complete.
+    pub fn finish(self) -> anyhow::Result<()> {
+        if self.unfinished != self.path {
+            std::fs::rename(&self.unfinished, &self.path)
+                .with_context(|| format!("cannot write {}", self.path.display()))?;
+        }
+        Ok(())
+    }
+
+    /// Writes all of it.
+    pub fn write(self, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
+        let mut out = self.create()?;
+        out.write_all(content.as_ref())
+            .and_then(|()| out.flush())
+            .with_context(|| format!("cannot write {}", self.path.display()))?;
+        self.finish()
+    }
+}
+
+impl Drop for NewFile {
+    /// Leaves nothing of a file that was not completed.
+    fn drop(&mut self) {
+        if self.unfinished != self.path {
+            drop(std::fs::remove_file(&self.unfinished));
+        }
     }
 }
 
@@ -15,4 +126,53 @@ pub fn command_line() -> String {
     let quoted = |word: String| if word.contains(char::is_whitespace) { format!("'{word}'") } else { word };
     let arguments = std::env::args_os().skip(1).map(|word| quoted(word.to_string_lossy().into_owned()));
     std::iter::once("tactomo".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path(name: &str) -> PathBuf {
+        std::env::temp_dir().join(format!("tactomo-{}-output-{name}", std::process::id()))
+    }
+
+    #[test]
+    fn a_file_is_replaced_only_if_that_is_wanted() -> anyhow::Result<()> {
+        let path = path("kept");
+        NewFile::new(&path, false)?.write("one")?;
+        let refused = NewFile::new(&path, false).map_or_else(|error| error.to_string(), |_| String::new());
+        assert!(refused.contains("exists already") && refused.contains("--overwrite"), "{refused}");
+        assert_eq!(std::fs::read_to_string(&path)?, "one");
+        NewFile::new(&path, true)?.write("two")?;
+        assert_eq!(std::fs::read_to_string(&path)?, "two");
+        Ok(std::fs::remove_file(&path)?)
+    }
+
+    #[test]
+    fn a_file_that_is_not_completed_leaves_the_one_before_and_nothing_else() -> anyhow::Result<()> {
+        let path = path("broken");
+        std::fs::write(&path, "whole")?;
+        let file = NewFile::new(&path, true)?;
+        file.create()?.write_all(b"half")?;
+        let unfinished = file.unfinished_path().to_owned();
+        assert!(unfinished.exists());
+        drop(file);
+        assert!(!unfinished.exists());
+        assert_eq!(std::fs::read_to_string(&path)?, "whole");
+        Ok(std::fs::remove_file(&path)?)
+    }
+
+    #[test]
+    fn folders_and_missing_folders_are_refused_at_once() {
+        let refused = |path: &Path| NewFile::new(path, true).map_or_else(|error| error.to_string(), |_| String::new());
+        assert!(refused(&std::env::temp_dir()).contains("is a folder"));
+        assert!(refused(Path::new("no/such/folder/a.csv")).contains("cannot write no/such/folder/a.csv"));
+    }
+
+    #[test]
+    fn a_device_is_written_to_and_stays_one() -> anyhow::Result<()> {
+        NewFile::new(Path::new("/dev/null"), false)?.write("gone")?;
+        assert!(!Path::new("/dev/null").is_file());
+        Ok(())
+    }
 }

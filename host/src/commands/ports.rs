@@ -4,18 +4,18 @@ use tactomo::board::link::discover::{self, Probe};
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo_protocol::Hello;
 
-use super::output;
+use super::output::{self, message};
 
-/// Lists the serial ports, and asks each USB port whether it has a board.
+/// Lists the serial ports, and which USB ports have a board.
 ///
 /// Example: tactomo ports
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
-    /// Lists only: opening a port resets many boards
+    /// Lists the ports without opening them: opening resets many boards
     #[arg(long)]
     no_probe: bool,
-    /// Bits a second of the serial ports
+    /// Baud rate of the serial ports
     #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     baud: u32,
 }
@@ -24,7 +24,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let ports = discover::ports();
     if ports.is_empty() {
-        eprintln!("no serial ports: is the board plugged in, with a cable that carries data?");
+        message!("no serial ports: is the board plugged in, with a cable that carries data?");
         return Ok(());
     }
     if args.no_probe {

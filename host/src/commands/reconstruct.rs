@@ -1,30 +1,35 @@
 //! `tactomo reconstruct`: touch from readings in a file.
 
 mod reader;
+mod units;
 mod writer;
 
 use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context;
+use tactomo::schema::FrameReport;
 use tactomo::solve::{Lambda, Method};
 
 use self::reader::Reader;
-use self::writer::{Found, Writer};
-use super::choice::{DetectorArgs, Model};
+use self::units::Unit;
+use self::writer::Writer;
+use super::choice::{self, DetectorArgs, Model};
+use super::output::message;
 
-/// Reads touch from the readings in a file: a recording, or a table of numbers (CSV, NPY or NPZ).
+/// Finds contacts and images in a recording, or in a table of readings (CSV, NPY or NPZ).
 ///
-/// A table has a frame a row: readings in volts, electrode by electrode for each grounded one, 256 for 16 electrodes; an array may
-/// also be frames x 16 x 16. In an NPZ file it is called readings_v. From the readings, those at rest are subtracted: the mean
-/// of the first frames.
+/// A table has one frame per row: the readings in volts, electrode by electrode for each
+/// grounded electrode, 256 for 16 electrodes. An array may also be frames x 16 x 16; in an NPZ
+/// file it is called readings_v. The baseline, the mean of the first frames, is subtracted: see
+/// --rest.
 ///
 /// Examples:
 ///   tactomo reconstruct touch.tactomo --solver nonlinear --json
-///   tactomo reconstruct readings.csv --detector square-60 --solver tikhonov --lambda gcv
+///   tactomo reconstruct readings.csv --unit mV --detector square-60 --solver tikhonov --lambda gcv
 ///   tactomo reconstruct readings.npz --rest 10 --out contacts.csv
 ///   tactomo reconstruct touch.tactomo --images --out images.npz
-///   tactomo reconstruct skin.csv --solver kernel --presses taught.csv --json
+///   tactomo reconstruct skin.csv --solver kernel --presses presses.csv --json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -36,46 +41,70 @@ pub struct Args {
     /// Forward model
     #[arg(long, value_enum, default_value = "auto")]
     model: Model,
-    /// Solver that reads the touch
-    #[arg(long, value_name = "NAME", default_value = "tikhonov")]
+    /// Solver
+    #[arg(long, value_name = "NAME", default_value = "tikhonov", value_parser = choice::method())]
     solver: Method,
-    /// Lambda of tikhonov, tikhonov-paper, noser or laplace: a share of the largest singular value, or chosen for each frame
+    /// Lambda of tikhonov, tikhonov-paper, noser or laplace: a share of the largest singular value, or a rule that chooses it for
+    /// each frame
     #[arg(long, value_name = "SHARE|discrepancy|l-curve|gcv")]
     lambda: Option<Lambda>,
-    /// Presses at known places that the solver kernel learns from, instead of simulated ones: CSV with named columns x_m, y_m,
-    /// force_n or conductance_s and the channels, any number of them, or NPZ with arrays of these names and readings_v
+    /// Presses at known places for the solver kernel to learn from, instead of simulated ones: CSV with columns named x_m, y_m,
+    /// and force_n or conductance_s, and one for each channel; or NPZ with arrays of these names and readings_v
     #[arg(long, value_name = "FILE", conflicts_with_all = ["detector", "material", "model", "lambda", "images"])]
     presses: Option<PathBuf>,
-    /// Frames at the start that are the readings at rest; 32 for a recording, none for a table, unless told
+    /// Frames at the start without contact, whose mean is the baseline [default: 32 of a recording, none of a table]
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     rest: Option<u32>,
-    /// Writes images too, where the solver makes them
+    /// Unit of the readings in a table [default: V]
+    #[arg(long, value_name = "V|mV")]
+    unit: Option<Unit>,
+    /// Writes images too, of solvers that make images
     #[arg(long)]
     images: bool,
-    /// Prints an object a frame as JSON: `{frame, time_s, frame_us, contacts, residual, flags, choice}`
+    /// Prints each frame as a JSON object: `{frame, sequence, time_s, lost_before, frame_us, contacts, residual, flags, choice}`
     #[arg(long)]
     json: bool,
-    /// Writes a file instead: a contact a line (.csv), arrays (.npz), or an object a frame (.json, .jsonl)
+    /// Writes a file: one contact a row (.csv), arrays (.npz), or one frame a line (.json, .jsonl)
     #[arg(long, value_name = "FILE", conflicts_with = "json")]
     out: Option<PathBuf>,
+    /// Replaces the file if it exists
+    #[arg(long, requires = "out", visible_alias = "force")]
+    overwrite: bool,
 }
 
 /// Solves all frames.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut reader = Reader::open(args)?;
-    let mut writer = Writer::new(args.out.as_deref(), args.json, args.images)?;
+    let mut writer = Writer::new(args, &reader)?;
     let mut times_us = Vec::new();
-    while let Some((time_s, readings)) = reader.next_frame()? {
-        let frame = reader.frame();
+    while let Some(frame) = reader.next_frame()? {
         let begin = Instant::now();
-        let solved = reader.solve(readings);
+        let solved = reader.solve(frame.volts);
         let frame_us = begin.elapsed().as_secs_f64() * 1e6;
         let solution = solved.with_context(|| reader.place())?;
         times_us.push(frame_us);
-        writer.write(&Found { frame, time_s, frame_us, solution })?;
+        let report = FrameReport {
+            frame: Some(reader.frame() as u64),
+            sequence: frame.sequence,
+            time_s: frame.time_s,
+            lost_before: Some(frame.lost_before),
+            frame_us: Some(frame_us),
+            image_s_per_m2: solution.image_s_per_m2.as_deref().filter(|_| args.images),
+            ..FrameReport::of(&solution)
+        };
+        if !writer.write(&report)? {
+            // Whoever read this has seen enough.
+            return Ok(());
+        }
     }
     writer.finish(reader.mesh())?;
-    eprintln!("{}", sentence(&reader, &mut times_us));
+    message!("{}", sentence(&reader, &mut times_us));
+    if let Some(notice) = reader.notice() {
+        message!("{notice}");
+    }
+    if let Some(losses) = reader.losses() {
+        message!("warning: {losses}");
+    }
     Ok(())
 }
 
@@ -84,7 +113,7 @@ fn sentence(reader: &Reader, times_us: &mut [f64]) -> String {
     times_us.sort_by(f64::total_cmp);
     let name = reader.name();
     match times_us {
-        [] => format!("no frame to solve after {} at rest", reader.frame()),
+        [] => format!("no frames to solve: all {} are baseline (see --rest)", reader.count()),
         _ => {
             let at = |share: usize| times_us[(times_us.len() - 1) * share / 100];
             format!("{name}: {} frames, median {:.1} us a frame, p99 {:.1} us", times_us.len(), at(50), at(99))

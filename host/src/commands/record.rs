@@ -9,6 +9,7 @@ use tactomo::run::plan::{Ends, Plan};
 use tokio::sync::watch;
 
 use super::choice::DetectorArgs;
+use super::output::message;
 use super::source::{self, BoardArgs};
 use super::{interrupt, live, recording};
 
@@ -47,6 +48,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let (_, requests) = mpsc::sync_channel(1);
     let ends = Ends { snapshots, requests, stop: interrupt::flag()? };
     let summary = tactomo::run::run(&mut *source, plan, ends)?;
-    eprintln!("{}; kept in {}", live::sentence(&summary), args.file.display());
+    message!("{}; kept in {}", live::sentence(&summary), args.file.display());
     Ok(())
 }

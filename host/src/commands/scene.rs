@@ -9,7 +9,9 @@ use tactomo::hertz::{Hertz, POISSON, SURFACE_DEPTH_M, Skin};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
-/// Seed unless said otherwise.
+use super::output::message;
+
+/// Default seed.
 const SEED: u64 = 1;
 
 /// A scene, its hand and faults.
@@ -18,26 +20,26 @@ pub struct SceneArgs {
     /// What touches: rest, wandering, single, several, wide, ring, line, five-fingers, rolling-ball, moving, changing-force
     #[arg(long, value_name = "NAME")]
     pub scene: Option<SceneName>,
-    /// Force of the scene's firmest press (N); else conductances relative to the detector's
+    /// Force of the scene's firmest press (N) [default: conductances relative to the detector's]
     #[arg(long, value_name = "NEWTONS", value_parser = positive)]
     force: Option<f64>,
-    /// Radius of the scene's tips and bars (mm); else a fingertip's, 8 mm, or a seventh of a smaller detector's side
+    /// Radius of fingertips and bars in the scene (mm) [default: 8, or a seventh of a smaller detector's side]
     #[arg(long, value_name = "MM", value_parser = positive, requires = "force")]
     tip: Option<f64>,
-    /// Young's modulus of the detector, under forces (MPa); else that of its foams
+    /// Young's modulus of the detector, for forces (MPa) [default: that of its foams]
     #[arg(long, value_name = "MPA", value_parser = positive)]
     elasticity: Option<f64>,
-    /// Poisson's ratio of the detector, under forces
+    /// Poisson's ratio of the detector, for forces
     #[arg(long, value_name = "RATIO", default_value_t = POISSON)]
     poisson: f64,
-    /// Depth of the detector's surface that a contact's current crosses, under forces (mm)
+    /// Depth of the surface layer that a contact's current crosses, for forces (mm)
     #[arg(long, value_name = "MM", default_value_t = SURFACE_DEPTH_M * 1e3, value_parser = positive)]
     surface_depth: f64,
-    /// Something wrong: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2 or
+    /// A fault: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2 or
     /// clip:0.14,1.8 (V); give it again for more
     #[arg(long, value_name = "FAULT")]
     pub fault: Vec<Fault>,
-    /// Seed of places, noise and faults
+    /// Seed of places, noise and faults [default: 1]
     #[arg(long)]
     seed: Option<u64>,
 }
@@ -65,7 +67,7 @@ impl SceneArgs {
         let radius_m = self.tip.map_or_else(|| Fingertip::fitting_m(detector), |tip_mm| tip_mm * 1e-3);
         let hand = Hand::in_newtons(detector, Fingertip { hertz: self.hertz(foams, detector)?, force_n, radius_m });
         if let Some(beyond) = hand.beyond(1.0, 1.0) {
-            eprintln!("beyond Hertz's theory at {force_n} N: {beyond}");
+            message!("warning: {force_n} N is beyond Hertz's theory: {beyond}");
         }
         Ok(hand)
     }
@@ -74,7 +76,7 @@ impl SceneArgs {
     pub fn hertz(&self, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hertz> {
         let skin = self.elasticity.map(|mpa| Skin::of(mpa * 1e6)).or_else(|| foams.as_ref().map(Skin::from));
         let skin = skin.with_context(|| {
-            format!("it is not known how soft {} is, for forces: give --elasticity or --material", detector.name)
+            format!("forces need to know how soft {} is: give --elasticity or --material", detector.name)
         })?;
         let surface_depth_m = self.surface_depth * 1e-3;
         Ok(Hertz::new(detector, Skin { poisson: self.poisson, surface_depth_m, ..skin })?)
@@ -94,7 +96,7 @@ impl Press {
     pub fn touch(&self, hertz: &Hertz) -> Touch {
         let imprint = hertz.ball(self.radius_m, self.force_n);
         if let Some(beyond) = imprint.beyond {
-            eprintln!("beyond Hertz's theory at {} N: {beyond}", self.force_n);
+            message!("warning: {} N is beyond Hertz's theory: {beyond}", self.force_n);
         }
         let shape = Shape::Disc { radius_m: imprint.half_width_m };
         let [x_m, y_m, z_m] = self.place_m;
@@ -119,7 +121,7 @@ pub fn read_touches(path: &Path) -> anyhow::Result<Vec<Touch>> {
 
 fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
-    number.ok_or_else(|| "a number above 0".to_owned())
+    number.ok_or_else(|| "a number above 0 is needed".to_owned())
 }
 
 #[cfg(test)]

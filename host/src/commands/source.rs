@@ -23,13 +23,13 @@ const MOUSE_FIRMNESS: f64 = 0.3;
 #[derive(Clone, Debug, clap::Args)]
 #[command(group(ArgGroup::new("simulated").args(SceneArgs::NAMES).multiple(true).requires("simulate")))]
 pub struct BoardArgs {
-    /// Serial port of the board; without it, each USB serial port is asked
+    /// Serial port of the board [default: the USB serial port on which a board answers]
     #[arg(long, value_name = "PORT", conflicts_with = "simulate")]
     pub port: Option<String>,
-    /// Runs the simulated board: the firmware over simulated pins
+    /// Uses the simulated board: the real firmware on simulated pins
     #[arg(long)]
     pub simulate: bool,
-    /// Bits a second of the serial port
+    /// Baud rate of the serial port
     #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     pub baud: u32,
     #[command(flatten)]
@@ -41,13 +41,13 @@ pub struct BoardArgs {
 /// Settings of the scan; what is not given stays as the board has it.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct SettingsArgs {
-    /// Wait between grounding an electrode and reading (us)
+    /// Wait after grounding an electrode before its readings (us)
     #[arg(long, value_name = "US")]
     settle_us: Option<u16>,
-    /// Conversions averaged into one reading
+    /// Conversions averaged for each reading
     #[arg(long, value_name = "1|2|4|...|256", value_parser = average_log2)]
     average: Option<u8>,
-    /// Frames a second at most; 0 for as fast as the board can
+    /// Frames per second at most; 0 for as fast as the board can
     #[arg(long, value_name = "FRAMES")]
     max_fps: Option<u16>,
 }

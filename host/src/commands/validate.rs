@@ -4,19 +4,19 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use serde::Serialize;
+use tactomo::forward::ForwardModel;
 use tactomo::forward::shell::Shell;
-use tactomo::forward::{ForwardError, ForwardModel};
-use tactomo::solve::{Lambda, Method, Problem, Solver, Tikhonov, Variant};
+use tactomo::solve::{Lambda, Method, Parameter, Problem};
 use tactomo::study::case::Case;
 use tactomo::study::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
 
-use super::choice::Model;
+use super::choice::{self, Model};
 use super::output;
 
 /// Compares models and solvers with reference cases.
 ///
-/// The forward model computes the readings of each case; solvers, on that model's image mesh (of the default size), read
-/// the contacts from the readings that the case gives.
+/// The forward model computes the readings of each case, to compare with the ones in the file;
+/// the solvers find contacts from the readings in the file.
 ///
 /// Examples:
 ///   tactomo validate reference/slab/*.json --noise-lsb 1.5 --trials 20
@@ -30,22 +30,22 @@ pub struct Args {
     /// Forward model
     #[arg(long, value_enum, default_value = "auto")]
     model: Model,
-    /// Nodes of the shell's mesh for the forward comparison, about
+    /// Approximate number of nodes of the shell's mesh, to compare readings
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     nodes: u32,
-    /// Adds noise of so many LSB to quantised readings
+    /// Quantises the readings and adds noise of this standard deviation (LSB)
     #[arg(long, value_name = "LSB", value_parser = noise)]
     noise_lsb: Option<f64>,
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How often each solver is tried, with new noise each time
+    /// Trials of each solver, with new noise each
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     trials: u32,
-    /// Solver to try; all, if none is given
-    #[arg(long, value_name = "NAME")]
+    /// Solver to try; give it again for more [default: all]
+    #[arg(long, value_name = "NAME", value_parser = choice::method(), hide_possible_values = true)]
     solver: Vec<Method>,
-    /// Tikhonov's lambda, as a share of the largest singular value
+    /// Lambda of the solvers that have one, as a share of the largest singular value
     #[arg(long, value_name = "SHARE", value_parser = positive)]
     lambda: Option<f64>,
     /// Prints `{cases: [...]}` as JSON
@@ -77,11 +77,12 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
         "shell" => Box::new(Shell::new(&case.detector)?),
         _ => forward,
     };
+    let lambda = args.lambda.map(|share| Parameter::Lambda(Lambda::Relative(share)));
     let trials = Trials { noise_lsb: args.noise_lsb, seed: args.seed, count: args.trials as usize };
     let problem = Problem::new(model);
     let solvers = Method::ALL.iter().filter(|m| args.solver.is_empty() || args.solver.contains(m));
     let solvers = solvers
-        .map(|method| Ok(try_solver(case, &mut *build(*method, &problem, args.lambda)?, &trials)?))
+        .map(|method| Ok(try_solver(case, &mut *method.build_with(&problem, lambda)?, &trials)?))
         .collect::<anyhow::Result<Vec<_>>>()?;
     Ok(CaseReport {
         case: case.detector.name.clone(),
@@ -93,26 +94,17 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
     })
 }
 
-fn build(method: Method, problem: &Problem, lambda: Option<f64>) -> Result<Box<dyn Solver>, ForwardError> {
-    let tikhonov = |lambda, variant| Ok(Box::new(Tikhonov::new(&problem.jacobian, lambda, variant)) as Box<dyn Solver>);
-    match (method, lambda.map(Lambda::Relative)) {
-        (Method::Tikhonov, Some(lambda)) => tikhonov(lambda, Variant::Balanced),
-        (Method::TikhonovPaper, Some(lambda)) => tikhonov(lambda, Variant::Paper),
-        _ => method.build(problem),
-    }
-}
-
 fn noise(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(lsb) if (0.0..1e6).contains(&lsb) => Ok(lsb),
-        _ => Err("a number of LSB is needed, zero or above".to_owned()),
+        _ => Err("a number of LSB is needed, 0 or more".to_owned()),
     }
 }
 
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(share) if share > 0.0 && f64::is_finite(share) => Ok(share),
-        _ => Err("a number above zero is needed".to_owned()),
+        _ => Err("a number above 0 is needed".to_owned()),
     }
 }
 

@@ -21,8 +21,8 @@ pub struct Bound {
 /// independent normal noise of a standard deviation (V).
 ///
 /// With `J` the derivatives of the readings by the unknowns, Fisher's information is `J'J / deviation^2`, and no unbiased estimate has
-/// a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of the model. `None` if the readings do not tell
-/// the unknowns apart.
+/// a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of the model. `None` if the readings do not
+/// separate the unknowns.
 ///
 /// # Errors
 /// [`ForwardError`] if a contact, or one a step beside it, is off the detector.
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn contacts_on_one_spot_cannot_be_told_apart() {
+    fn contacts_on_one_spot_cannot_be_separated() {
         let bound = cramer_rao(&slab(), &[firm(0.004, 0.007), firm(0.004, 0.007)], 1e-3).unwrap();
         assert!(bound.as_ref().is_none_or(|bound| bound[0].position_m > 1.0), "{bound:?}");
     }

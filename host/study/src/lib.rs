@@ -4,19 +4,19 @@
 
 mod bound;
 pub mod case;
-mod data;
-mod judge;
+mod experiment;
 mod machine;
 pub mod page;
 mod scenes;
+mod score;
 pub mod stability;
 pub mod tradeoff;
 pub mod validate;
 mod variant;
 
 pub use self::bound::{Bound, cramer_rao};
-pub use self::data::{Frame, Laboratory, StudyError};
-pub use self::judge::{Judge, Score, Summary};
+pub use self::experiment::{Experiment, Frame, StudyError};
 pub use self::machine::Machine;
 pub use self::scenes::{Group, SceneKind};
-pub use self::variant::{Family, Setting, Variation, family};
+pub use self::score::{Score, Scorer, Summary};
+pub use self::variant::Variation;

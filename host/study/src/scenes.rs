@@ -18,7 +18,7 @@ const FAR: f64 = 2.0;
 const APART: f64 = 1.3;
 /// A contact at the edge: so many radii from it.
 const EDGE_RADII: f64 = 1.2;
-/// Seconds between two looks at the moving ball.
+/// Seconds between two frames of the moving ball.
 const STEP_S: f64 = 0.02;
 /// Places tried before contacts are taken as they are.
 const TRIES: usize = 1000;

@@ -1,7 +1,11 @@
 //! Columns of numbers in text.
 //!
-//! Numbers are parted by commas, semicolons, tabs or blanks. A first line that is not all numbers names the columns. Empty lines, and
-//! lines that begin with `#`, are left out.
+//! Cells are separated by commas, semicolons, tabs or blanks, whichever the first line has. A first line without any number names the
+//! columns. Empty lines, and lines that begin with `#`, are left out.
+
+use std::io::{self, Write};
+
+use ::csv::{ReaderBuilder, StringRecord, Trim};
 
 use super::Array;
 
@@ -11,47 +15,145 @@ use super::Array;
 /// The line and the column that are wrong.
 pub fn parse(text: &str) -> Result<(Vec<String>, Array), String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let kept = |(_, line): &(usize, &str)| !line.trim().is_empty() && !line.trim_start().starts_with('#');
-    let mut lines = text.lines().enumerate().filter(kept).peekable();
-    let names = lines.next_if(|(_, line)| fields(line).any(|field| field.parse::<f64>().is_err()));
-    let names: Vec<String> = names.map(|(_, line)| fields(line).map(str::to_owned).collect()).unwrap_or_default();
-    let (mut columns, mut rows, mut values) = (names.len(), 0, Vec::new());
-    for (index, line) in lines {
-        let before = values.len();
-        for (column, field) in fields(line).enumerate() {
-            let number = field.parse().map_err(|_| {
-                format!("line {}, column {}: `{}` is not a number", index + 1, column + 1, shortened(field))
+    let separator = separator(text);
+    let mut reader = ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(Trim::All)
+        .comment(Some(b'#'))
+        .delimiter(separator)
+        .from_reader(text.as_bytes());
+    let mut rows = Rows::default();
+    for record in reader.records() {
+        let record = record.map_err(|error| error.to_string())?;
+        let line = record.position().map_or(0, |position| line_at(text, position));
+        let cells = cells(&record, separator);
+        match cells[..] {
+            [] | [""] => {}
+            [first, ..] if first.starts_with('#') => {}
+            _ => rows.add(line, &cells)?,
+        }
+    }
+    rows.finish()
+}
+
+/// Number of the line of a record that begins at or after a position, with empty lines and comments before it.
+fn line_at(text: &str, position: &::csv::Position) -> u64 {
+    let lines = text.get(position.byte() as usize..).unwrap_or_default().lines();
+    let skipped = lines.take_while(|line| line.trim().is_empty() || line.starts_with('#')).count();
+    position.line() + skipped as u64
+}
+
+/// The separator of the first line that is neither empty nor a comment.
+fn separator(text: &str) -> u8 {
+    let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let first = lines.next().unwrap_or_default();
+    // Semicolons first: where commas are decimal points, the cells have both.
+    [b';', b',', b'\t'].into_iter().find(|mark| first.as_bytes().contains(mark)).unwrap_or(b' ')
+}
+
+/// The cells of a line. Between two marks there must be a cell, so that one that is missing is seen; blanks may be many.
+fn cells(record: &StringRecord, separator: u8) -> Vec<&str> {
+    record.iter().filter(|cell| separator != b' ' || !cell.is_empty()).collect()
+}
+
+/// What has been read.
+#[derive(Default)]
+struct Rows {
+    names: Vec<String>,
+    columns: usize,
+    count: usize,
+    values: Vec<f64>,
+}
+
+impl Rows {
+    fn add(&mut self, line: u64, cells: &[&str]) -> Result<(), String> {
+        if self.columns == 0 {
+            self.columns = cells.len();
+            if is_header(line, cells)? {
+                self.names = cells.iter().map(|&cell| cell.to_owned()).collect();
+                return Ok(());
+            }
+        }
+        for (column, cell) in cells.iter().enumerate() {
+            let number = cell.parse().map_err(|_| {
+                format!("line {line}, column {}: `{}` is not a number{}", column + 1, shortened(cell), hint(cell))
             })?;
-            values.push(number);
+            self.values.push(number);
         }
-        let count = values.len() - before;
-        if columns == 0 {
-            columns = count;
+        if cells.len() != self.columns {
+            return Err(format!("line {line}: {} numbers, but {} columns before it", cells.len(), self.columns));
         }
-        if count != columns {
-            return Err(format!("line {}: {count} numbers, but {columns} columns before it", index + 1));
-        }
-        rows += 1;
+        self.count += 1;
+        Ok(())
     }
-    if rows == 0 {
-        return Err("there are no numbers".to_owned());
+
+    fn finish(self) -> Result<(Vec<String>, Array), String> {
+        if self.count == 0 {
+            return Err("there are no numbers".to_owned());
+        }
+        Ok((self.names, Array { shape: vec![self.count, self.columns], values: self.values }))
     }
-    Ok((names, Array { shape: vec![rows, columns], values }))
 }
 
-fn fields(line: &str) -> impl Iterator<Item = &str> {
-    let line = line.trim();
-    let marks: &[char] = &[',', ';', '\t'];
-    // A number must stand between two marks, so that one that is missing is seen; blanks may be many.
-    let blanks = !line.contains(marks);
-    let parts: Box<dyn Iterator<Item = &str>> =
-        if blanks { Box::new(line.split_whitespace()) } else { Box::new(line.split(marks).map(str::trim)) };
-    parts.map(|field| field.trim_matches('"'))
+/// Whether the first line names the columns: no cell of it is a number, nor begins as one does. A line of both is one of
+/// numbers with a mistake in it, or a header that would swallow a frame without a word.
+fn is_header(line: u64, cells: &[&str]) -> Result<bool, String> {
+    let is_number = |cell: &&str| cell.parse::<f64>().is_ok();
+    let is_name =
+        |cell: &&str| !is_number(cell) && !cell.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+    if cells.iter().all(is_number) {
+        return Ok(false);
+    }
+    if cells.iter().all(is_name) {
+        return Ok(true);
+    }
+    let wrong = cells.iter().position(|cell| !is_number(cell)).unwrap_or_default();
+    Err(format!(
+        "line {line}, column {}: `{}` is not a number{}; to name the columns, the first line must hold names only",
+        wrong + 1,
+        shortened(cells[wrong]),
+        hint(cells[wrong])
+    ))
 }
 
-/// The beginning of a field, for messages.
-fn shortened(field: &str) -> String {
-    field.chars().take(20).collect::<String>().escape_debug().to_string()
+/// What may have been meant.
+fn hint(cell: &str) -> &'static str {
+    let with_point = cell.replacen(',', ".", 1);
+    if cell.contains(',') && with_point.parse::<f64>().is_ok() { " (decimals need a point)" } else { "" }
+}
+
+/// The beginning of a cell, for messages.
+fn shortened(cell: &str) -> String {
+    cell.chars().take(20).collect::<String>().escape_debug().to_string()
+}
+
+/// Writes a table of text.
+pub struct CsvWriter<W: Write> {
+    writer: ::csv::Writer<W>,
+}
+
+impl<W: Write> CsvWriter<W> {
+    /// Begins it.
+    pub fn new(out: W) -> Self {
+        Self { writer: ::csv::Writer::from_writer(out) }
+    }
+
+    /// Writes a row; cells are quoted where they need to be.
+    ///
+    /// # Errors
+    /// If it cannot be written, or is not as long as the rows before it.
+    pub fn row<C: AsRef<[u8]>>(&mut self, cells: impl IntoIterator<Item = C>) -> io::Result<()> {
+        self.writer.write_record(cells).map_err(io::Error::from)
+    }
+
+    /// Ends it.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
 }
 
 #[cfg(test)]
@@ -60,23 +162,54 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn names_comments_and_marks_are_understood() {
-        let (names, rows) = parse("# made by hand\n\"x_m\"; force_n\r\n1; 2.5\n\n-3e-3;nan\n").unwrap();
+    fn names_comments_and_separators_are_understood() {
+        let (names, rows) = parse("# made by hand, \"today\n\"x_m\"; force_n\r\n1; 2.5\n\n-3e-3;nan\n").unwrap();
         assert_eq!(names, ["x_m", "force_n"]);
         assert_eq!(rows.shape, [2, 2]);
         assert_eq!(rows.values[..3], [1.0, 2.5, -3e-3]);
         assert!(rows.values[3].is_nan());
         assert_eq!(parse("1  2\t\n 3 4").unwrap().1.shape, [2, 2]);
+        assert_eq!(parse("1\t2\n3\t4").unwrap().1.values, [1.0, 2.0, 3.0, 4.0]);
         assert_eq!(parse("\u{feff}7").unwrap(), (Vec::new(), Array { shape: vec![1, 1], values: vec![7.0] }));
+        assert_eq!(parse("\"a, b\",c\n1,2").unwrap().0, ["a, b", "c"]);
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_place() {
+    fn what_is_wrong_is_reported_with_its_place() {
         assert_eq!(parse("1,2\n3,much").unwrap_err(), "line 2, column 2: `much` is not a number");
         assert_eq!(parse("1,2\n\n3").unwrap_err(), "line 3: 1 numbers, but 2 columns before it");
         assert_eq!(parse("1,2\n3,,4").unwrap_err(), "line 2, column 2: `` is not a number");
+        assert_eq!(parse("1;2\n3;4,5").unwrap_err(), "line 2, column 2: `4,5` is not a number (decimals need a point)");
         assert_eq!(parse("a,b\n").unwrap_err(), "there are no numbers");
         assert_eq!(parse("").unwrap_err(), "there are no numbers");
+    }
+
+    #[test]
+    fn a_typing_mistake_in_the_first_line_does_not_make_it_a_header() {
+        for (text, place) in [
+            ("0.1,O.2,0.3\n1,2,3", "line 1, column 2: `O.2`"),
+            ("# volts\n0.1,0.2,\n1,2,3", "line 2, column 3: ``"),
+            ("x_m,y_m,0\n1,2,3", "line 1, column 1: `x_m`"),
+            ("0.1x\n0.2", "line 1, column 1: `0.1x`"),
+            ("1.2.3,-\n1,2", "line 1, column 1: `1.2.3`"),
+        ] {
+            let error = parse(text).unwrap_err();
+            assert!(error.starts_with(place) && error.contains("must hold names only"), "{text:?}: {error}");
+        }
+        assert_eq!(parse(",x_m\n0,1").unwrap().0, ["", "x_m"], "an index without a name, as some programs write it");
+    }
+
+    #[test]
+    fn what_is_written_is_quoted_where_it_must_be() {
+        let mut bytes = Vec::new();
+        let mut writer = CsvWriter::new(&mut bytes);
+        writer.row(["a", "b"]).unwrap();
+        writer.row(["1", "two, or \"three\""]).unwrap();
+        writer.finish().unwrap();
+        assert_eq!(bytes, b"a,b\n1,\"two, or \"\"three\"\"\"\n");
+        let mut writer = CsvWriter::new(Vec::new());
+        writer.row(["a", "b"]).unwrap();
+        assert!(writer.row(["short"]).is_err());
     }
 
     proptest! {
@@ -84,15 +217,19 @@ mod tests {
         fn what_is_written_is_read(values in prop::collection::vec(prop::num::f64::NORMAL, 1..40), columns in 1..5usize) {
             let whole = values.len() / columns * columns;
             prop_assume!(whole > 0);
-            let line = |row: &[f64]| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-            let text = values[..whole].chunks(columns).map(line).collect::<Vec<_>>().join("\n");
-            let (names, rows) = parse(&text).unwrap();
+            let mut bytes = Vec::new();
+            let mut writer = CsvWriter::new(&mut bytes);
+            for row in values[..whole].chunks(columns) {
+                writer.row(row.iter().map(f64::to_string)).unwrap();
+            }
+            writer.finish().unwrap();
+            let (names, rows) = parse(str::from_utf8(&bytes).unwrap()).unwrap();
             prop_assert!(names.is_empty());
             prop_assert_eq!(&rows.values[..], &values[..whole]);
         }
 
         #[test]
-        fn any_text_is_read_without_panic(text in "\\PC*|[0-9,;.e\n -]*") {
+        fn any_text_is_read_without_panic(text in "\\PC*|[0-9,;.e\n\"# -]*") {
             if let Ok((names, rows)) = parse(&text) {
                 prop_assert_eq!(rows.values.len(), rows.shape[0] * rows.shape[1]);
                 prop_assert!(names.is_empty() || names.len() == rows.shape[1]);

@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+pub use self::csv::CsvWriter;
 pub use self::npz::NpzWriter;
 
 /// Longest file that is read (bytes).
@@ -157,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_file_and_other_bytes_are_told() {
+    fn a_missing_file_and_other_bytes_are_refused() {
         let missing = Table::read(Path::new("no/such.csv")).unwrap_err();
         assert_eq!(missing.to_string(), "cannot read no/such.csv");
         assert!(Table::parse(&[0xff, 0xfe, 0]).unwrap_err().contains("neither text nor NPY"));

@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_read_is_told() {
+    fn what_is_not_read_is_refused() {
         assert!(of("<c16", &[0; 16]).unwrap_err().contains("arrays of <c16 are not read"));
         assert!(of("<f2", &[0; 2]).is_err());
         assert!(of("<f8", &[0; 9]).unwrap_err().contains("9 bytes"));

@@ -20,7 +20,7 @@ pub fn is_npz(bytes: &[u8]) -> bool {
 /// # Errors
 /// What is wrong, and in which array.
 pub fn parse(bytes: &[u8]) -> Result<Vec<(String, Array)>, String> {
-    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| format!("no NPZ file: {error}"))?;
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| format!("not an NPZ file: {error}"))?;
     if archive.len() > MOST_ARRAYS {
         return Err(format!("{} arrays, but {MOST_ARRAYS} at most are read", archive.len()));
     }
@@ -28,12 +28,12 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<(String, Array)>, String> {
     for index in 0..archive.len() {
         let mut file = archive.by_index(index).map_err(|error| format!("array {index}: {error}"))?;
         let name = file.name().strip_suffix(".npy").unwrap_or(file.name()).to_owned();
-        let told = |what: String| format!("array {}: {what}", name.escape_debug());
+        let located = |what: String| format!("array {}: {what}", name.escape_debug());
         let mut bytes = Vec::new();
-        // What the archive says of its length is not trusted.
-        file.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| told(error.to_string()))?;
-        room = room.checked_sub(bytes.len() as u64).ok_or_else(|| told("too long".to_owned()))?;
-        arrays.push((name.clone(), npy::parse(&bytes).map_err(told)?));
+        // The length in the archive's directory is not trusted.
+        file.by_ref().take(room + 1).read_to_end(&mut bytes).map_err(|error| located(error.to_string()))?;
+        room = room.checked_sub(bytes.len() as u64).ok_or_else(|| located("too long".to_owned()))?;
+        arrays.push((name.clone(), npy::parse(&bytes).map_err(located)?));
     }
     Ok(arrays)
 }
@@ -93,8 +93,8 @@ mod tests {
     }
 
     #[test]
-    fn other_archives_are_told() {
-        assert!(parse(b"PK\x03\x04 and no more").unwrap_err().contains("no NPZ file"));
+    fn other_archives_are_refused() {
+        assert!(parse(b"PK\x03\x04 and no more").unwrap_err().contains("not an NPZ file"));
         let mut bytes = Vec::new();
         let mut zip = ZipWriter::new(Cursor::new(&mut bytes));
         zip.start_file("letter.txt", SimpleFileOptions::default()).unwrap();

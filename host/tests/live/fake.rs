@@ -66,15 +66,8 @@ impl FakeBoard {
     }
 
     fn say_hello(&mut self) {
-        let hello = Hello {
-            firmware_version: "0.0.1".try_into().unwrap(),
-            board: "fake".try_into().unwrap(),
-            electrodes: self.electrodes,
-            adc_bits: 12,
-            adc_full_scale_mv: 3300,
-            drive_mv: 2000,
-            settings: self.settings,
-        };
+        let board = "fake".try_into().unwrap();
+        let hello = Hello { board, settings: self.settings, ..Hello::example(self.electrodes) };
         let mut wire = [0; MAX_WIRE];
         let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
         self.out.extend(&wire[..length]);

@@ -1,7 +1,8 @@
 //! From readings back to touch, and how right that is.
 //!
-//! [`solve`] has the solvers, one file a method, one trait; [`metrics`] the figures that they are judged by. Neither knows of boards,
-//! ports or pages.
+//! [`solve`] has the solvers, one file a method, one trait; [`metrics`] the figures that they are judged by; [`schema`] the names of
+//! what leaves the program. None of them knows of boards, ports or pages.
 
 pub mod metrics;
+pub mod schema;
 pub mod solve;

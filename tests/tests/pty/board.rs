@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serialport::{SerialPort, TTYPort};
 use tactomo_protocol::{
-    BoardMessage, Command, CommandReceiver, FrameHead, Hello, MAX_WIRE, Settings, encode_board, encode_frame,
+    BoardMessage, Command, CommandReceiver, FrameHead, Hello, MAX_WIRE, encode_board, encode_frame,
 };
 
 /// How long the host may take for anything.
@@ -67,15 +67,7 @@ impl Board {
     }
 
     pub fn say_hello(&mut self) {
-        self.say(&BoardMessage::Hello(Hello {
-            firmware_version: "0.1.0".try_into().unwrap(),
-            board: "pty".try_into().unwrap(),
-            electrodes: 16,
-            adc_bits: 12,
-            adc_full_scale_mv: 3300,
-            drive_mv: 2000,
-            settings: Settings::default(),
-        }));
+        self.say(&BoardMessage::Hello(Hello::example(16)));
     }
 
     pub fn say(&mut self, message: &BoardMessage) {

@@ -34,6 +34,10 @@ pub struct Rows {
 pub struct FileFrame {
     /// Board time since the first frame (s), if that is known.
     pub time_s: Option<f64>,
+    /// The board's number of the scan, if the file tells.
+    pub sequence: Option<u64>,
+    /// Scans that are missing since the frame before: lost on the way, or damaged in the file.
+    pub lost_before: u64,
     /// Readings (V) in the order of the channels; of a detector row by row.
     pub volts: Vec<f64>,
 }
@@ -155,7 +159,7 @@ impl Rows {
 
     fn next_frame(&mut self) -> Option<FileFrame> {
         let volts: Vec<f64> = self.rows.by_ref().take(self.channels).collect();
-        (volts.len() == self.channels).then_some(FileFrame { time_s: None, volts })
+        (volts.len() == self.channels).then_some(FileFrame { time_s: None, sequence: None, lost_before: 0, volts })
     }
 }
 

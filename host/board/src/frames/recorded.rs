@@ -146,7 +146,8 @@ impl Recorded {
         let place = self.sequence.place(&frame.head);
         self.lost.missing_frames += place.dropped;
         let first_us = *self.first_us.get_or_insert(place.time_us);
-        Some(FileFrame { time_s: Some(place.time_us.saturating_sub(first_us) as f64 * 1e-6), volts })
+        let time_s = Some(place.time_us.saturating_sub(first_us) as f64 * 1e-6);
+        Some(FileFrame { time_s, sequence: Some(place.sequence), lost_before: place.dropped, volts })
     }
 }
 
@@ -205,14 +206,15 @@ mod tests {
         let mut file = recorded("whole", &chunks).unwrap();
         assert_eq!((file.channels(), file.board().map(|board| board.drive_mv)), (16, Some(1500)));
         let frames: Vec<_> = std::iter::from_fn(|| file.next_frame().unwrap()).collect();
-        let of = |time_s: f64, volts: f64| FileFrame { time_s: Some(time_s), volts: vec![volts; 16] };
         assert_eq!(frames.len(), 3);
         let loss = file.loss().unwrap();
         assert_eq!((loss.missing_frames, loss.corrupt, loss.other_frames), (4, 1, 0));
         assert_eq!(loss.to_string(), "4 frames are missing; 1 message is corrupt");
-        for (found, expected) in frames.iter().zip([of(0.0, 0.05), of(0.001, 0.02), of(0.006, 0.0)]) {
-            assert!((found.time_s.unwrap() - expected.time_s.unwrap()).abs() < 1e-12, "{found:?}");
-            assert!((found.volts[5] - expected.volts[5]).abs() < 1e-12, "{found:?}");
+        let expected = [(0.0, 3, 0, 0.05), (0.001, 4, 0, 0.02), (0.006, 9, 4, 0.0)];
+        for (found, (time_s, sequence, lost_before, volts)) in frames.iter().zip(expected) {
+            assert!((found.time_s.unwrap() - time_s).abs() < 1e-12, "{found:?}");
+            assert!(found.volts.iter().all(|found_v| (found_v - volts).abs() < 1e-12), "{found:?}");
+            assert_eq!((found.sequence, found.lost_before), (Some(sequence), lost_before));
         }
     }
 

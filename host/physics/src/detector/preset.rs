@@ -25,7 +25,7 @@ const ROWS: [Row; 7] = [
 
 impl Detector {
     /// Name of the default preset.
-    pub const DEFAULT: &str = "square-60";
+    pub const DEFAULT: &str = ROWS[0].0;
 
     /// Names of all presets.
     pub fn preset_names() -> impl Iterator<Item = &'static str> {
@@ -34,9 +34,11 @@ impl Detector {
 
     /// A detector of the paper in sample A, or `None` if there is none of that name.
     pub fn preset(name: &str) -> Option<Self> {
-        let &(name, width_m, height_m, thickness_m, columns, rows, diameter_m) =
-            ROWS.iter().find(|row| row.0 == name)?;
-        Some(Self {
+        ROWS.iter().find(|row| row.0 == name).map(Self::of)
+    }
+
+    fn of(&(name, width_m, height_m, thickness_m, columns, rows, diameter_m): &Row) -> Self {
+        Self {
             name: name.to_owned(),
             outline: Outline::rectangle(width_m, height_m),
             surface: None,
@@ -46,7 +48,14 @@ impl Detector {
             drive_v: DRIVE_V,
             on_resistance_ohm: ON_RESISTANCE_OHM,
             adc: Adc::default(),
-        })
+        }
+    }
+}
+
+impl Default for Detector {
+    /// The default preset, 60 x 60 mm with 16 electrodes.
+    fn default() -> Self {
+        Self::of(&ROWS[0])
     }
 }
 

@@ -94,10 +94,10 @@ pub(super) fn scene(scene: &PageSetup) -> serde_json::Result<String> {
     })
 }
 
-/// The solvers to choose from, those that do most first.
+/// The solvers to choose from, those that most people look for first.
 fn solvers() -> Vec<SolverMessage> {
     let message = |method: Method| SolverMessage { name: method.name(), explanation: method.explanation() };
-    Method::ALL.into_iter().rev().map(message).collect()
+    Method::ALL.into_iter().map(message).collect()
 }
 
 /// The triangles of the image that are drawn: on the map of a closed surface those about the lowest point are torn apart.

@@ -56,8 +56,8 @@ pub struct Mark {
     pub x: f64,
     /// Upwards.
     pub y: f64,
-    /// What to tell when it is pointed at.
-    pub tells: String,
+    /// Shown when the mouse is over it.
+    pub tooltip: String,
 }
 
 impl Chart {
@@ -189,7 +189,7 @@ impl Chart {
             _ = writeln!(
                 svg,
                 "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}</title></circle>",
-                escaped(&mark.tells)
+                escaped(&mark.tooltip)
             );
         }
         *svg += "</g>\n";
@@ -265,7 +265,7 @@ mod tests {
         let series = points.iter().map(|&[x, y]| Series {
             name: format!("s{x}"),
             class: "linear",
-            marks: vec![Mark { x, y, tells: "<&".to_owned() }],
+            marks: vec![Mark { x, y, tooltip: "<&".to_owned() }],
             main: 0,
             is_joined: false,
         });

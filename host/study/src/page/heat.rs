@@ -15,6 +15,8 @@ pub struct Heat {
     pub columns: Vec<String>,
     /// The rows.
     pub rows: Vec<Row>,
+    /// Whether it takes the width of the page, with all its columns in it.
+    pub is_whole: bool,
 }
 
 /// A row of a map.
@@ -29,23 +31,24 @@ pub struct Row {
 /// A cell of a map.
 #[derive(Clone, Debug, Default)]
 pub struct Cell {
-    /// How bad: 0 good to 4 useless; `None` where there is nothing to tell.
+    /// How bad: 0 good to 4 useless; `None` where there is no figure.
     pub level: Option<u8>,
     /// What it says.
     pub text: String,
     /// What it says below that, smaller.
     pub detail: String,
-    /// Whether the method itself said that something is wrong.
+    /// Whether the method itself flagged that something is wrong.
     pub is_flagged: bool,
-    /// What to tell when it is pointed at.
-    pub tells: String,
+    /// Shown when the mouse is over it.
+    pub tooltip: String,
 }
 
 impl Heat {
     /// The map as HTML.
     pub fn html(&self) -> String {
+        let class = if self.is_whole { "heat whole" } else { "heat" };
         let mut html =
-            format!("<section class=\"heat\"><h3>{}</h3><p>{}</p>\n", escaped(&self.title), escaped(&self.note));
+            format!("<section class=\"{class}\"><h3>{}</h3><p>{}</p>\n", escaped(&self.title), escaped(&self.note));
         html += "<div class=\"wide\"><table><thead><tr><th></th>";
         for column in &self.columns {
             _ = write!(html, "<th>{}</th>", escaped(column));
@@ -71,7 +74,7 @@ impl Cell {
         _ = write!(
             html,
             "<td class=\"{class}\" title=\"{}\">{}{flag}{detail}</td>",
-            escaped(&self.tells),
+            escaped(&self.tooltip),
             escaped(&self.text)
         );
     }

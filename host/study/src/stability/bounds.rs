@@ -3,7 +3,7 @@
 use super::scenes::{APART, pair};
 use super::sweep::{Bench, Trials};
 use crate::bound::cramer_rao;
-use crate::data::StudyError;
+use crate::experiment::StudyError;
 use crate::scenes::SceneKind;
 use tactomo_physics::scene::{Contact, Touch};
 
@@ -84,7 +84,7 @@ fn chart(
     Ok(BoundChart { title: title.to_owned(), is_distance, curves })
 }
 
-/// Mean of the bound over contacts and places (m); `None` where one cannot be told from another.
+/// Mean of the bound over contacts and places (m); `None` where they cannot be separated.
 fn bound(bench: &Bench, contacts: impl Fn(u64) -> Vec<Contact>) -> Result<Option<f64>, StudyError> {
     let deviation_v = bench.sound.detector.adc.deviation_v();
     let mut all = Vec::new();

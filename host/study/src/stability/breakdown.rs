@@ -1,6 +1,6 @@
 //! What counts as broken.
 
-use crate::judge::Summary;
+use crate::score::Summary;
 
 /// Error from which a method is broken, in mean distances of electrodes, and in errors at the harmless point.
 const BROKEN_SHARE: f64 = 0.15;
@@ -14,7 +14,7 @@ const SLOW_US: f64 = 10_000.0;
 const SLOW_FACTOR: f64 = 10.0;
 /// Errors up to such shares of the mean distance of electrodes are of level 0, 1, 2, 3; above, 4.
 const LEVELS: [f64; 4] = [0.03, 0.1, 0.3, 0.6];
-/// Share of frames from which something is said to be so.
+/// Share of frames from which a solver counts as refusing, or as flagging: most of them.
 const MOST: f64 = 0.5;
 
 /// How a method breaks.
@@ -59,8 +59,8 @@ pub struct Break {
     pub at: String,
     /// How.
     pub how: Breakdown,
-    /// Whether it says so itself, by a flag in most frames of that point or most points alike, or refuses.
-    pub is_told: bool,
+    /// Whether the solver reports it itself, by a flag in most frames of that point or of most points alike, or by refusing.
+    pub is_reported: bool,
     /// Share of the points that it survives.
     pub survives: f64,
 }
@@ -120,7 +120,7 @@ impl CellReport {
     }
 
     /// Whether the solver itself says that something is wrong.
-    pub fn is_told(&self) -> bool {
+    pub fn is_reported(&self) -> bool {
         self.flagged >= MOST || self.failed >= MOST
     }
 
@@ -146,7 +146,7 @@ impl CellReport {
     }
 }
 
-/// Judges the cells of a row, and tells where it breaks first.
+/// Judges the cells of a row, and finds where it breaks first.
 pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<CellReport>]) -> Option<Break> {
     let mut order: Vec<usize> = (0..cells.len()).filter(|index| cells[*index].is_some()).collect();
     order.sort_by(|a, b| severities[*a].total_cmp(&severities[*b]));
@@ -161,18 +161,18 @@ pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<Ce
     // Points that are as bad as that one: a fault at one electrode after the other.
     let alike: Vec<usize> = order.iter().copied().filter(|index| severities[*index] == severities[first]).collect();
     let broken: Vec<_> = alike.iter().filter_map(broken).collect();
-    let told = broken.iter().filter(|(_, cell)| cell.is_told()).count();
+    let reported = broken.iter().filter(|(_, cell)| cell.is_reported()).count();
     let at = match alike.len() {
         1 => labels[first].to_owned(),
         count => format!("{} of {count}", broken.len()),
     };
-    Some(Break { at, how: cell.broken?, is_told: 2 * told > broken.len(), survives })
+    Some(Break { at, how: cell.broken?, is_reported: 2 * reported > broken.len(), survives })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::judge::Times;
+    use crate::score::Times;
 
     fn cell(error_mm: f64) -> CellReport {
         let time_us = Times { median: 10.0, p99: 20.0, max: 30.0 };
@@ -183,7 +183,7 @@ mod tests {
     fn a_method_breaks_where_its_error_first_grows_beyond_twice_the_harmless_one() {
         let mut cells = [9.0, 3.0, 7.0, 5.0].map(|mm| Some(cell(mm)));
         let found = breaks(&["a", "b", "c", "d"], &[3.0, 0.0, 2.0, 1.0], &mut cells);
-        let expected = Break { at: "c".to_owned(), how: Breakdown::Error, is_told: false, survives: 0.5 };
+        let expected = Break { at: "c".to_owned(), how: Breakdown::Error, is_reported: false, survives: 0.5 };
         assert_eq!(found, Some(expected));
         assert_eq!(
             breaks(&["a", "b"], &[0.0, 1.0], &mut [Some(cell(0.1)), Some(cell(2.0))]),
@@ -193,11 +193,11 @@ mod tests {
     }
 
     #[test]
-    fn of_points_alike_it_tells_how_many_break() {
-        let told = CellReport { flagged: 1.0, ..cell(9.0) };
-        let mut cells = [cell(0.1), cell(9.0), cell(0.2), told.clone(), told].map(Some);
+    fn of_points_alike_it_counts_how_many_break() {
+        let flagged = CellReport { flagged: 1.0, ..cell(9.0) };
+        let mut cells = [cell(0.1), cell(9.0), cell(0.2), flagged.clone(), flagged].map(Some);
         let found = breaks(&["none", "0", "1", "2", "3"], &[0.0, 1.0, 1.0, 1.0, 1.0], &mut cells);
-        let expected = Break { at: "3 of 4".to_owned(), how: Breakdown::Error, is_told: true, survives: 0.4 };
+        let expected = Break { at: "3 of 4".to_owned(), how: Breakdown::Error, is_reported: true, survives: 0.4 };
         assert_eq!(found, Some(expected));
     }
 
@@ -211,7 +211,7 @@ mod tests {
     fn what_is_worst_is_named() {
         let broken = |worse: CellReport| {
             breaks(&["a", "", "b"], &[0.0, -1.0, 1.0], &mut [Some(cell(0.1)), None, Some(worse)])
-                .map(|at| (at.how, at.is_told))
+                .map(|at| (at.how, at.is_reported))
         };
         let flagged = CellReport { not_finite: 0.1, missed: 1.0, flagged: 0.9, ..cell(9.0) };
         assert_eq!(broken(flagged), Some((Breakdown::NotFinite, true)));

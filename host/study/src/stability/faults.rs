@@ -1,7 +1,7 @@
 //! Sweeps of a fault over all electrodes.
 
 use super::sweep::{Bench, Point, Sweep};
-use crate::data::StudyError;
+use crate::experiment::StudyError;
 use crate::scenes::SceneKind;
 use tactomo_physics::simulate::Fault;
 use tactomo_touch::solve::{Guard, Method, Solver};
@@ -20,12 +20,12 @@ const KINDS: [Kind; 5] = [
     ("A channel of the wrong gain", "0.8 of the voltage.", |channel, _| Fault::Gain { channel, factor: 0.8 }),
 ];
 
-/// Electrodes that a quick study tries: every so manieth.
+/// A quick study tries every fifth electrode.
 const QUICK_STEP: usize = 5;
 /// Frames that the guard has seen before electrodes are left out as it says.
 const SEEN: usize = 48;
 /// The kinds, from the first, that are also tried with what the guard finds left out, and the solver that it guards meanwhile: an exchange is looked
-/// for where that keeps telling of a misfit, which `kernel` does soon; all others the readings tell by themselves.
+/// for where that keeps flagging a misfit, which `kernel` does soon; all others show in the readings alone.
 const GUARDED: [(&str, Method); 3] = [
     ("A dead electrode, left out", Method::TikhonovPaper),
     ("Two electrodes shorted, left out", Method::TikhonovPaper),
@@ -67,23 +67,23 @@ fn without_wrong(mut point: Point, method: Method) -> Result<Point, StudyError> 
     if wrong.is_empty() {
         return Ok(point);
     }
-    let electrodes = point.laboratory.detector.electrodes.len();
+    let electrodes = point.experiment.detector.electrodes.len();
     let kept: Vec<usize> = (0..electrodes).filter(|electrode| !wrong.contains(electrode)).collect();
     for frame in point.places.iter_mut().flatten() {
         frame.readings = frame.readings.of(&kept);
     }
     let names: Vec<_> = wrong.iter().map(usize::to_string).collect();
     point.label = format!("{} → {}", point.label, names.join(", "));
-    point.laboratory = point.laboratory.inverted_with(&kept);
+    point.experiment = point.experiment.inverted_with(&kept);
     Ok(point)
 }
 
 /// Electrodes that the guard finds wrong in frames of a point's first place.
 fn found_wrong(point: &Point, method: Method) -> Result<Vec<usize>, StudyError> {
     let Some(frame) = point.places.first().and_then(|frames| frames.first()) else { return Ok(Vec::new()) };
-    let mut guard = Guard::new(method, &point.laboratory.problem)?;
-    for frame in point.laboratory.frames(&vec![frame.touches.clone(); SEEN], 1)? {
-        // Readings that it refuses tell it nothing.
+    let mut guard = Guard::new(method, &point.experiment.problem)?;
+    for frame in point.experiment.frames(&vec![frame.touches.clone(); SEEN], 1)? {
+        // It learns nothing from readings that it refuses.
         drop(guard.solve(&frame.readings));
     }
     Ok(guard.excluded().iter().map(|(electrode, _)| *electrode).collect())
@@ -92,7 +92,7 @@ fn found_wrong(point: &Point, method: Method) -> Result<Vec<usize>, StudyError> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Laboratory;
+    use crate::experiment::Experiment;
     use crate::stability::Plan;
     use tactomo_physics::detector::Detector;
 
@@ -106,11 +106,11 @@ mod tests {
             seed: 1,
             quick: true,
         };
-        let bench = Bench { plan: &plan, sound: Laboratory::new(&plan.detector).unwrap() };
+        let bench = Bench { plan: &plan, sound: Experiment::new(&plan.detector).unwrap() };
         let Sweep { points, .. } = left_out(sweep(&bench, KINDS[0]).unwrap(), GUARDED[0]).unwrap();
         assert_eq!((points[0].label.as_str(), points[2].label.as_str()), ("none", "no. 5 → 5"));
         assert_eq!(points[2].places[0][0].readings.electrodes(), 15);
-        let mut solver = Method::Contacts.build(&points[2].laboratory.problem).unwrap();
+        let mut solver = Method::Contacts.build(&points[2].experiment.problem).unwrap();
         let frame = &points[2].places[0][0];
         let found = solver.solve(&frame.readings).unwrap().contacts;
         let truth = frame.contacts.as_deref().unwrap();

@@ -3,16 +3,15 @@
 use super::bounds::{BoundChart, BoundCurve};
 use super::{Breakdown, CellReport, Report, SolverRow, SweepReport};
 use crate::page::{Axis, Cell, Chart, Heat, Mark, Row, Series, Unit, html, machine};
-use crate::variant::family;
 use tactomo_touch::solve::Method;
 
 /// Errors below this show there (m).
 const FLOOR_M: f64 = 1e-6;
 
-const READ: &str = "<p class=\"lead-in\">Green holds, red is useless. <b class=\"flag\">⚑</b> marks where the solver itself says that something is wrong: \
+const READ: &str = "<p class=\"lead-in\">Green holds, red is useless. <b class=\"flag\">⚑</b> marks where the solver itself reports that something is wrong: \
     <b>red without a flag is the danger</b>.</p>\n\
     <p><span class=\"key h0\">below 3 %</span><span class=\"key h1\">10 %</span><span class=\"key h2\">30 %</span>\
-    <span class=\"key h3\">60 %</span><span class=\"key h4\">above</span> error, of the mean distance of electrodes.</p>";
+    <span class=\"key h3\">60 %</span><span class=\"key h4\">above</span> error, as a share of the mean distance of electrodes.</p>";
 
 /// A self-contained HTML page.
 pub fn page(report: &Report) -> String {
@@ -43,10 +42,11 @@ fn overview(report: &Report) -> String {
     Heat {
         title: format!("{}: first break of each solver", report.detector),
         note: "The mildest point of each sweep that breaks a solver: its error is above 15 % of the mean distance of electrodes and twice that at \
-               the harmless point, or it miscounts, slows down or answers no number. Where it holds: its largest error."
+               the harmless point, or it miscounts, slows down or answers with no finite number. Where it holds: its largest error."
             .to_owned(),
         columns: all.solvers.iter().map(|row| row.solver.clone()).collect(),
         rows: rows.collect(),
+        is_whole: true,
     }
     .html()
 }
@@ -75,8 +75,8 @@ fn overview_cell(sweep: &SweepReport, solver: &str) -> Cell {
         level: Some(level),
         text: found.at.clone(),
         detail: found.how.name().to_owned(),
-        is_flagged: found.is_told,
-        tells: format!("holds at {:.0} % of the points", 100.0 * found.survives),
+        is_flagged: found.is_reported,
+        tooltip: format!("holds at {:.0} % of the points", 100.0 * found.survives),
     }
 }
 
@@ -87,13 +87,14 @@ fn heat(sweep: &SweepReport) -> Heat {
         note: sweep.note.clone(),
         columns: sweep.points.iter().map(|point| point.label.clone()).collect(),
         rows: sweep.solvers.iter().map(row).collect(),
+        is_whole: false,
     }
 }
 
 fn cell(cell: &Option<CellReport>) -> Cell {
     let Some(cell) = cell else {
-        let tells = "cannot be made for this model".to_owned();
-        return Cell { text: "n/a".to_owned(), tells, ..Cell::default() };
+        let tooltip = "cannot be made for this model".to_owned();
+        return Cell { text: "n/a".to_owned(), tooltip, ..Cell::default() };
     };
     let number = cell.error_m.map_or_else(|| "–".to_owned(), millimetres);
     let marks = [
@@ -108,8 +109,8 @@ fn cell(cell: &Option<CellReport>) -> Cell {
         level: Some(cell.level),
         text: number + &marks,
         detail: String::new(),
-        is_flagged: cell.is_told(),
-        tells: format!(
+        is_flagged: cell.is_reported(),
+        tooltip: format!(
             "count right in {:.0} % of frames, missed {:.2}, invented {:.2}, conductance off by {}, p99 {}, flagged in {:.0} % of frames",
             100.0 * cell.count_right.unwrap_or(0.0),
             cell.missed,
@@ -156,10 +157,10 @@ fn bound_chart(report: &BoundChart) -> Chart {
 
 fn curve(curve: &BoundCurve) -> Series {
     let method = curve.solver.as_deref().and_then(|name| name.parse::<Method>().ok());
-    let mark = |[x, y]: &[f64; 2]| Mark { x: *x, y: *y, tells: format!("{}: {}", x, Unit::Metres.text(*y)) };
+    let mark = |[x, y]: &[f64; 2]| Mark { x: *x, y: *y, tooltip: format!("{}: {}", x, Unit::Metres.text(*y)) };
     Series {
         name: curve.solver.clone().unwrap_or_else(|| "noise limit".to_owned()),
-        class: method.map_or("bound", |method| family(method).class()),
+        class: method.map_or("bound", |method| method.family().class()),
         marks: curve.points.iter().map(mark).collect(),
         main: curve.points.len() / 2,
         is_joined: true,

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::sweep::{Bench, Sweep};
-use crate::data::{Laboratory, StudyError};
+use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
 use tactomo_physics::detector::{Adc, Detector};
 use tactomo_physics::forward::readings_v;
@@ -53,8 +53,8 @@ fn noise_of(bench: &Bench, kind: SceneKind, title: &'static str, note: &str) -> 
     let points = bench
         .some(&SNR_DB)
         .map(|snr_db| {
-            let laboratory = bench.sound.measured_as(&noisy(&bench.sound.detector, *snr_db, signal_v));
-            bench.point(format!("{snr_db} dB"), -snr_db, laboratory, kind)
+            let experiment = bench.sound.measured_as(&noisy(&bench.sound.detector, *snr_db, signal_v));
+            bench.point(format!("{snr_db} dB"), -snr_db, experiment, kind)
         })
         .collect::<Result<_, _>>()?;
     Ok(Sweep { title, note: note.to_owned(), points })
@@ -83,8 +83,8 @@ fn bits(bench: &Bench) -> Result<Sweep, StudyError> {
         .some(&BITS)
         .map(|bits| {
             let adc = Adc { bits: *bits, ..bench.sound.detector.adc };
-            let laboratory = bench.sound.measured_as(&Detector { adc, ..bench.sound.detector.clone() });
-            bench.point(format!("{bits} bits"), -f64::from(*bits), laboratory, SceneKind::Light)
+            let experiment = bench.sound.measured_as(&Detector { adc, ..bench.sound.detector.clone() });
+            bench.point(format!("{bits} bits"), -f64::from(*bits), experiment, SceneKind::Light)
         })
         .collect::<Result<_, _>>()?;
     let note = format!(
@@ -94,8 +94,8 @@ fn bits(bench: &Bench) -> Result<Sweep, StudyError> {
     Ok(Sweep { title: "Bits of the converter", note, points })
 }
 
-/// The sound laboratory once more.
-fn sound(bench: &Bench) -> Result<Laboratory, StudyError> {
+/// The sound experiment once more.
+fn sound(bench: &Bench) -> Result<Experiment, StudyError> {
     bench.sound.with_faults(&[], 0)
 }
 
@@ -168,7 +168,7 @@ fn apart_firm(bench: &Bench) -> Result<Sweep, StudyError> {
         bench,
         SceneKind::Firm,
         "Distance of two firm contacts",
-        "0.3 sheet conductances each. What is not told apart is missed.",
+        "0.3 sheet conductances each. Two that are found as one count as one missed.",
     )
 }
 
@@ -224,7 +224,7 @@ fn width(bench: &Bench) -> Result<Sweep, StudyError> {
     touched(bench, "Radius of a wide contact", "Of 0.3 sheet conductances in all.", &RADII, label, touches)
 }
 
-/// A second press that lowers the signal of the first: nearer to where the current leaves than to where it is heard.
+/// A second press that lowers the signal of the first: nearer to where the current leaves than to where it is measured.
 fn lowered(bench: &Bench) -> Result<Sweep, StudyError> {
     let seeds = bench.seeds();
     let ranked = seeds.iter().map(|seed| by_signal(bench, *seed)).collect::<Result<Vec<_>, _>>()?;

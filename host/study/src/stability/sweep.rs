@@ -5,19 +5,19 @@ use std::sync::Arc;
 use super::bounds::{self, BoundReport};
 use super::breakdown::{Break, CellReport, breaks};
 use super::{faults, scenes, wrong};
-use crate::data::{Frame, Laboratory, StudyError};
-use crate::judge::{Judge, Summary};
+use crate::experiment::{Experiment, Frame, StudyError};
 use crate::machine::Machine;
 use crate::scenes::SceneKind;
+use crate::score::{Scorer, Summary};
 use crate::variant::Variation;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::scene::{Contact, Hand, Touch};
-use tactomo_touch::solve::{Method, Problem, Solver};
+use tactomo_touch::solve::{Method, ParameterKind, Problem, Solver};
 
 /// Lambda's sweep, in shares of the largest singular value.
 const LAMBDAS: [f64; 7] = [1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
-/// Of the points of a sweep, a quick study tries every so manieth, and the last.
+/// Of the points of a sweep, a quick study tries every third, and the last.
 const QUICK_STEP: usize = 3;
 
 /// What is tried.
@@ -104,7 +104,7 @@ pub(super) struct Sweep {
 pub(super) struct Point {
     pub label: String,
     pub severity: f64,
-    pub laboratory: Laboratory,
+    pub experiment: Experiment,
     /// Frames of each place.
     pub places: Vec<Vec<Frame>>,
     /// What solvers' lambda is set to.
@@ -115,7 +115,7 @@ pub(super) struct Point {
 pub(super) struct Bench<'a> {
     pub plan: &'a Plan,
     /// The sound detector.
-    pub sound: Laboratory,
+    pub sound: Experiment,
 }
 
 impl Bench<'_> {
@@ -137,11 +137,11 @@ impl Bench<'_> {
         &self,
         label: String,
         severity: f64,
-        laboratory: Laboratory,
+        experiment: Experiment,
         kind: SceneKind,
     ) -> Result<Point, StudyError> {
         let detector = self.sound.detector.clone();
-        self.touched(label, severity, laboratory, |seed| kind.frames(&detector, seed, 1).remove(0))
+        self.touched(label, severity, experiment, |seed| kind.frames(&detector, seed, 1).remove(0))
     }
 
     /// A point at which something touches that a seed chooses.
@@ -149,15 +149,15 @@ impl Bench<'_> {
         &self,
         label: String,
         severity: f64,
-        laboratory: Laboratory,
+        experiment: Experiment,
         touches: impl Fn(u64) -> Vec<Touch>,
     ) -> Result<Point, StudyError> {
         let places = self
             .seeds()
             .into_iter()
-            .map(|seed| laboratory.frames(&vec![touches(seed); self.plan.frames], seed))
+            .map(|seed| experiment.frames(&vec![touches(seed); self.plan.frames], seed))
             .collect::<Result<_, _>>()?;
-        Ok(Point { label, severity, laboratory, places, lambda: None })
+        Ok(Point { label, severity, experiment, places, lambda: None })
     }
 
     /// The one contact of a kind of scene at a seed.
@@ -172,12 +172,12 @@ impl Bench<'_> {
 /// Makes some sweeps.
 type Maker = fn(&Bench) -> Result<Vec<Sweep>, StudyError>;
 
-/// Runs all sweeps. `progress` hears what is tried next.
+/// Runs all sweeps. `progress` is called with what is tried next.
 ///
 /// # Errors
 /// [`StudyError`] if the detector cannot be modelled or is curved.
 pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result<Report, StudyError> {
-    let bench = Bench { plan, sound: Laboratory::new(&plan.detector)? };
+    let bench = Bench { plan, sound: Experiment::new(&plan.detector)? };
     let makers: [Maker; 4] = [scenes::sweeps, wrong::sweeps, lambda, faults::sweeps];
     let mut trials = Trials::default();
     let mut sweeps = Vec::new();
@@ -206,10 +206,10 @@ fn lambda(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
     let points = bench
         .some(&LAMBDAS)
         .map(|lambda| {
-            let laboratory = bench.sound.with_faults(&[], 0)?;
+            let experiment = bench.sound.with_faults(&[], 0)?;
             // Distance from the default, 0.03.
             let severity = (lambda / 0.03).log10().abs();
-            let point = bench.point(format!("{lambda}"), severity, laboratory, SceneKind::Firm)?;
+            let point = bench.point(format!("{lambda}"), severity, experiment, SceneKind::Firm)?;
             Ok(Point { lambda: Some(*lambda), ..point })
         })
         .collect::<Result<_, StudyError>>()?;
@@ -218,13 +218,14 @@ fn lambda(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
 }
 
 fn try_sweep(plan: &Plan, sweep: Sweep, trials: &mut Trials) -> Result<SweepReport, StudyError> {
-    let has_lambda = sweep.points.iter().any(|point| point.lambda.is_some());
-    let methods = plan.methods.iter().filter(|method| !has_lambda || Variation::has_lambda(**method));
+    let sweeps_lambda = sweep.points.iter().any(|point| point.lambda.is_some());
+    let methods =
+        plan.methods.iter().filter(|method| !sweeps_lambda || method.parameter() == Some(ParameterKind::Lambda));
     let solvers = methods
         .map(|method| {
             let cell = |point: &Point| {
                 let summary = trials.summary(*method, point)?;
-                Ok(summary.map(|summary| CellReport::of(&summary, point.laboratory.reach_m())))
+                Ok(summary.map(|summary| CellReport::of(&summary, point.experiment.reach_m())))
             };
             let mut cells = sweep.points.iter().map(cell).collect::<Result<Vec<_>, StudyError>>()?;
             let severities: Vec<f64> = sweep.points.iter().map(|point| point.severity).collect();
@@ -245,7 +246,7 @@ fn try_sweep(plan: &Plan, sweep: Sweep, trials: &mut Trials) -> Result<SweepRepo
 /// Solvers and judges of the last problems, as long as they stay the same.
 #[derive(Default)]
 pub(super) struct Trials {
-    judge: Option<(Arc<Jacobian>, Judge)>,
+    scorer: Option<(Arc<Jacobian>, Scorer)>,
     solvers: Vec<Kept>,
 }
 
@@ -267,17 +268,17 @@ impl Trials {
             Some(lambda) => Variation::with_lambda(method, lambda),
             None => Variation::default_of(method),
         };
-        let jacobian = &point.laboratory.problem.jacobian;
-        if !self.judge.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, jacobian)) {
-            self.judge = Some((Arc::clone(jacobian), Judge::new(&point.laboratory)));
+        let jacobian = &point.experiment.problem.jacobian;
+        if !self.scorer.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, jacobian)) {
+            self.scorer = Some((Arc::clone(jacobian), Scorer::new(&point.experiment)));
         }
-        let index = self.kept(variation, &point.laboratory.problem);
-        let (Some((_, judge)), Some(solver)) = (&mut self.judge, &mut self.solvers[index].solver) else {
+        let index = self.kept(variation, &point.experiment.problem);
+        let (Some((_, scorer)), Some(solver)) = (&mut self.scorer, &mut self.solvers[index].solver) else {
             return Ok(None);
         };
         let mut scores = Vec::new();
         for frames in &point.places {
-            scores.extend(judge.run(&mut **solver, frames)?);
+            scores.extend(scorer.run(&mut **solver, frames)?);
         }
         Ok(Some(Summary::of(&scores)))
     }
@@ -348,7 +349,7 @@ mod tests {
         for chart in &report.bounds.charts {
             let (bound, solver) = (&chart.curves[0], &chart.curves[1]);
             assert!(!bound.points.is_empty() && bound.solver.is_none(), "{}", chart.title);
-            // Of contacts that noise does not let one tell apart, any guess on the detector is nearer than the bound.
+            // Of contacts that cannot be separated in the noise, any guess on the detector is nearer than the bound.
             for [value, bound_m] in bound.points.iter().filter(|[_, bound_m]| *bound_m < 0.1 * report.reach_m) {
                 let reached = solver.points.iter().find(|point| point[0] == *value).unwrap();
                 assert!(*bound_m > 0.0 && *bound_m < reached[1], "{}: {bound_m} {reached:?}", chart.title);

@@ -4,21 +4,21 @@ use super::Report;
 
 /// Lines for a terminal: for each sweep, where each solver breaks, and how.
 pub fn table(report: &Report) -> String {
-    let mut lines = vec![format!("{}: where solvers break, and whether they say so themselves", report.detector)];
+    let mut lines = vec![format!("{}: where solvers break, and whether they flag it themselves", report.detector)];
     for sweep in &report.sweeps {
         lines.push(format!("\n{}", sweep.title));
         for row in &sweep.solvers {
-            let told = match &row.breaks {
+            let verdict = match &row.breaks {
                 None => "holds".to_owned(),
                 Some(found) => format!(
-                    "breaks at {:<10} {:<10} {:<14} holds at {:.0} % of the points",
+                    "breaks at {:<10} {:<11} {:<12} holds at {:.0} % of the points",
                     found.at,
                     found.how.name(),
-                    if found.is_told { "and says so" } else { "and is silent" },
+                    if found.is_reported { "with a flag" } else { "silently" },
                     100.0 * found.survives
                 ),
             };
-            lines.push(format!("  {:<16} {told}", row.solver));
+            lines.push(format!("  {:<16} {verdict}", row.solver));
         }
     }
     lines.push(String::new());

@@ -1,16 +1,16 @@
-//! Sweeps of what the model has wrong, and of what the program was told wrong.
+//! Sweeps of what is wrong in the model or in the description of the detector.
 
 use super::sweep::{Bench, Sweep};
-use crate::data::{Laboratory, StudyError};
+use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
 use tactomo_physics::detector::{Adc, Detector, Layer};
 use tactomo_physics::forward::shell::Shell;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::Fault;
 
-/// True thickness over the one told.
+/// True thickness over the one in the model.
 const THICKNESSES: [f64; 9] = [0.5, 0.7, 0.85, 0.95, 1.0, 1.05, 1.15, 1.4, 2.0];
-/// True conductivity over the one told.
+/// True conductivity over the one in the model.
 const CONDUCTIVITIES: [f64; 7] = [0.5, 0.7, 0.9, 1.0, 1.1, 1.4, 2.0];
 /// Standard deviation of the logarithm of the conductivity, and of contact impedances.
 const UNEVEN: [f64; 5] = [0.0, 0.05, 0.1, 0.2, 0.4];
@@ -25,9 +25,9 @@ const SHELL_THICKNESSES: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 const THIN: f64 = 0.1;
 /// Nodes of the image.
 const NODES: [usize; 6] = [2000, 5000, 900, 400, 200, 100];
-/// Noise over the one told.
+/// True noise over the one that solvers expect.
 const NOISES: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
-/// Voltage above which the converter tells no more, as a share of the drive.
+/// Voltage at which the converter saturates, as a share of the drive.
 const CLIPS: [f64; 6] = [1.0, 0.5, 0.3, 0.2, 0.1, 0.05];
 
 /// All of them.
@@ -38,18 +38,18 @@ pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
         .collect()
 }
 
-/// A sweep on a firm contact: how bad a value is, and the laboratory for it.
+/// A sweep on a firm contact: how bad a value is, and the experiment for it.
 fn firm<T: Copy>(
     bench: &Bench,
     (title, note): (&'static str, &str),
     values: &[T],
     label: impl Fn(T) -> String,
     severity: impl Fn(T) -> f64,
-    laboratory: impl Fn(T) -> Result<Laboratory, StudyError>,
+    experiment: impl Fn(T) -> Result<Experiment, StudyError>,
 ) -> Result<Sweep, StudyError> {
     let points = bench
         .some(values)
-        .map(|value| bench.point(label(*value), severity(*value), laboratory(*value)?, SceneKind::Firm))
+        .map(|value| bench.point(label(*value), severity(*value), experiment(*value)?, SceneKind::Firm))
         .collect::<Result<_, _>>()?;
     Ok(Sweep { title, note: note.to_owned(), points })
 }
@@ -70,21 +70,21 @@ fn pad_radius_m(detector: &Detector) -> f64 {
 }
 
 fn thickness(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("Thickness not as told", "True thickness over the one in the model, at the same conductivity.");
+    let what = ("Wrong thickness", "True thickness over the one in the model, at the same conductivity.");
     let of = |factor| bench.sound.with_truth(&thicker(&bench.sound.detector, factor));
     firm(bench, what, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
 }
 
 fn conductivity(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("Conductivity not as told", "True conductivity over the one in the model.");
+    let what = ("Wrong conductivity", "True conductivity over the one in the model.");
     let of = |factor| bench.sound.with_faults(&[Fault::Conductivity { factor }], 1);
     firm(bench, what, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
 }
 
-/// A laboratory of a detector so thin that the shell is right: the only model of uneven conductivity.
-fn thin(bench: &Bench) -> Result<Laboratory, StudyError> {
+/// A experiment of a detector so thin that the shell is right: the only model of uneven conductivity.
+fn thin(bench: &Bench) -> Result<Experiment, StudyError> {
     let detector = &bench.sound.detector;
-    Laboratory::new(&as_thick(detector, THIN * pad_radius_m(detector)))
+    Experiment::new(&as_thick(detector, THIN * pad_radius_m(detector)))
 }
 
 fn uneven(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -108,7 +108,7 @@ fn spread(bench: &Bench) -> Result<Sweep, StudyError> {
         "Standard deviation of their logarithm, where pads have 1e-3 ohm m2, which the model has for all.",
     );
     let felt = Detector { contact_impedance_ohm_m2: FELT_OHM_M2, ..bench.sound.detector.clone() };
-    let felt = Laboratory::new(&felt)?;
+    let felt = Experiment::new(&felt)?;
     let of = |deviation| felt.with_faults(&[Fault::ContactSpread { deviation }], bench.plan.seed);
     firm(bench, what, &SPREADS, percent, |deviation| deviation, of)
 }
@@ -116,7 +116,7 @@ fn spread(bench: &Bench) -> Result<Sweep, StudyError> {
 fn baseline(bench: &Bench) -> Result<Sweep, StudyError> {
     let what = (
         "A baseline taken under load",
-        "Conductance of what pressed elsewhere while the readings at rest were taken, in sheet conductances; it lifts afterwards.",
+        "Conductance of a contact elsewhere that pressed while the baseline was taken, in sheet conductances, and is lifted afterwards.",
     );
     let sheet_s = bench.sound.detector.sheet_conductance_s();
     let load = bench.contact(SceneKind::Firm, bench.plan.seed.wrapping_add(77));
@@ -128,7 +128,7 @@ fn baseline(bench: &Bench) -> Result<Sweep, StudyError> {
 }
 
 fn noise(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("More noise than told", "Noise over that of the converter that solvers know.");
+    let what = ("More noise than expected", "True noise over the one that solvers expect.");
     let adc = bench.sound.detector.adc;
     let of = |factor: f64| {
         let noisy = Adc { noise_lsb: factor * adc.noise_lsb, ..adc };
@@ -138,7 +138,7 @@ fn noise(bench: &Bench) -> Result<Sweep, StudyError> {
 }
 
 fn clip(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("Readings that saturate", "Voltage above which the converter tells no more, as a share of the drive.");
+    let what = ("Readings that saturate", "Voltage at which the converter saturates, as a share of the drive.");
     let drive_v = bench.sound.detector.drive_v;
     let of = |share| bench.sound.with_faults(&[Fault::Clip { range_v: [0.0, share * drive_v] }], 1);
     firm(bench, what, &CLIPS, percent, |share: f64| -share, of)
@@ -149,8 +149,8 @@ fn shell(bench: &Bench) -> Result<Sweep, StudyError> {
     let detector = &bench.sound.detector;
     let of = |radii| {
         let detector = as_thick(detector, radii * pad_radius_m(detector));
-        let laboratory = Laboratory::new(&detector)?;
-        Ok(laboratory.inverted_on(Box::new(Shell::new(&detector)?)))
+        let experiment = Experiment::new(&detector)?;
+        Ok(experiment.inverted_on(Box::new(Shell::new(&detector)?)))
     };
     firm(bench, what, &SHELL_THICKNESSES, |radii| format!("{radii}"), |radii| radii, of)
 }

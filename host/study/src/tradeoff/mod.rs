@@ -1,20 +1,20 @@
 //! Speed against accuracy: every solver, over scenes that span the use.
 //!
-//! Times are of one thread with nothing else of this program running. Memory is what is allocated beyond what was before, told by a
-//! [`Heap`] that counts.
+//! Times are of one thread with nothing else of this program running. Memory is what is allocated beyond what was before, as a
+//! [`Heap`] counts it.
 
 mod page;
 mod table;
 
 use std::time::{Duration, Instant};
 
-use super::data::{Frame, Laboratory, StudyError};
-use super::judge::{Judge, Score, Summary};
+use super::experiment::{Experiment, Frame, StudyError};
 use super::machine::Machine;
 use super::scenes::{Group, SceneKind};
-use super::variant::{Family, Variation, family};
+use super::score::{Score, Scorer, Summary};
+use super::variant::Variation;
 use tactomo_physics::detector::Detector;
-use tactomo_touch::solve::Method;
+use tactomo_touch::solve::{Family, Method};
 
 pub use self::page::{page, picture};
 pub use self::table::table;
@@ -38,15 +38,13 @@ pub struct Plan {
     pub heap: Option<Heap>,
 }
 
-/// A counting allocator.
+/// An allocator that can count.
 #[derive(Clone, Copy, Debug)]
 pub struct Heap {
-    /// Bytes allocated now.
-    pub allocated: fn() -> usize,
-    /// Most bytes allocated since the last reset.
-    pub peak: fn() -> usize,
-    /// Sets the peak to what is allocated now.
-    pub reset_peak: fn(),
+    /// Begins to count, from zero.
+    pub start: fn(),
+    /// What is allocated since the start, and the most that was; ends counting.
+    pub stop: fn() -> Memory,
 }
 
 /// What came out.
@@ -93,7 +91,7 @@ pub struct SolverReport {
     /// What it is made of.
     pub family: Family,
     /// Its main parameter, where that is not the default.
-    pub setting: Option<String>,
+    pub parameter: Option<String>,
     /// Time to make it (ms).
     pub set_up_ms: f64,
     /// Memory, if it was counted.
@@ -145,7 +143,7 @@ impl SolverReport {
     }
 }
 
-/// Tries all. `progress` hears what is tried next.
+/// Tries all solvers on all detectors. `progress` is called with what is tried next.
 ///
 /// # Errors
 /// [`StudyError`] if a detector cannot be modelled or is curved.
@@ -164,17 +162,17 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
 
 fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str)) -> Result<DetectorReport, StudyError> {
     progress(&format!("{}: data", detector.name));
-    let laboratory = Laboratory::new(detector)?;
-    let scenes = scenes(plan, &laboratory)?;
+    let experiment = Experiment::new(detector)?;
+    let scenes = scenes(plan, &experiment)?;
     let sweep = |method: &Method| match plan.sweep {
         true => Variation::sweep(*method),
         false => vec![Variation::default_of(*method)],
     };
-    let mut judge = Judge::new(&laboratory);
+    let mut scorer = Scorer::new(&experiment);
     let (mut solvers, mut unavailable) = (Vec::new(), Vec::new());
     for variation in plan.methods.iter().flat_map(sweep) {
         progress(&format!("{}: {}", detector.name, variation.label()));
-        match try_variation(plan, &laboratory, &scenes, &mut judge, variation) {
+        match try_variation(plan, &experiment, &scenes, &mut scorer, variation) {
             Ok(report) => solvers.push(report),
             Err(error) => unavailable.push(format!("{}: {error}", variation.label())),
         }
@@ -182,9 +180,9 @@ fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str))
     Ok(DetectorReport {
         detector: detector.name.clone(),
         size_m: detector.outline.size_m(),
-        model: laboratory.model.clone(),
-        model_ms: milliseconds(laboratory.model_time),
-        reach_m: laboratory.reach_m(),
+        model: experiment.model.clone(),
+        model_ms: milliseconds(experiment.model_time),
+        reach_m: experiment.reach_m(),
         unavailable,
         solvers,
     })
@@ -196,40 +194,40 @@ struct Place {
     frames: Vec<Frame>,
 }
 
-fn scenes(plan: &Plan, laboratory: &Laboratory) -> Result<Vec<Place>, StudyError> {
+fn scenes(plan: &Plan, experiment: &Experiment) -> Result<Vec<Place>, StudyError> {
     let places = (0..plan.places as u64).flat_map(|place| SceneKind::ALL.map(|kind| (place, kind)));
     places
         .map(|(place, kind)| {
             let seed = plan.seed.wrapping_mul(1_000_003).wrapping_add(place * 101 + kind as u64);
-            let touches = kind.frames(&laboratory.detector, seed, plan.frames);
-            Ok(Place { kind, frames: laboratory.frames(&touches, seed)? })
+            let touches = kind.frames(&experiment.detector, seed, plan.frames);
+            Ok(Place { kind, frames: experiment.frames(&touches, seed)? })
         })
         .collect()
 }
 
 fn try_variation(
     plan: &Plan,
-    laboratory: &Laboratory,
+    experiment: &Experiment,
     scenes: &[Place],
-    judge: &mut Judge,
+    scorer: &mut Scorer,
     variation: Variation,
 ) -> Result<SolverReport, StudyError> {
     let start = Instant::now();
-    let mut solver = variation.build(&laboratory.problem)?;
+    let mut solver = variation.build(&experiment.problem)?;
     let set_up = start.elapsed();
     let mut scores: Vec<(SceneKind, Vec<Score>)> = Vec::with_capacity(scenes.len());
     for place in scenes {
-        scores.push((place.kind, judge.run(&mut *solver, &place.frames)?));
+        scores.push((place.kind, scorer.run(&mut *solver, &place.frames)?));
     }
     drop(solver);
-    let memory = plan.heap.map(|heap| memory(heap, laboratory, scenes, variation)).transpose()?;
+    let memory = plan.heap.map(|heap| memory(heap, experiment, scenes, variation)).transpose()?;
     let over = |is: &dyn Fn(SceneKind) -> bool| {
         Summary::of(scores.iter().filter(|(kind, _)| is(*kind)).flat_map(|(_, scores)| scores))
     };
     Ok(SolverReport {
         solver: variation.method.name().to_owned(),
-        family: family(variation.method),
-        setting: variation.setting.map(|setting| setting.to_string()),
+        family: variation.method.family(),
+        parameter: variation.parameter.map(|parameter| parameter.to_string()),
         set_up_ms: milliseconds(set_up),
         memory,
         all: over(&|_| true),
@@ -245,16 +243,19 @@ fn try_variation(
 }
 
 /// Makes the solver again and lets it solve the first place of each kind, with nothing else allocated meanwhile.
-fn memory(heap: Heap, laboratory: &Laboratory, scenes: &[Place], variation: Variation) -> Result<Memory, StudyError> {
-    (heap.reset_peak)();
-    let before = (heap.allocated)();
-    let mut solver = variation.build(&laboratory.problem)?;
-    for frame in scenes.iter().take(SceneKind::ALL.len()).flat_map(|place| &place.frames) {
-        // Readings that it refuses need no memory.
-        drop(solver.solve(&frame.readings));
-    }
-    let beyond = |bytes: usize| bytes.saturating_sub(before);
-    Ok(Memory { kept_bytes: beyond((heap.allocated)()), peak_bytes: beyond((heap.peak)()) })
+fn memory(heap: Heap, experiment: &Experiment, scenes: &[Place], variation: Variation) -> Result<Memory, StudyError> {
+    (heap.start)();
+    let built = variation.build(&experiment.problem).map(|mut solver| {
+        for frame in scenes.iter().take(SceneKind::ALL.len()).flat_map(|place| &place.frames) {
+            // Readings that it refuses need no memory.
+            drop(solver.solve(&frame.readings));
+        }
+        solver
+    });
+    // The solver is still there, so what it keeps is counted.
+    let memory = (heap.stop)();
+    built?;
+    Ok(memory)
 }
 
 fn milliseconds(time: Duration) -> f64 {

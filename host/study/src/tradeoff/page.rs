@@ -2,9 +2,9 @@
 
 use super::table::{label, names, number};
 use super::{DetectorReport, Group, Report, SceneKind, SolverReport};
-use crate::judge::Summary;
 use crate::page::{Axis, Chart, Mark, Series, Unit, escaped, folded, html, machine, table};
-use crate::variant::Family;
+use crate::score::Summary;
+use tactomo_touch::solve::Family;
 
 /// Errors below this show there (m).
 const FLOOR_M: f64 = 1e-5;
@@ -37,16 +37,9 @@ pub fn picture(report: &Report) -> String {
 fn legend(report: &Report) -> String {
     let solvers = || report.detectors.iter().flat_map(|detector| &detector.solvers);
     let mut items = String::new();
-    for (family, name) in [
-        (Family::Paper, "the paper's"),
-        (Family::Linear, "linear images"),
-        (Family::Image, "images under a constraint or the full physics"),
-        (Family::Contacts, "a few contacts"),
-        (Family::Learned, "learned from presses"),
-        (Family::Auto, "chooses by itself"),
-    ] {
+    for family in Family::ALL {
         if solvers().any(|solver| solver.family == family) {
-            items += &format!("<li class=\"{}\">{name}</li>", family.class());
+            items += &format!("<li class=\"{}\">{}</li>", family.class(), family.title());
         }
     }
     format!("<ul class=\"legend\">{items}</ul>")
@@ -152,7 +145,7 @@ fn series<'a>(
     for solver in &report.solvers {
         let Some(summary) = of(solver) else { continue };
         let Some(error) = error(group, summary) else { continue };
-        let mark = Mark { x: summary.time_us.median * 1e-6, y: error, tells: tells(solver, summary) };
+        let mark = Mark { x: summary.time_us.median * 1e-6, y: error, tooltip: tooltip(solver, summary) };
         match all.iter_mut().find(|series| series.name == solver.solver) {
             Some(series) => series.marks.push(mark),
             None => all.push(Series {
@@ -167,7 +160,7 @@ fn series<'a>(
     all
 }
 
-fn tells(solver: &SolverReport, summary: &Summary) -> String {
+fn tooltip(solver: &SolverReport, summary: &Summary) -> String {
     let mm = |value: Option<f64>| number(value.map(|metres| metres * 1e3), 2);
     format!(
         "{}: {} a frame; error {} mm (position {} mm, missed {}, invented {}); correlation {}, Dice {}",
@@ -182,7 +175,7 @@ fn tells(solver: &SolverReport, summary: &Summary) -> String {
     )
 }
 
-/// Who finds contacts where nothing is.
+/// Which solvers find contacts where nothing touches.
 fn nothing(report: &DetectorReport) -> String {
     let rate = |solver: &SolverReport| solver.scene(SceneKind::None)?.invented;
     let inventors: Vec<_> = report
@@ -192,12 +185,12 @@ fn nothing(report: &DetectorReport) -> String {
         .filter(|(_, rate)| *rate > 0.0)
         .map(|(name, rate)| format!("{} ({rate:.2} a frame)", escaped(&name)))
         .collect();
-    let told = match inventors.is_empty() {
+    let verdict = match inventors.is_empty() {
         true => "no solver finds a contact".to_owned(),
         false => format!("contacts are invented by {}", inventors.join(", ")),
     };
     let untried: String = report.unavailable.iter().map(|why| format!(" Not tried: {}.", escaped(why))).collect();
-    format!("<p><b>Where nothing touches</b>, {told}.{untried}</p>")
+    format!("<p><b>Where nothing touches</b>, {verdict}.{untried}</p>")
 }
 
 fn costs(report: &DetectorReport) -> String {

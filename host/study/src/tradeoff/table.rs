@@ -45,8 +45,8 @@ pub(super) fn names(group: Group) -> String {
 
 /// Name of a solver with its parameter.
 pub(super) fn label(solver: &SolverReport) -> String {
-    match &solver.setting {
-        Some(setting) => format!("{} {setting}", solver.solver),
+    match &solver.parameter {
+        Some(parameter) => format!("{} {parameter}", solver.solver),
         None => solver.solver.clone(),
     }
 }

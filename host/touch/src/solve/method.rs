@@ -1,4 +1,6 @@
-//! The solvers by their names.
+//! The solvers by their names: one table, a row each.
+
+use std::fmt;
 
 use super::{
     Auto, Bsbl, ContactSettings, Contacts, KernelSolver, Lambda, Nonlinear, NonlinearSettings, Nonnegative, Problem,
@@ -6,110 +8,329 @@ use super::{
 };
 use tactomo_physics::forward::ForwardError;
 
-/// A solver, with its parameters as they are best for most.
+/// A solver by its name; the order is that of the [table](Method::ALL).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Linear image of the readings less the force; a contact at each of its peaks.
-    Tikhonov,
-    /// Linear image and one contact at its centroid, as in the paper.
-    TikhonovPaper,
-    /// A few contacts fitted to the full contact physics.
-    Contacts,
-    /// No more of these than the scene needs.
+    /// Chooses between nothing, contacts and an image.
     Auto,
-    /// Linear image from the first singular images alone.
-    Tsvd,
-    /// Linear image that makes up for sensitivity.
-    Noser,
-    /// Smooth linear image.
-    Laplace,
-    /// Linear image, never negative.
-    Nonnegative,
+    /// Fits a few contacts with the full contact physics.
+    Contacts,
+    /// Image with the full contact physics.
+    Nonlinear,
+    /// Sparse image of a few patches.
+    Bsbl,
+    /// Linear image; a contact at each of its peaks.
+    Tikhonov,
     /// Linear image that keeps edges.
     Tv,
-    /// Sparse image of few patches, from 16 looks.
-    Bsbl,
-    /// Image by the full contact physics.
-    Nonlinear,
+    /// Linear image without negative values.
+    Nonnegative,
+    /// Smooth linear image.
+    Laplace,
+    /// Linear image weighted by sensitivity.
+    Noser,
+    /// Linear image from the largest singular values alone.
+    Tsvd,
     /// Regression from presses at known places.
     Kernel,
+    /// The paper's linear image.
+    TikhonovPaper,
+}
+
+/// What a solver is made of, for charts and legends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Family {
+    /// Chooses by itself.
+    Auto,
+    /// A few contacts.
+    Contacts,
+    /// Images under a constraint or with the full contact physics.
+    Image,
+    /// Linear images.
+    Linear,
+    /// Learned from presses.
+    Learned,
+    /// The paper's own.
+    Paper,
+}
+
+impl Family {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Auto, Self::Contacts, Self::Image, Self::Linear, Self::Learned, Self::Paper];
+
+    /// Its name in style sheets.
+    pub fn class(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Contacts => "contacts",
+            Self::Image => "image",
+            Self::Linear => "linear",
+            Self::Learned => "learned",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// Its name for people.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Auto => "chooses by itself",
+            Self::Contacts => "a few contacts",
+            Self::Image => "images with constraints or the full contact physics",
+            Self::Linear => "linear images",
+            Self::Learned => "learned from presses",
+            Self::Paper => "the paper's",
+        }
+    }
+}
+
+/// A value of a solver's main parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Parameter {
+    /// Regularisation: how strongly an image is held down.
+    Lambda(Lambda),
+    /// Singular values below this share of the largest are left out.
+    SingularShare(f64),
+    /// Most contacts that are fitted.
+    MaxContacts(usize),
+    /// Nodes of the image that is fitted.
+    Nodes(usize),
+}
+
+/// Which main parameter a solver has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterKind {
+    /// [`Parameter::Lambda`].
+    Lambda,
+    /// [`Parameter::SingularShare`].
+    SingularShare,
+    /// [`Parameter::MaxContacts`].
+    MaxContacts,
+    /// [`Parameter::Nodes`].
+    Nodes,
+}
+
+impl Parameter {
+    /// Which it is.
+    pub fn kind(&self) -> ParameterKind {
+        match self {
+            Self::Lambda(_) => ParameterKind::Lambda,
+            Self::SingularShare(_) => ParameterKind::SingularShare,
+            Self::MaxContacts(_) => ParameterKind::MaxContacts,
+            Self::Nodes(_) => ParameterKind::Nodes,
+        }
+    }
+}
+
+impl fmt::Display for Parameter {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lambda(Lambda::Relative(share)) => write!(formatter, "lambda {share}"),
+            Self::Lambda(Lambda::Absolute(lambda)) => write!(formatter, "lambda {lambda} absolute"),
+            Self::Lambda(Lambda::Paper(squared)) => write!(formatter, "lambda^2 {squared} of the paper"),
+            Self::Lambda(Lambda::Discrepancy(_)) => write!(formatter, "lambda by discrepancy"),
+            Self::Lambda(Lambda::LCurve) => write!(formatter, "lambda by L-curve"),
+            Self::Lambda(Lambda::Gcv) => write!(formatter, "lambda by GCV"),
+            Self::SingularShare(share) => write!(formatter, "share {share}"),
+            Self::MaxContacts(most) => write!(formatter, "at most {most}"),
+            Self::Nodes(nodes) => write!(formatter, "{nodes} nodes"),
+        }
+    }
+}
+
+type Built = Result<Box<dyn Solver>, ForwardError>;
+
+/// All that is known of a method before it is built.
+struct Row {
+    method: Method,
+    /// On the command line.
+    name: &'static str,
+    /// What it is for, in a line.
+    explanation: &'static str,
+    family: Family,
+    parameter: Option<ParameterKind>,
+    /// Builds it; a parameter that is `None`, or not of its kind, leaves the default.
+    build: fn(&Problem, Option<Parameter>) -> Built,
+}
+
+/// The methods, those that most people look for first.
+const TABLE: [Row; 12] = [
+    Row {
+        method: Method::Auto,
+        name: "auto",
+        explanation: "for most uses: decides for each frame between nothing, contacts and an image",
+        family: Family::Auto,
+        parameter: None,
+        build: |problem, _| Ok(Box::new(Auto::new(problem)?)),
+    },
+    Row {
+        method: Method::Contacts,
+        name: "contacts",
+        explanation: "for fingertips and probes: fits position and conductance of up to five contacts, with standard errors",
+        family: Family::Contacts,
+        parameter: Some(ParameterKind::MaxContacts),
+        build: |problem, parameter| {
+            let settings = ContactSettings::of(problem);
+            let most = if let Some(Parameter::MaxContacts(most)) = parameter { most } else { settings.most };
+            Ok(Box::new(Contacts::new(problem, ContactSettings { most, ..settings })?))
+        },
+    },
+    Row {
+        method: Method::Nonlinear,
+        name: "nonlinear",
+        explanation: "for hands, rings and other shapes: an image with the full contact physics; slower",
+        family: Family::Image,
+        parameter: Some(ParameterKind::Nodes),
+        build: |problem, parameter| {
+            let settings = NonlinearSettings::default();
+            let nodes = if let Some(Parameter::Nodes(nodes)) = parameter { nodes } else { settings.nodes };
+            Ok(Box::new(Nonlinear::new(problem, NonlinearSettings { nodes, ..settings })?))
+        },
+    },
+    Row {
+        method: Method::Bsbl,
+        name: "bsbl",
+        explanation: "for several blunt contacts: an image of few patches, by sparse Bayesian learning; slow",
+        family: Family::Image,
+        parameter: None,
+        build: |problem, _| Ok(Box::new(Bsbl::new(problem)?)),
+    },
+    Row {
+        method: Method::Tikhonov,
+        name: "tikhonov",
+        explanation: "for a fast picture: linear image in a few microseconds, with a contact at each peak",
+        family: Family::Linear,
+        parameter: Some(ParameterKind::Lambda),
+        build: |problem, parameter| {
+            Ok(Box::new(Tikhonov::new(&problem.jacobian, lambda(parameter).unwrap_or_default(), Variant::Balanced)))
+        },
+    },
+    Row {
+        method: Method::Tv,
+        name: "tv",
+        explanation: "for objects with sharp edges: linear image by total variation; slow",
+        family: Family::Image,
+        parameter: None,
+        build: |problem, _| Ok(Box::new(Tv::new(problem)?)),
+    },
+    Row {
+        method: Method::Nonnegative,
+        name: "nonnegative",
+        explanation: "for a clean background: linear image in which no conductance is negative",
+        family: Family::Image,
+        parameter: None,
+        build: |problem, _| Ok(Box::new(Nonnegative::new(&problem.jacobian, Nonnegative::SHARE))),
+    },
+    Row {
+        method: Method::Laplace,
+        name: "laplace",
+        explanation: "for broad, gentle presses: linear image that is smooth",
+        family: Family::Linear,
+        parameter: Some(ParameterKind::Lambda),
+        build: |problem, parameter| {
+            Ok(Box::new(match lambda(parameter) {
+                Some(lambda) => Tikhonov::laplace_with(&problem.jacobian, lambda)?,
+                None => Tikhonov::laplace(&problem.jacobian)?,
+            }))
+        },
+    },
+    Row {
+        method: Method::Noser,
+        name: "noser",
+        explanation: "for even sensitivity: linear image that makes up for places far from electrodes",
+        family: Family::Linear,
+        parameter: Some(ParameterKind::Lambda),
+        build: |problem, parameter| {
+            Ok(Box::new(Tikhonov::noser(&problem.jacobian, lambda(parameter).unwrap_or_default())))
+        },
+    },
+    Row {
+        method: Method::Tsvd,
+        name: "tsvd",
+        explanation: "for comparison: linear image from the largest singular values alone",
+        family: Family::Linear,
+        parameter: Some(ParameterKind::SingularShare),
+        build: |problem, parameter| {
+            let share = if let Some(Parameter::SingularShare(share)) = parameter { share } else { Tsvd::SHARE };
+            Ok(Box::new(Tsvd::new(&problem.jacobian, share)))
+        },
+    },
+    Row {
+        method: Method::Kernel,
+        name: "kernel",
+        explanation: "for skins without a model: one contact, learned from presses at known places, or from simulated ones",
+        family: Family::Learned,
+        parameter: None,
+        build: |problem, _| Ok(Box::new(KernelSolver::new(problem)?)),
+    },
+    Row {
+        method: Method::TikhonovPaper,
+        name: "tikhonov-paper",
+        explanation: "for comparison with the paper: its linear image, and one contact at the centroid",
+        family: Family::Paper,
+        parameter: Some(ParameterKind::Lambda),
+        build: |problem, parameter| {
+            Ok(Box::new(Tikhonov::new(&problem.jacobian, lambda(parameter).unwrap_or_default(), Variant::Paper)))
+        },
+    },
+];
+
+fn lambda(parameter: Option<Parameter>) -> Option<Lambda> {
+    if let Some(Parameter::Lambda(lambda)) = parameter { Some(lambda) } else { None }
 }
 
 impl Method {
-    /// All of them.
-    pub const ALL: [Self; 12] = [
-        Self::Tikhonov,
-        Self::TikhonovPaper,
-        Self::Tsvd,
-        Self::Noser,
-        Self::Laplace,
-        Self::Nonnegative,
-        Self::Tv,
-        Self::Bsbl,
-        Self::Nonlinear,
-        Self::Kernel,
-        Self::Contacts,
-        Self::Auto,
-    ];
+    /// All of them, those that most people look for first.
+    pub const ALL: [Self; TABLE.len()] = {
+        let mut all = [Self::Auto; TABLE.len()];
+        let mut row = 0;
+        while row < TABLE.len() {
+            all[row] = TABLE[row].method;
+            assert!(all[row] as usize == row, "the table is in the order of the enum");
+            row += 1;
+        }
+        all
+    };
+
+    fn row(self) -> &'static Row {
+        const ROWS: &[Row] = &TABLE;
+        &ROWS[self as usize]
+    }
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Tikhonov => "tikhonov",
-            Self::TikhonovPaper => "tikhonov-paper",
-            Self::Contacts => "contacts",
-            Self::Auto => "auto",
-            Self::Tsvd => "tsvd",
-            Self::Noser => "noser",
-            Self::Laplace => "laplace",
-            Self::Nonnegative => "nonnegative",
-            Self::Tv => "tv",
-            Self::Bsbl => "bsbl",
-            Self::Nonlinear => "nonlinear",
-            Self::Kernel => "kernel",
-        }
+        self.row().name
     }
 
-    /// What it is, in a line.
+    /// What it is for, in a line.
     pub fn explanation(self) -> &'static str {
-        match self {
-            Self::Tikhonov => "linear image of the readings less the force; a contact at each of its peaks",
-            Self::TikhonovPaper => "linear image and one contact at its centroid, as in the paper",
-            Self::Contacts => "up to five contacts fitted to the full contact physics, as many as the readings ask for",
-            Self::Auto => "nothing, contacts or an image: no more than the scene needs",
-            Self::Tsvd => "linear image from the first singular images alone",
-            Self::Noser => "linear image that makes up for places that readings hear less",
-            Self::Laplace => "linear image with a prior of smoothness",
-            Self::Nonnegative => "linear image in which no conductance is negative",
-            Self::Tv => "linear image that keeps edges, by total variation",
-            Self::Bsbl => "image of few patches that all 16 grounds agree on, by sparse Bayesian learning",
-            Self::Nonlinear => "image of conductance by the full contact physics, never negative",
-            Self::Kernel => {
-                "one contact, by regression from presses at known places (simulated, unless real ones are told)"
-            }
-        }
+        self.row().explanation
     }
 
-    /// Makes the solver for a problem.
+    /// What it is made of.
+    pub fn family(self) -> Family {
+        self.row().family
+    }
+
+    /// Its main parameter, if it has one.
+    pub fn parameter(self) -> Option<ParameterKind> {
+        self.row().parameter
+    }
+
+    /// Makes the solver for a problem, with its parameters as they are best for most.
     ///
     /// # Errors
     /// [`ForwardError`] if the model cannot give what the solver needs.
     pub fn build(self, problem: &Problem) -> Result<Box<dyn Solver>, ForwardError> {
-        let jacobian = &problem.jacobian;
-        Ok(match self {
-            Self::Tikhonov => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Balanced)),
-            Self::TikhonovPaper => Box::new(Tikhonov::new(jacobian, Lambda::default(), Variant::Paper)),
-            Self::Contacts => Box::new(Contacts::new(problem, ContactSettings::of(problem))?),
-            Self::Auto => Box::new(Auto::new(problem)?),
-            Self::Tsvd => Box::new(Tsvd::new(jacobian, Tsvd::SHARE)),
-            Self::Noser => Box::new(Tikhonov::noser(jacobian, Lambda::default())),
-            Self::Laplace => Box::new(Tikhonov::laplace(jacobian)?),
-            Self::Nonnegative => Box::new(Nonnegative::new(jacobian, Nonnegative::SHARE)),
-            Self::Tv => Box::new(Tv::new(problem)?),
-            Self::Bsbl => Box::new(Bsbl::new(problem)?),
-            Self::Nonlinear => Box::new(Nonlinear::new(problem, NonlinearSettings::default())?),
-            Self::Kernel => Box::new(KernelSolver::new(problem)?),
-        })
+        self.build_with(problem, None)
+    }
+
+    /// Makes the solver with a value of its main parameter; one that it does not have changes nothing.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if the model cannot give what the solver needs.
+    pub fn build_with(self, problem: &Problem, parameter: Option<Parameter>) -> Result<Box<dyn Solver>, ForwardError> {
+        (self.row().build)(problem, parameter)
     }
 }
 
@@ -121,6 +342,41 @@ impl std::str::FromStr for Method {
         Self::ALL
             .into_iter()
             .find(|method| method.name() == name)
-            .ok_or_else(|| format!("no such solver; there are {}", known()))
+            .ok_or_else(|| format!("there is no solver `{name}`; choose one of {}", known()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_method_is_found_by_its_name_and_says_what_it_is_for() {
+        for method in Method::ALL {
+            assert_eq!(method.name().parse(), Ok(method));
+            assert!(method.explanation().starts_with("for "), "{}", method.name());
+            assert!(Family::ALL.contains(&method.family()));
+        }
+        assert!(
+            "jazz".parse::<Method>().is_err_and(|error| error.contains("`jazz`") && error.contains("auto, contacts"))
+        );
+    }
+
+    #[test]
+    fn a_parameter_changes_the_solver_that_has_it_and_no_other() {
+        use tactomo_physics::detector::Detector;
+        use tactomo_physics::forward::shell::Shell;
+        let shell = Shell::with_nodes(&Detector::default(), 300).unwrap_or_else(|error| panic!("{error}"));
+        let problem = Problem::new(Box::new(shell) as Box<dyn tactomo_physics::forward::ForwardModel>);
+        let readings = crate::solve::samples::readings(crate::solve::samples::CONTACT);
+        let strong = Some(Parameter::Lambda(Lambda::Relative(3.0)));
+        for method in [Method::Tikhonov, Method::TikhonovPaper, Method::Noser, Method::Laplace, Method::Tsvd] {
+            let image = |parameter| {
+                let mut solver = method.build_with(&problem, parameter).unwrap_or_else(|error| panic!("{error}"));
+                solver.solve(&readings).map(|solution| solution.image_s_per_m2)
+            };
+            let changes = image(strong) != image(None);
+            assert_eq!(changes, method.parameter() == Some(ParameterKind::Lambda), "{}", method.name());
+        }
     }
 }

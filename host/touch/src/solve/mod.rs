@@ -36,7 +36,7 @@ pub use self::health::{ElectrodeFault, faulty_electrodes};
 pub use self::kernel::{Kernel, KernelSolver, Press, Presses, PressesError, Strength, TeachError};
 pub use self::lambda::Lambda;
 use self::lambda::Spectrum;
-pub use self::method::Method;
+pub use self::method::{Family, Method, Parameter, ParameterKind};
 pub use self::nonlinear::{Nonlinear, NonlinearSettings};
 pub use self::nonnegative::Nonnegative;
 pub use self::problem::Problem;
@@ -105,34 +105,29 @@ pub struct Choice {
     pub why: String,
 }
 
-/// One contact found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+/// One contact found. Its names outside of the program are those of [`crate::schema`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FoundContact {
     /// Centre, x (m).
     pub x_m: f64,
     /// Centre, y (m).
     pub y_m: f64,
     /// Centre, z (m): on a curved detector; zero on a flat one.
-    #[serde(skip_serializing_if = "tactomo_physics::geometry::is_zero")]
     pub z_m: f64,
     /// Conductance (S).
     pub conductance_s: f64,
     /// Radius (m), where the readings tell it.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_m: Option<f64>,
     /// Force (N), on a calibrated detector.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub force_n: Option<f64>,
     /// Standard errors, of a method that knows them.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
     /// The same number from frame to frame for the same contact, of a method that follows contacts.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub id: Option<u32>,
 }
 
 /// Standard errors of a contact.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Uncertainty {
     /// Of x (m).
     pub x_m: f64,

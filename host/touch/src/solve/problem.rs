@@ -16,19 +16,19 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// The problem of a detector, on the model that it needs: see [`Auto`].
+    ///
+    /// # Errors
+    /// [`ForwardError`] if the detector cannot be modelled.
+    pub fn of(detector: &Detector) -> Result<Self, ForwardError> {
+        Ok(Self::new(Auto::new(detector, None)?.model))
+    }
+
     /// The problem of a model, measured as its detector says.
     pub fn new(model: impl Into<Arc<dyn ForwardModel>>) -> Self {
         let model = model.into();
         let jacobian = Arc::new(Jacobian::of(&*model));
         Self { model, jacobian }
-    }
-
-    /// The problem of a detector, with the model that it needs.
-    ///
-    /// # Errors
-    /// [`ForwardError::Detector`] if there is no model of it.
-    pub fn of(detector: &Detector) -> Result<Self, ForwardError> {
-        Ok(Self::new(Auto::new(detector, None)?.model))
     }
 
     /// The same with another linear theory, on a mesh of its own.

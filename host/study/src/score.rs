@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::data::{Frame, Laboratory};
+use super::experiment::{Experiment, Frame};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
 use tactomo_physics::scene::{Contact, Shape, Touch};
@@ -45,8 +45,8 @@ pub struct Score {
     pub residual: Option<f64>,
 }
 
-/// Judges solutions on one detector.
-pub struct Judge {
+/// Scores solutions on one detector.
+pub struct Scorer {
     detector: Detector,
     mesh: ImageMesh,
     comparison: Comparison,
@@ -56,15 +56,15 @@ pub struct Judge {
     last: Option<(Vec<Touch>, Vec<f32>)>,
 }
 
-impl Judge {
-    /// For solutions of a laboratory's problem.
-    pub fn new(laboratory: &Laboratory) -> Self {
-        let detector = laboratory.detector.clone();
-        let mesh = laboratory.problem.jacobian.image_mesh.clone();
+impl Scorer {
+    /// For solutions of an experiment's problem.
+    pub fn new(experiment: &Experiment) -> Self {
+        let detector = experiment.detector.clone();
+        let mesh = experiment.problem.jacobian.image_mesh.clone();
         let [width_m, height_m] = detector.outline.size_m();
         let smoothing_m = SMOOTHING_SHARE * width_m.min(height_m);
         let comparison = Comparison::new(&mesh, smoothing_m);
-        Self { detector, mesh, comparison, smoothing_m, reach_m: laboratory.reach_m(), last: None }
+        Self { detector, mesh, comparison, smoothing_m, reach_m: experiment.reach_m(), last: None }
     }
 
     /// Lets a solver read frames one after the other, and scores what it found.
@@ -293,13 +293,13 @@ mod tests {
     use super::*;
     use crate::SceneKind;
 
-    fn laboratory() -> Laboratory {
-        Laboratory::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
+    fn experiment() -> Experiment {
+        Experiment::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
     }
 
-    fn frame(laboratory: &Laboratory, kind: SceneKind) -> Frame {
-        let touches = kind.frames(&laboratory.detector, 1, 1);
-        laboratory.frames(&touches, 1).unwrap().remove(0)
+    fn frame(experiment: &Experiment, kind: SceneKind) -> Frame {
+        let touches = kind.frames(&experiment.detector, 1, 1);
+        experiment.frames(&touches, 1).unwrap().remove(0)
     }
 
     fn truth_of(frame: &Frame) -> Solution {
@@ -309,33 +309,33 @@ mod tests {
 
     #[test]
     fn the_truth_scores_full_marks_and_nothing_scores_none() {
-        let laboratory = laboratory();
-        let mut judge = Judge::new(&laboratory);
-        let frame = frame(&laboratory, SceneKind::Three);
-        let best = judge.score(&frame, &truth_of(&frame)).unwrap();
+        let experiment = experiment();
+        let mut scorer = Scorer::new(&experiment);
+        let frame = frame(&experiment, SceneKind::Three);
+        let best = scorer.score(&frame, &truth_of(&frame)).unwrap();
         assert_eq!((best.error_m, best.missed, best.invented), (Some(0.0), Some(0), Some(0)));
         assert!(best.conductance_error.is_some_and(|error| error < 1e-12));
         assert!(best.image.correlation.is_some_and(|correlation| correlation > 0.95), "{:?}", best.image);
-        let worst = judge.score(&frame, &Solution::default()).unwrap();
-        assert_eq!((worst.error_m, worst.missed), (Some(laboratory.reach_m()), Some(3)));
+        let worst = scorer.score(&frame, &Solution::default()).unwrap();
+        assert_eq!((worst.error_m, worst.missed), (Some(experiment.reach_m()), Some(3)));
         let summary = Summary::of([&best, &worst]);
         assert_eq!((summary.missed, summary.count_right), (Some(1.5), Some(0.5)));
     }
 
     #[test]
     fn nothing_found_where_nothing_is_has_no_error() {
-        let laboratory = laboratory();
-        let frame = frame(&laboratory, SceneKind::None);
-        let score = Judge::new(&laboratory).score(&frame, &Solution::default()).unwrap();
+        let experiment = experiment();
+        let frame = frame(&experiment, SceneKind::None);
+        let score = Scorer::new(&experiment).score(&frame, &Solution::default()).unwrap();
         assert_eq!((score.error_m, score.invented, score.image.correlation), (Some(0.0), Some(0), None));
     }
 
     #[test]
     fn what_is_no_number_is_seen() {
-        let laboratory = laboratory();
-        let frame = frame(&laboratory, SceneKind::Firm);
+        let experiment = experiment();
+        let frame = frame(&experiment, SceneKind::Firm);
         let solution = Solution { contacts: vec![FoundContact::flat(f64::NAN, 0.0, 1e-3)], ..Solution::default() };
-        assert!(Judge::new(&laboratory).score(&frame, &solution).unwrap().not_finite);
+        assert!(Scorer::new(&experiment).score(&frame, &solution).unwrap().not_finite);
     }
 
     #[test]

@@ -11,8 +11,9 @@ use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Fault, FaultError, Measurement, finer_model};
 use tactomo_touch::solve::{Problem, SolveError};
 
-/// Frames without contact that make the readings at rest, where those are not zero.
-const REST_FRAMES: u8 = 16;
+/// Frames without contact whose mean is the baseline, where that is not zero: enough that its noise, a quarter of a frame's,
+/// adds 3 % to that of the difference.
+const BASELINE_FRAMES: u8 = 16;
 
 /// Why a study cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -46,13 +47,13 @@ pub struct Frame {
     pub touches: Vec<Touch>,
     /// The same as contacts, if all are discs.
     pub contacts: Option<Vec<Contact>>,
-    /// Readings less those at rest (V).
+    /// Readings less the baseline (V).
     pub readings: Readings,
 }
 
 /// A detector, what it is simulated with and what is inverted.
-pub struct Laboratory {
-    /// The detector as it is told.
+pub struct Experiment {
+    /// The detector as it is described to solvers.
     pub detector: Detector,
     /// What solvers get.
     pub problem: Problem,
@@ -64,11 +65,11 @@ pub struct Laboratory {
     /// The detector as it is measured in truth.
     measured: Detector,
     faults: Vec<Fault>,
-    /// Readings that are taken for those at rest (V).
+    /// Readings that are taken for the baseline (V), if they are given.
     baseline: Option<Readings>,
 }
 
-impl Laboratory {
+impl Experiment {
     /// A sound detector, inverted on the model that it needs.
     ///
     /// # Errors
@@ -110,7 +111,7 @@ impl Laboratory {
         Ok(Self { truth, faults: faults.to_vec(), ..self.again() })
     }
 
-    /// The same, in truth another detector than the one told: thicker, or noisier.
+    /// The same, in truth another detector than the one described: thicker, or noisier.
     ///
     /// # Errors
     /// [`StudyError`] if it cannot be modelled.
@@ -118,7 +119,7 @@ impl Laboratory {
         Ok(Self { truth: finer_model(detector, &[], 0)?.into(), measured: detector.clone(), ..self.again() })
     }
 
-    /// The same, with readings under such contacts taken for those at rest.
+    /// The same, with readings under such contacts taken for the baseline.
     ///
     /// # Errors
     /// [`StudyError`] if a contact is off the detector.
@@ -158,14 +159,14 @@ impl Laboratory {
         }
     }
 
-    /// What is taken for the readings at rest: those told, or the mean of a few frames without contact, where faults show in them.
-    fn rest(&self, measurement: &mut Measurement) -> Readings {
+    /// The baseline: the given one, or the mean of a few frames without contact, where faults show in them.
+    fn baseline_v(&self, measurement: &mut Measurement) -> Readings {
         let electrodes = self.detector.electrodes.len();
         let mut rest = self.baseline.clone().unwrap_or_else(|| Readings::from_fn(electrodes, |_, _| 0.0));
         if self.baseline.is_none() && !self.faults.is_empty() {
-            for _ in 0..REST_FRAMES {
+            for _ in 0..BASELINE_FRAMES {
                 let frame = measurement.readings_v(None);
-                let share = |(sum, volts): (&mut f64, &f64)| *sum += volts / f64::from(REST_FRAMES);
+                let share = |(sum, volts): (&mut f64, &f64)| *sum += volts / f64::from(BASELINE_FRAMES);
                 rest.volts_mut().iter_mut().zip(frame.volts()).for_each(share);
             }
         }
@@ -183,7 +184,7 @@ impl Laboratory {
     /// [`StudyError`] if a touch is off the detector.
     pub fn frames(&self, touches: &[Vec<Touch>], seed: u64) -> Result<Vec<Frame>, StudyError> {
         let mut measurement = Measurement::new(&self.measured, &self.faults, seed)?;
-        let rest = self.rest(&mut measurement);
+        let rest = self.baseline_v(&mut measurement);
         let mut frames: Vec<Frame> = Vec::with_capacity(touches.len());
         let mut last = None;
         for touches in touches {
@@ -207,53 +208,53 @@ mod tests {
     use super::*;
     use crate::scenes::SceneKind;
 
-    fn laboratory() -> Laboratory {
-        Laboratory::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
+    fn experiment() -> Experiment {
+        Experiment::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()
     }
 
-    fn readings(laboratory: &Laboratory, seed: u64) -> Readings {
-        let touches = SceneKind::Firm.frames(&laboratory.detector, 1, 1);
-        laboratory.frames(&touches, seed).unwrap().remove(0).readings
+    fn readings(experiment: &Experiment, seed: u64) -> Readings {
+        let touches = SceneKind::Firm.frames(&experiment.detector, 1, 1);
+        experiment.frames(&touches, seed).unwrap().remove(0).readings
     }
 
     #[test]
     fn readings_are_the_finer_models_with_noise_and_those_of_a_seed() {
-        let laboratory = laboratory();
-        let first = readings(&laboratory, 1);
-        assert_eq!(first, readings(&laboratory, 1));
-        assert_ne!(first, readings(&laboratory, 2));
-        let contact = SceneKind::Firm.frames(&laboratory.detector, 1, 1)[0][0].disc().unwrap();
-        let model = readings_v(&laboratory.problem.model.impedance_ohm(&[contact]).unwrap(), &laboratory.detector);
+        let experiment = experiment();
+        let first = readings(&experiment, 1);
+        assert_eq!(first, readings(&experiment, 1));
+        assert_ne!(first, readings(&experiment, 2));
+        let contact = SceneKind::Firm.frames(&experiment.detector, 1, 1)[0][0].disc().unwrap();
+        let model = readings_v(&experiment.problem.model.impedance_ohm(&[contact]).unwrap(), &experiment.detector);
         let off = first.volts().iter().zip(model.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off > 0.0 && off < 0.02 * model.largest_v() + 0.006, "{off}");
     }
 
     #[test]
-    fn a_wrong_sign_shows_in_the_readings_at_rest_and_is_taken_off() {
-        let laboratory = laboratory();
-        let wrong = laboratory.with_faults(&[Fault::Invert { channel: 3 }], 1).unwrap();
-        let (sound, wrong) = (readings(&laboratory, 1), readings(&wrong, 1));
+    fn a_wrong_sign_shows_in_the_baseline_and_is_taken_off() {
+        let experiment = experiment();
+        let wrong = experiment.with_faults(&[Fault::Invert { channel: 3 }], 1).unwrap();
+        let (sound, wrong) = (readings(&experiment, 1), readings(&wrong, 1));
         assert!(sound.at(7, 3) > 0.02 && (wrong.at(7, 3) + sound.at(7, 3)).abs() < 0.02, "{}", wrong.at(7, 3));
         assert!((wrong.at(7, 4) - sound.at(7, 4)).abs() < 0.02);
     }
 
     #[test]
     fn a_baseline_under_load_is_taken_off() {
-        let laboratory = laboratory();
-        let contact = SceneKind::Firm.frames(&laboratory.detector, 1, 1)[0][0].disc().unwrap();
-        let loaded = readings(&laboratory.with_baseline(&[contact]).unwrap(), 1);
+        let experiment = experiment();
+        let contact = SceneKind::Firm.frames(&experiment.detector, 1, 1)[0][0].disc().unwrap();
+        let loaded = readings(&experiment.with_baseline(&[contact]).unwrap(), 1);
         assert!(loaded.volts().iter().all(|volts| volts.abs() < 0.01), "the same contact is no change");
     }
 
     #[test]
     fn solvers_know_of_another_converter_but_not_of_a_wrong_detector() {
-        let laboratory = laboratory();
-        let mut other = laboratory.detector.clone();
+        let experiment = experiment();
+        let mut other = experiment.detector.clone();
         other.adc.bits = 10;
-        assert_eq!(laboratory.measured_as(&other).problem.detector().adc.bits, 10);
+        assert_eq!(experiment.measured_as(&other).problem.detector().adc.bits, 10);
         other.layers[0].thickness_m *= 2.0;
-        let wrong = laboratory.with_truth(&other).unwrap();
-        assert_eq!(wrong.problem.detector(), &laboratory.detector);
-        assert_ne!(readings(&wrong, 1), readings(&laboratory, 1));
+        let wrong = experiment.with_truth(&other).unwrap();
+        assert_eq!(wrong.problem.detector(), &experiment.detector);
+        assert_ne!(readings(&wrong, 1), readings(&experiment, 1));
     }
 }

@@ -1,0 +1,264 @@
+//! What a solved frame is called outside of the program: the one schema behind JSON, CSV, NPZ and the page's socket.
+//!
+//! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of its contacts [`CONTACT_COLUMNS`]; a column that is
+//! added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
+//! newtons, `_us` microseconds. `sigma_` is a standard error. What is not known is absent in JSON, empty in CSV and NaN elsewhere.
+
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
+
+use crate::solve::{Choice, Flags, FoundContact, Solution, Uncertainty};
+
+/// A number of a contact, by its name.
+pub struct ContactColumn {
+    /// Name with unit.
+    pub name: &'static str,
+    of: fn(&FoundContact) -> Option<f64>,
+}
+
+/// The numbers of a contact, in the order of every format.
+pub const CONTACT_COLUMNS: [ContactColumn; 11] = [
+    ContactColumn { name: "id", of: |contact| contact.id.map(f64::from) },
+    ContactColumn { name: "x_m", of: |contact| Some(contact.x_m) },
+    ContactColumn { name: "y_m", of: |contact| Some(contact.y_m) },
+    ContactColumn { name: "z_m", of: |contact| Some(contact.z_m) },
+    ContactColumn { name: "conductance_s", of: |contact| Some(contact.conductance_s) },
+    ContactColumn { name: "radius_m", of: |contact| contact.radius_m },
+    ContactColumn { name: "force_n", of: |contact| contact.force_n },
+    ContactColumn { name: "sigma_x_m", of: |contact| error(contact, |errors| errors.x_m) },
+    ContactColumn { name: "sigma_y_m", of: |contact| error(contact, |errors| errors.y_m) },
+    ContactColumn { name: "correlation", of: |contact| error(contact, |errors| errors.correlation) },
+    ContactColumn { name: "sigma_conductance_s", of: |contact| error(contact, |errors| errors.conductance_s) },
+];
+
+fn error(contact: &FoundContact, of: fn(&Uncertainty) -> f64) -> Option<f64> {
+    contact.uncertainty.as_ref().map(of)
+}
+
+impl ContactColumn {
+    /// Its value, if it is known.
+    pub fn value(&self, contact: &FoundContact) -> Option<f64> {
+        (self.of)(contact)
+    }
+}
+
+/// The numbers of a contact in the order of [`CONTACT_COLUMNS`] without the first, its id, which is an integer; NaN where not
+/// known. For binary layouts.
+pub fn contact_values(contact: &FoundContact) -> [f32; CONTACT_COLUMNS.len() - 1] {
+    std::array::from_fn(|index| CONTACT_COLUMNS[index + 1].value(contact).map_or(f32::NAN, |value| value as f32))
+}
+
+/// `{id?, x_m, y_m, z_m?, conductance_s, radius_m?, force_n?, sigma_x_m?, ...}`; z is left out on a flat detector.
+impl Serialize for FoundContact {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for column in &CONTACT_COLUMNS {
+            match (column.name, column.value(self)) {
+                ("id", Some(_)) => map.serialize_entry("id", &self.id)?,
+                ("z_m", Some(0.0)) | (_, None) => {}
+                (name, Some(value)) => map.serialize_entry(name, &value)?,
+            }
+        }
+        map.end()
+    }
+}
+
+/// A solved frame as it leaves the program: a line of JSON.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct FrameReport<'a> {
+    /// Number of the frame in its file, from 0; of frames from a file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame: Option<u64>,
+    /// The board's number of the scan; of frames from a board or its recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<u64>,
+    /// Board time (s): since the first frame in a file, since the board's start in a stream.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
+    /// Frames lost or damaged since the one before.
+    #[serde(skip_serializing_if = "is_none_or_zero")]
+    pub lost_before: Option<u64>,
+    /// Time that the solver took (us).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_us: Option<f64>,
+    /// Age of the answer: time since the last byte of the frame arrived (us).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub age_us: Option<f64>,
+    /// The contacts found.
+    pub contacts: &'a [FoundContact],
+    /// Root mean square of what the answer leaves of the readings, in standard deviations of the noise.
+    pub residual: Option<f64>,
+    /// What to know before this is believed.
+    pub flags: Option<&'a Flags>,
+    /// What was chosen and why.
+    pub choice: Option<&'a Choice>,
+    /// The image, if it is wanted: contact conductance per area at each node (S/m2).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image_s_per_m2: Option<&'a [f32]>,
+}
+
+fn is_none_or_zero(count: &Option<u64>) -> bool {
+    count.is_none_or(|count| count == 0)
+}
+
+impl<'a> FrameReport<'a> {
+    /// That of a solution without its image; whoever knows them adds numbers and times.
+    pub fn of(solution: &'a Solution) -> Self {
+        Self {
+            contacts: &solution.contacts,
+            residual: solution.residual,
+            flags: Some(&solution.flags),
+            choice: solution.choice.as_ref(),
+            ..Self::default()
+        }
+    }
+
+    fn flag(&self, of: fn(&Flags) -> bool) -> Option<f64> {
+        self.flags.map(|flags| f64::from(u8::from(of(flags))))
+    }
+}
+
+/// A number of a frame, by its name.
+pub struct FrameColumn {
+    /// Name with unit.
+    pub name: &'static str,
+    of: fn(&FrameReport) -> Option<f64>,
+}
+
+/// The numbers of a frame but for its contacts and image, in the order of every format.
+pub const FRAME_COLUMNS: [FrameColumn; 11] = [
+    FrameColumn { name: "frame", of: |frame| frame.frame.map(|frame| frame as f64) },
+    FrameColumn { name: "sequence", of: |frame| frame.sequence.map(|sequence| sequence as f64) },
+    FrameColumn { name: "time_s", of: |frame| frame.time_s },
+    FrameColumn { name: "lost_before", of: |frame| frame.lost_before.map(|count| count as f64) },
+    FrameColumn { name: "frame_us", of: |frame| frame.frame_us },
+    FrameColumn { name: "age_us", of: |frame| frame.age_us },
+    FrameColumn { name: "residual", of: |frame| frame.residual },
+    FrameColumn { name: "saturated", of: |frame| frame.flag(|flags| flags.saturated) },
+    FrameColumn { name: "misfit", of: |frame| frame.flag(|flags| flags.misfit) },
+    FrameColumn { name: "unfinished", of: |frame| frame.flag(|flags| flags.unfinished) },
+    FrameColumn { name: "excluded_count", of: |frame| frame.flags.map(|flags| flags.excluded.len() as f64) },
+];
+
+impl FrameColumn {
+    /// Its value, if it is known.
+    pub fn value(&self, frame: &FrameReport) -> Option<f64> {
+        (self.of)(frame)
+    }
+}
+
+/// Names of the text columns that follow the numbers in CSV.
+pub const TEXT_COLUMNS: [&str; 2] = ["excluded", "choice"];
+
+/// Electrodes left out, with blanks between them, and what was chosen.
+pub fn texts(frame: &FrameReport) -> [String; TEXT_COLUMNS.len()] {
+    let excluded = frame.flags.map(|flags| flags.excluded.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
+    [excluded.unwrap_or_default(), frame.choice.map(|choice| choice.what.clone()).unwrap_or_default()]
+}
+
+/// Heads of a CSV table with a contact a row: a frame's columns, `contact` (from 0), a contact's columns in that order,
+/// and the texts.
+pub fn csv_heads() -> Vec<&'static str> {
+    let frame = FRAME_COLUMNS.iter().map(|column| column.name);
+    let contact = CONTACT_COLUMNS.iter().map(|column| column.name);
+    frame.chain(["contact"]).chain(contact).chain(TEXT_COLUMNS).collect()
+}
+
+/// Rows of that table: one for each contact, or one without a contact.
+pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
+    let text = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+    let start: Vec<_> = FRAME_COLUMNS.iter().map(|column| text(column.value(frame))).collect();
+    let end = texts(frame);
+    let row = |contact: Option<(usize, &FoundContact)>| {
+        let index = contact.map_or_else(String::new, |(index, _)| index.to_string());
+        let values = CONTACT_COLUMNS.iter().map(|column| text(contact.and_then(|(_, contact)| column.value(contact))));
+        start.iter().cloned().chain([index]).chain(values).chain(end.iter().cloned()).collect()
+    };
+    match frame.contacts {
+        [] => vec![row(None)],
+        contacts => contacts.iter().enumerate().map(|contact| row(Some(contact))).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contact() -> FoundContact {
+        FoundContact {
+            id: Some(7),
+            z_m: 0.5,
+            radius_m: Some(0.25),
+            force_n: Some(3.0),
+            uncertainty: Some(Uncertainty { x_m: 0.125, y_m: 0.75, correlation: -0.5, conductance_s: 4.0 }),
+            ..FoundContact::flat(1.0, 2.0, 8.0)
+        }
+    }
+
+    fn solution() -> Solution {
+        Solution {
+            contacts: vec![contact(), FoundContact::flat(-1.0, -2.0, 5.0)],
+            residual: Some(1.5),
+            flags: Flags { misfit: true, excluded: vec![3, 14], ..Flags::default() },
+            choice: Some(Choice { what: "2 contacts".to_owned(), why: "they fit".to_owned() }),
+            ..Solution::default()
+        }
+    }
+
+    #[test]
+    fn names_are_unique() {
+        let heads = csv_heads();
+        assert!(heads.iter().all(|head| heads.iter().filter(|other| *other == head).count() == 1), "{heads:?}");
+    }
+
+    #[test]
+    fn json_csv_and_binary_say_the_same_of_a_contact() {
+        let json = serde_json::to_value(contact()).unwrap();
+        let solution = solution();
+        let rows = csv_rows(&FrameReport::of(&solution));
+        let heads = csv_heads();
+        for (index, column) in CONTACT_COLUMNS.iter().enumerate() {
+            let value = column.value(&contact()).unwrap();
+            assert_eq!(json[column.name].as_f64(), Some(value), "{}", column.name);
+            let cell = heads.iter().position(|head| *head == column.name).unwrap();
+            assert_eq!(rows[0][cell].parse(), Ok(value), "{}", column.name);
+            if index > 0 {
+                assert_eq!(f64::from(contact_values(&contact())[index - 1]), value, "{}", column.name);
+            }
+        }
+        assert!(json["id"].is_u64(), "{json}");
+        assert_eq!(json.as_object().map(serde_json::Map::len), Some(CONTACT_COLUMNS.len()));
+    }
+
+    #[test]
+    fn what_is_not_known_is_absent() {
+        let flat = FoundContact::flat(1.0, 2.0, 8.0);
+        assert_eq!(serde_json::to_string(&flat).unwrap(), r#"{"x_m":1.0,"y_m":2.0,"conductance_s":8.0}"#);
+        assert!(contact_values(&flat)[4..].iter().all(|value| value.is_nan()));
+        let nothing = Solution::default();
+        let rows = csv_rows(&FrameReport::of(&nothing));
+        assert_eq!((rows.len(), rows[0].len()), (1, csv_heads().len()));
+        assert!(rows[0][FRAME_COLUMNS.len()..].iter().all(String::is_empty), "{rows:?}");
+    }
+
+    #[test]
+    fn a_frame_is_a_line_of_json() {
+        let solution = solution();
+        let report = FrameReport {
+            sequence: Some(9),
+            time_s: Some(0.5),
+            lost_before: Some(3),
+            age_us: Some(40.0),
+            ..FrameReport::of(&solution)
+        };
+        let json = serde_json::to_value(report).unwrap();
+        assert_eq!((json["sequence"].as_u64(), json["lost_before"].as_u64()), (Some(9), Some(3)));
+        assert_eq!((json["time_s"].as_f64(), json["age_us"].as_f64()), (Some(0.5), Some(40.0)));
+        assert_eq!(json["flags"]["excluded"], serde_json::json!([3, 14]));
+        assert_eq!(json["choice"]["what"], "2 contacts");
+        assert_eq!(json["contacts"].as_array().map(Vec::len), Some(2));
+        assert!(json.get("image_s_per_m2").is_none() && json.get("frame").is_none());
+        let rows = csv_rows(&FrameReport::of(&solution));
+        assert_eq!(rows[1][csv_heads().len() - 2..], ["3 14", "2 contacts"]);
+    }
+}
