@@ -39,6 +39,8 @@ pub struct Snapshot {
     pub recording: Option<PathBuf>,
     /// What was asked for last and cannot be, for the person who asked.
     pub refused: Option<String>,
+    /// What to know of the baseline, as one sentence for a person; none if all is well.
+    pub baseline: Option<String>,
 }
 
 /// How the link to the board fares.
@@ -51,6 +53,8 @@ pub enum LinkState {
     Waiting,
     /// Frames come in.
     Streaming,
+    /// The board has said Hello and sends no frames, for the reason given.
+    Silent(String),
     /// The link was lost, for the reason given; it is tried again.
     Lost(String),
     /// The link has ended for good, for the reason given: the recording is over, the board speaks another protocol.
