@@ -16,9 +16,10 @@ use tactomo::forward::Auto;
 use tactomo::run::plan::{Ends, LiveError, Plan, Solving, Summary};
 use tactomo::run::{Snapshot, Statistics, pipeline};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
-use tactomo::simulate::{Fault, Mouse, Simulation};
-use tactomo::sink::page::{Finger, PageSetup, Server};
-use tactomo::solve::{Guard, Method, Problem};
+use tactomo::readings::Readings;
+use tactomo::simulate::{Fault, Mouse, Physics, Simulation};
+use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
+use tactomo::solve::{ContactSettings, Guard, Method, Problem};
 use tokio::sync::watch;
 
 /// How firmly the mouse presses.
@@ -38,24 +39,34 @@ pub struct Live {
 impl Live {
     /// Starts it with a scene on the default detector, with faults if asked, and the default solver.
     pub fn start(scene: SceneName, faults: &[Fault]) -> Result<Self> {
-        let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
-        let hand = Hand::relative(&detector);
-        let scene = Scene::new(scene, &detector, hand, 1);
-        let physics = Simulation::new(&detector, scene, faults, 1)?;
-        let problem = Problem::new(Auto::new(&detector, None)?.model);
+        let (detector, hand, physics) = simulation(scene, faults)?;
+        let mouse = physics.mouse();
+        Self::of(&detector, hand, mouse, Box::new(physics))
+    }
+
+    /// Starts it at rest; the scene begins after a while.
+    pub fn after_rest(scene: SceneName, rest: Duration) -> Result<Self> {
+        let (detector, hand, at_rest) = simulation(SceneName::Rest, &[])?;
+        let (_, _, scene) = simulation(scene, &[])?;
+        let mouse = at_rest.mouse();
+        Self::of(&detector, hand, mouse, Box::new(AfterRest { at_rest, scene, rest_s: rest.as_secs_f64() }))
+    }
+
+    fn of(detector: &Detector, hand: Hand, mouse: Mouse, physics: Box<dyn Physics>) -> Result<Self> {
+        let problem = Problem::new(Auto::new(detector, None)?.model);
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
         let page = PageSetup {
             detector: detector.clone(),
             mesh: problem.jacobian.image_mesh.clone(),
+            usual_radius_m: ContactSettings::of(&problem).radius_m,
             source: "simulated board".to_owned(),
             finger: Some(Finger::from(touch(&hand, [0.0; 2])?)),
         };
-        let server = Server::start(Some(0), page, receiver.clone(), sender)?;
+        let server = Server::start(Listen { port: Some(0), ..Listen::default() }, page, receiver.clone(), sender)?;
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
-        let mouse = physics.mouse();
-        let pipeline = Some(run(&detector, physics, problem, ends)?);
+        let pipeline = Some(run(detector, physics, mouse.clone(), problem, ends)?);
         Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 
@@ -89,6 +100,27 @@ impl Drop for Live {
     }
 }
 
+/// Nothing touches before the scene begins.
+struct AfterRest {
+    at_rest: Simulation,
+    scene: Simulation,
+    rest_s: f64,
+}
+
+impl Physics for AfterRest {
+    fn readings_v(&mut self, time_s: f64) -> Readings {
+        let of_now = if time_s < self.rest_s { &mut self.at_rest } else { &mut self.scene };
+        of_now.readings_v(time_s)
+    }
+}
+
+fn simulation(scene: SceneName, faults: &[Fault]) -> Result<(Detector, Hand, Simulation)> {
+    let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
+    let hand = Hand::relative(&detector);
+    let physics = Simulation::new(&detector, Scene::new(scene, &detector, hand, 1), faults, 1)?;
+    Ok((detector, hand, physics))
+}
+
 /// The mouse's touch at a place (mm).
 fn touch(hand: &Hand, at_mm: [f64; 2]) -> Result<Contact> {
     hand.tip(at_mm.map(|mm| mm * 1e-3), FIRMNESS, 1.0).disc().context("a tip touches in a disc")
@@ -96,12 +128,12 @@ fn touch(hand: &Hand, at_mm: [f64; 2]) -> Result<Contact> {
 
 fn run(
     detector: &Detector,
-    physics: Simulation,
+    physics: Box<dyn Physics>,
+    mouse: Mouse,
     problem: Problem,
     ends: Ends,
 ) -> Result<JoinHandle<Result<Summary, LiveError>>> {
-    let mouse = physics.mouse();
-    let board = SimulatedBoard::start(detector, Box::new(physics), Options::default())?;
+    let board = SimulatedBoard::start(detector, physics, Options::default())?;
     let plan = Plan {
         detector: detector.clone(),
         settings: RequestedSettings::default(),

@@ -2,6 +2,10 @@
 
 mod browser;
 mod chromium;
+mod controls;
 mod live;
 mod raw;
+mod script;
 mod server;
+mod stage;
+mod view;
