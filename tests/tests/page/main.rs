@@ -3,6 +3,7 @@
 mod browser;
 mod chromium;
 mod controls;
+mod gallery;
 mod live;
 mod raw;
 mod script;

@@ -21,7 +21,7 @@ const MAX_FAULTS: usize = 16;
 /// Most conversions averaged, as a base-2 logarithm: what the protocol carries.
 const MAX_AVERAGE_LOG2: u8 = 8;
 
-/// Slowest and fastest play of a recording, beside "max".
+/// Slowest and fastest play of a recording, beside as fast as it can be read.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
 /// What a page asks.
@@ -48,8 +48,8 @@ pub(super) enum PageMessage {
     Pause(bool),
     /// Goes on with the recording from here (s).
     SeekS(f64),
-    /// Plays the recording so many times as fast; `"max"` for as fast as it can be read.
-    Speed(Speed),
+    /// Plays the recording so many times as fast; `null` for as fast as it can be read.
+    Speed(Option<f64>),
     /// Begins the recording again where it ends, or not.
     Loop(bool),
 }
@@ -74,23 +74,6 @@ pub(super) struct Settings {
 /// A fault as it is written on the command line: `open:3`.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub(super) struct FaultText(#[serde(deserialize_with = "by_name")] Fault);
-
-/// How fast a recording is played.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(untagged)]
-pub(super) enum Speed {
-    /// So many times as fast as it was recorded.
-    Times(f64),
-    /// As fast as it can be read.
-    Named(Max),
-}
-
-/// The one speed with a name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Max {
-    Max,
-}
 
 /// A value by the name that it has on the command line.
 fn by_name<'de, D: Deserializer<'de>, T: std::str::FromStr<Err: std::fmt::Display>>(name: D) -> Result<T, D::Error> {
@@ -131,8 +114,8 @@ impl PageMessage {
             Self::Faults(faults) => Control::Faults(simulated(setup, checked(&faults, setup)?)?),
             Self::Pause(on) => Control::Pause(on),
             Self::SeekS(time_s) if time_s >= 0.0 => Control::Seek(time_s),
-            Self::Speed(Speed::Named(Max::Max)) => Control::Speed(f64::INFINITY),
-            Self::Speed(Speed::Times(speed)) if SPEEDS.contains(&speed) => Control::Speed(speed),
+            Self::Speed(None) => Control::Speed(f64::INFINITY),
+            Self::Speed(Some(speed)) if SPEEDS.contains(&speed) => Control::Speed(speed),
             Self::Loop(on) => Control::Loop(on),
             _ => return Err("a number that is out of range"),
         })
@@ -226,7 +209,7 @@ mod tests {
         assert_eq!(asks(r#"{"pause":true}"#), control(Control::Pause(true)));
         assert_eq!(asks(r#"{"seek_s":1.5}"#), control(Control::Seek(1.5)));
         assert_eq!(asks(r#"{"speed":0.25}"#), control(Control::Speed(0.25)));
-        assert_eq!(asks(r#"{"speed":"max"}"#), control(Control::Speed(f64::INFINITY)));
+        assert_eq!(asks(r#"{"speed":null}"#), control(Control::Speed(f64::INFINITY)));
         assert_eq!(asks(r#"{"loop":false}"#), control(Control::Loop(false)));
         let settings = RequestedSettings { average_log2: Some(3), ..Default::default() };
         assert_eq!(asks(r#"{"settings":{"average_log2":3}}"#), Ok(Some(Request::Settings(settings))));
@@ -255,7 +238,7 @@ mod tests {
             r#"{"seek_s":null}"#,
             r#"{"speed":0}"#,
             r#"{"speed":1000}"#,
-            r#"{"speed":"fast"}"#,
+            r#"{"speed":"max"}"#,
             r#"{"settings":{"average_log2":9}}"#,
             r#"{"settings":{"settle_us":70000}}"#,
             r#"{"settings":{"baud":1}}"#,

@@ -43,7 +43,7 @@ export class FlatView {
       contact, x: layout.x(contact.xM), y: layout.y(contact.yM), radius: view.field.radiusOf(contact) * layout.perM,
     }));
     for (const { contact, x, y } of spots) drawMark(over, contact, [x, y], layout.perM, view.colours);
-    drawLabels(over, spots, view.colours, { width: layout.boxWidth, height: layout.boxHeight });
+    drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight });
     this.#drawFingers();
   }
 

@@ -22,7 +22,7 @@ export class Transport {
     this.playButton.onclick = () => this.toggle();
     find("again").onclick = () => this.#playAgain();
     this.seek.oninput = () => this.#ask({ seek_s: Number(this.seek.value) });
-    this.speed.onchange = () => this.#ask({ speed: this.speed.value === "max" ? "max" : Number(this.speed.value) });
+    this.speed.onchange = () => this.#ask({ speed: this.speed.value === "max" ? null : Number(this.speed.value) });
     this.loop.onclick = () => this.#ask({ loop: this.loop.getAttribute("aria-pressed") !== "true" });
   }
 
