@@ -1,5 +1,6 @@
 //! `tactomo live`: the live picture.
 
+use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -12,15 +13,15 @@ use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
 use tactomo::run::{Request, Snapshot};
-use tactomo::sink::page::{Finger, PageSetup, Server};
+use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
 use tactomo::sink::stream::Stream;
-use tactomo::solve::{Method, Problem};
+use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
 
 use super::choice::{DetectorArgs, Model};
 use super::output::message;
 use super::source::{self, BoardArgs};
-use super::{interrupt, output, recording};
+use super::{browser, interrupt, output, recording};
 
 /// Requests of pages that may wait.
 const REQUESTS: usize = 64;
@@ -33,6 +34,7 @@ const REQUESTS: usize = 64;
 ///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
 ///   tactomo live --replay touch.tactomo --speed 0.25
+///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -71,9 +73,17 @@ pub struct PictureArgs {
     /// Jacobian from `forward --save-jacobian`, instead of computing it
     #[arg(long, value_name = "FILE")]
     pub jacobian: Option<PathBuf>,
-    /// Port of the page on 127.0.0.1; 0 for any
+    /// Port of the page; 0 for any
     #[arg(long, value_name = "PORT")]
     pub http_port: Option<u16>,
+    /// Shares the page on the network, at this address of this machine or at 0.0.0.0 for all it has; else only this machine
+    /// reaches it. The address that is printed has a random token: who has it sees the page and can press its buttons, and the
+    /// link is not encrypted
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "json")]
+    pub listen: Option<IpAddr>,
+    /// Leaves it to you to open the page: else the browser opens by itself where there is a desktop
+    #[arg(long)]
+    pub no_open: bool,
     /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, skipped, solved, corrupt, latency_us, age_us}` at the end as JSON
     #[arg(long)]
     pub json: bool,
@@ -165,14 +175,22 @@ fn serve(
     if show.picture.json {
         return Ok(None);
     }
-    let scene = PageSetup {
+    let setup = PageSetup {
         detector: show.detector.clone(),
         mesh: problem.jacobian.image_mesh.clone(),
+        usual_radius_m: ContactSettings::of(problem).radius_m,
         source: show.source.name(),
         finger: show.finger,
     };
-    let server = Server::start(show.picture.http_port, scene, snapshots, requests)?;
+    let PictureArgs { listen: address, http_port: port, no_open, .. } = show.picture;
+    let server = Server::start(Listen { address, port }, setup, snapshots, requests)?;
     message!("live picture: {}", server.url());
+    if let Some(url) = server.shared_url() {
+        message!("on the network: {url}\nwho has this address can see the page and press its buttons");
+    }
+    if !no_open {
+        browser::open(&server.url());
+    }
     Ok(Some(server))
 }
 

@@ -216,7 +216,7 @@ impl Desk {
         let Some(seat) = &mut self.seat else { return Ok(()) };
         let begun = Instant::now();
         if seat.baseline.add(frame.mean.volts(), frame.averaged) {
-            self.notice.change(|snapshot| snapshot.notice = seat.baseline.state().notice());
+            self.notice.change(|snapshot| snapshot.baseline = seat.baseline.state().notice());
         }
         let mut touch = frame.mean.clone();
         seat.baseline.subtract(frame.mean.volts(), touch.volts_mut());

@@ -158,7 +158,11 @@ mod tests {
     }
 
     fn order(method: Method) -> Order {
-        Order { method, detector: Arc::new(Detector::preset(Detector::DEFAULT).unwrap()), faulty: FaultyElectrodes::default() }
+        Order {
+            method,
+            detector: Arc::new(Detector::preset(Detector::DEFAULT).unwrap()),
+            faulty: FaultyElectrodes::default(),
+        }
     }
 
     fn next(maker: &mut Maker, inbox: &Inbox) -> Result<Option<&'static str>, String> {

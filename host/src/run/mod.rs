@@ -48,8 +48,8 @@ pub struct Snapshot {
     pub recording: Option<PathBuf>,
     /// What was asked for last and cannot be, for the person who asked.
     pub refused: Option<String>,
-    /// What a person should know of the readings, in a sentence.
-    pub notice: Option<String>,
+    /// What to know of the baseline, as one sentence for a person; none if all is well.
+    pub baseline: Option<String>,
 }
 
 /// How the link to the board fares.

@@ -103,8 +103,7 @@ impl Browser {
 
     /// Chooses a solver, as a person does in the list.
     pub async fn choose(&self, method: Method) -> Result<()> {
-        let list = self.client.find(Locator::Id("method")).await?;
-        Ok(list.select_by_value(method.name()).await?)
+        self.select("method", method.name()).await
     }
 
     /// Lets go of the mouse's button.
@@ -114,8 +113,28 @@ impl Browser {
         Ok(self.client.perform_actions(mouse).await?)
     }
 
+    /// What a script in the page returns.
+    pub async fn run(&self, script: &str) -> Result<Value> {
+        Ok(self.client.execute(script, Vec::new()).await?)
+    }
+
+    /// Clicks on the element of this id.
+    pub async fn click(&self, id: &str) -> Result<()> {
+        Ok(self.client.find(Locator::Id(id)).await?.click().await?)
+    }
+
+    /// Chooses a value of the list of this id.
+    pub async fn select(&self, id: &str, value: &str) -> Result<()> {
+        Ok(self.client.find(Locator::Id(id)).await?.select_by_value(value).await?)
+    }
+
+    /// Shows the page `light` or `dark`.
+    pub async fn theme(&self, name: &str) -> Result<()> {
+        if self.told().await?.text("theme") == name { Ok(()) } else { self.click("theme").await }
+    }
+
     /// Makes the page this large (CSS pixels).
-    async fn resize(&self, width: u32, height: u32) -> Result<()> {
+    pub async fn resize(&self, width: u32, height: u32) -> Result<()> {
         // The window has a border that the page does not; asked once, it is known.
         self.client.set_window_size(width, height).await?;
         let inner = self.client.execute("return [innerWidth, innerHeight]", Vec::new()).await?;

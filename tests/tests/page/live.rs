@@ -10,13 +10,12 @@ use anyhow::{Context, Result};
 use tactomo::board::link::Opened;
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::detector::Detector;
-use tactomo::forward::Auto;
 use tactomo::run::plan::{Ends, LiveError, Plan, Solving, Summary};
 use tactomo::run::{Snapshot, Statistics};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
 use tactomo::simulate::{Controls, Fault, Simulation};
-use tactomo::sink::page::{Finger, PageSetup, Server};
-use tactomo::solve::{Method, Problem};
+use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
+use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
 
 /// How firmly the mouse presses.
@@ -38,22 +37,22 @@ impl Live {
     pub fn start(scene: SceneName, faults: &[Fault]) -> Result<Self> {
         let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
         let hand = Hand::relative(&detector);
-        let scene = Scene::new(scene, &detector, hand, 1);
-        let physics = Simulation::new(&detector, scene, faults, 1)?;
-        let problem = Problem::new(Auto::new(&detector, None)?.model);
+        let simulation = Simulation::new(&detector, Scene::new(scene, &detector, hand, 1), faults, 1)?;
+        let mouse = simulation.controls();
+        let problem = Problem::of(&detector)?;
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
         let page = PageSetup {
             detector: detector.clone(),
             mesh: problem.jacobian.image_mesh.clone(),
+            usual_radius_m: ContactSettings::of(&problem).radius_m,
             source: "simulated board".to_owned(),
             finger: Some(Finger::from(touch(&hand, [0.0; 2])?)),
         };
-        let server = Server::start(Some(0), page, receiver.clone(), sender)?;
+        let server = Server::start(Listen { port: Some(0), ..Listen::default() }, page, receiver.clone(), sender)?;
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
-        let mouse = physics.controls();
-        let pipeline = Some(run(&detector, physics, problem, ends)?);
+        let pipeline = Some(run(&detector, simulation, problem, ends)?);
         Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 
@@ -94,11 +93,11 @@ fn touch(hand: &Hand, at_mm: [f64; 2]) -> Result<Contact> {
 
 fn run(
     detector: &Detector,
-    physics: Simulation,
+    simulation: Simulation,
     problem: Problem,
     ends: Ends,
 ) -> Result<JoinHandle<Result<Summary, LiveError>>> {
-    let board = SimulatedBoard::simulate(detector, physics, Options::default())?;
+    let board = SimulatedBoard::simulate(detector, simulation, Options::default())?;
     let plan = Plan { solving: Some(Solving::new(Method::Auto, problem)), ..Plan::new(detector.clone()) };
     let mut source = Opened::new(Box::new(board));
     Ok(std::thread::spawn(move || tactomo::run::run(&mut source, plan, ends)))

@@ -2,6 +2,11 @@
 
 mod browser;
 mod chromium;
+mod controls;
+mod gallery;
 mod live;
 mod raw;
+mod script;
 mod server;
+mod stage;
+mod view;

@@ -41,6 +41,11 @@ pub fn ask(port: u16, path: &str, host: &str, headers: &[(&str, &str)]) -> Resul
 
 /// Asks to open the socket.
 pub fn ask_socket(port: u16, host: &str, origin: Option<&str>) -> Result<Answer> {
+    ask_socket_at(port, "/socket", host, origin)
+}
+
+/// Asks to open the socket at `path`.
+pub fn ask_socket_at(port: u16, path: &str, host: &str, origin: Option<&str>) -> Result<Answer> {
     let mut headers = vec![
         ("Connection", "Upgrade"),
         ("Upgrade", "websocket"),
@@ -48,7 +53,7 @@ pub fn ask_socket(port: u16, host: &str, origin: Option<&str>) -> Result<Answer>
         ("Sec-WebSocket-Key", "dGhlIHNhbXBsZSBub25jZQ=="),
     ];
     headers.extend(origin.map(|origin| ("Origin", origin)));
-    ask(port, "/socket", host, &headers)
+    ask(port, path, host, &headers)
 }
 
 /// An open socket.

@@ -1,5 +1,6 @@
 //! The server alone: what it lets in, what it sends when, and what it makes of nonsense.
 
+use std::net::Ipv4Addr;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
@@ -11,11 +12,11 @@ use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
 use tactomo::run::{FrameSnapshot, Request, Snapshot};
 use tactomo::scene::Contact;
-use tactomo::sink::page::{Finger, PageSetup, Server, ServerError};
+use tactomo::sink::page::{Finger, Listen, PageSetup, Server, ServerError};
 use tactomo::solve::{Method, Solution};
 use tokio::sync::watch;
 
-use crate::raw::{Heard, RawPage, ask, ask_socket};
+use crate::raw::{Heard, RawPage, ask, ask_socket, ask_socket_at};
 
 const FINGER: Finger = Finger { radius_m: 0.003, conductance_s: 1e-4 };
 
@@ -26,10 +27,16 @@ struct Rig {
     requests: Receiver<Request>,
 }
 
-fn scene(finger: Option<Finger>) -> Result<PageSetup> {
+/// This machine alone, at a port.
+fn local(port: Option<u16>) -> Listen {
+    Listen { port, ..Listen::default() }
+}
+
+fn setup(finger: Option<Finger>) -> Result<PageSetup> {
     Ok(PageSetup {
         detector: Detector::preset(Detector::DEFAULT).context("the default preset")?,
         mesh: ImageMesh::default(),
+        usual_radius_m: 0.0025,
         source: "a test".to_owned(),
         finger,
     })
@@ -37,9 +44,13 @@ fn scene(finger: Option<Finger>) -> Result<PageSetup> {
 
 impl Rig {
     fn start(finger: Option<Finger>) -> Result<Self> {
+        Self::listening(local(Some(0)), finger)
+    }
+
+    fn listening(listen: Listen, finger: Option<Finger>) -> Result<Self> {
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
-        let server = Server::start(Some(0), scene(finger)?, receiver, sender)?;
+        let server = Server::start(listen, setup(finger)?, receiver, sender)?;
         Ok(Self { server, snapshots, requests })
     }
 
@@ -105,8 +116,8 @@ fn a_foreign_page_cannot_open_the_socket() -> Result<()> {
 fn a_message_is_sent_when_the_last_was_taken() -> Result<()> {
     let rig = Rig::start(None)?;
     let mut page = RawPage::open(rig.server.port())?;
-    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"scene","layout":2,"#)));
-    assert!(page.is_silent_for(Duration::from_millis(400))?, "the scene was not taken");
+    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"setup","layout":3,"#)));
+    assert!(page.is_silent_for(Duration::from_millis(400))?, "the setup was not taken");
     page.take()?;
     assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"status","#)));
     rig.publish(1);
@@ -158,13 +169,15 @@ fn nonsense_closes_its_page_and_no_other() -> Result<()> {
         "{",
         r#""flash""#,
         r#"{"solver":"guess"}"#,
-        r#"{"press":{"x_m":0}}"#,
-        r#"{"press":{"x_m":0,"y_m":0}}"#,
+        r#"{"press":[{"x_m":0}]}"#,
+        r#"{"press":[{"x_m":0,"y_m":0}]}"#,
+        r#"{"scene":"ring"}"#,
+        r#"{"speed":-1}"#,
         &long,
     ] {
         let mut page = RawPage::open(rig.server.port())?;
         page.say(text)?;
-        ensure!(matches!(page.hear()?, Heard::Text(_)), "the scene comes first");
+        ensure!(matches!(page.hear()?, Heard::Text(_)), "the setup comes first");
         // A message that is too long ends the stream at once; others are answered with a reason.
         match page.hear() {
             Ok(Heard::Close(reason)) => assert!(!reason.is_empty(), "{text}"),
@@ -182,10 +195,10 @@ fn nonsense_closes_its_page_and_no_other() -> Result<()> {
 fn a_page_presses_on_the_detector_and_lets_go_when_it_leaves() -> Result<()> {
     let rig = Rig::start(Some(FINGER))?;
     let mut page = RawPage::open(rig.server.port())?;
-    page.say(r#"{"press":{"x_m":0.031,"y_m":0}}"#)?;
-    page.say(r#"{"press":{"x_m":0.01,"y_m":-0.02}}"#)?;
-    let contact = Contact::flat(0.01, -0.02, 0.003, 1e-4);
-    assert_eq!(rig.request()?, Request::Control(Control::Press(vec![contact])), "0.031 m is off the detector");
+    page.say(r#"{"press":[{"x_m":0.031,"y_m":0}]}"#)?;
+    page.say(r#"{"press":[{"x_m":0.01,"y_m":-0.02},{"x_m":0,"y_m":0}]}"#)?;
+    let contacts = [[0.01, -0.02], [0.0, 0.0]].map(|[x, y]| Contact::flat(x, y, 0.003, 1e-4)).to_vec();
+    assert_eq!(rig.request()?, Request::Control(Control::Press(contacts)), "0.031 m is off the detector");
     page.say("\"rezero\"")?;
     assert_eq!(rig.request()?, Request::Rezero);
     page.say(r#"{"solver":"contacts"}"#)?;
@@ -196,14 +209,61 @@ fn a_page_presses_on_the_detector_and_lets_go_when_it_leaves() -> Result<()> {
 }
 
 #[test]
+fn a_shared_page_needs_its_token_for_everything() -> Result<()> {
+    let any = Listen { address: Some(Ipv4Addr::UNSPECIFIED.into()), port: Some(0) };
+    let rig = Rig::listening(any, None)?;
+    let port = rig.server.port();
+    let host = format!("127.0.0.1:{port}");
+    let url = rig.server.url();
+    let path = url.strip_prefix(&format!("http://{host}")).context("an address of this machine")?;
+    let token = path.trim_matches('/');
+    assert_eq!(token.len(), 32, "128 bits in {url}");
+    let wrong = "0".repeat(32);
+    for (path, host, status) in [
+        (path, host.as_str(), 200),
+        (&format!("/{token}/app.js"), &host, 200),
+        (&format!("/{token}"), &host, 308),
+        (&format!("/{token}/Cargo.toml"), &host, 404),
+        ("/", &host, 403),
+        ("/app.js", &host, 403),
+        ("/socket", &host, 403),
+        (&format!("/{wrong}/"), &host, 403),
+        (&format!("/{}/", &token[..31]), &host, 403),
+        (path, &format!("rebound.example:{port}"), 403),
+    ] {
+        assert_eq!(ask(port, path, host, &[])?.status, status, "{path} of {host}");
+    }
+    let page = format!("http://{host}");
+    for (socket, origin, status) in [
+        ("/socket".to_owned(), Some(page.as_str()), 403),
+        (format!("/{wrong}/socket"), Some(&page), 403),
+        (format!("/{token}/socket"), Some("http://foreign.example"), 403),
+        (format!("/{token}/socket"), None, 403),
+        (format!("/{token}/socket"), Some(&page), 101),
+    ] {
+        assert_eq!(ask_socket_at(port, &socket, &host, origin)?.status, status, "{socket} from {origin:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn only_a_shared_page_has_an_address_for_others() -> Result<()> {
+    assert_eq!(Rig::start(None)?.server.shared_url(), None);
+    let loopback = Listen { address: Some(Ipv4Addr::LOCALHOST.into()), port: Some(0) };
+    let rig = Rig::listening(loopback, None)?;
+    assert_eq!(rig.server.shared_url(), Some(rig.server.url()));
+    Ok(())
+}
+
+#[test]
 fn a_busy_port_is_named_and_the_default_gives_way() -> Result<()> {
     let rig = Rig::start(None)?;
     let start = |port| {
         let (_, receiver) = watch::channel(Arc::default());
-        Server::start(port, scene(None)?, receiver, sync_channel(1).0).map_err(anyhow::Error::from)
+        Server::start(local(port), setup(None)?, receiver, sync_channel(1).0).map_err(anyhow::Error::from)
     };
     let error = start(Some(rig.server.port())).err().context("a busy port")?;
-    assert!(matches!(error.downcast_ref(), Some(ServerError::Busy { port }) if *port == rig.server.port()));
+    assert!(matches!(error.downcast_ref(), Some(ServerError::Busy { port, .. }) if *port == rig.server.port()));
     let (first, second) = (start(None)?, start(None)?);
     assert_ne!(first.port(), second.port());
     Ok(())
@@ -215,7 +275,7 @@ fn a_stopped_server_is_gone() -> Result<()> {
     let port = rig.server.port();
     let mut page = RawPage::open(port)?;
     drop(rig.server);
-    page.hear().context("the scene was sent before")?;
+    page.hear().context("the setup was sent before")?;
     assert!(page.hear().is_err());
     assert!(ask(port, "/", "localhost", &[]).is_err());
     Ok(())

@@ -1,30 +1,32 @@
-//! The web server of the live page: everything the page needs is in the program, and nothing leaves this machine.
+//! The web server of the live page: everything the page needs is in the program, and nothing leaves this machine unless
+//! [asked to](Listen).
 //!
 //! It runs in one thread of its own. Pages get the newest frame when they ask for the next one: a page that sleeps, or stops
 //! reading, gets none, and neither the board nor the memory notices.
 
+mod access;
 mod assets;
-mod guard;
+mod messages;
 mod socket;
 mod update;
 mod wire;
 
 use std::io;
-use std::net::{Ipv4Addr, TcpListener};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::SyncSender;
 use std::thread::JoinHandle;
 
 use axum::Router;
-use axum::extract::{State, WebSocketUpgrade};
-use axum::http::{HeaderMap, StatusCode, Uri};
-use axum::middleware::from_fn_with_state;
+use axum::extract::{FromRequestParts, Request as HttpRequest, State, WebSocketUpgrade};
+use axum::http::header::LOCATION;
+use axum::http::request::Parts;
+use axum::http::{HeaderValue, StatusCode};
 use axum::response::{IntoResponse, Response};
-use axum::routing::get;
 use tokio::sync::{Semaphore, oneshot, watch};
 
-use self::guard::Guard;
+use self::access::Access;
 use crate::run::{Request, Snapshot};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ImageMesh;
@@ -40,7 +42,7 @@ const PORTS_TRIED: u16 = 10;
 const MAX_PAGES: usize = 32;
 
 /// Largest message that a page may send, in bytes.
-const MAX_PAGE_MESSAGE: usize = 1024;
+const MAX_PAGE_MESSAGE: usize = 2048;
 
 /// What does not change while the program runs.
 #[derive(Clone, Debug)]
@@ -49,6 +51,8 @@ pub struct PageSetup {
     pub detector: Detector,
     /// Places of the image.
     pub mesh: ImageMesh,
+    /// Radius that contacts are drawn with where it is not known (m).
+    pub usual_radius_m: f64,
     /// What a person calls the source: a port, a recording, the simulated board.
     pub source: String,
     /// What the mouse presses with, if the board is simulated.
@@ -70,10 +74,28 @@ impl From<Contact> for Finger {
     }
 }
 
+/// Who can reach the page.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Listen {
+    /// Address of this machine that other machines reach, or `0.0.0.0` for all it has; then the page's address has a random token,
+    /// without which nothing is answered. `None` for this machine alone.
+    pub address: Option<IpAddr>,
+    /// Port, 0 for any free one; `None` for [`DEFAULT_PORT`] or the next free one.
+    pub port: Option<u16>,
+}
+
+impl Listen {
+    fn ip(&self) -> IpAddr {
+        self.address.unwrap_or(Ipv4Addr::LOCALHOST.into())
+    }
+}
+
 /// A running server; stops when dropped.
 #[derive(Debug)]
 pub struct Server {
-    port: u16,
+    at: SocketAddr,
+    /// The token and a slash, if there is one.
+    prefix: String,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -82,20 +104,27 @@ pub struct Server {
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
     /// Another program listens there.
-    #[error("port {port} on 127.0.0.1 is busy (is another tactomo live running?): choose another with --http-port")]
+    #[error("port {port} on {address} is busy (is another tactomo live running?): choose another with --http-port")]
     Busy {
+        /// The address asked for.
+        address: IpAddr,
         /// The port asked for.
         port: u16,
     },
     /// The system refuses.
-    #[error("cannot serve the page on port {port} of 127.0.0.1: {source}; choose another with --http-port")]
+    #[error(
+        "cannot serve the page on port {port} of {address}: {source}; choose another port with --http-port, or with --listen an \
+         address that this machine has"
+    )]
     Listen {
+        /// The address asked for.
+        address: IpAddr,
         /// The port asked for.
         port: u16,
         /// What the system says.
         source: io::Error,
     },
-    /// A scene with numbers that are none.
+    /// A setup with numbers that are none.
     #[error("detector {detector} cannot be described to the page: {source}")]
     PageSetup {
         /// Its name.
@@ -103,60 +132,74 @@ pub enum ServerError {
         /// What cannot be written.
         source: serde_json::Error,
     },
+    /// No random numbers.
+    #[error("the system gives no random numbers for the token of a shared page ({0}): leave out --listen")]
+    Token(getrandom::Error),
 }
 
 /// What all sockets share.
 #[derive(Debug)]
 struct Shared {
-    scene: PageSetup,
-    scene_message: String,
+    setup: PageSetup,
+    setup_message: String,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     requests: SyncSender<Request>,
     rezeros: AtomicU64,
     pages: Arc<Semaphore>,
-    guard: Guard,
+    access: Access,
 }
 
 impl Server {
-    /// Serves the page on `port`, 0 for any free one; without a port, on [`DEFAULT_PORT`] or the next free one.
+    /// Serves the page.
     ///
     /// Pages show the newest of `snapshots` and ask through `requests`; a request that finds `requests` full is dropped.
     ///
     /// # Errors
-    /// If the port is busy or refused.
+    /// If the port or the address is busy or refused.
     pub fn start(
-        port: Option<u16>,
-        scene: PageSetup,
+        listen: Listen,
+        setup: PageSetup,
         snapshots: watch::Receiver<Arc<Snapshot>>,
         requests: SyncSender<Request>,
     ) -> Result<Self, ServerError> {
-        let listener = listen(port)?;
-        let refused = |source| ServerError::Listen { port: port.unwrap_or(DEFAULT_PORT), source };
-        let port = listener.local_addr().map_err(refused)?.port();
-        let scene_message = wire::scene(&scene)
-            .map_err(|source| ServerError::PageSetup { detector: scene.detector.name.clone(), source })?;
-        let shared = Arc::new(Shared {
-            scene,
-            scene_message,
-            snapshots,
-            requests,
-            rezeros: AtomicU64::new(0),
-            pages: Arc::new(Semaphore::new(MAX_PAGES)),
-            guard: Guard::new(port),
-        });
+        let listener = bind(listen)?;
+        let (address, port) = (listen.ip(), listen.port.unwrap_or(DEFAULT_PORT));
+        let refused = |source| ServerError::Listen { address, port, source };
+        let at = listener.local_addr().map_err(refused)?;
+        let access = match listen.address {
+            Some(_) => Access::shared(at).map_err(ServerError::Token)?,
+            None => Access::local(at.port()),
+        };
+        let prefix = access.prefix();
+        let setup_message = wire::setup(&setup)
+            .map_err(|source| ServerError::PageSetup { detector: setup.detector.name.clone(), source })?;
+        let pages = Arc::new(Semaphore::new(MAX_PAGES));
+        let rezeros = AtomicU64::new(0);
+        let shared = Arc::new(Shared { setup, setup_message, snapshots, requests, rezeros, pages, access });
         let (stop, stopped) = oneshot::channel();
         let thread = run(listener, shared, stopped).map_err(refused)?;
-        Ok(Self { port, stop: Some(stop), thread: Some(thread) })
+        Ok(Self { at, prefix, stop: Some(stop), thread: Some(thread) })
     }
 
-    /// Where the page is.
+    /// Where the page is for a browser on this machine, with its token if it has one.
     pub fn url(&self) -> String {
-        format!("http://127.0.0.1:{}/", self.port)
+        let ip = if self.at.ip().is_unspecified() { Ipv4Addr::LOCALHOST.into() } else { self.at.ip() };
+        self.url_at(ip)
+    }
+
+    /// Where the page is for other machines, with its token; `None` if it is for this machine alone.
+    pub fn shared_url(&self) -> Option<String> {
+        let outward = || if self.at.ip().is_unspecified() { own_address() } else { Some(self.at.ip()) };
+        (!self.prefix.is_empty()).then(outward).flatten().map(|ip| self.url_at(ip))
+    }
+
+    fn url_at(&self, ip: IpAddr) -> String {
+        format!("http://{}/{}", SocketAddr::new(ip, self.at.port()), self.prefix)
     }
 
     /// The port it listens on.
     pub fn port(&self) -> u16 {
-        self.port
+        self.at.port()
     }
 }
 
@@ -170,15 +213,31 @@ impl Drop for Server {
     }
 }
 
-fn listen(port: Option<u16>) -> Result<TcpListener, ServerError> {
-    let Some(port) = port else {
-        return (DEFAULT_PORT..=DEFAULT_PORT + PORTS_TRIED)
-            .find_map(|port| listen(Some(port)).ok())
-            .ok_or(ServerError::Busy { port: DEFAULT_PORT });
+/// The address that other machines on the network know this one by, if it is on one.
+fn own_address() -> Option<IpAddr> {
+    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
+    // Chooses a route and sends nothing; the address is one of those kept for documentation (RFC 5737).
+    socket.connect((Ipv4Addr::new(192, 0, 2, 1), 9)).ok()?;
+    socket.local_addr().ok().map(|address| address.ip())
+}
+
+fn bind(listen: Listen) -> Result<TcpListener, ServerError> {
+    let address = listen.ip();
+    let Some(port) = listen.port else {
+        let mut refusal = None;
+        let ports = DEFAULT_PORT..=DEFAULT_PORT + PORTS_TRIED;
+        let found = ports.map(|port| bind(Listen { port: Some(port), ..listen })).find_map(|bound| match bound {
+            Ok(listener) => Some(listener),
+            Err(error) => {
+                refusal.get_or_insert(error);
+                None
+            }
+        });
+        return found.ok_or(refusal.unwrap_or(ServerError::Busy { address, port: DEFAULT_PORT }));
     };
-    TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(|source| match source.kind() {
-        io::ErrorKind::AddrInUse => ServerError::Busy { port },
-        _ => ServerError::Listen { port, source },
+    TcpListener::bind((address, port)).map_err(|source| match source.kind() {
+        io::ErrorKind::AddrInUse => ServerError::Busy { address, port },
+        _ => ServerError::Listen { address, port, source },
     })
 }
 
@@ -201,17 +260,49 @@ fn run(listener: TcpListener, shared: Arc<Shared>, stopped: oneshot::Receiver<()
 }
 
 fn router(shared: Arc<Shared>) -> Router {
-    let guard = shared.guard.clone();
-    Router::new()
-        .route("/socket", get(open_socket))
-        .fallback(get(|uri: Uri| async move { assets::answer(uri.path()) }))
-        .layer(from_fn_with_state(guard, guard::check))
-        .with_state(shared)
+    Router::new().fallback(serve).with_state(shared)
 }
 
-async fn open_socket(State(shared): State<Arc<Shared>>, headers: HeaderMap, upgrade: WebSocketUpgrade) -> Response {
-    if !shared.guard.knows_origin(&headers) {
-        return (StatusCode::FORBIDDEN, "Only the live page itself may open its socket.\n").into_response();
+/// Answers any request: who may not ask gets nothing else.
+async fn serve(State(shared): State<Arc<Shared>>, request: HttpRequest) -> Response {
+    let (mut parts, _) = request.into_parts();
+    let host = shared.access.host(&parts.headers).map(ToOwned::to_owned);
+    let mut response = match &host {
+        Some(host) => answer(shared, &mut parts, host).await,
+        None => refuse("This server answers to its own address only: open the address that tactomo live printed.\n"),
+    };
+    access::protect(response.headers_mut(), host.as_deref());
+    response
+}
+
+fn refuse(why: &'static str) -> Response {
+    (StatusCode::FORBIDDEN, why).into_response()
+}
+
+async fn answer(shared: Arc<Shared>, parts: &mut Parts, host: &str) -> Response {
+    let whole = parts.uri.path().to_owned();
+    match shared.access.path(&whole) {
+        None => refuse("The token is missing or wrong: open the whole address that tactomo live printed.\n"),
+        Some("") => redirect(&format!("{whole}/")),
+        Some("/socket") => match WebSocketUpgrade::from_request_parts(parts, &()).await {
+            Ok(upgrade) => open_socket(shared, parts, host, upgrade),
+            Err(rejection) => rejection.into_response(),
+        },
+        Some(path) => assets::answer(path).into_response(),
+    }
+}
+
+/// The same page with a slash at its end: the names of its files are relative to that.
+fn redirect(to: &str) -> Response {
+    match HeaderValue::try_from(to) {
+        Ok(to) => (StatusCode::PERMANENT_REDIRECT, [(LOCATION, to)]).into_response(),
+        Err(_) => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+fn open_socket(shared: Arc<Shared>, parts: &Parts, host: &str, upgrade: WebSocketUpgrade) -> Response {
+    if !access::is_own_page(&parts.headers, host) {
+        return refuse("Only the live page itself may open its socket.\n");
     }
     let Ok(page) = shared.pages.clone().try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, "Too many pages are open.\n").into_response();

@@ -10,10 +10,9 @@ use tactomo_board::link::Control;
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
 
-use super::wire::{self, PageMessage};
-use super::{Finger, Shared, update};
+use super::messages::PageMessage;
+use super::{Shared, update, wire};
 use crate::run::{Request, Snapshot};
-use tactomo_physics::scene::Contact;
 
 /// Least time between two updates: a little less than a screen's refresh, so that a page that asks at each refresh is served
 /// at each.
@@ -61,7 +60,7 @@ impl<'a> Page<'a> {
 
     /// Returns when the page has left, or with the reason to close.
     async fn talk(&mut self, socket: &mut WebSocket) -> Option<&'static str> {
-        socket.send(Message::text(self.shared.scene_message.clone())).await.ok()?;
+        socket.send(Message::text(self.shared.setup_message.clone())).await.ok()?;
         loop {
             tokio::select! {
                 heard = socket.recv() => match heard?.ok()? {
@@ -88,43 +87,23 @@ impl<'a> Page<'a> {
     }
 
     fn hear(&mut self, text: &str) -> Result<(), &'static str> {
-        let message =
-            serde_json::from_str(text).map_err(|_| "a message that this version does not know: reload the page")?;
-        match message {
-            PageMessage::Taken => self.taken = true,
-            PageMessage::Rezero => {
-                self.ask(Request::Rezero);
+        let message = PageMessage::parse(text)?;
+        self.taken |= message == PageMessage::Taken;
+        let Some(request) = message.request(&self.shared.setup)? else { return Ok(()) };
+        match &request {
+            Request::Rezero => {
                 self.shared.rezeros.fetch_add(1, Ordering::Relaxed);
             }
-            PageMessage::Solver(method) => self.ask(Request::Solver(method)),
-            PageMessage::Press { x_m, y_m } => {
-                let finger = self.shared.scene.finger.ok_or("only a simulated board can be pressed from the page")?;
-                self.press(finger, [x_m, y_m]);
-            }
-            PageMessage::Release => {
-                self.presses = false;
-                self.ask(Request::Control(Control::Press(Vec::new())));
-            }
+            Request::Control(Control::Press(contacts)) => self.presses = !contacts.is_empty(),
+            _ => {}
         }
+        self.ask(request);
         Ok(())
-    }
-
-    /// Presses there (m), if that is on the detector.
-    fn press(&mut self, finger: Finger, [x_m, y_m]: [f64; 2]) {
-        let detector = &self.shared.scene.detector;
-        let [low, high] = detector.outline.bounds();
-        let within = (low[0]..=high[0]).contains(&x_m) && (low[1]..=high[1]).contains(&y_m);
-        if let Some([x_m, y_m, z_m]) = detector.place_m([x_m, y_m]).filter(|_| within) {
-            self.presses = true;
-            let Finger { radius_m, conductance_s } = finger;
-            let contact = Contact { x_m, y_m, z_m, radius_m, conductance_s };
-            self.ask(Request::Control(Control::Press(vec![contact])));
-        }
     }
 
     fn ask(&self, request: Request) {
         if self.shared.requests.try_send(request).is_err() {
-            tracing::warn!("a request of the page was dropped: the pipeline does not take it");
+            tracing::warn!("a request of the page was dropped: the program does not take it");
         }
     }
 
@@ -139,7 +118,7 @@ impl<'a> Page<'a> {
         let snapshot = self.snapshots.borrow_and_update().clone();
         self.update_due = Instant::now() + UPDATE_INTERVAL;
         let frame = snapshot.frame.as_ref()?;
-        Some(Message::binary(update::update(frame, snapshot.statistics.frames, &self.shared.scene.detector)))
+        Some(Message::binary(update::update(frame, snapshot.statistics.frames, &self.shared.setup.detector)))
     }
 }
 

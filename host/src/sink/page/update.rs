@@ -1,14 +1,15 @@
-//! Updates: the newest frame, in bytes. The page's side is `page/protocol.js`.
+//! Updates: the newest frame, in bytes. The page's side is `web/protocol.js`.
 //!
 //! Little-endian throughout. What is not known is not a number.
 //!
 //! | bytes | what |
 //! |---|---|
 //! | 8 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; flags: 1 saturated, 2 the readings do not fit, 4 unfinished; electrodes left out: bit `e` is electrode `e` |
-//! | f32 | what is left of the readings: root mean square, in standard deviations of the noise |
+//! | f32 | residual of the readings: root mean square, in standard deviations of the noise |
+//! | f32 | age of the answer when this was sent: since the last byte of its frame came (s) |
 //! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
 //! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
-//! | k x (u32, 9 x f32) | the contacts found: number from frame to frame, 0 if it has none; x, y (m); conductance (S); radius (m); force (N); standard errors of x and y (m), the correlation of these, standard error of the conductance (S) |
+//! | k x (u32, 12 x f32) | the contacts found: number from frame to frame, 0 if it has none; x, y on the map (m); conductance (S); radius (m); force (N); standard errors of x and y (m), the correlation of these, standard error of the conductance (S); x, y, z in space (m) |
 //! | the rest | UTF-8: what was chosen, a line feed, why; nothing if the solver does not choose |
 
 use crate::run::FrameSnapshot;
@@ -16,17 +17,18 @@ use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{Flags, FoundContact, Uncertainty};
 
 /// Version of the layout; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 2;
+pub(super) const LAYOUT: u32 = 3;
 
 /// An update; `frames` received so far.
 pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) -> Vec<u8> {
     let solution = &frame.solution;
+    let age_s = frame.arrived.elapsed().as_secs_f32();
     let image = solution.image_s_per_m2.as_deref().unwrap_or_default();
     let counts = [image.len(), frame.readings.electrodes(), solution.contacts.len()].map(|count| count as u32);
     // The page counts modulo 2^32.
     let head = [LAYOUT, frame.sequence as u32, frames as u32].into_iter().chain(counts).chain(flags(&solution.flags));
     let readings = frame.readings.volts().iter().map(|&volt| volt as f32);
-    let values = std::iter::once(known(solution.residual)).chain(image.iter().copied()).chain(readings);
+    let values = [known(solution.residual), age_s].into_iter().chain(image.iter().copied()).chain(readings);
     let mut bytes: Vec<u8> = head.flat_map(u32::to_le_bytes).chain(values.flat_map(f32::to_le_bytes)).collect();
     for found in &solution.contacts {
         bytes.extend(found.id.unwrap_or(0).to_le_bytes());
@@ -44,7 +46,7 @@ fn flags(flags: &Flags) -> [u32; 2] {
     [told, flags.excluded.iter().filter_map(|e| 1_u32.checked_shl(*e as u32)).fold(0, |all, bit| all | bit)]
 }
 
-fn contact(found: &FoundContact, detector: &Detector) -> [f32; 9] {
+fn contact(found: &FoundContact, detector: &Detector) -> [f32; 12] {
     let [x_m, y_m] = detector.map_m([found.x_m, found.y_m, found.z_m]).map(|metres| metres as f32);
     let error = |of: fn(&Uncertainty) -> f64| known(found.uncertainty.as_ref().map(of));
     // Errors in space are not those on the flat map of a curved detector.
@@ -53,7 +55,8 @@ fn contact(found: &FoundContact, detector: &Detector) -> [f32; 9] {
     let [radius_m, force_n] = [known(found.radius_m), known(found.force_n)];
     let correlation = on_map(|errors| errors.correlation);
     let error_s = error(|errors| errors.conductance_s);
-    [x_m, y_m, found.conductance_s as f32, radius_m, force_n, x_error_m, y_error_m, correlation, error_s]
+    let [x, y, z] = [found.x_m, found.y_m, found.z_m].map(|metres| metres as f32);
+    [x_m, y_m, found.conductance_s as f32, radius_m, force_n, x_error_m, y_error_m, correlation, error_s, x, y, z]
 }
 
 fn known(value: Option<f64>) -> f32 {
@@ -105,13 +108,17 @@ mod tests {
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
         assert_eq!(words(&bytes[..32]), [LAYOUT, 9, 300, 3, 2, 2, 0b101, 1 << 31 | 1 << 3]);
-        assert_eq!(floats(&bytes[32..64]), [1.25, 2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0]);
-        assert_eq!(words(&bytes[64..68]), [6]);
-        assert_eq!(floats(&bytes[68..104]), [0.25, -0.5, 2.0, 1.5, 3.0, 0.5, 0.25, -0.5, 4.0]);
-        assert_eq!(words(&bytes[104..108]), [0]);
-        assert_eq!(floats(&bytes[108..120]), [1.0, 2.0, 3.0]);
-        assert!(floats(&bytes[120..144]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(&bytes[144..], "2 contacts\nµ".as_bytes());
+        let head = floats(&bytes[32..68]);
+        assert_eq!(head[0], 1.25);
+        assert!((0.0..5.0).contains(&head[1]), "{} s old", head[1]);
+        assert_eq!(head[2..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0]);
+        assert_eq!(words(&bytes[68..72]), [6]);
+        assert_eq!(floats(&bytes[72..120]), [0.25, -0.5, 2.0, 1.5, 3.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5, 0.0]);
+        assert_eq!(words(&bytes[120..124]), [0]);
+        assert_eq!(floats(&bytes[124..136]), [1.0, 2.0, 3.0]);
+        assert!(floats(&bytes[136..160]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[160..172]), [1.0, 2.0, 0.0]);
+        assert_eq!(&bytes[172..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -119,6 +126,6 @@ mod tests {
         let bytes = bytes_of(Solution::default());
         assert_eq!(words(&bytes[..32]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0]);
         assert!(floats(&bytes[32..36])[0].is_nan());
-        assert_eq!(bytes.len(), 36 + 4 * 4);
+        assert_eq!(bytes.len(), 40 + 4 * 4);
     }
 }

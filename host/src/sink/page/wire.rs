@@ -1,45 +1,26 @@
-//! What passes the socket. The page's side is `page/protocol.js`.
+//! What passes the socket. The page's side is `web/protocol.js`.
 //!
 //! Program to page, one message at a time, the next only after the page has answered `"taken"`:
 //!
-//! - `scene`, JSON, once: what does not change while the program runs.
-//! - `status`, JSON, four times a second: the link, the board, the counts.
+//! - `setup`, JSON, once: what does not change while the program runs.
+//! - `status`, JSON, four times a second: the link, the board, the counts, what is played and recorded.
 //! - an update, binary, at most about sixty times a second: the newest frame, as in [`update`](super::update).
 //!
-//! Page to program, JSON: `"taken"`, `"rezero"`, `{"solver": "auto"}`, `{"press": {"x_m": 0.01, "y_m": 0}}`, `"release"`.
+//! Page to program, JSON: see [`messages`](super::messages).
 
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::Serialize;
 use tactomo_protocol::Hello;
 
 use super::PageSetup;
 use super::update::LAYOUT;
 use crate::run::SolverState;
 use crate::run::{Latency, LinkState, Snapshot};
+use tactomo_board::link::Playing;
+use tactomo_physics::scene::SceneName;
 use tactomo_touch::solve::Method;
 
-/// What a page asks.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum PageMessage {
-    /// The last message is dealt with.
-    Taken,
-    /// Takes the readings at rest anew.
-    Rezero,
-    /// Reads the touch by the method of this name.
-    Solver(#[serde(deserialize_with = "method")] Method),
-    /// Presses on the simulated detector, here (m).
-    Press { x_m: f64, y_m: f64 },
-    /// Ends the press.
-    Release,
-}
-
-fn method<'de, D: Deserializer<'de>>(name: D) -> Result<Method, D::Error> {
-    String::deserialize(name)?.parse().map_err(D::Error::custom)
-}
-
 #[derive(Serialize)]
-struct SceneMessage<'a> {
+struct SetupMessage<'a> {
     r#type: &'static str,
     layout: u32,
     detector: &'a str,
@@ -47,10 +28,17 @@ struct SceneMessage<'a> {
     outline_m: Vec<&'a [[f64; 2]]>,
     electrodes: Vec<ElectrodeMessage>,
     nodes_m: &'a [[f64; 2]],
+    /// Nodes in space, of a curved detector.
+    places_m: &'a [[f64; 3]],
+    /// Triangles that the flat picture has.
     triangles: Vec<[u32; 3]>,
+    /// Triangles that the map of a closed surface tears apart: only the view in space has them.
+    torn_triangles: Vec<[u32; 3]>,
     drive_v: f64,
     sheet_conductance_s: f64,
+    usual_radius_m: f64,
     solvers: Vec<SolverMessage>,
+    scenes: Vec<String>,
     source: &'a str,
     simulated: bool,
 }
@@ -66,32 +54,49 @@ struct ElectrodeMessage {
     x_m: f64,
     y_m: f64,
     radius_m: f64,
+    place_m: [f64; 3],
 }
 
-/// The `scene` message.
-pub(super) fn scene(scene: &PageSetup) -> serde_json::Result<String> {
-    let detector = &scene.detector;
+/// The `setup` message.
+pub(super) fn setup(setup: &PageSetup) -> serde_json::Result<String> {
+    let detector = &setup.detector;
     let loops = std::iter::once(&detector.outline.outer).chain(&detector.outline.holes);
-    serde_json::to_string(&SceneMessage {
-        r#type: "scene",
+    let (triangles, torn_triangles) = drawn_triangles(setup);
+    serde_json::to_string(&SetupMessage {
+        r#type: "setup",
         layout: LAYOUT,
         detector: &detector.name,
         bounds_m: detector.outline.bounds(),
         outline_m: loops.map(Vec::as_slice).collect(),
-        electrodes: detector
-            .electrodes
-            .iter()
-            .map(|pad| (detector.map_m(pad.place_m()), pad.radius_m))
-            .map(|([x_m, y_m], radius_m)| ElectrodeMessage { x_m, y_m, radius_m })
-            .collect(),
-        nodes_m: &scene.mesh.nodes_m,
-        triangles: drawn_triangles(scene),
+        electrodes: electrodes(setup),
+        nodes_m: &setup.mesh.nodes_m,
+        places_m: &setup.mesh.places_m,
+        triangles,
+        torn_triangles,
         drive_v: detector.drive_v,
         sheet_conductance_s: detector.sheet_conductance_s(),
+        usual_radius_m: setup.usual_radius_m,
         solvers: solvers(),
-        source: &scene.source,
-        simulated: scene.finger.is_some(),
+        scenes: scenes(setup),
+        source: &setup.source,
+        simulated: setup.finger.is_some(),
     })
+}
+
+fn electrodes(setup: &PageSetup) -> Vec<ElectrodeMessage> {
+    let detector = &setup.detector;
+    let message = |place_m: [f64; 3], radius_m| {
+        let [x_m, y_m] = detector.map_m(place_m);
+        ElectrodeMessage { x_m, y_m, radius_m, place_m }
+    };
+    detector.electrodes.iter().map(|pad| message(pad.place_m(), pad.radius_m)).collect()
+}
+
+/// The scenes that a simulated detector can play: only discs can touch a curved one.
+fn scenes(setup: &PageSetup) -> Vec<String> {
+    let is_flat = setup.detector.surface.is_none();
+    let plays = |scene: &SceneName| is_flat || !matches!(scene, SceneName::Ring | SceneName::Line);
+    SceneName::ALL.iter().filter(|scene| plays(scene)).map(SceneName::to_string).collect()
 }
 
 /// The solvers to choose from, those that most people look for first.
@@ -100,13 +105,13 @@ fn solvers() -> Vec<SolverMessage> {
     Method::ALL.into_iter().map(message).collect()
 }
 
-/// The triangles of the image that are drawn: on the map of a closed surface those about the lowest point are torn apart.
-fn drawn_triangles(scene: &PageSetup) -> Vec<[u32; 3]> {
+/// The triangles that the flat picture has, and those about the lowest point of a closed surface, which its map tears apart.
+fn drawn_triangles(setup: &PageSetup) -> (Vec<[u32; 3]>, Vec<[u32; 3]>) {
     let shows = |node: u32| {
-        let surface = scene.detector.surface.as_ref();
-        surface.is_none_or(|surface| surface.shows(scene.mesh.nodes_m[node as usize]))
+        let surface = setup.detector.surface.as_ref();
+        surface.is_none_or(|surface| surface.shows(setup.mesh.nodes_m[node as usize]))
     };
-    scene.mesh.triangles.iter().copied().filter(|triangle| triangle.iter().all(|node| shows(*node))).collect()
+    setup.mesh.triangles.iter().partition(|triangle| triangle.iter().all(|node| shows(*node)))
 }
 
 #[derive(Serialize)]
@@ -118,6 +123,30 @@ struct StatusMessage<'a> {
     statistics: StatisticsMessage,
     rezeroing: bool,
     rezeros: u64,
+    playing: PlayingMessage,
+    recording: Option<String>,
+    refused: Option<&'a str>,
+    baseline: Option<&'a str>,
+}
+
+/// What the link plays.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+enum PlayingMessage {
+    Board,
+    Simulated {
+        scene: String,
+        faults: Vec<String>,
+    },
+    Recording {
+        position_s: f64,
+        length_s: f64,
+        /// `None` for as fast as it can be read.
+        speed: Option<f64>,
+        paused: bool,
+        looped: bool,
+        ended: bool,
+    },
 }
 
 #[derive(Serialize)]
@@ -151,8 +180,10 @@ struct StatisticsMessage {
     frames: u64,
     frames_per_s: f64,
     dropped: u64,
+    skipped: u64,
+    solved_per_s: f64,
     corrupt: u64,
-    latency_us: Latency,
+    age_us: Latency,
 }
 
 /// The `status` message; `rezeros` counts the re-zeros that pages asked for.
@@ -167,12 +198,36 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
             frames: counts.frames,
             frames_per_s: counts.frames_per_s,
             dropped: counts.dropped,
+            skipped: counts.skipped,
+            solved_per_s: counts.solved_per_s,
             corrupt: counts.corrupt,
-            latency_us: counts.age,
+            age_us: counts.age,
         },
         rezeroing: snapshot.frame.as_ref().is_some_and(|frame| frame.rezeroing),
         rezeros,
+        playing: playing(&snapshot.playing),
+        recording: snapshot.recording.as_ref().map(|path| path.display().to_string()),
+        refused: snapshot.refused.as_deref(),
+        baseline: snapshot.baseline.as_deref(),
     })
+}
+
+fn playing(playing: &Playing) -> PlayingMessage {
+    match playing {
+        Playing::Board => PlayingMessage::Board,
+        Playing::Simulated { scene, faults } => PlayingMessage::Simulated {
+            scene: scene.to_string(),
+            faults: faults.iter().map(ToString::to_string).collect(),
+        },
+        Playing::Recording { position_s, length_s, speed, paused, looped, ended } => PlayingMessage::Recording {
+            position_s: *position_s,
+            length_s: *length_s,
+            speed: speed.is_finite().then_some(*speed),
+            paused: *paused,
+            looped: *looped,
+            ended: *ended,
+        },
+    }
 }
 
 fn solver_state(state: &SolverState) -> SolverStateMessage<'_> {
@@ -215,7 +270,7 @@ mod tests {
     use tactomo_physics::detector::Detector;
     use tactomo_physics::forward::ImageMesh;
 
-    fn small_scene() -> PageSetup {
+    fn small_setup() -> PageSetup {
         PageSetup {
             detector: Detector::preset(Detector::DEFAULT).expect("the default is a preset"),
             mesh: ImageMesh {
@@ -224,42 +279,71 @@ mod tests {
                 triangles: vec![[0, 1, 2]],
                 node_areas_m2: vec![1e-5; 3],
             },
+            usual_radius_m: 0.0025,
             source: "a \"quoted\" port".to_owned(),
             finger: None,
         }
     }
 
-    #[test]
-    fn the_scene_says_what_the_page_needs() {
-        let text = scene(&small_scene()).expect("plain numbers and texts");
-        let value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-        assert_eq!(value["electrodes"].as_array().map(Vec::len), Some(16));
-        assert_eq!(value["source"], "a \"quoted\" port");
-        assert_eq!(value["simulated"], false);
-        assert_eq!(value["solvers"].as_array().map(Vec::len), Some(Method::ALL.len()));
-        assert_eq!(value["solvers"][0]["name"], "auto");
+    fn json(text: serde_json::Result<String>) -> serde_json::Value {
+        serde_json::from_str(&text.expect("plain numbers and texts")).expect("JSON")
     }
 
     #[test]
-    fn requests_other_than_the_known_are_refused() {
-        let parse = serde_json::from_str::<PageMessage>;
-        let press = parse(r#"{"press":{"x_m":0.01,"y_m":-2e-3}}"#);
-        assert_eq!(press.ok(), Some(PageMessage::Press { x_m: 0.01, y_m: -2e-3 }));
-        assert_eq!(parse(r#""rezero""#).ok(), Some(PageMessage::Rezero));
-        assert_eq!(parse(r#"{"solver":"noser"}"#).ok(), Some(PageMessage::Solver(Method::Noser)));
-        for text in [
-            "",
-            "{}",
-            "[]",
-            "rezero",
-            r#""flash""#,
-            r#"{"press":{}}"#,
-            r#""press""#,
-            r#"{"solver":"guess"}"#,
-            r#"{"press":{"x_m":1e999,"y_m":0}}"#,
-            r#"{"press":{"x_m":0,"y_m":0,"z_m":0}}"#,
-        ] {
-            assert!(parse(text).is_err(), "{text}");
-        }
+    fn the_setup_says_what_the_page_needs() {
+        let value = json(setup(&small_setup()));
+        assert_eq!(value["type"], "setup");
+        assert_eq!(value["electrodes"].as_array().map(Vec::len), Some(16));
+        assert_eq!(value["source"], "a \"quoted\" port");
+        assert_eq!(value["simulated"], false);
+        assert_eq!(value["usual_radius_m"], 0.0025);
+        assert_eq!(value["solvers"].as_array().map(Vec::len), Some(Method::ALL.len()));
+        assert_eq!(value["solvers"][0]["name"], "auto");
+        assert_eq!(value["scenes"].as_array().map(Vec::len), Some(SceneName::ALL.len()));
+        assert_eq!(value["triangles"], serde_json::json!([[0, 1, 2]]));
+    }
+
+    #[test]
+    fn a_curved_detector_comes_with_its_places_and_every_triangle() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/detectors/fingertip.toml");
+        let detector = Detector::read(file.as_ref()).expect("an example");
+        let model = tactomo_physics::forward::Auto::new(&detector, None).expect("a model").model;
+        let mesh = model.image_mesh().clone();
+        let value = json(setup(&PageSetup { detector, mesh: mesh.clone(), ..small_setup() }));
+        let count = |name: &str| value[name].as_array().map_or(0, Vec::len);
+        assert_eq!(count("places_m"), mesh.nodes_m.len());
+        assert_eq!(count("triangles") + count("torn_triangles"), mesh.triangles.len());
+        assert_eq!(count("scenes"), SceneName::ALL.len() - 2, "no line and no ring");
+    }
+
+    #[test]
+    fn the_status_says_what_is_played_and_recorded() {
+        let playing = Playing::Recording {
+            position_s: 1.5,
+            length_s: 4.0,
+            speed: f64::INFINITY,
+            paused: true,
+            looped: false,
+            ended: false,
+        };
+        let snapshot = Snapshot {
+            link: LinkState::Silent("no frames for 2 s".to_owned()),
+            playing,
+            recording: Some("touch.tactomo".into()),
+            baseline: Some("Something pressed at the start.".to_owned()),
+            ..Snapshot::default()
+        };
+        let value = json(status(&snapshot, 3));
+        assert_eq!(value["link"], serde_json::json!({"state": "silent", "reason": "no frames for 2 s"}));
+        assert_eq!(
+            value["playing"],
+            serde_json::json!({
+                "kind": "recording", "position_s": 1.5, "length_s": 4.0, "speed": null, "paused": true, "looped": false,
+                "ended": false
+            })
+        );
+        assert_eq!(value["recording"], "touch.tactomo");
+        assert_eq!(value["baseline"], "Something pressed at the start.");
+        assert_eq!(value["rezeros"], 3);
     }
 }

@@ -108,7 +108,9 @@ impl SpotTable {
                 }
             }
             let start = corners[i] as usize * 3 * self.columns;
-            for (row, by_part) in self.rows[start..start + 3 * self.columns].chunks_exact(self.columns).zip(coefficients) {
+            for (row, by_part) in
+                self.rows[start..start + 3 * self.columns].chunks_exact(self.columns).zip(coefficients)
+            {
                 for (sum, coefficient) in sums.iter_mut().zip(by_part) {
                     let coefficient = coefficient as f32;
                     sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += coefficient * value);

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::detector::{Electrode, Outline};
+use crate::forward::shell::Shell;
 use crate::forward::{readings_v, spots};
 use crate::readings::Readings;
-use crate::forward::shell::Shell;
 
 fn square(thickness_m: f64, radius_m: f64) -> Detector {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
@@ -107,7 +107,8 @@ fn discs_cut_by_walls_are_those_of_the_shell() {
     let mut detector = square(0.00025, 0.002);
     detector.layers[0] = Layer::uniform(0.00025, 0.3e-3 / 0.00025);
     let (slab, shell) = (Slab::new(&detector).unwrap(), Shell::with_nodes(&detector, 8000).unwrap());
-    let both = |press: &[Contact]| [&slab as &dyn ForwardModel, &shell].map(|model| model.impedance_ohm(press).unwrap());
+    let both =
+        |press: &[Contact]| [&slab as &dyn ForwardModel, &shell].map(|model| model.impedance_ohm(press).unwrap());
     // Away from the wall, the two are as far apart as the thickness makes them.
     let [inner, inner_shell] = both(&[contact(0.0, -0.012, 0.003, 1e-4)]);
     let usual = apart(&detector, &inner_shell, &inner);

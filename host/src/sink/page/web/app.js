@@ -1,80 +1,96 @@
 // The live page: takes messages from the program and shows them.
 
+import { Board } from "./board.js";
 import { ContactTable } from "./contacts.js";
+import { listenForActions, RecordButton, RezeroButton } from "./controls.js";
+import { Figures } from "./figures.js";
+import { History } from "./history.js";
+import { linkOf, showState } from "./link.js";
 import { MethodSelect } from "./method.js";
-import { Figures, linkText, showDetails, showState } from "./panel.js";
 import { Picture } from "./picture.js";
 import { listenForPresses } from "./press.js";
 import { Connection } from "./protocol.js";
 import { ReadingsMap } from "./readings.js";
+import { saveData, savePicture } from "./save.js";
+import { Simulation } from "./simulation.js";
+import { StripChart } from "./strip.js";
 import { listenForTheme, theme } from "./theme.js";
+import { Transport } from "./transport.js";
 import { Verdict } from "./verdict.js";
 
-const REZERO_SHOWN_MS = 1500;
-
 const { dataset } = document.documentElement;
-const rezeroButton = document.getElementById("rezero");
+const send = (request) => connection.send(request);
 const figures = new Figures();
-const table = new ContactTable();
 const verdict = new Verdict();
-let scene = null;
-let picture = null;
-let readings = null;
-let method = null;
+const transport = new Transport(send);
+const recordButton = new RecordButton(send);
+const rezeroButton = new RezeroButton(send);
+// What needs to know the detector.
+let parts = null;
 let waiting = null;
-let rezeros = null;
-let rezeroing = false;
-let rezeroTimer = 0;
+let shown = null;
+let frozen = false;
 
-function start(message) {
-  scene = message;
-  picture = new Picture(scene, theme());
-  readings = new ReadingsMap(scene, theme(), (g, e) => picture.highlight(g, e));
-  method = new MethodSelect(scene.solvers, (request) => connection.send(request));
-  document.getElementById("plot").classList.toggle("pressable", scene.simulated);
-  if (scene.simulated) listenForPresses(picture, (request) => connection.send(request));
-  document.getElementById("plot").tabIndex = scene.simulated ? 0 : -1;
-  document.getElementById("hint").textContent = scene.simulated
-    ? "Simulated board: press with the mouse, or with arrow keys and space." : "";
-  showDetails(scene, null);
+function start(setup) {
+  const text = JSON.stringify(setup);
+  if (parts) {
+    // The same program again, or another run of it, perhaps with another detector.
+    if (text !== parts.text) location.reload();
+    return;
+  }
+  const picture = new Picture(setup, theme());
+  const history = new History(setup);
+  parts = {
+    text, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
+    readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
+    method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
+  };
+  const plot = document.getElementById("plot");
+  plot.classList.toggle("pressable", setup.simulated);
+  plot.tabIndex = setup.simulated ? 0 : -1;
+  if (setup.simulated) listenForPresses(picture, send);
+  document.getElementById("hint").textContent = setup.simulated
+    ? "Press on the detector: mouse, fingers, or arrow keys and space. Shift-click leaves a finger down." : "";
 }
 
 function showStatus(status) {
-  figures.show(status);
-  showDetails(scene, status.hello);
-  showState(status.link.state, linkText(status.link));
-  method.show(status.solver, status.link.state === "streaming");
-  rezeroButton.disabled = status.link.state !== "streaming";
-  showRezero(status);
+  const { state, text } = linkOf(status);
+  showState(state, text);
+  for (const part of [figures, transport, recordButton, rezeroButton, parts.board, parts.simulation]) part.show(status);
+  if (parts.method.show(status.solver, status.link.state === "streaming")) parts.picture.fitNext();
+  document.getElementById("pause").hidden = transport.isThere;
+  showNotice(status);
 }
 
-// Every page sees that one has asked for a re-zero, and that it is done.
-function showRezero(status) {
-  const wasBusy = rezeroing;
-  const asked = rezeros !== null && status.rezeros > rezeros;
-  ({ rezeroing, rezeros } = status);
-  dataset.rezeros = String(rezeros);
-  if (rezeroing) rezeroButton.textContent = "Hold still…";
-  const done = !rezeroing && (wasBusy || asked);
-  if (!done) return;
-  rezeroButton.textContent = "Re-zeroed";
-  clearTimeout(rezeroTimer);
-  rezeroTimer = setTimeout(() => { rezeroButton.textContent = "Re-zero"; }, REZERO_SHOWN_MS);
+// One line for what the program has to say: what was refused, what to know of the baseline, where the recording is.
+function showNotice({ refused, baseline, recording, solver }) {
+  const notice = document.getElementById("notice");
+  const method = solver?.refused ? `This solver cannot be used: ${solver.refused}` : null;
+  notice.textContent = refused ?? method ?? baseline ?? (recording ? `Recording to ${recording}` : "");
+  notice.className = refused || method ? "bad" : baseline ? "warning" : "";
+  notice.hidden = !notice.textContent;
 }
 
 // Draws the newest update when the browser is about to paint, and only then asks for the next: a page that sleeps asks nothing.
 function draw(now) {
   const update = waiting;
   waiting = null;
-  if (!update || !picture) return;
-  picture.show(update, now);
-  readings.show(update, now);
-  table.show(update, now);
-  verdict.show(update, method.explanation, now);
-  dataset.sequence = String(update.sequence);
+  if (!update || !parts) return;
   dataset.received = String(update.frames);
-  dataset.updates = String(Number(dataset.updates ?? 0) + 1);
+  if (!frozen) show(update, now);
   connection.taken();
+}
+
+function show(update, now) {
+  shown = update;
+  parts.history.take(update, now);
+  parts.picture.show(update, now);
+  parts.readings.show(update, now);
+  parts.table.show(update, now);
+  parts.strip.draw(now);
+  verdict.show(update, parts.method.explanation, now);
+  dataset.sequence = String(update.sequence);
+  dataset.updates = String(Number(dataset.updates ?? 0) + 1);
 }
 
 function update(message) {
@@ -84,37 +100,60 @@ function update(message) {
 
 function lost(reason) {
   waiting = null;
-  rezeros = null;
-  rezeroButton.disabled = true;
-  rezeroButton.textContent = "Re-zero";
+  rezeroButton.lost();
   showState("unreachable", reason || "The program does not answer; trying again");
 }
 
-function fit() {
-  picture?.fit(performance.now());
-  readings?.fit(performance.now());
+// A recording is held; live frames keep coming, and only the picture stands still.
+function pause() {
+  if (transport.isThere) {
+    transport.toggle();
+    return;
+  }
+  frozen = !frozen;
+  const button = document.getElementById("pause");
+  button.textContent = frozen ? "Resume" : "Pause";
+  button.setAttribute("aria-pressed", String(frozen));
+  document.getElementById("frozen").hidden = !frozen;
+  dataset.frozen = String(frozen);
 }
 
-function rezero() {
-  if (rezeroButton.disabled) return;
-  rezeroButton.textContent = "Hold still…";
-  connection.send("rezero");
+function look(name) {
+  parts?.picture.look(name);
+  document.getElementById("view-flat").setAttribute("aria-pressed", String(name === "flat"));
+  document.getElementById("view-space").setAttribute("aria-pressed", String(name === "space"));
 }
 
-const connection = new Connection({ scene: start, status: showStatus, update, lost });
+function fullScreen() {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else document.getElementById("picture").requestFullscreen?.().catch(() => {});
+}
 
-rezeroButton.onclick = rezero;
-document.getElementById("rescale").onclick = fit;
-document.onkeydown = (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
-  if (event.key === "z") rezero();
-  if (event.key === "f") fit();
-};
-listenForTheme((name) => {
-  picture?.recolour(name);
-  readings?.recolour(name);
+const connection = new Connection({ setup: start, status: showStatus, update, lost });
+
+listenForActions({
+  pause,
+  "save-picture": () => parts && savePicture(parts.picture.layers(), parts.picture.colours.card),
+  "save-data": () => shown && saveData(shown),
+  record: () => recordButton.toggle(),
+  rescale: () => {
+    parts?.picture.fit(performance.now());
+    parts?.readings.fit(performance.now());
+  },
+  rezero: () => rezeroButton.press(),
+  full: fullScreen,
+  view: () => look(parts?.picture.looking === "flat" ? "space" : "flat"),
+  "view-flat": () => look("flat"),
+  "view-space": () => look("space"),
 });
-new ResizeObserver(() => {
-  picture?.layOut();
-  readings?.layOut();
-}).observe(document.querySelector("main"));
+listenForTheme((name) => {
+  parts?.picture.recolour(name);
+  parts?.readings.recolour(name);
+  parts?.strip.recolour();
+});
+const sizes = new ResizeObserver(() => {
+  parts?.picture.layOut();
+  parts?.readings.layOut();
+  parts?.strip.layOut();
+});
+for (const id of ["plot", "readings", "strip-card"]) sizes.observe(document.getElementById(id));

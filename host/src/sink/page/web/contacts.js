@@ -1,12 +1,20 @@
 // The contacts found, as a table.
 
-import { ellipseOf, hueOf } from "./marks.js";
+import { ellipseOf } from "./marks.js";
+import { hueOf } from "./palette.js";
 import { count, millimetres, withPrefix } from "./units.js";
 
 // Numbers that change faster cannot be read.
 const SHOWN_EVERY_MS = 120;
 // Rows that there is place for.
 const ROWS = 5;
+// Firmness in words and as a bar: conductance over the sheet conductance, from the lightest touch that linear theory describes
+// (a thirtieth) to a press that conducts as well as the detector itself and more.
+const WORDS = [[0.03, "light"], [0.3, "medium"], [1, "firm"], [Infinity, "hard"]];
+const BAR = { least: 0.003, most: 3 };
+
+const wordOf = (share) => WORDS.find(([below]) => share < below)[1];
+const barOf = (share) => Math.min(1, Math.max(0.02, Math.log(share / BAR.least) / Math.log(BAR.most / BAR.least)));
 
 // An error of place (mm): none known, or so large that its digits say nothing.
 function placeError(errors) {
@@ -14,33 +22,35 @@ function placeError(errors) {
   return errors.longM < 0.1 ? millimetres(errors.longM, errors.longM < 1e-3 ? 2 : 1) : "> 100";
 }
 
-const cell = (name, kind, text) => {
+function element(name, kind, ...children) {
   const made = document.createElement(name);
   made.className = kind;
-  made.textContent = text;
+  made.append(...children);
   return made;
-};
-
-function strength({ forceN, conductanceS, errorS }) {
-  if (forceN !== null) return [withPrefix(forceN, "N"), ""];
-  return [withPrefix(conductanceS, "S"), errorS === null ? "" : withPrefix(errorS, "S", 2)];
 }
 
-function row(contact) {
-  const made = document.createElement("tr");
-  const errors = ellipseOf(contact);
-  const [value, error] = strength(contact);
-  const id = cell("td", `id ${hueOf(contact.id)}`, contact.id ? String(contact.id) : "\u2013");
-  made.append(id,
-    cell("td", "", millimetres(contact.xM, 2)), cell("td", "", millimetres(contact.yM, 2)),
-    cell("td", "error", placeError(errors)),
-    cell("td", "", value), cell("td", "error", error));
-  return made;
+function bar(share) {
+  const made = document.createElement("meter");
+  made.className = "firmness";
+  made.value = barOf(share);
+  return element("td", "wide", element("span", "level", made, element("span", "word", wordOf(share))));
+}
+
+function row(contact, sheetS) {
+  const { id, xM, yM, forceN, conductanceS, errorS } = contact;
+  const error = forceN === null && errorS !== null ? ` ± ${withPrefix(errorS, "S", 2)}` : "";
+  const value = element("td", "value", forceN === null ? withPrefix(conductanceS, "S") : withPrefix(forceN, "N"));
+  value.title = `${value.textContent}${error}`;
+  return element("tr", hueOf(id),
+    element("td", "id", element("span", "badge-id", id ? String(id) : "\u2013")),
+    element("td", "", `${millimetres(xM, 1)}, ${millimetres(yM, 1)}`),
+    element("td", "error", placeError(ellipseOf(contact))), value, bar(Math.max(1e-9, conductanceS / sheetS)));
 }
 
 /** The table of contacts. */
 export class ContactTable {
-  constructor() {
+  constructor({ sheet_conductance_s: sheetS }) {
+    this.sheetS = sheetS;
     this.body = document.getElementById("contacts");
     this.rest = document.getElementById("no-contacts");
     this.strength = document.getElementById("strength");
@@ -49,13 +59,14 @@ export class ContactTable {
   }
 
   /** Shows the contacts of an update. */
-  show({ contacts }, now) {
+  show({ contacts, image }, now) {
     if (now - this.shown < SHOWN_EVERY_MS) return;
     this.shown = now;
-    const strongest = [...contacts].sort((a, b) => (a.id ?? 0) - (b.id ?? 0) || b.conductanceS - a.conductanceS);
-    this.body.replaceChildren(...strongest.slice(0, ROWS).map(row));
+    const sorted = [...contacts].sort((a, b) => (a.id ?? 0) - (b.id ?? 0) || b.conductanceS - a.conductanceS);
+    this.body.replaceChildren(...sorted.slice(0, ROWS).map((contact) => row(contact, this.sheetS)));
     this.strength.textContent = contacts.some(({ forceN }) => forceN !== null) ? "force" : "conductance";
     this.rest.hidden = contacts.length > 0;
+    this.rest.textContent = image.length ? "The image has no single contacts." : "Nothing touches.";
     this.more.textContent = contacts.length > ROWS ? `and ${count(contacts.length - ROWS)} more` : "";
   }
 }

@@ -1,74 +1,139 @@
-// The contacts on the picture: circles that grow with the conductance, or of the radius where that is known; ellipses of the
-// uncertainty; and the key to the sizes.
+// What is drawn over the heat for each contact: its way, its uncertainty, its size where that is known, and its label.
 
-import { label, svg } from "./svg.js";
+import { faded } from "./palette.js";
 import { withPrefix } from "./units.js";
 
-const HUES = 8;
-// Radius of a circle (pixels): of no conductance, and added for each decade above a hundredth of the sheet conductance.
-const LEAST = 7;
-const PER_DECADE = 7;
-const SMALLEST_SHARE = 0.01;
-// The ellipse holds the true place in 86 of 100 frames: two standard errors. Smaller ones (pixels) would hide in the centre's dot.
+// The ellipse holds the true place in 86 of 100 frames: two standard errors. Smaller ones (pixels) would hide in the centre's
+// dot, larger ones say nothing.
 const DEVIATIONS = 2;
 const SMALLEST_ELLIPSE = 4;
-// Larger ones say nothing, and a browser takes seconds for their dashes.
 const LARGEST_ELLIPSE = 2000;
-// Place for a value beside a contact (pixels).
-const LABEL_WIDTH = 86;
-
-/** The class that colours a contact: the same for the same number. */
-export const hueOf = (id) => (id ? `hue-${(id - 1) % HUES}` : "hue-none");
+const TRAIL_WIDTH = 5;
+const PILL = { height: 22, badge: 9, font: "600 12.5px system-ui, sans-serif" };
 
 /** What a contact presses with, for people: newtons where they are known. */
 export const strengthOf = ({ forceN, conductanceS }) => (forceN === null ? withPrefix(conductanceS, "S") : withPrefix(forceN, "N"));
 
-// Radius of the circle of a conductance, in pixels.
-const sizeOf = (conductanceS, sheetS) => LEAST + PER_DECADE * Math.log10(1 + Math.max(0, conductanceS) / (SMALLEST_SHARE * sheetS));
-
-/** The half axes (m) of one standard error and the direction of the longer (degrees, anticlockwise), or null. */
+/** The half axes (m) of one standard error and the direction of the longer (radians, anticlockwise), or null. */
 export function ellipseOf({ xErrorM, yErrorM, correlation }) {
   if (xErrorM === null || yErrorM === null) return null;
   const [xx, yy, xy] = [xErrorM ** 2, yErrorM ** 2, (correlation ?? 0) * xErrorM * yErrorM];
   const [mean, half] = [(xx + yy) / 2, Math.hypot((xx - yy) / 2, xy)];
   return {
-    longM: Math.sqrt(mean + half), shortM: Math.sqrt(Math.max(0, mean - half)),
-    degrees: (Math.atan2(2 * xy, xx - yy) / 2) * (180 / Math.PI),
+    longM: Math.sqrt(mean + half), shortM: Math.sqrt(Math.max(0, mean - half)), radians: Math.atan2(2 * xy, xx - yy) / 2,
   };
 }
 
-function ellipse(contact, perM) {
+function drawEllipse(context, contact, [x, y], perM, colour) {
   const of = ellipseOf(contact);
   const long = of ? DEVIATIONS * of.longM * perM : 0;
-  if (long < SMALLEST_ELLIPSE || long > LARGEST_ELLIPSE) return [];
-  const [rx, ry] = [of.longM, of.shortM].map((m) => (DEVIATIONS * m * perM).toFixed(1));
-  return [svg("ellipse", { class: "uncertainty", rx, ry, transform: `rotate(${(-of.degrees).toFixed(1)})` })];
+  if (long < SMALLEST_ELLIPSE || long > LARGEST_ELLIPSE) return;
+  context.beginPath();
+  context.ellipse(x, y, long, Math.max(1, DEVIATIONS * of.shortM * perM), -of.radians, 0, 2 * Math.PI);
+  context.fillStyle = faded(colour, 0.14);
+  context.fill();
+  context.setLineDash([5, 3]);
+  context.lineWidth = 1.5;
+  context.strokeStyle = colour;
+  context.stroke();
+  context.setLineDash([]);
 }
 
-/** The mark of a contact about its centre; `perM` pixels a metre, `room` pixels to the right of it. */
-export function markOf(contact, sheetS, perM, room) {
-  const known = contact.radiusM !== null;
-  const r = known ? contact.radiusM * perM : sizeOf(contact.conductanceS, sheetS);
-  const [x, anchor] = room > r + LABEL_WIDTH ? [r + 6, "start"] : [-r - 6, "end"];
-  const text = label(x, 0.5, "", "contact-label", anchor);
-  if (contact.id) text.append(svg("tspan", { class: "contact-id" }, `${contact.id}`), "\u2002");
-  text.append(strengthOf(contact));
-  return svg("g", { class: `contact ${hueOf(contact.id)}` },
-    svg("circle", { class: known ? "disc known" : "disc", r: r.toFixed(1) }), ...ellipse(contact, perM),
-    svg("circle", { class: "centre", r: 2.2 }), text);
+/** A contact's size, where it is known, its uncertainty and its centre, at `[x, y]` pixels. */
+export function drawMark(context, contact, [x, y], perM, colours) {
+  const colour = colours.hue(contact.id);
+  if (contact.radiusM !== null) {
+    context.beginPath();
+    context.arc(x, y, contact.radiusM * perM, 0, 2 * Math.PI);
+    context.lineWidth = 1.5;
+    context.strokeStyle = faded(colours.ink, 0.5);
+    context.stroke();
+  }
+  drawEllipse(context, contact, [x, y], perM, colour);
+  context.beginPath();
+  context.arc(x, y, 3, 0, 2 * Math.PI);
+  context.fillStyle = colour;
+  context.fill();
+  context.lineWidth = 1.5;
+  context.strokeStyle = colours.card;
+  context.stroke();
 }
 
-/** The key to the circles' sizes: a circle for each decade, from `top` down about `x`, in at most `height` pixels. */
-export function sizeKey(sheetS, x, top, height) {
-  const most = Math.floor(Math.log10(sheetS)) + 1;
-  const decades = [most, most - 1, most - 2, most - 3].map((power) => 10 ** power);
-  const sizes = decades.map((value) => sizeOf(value, sheetS));
-  const gap = 34;
-  const needed = sizes.reduce((sum, size) => sum + 2 * size + gap, 0);
-  let y = top + Math.max(0, (height - needed) / 2);
-  return decades.flatMap((value, i) => {
-    y += 2 * sizes[i] + gap;
-    return [svg("circle", { class: "key", cx: x, cy: y - gap - sizes[i], r: sizes[i].toFixed(1) }),
-      label(x, y - gap + 14, withPrefix(value, "S", 1), "tick-text")];
-  });
+/** The way of a contact, fading: points `{x, y, age}` in pixels. */
+export function drawTrail(context, id, points, colours) {
+  context.lineCap = "round";
+  for (let i = 1; i < points.length; i += 1) {
+    const left = 1 - points[i].age;
+    if (points[i].begins) continue;
+    context.strokeStyle = faded(colours.hue(id), 0.6 * left);
+    context.lineWidth = Math.max(0.5, TRAIL_WIDTH * left);
+    context.beginPath();
+    context.moveTo(points[i - 1].x, points[i - 1].y);
+    context.lineTo(points[i].x, points[i].y);
+    context.stroke();
+  }
+}
+
+// How much of each other two boxes cover (pixels).
+function covered(a, b) {
+  const across = Math.min(a.x + a.width, b.x + b.width) - Math.max(a.x, b.x);
+  const down = Math.min(a.y + a.height, b.y + b.height) - Math.max(a.y, b.y);
+  return across > 0 && down > 0 ? across * down : 0;
+}
+
+// The place about the contact, right of it if that is free, where its label covers least.
+function placeFor(width, { x, y, radius }, taken, box) {
+  const { height } = PILL;
+  const gap = radius + 7;
+  const [right, left, above, below] = [x + gap, x - gap - width, y - gap - height, y + gap];
+  const places = [[right, y - height / 2], [left, y - height / 2], [x - width / 2, above], [x - width / 2, below],
+    [right - 5, above + 5], [left + 5, above + 5], [right - 5, below - 5], [left + 5, below - 5]];
+  const costOf = (pill) => taken.reduce((sum, other) => sum + covered(pill, other), 0)
+    + 4 * (width * height - covered(pill, { x: 0, y: 0, ...box }));
+  let best = null;
+  for (const [px, py] of places) {
+    const pill = { x: px, y: py, width, height };
+    const cost = costOf(pill);
+    if (!best || cost < best.cost) best = { ...pill, cost };
+    if (cost === 0) break;
+  }
+  return best;
+}
+
+/** Labels of contacts: `spots` with the contact, its pixels `x`, `y` and its `radius` there; `box` that they stay in. */
+export function drawLabels(context, spots, colours, box) {
+  context.font = PILL.font;
+  context.textBaseline = "middle";
+  const taken = spots.map(({ x, y, radius }) => ({ x: x - radius, y: y - radius, width: 2 * radius, height: 2 * radius }));
+  for (const spot of spots) {
+    const { contact } = spot;
+    const text = strengthOf(contact);
+    const badge = contact.id ? Math.max(2 * PILL.badge, context.measureText(String(contact.id)).width + 9) : 0;
+    const pill = placeFor(badge + context.measureText(text).width + 16, spot, taken, box);
+    taken.push(pill);
+    drawPill(context, pill, contact, text, badge, colours);
+  }
+}
+
+function drawPill(context, pill, { id }, text, badge, colours) {
+  const middle = pill.y + pill.height / 2;
+  context.beginPath();
+  context.roundRect(pill.x, pill.y, pill.width, pill.height, pill.height / 2);
+  context.fillStyle = faded(colours.card, 0.88);
+  context.fill();
+  context.lineWidth = 1;
+  context.strokeStyle = colours.edge;
+  context.stroke();
+  if (id) {
+    context.beginPath();
+    context.roundRect(pill.x + 2, middle - PILL.badge, badge, 2 * PILL.badge, PILL.badge);
+    context.fillStyle = colours.hue(id);
+    context.fill();
+    context.fillStyle = colours.card;
+    context.textAlign = "center";
+    context.fillText(String(id), pill.x + 2 + badge / 2, middle + 0.5);
+  }
+  context.textAlign = "left";
+  context.fillStyle = colours.ink;
+  context.fillText(text, pill.x + badge + 8, middle + 0.5);
 }

@@ -1,8 +1,8 @@
-// What passes the socket. The program's side is `live/server/wire.rs` and `live/server/update.rs`; the layout is described there and
-// must be the same.
+// What passes the socket. The program's side is `wire.rs`, `messages.rs` and `update.rs`; the layout is described there and must be
+// the same.
 
-/** Version of the layout below; the scene carries the program's. */
-export const LAYOUT = 2;
+/** Version of the layout below; the setup carries the program's. */
+export const LAYOUT = 3;
 
 const HEAD_WORDS = 8;
 // From the lowest bit on.
@@ -36,9 +36,9 @@ class Taker {
 
 function contact(taker) {
   const id = taker.word() || null;
-  const [xM, yM, conductanceS, ...others] = taker.floats(9);
-  const [radiusM, forceN, xErrorM, yErrorM, correlation, errorS] = others.map(known);
-  return { id, xM, yM, conductanceS, radiusM, forceN, xErrorM, yErrorM, correlation, errorS };
+  const [xM, yM, conductanceS, ...others] = taker.floats(12);
+  const [radiusM, forceN, xErrorM, yErrorM, correlation, errorS] = others.slice(0, 6).map(known);
+  return { id, xM, yM, conductanceS, radiusM, forceN, xErrorM, yErrorM, correlation, errorS, place: others.slice(6) };
 }
 
 function choice(text) {
@@ -52,9 +52,9 @@ export function decodeUpdate(buffer) {
   const [layout, sequence, frames, nodes, electrodes, contacts, flags, excluded] =
     Array.from({ length: HEAD_WORDS }, () => taker.word());
   if (layout !== LAYOUT) throw new Error("The program is of another version than this page: reload it.");
+  const [residual, ageS] = [...taker.floats(2)].map(known);
   return {
-    sequence, frames, electrodes, flags: bitsOf(flags).map((bit) => FLAGS[bit]), excluded: bitsOf(excluded),
-    residual: known(taker.floats(1)[0]),
+    sequence, frames, residual, ageS, electrodes, flags: bitsOf(flags).map((bit) => FLAGS[bit]), excluded: bitsOf(excluded),
     image: taker.floats(nodes),
     readings: taker.floats(electrodes * electrodes),
     contacts: Array.from({ length: contacts }, () => contact(taker)),
@@ -65,7 +65,7 @@ export function decodeUpdate(buffer) {
 const RETRY_MS = [250, 500, 1000, 2000];
 
 /**
- * The socket to the program: connects, and connects again when it is lost. `on` has `scene`, `status`, `update`, each given a
+ * The socket to the program: connects, and connects again when it is lost. `on` has `setup`, `status`, `update`, each given a
  * message, and `lost`. After each message the program waits for `taken()`.
  */
 export class Connection {
@@ -86,7 +86,10 @@ export class Connection {
   }
 
   #connect() {
-    this.socket = new WebSocket(`ws://${location.host}/socket`);
+    // Beside the page, behind the token if there is one.
+    const address = new URL("socket", location.href);
+    address.protocol = "ws:";
+    this.socket = new WebSocket(address);
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => { this.attempt = 0; };
     this.socket.onmessage = ({ data }) => this.#receive(data);
@@ -104,7 +107,7 @@ export class Connection {
       return;
     }
     const message = JSON.parse(data);
-    if (message.type === "scene") this.on.scene(message);
+    if (message.type === "setup") this.on.setup(message);
     if (message.type === "status") this.on.status(message);
     this.taken();
   }

@@ -1,5 +1,5 @@
-// From values at the nodes of a mesh to pixels. Which triangle a pixel lies in, and its weights there, never change: they are
-// found once.
+// From values at the nodes of a mesh to values at the pixels of a grid. Which triangle a pixel lies in, and its weights there,
+// never change: they are found once.
 
 const LONG_SIDE = 420;
 
@@ -15,8 +15,6 @@ export class Raster {
     const pixels = nodesM.map(([x, y]) => [(x - left) / this.pixelM - 0.5, (top - y) / this.pixelM - 0.5]);
     for (const triangle of triangles) this.#cover(triangle, pixels);
     this.#spread();
-    this.image = new ImageData(this.width, this.height);
-    this.pixels = new Uint32Array(this.image.data.buffer);
   }
 
   #cover(triangle, pixels) {
@@ -59,16 +57,12 @@ export class Raster {
       .map(([nx, ny]) => 3 * (ny * this.width + nx));
   }
 
-  /** Colours all pixels: zero and less is the first colour, `max` and more the last. Pixels off the mesh stay clear. */
-  paint(values, max, colours) {
-    const { corners, weights, pixels } = this;
-    const factor = (colours.length - 1) / max;
+  /** Fills `pixels` with the values at the nodes in between; pixels off the mesh become zero. */
+  interpolate(values, pixels) {
+    const { corners, weights } = this;
     for (let pixel = 0, at = 0; pixel < pixels.length; pixel += 1, at += 3) {
-      if (corners[at] < 0) continue;
-      const value = weights[at] * values[corners[at]] + weights[at + 1] * values[corners[at + 1]]
-        + weights[at + 2] * values[corners[at + 2]];
-      pixels[pixel] = colours[Math.min(colours.length - 1, Math.max(0, Math.round(value * factor)))];
+      pixels[pixel] = corners[at] < 0 ? 0 : weights[at] * values[corners[at]]
+        + weights[at + 1] * values[corners[at + 1]] + weights[at + 2] * values[corners[at + 2]];
     }
-    return this.image;
   }
 }

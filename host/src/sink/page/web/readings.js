@@ -1,19 +1,21 @@
 // The readings as a heat map: a row for each grounded electrode, a column for each electrode read.
 
 import { colourMaps, css } from "./colours.js";
-import { StickyScale } from "./scale.js";
+import { SteadyScale } from "./scale.js";
 import { gradient, label, line, svg } from "./svg.js";
 import { decimalsOf, fixed, niceStep, prefixOf, ticks } from "./units.js";
 
 const MARGIN = { left: 40, right: 6, top: 4, bottom: 66 };
+// Axes are drawn anew no more often than this while the scale moves.
+const AXES_EVERY_MS = 100;
 // Below this share of the drive the readings are mostly the converter's noise.
 const FLOOR_SHARE = 0.01;
 const STEPS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
 
 /** Draws the readings; calls `onChoose(g, e)` when one is pointed at, and `onChoose()` when none is. */
 export class ReadingsMap {
-  constructor(scene, theme, onChoose) {
-    this.count = scene.electrodes.length;
+  constructor(setup, theme, onChoose) {
+    this.count = setup.electrodes.length;
     this.theme = theme;
     this.onChoose = onChoose;
     this.box = document.getElementById("readings");
@@ -25,7 +27,7 @@ export class ReadingsMap {
     this.image = new ImageData(this.count, this.count);
     this.pixels = new Uint32Array(this.image.data.buffer);
     this.values = new Float32Array(this.count * this.count);
-    this.scale = new StickyScale(FLOOR_SHARE * scene.drive_v);
+    this.scale = new SteadyScale(FLOOR_SHARE * setup.drive_v);
     this.chosen = null;
     this.#listen();
     this.layOut();
@@ -35,7 +37,8 @@ export class ReadingsMap {
   show({ readings }, now) {
     if (readings.length !== this.values.length) return;
     this.values = readings;
-    if (this.scale.take(this.#largest(), now)) this.#drawAxes();
+    this.moved ||= this.scale.take(this.#largest(), now);
+    if (this.moved && now - this.drawn > AXES_EVERY_MS) this.#drawAxes();
     this.#paint();
     this.#tell();
   }
@@ -55,6 +58,7 @@ export class ReadingsMap {
   /** Fits everything into the space there is. */
   layOut() {
     const { clientWidth, clientHeight } = this.box;
+    if (!clientWidth) return; // folded away
     const room = Math.min(clientWidth - MARGIN.left - MARGIN.right, clientHeight - MARGIN.top - MARGIN.bottom);
     this.cell = Math.max(1, room / this.count);
     this.size = this.cell * this.count;
@@ -81,6 +85,7 @@ export class ReadingsMap {
   }
 
   #drawAxes() {
+    [this.moved, this.drawn] = [false, performance.now()];
     const { left, cell, size } = this;
     const every = Math.ceil(22 / cell);
     const shown = Array.from({ length: this.count }, (_, i) => i).filter((i) => i % every === 0);
@@ -150,7 +155,7 @@ export class ReadingsMap {
   #tell() {
     const [g, e] = this.chosen ?? [];
     this.text.textContent = this.chosen
-      ? `g ${g}, e ${e}: ${fixed(this.values[g * this.count + e], 4)} V`
+      ? `ground ${g}, read ${e}: ${fixed(this.values[g * this.count + e], 4)} V`
       : `largest ${fixed(this.#largest(), 3)} V`;
   }
 }

@@ -1,46 +1,65 @@
-// The upper end of a colour scale. It grows at once to hold a larger value, and shrinks only after the values have stayed
-// far below it for a while: a frame is never stretched to fill the colours, so that a harder press looks harder.
+// The upper end of a colour scale. It is steady, so that a harder press looks harder; robust, so that one odd frame changes
+// nothing; and never so high that what is there cannot be seen.
 
-const NICE = [1, 1.5, 2, 3, 4, 5, 7, 10];
-const PATIENCE_MS = 12_000;
-const SHRINK_BELOW = 0.3;
+// Peaks of which the median counts: two odd frames among them change nothing.
+const PEAKS = 7;
+const PEAK_AGE_MS = 400;
+// The scale rises to a lasting peak with this time constant, at most by this factor in a tenth of a second.
+const RISE_MS = 80;
+const MOST_RISE = 2;
+// It falls slowly when values have stayed below this share for a while, fast below that one, where colours would hardly show.
+const LOW = 0.4;
+const HIDDEN = 0.05;
+const PATIENCE_MS = 5000;
+const FALL_MS = 2500;
+const FALL_FAST_MS = 600;
+const HEADROOM = 1.15;
 
-/** The smallest nice number that holds `value`. */
-function niceAbove(value) {
-  const power = 10 ** Math.floor(Math.log10(value));
-  return power * NICE.find((n) => n * power >= value * (1 - 1e-9));
-}
+const median = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
 
-/** A colour scale from zero to `max`, never less than `floor`. */
-export class StickyScale {
-  constructor(floor) {
+/** A colour scale from zero to `max`, never less than `floor`, under which all is noise. */
+export class SteadyScale {
+  constructor(floor, first = floor) {
     this.floor = floor;
-    this.max = niceAbove(floor);
-    this.#forget(0);
+    this.max = Math.max(floor, first);
+    this.peaks = [];
+    this.since = 0;
+    this.last = null;
   }
 
   /** Takes the largest value of a frame at time `now` (ms); says whether `max` changed. */
   take(value, now) {
-    this.recent = Math.max(this.recent, value);
-    if (value > this.max) return this.#set(value, now);
-    if (value > SHRINK_BELOW * this.max || this.max <= niceAbove(this.floor)) this.#forget(now);
-    return now - this.since > PATIENCE_MS && this.#set(this.recent, now);
+    const elapsed = Math.min(200, now - (this.last ?? now));
+    this.last = now;
+    this.peaks.push([now, value]);
+    while (this.peaks.length > PEAKS || (this.peaks.length > 3 && now - this.peaks[0][0] > PEAK_AGE_MS)) this.peaks.shift();
+    const peak = median(this.peaks.map(([, v]) => v));
+    const before = this.max;
+    if (this.peaks.length >= 3 && peak > this.floor) this.#follow(peak, now, elapsed);
+    return this.max !== before;
   }
 
   /** Fits the scale to `value` now. */
   fit(value, now) {
-    this.#set(value, now);
-  }
-
-  #set(value, now) {
-    const before = this.max;
-    this.max = niceAbove(Math.max(this.floor, value));
-    this.#forget(now);
-    return this.max !== before;
-  }
-
-  #forget(now) {
+    this.peaks = [];
     this.since = now;
-    this.recent = 0;
+    this.max = Math.max(this.floor, HEADROOM * value);
+  }
+
+  /** Share of the colours, 0 to 1, that shows a value: its square root, so that light touches show beside firm ones. */
+  share(value) { return Math.sqrt(Math.min(1, Math.max(0, value / this.max))); }
+
+  #follow(peak, now, elapsed) {
+    if (peak > LOW * this.max) this.since = now;
+    if (peak > this.max) this.#approach(HEADROOM * peak, RISE_MS, elapsed);
+    else if (peak < HIDDEN * this.max) this.#approach(HEADROOM * peak, FALL_FAST_MS, elapsed);
+    else if (now - this.since > PATIENCE_MS) this.#approach(HEADROOM * peak, FALL_MS, elapsed);
+  }
+
+  // In the logarithm, so that rising tenfold and falling tenfold look alike.
+  #approach(target, constantMs, elapsed) {
+    const step = Math.log(target / this.max) * (1 - Math.exp(-elapsed / constantMs));
+    const most = Math.log(MOST_RISE) * elapsed / 100;
+    this.max = Math.max(this.floor, this.max * Math.exp(Math.min(step, most)));
   }
 }

@@ -1,15 +1,15 @@
-// The line over the picture: what was chosen and why, and what to know before it is believed.
+// The first line of the picture: what touches, and what to know before it is believed.
 
 import { fixed } from "./units.js";
 
-// A warning stays this long after the last frame with it, and a reason until the next is due: what flickers cannot be read.
+// A warning stays this long after the last frame with it, and words until the next are due: what flickers cannot be read.
 const WARNING_STAYS_MS = 800;
-const REASON_STAYS_MS = 400;
+const WORDS_STAY_MS = 250;
 
 const WARNINGS = {
   saturated: ["saturated", "Readings at the end of the converter's range, or contacts that conduct so well that more would change nothing"],
   misfit: ["readings do not fit", "The readings are not what the model gives for what was found"],
-  unfinished: ["cut short", "A cheaper answer, or a search that stopped at its limit of steps"],
+  unfinished: ["quick answer", "A cheaper answer, or a search that stopped at its limit of time or steps"],
 };
 
 function chip(kind, text, title) {
@@ -20,30 +20,45 @@ function chip(kind, text, title) {
   return made;
 }
 
-const leftText = (residual) => (residual === null ? "" : `; it leaves ${fixed(residual, 1)} times the noise`);
+// What a passer-by calls it.
+function headline({ choice, contacts, image }) {
+  const what = choice?.what ?? "";
+  if (contacts.length) return contacts.length === 1 ? "1 contact" : `${contacts.length} contacts`;
+  if (image.length && what !== "nothing") return "Pressure image";
+  return "Nothing touches";
+}
+
+function ageText(ageS) {
+  if (ageS === null) return "";
+  return ageS < 10 ? `answer ${fixed(ageS * 1e3, 0)} ms old` : `answer ${fixed(ageS, 0)} s old`;
+}
 
 /** What the solver says of its answer. */
 export class Verdict {
   constructor() {
     this.what = document.getElementById("choice");
+    this.residual = document.getElementById("residual");
     this.why = document.getElementById("why");
     this.chips = document.getElementById("warnings");
     this.seen = new Map();
-    this.reasonShown = -Infinity;
+    this.shown = -Infinity;
     this.told = "";
   }
 
   /** Shows an update; `explanation` of the solver, for one that does not choose. */
-  show({ choice, flags, excluded, residual }, explanation, now) {
-    const what = choice?.what ?? "";
-    if (what !== this.what.textContent || now - this.reasonShown > REASON_STAYS_MS) {
-      this.reasonShown = now;
-      this.what.textContent = what;
-      this.why.textContent = choice ? choice.why : `${explanation}${leftText(residual)}`;
+  show(update, explanation, now) {
+    const { choice, flags, excluded, residual, ageS } = update;
+    const words = headline(update);
+    if (words !== this.what.textContent || now - this.shown > WORDS_STAY_MS) {
+      this.shown = now;
+      this.what.textContent = words;
+      const left = residual === null ? [] : [`residual ${fixed(residual, 1)} × noise`];
+      this.residual.textContent = [...left, ageText(ageS)].filter(Boolean).join(" · ");
+      this.why.textContent = choice ? `${choice.what}: ${choice.why}` : explanation;
       this.why.title = this.why.textContent;
     }
     this.#warn(flags, excluded, now);
-    Object.assign(document.documentElement.dataset, { choice: what, flags: flags.join(" "), excluded: excluded.join(" ") });
+    Object.assign(document.documentElement.dataset, { choice: choice?.what ?? "", flags: flags.join(" "), ageS: String(ageS) });
   }
 
   #warn(flags, excluded, now) {

@@ -104,7 +104,10 @@ fn contacts_at_walls_are_found_steadily_where_they_are() {
                 let expected_m = 4.0 * sigma.x_m.hypot(sigma.y_m) + 2e-4;
                 assert!(off_m(&truth, &found) < expected_m.min(1.5e-3), "{truth:?}, frame {count}: {found:?}");
                 let finite = [sigma.x_m, sigma.y_m, sigma.conductance_s].map(|sigma| sigma.is_finite() && sigma > 0.0);
-                assert!(finite == [true; 3] && sigma.x_m.hypot(sigma.y_m) < 2e-3, "{truth:?}, frame {count}: {found:?}");
+                assert!(
+                    finite == [true; 3] && sigma.x_m.hypot(sigma.y_m) < 2e-3,
+                    "{truth:?}, frame {count}: {found:?}"
+                );
                 ids.extend(found.id);
             }
             ids.dedup();
@@ -120,7 +123,9 @@ fn radii_are_found_where_the_readings_say_them() {
     let mut bench = Bench::new(detector, 36);
     bench.fine = Box::new(fine);
     // Firm and wide: the readings say it. A light touch's they do not.
-    for (radius_m, sheets, known) in [(0.0035, 3.0, true), (0.005, 1.0, true), (0.0018, 3.0, true), (0.0035, 0.02, false)] {
+    for (radius_m, sheets, known) in
+        [(0.0035, 3.0, true), (0.005, 1.0, true), (0.0018, 3.0, true), (0.0035, 0.02, false)]
+    {
         let truth = Contact { radius_m, ..bench.contact([0.0043, -0.0071, 0.0], sheets) };
         bench.solver.reset();
         let solution = bench.press(&[truth]);

@@ -1,0 +1,74 @@
+// The card of the board: who it is, and the settings of its scan.
+
+import { count, fixed } from "./units.js";
+
+const AVERAGES = [1, 2, 4, 8, 16, 32, 64, 128, 256];
+
+function rowOf([name, value]) {
+  const [term, text] = [document.createElement("dt"), document.createElement("dd")];
+  [term.textContent, text.textContent] = [name, value];
+  return [term, text];
+}
+
+/** Shows the board and asks it for other settings through `send`. */
+export class Board {
+  constructor(setup, send) {
+    this.setup = setup;
+    this.form = document.getElementById("settings");
+    this.average = document.getElementById("average");
+    this.settle = document.getElementById("settle");
+    this.rate = document.getElementById("max-rate");
+    this.average.replaceChildren(...AVERAGES.map((many, log2) => new Option(many === 1 ? "none" : String(many), String(log2))));
+    this.form.onsubmit = (event) => {
+      event.preventDefault();
+      this.shown = null;
+      send({ settings: this.#asked() });
+    };
+    this.#showSource();
+    this.show({ hello: null, playing: { kind: "board" } });
+  }
+
+  #asked() {
+    // No limit of the rate is zero.
+    const [settle, most] = [this.settle, this.rate].map(({ value }) => Number(value));
+    return { average_log2: Number(this.average.value), settle_us: settle, max_frames_per_s: most };
+  }
+
+  #showSource() {
+    const { source, simulated, detector, electrodes } = this.setup;
+    document.getElementById("detector").textContent = `${detector}, ${electrodes.length} electrodes`;
+    const badge = document.getElementById("source");
+    badge.hidden = false;
+    badge.textContent = simulated ? "Simulated" : source;
+    badge.title = source;
+    badge.classList.toggle("simulated", simulated);
+    document.title = `Tactomo live: ${simulated ? "simulated board" : source}`;
+  }
+
+  /** Shows a status message. */
+  show({ hello, playing }) {
+    const { setup } = this;
+    this.form.hidden = !hello || playing.kind === "recording";
+    const [width, height] = [0, 1].map((k) => fixed((setup.bounds_m[1][k] - setup.bounds_m[0][k]) * 1e3, 0));
+    const rows = [
+      ["Source", setup.source],
+      ["Board", hello ? `${hello.board}, firmware ${hello.firmware}` : "has not answered yet"],
+      ["Converter", hello ? `${hello.adc_bits} bits of ${fixed(hello.full_scale_v, 2)} V; drive ${fixed(hello.drive_v, 2)} V` : ""],
+      ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes`],
+      ["Images", `${count(setup.nodes_m.length)} nodes`],
+    ];
+    document.getElementById("details").replaceChildren(...rows.flatMap(rowOf));
+    if (hello) this.#showSettings(hello);
+  }
+
+  // Only when the board changed them: what a person is typing stays.
+  #showSettings({ averages, settle_us: settle, max_frames_per_s: most }) {
+    const shown = JSON.stringify([averages, settle, most]);
+    if (shown === this.shown) return;
+    this.shown = shown;
+    this.average.value = String(Math.log2(averages));
+    this.settle.value = String(settle);
+    this.rate.value = most ? String(most) : "";
+    this.rate.placeholder = "all";
+  }
+}

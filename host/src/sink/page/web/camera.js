@@ -1,0 +1,81 @@
+// The eye in space: turned by dragging, brought nearer with the wheel or two fingers.
+
+const TURN = 0.008;
+const ZOOM = 0.0012;
+const [NEAREST, FARTHEST] = [0.4, 3];
+// Distance of the eye, in sizes of the detector: from nearer, perspective exaggerates.
+const DISTANCE = 3.4;
+
+/** Turns places (m) into pixels. */
+export class Camera {
+  constructor(curved) {
+    this.turn = -0.6;
+    this.tilt = curved ? 0.75 : 0.7;
+    this.zoom = 1;
+  }
+
+  /** Makes `element` turn the camera; calls `changed` when it did. */
+  listen(element, isOn, changed) {
+    const pointers = new Map();
+    const spread = () => {
+      const [a, b] = [...pointers.values()];
+      return b && Math.hypot(a.x - b.x, a.y - b.y);
+    };
+    element.addEventListener("pointerdown", (event) => {
+      if (!isOn()) return;
+      element.setPointerCapture(event.pointerId);
+      pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    });
+    element.addEventListener("pointermove", (event) => {
+      const from = pointers.get(event.pointerId);
+      if (!from) return;
+      const before = spread();
+      const [dx, dy] = [event.clientX - from.x, event.clientY - from.y];
+      pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      if (before) this.#zoomBy(spread() / before);
+      else this.#turnBy(dx, dy);
+      changed();
+    });
+    const end = (event) => pointers.delete(event.pointerId);
+    element.addEventListener("pointerup", end);
+    element.addEventListener("pointercancel", end);
+    element.addEventListener("wheel", (event) => {
+      if (!isOn()) return;
+      event.preventDefault();
+      this.#zoomBy(Math.exp(-ZOOM * event.deltaY));
+      changed();
+    }, { passive: false });
+  }
+
+  /** Turns by so many pixels of dragging. */
+  #turnBy(dx, dy) {
+    this.turn += TURN * dx;
+    this.tilt = Math.min(Math.PI / 2, Math.max(-0.2, this.tilt + TURN * dy));
+  }
+
+  #zoomBy(factor) { this.zoom = Math.min(FARTHEST, Math.max(NEAREST, this.zoom * factor)); }
+
+  /** Projects `points` (m), x, y, z one after the other, to `x`, `y` on `width` x `height` pixels and the depth `z` (m). */
+  project({ centre, sizeM }, points, { x, y, z }, width, height) {
+    const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
+    const scale = (0.64 * this.zoom * Math.min(width, 1.35 * height)) / sizeM;
+    const eye = DISTANCE * sizeM;
+    for (let i = 0, k = 0; k < points.length; i += 1, k += 3) {
+      const [dx, dy, dz] = [points[k] - centre[0], points[k + 1] - centre[1], points[k + 2] - centre[2]];
+      const away = dx * sinTurn + dy * cosTurn;
+      z[i] = away * cosTilt - dz * sinTilt;
+      const near = (scale * eye) / (eye + z[i]);
+      x[i] = width / 2 + (dx * cosTurn - dy * sinTurn) * near;
+      y[i] = 0.47 * height - (away * sinTilt + dz * cosTilt) * near;
+    }
+  }
+
+  /** A function that projects one place. */
+  projection(shape, width, height) {
+    const [x, y, z] = [[0], [0], [0]];
+    return (...place) => {
+      this.project(shape, place, { x, y, z }, width, height);
+      return [x[0], y[0], z[0]];
+    };
+  }
+}

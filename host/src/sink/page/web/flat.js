@@ -1,0 +1,75 @@
+// The flat picture: the detector from above, heat on one canvas, everything else on another over it.
+
+import { colourMaps } from "./colours.js";
+import { drawFrame, outlinePath } from "./frame.js";
+import { Layout, sizeCanvas } from "./layout.js";
+import { drawLabels, drawMark, drawTrail } from "./marks.js";
+
+/** Draws the heat of `view.field` on the scale `view.scale` in the colours of `view.theme`. */
+export class FlatView {
+  constructor(view) {
+    this.view = view;
+    this.canvas = document.getElementById("image");
+    this.marks = document.getElementById("marks");
+    this.small = document.createElement("canvas");
+    [this.small.width, this.small.height] = [view.field.width, view.field.height];
+    this.image = new ImageData(view.field.width, view.field.height);
+    this.pixels = new Uint32Array(this.image.data.buffer);
+  }
+
+  /** Fits into a box of pixels. */
+  layOut(width, height) {
+    const { setup } = this.view;
+    this.layout = new Layout(setup.bounds_m, width, height);
+    const { left, top } = this.layout;
+    [this.canvas.style.left, this.canvas.style.top] = [`${left}px`, `${top}px`];
+    this.heat = sizeCanvas(this.canvas, this.layout.width, this.layout.height);
+    this.heat.imageSmoothingQuality = "high";
+    this.heat.clip(outlinePath(setup.outline_m, (xM) => this.layout.x(xM) - left, (yM) => this.layout.y(yM) - top), "evenodd");
+    this.over = sizeCanvas(this.marks, width, height);
+  }
+
+  /** Draws all of it. */
+  draw(now) {
+    this.#drawHeat();
+    const { view, over, layout } = this;
+    over.clearRect(0, 0, layout.boxWidth, layout.boxHeight);
+    drawFrame(over, view.setup, layout, view);
+    for (const [id, way] of view.trails.all(now)) {
+      const points = way.map(({ xM, yM, ...rest }) => ({ ...rest, x: layout.x(xM), y: layout.y(yM) }));
+      drawTrail(over, id, points, view.colours);
+    }
+    const spots = view.field.contacts.map((contact) => ({
+      contact, x: layout.x(contact.xM), y: layout.y(contact.yM), radius: view.field.radiusOf(contact) * layout.perM,
+    }));
+    for (const { contact, x, y } of spots) drawMark(over, contact, [x, y], layout.perM, view.colours);
+    drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight });
+    this.#drawFingers();
+  }
+
+  #drawHeat() {
+    const { field, scale, theme } = this.view;
+    const colours = colourMaps(theme).image;
+    const [last, factor] = [colours.length - 1, 1 / scale.max];
+    for (let i = 0; i < this.pixels.length; i += 1) {
+      const share = field.values[i] * factor;
+      this.pixels[i] = colours[share <= 0 ? 0 : share >= 1 ? last : Math.round(last * Math.sqrt(share))];
+    }
+    this.small.getContext("2d").putImageData(this.image, 0, 0);
+    this.heat.drawImage(this.small, 0, 0, this.layout.width, this.layout.height);
+  }
+
+  // Where the person presses, and the cursor of the keyboard.
+  #drawFingers() {
+    const { over, layout, view } = this;
+    over.strokeStyle = view.colours.ink;
+    over.lineWidth = 1.5;
+    for (const { place, down } of view.fingers) {
+      over.setLineDash(down ? [] : [3, 3]);
+      over.beginPath();
+      over.arc(layout.x(place[0]), layout.y(place[1]), 14, 0, 2 * Math.PI);
+      over.stroke();
+    }
+    over.setLineDash([]);
+  }
+}

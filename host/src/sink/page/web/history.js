@@ -1,0 +1,69 @@
+// How firmly each contact pressed, over the last minute.
+
+const KEPT_MS = 61_000;
+// Samples are this far apart at least: more do not fit on a screen.
+const EVERY_MS = 40;
+
+const strength = ({ forceN, conductanceS }) => forceN ?? conductanceS;
+
+/** Samples of each contact, by its number; those of an image without contacts under 0. */
+export class History {
+  constructor(setup) {
+    this.areas = nodeAreas(setup);
+    this.clear();
+  }
+
+  clear() {
+    this.lines = new Map();
+    this.last = -Infinity;
+    this.unit = "S";
+  }
+
+  /** Takes an update. */
+  take({ contacts, image }, now) {
+    this.unit = contacts.some(({ forceN }) => forceN !== null) ? "N" : "S";
+    if (now - this.last < EVERY_MS) return;
+    this.last = now;
+    const numbered = contacts.filter(({ id }) => id);
+    for (const contact of numbered) this.#add(contact.id, strength(contact), now);
+    if (!numbered.length) this.#addWhole(contacts, image, now);
+    for (const [id, line] of this.lines) {
+      while (line.length && now - line[0].at > KEPT_MS) line.shift();
+      if (!line.length) this.lines.delete(id);
+    }
+  }
+
+  // Contacts without numbers cannot be told apart from frame to frame: all of them together, or all of the image.
+  #addWhole(contacts, image, now) {
+    const whole = contacts.reduce((sum, contact) => sum + strength(contact), 0)
+      || this.areas.reduce((sum, area, node) => sum + area * Math.max(0, image[node] ?? 0), 0);
+    if (whole > 0) this.#add(0, whole, now);
+  }
+
+  #add(id, value, at) {
+    const line = this.lines.get(id) ?? [];
+    line.push({ at, value });
+    this.lines.set(id, line);
+  }
+
+  /** The values at a moment: `[id, value]` of those that were there. */
+  at(moment) {
+    const near = (line) => line.findLast(({ at }) => at <= moment + EVERY_MS);
+    return [...this.lines].map(([id, line]) => [id, near(line)])
+      .filter(([, sample]) => sample && moment - sample.at < 4 * EVERY_MS + 100)
+      .map(([id, sample]) => [id, sample.value]);
+  }
+}
+
+// A third of each triangle belongs to each of its corners (m2).
+function nodeAreas({ nodes_m: nodes, places_m: places, triangles, torn_triangles: torn }) {
+  const areas = new Float64Array(nodes.length);
+  const at = (node) => places[node] ?? [...nodes[node], 0];
+  for (const triangle of [...triangles, ...torn]) {
+    const [a, b, c] = triangle.map(at);
+    const [u, v] = [b, c].map((p) => p.map((value, k) => value - a[k]));
+    const area = 0.5 * Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
+    for (const node of triangle) areas[node] += area / 3;
+  }
+  return areas;
+}

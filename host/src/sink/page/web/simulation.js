@@ -1,0 +1,38 @@
+// What touches the simulated detector, and what is wrong with it.
+
+const FAULTS = [
+  ["", "none"], ["open:3", "wire 3 broken"], ["short:2,7", "wires 2 and 7 touch"], ["swap:1,5", "wires 1 and 5 exchanged"],
+  ["gain:4:0.8", "channel 4 reads 20 % low"], ["invert:4", "channel 4 inverted"], ["uneven:0.2", "uneven foam"],
+];
+const WISH_STAYS_MS = 500;
+
+/** The choice of scene and fault; asks through `send`. */
+export class Simulation {
+  constructor({ scenes, electrodes }, send) {
+    this.box = document.getElementById("simulation");
+    this.scene = document.getElementById("scene");
+    this.fault = document.getElementById("fault");
+    this.asked = -Infinity;
+    this.scene.replaceChildren(...scenes.map((name) => new Option(name.replaceAll("-", " "), name)));
+    // The faults of the list name electrodes up to 7.
+    const faults = electrodes.length > 7 ? FAULTS : [FAULTS[0], FAULTS.at(-1)];
+    this.fault.replaceChildren(...faults.map(([text, words]) => new Option(words, text)));
+    const ask = (request) => {
+      this.asked = performance.now();
+      send(request);
+    };
+    this.scene.onchange = () => ask({ scene: this.scene.value });
+    this.fault.onchange = () => ask({ faults: this.fault.value ? this.fault.value.split(" ") : [] });
+  }
+
+  /** Shows a status message. */
+  show({ playing }) {
+    this.box.hidden = playing.kind !== "simulated";
+    if (this.box.hidden || performance.now() - this.asked < WISH_STAYS_MS) return;
+    this.scene.value = playing.scene;
+    // Faults of the command line may be none of the list.
+    const text = playing.faults.join(" ");
+    if (![...this.fault.options].some(({ value }) => value === text)) this.fault.add(new Option(text, text));
+    this.fault.value = text;
+  }
+}

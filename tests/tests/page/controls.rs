@@ -1,0 +1,198 @@
+//! What the page's controls ask.
+
+use std::time::Duration;
+
+use anyhow::{Result, ensure};
+use fantoccini::Locator;
+use fantoccini::key::Key;
+use tactomo::board::link::{Control, Playing};
+use tactomo::board::session::RequestedSettings;
+use tactomo::run::{LinkState, Request, Snapshot};
+use tactomo::scene::{Contact, SceneName};
+use tactomo::simulate::Fault;
+use tactomo::solve::FoundContact;
+use tactomo_protocol::{Hello, Settings};
+
+use crate::chromium::Browser;
+use crate::script::{FINGER, Script};
+use crate::stage::{Stage, in_front_of};
+
+fn hello() -> Hello {
+    Hello {
+        firmware_version: "0.1.0".try_into().unwrap_or_default(),
+        board: "test".try_into().unwrap_or_default(),
+        electrodes: 16,
+        adc_bits: 12,
+        adc_full_scale_mv: 2000,
+        drive_mv: 2000,
+        settings: Settings::default(),
+    }
+}
+
+fn recording(position_s: f64, paused: bool) -> Playing {
+    Playing::Recording { position_s, length_s: 20.0, speed: 1.0, paused, looped: false, ended: position_s >= 20.0 }
+}
+
+async fn visible(browser: &Browser, id: &str) -> Result<bool> {
+    Ok(browser.client.find(Locator::Id(id)).await?.is_displayed().await?)
+}
+
+/// Waits until the page has shown a status that came after a change.
+async fn status_shown() {
+    tokio::time::sleep(Duration::from_millis(900)).await;
+}
+
+async fn asks(stage: &Stage<Script>, expected: Request) -> Result<()> {
+    let request = stage.behind.request()?;
+    ensure!(request == expected, "{request:?} instead of {expected:?}");
+    Ok(())
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let simulated = Playing::Simulated { scene: SceneName::Rest, faults: Vec::new() };
+        stage.behind.set(|snapshot| {
+            (snapshot.playing, snapshot.hello) = (simulated, Some(hello()));
+        });
+        status_shown().await;
+        stage.browser.select("scene", "five-fingers").await?;
+        asks(&stage, Request::Control(Control::Scene(SceneName::FiveFingers))).await?;
+        stage.browser.select("fault", "open:3").await?;
+        asks(&stage, Request::Control(Control::Faults(vec![Fault::Open { electrode: 3 }]))).await?;
+        stage.browser.run("document.getElementById('details-card').open = true").await?;
+        stage.browser.select("average", "3").await?;
+        stage
+            .browser
+            .run("document.getElementById('settle').value = 25; document.getElementById('max-rate').value = 100")
+            .await?;
+        stage.browser.run("document.getElementById('settings').requestSubmit()").await?;
+        let settings = RequestedSettings { settle_us: Some(25), average_log2: Some(3), max_frames_per_s: Some(100) };
+        asks(&stage, Request::Settings(settings)).await?;
+        stage.browser.click("rezero").await?;
+        asks(&stage, Request::Rezero).await
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn recording_is_asked_for_and_its_file_shown() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        stage.browser.click("record").await?;
+        asks(&stage, Request::Record(true)).await?;
+        stage.behind.set(|snapshot| snapshot.recording = Some("/tmp/touch.tactomo".into()));
+        status_shown().await;
+        let notice = stage.browser.run("return document.getElementById('notice').textContent").await?;
+        ensure!(notice == "Recording to /tmp/touch.tactomo", "{notice}");
+        stage.browser.client.find(Locator::Css("body")).await?.send_keys("r").await?;
+        asks(&stage, Request::Record(false)).await
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_recording_is_held_sought_and_played_again() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        ensure!(!visible(&stage.browser, "transport").await?, "there is nothing to play");
+        stage.behind.set(|snapshot| snapshot.playing = recording(5.0, false));
+        status_shown().await;
+        ensure!(visible(&stage.browser, "transport").await?, "there is something to play");
+        stage.browser.click("play").await?;
+        asks(&stage, Request::Control(Control::Pause(true))).await?;
+        stage.browser.client.find(Locator::Id("seek")).await?.send_keys(&char::from(Key::End).to_string()).await?;
+        asks(&stage, Request::Control(Control::Seek(20.0))).await?;
+        stage.browser.select("speed", "0.25").await?;
+        asks(&stage, Request::Control(Control::Speed(0.25))).await?;
+        stage.browser.click("loop").await?;
+        asks(&stage, Request::Control(Control::Loop(true))).await?;
+        ends_calmly(&stage).await
+    })
+}
+
+async fn ends_calmly(stage: &Stage<Script>) -> Result<()> {
+    ensure!(!visible(&stage.browser, "ended").await?, "it has not ended yet");
+    stage.behind.set(|snapshot| {
+        *snapshot = Snapshot {
+            link: LinkState::Ended("the recording is over".to_owned()),
+            playing: recording(20.0, false),
+            ..snapshot.clone()
+        };
+    });
+    stage.browser.until("the end", |told| told.text("state") == "finished").await?;
+    let said = stage.browser.run("return document.getElementById('state-text').textContent").await?;
+    ensure!(said == "The recording has ended", "{said}");
+    stage.browser.click("again").await?;
+    asks(stage, Request::Control(Control::Seek(0.0))).await?;
+    asks(stage, Request::Control(Control::Pause(false))).await
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_paused_picture_stands_still_while_frames_come() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        stage.browser.client.find(Locator::Css("body")).await?.send_keys("p").await?;
+        let before = stage.browser.until("a pause", |told| told.text("frozen") == "true").await?;
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        let after = stage.browser.told().await?;
+        ensure!(after.number("updates") == before.number("updates"), "the picture goes on");
+        ensure!(after.number("received") > before.number("received"), "no frames come");
+        stage.browser.click("pause").await?;
+        let updates = after.number("updates");
+        stage.browser.until("the picture to go on", |told| told.number("updates") > updates).await?;
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn shift_click_leaves_a_finger_down() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let click = |x: f64, y: f64, shift: bool| {
+            format!(
+                "const box = document.getElementById('image').getBoundingClientRect();
+                const at = {{ clientX: box.left + box.width * (0.5 + {x} / 60), clientY: box.top + box.height * (0.5 - {y} / 60),
+                  pointerId: 1, button: 0, shiftKey: {shift}, bubbles: true }};
+                document.getElementById('plot').dispatchEvent(new PointerEvent('pointerdown', at));"
+            )
+        };
+        let pressed = |request: Request| match request {
+            Request::Control(Control::Press(contacts)) => contacts,
+            _ => Vec::new(),
+        };
+        stage.browser.run(&click(10.0, 5.0, true)).await?;
+        let one = pressed(stage.behind.request()?);
+        ensure!(is_near(&one, &[[10.0, 5.0]]), "{one:?}");
+        stage.browser.run(&click(-10.0, -5.0, true)).await?;
+        let both = pressed(stage.behind.request()?);
+        ensure!(is_near(&both, &[[10.0, 5.0], [-10.0, -5.0]]), "{both:?}");
+        stage.browser.run(&click(10.0, 5.0, true)).await?;
+        let other = pressed(stage.behind.request()?);
+        ensure!(is_near(&other, &[[-10.0, -5.0]]), "{other:?}");
+        Ok(())
+    })
+}
+
+/// Whether the contacts are fingers within 0.5 mm of these places (mm).
+fn is_near(contacts: &[Contact], places_mm: &[[f64; 2]]) -> bool {
+    let near = |(contact, [x_mm, y_mm]): (&Contact, &[f64; 2])| {
+        contact.conductance_s == FINGER.conductance_s
+            && (contact.x_m * 1e3 - x_mm).hypot(contact.y_m * 1e3 - y_mm) < 0.5
+    };
+    contacts.len() == places_mm.len() && contacts.iter().zip(places_mm).all(near)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn picture_and_data_are_saved() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        stage.behind.contacts(vec![FoundContact { id: Some(3), ..FoundContact::flat(0.01, -0.005, 2e-4) }]);
+        for (key, ending) in [("s", ".png"), ("c", ".csv")] {
+            stage.browser.client.find(Locator::Css("body")).await?.send_keys(key).await?;
+            stage.browser.until(ending, |told| told.text("saved").ends_with(ending)).await?;
+        }
+        let script = "const done = arguments[0];
+            import('./save.js').then(({ csvOf }) => done(csvOf({ electrodes: 2, readings: [0, 0.5, 0.25, 0], contacts: [{ id: 3,
+              place: [0.5, -0.25, 0], conductanceS: 0.125, errorS: null, radiusM: null, forceN: null, xErrorM: 0.5, yErrorM: 1,
+              correlation: 0 }] })))";
+        let csv = stage.browser.client.execute_async(script, Vec::new()).await?;
+        let expected = "id,x_m,y_m,z_m,conductance_s,conductance_error_s,radius_m,force_n,x_error_m,y_error_m,correlation\n\
+            3,0.5,-0.25,0,0.125,,,,0.5,1,0\n\ngrounded,electrode_0_v,electrode_1_v\n0,0,0.5\n1,0.25,0\n";
+        ensure!(csv == expected, "{csv}");
+        Ok(())
+    })
+}

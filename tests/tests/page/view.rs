@@ -1,0 +1,229 @@
+//! What the page shows of snapshots that are made up, by pixels and by what it tells.
+
+use std::time::Duration;
+
+use anyhow::{Context, Result, ensure};
+use tactomo::run::LinkState;
+use tactomo::solve::{Flags, FoundContact, Solution, Uncertainty};
+
+use crate::chromium::Browser;
+use crate::script::Script;
+use crate::stage::{Stage, in_front_of};
+
+/// The place (mm) of the pixel of the flat picture that differs most from nothing, and by how much, 0 to 1.
+async fn hottest(browser: &Browser) -> Result<([f64; 2], f64)> {
+    let script = "const canvas = document.getElementById('image');
+        const { width, height } = canvas;
+        const { data } = canvas.getContext('2d').getImageData(0, 0, width, height);
+        const far = (i) => Math.hypot(data[i] - data[at], data[i + 1] - data[at + 1], data[i + 2] - data[at + 2]);
+        const at = 4 * (Math.floor(height * 0.97) * width + Math.floor(width * 0.97));
+        let best = 0, sum = [0, 0, 0];
+        for (let i = 0; i < data.length; i += 4) best = Math.max(best, far(i));
+        for (let i = 0; i < data.length; i += 4) {
+          if (far(i) < best - 3) continue;
+          sum = [sum[0] + 1, sum[1] + (i / 4) % width, sum[2] + Math.floor(i / 4 / width)];
+        }
+        return [(sum[1] / sum[0] / width - 0.5) * 60, (0.5 - sum[2] / sum[0] / height) * 60, best / 441];";
+    let found = browser.run(script).await?;
+    let number = |i: usize| found[i].as_f64().context("a number");
+    Ok(([number(0)?, number(1)?], number(2)?))
+}
+
+fn contact(id: u32, [x_mm, y_mm]: [f64; 2], conductance_s: f64) -> FoundContact {
+    FoundContact { id: Some(id), ..FoundContact::flat(x_mm * 1e-3, y_mm * 1e-3, conductance_s) }
+}
+
+async fn settled(stage: &Stage<Script>) {
+    stage.behind.publish(3);
+    tokio::time::sleep(Duration::from_millis(700)).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn heat_is_drawn_where_a_contact_is() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        settled(&stage).await;
+        let (_, at_rest) = hottest(&stage.browser).await?;
+        ensure!(at_rest < 0.01, "at rest there are colours: {at_rest}");
+        for place in [[12.0, 9.0], [-14.0, -20.0]] {
+            stage.behind.contacts(vec![contact(1, place, 3e-4)]);
+            settled(&stage).await;
+            let (found, heat) = hottest(&stage.browser).await?;
+            ensure!((found[0] - place[0]).hypot(found[1] - place[1]) < 1.0, "{found:?} instead of {place:?}");
+            ensure!(heat > 0.3, "hardly to be seen: {heat}");
+        }
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn one_sharp_frame_changes_no_colours() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        stage.behind.patch([5.0, 5.0], 2.0);
+        tokio::time::sleep(Duration::from_secs(3)).await;
+        let before = stage.browser.told().await?.number("scaleMaxSPerM2");
+        let (_, heat) = hottest(&stage.browser).await?;
+        ensure!(heat > 0.15, "an image of 2 S/m2 is hardly to be seen: {heat}");
+        stage.behind.patch([5.0, 5.0], 200.0);
+        stage.behind.publish(3);
+        stage.behind.patch([5.0, 5.0], 2.0);
+        settled(&stage).await;
+        let after = stage.browser.told().await?.number("scaleMaxSPerM2");
+        ensure!((after / before).ln().abs() < 0.3, "the scale went from {before} to {after} S/m2");
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_light_touch_shows_soon_after_a_hard_one() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        stage.behind.patch([5.0, 5.0], 200.0);
+        let hard = stage.browser.until("a hard press", |told| told.number("scaleMaxSPerM2") > 190.0);
+        hard.await?;
+        stage.behind.patch([5.0, 5.0], 0.5);
+        tokio::time::sleep(Duration::from_millis(2500)).await;
+        let (_, heat) = hottest(&stage.browser).await?;
+        ensure!(heat > 0.1, "after 2.5 s a touch of 0.5 S/m2 is hardly to be seen: {heat}");
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_strip_chart_has_each_contacts_value() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        stage.behind.contacts(vec![contact(7, [5.0, 5.0], 2e-4), contact(9, [-5.0, 5.0], 4e-4)]);
+        settled(&stage).await;
+        let script = "const strip = document.getElementById('strip');
+            const { data } = strip.getContext('2d').getImageData(0, 0, strip.width, strip.height);
+            const hue = (id) => getComputedStyle(document.documentElement).getPropertyValue(`--hue-${(id - 1) % 8}`).trim();
+            const rgb = (text) => [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16));
+            const count = ([r, g, b]) => { let n = 0; for (let i = 0; i < data.length; i += 4)
+              n += Math.hypot(data[i] - r, data[i + 1] - g, data[i + 2] - b) < 12 && data[i + 3] > 200; return n; };
+            return [JSON.parse(strip.dataset.values), count(rgb(hue(7))), count(rgb(hue(9)))]";
+        let shown = stage.browser.run(script).await?;
+        for (id, value) in [("7", 2e-4), ("9", 4e-4)] {
+            let found = shown[0][id].as_f64().context("a value")?;
+            ensure!((found - value).abs() < 1e-6, "contact {id}: {found} S");
+        }
+        ensure!(shown[1].as_u64() > Some(5) && shown[2].as_u64() > Some(5), "both lines are drawn: {shown}");
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_view_in_space_rises_where_it_is_pressed() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        stage.browser.click("view-space").await?;
+        settled(&stage).await;
+        let script = "const canvas = document.getElementById('space');
+            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            let top = canvas.height, drawn = 0;
+            for (let i = 3; i < data.length; i += 4) if (data[i]) { drawn += 1; top = Math.min(top, Math.floor(i / 4 / canvas.width)); }
+            const colours = new Set(new Uint32Array(data.buffer)).size;
+            return [drawn / (canvas.width * canvas.height), colours, top / canvas.height]";
+        let rest = stage.browser.run(script).await?;
+        ensure!(rest[0].as_f64() > Some(0.1), "the detector covers {} of the picture", rest[0]);
+        // Far from the eye, so that it rises over the edge behind.
+        stage.behind.contacts(vec![contact(1, [-20.0, 24.0], 1e-3)]);
+        settled(&stage).await;
+        let pressed = stage.browser.run(script).await?;
+        ensure!(pressed[1].as_u64() > rest[1].as_u64().map(|colours| colours + 20), "{pressed} after {rest}");
+        ensure!(pressed[2].as_f64() < rest[2].as_f64(), "{pressed} after {rest}");
+        eprintln!("drawn in {} ms", stage.browser.told().await?.text("drawMs"));
+        Ok(())
+    })
+}
+
+/// Width of what does not fit across, and what is cut off below (CSS pixels).
+const OVERFLOW: &str = "const box = document.getElementById('tools').getBoundingClientRect();
+    const plot = document.getElementById('image').getBoundingClientRect();
+    const wide = [...document.querySelectorAll('body *')].filter((e) => !e.closest('svg') && getComputedStyle(e).position !== 'absolute'
+      && e.getBoundingClientRect().right > innerWidth + 0.5).map((e) => e.id || e.tagName);
+    return [document.documentElement.scrollWidth - innerWidth, document.documentElement.scrollHeight - innerHeight,
+      box.bottom - innerHeight, plot.width, wide.join(' ')]";
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn nothing_is_cut_off_on_a_phone_or_a_low_window() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let five = (0..5).map(|i| contact(i + 100, [10.0 * f64::from(i) - 20.0, 5.0], 1e-4)).collect();
+        stage.behind.contacts(five);
+        stage.behind.set(|snapshot| snapshot.baseline = Some("Something pressed at the start.".to_owned()));
+        stage.browser.resize(1280, 760).await?;
+        settled(&stage).await;
+        let low = stage.browser.run(OVERFLOW).await?;
+        ensure!(low[0] == 0 && low[1] == 0 && low[4] == "", "{low}");
+        ensure!(low[2].as_f64() < Some(0.0) && low[3].as_f64() > Some(380.0), "{low}");
+        phone(&stage).await
+    })
+}
+
+/// A phone of 390 px, within a frame: windows of a browser on a desktop are not made as narrow.
+async fn phone(stage: &Stage<Script>) -> Result<()> {
+    stage.browser.resize(390, 844).await?;
+    settled(stage).await;
+    let width = stage.browser.run("return innerWidth").await?;
+    ensure!(width == 390, "the window is {width} px wide");
+    let shown = stage.browser.run(OVERFLOW).await?;
+    ensure!(shown[0] == 0 && shown[4] == "", "{shown}");
+    ensure!(shown[3].as_f64() > Some(240.0), "{shown}");
+    Ok(())
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_board_card_leaves_the_readings_as_they_are() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let script = "const map = document.getElementById('readings-map').getBoundingClientRect();
+            const card = document.getElementById('readings-card').getBoundingClientRect();
+            const board = document.getElementById('details-card').getBoundingClientRect();
+            return [map.width, map.height, map.bottom <= card.bottom, card.bottom <= board.top]";
+        for (width, height) in [(1280, 760), (1280, 560), (800, 900)] {
+            stage.browser.resize(width, height).await?;
+            settled(&stage).await;
+            let before = stage.browser.run(script).await?;
+            stage.browser.run("document.getElementById('details-card').open = true").await?;
+            settled(&stage).await;
+            let after = stage.browser.run(script).await?;
+            ensure!(before == after, "{after} instead of {before}");
+            ensure!(after[0] == after[1] && after[0].as_f64() > Some(150.0), "{after}");
+            ensure!(after[2] == true && after[3] == true, "{after}");
+            stage.browser.run("document.getElementById('details-card').open = false").await?;
+        }
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_silent_board_is_never_live() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let words = "The board has said Hello, and sends no frames: is its firmware stuck?";
+        stage.behind.set(|snapshot| snapshot.link = LinkState::Silent(words.to_owned()));
+        stage.browser.until("silence", |told| told.text("state") == "silent").await?;
+        let script = "return [document.getElementById('state-text').textContent,
+            getComputedStyle(document.querySelector('.dot')).backgroundColor,
+            getComputedStyle(document.documentElement).getPropertyValue('--good')]";
+        let shown = stage.browser.run(script).await?;
+        ensure!(shown[0].as_str().is_some_and(|text| text.contains(words) && !text.contains("Live")), "{shown}");
+        ensure!(shown[1] != "rgb(31, 138, 76)" && shown[2] == "#1f8a4c", "the dot is green: {shown}");
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let sentence = "Something pressed at the start: let go, and re-zero.";
+        stage.behind.set(|snapshot| snapshot.baseline = Some(sentence.to_owned()));
+        let errors = Uncertainty { x_m: 0.004, y_m: 0.002, correlation: 0.3, conductance_s: 1e-6 };
+        let blurred = FoundContact { uncertainty: Some(errors), ..contact(2, [-10.0, 0.0], 1e-4) };
+        let flags = Flags { excluded: vec![3], ..Flags::default() };
+        let contacts = vec![contact(1, [10.0, 0.0], 3e-4), blurred];
+        stage.behind.solution(Solution { contacts, residual: Some(1.04), flags, ..Solution::default() });
+        settled(&stage).await;
+        let script =
+            "return ['choice', 'residual', 'warnings', 'notice'].map((id) => document.getElementById(id).textContent)";
+        let shown = stage.browser.run(script).await?;
+        ensure!(shown[0] == "2 contacts", "{shown}");
+        ensure!(shown[1].as_str().is_some_and(|text| text.starts_with("residual 1.0 × noise · answer ")), "{shown}");
+        ensure!(shown[2] == "electrode 3 left out" && shown[3] == sentence, "{shown}");
+        Ok(())
+    })
+}
