@@ -107,8 +107,10 @@ async fn a_page_that_hangs_does_not_slow_the_board() -> Result<()> {
         let (before, dropped_before) = stage.behind.rate_over(Duration::from_secs(2)).await;
         let hang = "const end = performance.now() + 3000; while (performance.now() < end); return true";
         let updates = stage.browser.told().await?.number("updates");
-        let (hung, (during, dropped)) =
-            tokio::join!(stage.browser.client.execute(hang, Vec::new()), stage.behind.rate_over(Duration::from_secs(2)));
+        let (hung, (during, dropped)) = tokio::join!(
+            stage.browser.client.execute(hang, Vec::new()),
+            stage.behind.rate_over(Duration::from_secs(2))
+        );
         hung?;
         ensure!(during > 0.8 * before, "{during} frames/s instead of {before} while the page hung");
         // A busy machine may drop some either way; a board that waited for the page would drop nearly all.
@@ -150,8 +152,7 @@ async fn a_broken_wire_is_told_and_its_electrode_crossed_out() -> Result<()> {
         stage.behind.press(place)?;
         let told = |told: &Told| told.text("excluded") == "3" && told.is_pressed_at(place, TOLERANCE_MM);
         stage.browser.until("electrode 3 left out", told).await?;
-        let script =
-            "return document.getElementById('warnings').textContent";
+        let script = "return document.getElementById('warnings').textContent";
         let shown = stage.browser.client.execute(script, Vec::new()).await?;
         ensure!(shown.as_str().is_some_and(|text| text.contains("electrode 3 left out")), "{shown}");
         Ok(())

@@ -62,10 +62,12 @@ async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
         asks(&stage, Request::Control(Control::Faults(vec![Fault::Open { electrode: 3 }]))).await?;
         stage.browser.run("document.getElementById('details-card').open = true").await?;
         stage.browser.select("average", "3").await?;
-        stage.browser.run("document.getElementById('settle').value = 25; document.getElementById('max-rate').value = 100").await?;
+        stage
+            .browser
+            .run("document.getElementById('settle').value = 25; document.getElementById('max-rate').value = 100")
+            .await?;
         stage.browser.run("document.getElementById('settings').requestSubmit()").await?;
-        let settings =
-            RequestedSettings { settle_us: Some(25), average_log2: Some(3), max_frames_per_s: Some(100) };
+        let settings = RequestedSettings { settle_us: Some(25), average_log2: Some(3), max_frames_per_s: Some(100) };
         asks(&stage, Request::Settings(settings)).await?;
         stage.browser.click("rezero").await?;
         asks(&stage, Request::Rezero).await

@@ -47,7 +47,9 @@ async fn scripted(folder: &Path) -> Result<()> {
         shot(&stage, folder, "rest").await?;
         stage.behind.solution(hand());
         shot(&stage, folder, "hand").await?;
-        for (size, name) in [((1280, 760), "low"), ((390, 844), "phone"), ((820, 1100), "tablet"), ((1920, 1080), "wide")] {
+        for (size, name) in
+            [((1280, 760), "low"), ((390, 844), "phone"), ((820, 1100), "tablet"), ((1920, 1080), "wide")]
+        {
             stage.browser.resize(size.0, size.1).await?;
             shot(&stage, folder, name).await?;
         }

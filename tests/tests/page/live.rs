@@ -13,10 +13,10 @@ use tactomo::board::session::RequestedSettings;
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::detector::Detector;
 use tactomo::forward::Auto;
+use tactomo::readings::Readings;
 use tactomo::run::plan::{Ends, LiveError, Plan, Solving, Summary};
 use tactomo::run::{Snapshot, Statistics, pipeline};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
-use tactomo::readings::Readings;
 use tactomo::simulate::{Fault, Mouse, Physics, Simulation};
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
 use tactomo::solve::{ContactSettings, Guard, Method, Problem};
@@ -41,18 +41,25 @@ impl Live {
     pub fn start(scene: SceneName, faults: &[Fault]) -> Result<Self> {
         let (detector, hand, physics) = simulation(scene, faults)?;
         let mouse = physics.mouse();
-        Self::of(&detector, hand, mouse, Box::new(physics))
+        Self::of(&detector, hand, mouse, Box::new(physics), RequestedSettings::default())
     }
 
-    /// Starts it at rest; the scene begins after a while.
+    /// Starts it at rest and with few frames, for pictures of what a solver finds when it has time; the scene begins after a while.
     pub fn after_rest(scene: SceneName, rest: Duration) -> Result<Self> {
         let (detector, hand, at_rest) = simulation(SceneName::Rest, &[])?;
         let (_, _, scene) = simulation(scene, &[])?;
         let mouse = at_rest.mouse();
-        Self::of(&detector, hand, mouse, Box::new(AfterRest { at_rest, scene, rest_s: rest.as_secs_f64() }))
+        let few = RequestedSettings { max_frames_per_s: Some(60), ..RequestedSettings::default() };
+        Self::of(&detector, hand, mouse, Box::new(AfterRest { at_rest, scene, rest_s: rest.as_secs_f64() }), few)
     }
 
-    fn of(detector: &Detector, hand: Hand, mouse: Mouse, physics: Box<dyn Physics>) -> Result<Self> {
+    fn of(
+        detector: &Detector,
+        hand: Hand,
+        mouse: Mouse,
+        physics: Box<dyn Physics>,
+        settings: RequestedSettings,
+    ) -> Result<Self> {
         let problem = Problem::new(Auto::new(detector, None)?.model);
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
@@ -66,7 +73,7 @@ impl Live {
         let server = Server::start(Listen { port: Some(0), ..Listen::default() }, page, receiver.clone(), sender)?;
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
-        let pipeline = Some(run(detector, physics, mouse.clone(), problem, ends)?);
+        let pipeline = Some(run(detector, physics, mouse.clone(), settings, problem, ends)?);
         Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 
@@ -130,13 +137,14 @@ fn run(
     detector: &Detector,
     physics: Box<dyn Physics>,
     mouse: Mouse,
+    settings: RequestedSettings,
     problem: Problem,
     ends: Ends,
 ) -> Result<JoinHandle<Result<Summary, LiveError>>> {
     let board = SimulatedBoard::start(detector, physics, Options::default())?;
     let plan = Plan {
         detector: detector.clone(),
-        settings: RequestedSettings::default(),
+        settings,
         solving: Some(Solving {
             method: Method::Auto,
             make: Arc::new(move |method, detector| Ok(Box::new(Guard::new(method, &problem.measured_as(detector))?))),

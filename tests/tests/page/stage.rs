@@ -25,7 +25,8 @@ impl<T> Stage<T> {
         let behind = start()?;
         let browser = Browser::open(&url(&behind)).await?;
         let stage = Self { behind, browser, _turn: turn };
-        let ready = stage.browser.until("frames", |told| told.text("state") == "streaming" && told.number("updates") > 5.0);
+        let ready =
+            stage.browser.until("frames", |told| told.text("state") == "streaming" && told.number("updates") > 5.0);
         match ready.await {
             Ok(_) => Ok(Some(stage)),
             Err(error) => stage.end(Err(error)).await.map(|()| None),

@@ -138,6 +138,7 @@ const OVERFLOW: &str = "const box = document.getElementById('tools').getBounding
     const plot = document.getElementById('image').getBoundingClientRect();
     const wide = [...document.querySelectorAll('body *')].filter((e) => !e.closest('svg') && getComputedStyle(e).position !== 'absolute'
       && e.getBoundingClientRect().right > innerWidth + 0.5).map((e) => e.id || e.tagName);
+    for (const card of document.querySelectorAll('.card')) if (card.scrollWidth > card.clientWidth + 1) wide.push(`within ${card.id}`);
     return [document.documentElement.scrollWidth - innerWidth, document.documentElement.scrollHeight - innerHeight,
       box.bottom - innerHeight, plot.width, wide.join(' ')]";
 
@@ -218,7 +219,8 @@ async fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
         let contacts = vec![contact(1, [10.0, 0.0], 3e-4), blurred];
         stage.behind.solution(Solution { contacts, residual: Some(1.04), flags, ..Solution::default() });
         settled(&stage).await;
-        let script = "return ['choice', 'residual', 'warnings', 'notice'].map((id) => document.getElementById(id).textContent)";
+        let script =
+            "return ['choice', 'residual', 'warnings', 'notice'].map((id) => document.getElementById(id).textContent)";
         let shown = stage.browser.run(script).await?;
         ensure!(shown[0] == "2 contacts", "{shown}");
         ensure!(shown[1].as_str().is_some_and(|text| text.starts_with("residual 1.0 × noise · answer ")), "{shown}");

@@ -202,10 +202,7 @@ mod tests {
         assert_eq!(asks(r#"{"press":[]}"#), control(Control::Press(Vec::new())));
         assert_eq!(asks(r#"{"press":[{"x_m":0.031,"y_m":0}]}"#), Ok(None), "beside the detector");
         assert_eq!(asks(r#"{"scene":"five-fingers"}"#), control(Control::Scene(SceneName::FiveFingers)));
-        assert_eq!(
-            asks(r#"{"faults":["open:3"]}"#),
-            control(Control::Faults(vec![Fault::Open { electrode: 3 }]))
-        );
+        assert_eq!(asks(r#"{"faults":["open:3"]}"#), control(Control::Faults(vec![Fault::Open { electrode: 3 }])));
         assert_eq!(asks(r#"{"pause":true}"#), control(Control::Pause(true)));
         assert_eq!(asks(r#"{"seek_s":1.5}"#), control(Control::Seek(1.5)));
         assert_eq!(asks(r#"{"speed":0.25}"#), control(Control::Speed(0.25)));

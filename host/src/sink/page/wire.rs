@@ -316,13 +316,8 @@ mod tests {
 
     #[test]
     fn the_status_says_what_is_played_and_recorded() {
-        let playing = Playing::Recording {
-            position_s: 1.5,
-            length_s: 4.0,
-            speed: f64::INFINITY,
-            paused: true,
-            looped: false,
-        };
+        let playing =
+            Playing::Recording { position_s: 1.5, length_s: 4.0, speed: f64::INFINITY, paused: true, looped: false };
         let snapshot = Snapshot {
             link: LinkState::Silent("no frames for 2 s".to_owned()),
             playing,
