@@ -173,11 +173,11 @@ async fn picture(theme: &str, file: &std::path::Path) -> Result<()> {
     let start = || Live::after_rest(SceneName::FiveFingers, Duration::from_secs(4));
     in_front_of!(start(), stage, {
         stage.browser.theme(theme).await?;
-        let pressed = stage.browser.until("a hand", |told| told.number("contacts") >= 4.0);
-        pressed.await?;
+        let hand = |told: &Told| told.number("contacts") >= 4.0 && told.text("image") == "false";
+        stage.browser.until("a hand", hand).await?;
         // Until the strip chart has something to show.
         tokio::time::sleep(Duration::from_secs(6)).await;
-        stage.browser.until("a hand", |told| told.number("contacts") >= 4.0).await?;
+        stage.browser.until("a hand", hand).await?;
         std::fs::write(file, stage.browser.client.screenshot().await?).context("the picture's folder")
     })
 }

@@ -66,9 +66,9 @@ export class Camera {
   }
 
   /** Projects `points` (m), x, y, z one after the other, to `x`, `y` on `width` x `height` pixels and the depth `z` (m). */
-  project({ centre, sizeM }, points, { x, y, z }, width, height) {
+  project({ centre, sizeM, fill }, points, { x, y, z }, width, height) {
     const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
-    const scale = (0.64 * this.zoom * Math.min(width, 1.35 * height)) / sizeM;
+    const scale = (fill * this.zoom * Math.min(width, 1.35 * height)) / sizeM;
     const eye = DISTANCE * sizeM;
     for (let i = 0, k = 0; k < points.length; i += 1, k += 3) {
       const [dx, dy, dz] = [points[k] - centre[0], points[k + 1] - centre[1], points[k + 2] - centre[2]];
