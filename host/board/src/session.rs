@@ -44,7 +44,7 @@ pub struct RequestedSettings {
 
 impl RequestedSettings {
     /// These, with those that are asked for later.
-    fn changed_by(self, later: Self) -> Self {
+    pub fn changed_by(self, later: Self) -> Self {
         Self {
             settle_us: later.settle_us.or(self.settle_us),
             average_log2: later.average_log2.or(self.average_log2),

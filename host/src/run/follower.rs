@@ -139,6 +139,12 @@ impl Desk {
                         seat.baseline.renew();
                     }
                 }
+                Event::Jumped => {
+                    if let Some(seat) = &mut self.seat {
+                        seat.steady = None;
+                        seat.follower.as_mut().into_iter().for_each(|follower| follower.reset());
+                    }
+                }
                 Event::Looked(look, found) => {
                     self.search.looked();
                     let changed = self.seat.as_mut().is_some_and(|seat| seat.watch.conclude(look, found));

@@ -41,6 +41,8 @@ pub enum Event {
     Board(Arc<Detector>),
     /// The baseline is to be taken anew.
     Rezero,
+    /// The frames to come do not follow those before.
+    Jumped,
     /// A solver is made.
     Solver(Made),
     /// A search has ended.

@@ -25,9 +25,6 @@ use super::{LinkState, Request};
 const PATIENCE: Duration = Duration::from_secs(6);
 /// Time between two tries to open a link that was lost.
 const REOPEN_EVERY: Duration = Duration::from_millis(500);
-/// What is shown of a board that answers and sends no frames.
-const MUTE: &str =
-    "The board answers but sends no frames. Press its reset button; if that does not help, flash the firmware anew.";
 /// Bytes of one read: 40 ms at 921600 baud.
 const READ_BYTES: usize = 4096;
 
@@ -191,6 +188,7 @@ impl Reader {
                     if link.jumped() {
                         self.sequence.restart();
                         talk.jumped();
+                        self.inbox.put(Event::Jumped);
                     }
                     self.receive(&mut talk, link, &buffer[..count])?;
                 }
@@ -318,7 +316,7 @@ impl Reader {
                 Request::Rezero => self.inbox.put(Event::Rezero),
                 Request::Solver(method) => self.inbox.put(Event::Method(method)),
                 Request::Settings(settings) => {
-                    self.plan.settings = settings;
+                    self.plan.settings = self.plan.settings.changed_by(settings);
                     if let Some((_, talk)) = &mut open {
                         talk.session.request(settings);
                     }
@@ -366,7 +364,7 @@ impl Reader {
     /// Shows how the link fares.
     fn show_link(&mut self, link: &dyn Link, talk: &Talk) {
         if talk.session.is_mute(Instant::now()) {
-            self.enter(LinkState::Silent(MUTE.to_owned()));
+            self.enter(LinkState::Silent(session::MUTE.to_owned()));
         } else if talk.junk.is_some() {
             self.enter(LinkState::Streaming);
         }

@@ -7,8 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use serde::Serialize;
-use tactomo_touch::solve::{Choice, Flags, FoundContact};
+use tactomo_touch::schema::FrameReport;
 
 use crate::run::SolvedFrame;
 use crate::run::plan::Listener;
@@ -38,19 +37,6 @@ pub struct Stream {
     lost: u64,
 }
 
-/// A line.
-#[derive(Serialize)]
-struct Line<'a> {
-    time_s: f64,
-    sequence: u64,
-    contacts: &'a [FoundContact],
-    residual: Option<f64>,
-    choice: Option<&'a Choice>,
-    flags: &'a Flags,
-    averaged: u32,
-    age_us: f64,
-}
-
 impl Stream {
     /// Writes to a new file, or to stdout if it is called `-`.
     ///
@@ -76,15 +62,11 @@ impl Stream {
 impl Listener for Stream {
     fn solved(&mut self, solved: &SolvedFrame<'_>) {
         let SolvedFrame { frame, solution, age } = solved;
-        let line = Line {
-            time_s: frame.board_time_us as f64 * 1e-6,
-            sequence: frame.sequence,
-            contacts: &solution.contacts,
-            residual: solution.residual,
-            choice: solution.choice.as_ref(),
-            flags: &solution.flags,
-            averaged: frame.averaged,
-            age_us: age.as_secs_f64() * 1e6,
+        let line = FrameReport {
+            time_s: Some(frame.board_time_us as f64 * 1e-6),
+            sequence: Some(frame.sequence),
+            age_us: Some(age.as_secs_f64() * 1e6),
+            ..FrameReport::of(solution)
         };
         let sent = serde_json::to_string(&line).ok().zip(self.lines.as_ref()).map(|(line, lines)| lines.try_send(line));
         self.lost += u64::from(!matches!(sent, Some(Ok(()))));

@@ -172,11 +172,11 @@ async fn screenshot() -> Result<()> {
 async fn picture(theme: &str, file: &std::path::Path) -> Result<()> {
     in_front_of!(Live::start(SceneName::FiveFingers, &[]), stage, {
         stage.browser.theme(theme).await?;
-        let pressed = stage.browser.until("a hand", |told| told.number("contacts") >= 4.0);
-        pressed.await?;
+        let hand = |told: &Told| told.number("contacts") >= 4.0 && told.text("image") == "false";
+        stage.browser.until("a hand", hand).await?;
         // Until the strip chart has something to show.
         tokio::time::sleep(Duration::from_secs(6)).await;
-        stage.browser.until("a hand", |told| told.number("contacts") >= 4.0).await?;
+        stage.browser.until("a hand", hand).await?;
         std::fs::write(file, stage.browser.client.screenshot().await?).context("the picture's folder")
     })
 }

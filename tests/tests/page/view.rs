@@ -138,6 +138,7 @@ const OVERFLOW: &str = "const box = document.getElementById('tools').getBounding
     const plot = document.getElementById('image').getBoundingClientRect();
     const wide = [...document.querySelectorAll('body *')].filter((e) => !e.closest('svg') && getComputedStyle(e).position !== 'absolute'
       && e.getBoundingClientRect().right > innerWidth + 0.5).map((e) => e.id || e.tagName);
+    for (const card of document.querySelectorAll('.card')) if (card.scrollWidth > card.clientWidth + 1) wide.push(`within ${card.id}`);
     return [document.documentElement.scrollWidth - innerWidth, document.documentElement.scrollHeight - innerHeight,
       box.bottom - innerHeight, plot.width, wide.join(' ')]";
 

@@ -55,7 +55,7 @@ function start(setup) {
 
 function showStatus(status) {
   const { state, text } = linkOf(status);
-  showState(state, text);
+  if (showState(state, text)) verdict.hold();
   for (const part of [figures, transport, recordButton, rezeroButton, parts.board, parts.simulation]) part.show(status);
   if (parts.method.show(status.solver, status.link.state === "streaming")) parts.picture.fitNext();
   document.getElementById("pause").hidden = transport.isThere;
@@ -102,6 +102,7 @@ function lost(reason) {
   waiting = null;
   rezeroButton.lost();
   showState("unreachable", reason || "The program does not answer; trying again");
+  verdict.hold();
 }
 
 // A recording is held; live frames keep coming, and only the picture stands still.

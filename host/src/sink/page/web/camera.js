@@ -5,12 +5,14 @@ const ZOOM = 0.0012;
 const [NEAREST, FARTHEST] = [0.4, 3];
 // Distance of the eye, in sizes of the detector: from nearer, perspective exaggerates.
 const DISTANCE = 3.4;
+// A unit vector: to the left, up, towards the eye.
+const OVER_THE_SHOULDER = [0.5, 0.55, 0.67];
 
 /** Turns places (m) into pixels. */
 export class Camera {
   constructor(curved) {
     this.turn = -0.6;
-    this.tilt = curved ? 0.75 : 0.7;
+    this.tilt = curved ? 0.6 : 0.7;
     this.zoom = 1;
   }
 
@@ -55,10 +57,18 @@ export class Camera {
 
   #zoomBy(factor) { this.zoom = Math.min(FARTHEST, Math.max(NEAREST, this.zoom * factor)); }
 
-  /** Projects `points` (m), x, y, z one after the other, to `x`, `y` on `width` x `height` pixels and the depth `z` (m). */
-  project({ centre, sizeM }, points, { x, y, z }, width, height) {
+  /** The direction that light comes from: over the left shoulder of who looks. */
+  light() {
     const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
-    const scale = (0.64 * this.zoom * Math.min(width, 1.35 * height)) / sizeM;
+    const [left, up, near] = OVER_THE_SHOULDER;
+    const away = up * sinTilt - near * cosTilt;
+    return [-left * cosTurn + away * sinTurn, left * sinTurn + away * cosTurn, up * cosTilt + near * sinTilt];
+  }
+
+  /** Projects `points` (m), x, y, z one after the other, to `x`, `y` on `width` x `height` pixels and the depth `z` (m). */
+  project({ centre, sizeM, fill }, points, { x, y, z }, width, height) {
+    const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
+    const scale = (fill * this.zoom * Math.min(width, 1.35 * height)) / sizeM;
     const eye = DISTANCE * sizeM;
     for (let i = 0, k = 0; k < points.length; i += 1, k += 3) {
       const [dx, dy, dz] = [points[k] - centre[0], points[k + 1] - centre[1], points[k + 2] - centre[2]];

@@ -4,7 +4,7 @@
 import { Raster } from "./raster.js";
 
 // A contact is drawn as C / (pi r2) exp(-(d / r)2), which adds up to its conductance C; beyond so many radii that is nothing.
-const REACH = 2.8;
+const REACH = 3.5;
 
 /** Density (S/m2) in the middle of a contact of this conductance and radius. */
 export const densityOf = ({ conductanceS }, radiusM) => Math.max(0, conductanceS) / (Math.PI * radiusM * radiusM);

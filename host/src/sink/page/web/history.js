@@ -15,6 +15,7 @@ export class History {
 
   clear() {
     this.lines = new Map();
+    this.turn = 0;
     this.last = -Infinity;
     this.unit = "S";
   }
@@ -24,6 +25,7 @@ export class History {
     this.unit = contacts.some(({ forceN }) => forceN !== null) ? "N" : "S";
     if (now - this.last < EVERY_MS) return;
     this.last = now;
+    this.turn += 1;
     const numbered = contacts.filter(({ id }) => id);
     for (const contact of numbered) this.#add(contact.id, strength(contact), now);
     if (!numbered.length) this.#addWhole(contacts, image, now);
@@ -42,7 +44,8 @@ export class History {
 
   #add(id, value, at) {
     const line = this.lines.get(id) ?? [];
-    line.push({ at, value });
+    // In turns one after the other, the contact was there in between.
+    line.push({ at, value, turn: this.turn });
     this.lines.set(id, line);
   }
 

@@ -1,6 +1,6 @@
 // Where the flat picture lies on the screen.
 
-const WIDE = { left: 50, right: 84, top: 12, bottom: 40 };
+const WIDE = { left: 50, right: 100, top: 12, bottom: 40 };
 const NARROW = { left: 34, right: 50, top: 6, bottom: 24 };
 const NARROW_BELOW = 520;
 

@@ -14,11 +14,15 @@ const LINK_TEXT = {
 
 /** What to say of a link: `{state, text}` of a status message. */
 export function linkOf({ link: { state, reason }, playing }) {
-  if (playing.kind === "recording") {
-    const shown = hasEnded({ link: { state }, playing }) ? "finished" : state === "streaming" ? (playing.paused ? "paused" : "playing") : state;
-    if (shown in { finished: 0, paused: 0, playing: 0 }) return { state: shown, text: LINK_TEXT[shown] };
-  }
+  const shown = recordingState(state, playing);
+  if (shown) return { state: shown, text: LINK_TEXT[shown] };
   return { state, text: reason ? `${LINK_TEXT[state]}: ${reason}` : LINK_TEXT[state] };
+}
+
+function recordingState(state, playing) {
+  if (hasEnded({ link: { state }, playing })) return "finished";
+  if (playing.kind !== "recording" || state !== "streaming") return null;
+  return playing.paused ? "paused" : "playing";
 }
 
 /** Whether a recording has come to its end. */
@@ -26,12 +30,17 @@ export function hasEnded({ link: { state }, playing }) {
   return playing.kind === "recording" && (state === "ended" || playing.ended);
 }
 
-/** Says how the link fares: `state` for colours and tests, `text` for people. */
+// States in which what is shown is of now, or what a person chose to look at.
+const FRESH = ["streaming", "playing", "paused", "finished"];
+
+/** Says how the link fares: `state` for colours and tests, `text` for people; returns whether what is shown is old. */
 export function showState(state, text) {
   const line = document.getElementById("state");
   line.dataset.state = state;
   line.title = text;
   document.getElementById("state-text").textContent = text;
-  document.body.classList.toggle("stale", !["streaming", "playing", "paused", "finished"].includes(state));
+  const stale = !FRESH.includes(state);
+  document.body.classList.toggle("stale", stale);
   document.documentElement.dataset.state = state;
+  return stale;
 }

@@ -7,6 +7,8 @@ const GRID = 96;
 // Height of the hottest place, as a share of the detector's longer side.
 const RISE = 0.26;
 const SWELL = 0.1;
+// Share of the picture that the size takes: a plate lies, a curved detector may stand.
+const FILL = { plate: 0.64, curved: 0.5 };
 
 // Whether a point is within an outline with holes: even-odd rule.
 function isInside(loops, [x, y]) {
@@ -47,6 +49,7 @@ export function normalsOf(points, triangles, normals) {
 class Plate {
   constructor({ bounds_m: [[left, bottom], [right, top]], outline_m: loops }) {
     this.sizeM = Math.max(right - left, top - bottom);
+    this.fill = FILL.plate;
     this.centre = [(left + right) / 2, (bottom + top) / 2, 0.06 * this.sizeM];
     const cellM = this.sizeM / GRID;
     const [columns, rows] = [right - left, top - bottom].map((side) => Math.max(2, Math.round(side / cellM)));
@@ -89,6 +92,7 @@ class Curved {
   constructor({ places_m: places, triangles, torn_triangles: torn }) {
     const ends = [0, 1, 2].map((k) => [Math.min(...places.map((p) => p[k])), Math.max(...places.map((p) => p[k]))]);
     this.centre = ends.map(([low, high]) => (low + high) / 2);
+    this.fill = FILL.curved;
     this.sizeM = Math.max(...ends.map(([low, high]) => high - low));
     this.triangles = Uint32Array.from([...triangles, ...torn].flat());
     this.rest = Float32Array.from(places.flat());

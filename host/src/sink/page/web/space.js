@@ -11,8 +11,9 @@ import { DepthImage, shadesOf } from "./triangles.js";
 
 // More pixels than this are not drawn one by one.
 const MOST_PIXELS = 420_000;
-const LIGHT = [-0.45, 0.35, 0.82];
-const DARKEST = { light: 0.62, dark: 0.35 };
+// An edge is drawn in so many pieces, each of which may be hidden.
+const EDGE_PIECES = 48;
+const SHADES = { light: { darkest: 0.6, lift: 0 }, dark: { darkest: 0.4, lift: 34 } };
 
 /** Draws `view.field` in space. */
 export class SpaceView {
@@ -44,7 +45,7 @@ export class SpaceView {
     shape.update(field, scale);
     this.#project();
     depth.clear();
-    if (this.theme !== theme) this.shades = shadesOf(colourMaps(theme).image, DARKEST[this.theme = theme]);
+    if (this.theme !== theme) this.shades = shadesOf(colourMaps(theme).image, SHADES[this.theme = theme]);
     depth.draw(shape.triangles, this.screen, this.shades);
     this.canvas.getContext("2d").putImageData(depth.image, 0, 0);
     this.#drawOver(now);
@@ -54,9 +55,9 @@ export class SpaceView {
     const { shape: { points, triangles }, normals, screen, depth } = this;
     normalsOf(points, triangles, normals);
     this.camera.project(this.shape, points, screen, depth.width, depth.height);
-    for (let i = 0; i < screen.x.length; i += 1) {
-      const k = 3 * i;
-      const facing = normals[k] * LIGHT[0] + normals[k + 1] * LIGHT[1] + normals[k + 2] * LIGHT[2];
+    const [x, y, z] = this.camera.light();
+    for (let i = 0, k = 0; i < screen.x.length; i += 1, k += 3) {
+      const facing = normals[k] * x + normals[k + 1] * y + normals[k + 2] * z;
       screen.light[i] = 0.5 + 0.5 * facing;
     }
   }
@@ -86,24 +87,37 @@ export class SpaceView {
   #drawRims(at) {
     this.over.strokeStyle = faded(this.view.colours.muted, 0.7);
     this.over.lineWidth = 1;
+    this.over.beginPath();
     for (const rim of this.shape.rimsM) {
-      this.over.beginPath();
-      rim.forEach((corner, i) => {
-        const [x, y] = at(...corner);
-        if (i) this.over.lineTo(x, y); else this.over.moveTo(x, y);
-      });
-      this.over.closePath();
-      this.over.stroke();
+      rim.forEach((corner, i) => this.#addEdge(at, corner, rim[(i + 1) % rim.length]));
     }
+    this.over.stroke();
+  }
+
+  // The pieces of an edge that are not behind something.
+  #addEdge(at, from, to) {
+    let before = null;
+    for (let i = 0; i <= EDGE_PIECES; i += 1) {
+      const [x, y, z] = at(...from.map((v, k) => v + ((to[k] - v) * i) / EDGE_PIECES));
+      if (before && (before.shows || this.#shows(x, y, z))) {
+        this.over.moveTo(before.x, before.y);
+        this.over.lineTo(x, y);
+      }
+      before = { x, y, shows: this.#shows(x, y, z) };
+    }
+  }
+
+  #shows(x, y, z) {
+    const ratio = this.depth.width / this.width;
+    return this.depth.isVisible(x * ratio, y * ratio, z, 0.03 * this.shape.sizeM);
   }
 
   // Electrodes that are not behind something.
   #drawPads(at) {
-    const { over, view, depth } = this;
-    const ratio = depth.width / this.width;
+    const { over, view } = this;
     view.setup.electrodes.forEach((pad, i) => {
       const [x, y, z] = at(...pad.place_m);
-      if (!depth.isVisible(x * ratio, y * ratio, z, 0.03 * this.shape.sizeM)) return;
+      if (!this.#shows(x, y, z)) return;
       over.beginPath();
       over.arc(x, y, 3, 0, 2 * Math.PI);
       over.fillStyle = view.excluded.includes(i) ? view.colours.bad : faded(view.colours.ink, 0.4);

@@ -6,8 +6,6 @@ import { decimalsOf, fixed, niceStep, prefixOf, ticks, withPrefix } from "./unit
 
 const MARGIN = { left: 34, right: 8, top: 8, bottom: 18 };
 const DRAWN_EVERY_MS = 40;
-// A longer gap (ms) is no line: the contact was gone.
-const GAP_MS = 400;
 const FONT = "11px system-ui, sans-serif";
 
 // The largest value that lasts: the least of three after each other, so that one odd sample does not flatten all others.
@@ -119,9 +117,9 @@ export class StripChart {
     const { context, colours } = this;
     const colour = colours.hue(id);
     context.beginPath();
-    line.forEach(({ at, value }, i) => {
+    line.forEach(({ at, value, turn }, i) => {
       const [x, y] = [this.#x(at, end), this.#y(value)];
-      if (i && at - line[i - 1].at < GAP_MS) context.lineTo(x, y); else context.moveTo(x, y);
+      if (i && turn - line[i - 1].turn === 1) context.lineTo(x, y); else context.moveTo(x, y);
     });
     context.strokeStyle = colour;
     context.lineWidth = 2;

@@ -61,15 +61,22 @@ export class DepthImage {
   }
 }
 
-/** Canvas pixels for each brightness, `LIGHTS` of them, of each of `colours`. */
-export function shadesOf(colours, darkest) {
+// Share of the colours up to which `lift` reaches.
+const LIFTED = 0.35;
+
+/**
+ * Canvas pixels for each brightness, `LIGHTS` of them, of each of `colours`. `darkest` is the factor of the least brightness, `lift`
+ * what is added where nothing presses (0 to 255), so that a shape shows before a background of the same colour.
+ */
+export function shadesOf(colours, { darkest, lift }) {
   const shades = new Uint32Array(LIGHTS * colours.length);
   const bytes = new Uint8Array(shades.buffer);
   const source = new Uint8Array(colours.buffer);
   for (let light = 0; light < LIGHTS; light += 1) {
     const factor = darkest + (1 - darkest) * (light / (LIGHTS - 1));
     for (let i = 0; i < source.length; i += 1) {
-      bytes[light * source.length + i] = i % 4 === 3 ? 255 : Math.min(255, source[i] * factor);
+      const added = lift * Math.max(0, 1 - i / source.length / LIFTED);
+      bytes[light * source.length + i] = i % 4 === 3 ? 255 : Math.min(255, (source[i] + added) * factor);
     }
   }
   return shades;

@@ -23,8 +23,9 @@ function chip(kind, text, title) {
 // What a passer-by calls it.
 function headline({ choice, contacts, image }) {
   const what = choice?.what ?? "";
-  if (contacts.length) return contacts.length === 1 ? "1 contact" : `${contacts.length} contacts`;
-  if (image.length && what !== "nothing") return "Pressure image";
+  const counted = (word) => (contacts.length === 1 ? `1 ${word}` : `${contacts.length} ${word}s`);
+  if (image.length && what !== "nothing") return contacts.length ? `Image, ${counted("peak")}` : "Image";
+  if (contacts.length) return counted("contact");
   return "Nothing touches";
 }
 
@@ -59,6 +60,11 @@ export class Verdict {
     }
     this.#warn(flags, excluded, now);
     Object.assign(document.documentElement.dataset, { choice: choice?.what ?? "", flags: flags.join(" "), ageS: String(ageS) });
+  }
+
+  /** Says that the last answer is no longer of now. */
+  hold() {
+    if (this.what.textContent.trim()) this.residual.textContent = "the last answer";
   }
 
   #warn(flags, excluded, now) {
