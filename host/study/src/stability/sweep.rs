@@ -364,6 +364,8 @@ mod tests {
         for sweep in &report.sweeps {
             assert!(page.contains(&sweep.title) && table.contains(&sweep.title), "{}", sweep.title);
         }
+        let fits = page.find("heat whole").is_some_and(|at| at < page.find("Against what noise allows").unwrap());
+        assert!(fits, "the overview takes the width of the page, whatever its columns");
         assert!(page.contains("tactomo &lt;stability&gt;") && page.contains("noise limit"));
     }
 }

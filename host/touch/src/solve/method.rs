@@ -351,6 +351,11 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_people_look_for_comes_first() {
+        assert_eq!(Method::ALL[..2], [Method::Auto, Method::Contacts]);
+    }
+
+    #[test]
     fn each_method_is_found_by_its_name_and_says_what_it_is_for() {
         for method in Method::ALL {
             assert_eq!(method.name().parse(), Ok(method));
