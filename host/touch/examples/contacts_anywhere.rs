@@ -10,8 +10,8 @@ use tactomo_physics::detector::{Detector, Layer};
 use tactomo_physics::forward::{Auto, readings_v};
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, finer_model, measured};
-use tactomo_touch::solve::{ContactSettings, Contacts, Problem, Solver};
 use tactomo_physics::space;
+use tactomo_touch::solve::{ContactSettings, Contacts, Problem, Solver};
 
 /// Length of a step of a contact that is followed, in radii.
 const STEP: f64 = 0.03;

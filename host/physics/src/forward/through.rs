@@ -207,10 +207,16 @@ mod tests {
         let fields = some.spots(0.002).unwrap();
         let spots = contacts.map(|at| fields.spot([at.x_m, at.y_m, 0.0]));
         let cross = DMatrix::from_fn(2, 15, |k, e| spots[k].electrodes_ohm[e]);
-        let between = DMatrix::from_fn(2, 2, |k, l| {
-            if k == l { spots[k].own_ohm } else { fields.between_ohm(&spots[k], &spots[l]) }
-        });
-        let found = conducting_patches(some.electrode_fields_ohm(), &cross, between, &contacts.map(|at| at.conductance_s));
+        let between =
+            DMatrix::from_fn(
+                2,
+                2,
+                |k, l| {
+                    if k == l { spots[k].own_ohm } else { fields.between_ohm(&spots[k], &spots[l]) }
+                },
+            );
+        let found =
+            conducting_patches(some.electrode_fields_ohm(), &cross, between, &contacts.map(|at| at.conductance_s));
         let [found, expected] = [found.impedance_ohm().unwrap(), some.impedance_ohm(&contacts)?];
         let [found, expected] = [found, expected].map(|z| readings_v(&z, some.detector()));
         let off = found.volts().iter().zip(expected.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

@@ -261,7 +261,8 @@ mod tests {
             let truth = Contact::flat(pad.x_m + 0.003 * way.cos(), pad.y_m + 0.003 * way.sin(), 0.0025, 6e-4);
             let impedance_ohm = fine.impedance_ohm(&[truth]).unwrap();
             let frames = if turn == 0 { 20 } else { 2 };
-            let last = (0..frames).map(|_| guard.solve(&board.readings_v(Some(&impedance_ohm))).unwrap()).last().unwrap();
+            let last =
+                (0..frames).map(|_| guard.solve(&board.readings_v(Some(&impedance_ohm))).unwrap()).last().unwrap();
             let [found] = last.contacts[..] else { panic!("{truth:?} {:?}", last.contacts) };
             let off_m = (found.x_m - truth.x_m).hypot(found.y_m - truth.y_m);
             assert!(off_m < 5e-4, "{truth:?} {found:?}: {off_m}");

@@ -30,11 +30,14 @@ impl Locator {
     pub fn new(mesh: &Mesh) -> Self {
         let all = (0..mesh.nodes_m.len()).map(|node| mesh.place_m(node as u32));
         let [low, high] = all.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], at| {
-            [0, 1].map(|end| [0, 1, 2].map(|axis| if end == 0 { low[axis].min(at[axis]) } else { high[axis].max(at[axis]) }))
+            [0, 1].map(|end| {
+                [0, 1, 2].map(|axis| if end == 0 { low[axis].min(at[axis]) } else { high[axis].max(at[axis]) })
+            })
         });
         let area_m2: f64 = mesh.node_areas_m2().iter().sum();
         let longest_m = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
-        let cell_m = (CELL_TRIANGLES * (area_m2 / mesh.triangles.len().max(1) as f64).sqrt()).max(longest_m / MOST_CELLS);
+        let cell_m =
+            (CELL_TRIANGLES * (area_m2 / mesh.triangles.len().max(1) as f64).sqrt()).max(longest_m / MOST_CELLS);
         let counts = [0, 1, 2].map(|axis| ((high[axis] - low[axis]) / cell_m) as usize + 1);
         let mut locator = Self { low, cell_m, counts, starts: Vec::new(), triangles: Vec::new() };
         let mut cells = vec![Vec::new(); counts.iter().product()];

@@ -29,7 +29,11 @@ fn cases() -> Vec<(Detector, f64, Vec<Place>)> {
     let surface = dome.surface.clone().unwrap();
     let on_dome = [[0.005, 0.002, 0.004], [-0.003, -0.004, 0.006], [0.001, -0.008, -0.002]];
     vec![
-        (thin(), RADIUS_M, vec![[0.003, -0.008, 0.0], [-0.0125, 0.004, 0.0], [0.0292, 0.0, 0.0], [0.029, -0.0285, 0.0]]),
+        (
+            thin(),
+            RADIUS_M,
+            vec![[0.003, -0.008, 0.0], [-0.0125, 0.004, 0.0], [0.0292, 0.0, 0.0], [0.029, -0.0285, 0.0]],
+        ),
         (example("l-shape"), 0.003, vec![[-0.02, -0.005, 0.0], [0.0, -0.0052, 0.0], [-0.0385, 0.01, 0.0]]),
         (dome, 0.0007, on_dome.map(|at| surface.nearest(at).place_m).into()),
     ]
@@ -57,11 +61,15 @@ fn readings_of_spots_are_those_of_discs_but_for_crowded_current() {
             for some in single.chain([places.clone()]) {
                 let contacts: Vec<_> = some
                     .iter()
-                    .map(|[x_m, y_m, z_m]| Contact { z_m: *z_m, ..Contact::flat(*x_m, *y_m, radius_m, sheets * sheet_s) })
+                    .map(|[x_m, y_m, z_m]| Contact {
+                        z_m: *z_m,
+                        ..Contact::flat(*x_m, *y_m, radius_m, sheets * sheet_s)
+                    })
                     .collect();
                 let spots: Vec<_> = some.iter().map(|at| fields.spot(*at)).collect();
                 let found = impedance_ohm(&shell, &spots, &*fields, &vec![sheets * sheet_s; some.len()]);
-                let [found, expected] = [found, shell.impedance_ohm(&contacts).unwrap()].map(|z| readings_v(&z, &detector));
+                let [found, expected] =
+                    [found, shell.impedance_ohm(&contacts).unwrap()].map(|z| readings_v(&z, &detector));
                 let off = found.volts().iter().zip(expected.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 let off = off / expected.largest_v();
                 assert!(off < share, "{} {sheets} {some:?}: {off}", detector.name);
@@ -90,7 +98,8 @@ fn slopes_are_those_of_the_fields() {
                     let off = slope(&|spot| spot.electrodes_ohm[e]) - spot.slopes_ohm_per_m[axis][e];
                     assert!(off.abs() < 2e-3 * scale_ohm, "{} {at:?} {axis} {e}: {}", detector.name, off / scale_ohm);
                 }
-                let off = slope(&|spot| fields.between_ohm(&other, spot)) - fields.between(&other, &spot).by_second[axis];
+                let off =
+                    slope(&|spot| fields.between_ohm(&other, spot)) - fields.between(&other, &spot).by_second[axis];
                 assert!(off.abs() < 2e-3 * scale_ohm, "{} {at:?} {axis}: {}", detector.name, off / scale_ohm);
                 let mirrored = fields.between(&spot, &other);
                 assert_eq!(mirrored.by_first, fields.between(&other, &spot).by_second);

@@ -48,7 +48,11 @@ impl CutDisc {
         let mut x = first.clamp(low, high);
         for _ in 0..STEPS {
             let excess = self.area(x) - wanted;
-            if excess < 0.0 { low = x } else { high = x }
+            if excess < 0.0 {
+                low = x
+            } else {
+                high = x
+            }
             let half = half_chord(x);
             let next = x - excess / (half.min(self.low[1]) + half.min(self.high[1]));
             let next = if next >= low && next <= high { next } else { 0.5 * (low + high) };

@@ -228,7 +228,8 @@ impl Slab {
         }
         let distance_m = (disc.centre_m[0] - other.centre_m[0]).hypot(disc.centre_m[1] - other.centre_m[1]);
         let [far, far_other] = [disc, other].map(|disc| disc.basis.seen_from(disc.radius_m / distance_m));
-        let nodes = [(disc, far), (other, far_other)].map(|(disc, far)| disc_nodes_m(far, disc.centre_m, disc.radius_m, disc.cut));
+        let nodes = [(disc, far), (other, far_other)]
+            .map(|(disc, far)| disc_nodes_m(far, disc.centre_m, disc.radius_m, disc.cut));
         between(far, &nodes[0], far_other, &nodes[1], &self.top, &images, false)
     }
 }

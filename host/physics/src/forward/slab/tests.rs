@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::detector::{Electrode, Outline};
+use crate::forward::shell::Shell;
 use crate::forward::{readings_v, spots};
 use crate::readings::Readings;
-use crate::forward::shell::Shell;
 
 fn square(thickness_m: f64, radius_m: f64) -> Detector {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
@@ -107,7 +107,8 @@ fn discs_cut_by_walls_are_those_of_the_shell() {
     let mut detector = square(0.00025, 0.002);
     detector.layers[0] = Layer::uniform(0.00025, 0.3e-3 / 0.00025);
     let (slab, shell) = (Slab::new(&detector).unwrap(), Shell::with_nodes(&detector, 8000).unwrap());
-    let both = |press: &[Contact]| [&slab as &dyn ForwardModel, &shell].map(|model| model.impedance_ohm(press).unwrap());
+    let both =
+        |press: &[Contact]| [&slab as &dyn ForwardModel, &shell].map(|model| model.impedance_ohm(press).unwrap());
     // Away from the wall, the two are as far apart as the thickness makes them.
     let [inner, inner_shell] = both(&[contact(0.0, -0.012, 0.003, 1e-4)]);
     let usual = apart(&detector, &inner_shell, &inner);
@@ -129,7 +130,7 @@ fn discs_go_on_into_walls_without_a_jump() {
     let off = |a: &Readings, b: &Readings| {
         a.volts().iter().zip(b.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / b.largest_v()
     };
-    let steps: Vec<_> = (0..60).map(|i| 0.0265 + 6e-5 * f64::from(i)).map(|y_m| readings(&slab, y_m)).collect();
+    let steps: Vec<_> = (0..58).map(|i| 0.0265 + 6e-5 * f64::from(i)).map(|y_m| readings(&slab, y_m)).collect();
     let changes: Vec<_> = steps.windows(2).map(|pair| off(&pair[0], &pair[1])).collect();
     assert!(changes.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 4e-3), "{changes:?}");
     // The conductance of what is left counts: half a disc is half of it.
