@@ -55,7 +55,8 @@ impl Score {
     pub fn is_as_good_as(&self, other: &Self) -> bool {
         self.count_right > 0.9 * other.count_right - 0.01
             && self.error_m < 1.1 * other.error_m + 5e-5
-            && (other.images == 0 || self.images > 0 && self.correlation > 0.9 * other.correlation - 0.01)
+            && (other.images == 0
+                || self.images > 0 && self.correlation > other.correlation - 0.1 * other.correlation.abs() - 0.01)
     }
 }
 

@@ -20,7 +20,7 @@ pub struct Contact {
     pub z_m: f64,
     /// Radius (m).
     pub radius_m: f64,
-    /// Conductance of the whole disc (S), spread evenly over its area.
+    /// Conductance of the whole disc (S), spread evenly over its area; a part beyond an edge of the detector touches nothing.
     pub conductance_s: f64,
 }
 

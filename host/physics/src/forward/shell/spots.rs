@@ -236,12 +236,14 @@ fn spread(mesh: &Mesh, count: usize) -> Vec<u32> {
 /// `v` with `N(x, y) = v(x) . v(y)` between discs: a column for each node and part of its stencil.
 fn factor_rows(shell: &Shell, stencils: &[Stencil], at: &[u32]) -> Result<DMatrix<f64>, ForwardError> {
     let fields_ohm = shell.floating_fields_ohm(at.len(), |j| stencils[at[j] as usize].mean.clone())?;
+    // A node's fields beside each other.
+    let fields_ohm = fields_ohm.transpose();
     let mut all = DMatrix::zeros(at.len(), 3 * stencils.len());
     for (node, stencil) in stencils.iter().enumerate() {
         for part in 0..3 {
             let mut column = all.column_mut(3 * node + part);
             for (i, weight) in stencil.weights(part) {
-                column.iter_mut().zip(fields_ohm.row(*i as usize).iter()).for_each(|(sum, ohm)| *sum += weight * ohm);
+                column.axpy(*weight, &fields_ohm.column(*i as usize), 1.0);
             }
         }
     }

@@ -130,7 +130,7 @@ fn discs_go_on_into_walls_without_a_jump() {
     let off = |a: &Readings, b: &Readings| {
         a.volts().iter().zip(b.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / b.largest_v()
     };
-    let steps: Vec<_> = (0..60).map(|i| 0.0265 + 6e-5 * f64::from(i)).map(|y_m| readings(&slab, y_m)).collect();
+    let steps: Vec<_> = (0..58).map(|i| 0.0265 + 6e-5 * f64::from(i)).map(|y_m| readings(&slab, y_m)).collect();
     let changes: Vec<_> = steps.windows(2).map(|pair| off(&pair[0], &pair[1])).collect();
     assert!(changes.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 4e-3), "{changes:?}");
     // The conductance of what is left counts: half a disc is half of it.

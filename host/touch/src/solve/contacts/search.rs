@@ -1,5 +1,7 @@
 //! How many contacts, and where each fit starts.
 
+use std::f64::consts::TAU;
+
 use nalgebra::DMatrix;
 
 use super::discs::{DiscFit, DiscFitter, PARAMETERS};
@@ -31,6 +33,9 @@ const STARTS: usize = 3;
 const WORTH: f64 = 7.0;
 /// The same for there being any contact at all.
 pub(super) const WORTH_FIRST: f64 = 60.0;
+/// Starts around a single contact, and the cost over its, or over what noise makes, up to which a minimum there is looked at.
+const BESIDE: usize = 8;
+const OTHER: f64 = 5.0;
 /// Half the distance of two contacts that one is split into, in mean distances of electrodes.
 const SPLIT: f64 = 0.25;
 /// Mean square of what is left below which a fit is nearly right.
@@ -53,6 +58,33 @@ impl ContactFinder {
         let looks = self.scan.at_first(&self.network, &target);
         let first = self.scan.ones(&looks, STARTS, self.apart_m());
         Some(self.lowest_of(&looks, &first, &target)?.cost / target.count().max(1) as f64)
+    }
+
+    /// One contact corrected; or one beside it, which near edges and pads may be another minimum that is as deep until it is corrected.
+    fn or_beside(&self, one: Fit, target: &Target) -> (Fit, Explanation) {
+        let fitter = self.fitter();
+        let from = &one.spots[0];
+        let beside = (0..BESIDE).filter_map(|turn| {
+            let (sin, cos) = (TAU * turn as f64 / BESIDE as f64).sin_cos();
+            let way = space::along(scaled(cos, from.spot.along[0]), sin, from.spot.along[1]);
+            let place_m = space::along(from.spot.place_m, self.apart_m(), way);
+            let start = fitter.spot(self.fields.spot(place_m), from.ohm);
+            fitter.fit(vec![start], target, FIRST_STEPS)
+        });
+        let is_another = |fit: &Fit| {
+            space::distance(fit.spots[0].spot.place_m, from.spot.place_m) > 0.25 * self.apart_m()
+                && fit.cost < OTHER * one.cost.max(target.count() as f64)
+        };
+        let mut others: Vec<_> = beside.filter(is_another).collect();
+        others.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost));
+        others.truncate(FINALISTS);
+        let corrected = |fit: Fit| {
+            let explanation = self.correct(fit.clone(), &self.usual(1), target, CORRECTIONS);
+            (fit, explanation)
+        };
+        let first = corrected(one);
+        let others = others.into_iter().map(corrected);
+        others.fold(first, |best, other| if other.1.cost() < best.1.cost() { other } else { best })
     }
 
     /// The best fit from some candidates.
@@ -136,7 +168,7 @@ impl ContactFinder {
             return None;
         }
         let one = self.lowest_of(&looks, &first, target)?;
-        let mut best = self.correct(one.clone(), &self.usual(1), target, CORRECTIONS);
+        let (one, mut best) = self.or_beside(one, target);
         let mut fits = vec![one];
         let mut starts: Vec<Vec<FitSpot>> = match explains(&best, target) {
             true => Vec::new(),
