@@ -153,13 +153,16 @@ impl Desk {
                     }
                 }
                 Event::Searched(searched) => {
+                    let is_last = searched.is_last;
                     if let Some(lead) = self.search.receive(searched)
                         && let (Some(seat), Some(solved)) = (&mut self.seat, &self.solved)
                         && let Some(follower) = &mut seat.follower
                     {
                         let begun = Instant::now();
                         let adopted = follower.adopt(lead, &solved.touch)?;
-                        self.rest.after_search(&adopted.solution);
+                        if is_last {
+                            self.rest.after_search(&adopted.solution);
+                        }
                         self.better = Some((adopted, begun));
                     }
                 }

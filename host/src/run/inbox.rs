@@ -65,6 +65,8 @@ pub struct Searched {
     pub solver: u64,
     /// What it has found.
     pub lead: Lead,
+    /// Whether it has ended with that.
+    pub is_last: bool,
 }
 
 /// Where frames and everything else that the follower has to know wait for it.

@@ -62,7 +62,7 @@ impl SearchThread {
 
     /// Takes what has come from it: the lead, unless another solver is in use by now.
     pub fn receive(&mut self, searched: Searched) -> Option<Lead> {
-        self.busy = false;
+        self.busy &= !searched.is_last;
         (searched.solver == self.solver).then_some(searched.lead)
     }
 
@@ -97,10 +97,11 @@ fn work(jobs: &Receiver<Job>, inbox: &Inbox, look_at_wires: &LookAtWires) {
         match job {
             Job::Solver { solver: of, half: next } => (solver, half) = (of, next),
             Job::Search { from, readings } => {
-                let found = half.as_mut().map(|half| half.search(from, &readings));
+                let mut better = |lead| inbox.put(Event::Searched(Searched { solver, lead, is_last: false }));
+                let found = half.as_mut().map(|half| half.search(from, &readings, &mut better));
                 // Readings that cannot be were refused by the follower before.
                 let lead = found.and_then(Result::ok).unwrap_or_default();
-                inbox.put(Event::Searched(Searched { solver, lead }));
+                inbox.put(Event::Searched(Searched { solver, lead, is_last: true }));
             }
             Job::Look { order, look, readings } => {
                 let found = look_at_wires(&order, look, &readings);

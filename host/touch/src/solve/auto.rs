@@ -154,7 +154,7 @@ impl Follower for AutoFollower {
 }
 
 impl Searcher for AutoSearcher {
-    fn search(&mut self, from: Lead, readings: &Readings) -> Result<Lead, SolveError> {
+    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
         let Some(searcher) = &self.contacts else {
             return self.search_image(from, readings, "this model has no fields of single contacts".to_owned());
         };
@@ -162,7 +162,12 @@ impl Searcher for AutoSearcher {
             Known::Contacts(contacts) => (Some(contacts), Lead::default()),
             known => (None, Lead(known)),
         };
-        let Some((found, solution)) = searcher.contacts(contacts, readings)? else { return Ok(Lead::default()) };
+        // A picture does not change to contacts that may not explain it.
+        let mut nowhere = |_| {};
+        let found = if matches!(from.0, Known::Image(..)) { &mut nowhere } else { found };
+        let Some((found, solution)) = searcher.contacts(contacts, readings, found)? else {
+            return Ok(Lead::default());
+        };
         if !solution.flags.misfit {
             return Ok(Lead::of_contacts(Some(found)));
         }
@@ -309,7 +314,7 @@ mod tests {
         let first = bench.measured(&moved(0.0));
         let before = follower.follow(&first).unwrap();
         assert!(before.search && before.solution.flags.unfinished && before.solution.contacts.is_empty());
-        let lead = searcher.search(follower.lead(), &first).unwrap();
+        let lead = searcher.search(follower.lead(), &first, &mut |_| {}).unwrap();
         // The answer comes when the contacts are 3 mm further on.
         let after = follower.adopt(lead, &bench.measured(&moved(0.003))).unwrap();
         assert_eq!((what(&after.solution), after.search), ("2 contacts", false), "{after:?}");
@@ -338,9 +343,9 @@ mod tests {
         let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
         let mut searcher = searcher.unwrap();
         let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
-        let past = searcher.search(Lead::default(), &bench.measured(&[a])).unwrap();
+        let past = searcher.search(Lead::default(), &bench.measured(&[a]), &mut |_| {}).unwrap();
         let present = bench.measured(&[a, b]);
-        let lead = searcher.search(Lead::default(), &present).unwrap();
+        let lead = searcher.search(Lead::default(), &present, &mut |_| {}).unwrap();
         follower.adopt(lead, &present).unwrap();
         let kept = follower.adopt(past, &bench.measured(&[a, b])).unwrap();
         assert_eq!(what(&kept.solution), "2 contacts");

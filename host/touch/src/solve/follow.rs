@@ -32,11 +32,12 @@ pub trait Follower: Send {
 
 /// Searches what explains a frame.
 pub trait Searcher: Send {
-    /// What explains `readings`; `from` is what was followed up to now, and explains them partly.
+    /// What explains `readings`; `from` is what was followed up to now, and explains them partly. What is better than nothing on the way
+    /// there goes to `found`.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
-    fn search(&mut self, from: Lead, readings: &Readings) -> Result<Lead, SolveError>;
+    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError>;
 }
 
 /// The answer of a follower.
@@ -104,7 +105,7 @@ pub(super) fn follow_and_search(
     if !followed.search {
         return Ok(followed.solution);
     }
-    let lead = searcher.search(follower.lead(), readings)?;
+    let lead = searcher.search(follower.lead(), readings, &mut |_| {})?;
     Ok(follower.adopt(lead, readings)?.solution)
 }
 

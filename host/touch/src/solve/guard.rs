@@ -163,8 +163,8 @@ impl Follower for Half<dyn Follower> {
 }
 
 impl Searcher for Half<dyn Searcher> {
-    fn search(&mut self, from: Lead, readings: &Readings) -> Result<Lead, SolveError> {
-        self.half.search(from, &self.lens.readings(readings)?)
+    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
+        self.half.search(from, &self.lens.readings(readings)?, found)
     }
 }
 

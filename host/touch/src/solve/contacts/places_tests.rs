@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::solve::Solver;
 use tactomo_physics::detector::{Detector, Layer};
 use tactomo_physics::forward::{Auto, ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::simulate::{Noise, finer_model, measured};
@@ -42,7 +43,7 @@ impl Bench {
 
     fn contact(&self, [x_m, y_m, z_m]: [f64; 3], sheets: f64) -> Contact {
         let conductance_s = sheets * self.detector.sheet_conductance_s();
-        Contact { z_m, ..Contact::flat(x_m, y_m, self.solver.settings.radius_m, conductance_s) }
+        Contact { z_m, ..Contact::flat(x_m, y_m, self.solver.finder().settings.radius_m, conductance_s) }
     }
 
     fn press(&mut self, contacts: &[Contact]) -> Solution {
@@ -62,8 +63,8 @@ fn single_contacts_are_found_on_outlines_shells_and_curved_surfaces() {
         let mut bench = Bench::new(detector, seed);
         let mut places = fastrand::Rng::with_seed(seed);
         // A contact on an edge is known less well: it has a test of its own.
-        let mut spread = bench.solver.fields.places_m(300);
-        spread.retain(|place_m| bench.solver.fields.spot(*place_m).share > 0.999);
+        let mut spread = bench.solver.finder().fields.places_m(300);
+        spread.retain(|place_m| bench.solver.finder().fields.spot(*place_m).share > 0.999);
         let mut errors = Vec::new();
         for _ in 0..24 {
             let truth = bench.contact(spread[places.usize(..spread.len())], 0.5);

@@ -100,9 +100,16 @@ impl ContactFinder {
         self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= WORTH_FIRST)
     }
 
-    /// What explains a frame, from what explains it so far: one contact more if that is all it takes, else from nothing.
-    pub(super) fn search(&self, from: Option<&Explanation>, target: &Target) -> Option<Explanation> {
-        let found = from.and_then(|from| self.with_one_more(from, target)).or_else(|| self.explanation(target));
+    /// What explains a frame, from what explains it so far: one contact more if that is all it takes, else from
+    /// nothing. Each better explanation on the way goes to `better`.
+    pub(super) fn search(
+        &self,
+        from: Option<&Explanation>,
+        target: &Target,
+        better: &mut dyn FnMut(&Explanation),
+    ) -> Option<Explanation> {
+        let grown = from.and_then(|from| self.with_one_more(from, target));
+        let found = grown.or_else(|| self.explanation(target, better));
         found.map(|found| self.with_radii(found, target))
     }
 
@@ -160,7 +167,7 @@ impl ContactFinder {
     }
 
     /// What explains a frame, from nothing.
-    fn explanation(&self, target: &Target) -> Option<Explanation> {
+    fn explanation(&self, target: &Target, found: &mut dyn FnMut(&Explanation)) -> Option<Explanation> {
         let fitter = self.fitter();
         let looks = self.scan.at_first(&self.network, target);
         let first = self.scan.ones(&looks, STARTS, self.apart_m());
@@ -178,6 +185,7 @@ impl ContactFinder {
             }
         };
         while fits.len() < self.settings.most && !explains(&best, target) {
+            found(&best);
             let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
             let Explanation::Spots(fit, ..) = &more else { break };
             let fit = fit.clone();

@@ -155,10 +155,17 @@ impl ContactSearcher {
         Self { finder }
     }
 
-    /// The contacts that explain the readings, and the solution that they are; `None` if nothing touches.
-    pub fn contacts(&self, from: Option<Found>, readings: &Readings) -> Result<Option<(Found, Solution)>, SolveError> {
+    /// The contacts that explain the readings, and the solution that they are; `None` if nothing touches. Better ones on the way there go
+    /// to `found`.
+    pub fn contacts(
+        &self,
+        from: Option<Found>,
+        readings: &Readings,
+        found: &mut dyn FnMut(Lead),
+    ) -> Result<Option<(Found, Solution)>, SolveError> {
         let target = self.finder.target(readings)?;
-        let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target);
+        let mut better = |better: &Explanation| found(Lead::of_contacts(Some(Found(better.clone()))));
+        let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
         Ok(found.map(|found| {
             let solution = self.finder.solution(&found, &target);
             (Found(found), solution)
@@ -167,8 +174,8 @@ impl ContactSearcher {
 }
 
 impl Searcher for ContactSearcher {
-    fn search(&mut self, from: Lead, readings: &Readings) -> Result<Lead, SolveError> {
-        Ok(Lead::of_contacts(self.contacts(from.into_contacts(), readings)?.map(|(found, _)| found)))
+    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
+        Ok(Lead::of_contacts(self.contacts(from.into_contacts(), readings, found)?.map(|(found, _)| found)))
     }
 }
 
