@@ -80,12 +80,12 @@ impl SpotTable {
         let columns = electrodes + factors.len() + 2;
         let mut rows = Vec::with_capacity(nodes * 3 * columns);
         for (node, stencil) in stencils.iter().enumerate() {
-            for part in 0..3 {
+            for (part, own) in own[node].iter().enumerate() {
                 let weights = stencil.weights(part);
                 let field = |e: usize| weights.iter().map(|(i, w)| w * shell.fields_ohm[(*i as usize, e)]).sum::<f64>();
                 rows.extend((0..electrodes).map(|e| field(e) as f32));
                 rows.extend(factor.column(3 * node + part).iter().map(|value| *value as f32));
-                rows.extend([own[node][part] as f32, stencil.share[part] as f32]);
+                rows.extend([*own as f32, stencil.share[part] as f32]);
             }
         }
         Ok(Self { mesh, locator, electrodes, columns, rows, tangents, spread })
@@ -102,9 +102,9 @@ impl SpotTable {
             let mut coefficients = [cubic.value[i], [0.0; 3], [0.0; 3]];
             for (edge, j) in [(0, (i + 1) % 3), (1, (i + 2) % 3)] {
                 let way = space::sub(self.mesh.place_m(corners[j]), self.mesh.place_m(corners[i]));
-                for part in 0..3 {
-                    coefficients[1][part] += cubic.slope[i][edge][part] * space::dot(way, first);
-                    coefficients[2][part] += cubic.slope[i][edge][part] * space::dot(way, second);
+                let along = [space::dot(way, first), space::dot(way, second)];
+                for (coefficients, along) in coefficients[1..].iter_mut().zip(along) {
+                    coefficients.iter_mut().zip(cubic.slope[i][edge]).for_each(|(sum, slope)| *sum += slope * along);
                 }
             }
             let start = corners[i] as usize * 3 * self.columns;

@@ -32,7 +32,7 @@ pub(super) struct Radii {
     /// Of each contact (m), and whether the readings say so.
     all: Vec<(f64, bool)>,
     /// What they add to the covariance of the spots' parameters; none before it has been looked at.
-    added: Option<DMatrix<f64>>,
+    added: Option<Box<DMatrix<f64>>>,
 }
 
 /// What a look at the readings says of radii.
@@ -66,7 +66,7 @@ impl Radii {
     /// A covariance of the spots' parameters with what radii add to it.
     pub fn widened(&self, covariance: &DMatrix<f64>) -> DMatrix<f64> {
         match &self.added {
-            Some(added) if added.shape() == covariance.shape() => covariance + added,
+            Some(added) if added.shape() == covariance.shape() => covariance + &**added,
             _ => covariance.clone(),
         }
     }
@@ -81,7 +81,7 @@ impl Radii {
             (radius_m * step.exp(), known)
         };
         let all = self.all.iter().zip(&looked.steps).map(moved).collect();
-        (Self { all, added: Some(looked.added) }, changed)
+        (Self { all, added: Some(Box::new(looked.added)) }, changed)
     }
 }
 
