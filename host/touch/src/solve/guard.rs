@@ -347,7 +347,7 @@ mod tests {
                 assert!(
                     !watch.note(&board.readings_v(Some(&impedance_ohm))),
                     "{scene}: {:?} {contacts:?}",
-                    watch.excluded()
+                    watch.faulty()
                 );
             }
         }
