@@ -230,7 +230,7 @@ fn frames_missing_in_a_recording_are_reported() {
     let (_, messages) = run(&recording_of("whole.tactomo", 0..60));
     assert!(!messages.contains("warning"), "{messages}");
     let (lines, messages) = run(&recording_of("gap.tactomo", (0..40).chain(340..360)));
-    assert!(messages.contains("300 frames are missing (83.3 %), at 1 places"), "{messages}");
+    assert!(messages.contains("warning") && messages.contains("300 frames are missing"), "{messages}");
     let of = |sequence: u64| lines.iter().find(|line| line["sequence"] == sequence).unwrap();
     assert_eq!((&of(340)["lost_before"], of(340)["frame"].as_u64()), (&Value::from(300), Some(40)));
     assert!(of(341).get("lost_before").is_none());
@@ -240,7 +240,7 @@ fn frames_missing_in_a_recording_are_reported() {
     bytes[middle] ^= 0x10;
     std::fs::write(&file.0, bytes).unwrap();
     let (_, messages) = run(&file);
-    assert!(messages.contains("warning") && messages.contains("1 chunks of the file are damaged"), "{messages}");
+    assert!(messages.contains("warning") && messages.contains("damaged"), "{messages}");
 }
 
 #[test]
@@ -250,7 +250,7 @@ fn a_recording_is_read_with_its_board() {
     assert_eq!(tactomo(&live).status.code(), Some(0));
     let found = lines(&[recording.name()]);
     assert!(found.len() > 20, "{} frames", found.len());
-    assert_eq!(found[0]["frame"], 32, "the first frames are those at rest");
+    assert_eq!(found[0]["frame"], 0, "frames are solved while the baseline is taken");
     assert!(found.last().unwrap()["time_s"].as_f64().unwrap() > 0.1);
 }
 
@@ -304,7 +304,7 @@ fn wrong_files_are_told() {
         (text.name(), "line 2, column 1: `how are you?` is not a number"),
         (typo.name(), "line 1, column 3: `O.1` is not a number; to name the columns"),
         (broken.name(), "not an NPZ file"),
-        (recording.name(), "is not a recording of tactomo, or its header is damaged"),
+        (recording.name(), "is not a recording of tactomo, or too damaged"),
         ("no/such.csv", "cannot read no/such.csv: No such file"),
     ] {
         let message = told(file, &[]);

@@ -61,7 +61,8 @@ impl BoardLog {
             }
         } else if !self.hinted {
             self.hinted = true;
-            tracing::info!("the board sends a log; give the file of its firmware with `--elf` to read it");
+            let how = if cfg!(feature = "log") { "" } else { ", in a program built with `--features log`," };
+            tracing::info!("the board sends a log; give the file of its firmware with `--elf`{how} to read it");
         }
     }
 }

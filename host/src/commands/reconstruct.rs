@@ -52,7 +52,8 @@ pub struct Args {
     /// and force_n or conductance_s, and one for each channel; or NPZ with arrays of these names and readings_v
     #[arg(long, value_name = "FILE", conflicts_with_all = ["detector", "material", "model", "lambda", "images"])]
     presses: Option<PathBuf>,
-    /// Frames at the start without contact, whose mean is the baseline [default: 32 of a recording, none of a table]
+    /// Frames at the start whose mean is the baseline, whatever they are, and which are not solved [default: of a recording, the baseline that live takes; of a
+    /// table, none]
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     rest: Option<u32>,
     /// Unit of the readings in a table [default: V]

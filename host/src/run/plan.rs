@@ -106,7 +106,7 @@ pub struct Ends {
     pub stop: Arc<AtomicBool>,
 }
 
-/// What a run of the run has come to.
+/// What a run has come to.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Summary {
     /// Where the bytes came from.

@@ -118,6 +118,11 @@ impl Follower for AutoFollower {
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         match lead.0 {
             Known::Image(descent, why) if !self.image.is_rest(readings) => {
+                // An image of the past is no better than contacts that explain the present.
+                let followed = self.follow(readings)?;
+                if self.imaged.is_none() && !followed.solution.contacts.is_empty() && !followed.solution.flags.misfit {
+                    return Ok(Followed { search: false, ..followed });
+                }
                 self.image.go_on_from(Some(*descent));
                 self.skip = self.patience;
                 self.patience = (2 * self.patience).min(PATIENCE[1]);
@@ -212,8 +217,11 @@ fn as_contacts(solution: Solution, search: bool) -> Solution {
 /// The solution of nothing; unless something stands out, and is searched.
 fn nothing(mut solution: Solution, search: bool) -> Solution {
     solution.flags.unfinished |= search;
-    let why = if search { "something touches; searching where" } else { "no reading stands out of the noise" };
-    chosen(solution, "nothing".to_owned(), why.to_owned())
+    let (what, why) = match search {
+        true => ("searching", "something touches, and it is not known yet what"),
+        false => ("nothing", "no reading stands out of the noise"),
+    };
+    chosen(solution, what.to_owned(), why.to_owned())
 }
 
 /// The solution of an image, and why it is one.

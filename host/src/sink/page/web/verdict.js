@@ -9,7 +9,7 @@ const WORDS_STAY_MS = 250;
 const WARNINGS = {
   saturated: ["saturated", "Readings at the end of the converter's range, or contacts that conduct so well that more would change nothing"],
   misfit: ["readings do not fit", "The readings are not what the model gives for what was found"],
-  unfinished: ["quick answer", "A cheaper answer, or a search that stopped at its limit of time or steps"],
+  unfinished: ["searching", "A better answer is being searched, or a search stopped at its limit of steps"],
 };
 
 function chip(kind, text, title) {
@@ -23,6 +23,7 @@ function chip(kind, text, title) {
 // What a passer-by calls it.
 function headline({ choice, contacts, image }) {
   const what = choice?.what ?? "";
+  if (what === "searching") return "Something touches";
   const counted = (word) => (contacts.length === 1 ? `1 ${word}` : `${contacts.length} ${word}s`);
   if (image.length && what !== "nothing") return contacts.length ? `Image, ${counted("peak")}` : "Image";
   if (contacts.length) return counted("contact");

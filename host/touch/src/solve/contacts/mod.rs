@@ -161,7 +161,9 @@ impl ContactFinder {
 
     /// What is known where there is no contact.
     pub fn nothing(&self, target: &Target) -> Solution {
-        let squares: f64 = target.volts.iter().map(|volts| (volts / self.errors.noise_v).powi(2)).sum();
+        // No voltage of a board is far beyond its drive.
+        let held = |volts: &f64| volts.clamp(-2.0 * self.errors.drive_v, 2.0 * self.errors.drive_v);
+        let squares: f64 = target.volts.iter().map(|volts| (held(volts) / self.errors.noise_v).powi(2)).sum();
         let residual = Some((squares / target.volts.len().max(1) as f64).sqrt());
         Solution { residual, ..Solution::default() }
     }
