@@ -16,6 +16,10 @@ const LEAKAGE: f64 = 0.005;
 /// Share of the drive above which something presses, whatever a person says.
 const PRESSED: f64 = 0.05;
 
+/// Deviations of its noise that the largest of a frame's readings may be beyond the limit: that of 256 is 2.8 in the mean, and beyond 6 once in
+/// two million frames.
+const DEVIATIONS: f64 = 6.0;
+
 /// Mean readings of a detector that nothing touches.
 #[derive(Clone, Debug)]
 pub struct Baseline {
@@ -26,6 +30,8 @@ pub struct Baseline {
     missing: u32,
     /// Largest mean that is taken for a baseline (V): by itself, and when it is asked for.
     largest_v: [f64; 2],
+    /// Standard deviation of a frame's reading (V).
+    noise_v: f64,
     state: BaselineState,
     /// Whether it was ever taken.
     held: bool,
@@ -55,7 +61,7 @@ impl Baseline {
         let code_v = full_scale_v / f64::from(1u32 << bits.min(31));
         let by_itself_v = (OFFSET_CODES * code_v).max(LEAKAGE * detector.drive_v);
         let largest_v = [by_itself_v, by_itself_v.max(PRESSED * detector.drive_v)];
-        Self { largest_v, ..Self::over(FRAMES, count) }
+        Self { largest_v, noise_v: detector.adc.deviation_v(), ..Self::over(FRAMES, count) }
     }
 
     /// The mean of so many frames of `count` readings, whatever they are; of none it stays zero.
@@ -68,6 +74,7 @@ impl Baseline {
             frames,
             missing: frames,
             largest_v: [f64::INFINITY; 2],
+            noise_v: 0.0,
             state,
             held: frames == 0,
         }
@@ -85,9 +92,18 @@ impl Baseline {
     }
 
     /// Takes the mean `readings_v` of `frames` frames into account, if the baseline is being taken; whether its state has changed.
-    pub fn add(&mut self, readings_v: &[f64], frames: u32) -> bool {
+    /// Readings of the electrodes `left_out` say nothing.
+    pub fn add(&mut self, readings_v: &[f64], frames: u32, left_out: &[usize]) -> bool {
         if self.missing == 0 || frames == 0 || readings_v.len() != self.sum_v.len() {
             return false;
+        }
+        let before = self.state;
+        let most_v = self.largest_v[usize::from(self.state == BaselineState::Renewing)];
+        let largest_v = largest_v(readings_v, left_out);
+        // A press that begins in the last of the frames hardly shows in their mean.
+        if largest_v > most_v + DEVIATIONS * self.noise_v / f64::from(frames).sqrt() {
+            self.refuse(largest_v);
+            return self.state != before;
         }
         let frames = frames.min(self.missing);
         self.sum_v.iter_mut().zip(readings_v).for_each(|(sum, volts)| *sum += f64::from(frames) * volts);
@@ -95,25 +111,24 @@ impl Baseline {
         if self.missing > 0 {
             return false;
         }
-        let before = self.state;
-        self.conclude();
+        let mean_v: Vec<f64> = self.sum_v.iter().map(|sum| sum / f64::from(self.frames)).collect();
+        let mean_largest_v = self::largest_v(&mean_v, left_out);
+        if mean_largest_v > most_v {
+            self.refuse(mean_largest_v);
+        } else {
+            (self.mean_v, self.state, self.held) = (mean_v, BaselineState::Held, true);
+        }
         self.state != before
     }
 
-    /// Judges the mean of the frames.
-    fn conclude(&mut self) {
-        let largest_v = self.sum_v.iter().map(|sum| sum.abs() / f64::from(self.frames)).fold(0.0, f64::max);
-        let asked = self.state == BaselineState::Renewing;
-        if largest_v <= self.largest_v[usize::from(asked)] {
-            self.mean_v.iter_mut().zip(&self.sum_v).for_each(|(mean, sum)| *mean = sum / f64::from(self.frames));
-            (self.state, self.held) = (BaselineState::Held, true);
-            return;
-        }
+    /// Something presses, with readings up to this (V).
+    fn refuse(&mut self, largest_v: f64) {
         self.state = match self.state {
             BaselineState::Renewing => BaselineState::Refused(largest_v),
             BaselineState::Starting => BaselineState::Pressed(largest_v),
             before => before,
         };
+        self.missing = 0;
         if !self.held {
             // The press may end: the next frames are looked at too.
             self.begin();
@@ -130,6 +145,13 @@ impl Baseline {
         let pairs = readings_v.iter().zip(&self.mean_v);
         touch_v.iter_mut().zip(pairs).for_each(|(touch, (volts, rest))| *touch = volts - rest);
     }
+}
+
+/// Largest of readings (V), row by row, but for those of electrodes that are left out.
+fn largest_v(readings_v: &[f64], left_out: &[usize]) -> f64 {
+    let electrodes = readings_v.len().isqrt().max(1);
+    let counts = |index: usize| !left_out.contains(&(index / electrodes)) && !left_out.contains(&(index % electrodes));
+    readings_v.iter().enumerate().filter(|(index, _)| counts(*index)).map(|(_, volts)| volts.abs()).fold(0.0, f64::max)
 }
 
 impl BaselineState {
@@ -174,7 +196,9 @@ mod tests {
     }
 
     fn add(baseline: &mut Baseline, volts: f64, frames: u32) {
-        (0..frames).for_each(|_| drop(baseline.add(&even(volts), 1)));
+        for _ in 0..frames {
+            baseline.add(&even(volts), 1, &[]);
+        }
     }
 
     #[test]
@@ -182,10 +206,10 @@ mod tests {
         let mut baseline = baseline();
         add(&mut baseline, 0.002, FRAMES / 2);
         assert_eq!((baseline.state(), touch_v(&baseline, 1.0)), (BaselineState::Starting, 1.0));
-        assert!(baseline.add(&even(0.004), FRAMES / 2), "means of several frames count as many");
+        assert!(baseline.add(&even(0.004), FRAMES / 2, &[]), "means of several frames count as many");
         assert_eq!(baseline.state(), BaselineState::Held);
         assert!((touch_v(&baseline, 1.0) - 0.997).abs() < 1e-12);
-        assert!(!baseline.add(&even(0.005), 99), "it stays");
+        assert!(!baseline.add(&even(0.005), 99, &[]), "it stays");
     }
 
     #[test]
@@ -197,6 +221,24 @@ mod tests {
         // It is taken as soon as nothing presses.
         add(&mut baseline, 0.003, 2 * FRAMES);
         assert!(baseline.state() == BaselineState::Held && touch_v(&baseline, 0.003).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_press_that_begins_while_the_baseline_is_taken_is_none_of_it() {
+        let mut baseline = baseline();
+        add(&mut baseline, 0.001, FRAMES - 1);
+        add(&mut baseline, 0.3, 1);
+        assert_eq!((baseline.state(), touch_v(&baseline, 0.3)), (BaselineState::Pressed(0.3), 0.3));
+    }
+
+    #[test]
+    fn a_broken_wire_is_no_press() {
+        let mut baseline = baseline();
+        let floating: Vec<f64> = (0..256).map(|i| if i / 16 == 3 || i % 16 == 3 { 0.6 } else { 0.002 }).collect();
+        for _ in 0..FRAMES {
+            baseline.add(&floating, 1, &[3]);
+        }
+        assert_eq!(baseline.state(), BaselineState::Held);
     }
 
     #[test]

@@ -28,10 +28,15 @@ pub fn as_measured(detector: &Detector, board: &Hello) -> Result<Detector, Misma
         return Err(Mismatch { board: found, detector: detector.name.clone(), expected });
     }
     let mut measured = detector.clone();
-    measured.drive_v = f64::from(board.drive_mv) * 1e-3;
+    measured.drive_v = volts(board.drive_mv);
     measured.adc.bits = board.adc_bits;
-    measured.adc.full_scale_v = f64::from(board.adc_full_scale_mv) * 1e-3;
+    measured.adc.full_scale_v = volts(board.adc_full_scale_mv);
     Ok(measured)
+}
+
+/// Volts of whole millivolts: as near as a number gets, so that a board which measures as the description says has its very voltages.
+fn volts(millivolts: u16) -> f64 {
+    f64::from(millivolts) / 1000.0
 }
 
 /// Makes volts of a board's codes.
@@ -48,7 +53,7 @@ impl Volts {
     pub fn of(board: &Hello) -> Self {
         let codes = f64::from(1u32 << board.adc_bits.min(31));
         let electrodes = usize::from(board.electrodes);
-        Self { per_code: f64::from(board.adc_full_scale_mv) * 1e-3 / codes, readings: electrodes * electrodes }
+        Self { per_code: volts(board.adc_full_scale_mv) / codes, readings: electrodes * electrodes }
     }
 
     /// Readings of a frame (V), row by row; `None` if it is a frame of another board.
@@ -75,6 +80,13 @@ mod tests {
         assert_eq!((measured.drive_v, measured.adc.bits, measured.adc.full_scale_v), (1.5, 10, 1.024));
         let mismatch = as_measured(&preset, &hello(32)).unwrap_err().to_string();
         assert!(mismatch.contains("32") && mismatch.contains("square-60 has 16"), "{mismatch}");
+    }
+
+    #[test]
+    fn a_board_as_described_changes_nothing() {
+        let preset = Detector::preset(Detector::DEFAULT).unwrap();
+        let board = Hello { adc_bits: 12, adc_full_scale_mv: 3300, drive_mv: 2000, ..hello(16) };
+        assert_eq!(as_measured(&preset, &board), Ok(preset));
     }
 
     #[test]

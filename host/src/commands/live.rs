@@ -7,6 +7,7 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
+use anyhow::ensure;
 use tactomo::board::link::Source;
 use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
@@ -129,8 +130,13 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
     let stop = interrupt::flag()?;
     let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
     let (request, requests) = mpsc::sync_channel(REQUESTS);
+    ensure!(
+        !(show.picture.json && show.stream.as_deref().is_some_and(|path| path.as_os_str() == "-")),
+        "--json and --stream - would both write to stdout: give the stream a file"
+    );
+    // Whatever cannot be is said before a page opens.
+    let plan = plan(&mut show, problem.clone())?;
     let server = serve(&show, &problem, shown, request)?;
-    let plan = plan(&mut show, problem)?;
     // The page may outlive the pipeline, so the snapshots have a sender here too.
     let ends = Ends { snapshots: snapshots.clone(), requests, stop: Arc::clone(&stop) };
     let summary = tactomo::run::run(&mut *show.source, plan, ends)?;

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use tactomo_board::baseline::Baseline;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, Method, Parts, Solution};
+use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, FoundContact, Method, Parts, Solution};
 
-use super::inbox::{Event, Inbox, Taken};
+use super::inbox::{Event, Inbox, Searched, Taken};
 use super::maker::{Made, Maker, Order};
 use super::notice::NoticeBoard;
 use super::plan::{Listener, LiveError, Solving};
@@ -20,9 +20,9 @@ use super::{FrameSnapshot, SolvedFrame};
 /// Longest wait for a frame: then the rate shown falls.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Rest after a search that has changed nothing, doubled each time up to the second: what cannot be explained better need not be searched
-/// a hundred times a second. A residual that jumps ends the rest.
-const REST: [Duration; 2] = [Duration::from_millis(10), Duration::from_millis(320)];
+/// Pause after a search that has changed nothing, doubled each time up to the second: what cannot be explained better need not be searched
+/// a hundred times a second. A residual that jumps ends the pause.
+const PAUSE: [Duration; 2] = [Duration::from_millis(10), Duration::from_millis(320)];
 /// Rise of the residual that ends it.
 const JUMP: f64 = 1.3;
 
@@ -40,16 +40,18 @@ impl FollowThread {
         let search = SearchThread::start(Arc::clone(inbox), Arc::clone(&solving.look_at_wires))?;
         let maker = Maker::new(solving, Arc::clone(inbox));
         let (inbox, notice) = (Arc::clone(inbox), Arc::clone(notice));
-        let desk = Desk {
+        let desk = FollowLoop {
             inbox,
             notice,
             maker,
             search,
             listeners,
-            seat: None,
-            rest: Rest::default(),
+            board: None,
+            pause: SearchPause::default(),
             solved: None,
-            better: None,
+            wants_search: false,
+            found: Vec::new(),
+            unshown: None,
         };
         let thread = thread::Builder::new().name("follower".to_owned());
         Ok(Self(thread.spawn(move || desk.run())?))
@@ -65,22 +67,26 @@ impl FollowThread {
 }
 
 /// Everything that the thread works with.
-struct Desk {
+struct FollowLoop {
     inbox: Arc<Inbox>,
     notice: Arc<NoticeBoard>,
     maker: Maker,
     search: SearchThread,
     listeners: Vec<Box<dyn Listener>>,
-    seat: Option<Seat>,
-    rest: Rest,
+    board: Option<BoardState>,
+    pause: SearchPause,
     /// The frame that was solved last, for answers that come after it.
     solved: Option<Solved>,
-    /// A better answer to it, which the next frame's will replace.
-    better: Option<(Followed, Instant)>,
+    /// Whether a search may find something better for it.
+    wants_search: bool,
+    /// The contacts that were found last, for another solver to number on from.
+    found: Vec<FoundContact>,
+    /// The newest answer, if it came too soon after the one that is shown.
+    unshown: Option<FrameSnapshot>,
 }
 
 /// What belongs to one detector.
-struct Seat {
+struct BoardState {
     detector: Arc<Detector>,
     noise_v: f64,
     baseline: Baseline,
@@ -91,7 +97,7 @@ struct Seat {
     steady: Option<Steady>,
 }
 
-/// A frame on the desk.
+/// A frame that was answered.
 struct Solved {
     frame: Taken,
     touch: Readings,
@@ -99,7 +105,7 @@ struct Solved {
 
 /// When to search again.
 #[derive(Default)]
-struct Rest {
+struct SearchPause {
     until: Option<Instant>,
     length: Duration,
     residual: f64,
@@ -113,7 +119,7 @@ impl Drop for CloseOnDrop {
     }
 }
 
-impl Desk {
+impl FollowLoop {
     fn run(mut self) -> Result<(), LiveError> {
         // However it ends, the reader is not left waiting.
         let _closes = CloseOnDrop(Arc::clone(&self.inbox));
@@ -122,58 +128,84 @@ impl Desk {
 
     fn work(&mut self) -> Result<(), LiveError> {
         loop {
-            let is_ready = self.seat.as_ref().is_some_and(|seat| seat.follower.is_some());
+            let is_ready = self.board.as_ref().is_some_and(|board| board.follower.is_some());
             match self.inbox.take(PATIENCE, is_ready) {
-                Event::Closed => return Ok(()),
-                Event::Quiet => {
-                    if let Some((better, begun)) = self.better.take() {
-                        self.answer(better, begun, false);
-                    }
-                    self.notice.keep_fresh();
+                Event::Closed => {
+                    self.show_newest();
+                    return Ok(());
                 }
-                Event::Board(detector) => self.sit_down(detector),
+                Event::Quiet => self.be_quiet(),
+                Event::Board(detector) => self.begin_with(detector),
                 Event::Method(method) => self.change_method(method),
                 Event::Solver(made) => self.change_solver(made)?,
                 Event::Rezero => {
-                    if let Some(seat) = &mut self.seat {
-                        seat.baseline.renew();
+                    if let Some(board) = &mut self.board {
+                        board.baseline.renew();
                     }
                 }
                 Event::Jumped => {
-                    if let Some(seat) = &mut self.seat {
-                        seat.steady = None;
-                        seat.follower.as_mut().into_iter().for_each(|follower| follower.reset());
+                    self.search.forget();
+                    (self.solved, self.wants_search) = (None, false);
+                    if let Some(board) = &mut self.board {
+                        board.steady = None;
+                        board.follower.as_mut().into_iter().for_each(|follower| follower.reset());
                     }
                 }
                 Event::Looked(look, found) => {
                     self.search.looked();
-                    let changed = self.seat.as_mut().is_some_and(|seat| seat.watch.conclude(look, found));
+                    let changed = self.board.as_mut().is_some_and(|board| board.watch.conclude(look, found));
                     if changed {
                         self.order(self.maker.method());
                     }
                 }
-                Event::Searched(searched) => {
-                    let is_last = searched.is_last;
-                    if let Some(lead) = self.search.receive(searched)
-                        && let (Some(seat), Some(solved)) = (&mut self.seat, &self.solved)
-                        && let Some(follower) = &mut seat.follower
-                    {
-                        let begun = Instant::now();
-                        let adopted = follower.adopt(lead, &solved.touch)?;
-                        if is_last {
-                            self.rest.after_search(&adopted.solution);
-                        }
-                        self.better = Some((adopted, begun));
-                    }
-                }
+                Event::Searched(searched) => self.searched(searched)?,
                 Event::Frame(frame) => self.frame(frame)?,
             }
         }
     }
 
+    /// Goes on from what a search has found. Where a frame waits, the answer to that shows it.
+    fn searched(&mut self, searched: Searched) -> Result<(), LiveError> {
+        let is_last = searched.is_last;
+        let Some(lead) = self.search.receive(searched) else { return Ok(()) };
+        let (Some(board), Some(solved)) = (&mut self.board, &self.solved) else { return Ok(()) };
+        let Some(follower) = &mut board.follower else { return Ok(()) };
+        let begun = Instant::now();
+        let adopted = follower.adopt(lead, &solved.touch)?;
+        if is_last {
+            self.pause.after_search(&adopted.solution);
+        }
+        if self.inbox.is_empty() {
+            self.answer(adopted, begun, false);
+        }
+        Ok(())
+    }
+
+    /// Where no frame comes, shows what is known and searches what is not.
+    fn be_quiet(&mut self) {
+        self.show_newest();
+        if self.wants_search
+            && self.pause.until.is_none_or(|until| Instant::now() >= until)
+            && !self.search.is_busy()
+            && let (Some(board), Some(solved)) = (&self.board, &self.solved)
+            && let Some(follower) = &board.follower
+        {
+            self.wants_search = false;
+            self.search.search(follower.lead(), board.for_search(&solved.touch));
+        }
+        self.notice.keep_fresh();
+    }
+
+    /// Shows the newest answer, if it has come too soon after the one that is shown.
+    fn show_newest(&mut self) {
+        if let Some(shown) = self.unshown.take() {
+            self.notice.publish(|snapshot| snapshot.frame = Some(shown));
+        }
+    }
+
     /// Begins with a board's detector, or with another.
-    fn sit_down(&mut self, detector: Arc<Detector>) {
-        self.seat = Some(Seat {
+    fn begin_with(&mut self, detector: Arc<Detector>) {
+        self.board = Some(BoardState {
             noise_v: detector.adc.deviation_v(),
             baseline: Baseline::new(&detector),
             watch: ElectrodeWatch::new(&detector),
@@ -186,29 +218,30 @@ impl Desk {
     }
 
     fn change_method(&mut self, method: Method) {
-        match self.seat {
+        match self.board {
             Some(_) => self.order(method),
             None => self.maker.begin_with(method),
         }
     }
 
     fn order(&mut self, method: Method) {
-        let Some(seat) = &self.seat else { return };
-        self.maker.order(seat.order(method));
+        let Some(board) = &self.board else { return };
+        self.maker.order(board.order(method));
         self.show_solver();
     }
 
     /// Goes on with a solver that was made. The first one has to be.
     fn change_solver(&mut self, made: Made) -> Result<(), LiveError> {
-        match (self.maker.receive(made), &mut self.seat) {
-            (Ok(Some((order, solver))), Some(seat)) if order.detector == seat.detector => {
-                let Parts { follower, searcher } = self.inbox.parts_of(solver);
+        match (self.maker.receive(made), &mut self.board) {
+            (Ok(Some((order, solver))), Some(board)) if order.detector == board.detector => {
+                let Parts { mut follower, searcher } = self.inbox.parts_of(solver);
+                follower.inherit(&self.found);
                 self.search.change_solver(searcher);
-                seat.follower = Some(follower);
+                board.follower = Some(follower);
                 self.inbox.set_ready();
-                self.rest = Rest::default();
+                self.pause = SearchPause::default();
             }
-            (Err(error), Some(Seat { follower: None, .. })) => return Err(LiveError::MakeSolver(error)),
+            (Err(error), Some(BoardState { follower: None, .. })) => return Err(LiveError::MakeSolver(error)),
             (Err(error), _) => tracing::warn!("the solver stays, for another cannot be made: {error}"),
             _ => {}
         }
@@ -222,18 +255,18 @@ impl Desk {
     }
 
     fn frame(&mut self, frame: Taken) -> Result<(), LiveError> {
-        let Some(seat) = &mut self.seat else { return Ok(()) };
+        let Some(board) = &mut self.board else { return Ok(()) };
         let begun = Instant::now();
-        if seat.baseline.add(frame.mean.volts(), frame.averaged) {
-            self.notice.change(|snapshot| snapshot.baseline = seat.baseline.state().notice());
+        let left_out: Vec<usize> = board.watch.faulty().faults.iter().map(|(electrode, _)| *electrode).collect();
+        if board.baseline.add(frame.mean.volts(), frame.averaged, &left_out) {
+            self.notice.change(|snapshot| snapshot.baseline = board.baseline.state().notice());
         }
         let mut touch = frame.mean.clone();
-        seat.baseline.subtract(frame.mean.volts(), touch.volts_mut());
-        seat.keep_steady(&touch);
-        let changed = seat.watch.note(&touch);
-        let Some(follower) = &mut seat.follower else { return Ok(()) };
+        board.baseline.subtract(frame.mean.volts(), touch.volts_mut());
+        board.keep_steady(&touch);
+        let changed = board.watch.note(&touch);
+        let Some(follower) = &mut board.follower else { return Ok(()) };
         let followed = follower.follow(&touch)?;
-        self.better = None;
         self.solved = Some(Solved { frame, touch });
         self.answer(followed, begun, true);
         if changed {
@@ -242,36 +275,40 @@ impl Desk {
         Ok(())
     }
 
-    /// Gives an answer to the frame on the desk, and searches a better one if there may be one.
+    /// Gives an answer to the newest frame, and searches a better one if there may be one.
     fn answer(&mut self, followed: Followed, begun: Instant, is_new: bool) {
-        let (Some(seat), Some(solved)) = (&mut self.seat, &self.solved) else { return };
+        let (Some(board), Some(solved)) = (&mut self.board, &self.solved) else { return };
         let Followed { solution, search } = followed;
+        self.wants_search = search;
         let now = Instant::now();
         self.notice.count(|meter| {
             let came = if is_new { solved.frame.came } else { 0 };
             meter.solved(came, now - solved.frame.arrived, now - begun);
         });
-        let told = SolvedFrame { frame: &solved.frame, solution: &solution, age: now - solved.frame.arrived };
-        self.listeners.iter_mut().for_each(|listener| listener.solved(&told));
+        let answered = SolvedFrame { frame: &solved.frame, solution: &solution, age: now - solved.frame.arrived };
+        self.listeners.iter_mut().for_each(|listener| listener.solved(&answered));
         if !self.search.is_busy() {
-            if let Some(look) = seat.watch.look(&solution) {
-                self.search.look(seat.order(self.maker.method()), look, solved.touch.clone());
+            if let Some(look) = board.watch.look(&solution) {
+                self.search.look(board.order(self.maker.method()), look, solved.touch.clone());
             } else if search
-                && self.rest.is_over(&solution, now)
-                && let Some(follower) = &seat.follower
+                && self.pause.is_over(&solution, now)
+                && let Some(follower) = &board.follower
             {
-                self.search.search(follower.lead(), seat.for_search(&solved.touch));
+                self.search.search(follower.lead(), board.for_search(&solved.touch));
             }
         }
+        self.found.clone_from(&solution.contacts);
+        let shown = solved.frame.snapshot(solution, board.baseline.state().is_taking());
         if self.notice.is_due() {
-            let rezeroing = seat.baseline.state().is_taking();
-            let shown = solved.frame.snapshot(solution, rezeroing);
+            self.unshown = None;
             self.notice.publish(|snapshot| snapshot.frame = Some(shown));
+        } else {
+            self.unshown = Some(shown);
         }
     }
 }
 
-impl Seat {
+impl BoardState {
     /// The solver of a method for this detector as it is.
     fn order(&self, method: Method) -> Order {
         Order { method, detector: Arc::clone(&self.detector), faulty: self.watch.faulty().clone() }
@@ -294,18 +331,18 @@ impl Seat {
     }
 }
 
-impl Rest {
+impl SearchPause {
     /// Whether a search is worth it again.
     fn is_over(&self, solution: &Solution, now: Instant) -> bool {
         let residual = solution.residual.unwrap_or_default();
         self.until.is_none_or(|until| now >= until) || residual > JUMP * self.residual
     }
 
-    /// Rests after a search: the longer, the less has changed.
+    /// Pauses after a search: the longer, the less has changed.
     fn after_search(&mut self, solution: &Solution) {
         let residual = solution.residual.unwrap_or_default();
         let is_same = self.until.is_some() && residual * JUMP > self.residual && residual < JUMP * self.residual;
-        self.length = if is_same { (2 * self.length).min(REST[1]) } else { REST[0] };
+        self.length = if is_same { (2 * self.length).min(PAUSE[1]) } else { PAUSE[0] };
         self.until = Some(Instant::now() + self.length);
         self.residual = residual;
     }

@@ -14,6 +14,9 @@ use tactomo_touch::solve::{Lead, Look, Method, Parts, Solver};
 use super::maker::Made;
 use super::steady::Steady;
 
+/// Longest wait before it is asked whether there is still something to wait for.
+const LONGEST_WAIT: Duration = Duration::from_millis(50);
+
 /// A frame, or the mean of some that stood still.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taken {
@@ -61,8 +64,8 @@ pub enum Event {
 
 /// What a search has found.
 pub struct Searched {
-    /// Of which solver: the number of those that were made before it.
-    pub solver: u64,
+    /// The epoch in which it was asked for.
+    pub epoch: u64,
     /// What it has found.
     pub lead: Lead,
     /// Whether it has ended with that.
@@ -103,6 +106,21 @@ impl Inbox {
         self.changed.notify_all();
     }
 
+    /// Says that the frames to come do not follow those before, which nobody wants any more.
+    pub fn jump(&self) {
+        let mut state = self.lock();
+        (state.pending, state.steady) = (None, None);
+        state.events.push_back(Event::Jumped);
+        drop(state);
+        self.changed.notify_all();
+    }
+
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        let state = self.lock();
+        state.pending.is_none() && state.events.is_empty()
+    }
+
     /// Puts a frame in, in place of one that was not taken; `noise_v` is the deviation of a reading.
     pub fn put_frame(&self, frame: Taken, noise_v: f64) {
         let mut state = self.lock();
@@ -141,10 +159,15 @@ impl Inbox {
         self.changed.notify_all();
     }
 
-    /// Waits until there is a solver, or there will be none.
-    pub fn wait_until_ready(&self) {
+    /// Waits until there is a solver, or there will be none, or `is_over` says that nobody wants one.
+    pub fn wait_until_ready(&self, is_over: impl Fn() -> bool) {
         let waiting = |state: &mut State| !state.ready && !state.closed;
-        drop(self.changed.wait_while(self.lock(), waiting));
+        while !is_over() {
+            let waited = self.changed.wait_timeout_while(self.lock(), LONGEST_WAIT, waiting);
+            if !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out() {
+                return;
+            }
+        }
     }
 
     /// Says that nothing more comes, or that nobody takes it.

@@ -115,7 +115,11 @@ impl Maker {
         });
         match spawned {
             Ok(_) => self.making = Some(order),
-            Err(error) => self.refused = Some(format!("{}: {error}", order.method.name())),
+            Err(error) => {
+                let made = Made { order: order.clone(), solver: Err(error.into()) };
+                self.inbox.put(Event::Solver(made));
+                self.making = Some(order);
+            }
         }
     }
 }

@@ -1,4 +1,5 @@
-//! The thread that receives: it reads, stamps, records, decodes and counts, and never waits for anything else.
+//! The thread that receives: it reads, stamps, records, decodes and counts, and never waits for a disk, a page or a solver, but where each
+//! frame of a recording is to be answered.
 
 use std::io;
 use std::sync::Arc;
@@ -43,7 +44,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     if follower.is_some() {
         // Most boards measure as the detector's description says, so their first frame finds a solver.
         inbox.put(Event::Board(Arc::new(plan.detector.clone())));
-        inbox.wait_until_ready();
+        inbox.wait_until_ready(|| stop.load(Ordering::Relaxed));
     }
     let mut reader = Reader {
         plan,
@@ -133,6 +134,8 @@ struct Talk {
     counted: u64,
     /// Whether no frame has come since a jump.
     landing: bool,
+    /// What the board has refused, as it is shown.
+    refusal: Option<session::Refusal>,
 }
 
 impl Reader {
@@ -188,7 +191,7 @@ impl Reader {
                     if link.jumped() {
                         self.sequence.restart();
                         talk.jumped();
-                        self.inbox.put(Event::Jumped);
+                        self.inbox.jump();
                     }
                     self.receive(&mut talk, link, &buffer[..count])?;
                 }
@@ -197,7 +200,7 @@ impl Reader {
             if comes_back && talk.is_in_vain() {
                 return self.unanswered(&talk, link);
             }
-            self.show_link(link, &talk);
+            self.show_link(link, &mut talk);
         }
         Ok(End::Stopped)
     }
@@ -362,14 +365,16 @@ impl Reader {
     }
 
     /// Shows how the link fares.
-    fn show_link(&mut self, link: &dyn Link, talk: &Talk) {
+    fn show_link(&mut self, link: &dyn Link, talk: &mut Talk) {
         if talk.session.is_mute(Instant::now()) {
             self.enter(LinkState::Silent(session::MUTE.to_owned()));
         } else if talk.junk.is_some() {
             self.enter(LinkState::Streaming);
         }
-        if let Some(refusal) = talk.session.refusal() {
-            self.notice.change(|snapshot| snapshot.refused = Some(refusal.to_string()));
+        let refusal = talk.session.refusal();
+        if refusal != talk.refusal {
+            self.notice.change(|snapshot| snapshot.refused = refusal.map(|refusal| refusal.to_string()));
+            talk.refusal = refusal;
         }
         let playing = link.playing();
         self.notice.change(|snapshot| snapshot.playing = playing);
@@ -394,6 +399,7 @@ impl Talk {
             junk: None,
             counted: 0,
             landing: false,
+            refusal: None,
         }
     }
 

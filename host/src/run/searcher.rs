@@ -14,9 +14,9 @@ use super::plan::LookAtWires;
 /// What the thread is asked.
 enum Job {
     /// To search with another solver's half from now on.
-    Solver { solver: u64, half: Option<Box<dyn Searcher>> },
+    Solver(Option<Box<dyn Searcher>>),
     /// To search what explains readings.
-    Search { from: Lead, readings: Readings },
+    Search { epoch: u64, from: Lead, readings: Readings },
     /// To look for exchanged wires.
     Look { order: Order, look: Look, readings: Readings },
 }
@@ -26,7 +26,8 @@ pub(super) struct SearchThread {
     jobs: Option<Sender<Job>>,
     thread: Option<JoinHandle<()>>,
     busy: bool,
-    solver: u64,
+    /// Counts what makes running searches useless: another solver, a jump.
+    epoch: u64,
 }
 
 impl SearchThread {
@@ -34,13 +35,18 @@ impl SearchThread {
     pub fn start(inbox: Arc<Inbox>, look: LookAtWires) -> std::io::Result<Self> {
         let (jobs, queue) = channel();
         let thread = thread::Builder::new().name("searcher".to_owned()).spawn(move || work(&queue, &inbox, &look))?;
-        Ok(Self { jobs: Some(jobs), thread: Some(thread), busy: false, solver: 0 })
+        Ok(Self { jobs: Some(jobs), thread: Some(thread), busy: false, epoch: 0 })
     }
 
     /// Searches with this half from now on; what is still searched with another is thrown away.
     pub fn change_solver(&mut self, half: Option<Box<dyn Searcher>>) {
-        self.solver += 1;
-        self.send(Job::Solver { solver: self.solver, half });
+        self.forget();
+        self.send(Job::Solver(half));
+    }
+
+    /// Throws away what is being searched.
+    pub fn forget(&mut self) {
+        self.epoch += 1;
     }
 
     /// Whether it has something to do.
@@ -50,20 +56,18 @@ impl SearchThread {
 
     /// Searches what explains `readings`, of which `from` explains a part.
     pub fn search(&mut self, from: Lead, readings: Readings) {
-        self.busy = true;
-        self.send(Job::Search { from, readings });
+        self.busy = self.send(Job::Search { epoch: self.epoch, from, readings });
     }
 
     /// Looks for exchanged wires.
     pub fn look(&mut self, order: Order, look: Look, readings: Readings) {
-        self.busy = true;
-        self.send(Job::Look { order, look, readings });
+        self.busy = self.send(Job::Look { order, look, readings });
     }
 
-    /// Takes what has come from it: the lead, unless another solver is in use by now.
+    /// Takes what has come from it: the lead, unless it is of no use by now.
     pub fn receive(&mut self, searched: Searched) -> Option<Lead> {
         self.busy &= !searched.is_last;
-        (searched.solver == self.solver).then_some(searched.lead)
+        (searched.epoch == self.epoch).then_some(searched.lead)
     }
 
     /// Takes note that a look has ended.
@@ -71,12 +75,9 @@ impl SearchThread {
         self.busy = false;
     }
 
-    fn send(&self, job: Job) {
-        if let Some(jobs) = &self.jobs
-            && jobs.send(job).is_err()
-        {
-            tracing::error!("the searching thread has ended; answers stay as they are followed");
-        }
+    /// Whether the thread takes it.
+    fn send(&self, job: Job) -> bool {
+        self.jobs.as_ref().is_some_and(|jobs| jobs.send(job).is_ok())
     }
 }
 
@@ -89,19 +90,27 @@ impl Drop for SearchThread {
 }
 
 fn work(jobs: &Receiver<Job>, inbox: &Inbox, look_at_wires: &LookAtWires) {
-    let (mut solver, mut half): (u64, Option<Box<dyn Searcher>>) = (0, None);
+    let mut half: Option<Box<dyn Searcher>> = None;
     while let Ok(job) = jobs.recv() {
         if inbox.is_closed() {
             return;
         }
         match job {
-            Job::Solver { solver: of, half: next } => (solver, half) = (of, next),
-            Job::Search { from, readings } => {
-                let mut better = |lead| inbox.put(Event::Searched(Searched { solver, lead, is_last: false }));
-                let found = half.as_mut().map(|half| half.search(from, &readings, &mut better));
+            Job::Solver(next) => half = next,
+            Job::Search { epoch, from, readings } => {
+                let mut better = |lead| inbox.put(Event::Searched(Searched { epoch, lead, is_last: false }));
+                // Whatever happens, the follower is not left waiting.
+                let search = std::panic::AssertUnwindSafe(|| {
+                    half.as_mut().map(|half| half.search(from, &readings, &mut better))
+                });
+                let found = std::panic::catch_unwind(search).unwrap_or_else(|_| {
+                    tracing::error!("a search panicked: this is a mistake in the program, please report it");
+                    half = None;
+                    None
+                });
                 // Readings that cannot be were refused by the follower before.
                 let lead = found.and_then(Result::ok).unwrap_or_default();
-                inbox.put(Event::Searched(Searched { solver, lead, is_last: true }));
+                inbox.put(Event::Searched(Searched { epoch, lead, is_last: true }));
             }
             Job::Look { order, look, readings } => {
                 let found = look_at_wires(&order, look, &readings);

@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tactomo_touch::schema::FrameReport;
 
@@ -16,6 +16,8 @@ use crate::run::plan::Listener;
 const QUEUE: usize = 4096;
 /// Longest that a line waits in the buffer.
 const FLUSH_EVERY: Duration = Duration::from_millis(20);
+/// Longest wait for a reader at the end.
+const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Why there is no stream.
 #[derive(Debug, thiserror::Error)]
@@ -76,6 +78,15 @@ impl Listener for Stream {
 impl Drop for Stream {
     fn drop(&mut self) {
         self.lines = None;
+        // A reader that is there and does not read would be waited for for ever.
+        let end = Instant::now() + PATIENCE;
+        while self.writer.as_ref().is_some_and(|writer| !writer.is_finished()) {
+            if Instant::now() > end {
+                tracing::warn!("the stream's reader does not read: the last lines are lost");
+                return;
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
         match self.writer.take().map(JoinHandle::join) {
             // Whoever reads has enough.
             Some(Ok(Err(error))) if error.kind() == io::ErrorKind::BrokenPipe => return,
@@ -89,11 +100,69 @@ impl Drop for Stream {
 }
 
 fn write(lines: &Receiver<String>, mut out: BufWriter<Box<dyn Write + Send>>) -> io::Result<()> {
+    let mut flushed = Instant::now();
     loop {
         match lines.recv_timeout(FLUSH_EVERY) {
             Ok(line) => writeln!(out, "{line}")?,
-            Err(RecvTimeoutError::Timeout) => out.flush()?,
+            Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return out.flush(),
         }
+        if flushed.elapsed() >= FLUSH_EVERY {
+            out.flush()?;
+            flushed = Instant::now();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+    use crate::run::Taken;
+    use tactomo_physics::readings::Readings;
+    use tactomo_touch::solve::{FoundContact, Solution};
+
+    #[derive(Clone, Default)]
+    struct Shared(Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Shared {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.lock().unwrap().extend(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn answers_are_lines_that_do_not_wait_while_more_come() {
+        let out = Shared::default();
+        let mut stream = Stream::start(Box::new(out.clone())).unwrap();
+        let readings = Readings::from_fn(4, |_, _| 0.0);
+        let solution = Solution { contacts: vec![FoundContact::flat(0.01, 0.0, 1e-3)], ..Solution::default() };
+        for sequence in 0..20 {
+            let frame = Taken {
+                newest: readings.clone(),
+                mean: readings.clone(),
+                averaged: 1,
+                came: 1,
+                sequence,
+                board_time_us: 1000 * sequence,
+                arrived: Instant::now(),
+                status: Default::default(),
+            };
+            stream.solved(&SolvedFrame { frame: &frame, solution: &solution, age: Duration::from_micros(50) });
+            thread::sleep(Duration::from_millis(5));
+        }
+        assert!(!out.0.lock().unwrap().is_empty(), "lines wait at most {FLUSH_EVERY:?}");
+        drop(stream);
+        let text = String::from_utf8(out.0.lock().unwrap().clone()).unwrap();
+        let lines: Vec<serde_json::Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert_eq!((lines.len(), &lines[19]["sequence"]), (20, &19.into()));
+        assert_eq!((&lines[3]["contacts"][0]["x_m"], &lines[3]["time_s"]), (&0.01.into(), &0.003.into()));
+        assert!((lines[0]["age_us"].as_f64().unwrap() - 50.0).abs() < 1e-9);
     }
 }

@@ -78,6 +78,18 @@ impl Live {
         Self { answers, summary, recording, scene }
     }
 
+    /// Whether there was an answer as often as answers take, soon after the start and then without a gap, and none was old: 50 ms or what an
+    /// answer takes, whichever is longer, and twice that on a busy machine.
+    pub fn is_timely(&self, seconds: f64) -> bool {
+        let answer_s = 1e-6 * self.summary.latency_us.p99.max(833.0);
+        let longest_s = 2.0 * answer_s.max(0.05);
+        let times = self.answers.iter().map(|answer| answer.time_s);
+        let first = times.clone().next().is_some_and(|first_s| first_s < SETTLED_S + longest_s);
+        let gaps = times.clone().zip(times.skip(1)).map(|(a, b)| b - a).fold(0.0, f64::max);
+        let enough = self.answers.len() as f64 > 0.3 * (seconds - SETTLED_S) / answer_s;
+        first && enough && gaps < longest_s + answer_s && self.summary.age_us.p99 * 1e-6 < longest_s
+    }
+
     /// What truly touched at each answer's time.
     pub fn truths(&self) -> Vec<Vec<Touch>> {
         self.answers.iter().map(|answer| self.scene.at(answer.time_s)).collect()

@@ -31,7 +31,8 @@ fn is_alike(problem: &Problem, method: Method, scene: SceneName, seconds: f64) -
     let [live_score, offline_score] = [&live.answers, &offline]
         .map(|answers| Score::of(problem, &truth, answers.iter().map(|answer| &answer.solution)));
     let summary = &live.summary;
-    let alike = live_score.is_as_good_as(&offline_score) && summary.dropped == 0 && summary.corrupt == 0;
+    let lossless = summary.dropped == 0 && summary.corrupt == 0;
+    let alike = live_score.is_as_good_as(&offline_score) && lossless && live.is_timely(seconds);
     println!(
         "{:<15} {:<15} live {live_score}  offline {offline_score}  age p50 {:>6.2} p99 {:>6.2} ms, answer p99 {:>6.2} ms, {:>5} answers{}",
         method.name(),

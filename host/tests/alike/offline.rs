@@ -24,7 +24,7 @@ pub fn answers(problem: &Problem, method: Method, live: &Live) -> Vec<Answer> {
         if sequence > last {
             break;
         }
-        baseline.add(&frame.volts, 1);
+        baseline.add(&frame.volts, 1, &[]);
         let is_answered = answered.contains(&sequence);
         if is_answered || !SLOW.contains(&method) {
             let mut touch = frame.volts.clone();

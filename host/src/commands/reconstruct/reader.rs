@@ -64,7 +64,7 @@ impl Reader {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
             if self.given == 0 {
-                self.baseline.add(&frame.volts, 1);
+                self.baseline.add(&frame.volts, 1, &[]);
                 let volts = frame.volts.clone();
                 self.baseline.subtract(&volts, &mut frame.volts);
                 return Ok(Some(frame));
@@ -72,7 +72,7 @@ impl Reader {
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
                 bail!("{}: the baseline needs finite readings, but some of these are not", self.place());
             }
-            self.baseline.add(&frame.volts, 1);
+            self.baseline.add(&frame.volts, 1, &[]);
             self.given -= 1;
         }
         Ok(None)

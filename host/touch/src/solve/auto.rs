@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 use super::contacts::{ContactFinder, ContactFollower, ContactSearcher};
 use super::follow::{Followed, Follower, Known, Lead, Parts, Searcher, follow_and_search};
-use super::{Choice, ContactSettings, Nonlinear, NonlinearSettings, Problem, Solution, SolveError, Solver};
+use super::{
+    Choice, ContactSettings, FoundContact, Nonlinear, NonlinearSettings, Problem, Solution, SolveError, Solver,
+};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
@@ -102,7 +104,7 @@ impl AutoFollower {
         Ok(Followed { solution: as_contacts(contacts.solution(&target), search), search })
     }
 
-    fn rest(&mut self) {
+    fn begin_with_contacts(&mut self) {
         (self.imaged, self.skip, self.patience) = (None, 0, PATIENCE[0]);
     }
 }
@@ -127,16 +129,23 @@ impl Follower for AutoFollower {
                 self.skip = self.patience;
                 self.patience = (2 * self.patience).min(PATIENCE[1]);
                 if let Some(contacts) = &mut self.contacts {
-                    contacts.rest();
+                    contacts.let_go();
                 }
                 self.follow_image(readings, why)
             }
             known => {
-                self.rest();
+                // Nor are contacts of the past better than an image that explains the present.
+                let image = self.imaged.take().map(|why| self.follow_image(readings, why)).transpose()?;
                 let Some(contacts) = &mut self.contacts else { return self.follow_contacts(readings) };
                 let target = contacts.finder().target(readings)?;
-                contacts.adopt(Lead(known).into_contacts(), &target);
-                Ok(Followed { solution: as_contacts(contacts.solution(&target), false), search: false })
+                let search = contacts.adopt(Lead(known).into_contacts(), &target);
+                if let Some(image) = image.filter(|image| contacts.residual(&target) > image.solution.residual) {
+                    contacts.let_go();
+                    return Ok(image);
+                }
+                let solution = as_contacts(contacts.solution(&target), search);
+                self.begin_with_contacts();
+                Ok(Followed { solution, search })
             }
         }
     }
@@ -149,12 +158,18 @@ impl Follower for AutoFollower {
         }
     }
 
+    fn inherit(&mut self, before: &[FoundContact]) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.inherit(before);
+        }
+    }
+
     fn reset(&mut self) {
         if let Some(contacts) = &mut self.contacts {
             contacts.reset();
         }
         self.image.reset();
-        self.rest();
+        self.begin_with_contacts();
     }
 }
 
@@ -241,7 +256,6 @@ fn counted(contacts: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::FoundContact;
     use tactomo_physics::detector::Detector;
     use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
     use tactomo_physics::scene::Contact;
@@ -278,6 +292,15 @@ mod tests {
             measured(&exact, &self.detector.adc, &mut self.noise)
         }
 
+        /// Readings of a frame all around: nothing that a few discs can be.
+        fn frame_around(&mut self) -> Readings {
+            let nodes = &self.fine.image_mesh().nodes_m;
+            let ring: Vec<_> =
+                nodes.iter().map(|[x, y]| f64::from(u8::from((x.hypot(*y) - 0.018).abs() < 0.002)) * 2e-4).collect();
+            let exact = readings_v(&self.fine.image_impedance_ohm(&ring).unwrap(), &self.detector);
+            measured(&exact, &self.detector.adc, &mut self.noise)
+        }
+
         fn problem(&self) -> Problem {
             let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&self.detector).unwrap());
             Problem::new(slab)
@@ -298,14 +321,8 @@ mod tests {
         assert_eq!((what(&one), one.contacts.len()), ("1 contact", 1));
         let two = bench.touched(&[a, b]);
         assert_eq!((what(&two), two.contacts.len()), ("2 contacts", 2));
-        // A frame all around: nothing that a few discs can be.
-        let nodes = bench.fine.image_mesh().nodes_m.clone();
-        let ring = nodes
-            .iter()
-            .map(|[x, y]| f64::from(u8::from((x.hypot(*y) - 0.018).abs() < 0.002)) * 2e-4)
-            .collect::<Vec<_>>();
-        let exact = readings_v(&bench.fine.image_impedance_ohm(&ring).unwrap(), &bench.detector);
-        let image = bench.solve(&exact);
+        let around = bench.frame_around();
+        let image = bench.auto.solve(&around).unwrap();
         assert_eq!((what(&image), image.image_s_per_m2.is_some()), ("image", true), "{:?}", image.choice);
         let again = bench.touched(&[a]);
         assert_eq!(what(&again), "1 contact", "the image no longer explains anything");
@@ -357,5 +374,23 @@ mod tests {
         follower.adopt(lead, &present).unwrap();
         let kept = follower.adopt(past, &bench.measured(&[a, b])).unwrap();
         assert_eq!(what(&kept.solution), "2 contacts");
+    }
+
+    #[test]
+    fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
+        let mut bench = Bench::new();
+        let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+        let mut searcher = searcher.unwrap();
+        let a = [Contact::flat(0.01, 0.004, 0.0025, 3e-4)];
+        let frame_around = bench.frame_around();
+        let image = searcher.search(Lead::default(), &frame_around, &mut |_| {}).unwrap();
+        let contact = searcher.search(Lead::default(), &bench.measured(&a), &mut |_| {}).unwrap();
+        follower.adopt(contact.clone(), &bench.measured(&a)).unwrap();
+        let kept = follower.adopt(image.clone(), &bench.measured(&a)).unwrap();
+        assert_eq!(what(&kept.solution), "1 contact");
+        follower.reset();
+        follower.adopt(image, &frame_around).unwrap();
+        let kept = follower.adopt(contact, &frame_around).unwrap();
+        assert_eq!(what(&kept.solution), "image");
     }
 }

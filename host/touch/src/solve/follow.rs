@@ -5,7 +5,7 @@
 
 use super::contacts::Found;
 use super::nonlinear::Descent;
-use super::{Solution, SolveError, Solver};
+use super::{FoundContact, Solution, SolveError, Solver};
 use tactomo_physics::readings::Readings;
 
 /// Follows what is known from frame to frame.
@@ -25,6 +25,11 @@ pub trait Follower: Send {
 
     /// What is followed: where a search may begin.
     fn lead(&self) -> Lead;
+
+    /// Numbers contacts on from those that another follower found before.
+    fn inherit(&mut self, before: &[FoundContact]) {
+        let _ = before;
+    }
 
     /// Forgets the frames before.
     fn reset(&mut self);

@@ -3,7 +3,7 @@
 use super::contacts::ContactSettings;
 use super::follow::{Followed, Follower, Lead, Parts, Searcher};
 use super::watch::{ElectrodeWatch, FaultyElectrodes, Look};
-use super::{Contacts, ElectrodeFault, Method, Problem, Solution, SolveError, Solver};
+use super::{Contacts, ElectrodeFault, FoundContact, Method, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
@@ -155,6 +155,10 @@ impl Follower for Half<dyn Follower> {
 
     fn lead(&self) -> Lead {
         self.half.lead()
+    }
+
+    fn inherit(&mut self, before: &[FoundContact]) {
+        self.half.inherit(before);
     }
 
     fn reset(&mut self) {

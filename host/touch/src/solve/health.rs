@@ -15,7 +15,7 @@ const SMALLEST: f64 = 0.02;
 /// Sweeps for the loads: a test holds them against healthy boards under firm presses.
 const SWEEPS: usize = 8;
 /// Readings have to be this many deviations of the noise large before they say anything of a short or a broken wire.
-const TOUCHED: f64 = 40.0;
+pub(super) const TOUCHED: f64 = 40.0;
 /// Share of the drive that everything reaches when a broken wire is to be grounded.
 const UNGROUNDED: f64 = 0.97;
 /// Deviations of the noise within which two electrodes read the same.

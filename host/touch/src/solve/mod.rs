@@ -51,7 +51,7 @@ pub trait Solver: Send + 'static {
     /// Name on the command line.
     fn name(&self) -> &'static str;
 
-    /// What the readings, less the readings at rest, say of the contacts.
+    /// What the readings, less the baseline, say of the contacts.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.

@@ -43,6 +43,13 @@ impl Tracker {
         self.known.extend_from_slice(contacts);
     }
 
+    /// Goes on from contacts that were numbered before, by another solver.
+    pub fn inherit(&mut self, before: &[FoundContact]) {
+        self.known = before.iter().copied().filter(|contact| contact.id.is_some()).collect();
+        let last = self.known.iter().filter_map(|contact| contact.id).max().unwrap_or(0);
+        self.next = self.next.max(last.saturating_add(1));
+    }
+
     /// Forgets all, and counts from 1 again.
     pub fn reset(&mut self) {
         self.known.clear();

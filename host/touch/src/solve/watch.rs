@@ -18,9 +18,9 @@ const HEALTHY: [u32; 2] = [64, 64 << 10];
 const STRIDE: u32 = 8;
 /// Share of the largest reading at which a fault was found from which readings would show it again.
 const AS_LARGE: f64 = 0.7;
-/// Frames in a row that do not fit after which a look is taken for exchanged wires: it takes as long as some hundred frames.
+/// Answers in a row that do not fit after which a look is taken for exchanged wires: it takes as long as some hundred frames.
 const MISFITS: [u32; 3] = [16, 160, 1600];
-/// Frames with contacts after which exchanged wires are looked at again.
+/// Answers with contacts after which exchanged wires are looked at again.
 const LOOK_AGAIN: u32 = 1200;
 /// Fewest electrodes that are worth solving for.
 const FEWEST: usize = 5;
@@ -62,9 +62,8 @@ pub struct ElectrodeWatch {
     faulty: FaultyElectrodes,
     /// Largest reading at which each electrode was found faulty (V), how many frames have shown it healthy since, and how many have to.
     cases: Vec<Case>,
-    suspected: Vec<(usize, ElectrodeFault)>,
-    /// Frames in a row that have the same suspicion.
-    seen: u32,
+    /// Largest reading between healthy electrodes in the newest frame that was judged (V).
+    largest_v: f64,
     skipped: u32,
     misfits: u32,
     touched: u32,
@@ -73,9 +72,18 @@ pub struct ElectrodeWatch {
 /// An electrode's history.
 #[derive(Clone, Copy, Debug)]
 struct Case {
+    /// Frames in a row that have shown it faulty.
+    seen: u32,
+    /// Largest reading between healthy electrodes when it was left out (V).
     found_at_v: f64,
     healthy: u32,
     needed: u32,
+}
+
+impl Default for Case {
+    fn default() -> Self {
+        Self { seen: 0, found_at_v: 0.0, healthy: 0, needed: HEALTHY[0] }
+    }
 }
 
 /// A look with the forward model for what readings alone do not show.
@@ -96,9 +104,8 @@ impl ElectrodeWatch {
             drive_v: detector.drive_v,
             noise_v: detector.adc.deviation_v(),
             faulty: FaultyElectrodes::default(),
-            cases: vec![Case { found_at_v: 0.0, healthy: 0, needed: HEALTHY[0] }; electrodes],
-            suspected: Vec::new(),
-            seen: 0,
+            cases: vec![Case::default(); electrodes],
+            largest_v: 0.0,
             skipped: 0,
             misfits: 0,
             touched: 0,
@@ -113,33 +120,46 @@ impl ElectrodeWatch {
     /// Takes note of a frame's readings (V), less the baseline; whether other electrodes are left out now.
     pub fn note(&mut self, readings: &Readings) -> bool {
         self.skipped += 1;
-        if !self.faulty.faults.is_empty() && self.suspected.is_empty() && self.skipped < STRIDE {
+        if !self.faulty.faults.is_empty() && self.skipped < STRIDE && self.cases.iter().all(|case| case.seen == 0) {
             return false;
         }
-        self.skipped = 0;
+        let frames = std::mem::take(&mut self.skipped);
         if readings.electrodes() != self.electrodes || readings.volts().iter().any(|volts| !volts.is_finite()) {
             return false;
         }
         let Some(faulty) = health::faulty_electrodes(readings, self.drive_v, self.noise_v) else { return false };
-        let largest_v = readings.largest_v();
-        let is_back = self.take_back(&faulty, largest_v);
-        let is_out = self.suspect(faulty, readings);
+        self.largest_v = self.healthy_largest_v(readings, &faulty);
+        let is_back = self.take_back(&faulty, frames);
+        let is_out = self.suspect(&faulty, readings);
         is_back || is_out
     }
 
+    /// Largest reading between electrodes that are neither faulty in this frame nor left out: one of those reads anything.
+    fn healthy_largest_v(&self, readings: &Readings, faulty: &[(usize, ElectrodeFault)]) -> f64 {
+        let all = faulty.iter().chain(&self.faulty.faults);
+        let wrong: Vec<usize> = all.map(|(electrode, _)| *electrode).collect();
+        let healthy: Vec<usize> = (0..self.electrodes).filter(|electrode| !wrong.contains(electrode)).collect();
+        readings.of(&healthy).largest_v()
+    }
+
     /// Counts frames that would have shown a fault and do not, and takes electrodes back.
-    fn take_back(&mut self, faulty: &[(usize, ElectrodeFault)], largest_v: f64) -> bool {
+    fn take_back(&mut self, faulty: &[(usize, ElectrodeFault)], frames: u32) -> bool {
         let mut back = Vec::new();
         for (electrode, fault) in &self.faulty.faults {
             let case = &mut self.cases[*electrode];
+            // A broken wire shows at any touch.
+            let least_v = match fault {
+                ElectrodeFault::Open => health::TOUCHED * self.noise_v,
+                _ => AS_LARGE * case.found_at_v,
+            };
             if faulty.iter().any(|(wrong, _)| wrong == electrode) {
                 case.healthy = 0;
-            } else if *fault != ElectrodeFault::Exchanged && largest_v > AS_LARGE * case.found_at_v {
-                case.healthy += STRIDE;
+            } else if *fault != ElectrodeFault::Exchanged && self.largest_v > least_v {
+                case.healthy += frames;
             }
             if case.healthy >= case.needed {
                 tracing::info!("electrode {electrode} is healthy again; before, {fault}");
-                *case = Case { found_at_v: 0.0, healthy: 0, needed: (2 * case.needed).min(HEALTHY[1]) };
+                *case = Case { needed: (2 * case.needed).min(HEALTHY[1]), ..Case::default() };
                 back.push(*electrode);
             }
         }
@@ -148,53 +168,64 @@ impl ElectrodeWatch {
     }
 
     /// Leaves out what enough frames in a row have shown.
-    fn suspect(&mut self, mut faulty: Vec<(usize, ElectrodeFault)>, readings: &Readings) -> bool {
-        faulty.retain(|(electrode, _)| self.faulty.faults.iter().all(|(known, _)| known != electrode));
-        self.seen = if faulty == self.suspected { self.seen + 1 } else { 1 };
-        self.suspected = faulty;
-        if self.seen < CONFIRMED || self.suspected.is_empty() {
+    fn suspect(&mut self, faulty: &[(usize, ElectrodeFault)], readings: &Readings) -> bool {
+        let mut found = Vec::new();
+        for (electrode, case) in self.cases.iter_mut().enumerate() {
+            let fault = faulty.iter().find(|(wrong, _)| *wrong == electrode);
+            let is_known = self.faulty.faults.iter().any(|(known, _)| *known == electrode);
+            case.seen = if fault.is_some() && !is_known { case.seen + 1 } else { 0 };
+            found.extend(fault.filter(|_| case.seen >= CONFIRMED));
+        }
+        if found.is_empty() || !self.exclude(&found) {
             return false;
         }
-        let found = std::mem::take(&mut self.suspected);
-        let joints = joints(&found, readings, self.drive_v);
-        self.exclude(found, joints, readings.largest_v())
+        let left_out =
+            |(electrode, _): &&(usize, ElectrodeFault)| self.faulty.faults.iter().any(|(e, _)| e == electrode);
+        let shorted: Vec<_> = faulty.iter().filter(left_out).copied().collect();
+        self.faulty.joints = joints(&shorted, readings, self.drive_v);
+        true
     }
 
-    fn exclude(&mut self, found: Vec<(usize, ElectrodeFault)>, joints: Vec<Joint>, largest_v: f64) -> bool {
-        if self.electrodes < FEWEST + self.faulty.faults.len() + found.len() {
+    fn exclude(&mut self, found: &[(usize, ElectrodeFault)]) -> bool {
+        let is_known = |electrode: usize| self.faulty.faults.iter().any(|(known, _)| *known == electrode);
+        let found: Vec<_> = found.iter().copied().filter(|(electrode, _)| !is_known(*electrode)).collect();
+        if found.is_empty() || self.electrodes < FEWEST + self.faulty.faults.len() + found.len() {
             return false;
         }
         for (electrode, fault) in &found {
             tracing::warn!("electrode {electrode} is left out: {fault}");
-            self.cases[*electrode].found_at_v = largest_v;
+            (self.cases[*electrode].found_at_v, self.cases[*electrode].seen) = (self.largest_v, 0);
         }
         self.faulty.faults.extend(found);
         self.faulty.faults.sort_unstable();
-        self.faulty.joints.extend(joints);
         true
     }
 
     /// What to look for after this answer, if anything.
     pub fn look(&mut self, solution: &Solution) -> Option<Look> {
         self.misfits = if solution.flags.misfit { self.misfits + 1 } else { 0 };
-        self.touched = (self.touched + u32::from(!solution.contacts.is_empty())) % LOOK_AGAIN;
+        self.touched += u32::from(!solution.contacts.is_empty());
         if MISFITS.contains(&self.misfits) {
             return Some(Look::Exchanged);
         }
         let is_exchanged =
             |(electrode, fault): &(usize, ElectrodeFault)| (*fault == ElectrodeFault::Exchanged).then_some(*electrode);
         let mut exchanged = self.faulty.faults.iter().filter_map(is_exchanged);
-        let pair = exchanged.next().zip(exchanged.next())?;
-        (self.touched == LOOK_AGAIN - 1).then_some(Look::Healed(pair.into()))
+        let (a, b) = exchanged.next().zip(exchanged.next())?;
+        // A light touch, or none, does not tell exchanged wires.
+        let is_telling = !solution.contacts.is_empty() && self.largest_v > AS_LARGE * self.cases[a].found_at_v;
+        if self.touched < LOOK_AGAIN || !is_telling {
+            return None;
+        }
+        self.touched = 0;
+        Some(Look::Healed([a, b]))
     }
 
     /// Takes what a look has found; whether other electrodes are left out now.
     pub fn conclude(&mut self, look: Look, found: Option<[usize; 2]>) -> bool {
         match (look, found) {
             (_, None) => false,
-            (Look::Exchanged, Some(pair)) => {
-                self.exclude(pair.map(|e| (e, ElectrodeFault::Exchanged)).into(), Vec::new(), 0.0)
-            }
+            (Look::Exchanged, Some(pair)) => self.exclude(&pair.map(|e| (e, ElectrodeFault::Exchanged))),
             (Look::Healed(_), Some(pair)) => {
                 self.faulty = self.faulty.but(&pair);
                 true

@@ -33,6 +33,8 @@ pub(super) struct Radii {
     all: Vec<(f64, bool)>,
     /// What they add to the covariance of the spots' parameters; none before it has been looked at.
     added: Option<Box<DMatrix<f64>>>,
+    /// That is taken where the readings do not say (m).
+    usual_m: f64,
 }
 
 /// What a look at the readings says of radii.
@@ -45,12 +47,12 @@ struct Looked {
 impl Radii {
     /// One radius (m) for so many contacts, as is usual.
     pub fn usual(radius_m: f64, count: usize) -> Self {
-        Self { all: vec![(radius_m, false); count], added: None }
+        Self { all: vec![(radius_m, false); count], added: None, usual_m: radius_m }
     }
 
     /// Those of some of the contacts.
     pub fn of(&self, contacts: &[usize]) -> Self {
-        Self { all: contacts.iter().map(|k| self.all[*k]).collect(), added: None }
+        Self { all: contacts.iter().map(|k| self.all[*k]).collect(), added: None, usual_m: self.usual_m }
     }
 
     /// The radius that a contact is taken to have (m).
@@ -76,12 +78,16 @@ impl Radii {
         let mut changed = false;
         let moved = |(&(radius_m, _), (step, error)): (&(f64, bool), &(f64, f64))| {
             let known = *error < KNOWN;
-            let step = if known { step.clamp(-LONGEST, LONGEST) } else { 0.0 };
+            if !known {
+                changed |= radius_m != self.usual_m;
+                return (self.usual_m, false);
+            }
+            let step = step.clamp(-LONGEST, LONGEST);
             changed |= step.abs() > SMALL * error;
-            (radius_m * step.exp(), known)
+            (radius_m * step.exp(), true)
         };
         let all = self.all.iter().zip(&looked.steps).map(moved).collect();
-        (Self { all, added: Some(Box::new(looked.added)) }, changed)
+        (Self { all, added: Some(Box::new(looked.added)), usual_m: self.usual_m }, changed)
     }
 }
 

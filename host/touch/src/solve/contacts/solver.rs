@@ -6,7 +6,7 @@ use super::search::{WORSE, WORTH_FIRST, score};
 use super::{ContactFinder, ContactSettings, Explanation, Found, Target};
 use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search};
 use crate::solve::track::Tracker;
-use crate::solve::{Problem, Solution, SolveError, Solver};
+use crate::solve::{FoundContact, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
@@ -28,6 +28,8 @@ pub(in crate::solve) struct ContactFollower {
     /// Sum of squares that the last search left, and its running mean since.
     searched: f64,
     mean: f64,
+    /// Whether what is followed could not be brought to the newest frame.
+    is_stale: bool,
     tracker: Tracker,
 }
 
@@ -60,7 +62,7 @@ impl ContactFollower {
     /// Follows nothing yet.
     pub fn new(finder: Arc<ContactFinder>) -> Self {
         let tracker = Tracker::new(finder.spacing_m);
-        Self { finder, last: None, searched: 0.0, mean: 0.0, tracker }
+        Self { finder, last: None, searched: 0.0, mean: 0.0, is_stale: false, tracker }
     }
 
     /// What finds the contacts.
@@ -77,17 +79,17 @@ impl ContactFollower {
     pub fn follow(&mut self, target: &Target) -> bool {
         let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
         let Some(moved) = self.finder.follow(last.clone(), target) else {
-            self.last = Some(last);
+            (self.last, self.is_stale) = (Some(last), true);
             return true;
         };
         let is_weak = self.finder.is_weak(&moved);
         let fewer = if is_weak { self.finder.without_weak(&moved, target) } else { None };
         let is_weak = is_weak && fewer.is_none();
         let found = fewer.unwrap_or(moved);
-        let enough = (WORSE * self.searched).max(target.count() as f64);
+        self.is_stale = false;
         self.mean += NEWEST * (found.cost() - self.mean);
         let has_risen = self.mean > (1.0 + RISE) * self.searched.max(self.finder.freedom(&found, target));
-        let search = is_weak || found.cost() > enough || has_risen;
+        let search = is_weak || found.cost() > self.enough(target) || has_risen;
         if is_weak && !self.finder.stands_out(target) {
             return false;
         }
@@ -95,34 +97,54 @@ impl ContactFollower {
         search
     }
 
-    /// Takes what a search has found, if it explains this frame better than what is followed.
-    pub fn adopt(&mut self, found: Option<Found>, target: &Target) {
+    /// Takes what a search has found, if it explains this frame better than what is followed; whether the search has to be repeated, because
+    /// what it has found does not explain this frame as well as its own.
+    pub fn adopt(&mut self, found: Option<Found>, target: &Target) -> bool {
+        let left = found.as_ref().map_or(0.0, |Found(found)| found.cost());
         let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
         let nothing = target.cost(&vec![0.0; target.volts.len()]) - WORTH_FIRST;
         let score_of = |found: &Option<Explanation>| found.as_ref().map_or(nothing, score);
-        if score_of(&caught_up) <= score_of(&self.last) {
-            self.last = caught_up;
+        if self.is_stale || score_of(&caught_up) <= score_of(&self.last) {
+            (self.last, self.is_stale) = (caught_up, false);
         }
-        self.searched = self.last.as_ref().map_or(0.0, Explanation::cost);
-        self.mean = self.searched;
+        let Some(last) = &self.last else { return self.finder.stands_out(target) };
+        (self.searched, self.mean) = (left.max(self.finder.freedom(last, target)), last.cost());
+        last.cost() > self.enough(target)
+    }
+
+    /// Sum of squares up to which what is followed explains a frame.
+    fn enough(&self, target: &Target) -> f64 {
+        (WORSE * self.searched).max(target.count() as f64)
+    }
+
+    /// What is left of a frame: root mean square, in standard deviations of the noise.
+    pub fn residual(&self, target: &Target) -> Option<f64> {
+        let found = self.last.as_ref();
+        found.map_or_else(|| self.finder.nothing(target), |found| self.finder.solution(found, target)).residual
+    }
+
+    /// Numbers contacts on from those that were found before.
+    pub fn inherit(&mut self, before: &[FoundContact]) {
+        self.tracker.inherit(before);
     }
 
     /// What is followed, as a solution, with the numbers that contacts keep.
     pub fn solution(&mut self, target: &Target) -> Solution {
         let mut solution =
             self.last.as_ref().map_or_else(|| self.finder.nothing(target), |found| self.finder.solution(found, target));
+        solution.flags.unfinished |= self.is_stale;
         self.tracker.follow(&mut solution.contacts);
         solution
     }
 
     /// Follows nothing for a time, and keeps the numbers of contacts.
-    pub fn rest(&mut self) {
-        (self.last, self.searched, self.mean) = (None, 0.0, 0.0);
+    pub fn let_go(&mut self) {
+        (self.last, self.searched, self.mean, self.is_stale) = (None, 0.0, 0.0, false);
     }
 
     /// Forgets all.
     pub fn reset(&mut self) {
-        self.rest();
+        self.let_go();
         self.tracker.reset();
     }
 }
@@ -136,12 +158,16 @@ impl Follower for ContactFollower {
 
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         let target = self.finder.target(readings)?;
-        ContactFollower::adopt(self, lead.into_contacts(), &target);
-        Ok(Followed { solution: self.solution(&target), search: false })
+        let search = ContactFollower::adopt(self, lead.into_contacts(), &target);
+        Ok(Followed { solution: self.solution(&target), search })
     }
 
     fn lead(&self) -> Lead {
         Lead::of_contacts(self.found())
+    }
+
+    fn inherit(&mut self, before: &[FoundContact]) {
+        ContactFollower::inherit(self, before);
     }
 
     fn reset(&mut self) {

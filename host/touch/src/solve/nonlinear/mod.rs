@@ -190,6 +190,8 @@ impl Nonlinear {
         let left = self.shared.left(&descent, &target);
         // The warm start has to be given up: what is left is no noise, and much more than a fresh start left.
         let is_lost = left > MISFIT && left > LOST * descent.begun;
+        // A first frame of a finger that lands may leave much; what later ones leave counts.
+        descent.begun = descent.begun.min(left);
         self.last = Some(descent);
         Ok((solution, is_lost))
     }
