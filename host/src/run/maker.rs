@@ -37,6 +37,9 @@ pub struct Made {
     solver: Result<Box<dyn Solver>, BoxError>,
 }
 
+/// A solver, and what it was ordered for.
+pub type Ordered = (Order, Box<dyn Solver>);
+
 /// Makes solvers, each in a thread of its own, one after the other; the last order counts.
 pub struct Maker {
     make: MakeSolver,
@@ -80,7 +83,7 @@ impl Maker {
     ///
     /// # Errors
     /// What the maker says of the solver that was ordered last.
-    pub fn receive(&mut self, made: Made) -> Result<Option<(Order, Box<dyn Solver>)>, BoxError> {
+    pub fn receive(&mut self, made: Made) -> Result<Option<Ordered>, BoxError> {
         self.making = None;
         if let Some(wanted) = self.wanted.take().filter(|wanted| *wanted != made.order) {
             self.begin(wanted);

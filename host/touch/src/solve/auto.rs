@@ -179,7 +179,7 @@ impl Searcher for AutoSearcher {
             return self.search_image(from, readings, "this model has no fields of single contacts".to_owned());
         };
         let (contacts, from) = match from.0 {
-            Known::Contacts(contacts) => (Some(contacts), Lead::default()),
+            Known::Contacts(contacts) => (Some(*contacts), Lead::default()),
             known => (None, Lead(known)),
         };
         // A picture does not change to contacts that may not explain it.

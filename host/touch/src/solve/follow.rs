@@ -80,7 +80,7 @@ pub(super) enum Known {
     #[default]
     Nothing,
     /// Contacts.
-    Contacts(Found),
+    Contacts(Box<Found>),
     /// An image, and why it is not contacts.
     Image(Box<Descent>, String),
 }
@@ -88,13 +88,13 @@ pub(super) enum Known {
 impl Lead {
     /// Contacts, or nothing.
     pub(super) fn of_contacts(found: Option<Found>) -> Self {
-        Self(found.map_or(Known::Nothing, Known::Contacts))
+        Self(found.map_or(Known::Nothing, |found| Known::Contacts(Box::new(found))))
     }
 
     /// The contacts, if it is contacts.
     pub(super) fn into_contacts(self) -> Option<Found> {
         match self.0 {
-            Known::Contacts(found) => Some(found),
+            Known::Contacts(found) => Some(*found),
             Known::Nothing | Known::Image(..) => None,
         }
     }
