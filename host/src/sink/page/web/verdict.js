@@ -56,10 +56,12 @@ export class Verdict {
       this.what.textContent = words;
       const left = residual === null ? [] : [`residual ${fixed(residual, 1)} × noise`];
       this.residual.textContent = [...left, ageText(ageS)].filter(Boolean).join(" · ");
-      this.why.textContent = choice ? `${choice.what}: ${choice.why}` : explanation;
+      // The residual stands beside it.
+      this.why.textContent = choice ? choice.why.replace(/^residual [\d.]+ x noise(; )?/, "") : explanation;
       this.why.title = this.why.textContent;
     }
-    this.#warn(flags, excluded, now);
+    // A warm image is never quite settled, and right all the same.
+    this.#warn(update.image.length ? flags.filter((flag) => flag !== "unfinished") : flags, excluded, now);
     Object.assign(document.documentElement.dataset, { choice: choice?.what ?? "", flags: flags.join(" "), ageS: String(ageS) });
   }
 
