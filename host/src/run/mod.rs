@@ -1,7 +1,7 @@
 //! The live picture: from a board's bytes to touch, frame by frame, in three threads.
 //!
-//! The [reader](reader) takes bytes, stamps them, hands them to the recording and decodes them; it never solves and never waits for a
-//! disk, a page or a solver. The [follower] answers to the newest frame, at the board's rate where the solver allows. The [searcher]
+//! The reader takes bytes, stamps them, hands them to the recording and decodes them; it never solves and never waits for a
+//! disk, a page or a solver. The follower answers to the newest frame, at the board's rate where the solver allows. The searcher
 //! finds thorough answers, from which the follower goes on once they explain the present better. What there is to show is published as
 //! [`Snapshot`]s through a cell that keeps the latest only, so that a slow page slows nothing. Pages answer with [`Request`]s.
 
@@ -14,6 +14,7 @@ mod reader;
 mod searcher;
 mod statistics;
 mod steady;
+mod talk;
 
 pub use self::inbox::Taken;
 pub use self::maker::{Order, SolverState};

@@ -11,19 +11,18 @@ use tactomo_board::link::{Link, Source};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::{Closing, RecordError, Recorder};
 use tactomo_board::sequence::Sequence;
-use tactomo_board::session::{self, GreetError, Session};
+use tactomo_board::session::{self, GreetError};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Frame, Hello};
+use tactomo_protocol::{BoardMessage, DecodeError, Frame, Hello};
 
 use super::follower::FollowThread;
 use super::inbox::{Event, Inbox, Taken};
 use super::notice::NoticeBoard;
 use super::plan::{Ends, LiveError, Plan, Summary};
+use super::talk::{PATIENCE, Talk};
 use super::{LinkState, Request};
 
-/// How long a board has to say Hello: opening the port may have reset it, and then it boots first.
-const PATIENCE: Duration = Duration::from_secs(6);
 /// Time between two tries to open a link that was lost.
 const REOPEN_EVERY: Duration = Duration::from_millis(500);
 /// Bytes of one read: 40 ms at 921600 baud.
@@ -121,21 +120,6 @@ struct Board {
     detector: Arc<Detector>,
     volts: Volts,
     noise_v: f64,
-}
-
-/// One link, from its opening on.
-struct Talk {
-    session: Session,
-    receiver: BoardReceiver,
-    opened: Instant,
-    /// Stretches of junk until the board said Hello; `None` before.
-    junk: Option<u64>,
-    /// Corrupt stretches that were counted.
-    counted: u64,
-    /// Whether no frame has come since a jump.
-    landing: bool,
-    /// What the board has refused, as it is shown.
-    refusal: Option<session::Refusal>,
 }
 
 impl Reader {
@@ -387,52 +371,6 @@ impl Reader {
         if self.notice.link() != state {
             self.notice.publish(|snapshot| snapshot.link = state);
         }
-    }
-}
-
-impl Talk {
-    fn new(settings: session::RequestedSettings) -> Self {
-        Self {
-            session: Session::new(settings),
-            receiver: BoardReceiver::default(),
-            opened: Instant::now(),
-            junk: None,
-            counted: 0,
-            landing: false,
-            refusal: None,
-        }
-    }
-
-    /// Sends what is due and reads what has come; returns the number of bytes.
-    fn exchange(&mut self, link: &mut dyn Link, buffer: &mut [u8]) -> io::Result<usize> {
-        if let Some(command) = self.session.command(Instant::now()) {
-            session::send(link, &command)?;
-        }
-        link.read(buffer)
-    }
-
-    fn is_in_vain(&self) -> bool {
-        self.junk.is_none() && self.opened.elapsed() >= PATIENCE
-    }
-
-    /// Forgets the packet under way: what follows it is elsewhere.
-    fn jumped(&mut self) {
-        self.receiver = BoardReceiver::default();
-        (self.junk, self.counted, self.landing) = (self.junk.map(|_| 0), 0, true);
-    }
-
-    /// Corrupt stretches since the last time this was asked; boot text before Hello is none.
-    fn newly_corrupt(&mut self) -> u64 {
-        let Some(junk) = self.junk else { return 0 };
-        if self.landing {
-            // The rest of a packet that a jump has landed in is none.
-            self.counted = self.receiver.counters().corrupt;
-            return 0;
-        }
-        let corrupt = self.receiver.counters().corrupt - junk;
-        let newly = corrupt - self.counted;
-        self.counted = corrupt;
-        newly
     }
 }
 
