@@ -9,15 +9,19 @@
 //! | f32 | age of the answer when this was sent: since the last byte of its frame came (s) |
 //! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
 //! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
-//! | k x (u32, 12 x f32) | the contacts found: number from frame to frame, 0 if it has none; x, y on the map (m); conductance (S); radius (m); force (N); standard errors of x and y (m), the correlation of these, standard error of the conductance (S); x, y, z in space (m) |
+//! | k x (u32, 12 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
 //! | the rest | UTF-8: what was chosen, a line feed, why; nothing if the solver does not choose |
 
 use crate::run::FrameSnapshot;
 use tactomo_physics::detector::Detector;
-use tactomo_touch::solve::{Flags, FoundContact, Uncertainty};
+use tactomo_touch::schema::{CONTACT_COLUMNS, contact_values};
+use tactomo_touch::solve::{Flags, FoundContact};
 
 /// Version of the layout; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 3;
+pub(super) const LAYOUT: u32 = 4;
+
+/// Numbers of a contact: the columns after its id, and its place on the map.
+const CONTACT_FLOATS: usize = CONTACT_COLUMNS.len() - 1 + 2;
 
 /// An update; `frames` received so far.
 pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) -> Vec<u8> {
@@ -46,17 +50,14 @@ fn flags(flags: &Flags) -> [u32; 2] {
     [told, flags.excluded.iter().filter_map(|e| 1_u32.checked_shl(*e as u32)).fold(0, |all, bit| all | bit)]
 }
 
-fn contact(found: &FoundContact, detector: &Detector) -> [f32; 12] {
-    let [x_m, y_m] = detector.map_m([found.x_m, found.y_m, found.z_m]).map(|metres| metres as f32);
-    let error = |of: fn(&Uncertainty) -> f64| known(found.uncertainty.as_ref().map(of));
+fn contact(found: &FoundContact, detector: &Detector) -> [f32; CONTACT_FLOATS] {
+    let mut values = [f32::NAN; CONTACT_FLOATS];
+    let (known, map) = values.split_at_mut(CONTACT_FLOATS - 2);
     // Errors in space are not those on the flat map of a curved detector.
-    let on_map = |of: fn(&Uncertainty) -> f64| if detector.surface.is_none() { error(of) } else { f32::NAN };
-    let [x_error_m, y_error_m] = [on_map(|errors| errors.x_m), on_map(|errors| errors.y_m)];
-    let [radius_m, force_n] = [known(found.radius_m), known(found.force_n)];
-    let correlation = on_map(|errors| errors.correlation);
-    let error_s = error(|errors| errors.conductance_s);
-    let [x, y, z] = [found.x_m, found.y_m, found.z_m].map(|metres| metres as f32);
-    [x_m, y_m, found.conductance_s as f32, radius_m, force_n, x_error_m, y_error_m, correlation, error_s, x, y, z]
+    let uncertainty = found.uncertainty.filter(|_| detector.surface.is_none());
+    known.copy_from_slice(&contact_values(&FoundContact { uncertainty, ..*found }));
+    map.copy_from_slice(&detector.map_m([found.x_m, found.y_m, found.z_m]).map(|metres| metres as f32));
+    values
 }
 
 fn known(value: Option<f64>) -> f32 {
@@ -67,7 +68,7 @@ fn known(value: Option<f64>) -> f32 {
 mod tests {
     use super::*;
     use tactomo_physics::readings::Readings;
-    use tactomo_touch::solve::{Choice, Solution};
+    use tactomo_touch::solve::{Choice, Solution, Uncertainty};
 
     fn bytes_of(solution: Solution) -> Vec<u8> {
         let frame = FrameSnapshot {
@@ -113,11 +114,11 @@ mod tests {
         assert!((0.0..5.0).contains(&head[1]), "{} s old", head[1]);
         assert_eq!(head[2..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0]);
         assert_eq!(words(&bytes[68..72]), [6]);
-        assert_eq!(floats(&bytes[72..120]), [0.25, -0.5, 2.0, 1.5, 3.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5, 0.0]);
+        assert_eq!(floats(&bytes[72..120]), [0.25, -0.5, 0.0, 2.0, 1.5, 3.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5]);
         assert_eq!(words(&bytes[120..124]), [0]);
-        assert_eq!(floats(&bytes[124..136]), [1.0, 2.0, 3.0]);
-        assert!(floats(&bytes[136..160]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[160..172]), [1.0, 2.0, 0.0]);
+        assert_eq!(floats(&bytes[124..140]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[140..164]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[164..172]), [1.0, 2.0]);
         assert_eq!(&bytes[172..], "2 contacts\nµ".as_bytes());
     }
 

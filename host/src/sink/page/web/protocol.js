@@ -2,7 +2,7 @@
 // the same.
 
 /** Version of the layout below; the setup carries the program's. */
-export const LAYOUT = 3;
+export const LAYOUT = 4;
 
 const HEAD_WORDS = 8;
 // From the lowest bit on.
@@ -36,9 +36,10 @@ class Taker {
 
 function contact(taker) {
   const id = taker.word() || null;
-  const [xM, yM, conductanceS, ...others] = taker.floats(12);
+  const [x, y, z, conductanceS, ...others] = taker.floats(12);
   const [radiusM, forceN, xErrorM, yErrorM, correlation, errorS] = others.slice(0, 6).map(known);
-  return { id, xM, yM, conductanceS, radiusM, forceN, xErrorM, yErrorM, correlation, errorS, place: others.slice(6) };
+  const [xM, yM] = others.slice(6);
+  return { id, xM, yM, conductanceS, radiusM, forceN, xErrorM, yErrorM, correlation, errorS, place: [x, y, z] };
 }
 
 function choice(text) {
