@@ -65,14 +65,22 @@ async fn the_mouse_presses_where_it_is() -> Result<()> {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_press_becomes_rest_when_re_zeroed() -> Result<()> {
+async fn a_press_is_never_re_zeroed() -> Result<()> {
     on_stage!(SceneName::Rest, stage, {
         stage.behind.press([10.0, 10.0])?;
         stage.browser.until("a contact", |told| told.number("contacts") > 0.0).await?;
         let button = stage.browser.client.find(fantoccini::Locator::Id("rezero")).await?;
         button.click().await?;
-        stage.browser.until("a re-zero", |told| told.text("label") == "Re-zeroed").await?;
+        tokio::time::sleep(Duration::from_secs(1)).await;
+        let notice = stage.browser.run("return document.getElementById('notice').textContent").await?;
+        ensure!(notice.as_str().is_some_and(|text| text.starts_with("Not re-zeroed")), "{notice}");
+        stage.browser.until("the contact still", |told| told.number("contacts") == 1.0).await?;
+        stage.behind.mouse.press(Vec::new());
         stage.browser.until("rest", |told| told.number("contacts") == 0.0).await?;
+        button.click().await?;
+        tokio::time::sleep(Duration::from_secs(1)).await;
+        let notice = stage.browser.run("return document.getElementById('notice').textContent").await?;
+        ensure!(notice.as_str() == Some(""), "{notice}");
         Ok(())
     })
 }
