@@ -198,8 +198,12 @@ mod tests {
         let (begin, mut longest) = (Instant::now(), Duration::ZERO);
         while controls.faults().is_empty() {
             let frame = Instant::now();
-            assert_eq!(simulation.readings_v(0.0), whole, "until the model is made, all stays as it was");
+            let readings = simulation.readings_v(0.0);
             longest = longest.max(frame.elapsed());
+            // The model may be ready just now.
+            if controls.faults().is_empty() {
+                assert_eq!(readings, whole, "until the model is made, all stays as it was");
+            }
             assert!(begin.elapsed() < Duration::from_secs(60));
         }
         assert!(
