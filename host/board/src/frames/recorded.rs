@@ -163,18 +163,10 @@ mod tests {
     use crate::frames::FrameFile;
     use crate::record::RecordWriter;
     use proptest::prelude::*;
-    use tactomo_protocol::{FrameHead, MAX_WIRE, Settings, encode_board, encode_frame};
+    use tactomo_protocol::{FrameHead, MAX_WIRE, encode_board, encode_frame};
 
     fn hello() -> Vec<u8> {
-        let hello = Hello {
-            firmware_version: "0.1.0".try_into().unwrap_or_default(),
-            board: "test".try_into().unwrap_or_default(),
-            electrodes: 4,
-            adc_bits: 10,
-            adc_full_scale_mv: 1024,
-            drive_mv: 1500,
-            settings: Settings::default(),
-        };
+        let hello = Hello { adc_bits: 10, adc_full_scale_mv: 1024, drive_mv: 1500, ..Hello::example(4) };
         let mut wire = [0; MAX_WIRE];
         let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
         wire[..length].to_vec()

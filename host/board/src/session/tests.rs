@@ -5,15 +5,7 @@ use proptest::prelude::*;
 use super::*;
 
 fn hello(settings: Settings) -> Hello {
-    Hello {
-        firmware_version: "0.1.0".try_into().unwrap_or_default(),
-        board: "test".try_into().unwrap_or_default(),
-        electrodes: 16,
-        adc_bits: 12,
-        adc_full_scale_mv: 3300,
-        drive_mv: 2000,
-        settings,
-    }
+    Hello { settings, ..Hello::example(16) }
 }
 
 fn settle(settle_us: u16) -> RequestedSettings {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tactomo_protocol::{FrameHead, Hello, MAX_WIRE, Settings, encode_board, encode_frame};
+use tactomo_protocol::{FrameHead, Hello, MAX_WIRE, encode_board, encode_frame};
 
 use super::*;
 use crate::record::{Header, RecordWriter};
@@ -67,15 +67,7 @@ fn the_end_is_calm_and_says_what_is_damaged() {
 }
 
 fn hello() -> Vec<u8> {
-    let hello = Hello {
-        firmware_version: "0.1.0".try_into().unwrap_or_default(),
-        board: "test".try_into().unwrap_or_default(),
-        electrodes: 4,
-        adc_bits: 12,
-        adc_full_scale_mv: 3300,
-        drive_mv: 2000,
-        settings: Settings::default(),
-    };
+    let hello = Hello::example(4);
     let mut wire = [0; MAX_WIRE];
     let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
     wire[..length].to_vec()

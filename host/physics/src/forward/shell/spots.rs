@@ -17,7 +17,7 @@ use super::contact::{cover, disc_m2};
 use super::locate::Locator;
 use super::mesh::Mesh;
 use crate::forward::ForwardError;
-use crate::forward::spots::{Between, MOST_PLACES, Spot, SpotFields};
+use crate::forward::spots::{Between, MOST_PLACES, Spot, SpotFields, dot};
 use crate::geometry::{Point, cross};
 use crate::space::{self, Place};
 
@@ -327,14 +327,4 @@ impl Cubic {
 /// Product of two functions with their derivatives along two directions.
 fn product(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + a[0] * b[2]]
-}
-
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let (a_lanes, a_rest) = a.as_chunks::<8>();
-    let (b_lanes, b_rest) = b.as_chunks::<8>();
-    let mut sums = [0.0f32; 8];
-    for (a, b) in a_lanes.iter().zip(b_lanes) {
-        (0..8).for_each(|lane| sums[lane] += a[lane] * b[lane]);
-    }
-    f64::from(sums.iter().sum::<f32>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f32>())
 }

@@ -8,7 +8,7 @@ use super::disc::DiscBasis;
 use super::green::Image;
 use super::image::ImageGrid;
 use super::{Slab, from_corner};
-use crate::forward::spots::{Between, MOST_PLACES, Spot, SpotFields};
+use crate::forward::spots::{Between, MOST_PLACES, Spot, SpotFields, dot};
 use crate::space::Place;
 
 /// Points of a disc of radius one with its second moments.
@@ -205,14 +205,4 @@ impl SpotFields for SlabSpots {
         let near: f64 = images.iter().map(|image| top.near_ohm(distance_m(image))).sum();
         top.smooth_ohm(a_m, b_m) + near - dot(&a.inner[0], &b.inner[0])
     }
-}
-
-fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let (a_lanes, a_rest) = a.as_chunks::<8>();
-    let (b_lanes, b_rest) = b.as_chunks::<8>();
-    let mut sums = [0.0f32; 8];
-    for (a, b) in a_lanes.iter().zip(b_lanes) {
-        (0..8).for_each(|lane| sums[lane] += a[lane] * b[lane]);
-    }
-    f64::from(sums.iter().sum::<f32>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f32>())
 }
