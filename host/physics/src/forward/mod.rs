@@ -46,6 +46,30 @@ pub trait ForwardModel: Send + Sync {
     /// [`ForwardError`] if a contact is not on the detector or no contact conducts.
     fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError>;
 
+    /// The impedance matrix (ohm), and to first order by how much it changes (ohm) where one contact, given by its place in the list,
+    /// is replaced by another that is near to it: derivatives by whatever contacts are described with. Some models give them at less
+    /// cost than the impedances themselves.
+    ///
+    /// # Errors
+    /// As for [`impedance_ohm`](Self::impedance_ohm).
+    ///
+    /// # Panics
+    /// If there is no such contact.
+    fn impedance_with_changes_ohm(
+        &self,
+        contacts: &[Contact],
+        replaced: &[(usize, Contact)],
+    ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), ForwardError> {
+        let before = self.impedance_ohm(contacts)?;
+        let changes = replaced.iter().map(|(index, contact)| {
+            let mut contacts = contacts.to_vec();
+            contacts[*index] = *contact;
+            Ok(self.impedance_ohm(&contacts)? - &before)
+        });
+        let changes = changes.collect::<Result<_, _>>()?;
+        Ok((before, changes))
+    }
+
     /// The impedance matrix and the fields under the image's nodes with a conductance at each of them (S): an image of contact,
     /// or a mask of any shape. A node stands for its cell of the surface, over which its conductance is spread.
     ///

@@ -60,6 +60,17 @@ impl ForwardModel for Through {
         Ok(self.seen(&self.model.impedance_ohm(contacts)?))
     }
 
+    fn impedance_with_changes_ohm(
+        &self,
+        contacts: &[Contact],
+        replaced: &[(usize, Contact)],
+    ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), ForwardError> {
+        let (all, changes) = self.model.impedance_with_changes_ohm(contacts, replaced)?;
+        let before = self.seen(&all);
+        let changes = changes.into_iter().map(|change| self.seen(&(&all + change)) - &before).collect();
+        Ok((before, changes))
+    }
+
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
         let all = self.model.image_fields(image_s)?;
         let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);

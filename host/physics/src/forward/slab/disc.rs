@@ -86,15 +86,20 @@ impl DiscBasis {
         ALL[degree].get_or_init(|| Self::new(degree))
     }
 
-    /// The basis, of at most this degree, that another disc at a distance sees; `radius` is this one's in distances. A density of
+    /// The degree, of at most this one's, that another disc at a distance sees; `radius` is this one's in distances. A density of
     /// order `n` acts there as `radius^(n + 1)`.
-    pub fn seen_from(&'static self, radius: f64) -> &'static Self {
+    pub fn degree_seen_from(&self, radius: f64) -> usize {
         let degree = match radius {
             ..FAR => 1,
             ..NEAR => 2,
             _ => self.degree,
         };
-        Self::of_degree(degree.min(self.degree))
+        degree.min(self.degree)
+    }
+
+    /// Highest radial order.
+    pub fn degree(&self) -> usize {
+        self.degree
     }
 
     /// Number of densities.

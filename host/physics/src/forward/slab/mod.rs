@@ -6,6 +6,7 @@
 
 mod cut;
 mod disc;
+mod discs;
 mod green;
 mod image;
 mod layers;
@@ -21,11 +22,10 @@ use std::sync::OnceLock;
 use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 
-use self::cut::CutDisc;
-use self::disc::{DiscBasis, MAX_DEGREE};
+use self::disc::DiscBasis;
 use self::green::{Surface, SurfaceGreen};
 use self::image::{CellFields, ImageGrid};
-use self::pads::{Across, Pad, PadFields, between, pad_impedances};
+use self::pads::{Across, Pad, PadFields, pad_impedances};
 use self::spots::SlabSpots;
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::spots::SpotFields;
@@ -76,20 +76,6 @@ struct Image {
     cells: OnceLock<CellFields>,
 }
 
-/// A contact, ready to be put into the system.
-struct Disc {
-    centre_m: [f64; 2],
-    radius_m: f64,
-    /// Of the part on the detector (S), and the radius of a whole disc of its area (m).
-    conductance_s: f64,
-    own_radius_m: f64,
-    cut: Option<CutDisc>,
-    basis: &'static DiscBasis,
-    nodes: Vec<[f64; 2]>,
-    /// Of the pads' fields, means under the densities: `columns x densities`.
-    fields: DMatrix<f64>,
-}
-
 impl Slab {
     /// Makes the model at the standard resolution.
     ///
@@ -126,32 +112,6 @@ impl Slab {
         })
     }
 
-    fn disc(&self, index: usize, contact: &Contact) -> Result<Disc, ForwardError> {
-        self.check_contact(contact).map_err(|what| ForwardError::Contact { index, what })?;
-        let centre_m = from_corner(self.size_m, [contact.x_m, contact.y_m]);
-        let basis = DiscBasis::of_degree(self.contact_degree(contact.radius_m));
-        let cut = CutDisc::new(self.size_m, centre_m, contact.radius_m);
-        let share = cut.map_or(1.0, |cut| cut.share());
-        let nodes = disc_nodes_m(basis, centre_m, contact.radius_m, cut);
-        let fields = self.pads.under_disc(basis, &nodes);
-        Ok(Disc {
-            centre_m,
-            radius_m: contact.radius_m,
-            conductance_s: share * contact.conductance_s,
-            own_radius_m: share.sqrt() * contact.radius_m,
-            cut,
-            basis,
-            nodes,
-            fields,
-        })
-    }
-
-    /// The smooth part of the kernel varies over a split length: a disc that is wider needs more degrees.
-    fn contact_degree(&self, radius_m: f64) -> usize {
-        let wider = (radius_m / self.top.split_m() - 1.0).max(0.0);
-        (self.resolution.contact_degree + (2.0 * wider).ceil() as usize).min(MAX_DEGREE)
-    }
-
     /// Whether a contact can be on this detector, or what is wrong with it.
     ///
     /// # Errors
@@ -179,59 +139,6 @@ impl Slab {
         let patches = self.cells().between(&touched, &touched);
         Ok((touched, conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)))
     }
-
-    fn system(&self, discs: &[Disc]) -> ContactSystem<'_> {
-        let electrodes = self.pads.electrodes();
-        let size = discs.iter().map(|disc| disc.basis.len()).sum();
-        let mut fields = DMatrix::zeros(self.pads.columns(), size);
-        let mut cross_and_current = DMatrix::zeros(size, electrodes + 1);
-        let mut start = 0;
-        for disc in discs {
-            let scale = disc.conductance_s.sqrt();
-            cross_and_current[(start, electrodes)] = scale;
-            fields.columns_mut(start, disc.basis.len()).copy_from(&(&disc.fields * scale));
-            start += disc.basis.len();
-        }
-        cross_and_current.columns_mut(0, electrodes).tr_copy_from(&fields.rows(0, electrodes));
-        let corrections = fields.rows(electrodes, fields.nrows() - electrodes);
-        // The floating pads below are a short way for the current between contacts.
-        let mut contacts = -corrections.transpose() * corrections;
-        self.add_kernel(discs, &mut contacts);
-        ContactSystem { electrodes: &self.pads.electrodes_ohm, contacts, cross_and_current }
-    }
-
-    /// Adds what the kernel of the top gives, to the lower triangle.
-    fn add_kernel(&self, discs: &[Disc], contacts: &mut DMatrix<f64>) {
-        let mut row = 0;
-        for (i, disc) in discs.iter().enumerate() {
-            let mut column = 0;
-            for other in &discs[..=i] {
-                let scale = (disc.conductance_s * other.conductance_s).sqrt();
-                let mut block = self.block(disc, other, row == column) * scale;
-                if row == column {
-                    block += self.top.disc_self(disc.own_radius_m).reduced(disc.basis, 1.0, disc.conductance_s);
-                }
-                let mut view = contacts.view_mut((row, column), block.shape());
-                view += block;
-                column += other.basis.len();
-            }
-            row += disc.basis.len();
-        }
-    }
-
-    /// Impedances between the densities of two contacts without their own singular parts. Of contacts far apart, only the first
-    /// densities see each other.
-    fn block(&self, disc: &Disc, other: &Disc, same: bool) -> DMatrix<f64> {
-        let images = self.top.images(disc.centre_m, other.centre_m, disc.radius_m + other.radius_m);
-        if same {
-            return between(disc.basis, &disc.nodes, disc.basis, &disc.nodes, &self.top, &images, true);
-        }
-        let distance_m = (disc.centre_m[0] - other.centre_m[0]).hypot(disc.centre_m[1] - other.centre_m[1]);
-        let [far, far_other] = [disc, other].map(|disc| disc.basis.seen_from(disc.radius_m / distance_m));
-        let nodes = [(disc, far), (other, far_other)]
-            .map(|(disc, far)| disc_nodes_m(far, disc.centre_m, disc.radius_m, disc.cut));
-        between(far, &nodes[0], far_other, &nodes[1], &self.top, &images, false)
-    }
 }
 
 impl ForwardModel for Slab {
@@ -244,12 +151,15 @@ impl ForwardModel for Slab {
     }
 
     fn impedance_ohm(&self, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
-        let discs = contacts
-            .iter()
-            .enumerate()
-            .map(|(index, contact)| self.disc(index, contact))
-            .collect::<Result<Vec<_>, _>>()?;
-        self.system(&discs).impedance_ohm().ok_or(ForwardError::NoContact)
+        self.discs(contacts)?.impedance_ohm().ok_or(ForwardError::NoContact)
+    }
+
+    fn impedance_with_changes_ohm(
+        &self,
+        contacts: &[Contact],
+        replaced: &[(usize, Contact)],
+    ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), ForwardError> {
+        self.discs(contacts)?.with_changes_ohm(replaced)
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
@@ -330,14 +240,6 @@ fn check(detector: &Detector) -> Result<[f64; 2], String> {
         }
     }
     Ok(size_m)
-}
-
-/// The points of a basis on a disc, or on what walls leave of it (m).
-fn disc_nodes_m(basis: &DiscBasis, centre_m: [f64; 2], radius_m: f64, cut: Option<CutDisc>) -> Vec<[f64; 2]> {
-    match cut {
-        Some(cut) => basis.mapped_nodes_m(centre_m, radius_m, |node| cut.map(node)),
-        None => basis.nodes_m(centre_m, radius_m),
-    }
 }
 
 /// A place from the corner, given from the middle (m).

@@ -79,7 +79,7 @@ pub(super) fn between(
             .filter(|image| !(same && image.in_place()))
             .map(|image| {
                 let at = image.of(b);
-                kernel.near_ohm((a[0] - at[0]).hypot(a[1] - at[1]))
+                kernel.near_ohm(((a[0] - at[0]).powi(2) + (a[1] - at[1]).powi(2)).sqrt())
             })
             .sum();
         kernel.smooth_ohm(a, b) + near
@@ -214,15 +214,19 @@ impl PadFields {
         sums
     }
 
-    /// Means of all columns of [`sample`](Self::sample) under the densities of a disc: `columns x densities`.
-    pub fn under_disc(&self, basis: &DiscBasis, nodes: &[[f64; 2]]) -> DMatrix<f64> {
+    /// Means under the densities of a disc, of the electrodes' fields, `densities x electrodes`, and of the correction, `columns x
+    /// densities`.
+    pub fn under_disc(&self, basis: &DiscBasis, nodes: &[[f64; 2]]) -> [DMatrix<f64>; 2] {
         let mut sample = vec![0.0_f32; self.columns];
-        let mut points = DMatrix::zeros(self.columns, nodes.len());
-        for (node, mut column) in nodes.iter().zip(points.column_iter_mut()) {
+        let mut electrodes = DMatrix::zeros(nodes.len(), self.electrodes);
+        let mut correction = DMatrix::zeros(self.columns - self.electrodes, nodes.len());
+        for (row, (node, mut column)) in nodes.iter().zip(correction.column_iter_mut()).enumerate() {
             self.sample(*node, &mut sample);
-            column.iter_mut().zip(&sample).for_each(|(to, from)| *to = f64::from(*from));
+            let (own, rest) = sample.split_at(self.electrodes);
+            electrodes.row_mut(row).iter_mut().zip(own).for_each(|(to, from)| *to = f64::from(*from));
+            column.iter_mut().zip(rest).for_each(|(to, from)| *to = f64::from(*from));
         }
-        points * basis.weights().transpose()
+        [basis.weights() * electrodes, correction * basis.weights().transpose()]
     }
 }
 

@@ -278,3 +278,31 @@ fn an_image_of_another_size_or_sign_is_refused() {
     assert!(slab.image_fields(&vec![-1e-3; nodes]).unwrap_err().to_string().contains("node 0"));
     assert_eq!(slab.image_fields(&vec![0.0; nodes]), Err(ForwardError::NoContact));
 }
+
+#[test]
+fn impedances_change_as_differences_do() {
+    let slab = Slab::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap();
+    let contacts = [
+        Contact::flat(0.004, 0.011, 0.002, 3e-4),
+        Contact::flat(-0.013, -0.004, 0.0042, 2e-2),
+        // Cut by two walls.
+        Contact::flat(0.0285, -0.029, 0.0027, 1e-3),
+    ];
+    let mut replaced = Vec::new();
+    for (k, contact) in contacts.iter().enumerate() {
+        let step = 1e-3;
+        replaced.push((k, Contact { x_m: contact.x_m + step * contact.radius_m, ..*contact }));
+        replaced.push((k, Contact { y_m: contact.y_m - step * contact.radius_m, ..*contact }));
+        replaced.push((k, Contact { conductance_s: (1.0 + step) * contact.conductance_s, ..*contact }));
+        replaced.push((k, Contact { radius_m: (1.0 + step) * contact.radius_m, ..*contact }));
+    }
+    let (impedance_ohm, changes) = slab.impedance_with_changes_ohm(&contacts, &replaced).unwrap();
+    assert_eq!(impedance_ohm, slab.impedance_ohm(&contacts).unwrap());
+    for ((k, contact), change) in replaced.iter().zip(&changes) {
+        let mut contacts = contacts;
+        contacts[*k] = *contact;
+        let expected = slab.impedance_ohm(&contacts).unwrap() - &impedance_ohm;
+        let off = (change - &expected).norm() / expected.norm();
+        assert!(off < 0.06, "contact {k} to {contact:?}: {off}");
+    }
+}

@@ -1,7 +1,10 @@
-//! Contacts whose radius is found too: the forward model itself, fitted.
+//! Least squares of a few discs: Levenberg and Marquardt's method on their places, conductances and radii, with the forward model
+//! itself.
 //!
-//! Only where spots of the usual radius cannot explain the readings: a contact that is wide, or so firm that it conducts better
-//! than a perfect one of that radius. Derivatives are differences, for the radius changes all of the model's tables.
+//! Derivatives are kept as long as the discs are near to where they were taken: then a step costs one answer of the forward model,
+//! and a very small one none, as the readings follow the derivatives.
+
+use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -11,43 +14,84 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardModel, readings_v};
 use tactomo_physics::scene::Contact;
-use tactomo_physics::space;
+use tactomo_physics::space::{self, Place};
 
-/// Parameters of a disc: x, y, logarithm of the conductance, logarithm of the radius.
+/// Parameters of a disc: its place along two directions in radii, logarithm of the conductance, logarithm of the radius.
 pub(super) const PARAMETERS: usize = 4;
-/// Standard deviation of the logarithm of a radius before anything is read: a factor of two or so.
-pub(super) const RADIUS_DEVIATION: f64 = 0.7;
-/// The same of a conductance around the sheet's: nearly nothing is known.
-const CONDUCTANCE_DEVIATION: f64 = 4.0;
-/// Differences, in radii for places.
+/// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
+pub(super) const CONDUCTANCE_DEVIATION: f64 = 4.0;
+/// Differences that derivatives are taken over.
 const DIFFERENCE: f64 = 1e-3;
-/// Longest change of a logarithm in a step.
-const LONGEST_LOG: f64 = 0.7;
-/// After so many steps, a fit that still leaves this times what noise and model error make is given up.
-const PROBATION: usize = 5;
-const HOPELESS: f64 = 30.0;
-/// Widest radius, in halves of the side of a square of the detector's area, or of its outline's shorter side: what is wider is an
-/// image's business.
+/// Longest way in a step, in radii, and longest changes of the logarithms of a conductance and of a radius: where contacts are too
+/// few, a fit would make them as wide as it can, at the highest cost.
+const LONGEST_WAY: f64 = 2.0;
+const LONGEST_CONDUCTANCE: f64 = 1.0;
+const LONGEST_RADIUS: f64 = 0.25;
+/// What the readings' curvature makes of the way from where derivatives were taken, in standard deviations: up to the first, readings are
+/// taken as linear; up to the second, the derivatives serve for steps, if no parameter has changed by more than the third.
+const LINEAR: f64 = 0.1;
+const NEAR: f64 = 3.0;
+const NEAR_AT_MOST: f64 = 0.4;
+/// Share of the expected gain that a step has to bring, or derivatives are taken anew.
+const TRUE: f64 = 0.5;
+/// Widest radius of a disc, in halves of the side of a square of the detector's area, or of its outline's shorter side: what is wider
+/// is an image's business.
 const WIDEST: f64 = 0.6;
-/// Tries of one step, and the share of the cost below which a step is the last.
+/// Tries of one step, each damped ten times more.
 const TRIES: usize = 4;
-const SMALL: f64 = 1e-4;
+const FIRST_DAMPING: f64 = 1e-3;
+const LEAST_DAMPING: f64 = 1e-7;
+/// Smallest and largest conductance, in sheet conductances.
+const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
+/// Smallest radius, in usual ones.
+const NARROWEST: f64 = 0.05;
+
+/// Derivatives of the readings where they were taken.
+#[derive(Clone, Debug)]
+struct Slopes {
+    at: Vec<Contact>,
+    /// Unit vectors of the two directions of each.
+    along: Vec<[Place; 2]>,
+    /// Readings there (V).
+    volts: Vec<f64>,
+    /// Of the readings (V), for each parameter of each contact.
+    by: Vec<Vec<f64>>,
+}
 
 /// Discs that fit best.
 #[derive(Clone, Debug)]
 pub(super) struct DiscFit {
     pub contacts: Vec<Contact>,
+    /// Readings that they predict (V).
+    pub volts: Vec<f64>,
     /// Sum of squares of the weighted residuals, without what was known before.
     pub cost: f64,
-    /// Of the parameters, [`PARAMETERS`] for each contact.
-    pub covariance: Option<DMatrix<f64>>,
+    /// Sum of squares of the parameters' deviations from what was known before.
+    pub known: f64,
+    slopes: Arc<Slopes>,
+    /// `J^T W^2 J` with what was known before.
+    pub normal: DMatrix<f64>,
+    /// Whether more steps would change nothing.
     pub settled: bool,
+}
+
+/// How far a fit goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    /// Steps at most.
+    pub steps: usize,
+    /// Ends where a step is expected to lower the sum of squares by less,
+    pub gain: f64,
+    /// or by less than this share of what noise does not explain.
+    pub share: f64,
 }
 
 /// What disc fits need beside the target.
 pub(super) struct DiscFitter<'a> {
     pub model: &'a dyn ForwardModel,
     pub usual_radius_m: f64,
+    /// Standard deviation of the logarithm of a radius before anything is read.
+    pub radius_deviation: f64,
     pub sheet_s: f64,
     /// Where a disc may be.
     pub fields: &'a dyn SpotFields,
@@ -64,111 +108,286 @@ pub(super) fn widest_m(problem: &Problem) -> f64 {
     0.5 * WIDEST * area_m2.sqrt().min(width_m).min(height_m)
 }
 
-impl DiscFitter<'_> {
-    /// The nearest minimum from a start, in at most so many steps; `None` if the start makes no sense.
-    pub fn fit(&self, start: Vec<Contact>, target: &Target, steps: usize) -> Option<DiscFit> {
-        let mut at = start;
-        let mut residuals = self.residuals(&at, target)?;
-        let (mut damping, mut settled, mut normal) = (1e-3, false, None);
-        for count in 0..steps {
-            if count == PROBATION && dot(&residuals, &residuals) > HOPELESS * target.count() as f64 {
-                return None;
-            }
-            let (matrix, gradient) = self.equations(&at, &residuals, target)?;
-            let next = self.step(&at, &residuals, target, (&matrix, &gradient), &mut damping);
-            normal = Some(matrix);
-            let Some((contacts, left)) = next else {
-                settled = true;
-                break;
-            };
-            let (before, after) = (dot(&residuals, &residuals), dot(&left, &left));
-            (at, residuals) = (contacts, left);
-            if before - after < SMALL * before {
-                settled = true;
-                break;
-            }
-        }
-        let count = target.volts.len();
-        let cost = dot(&residuals[..count], &residuals[..count]);
-        let covariance = normal.and_then(Cholesky::new).map(|factor| factor.inverse());
-        Some(DiscFit { contacts: at, cost, covariance, settled })
+impl DiscFit {
+    /// Covariance of the parameters, [`PARAMETERS`] for each contact; `None` where they are not determined.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        Some(Cholesky::new(self.normal.clone())?.inverse())
     }
 
+    /// Unit vectors of the directions that the parameters of a contact's place are along, and their unit (m).
+    pub fn along(&self, k: usize) -> ([Place; 2], f64) {
+        (self.slopes.along[k], self.slopes.at[k].radius_m)
+    }
+
+    /// Derivatives of the readings by all parameters (V).
+    pub fn slopes_v(&self) -> &[Vec<f64>] {
+        &self.slopes.by
+    }
+
+    /// What the curvature of the readings makes of an offset, in standard deviations: a change by one radius, or of a logarithm by one,
+    /// changes derivatives by about themselves.
+    fn bend(&self, offset: &[f64]) -> f64 {
+        let of = |(i, offset): (usize, &f64)| 0.5 * offset * offset * self.normal[(i, i)].sqrt();
+        offset.iter().enumerate().map(of).fold(0.0, f64::max)
+    }
+
+    /// Whether the derivatives were taken too far from here.
+    fn is_far(&self) -> bool {
+        let offset = self.slopes.offset(&self.contacts);
+        self.bend(&offset) > NEAR || offset.iter().any(|offset| offset.abs() > NEAR_AT_MOST)
+    }
+
+    /// What the fit lowers: both sums of squares.
+    fn objective(&self) -> f64 {
+        self.cost + self.known
+    }
+}
+
+impl Slopes {
+    /// How far contacts are from where the derivatives were taken, in the parameters.
+    fn offset(&self, contacts: &[Contact]) -> Vec<f64> {
+        let of = |(k, now): (usize, &Contact)| {
+            let before = &self.at[k];
+            let way = [now.x_m - before.x_m, now.y_m - before.y_m, now.z_m - before.z_m];
+            let along = |direction: usize| {
+                self.along[k][direction].iter().zip(way).map(|(a, b)| a * b).sum::<f64>() / before.radius_m
+            };
+            let conductance = (now.conductance_s / before.conductance_s).ln();
+            [along(0), along(1), conductance, (now.radius_m / before.radius_m).ln()]
+        };
+        contacts.iter().enumerate().flat_map(of).collect()
+    }
+}
+
+impl DiscFitter<'_> {
+    /// The nearest minimum from a start; `None` if the start makes no sense.
+    pub fn fit(&self, start: Vec<Contact>, target: &Target, effort: Effort) -> Option<DiscFit> {
+        let slopes = Arc::new(self.slopes(start)?);
+        let (contacts, volts) = (slopes.at.clone(), slopes.volts.clone());
+        self.descend(self.at(contacts, volts, slopes, target)?, target, effort)
+    }
+
+    /// The nearest minimum for other readings from a fit to some.
+    pub fn go_on(&self, from: &DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
+        let (contacts, volts) = (from.contacts.clone(), from.volts.clone());
+        self.descend(self.at(contacts, volts, Arc::clone(&from.slopes), target)?, target, effort)
+    }
+
+    fn descend(&self, mut fit: DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
+        let mut damping = FIRST_DAMPING;
+        let t0 = std::time::Instant::now();
+        let start = fit.contacts.clone();
+        let cost0 = fit.objective();
+        let mut nn = 0;
+        for _ in 0..effort.steps {
+            nn += 1;
+            if fit.is_far() {
+                fit = self.renewed(fit, target)?;
+            }
+            let gradient = self.gradient(&fit, target);
+            let Some((next, expected)) = self.step(&fit, target, &gradient, &mut damping) else {
+                // The derivatives may be too old for a step that lowers anything.
+                if fit.contacts != fit.slopes.at {
+                    fit = self.renewed(fit, target)?;
+                    continue;
+                }
+                fit.settled = true;
+                break;
+            };
+            let gained = fit.objective() - next.objective();
+            fit = next;
+            // A fit that is far off is wrong: it need not be wrong to many digits.
+            if expected < effort.gain.max(effort.share * (fit.objective() - target.count() as f64)) {
+                fit.settled = true;
+                break;
+            }
+            if gained < TRUE * expected {
+                fit = self.renewed(fit, target)?;
+            }
+        }
+        if std::env::var("DBG").is_ok() {
+            let show = |all: &[Contact]| all.iter().map(|c| format!("({:.1} {:.1} r{:.2} C{:.1e})", 1e3*c.x_m, 1e3*c.y_m, 1e3*c.radius_m, c.conductance_s)).collect::<Vec<_>>().join(" ");
+            eprintln!("{:.1} ms {nn}/{} {:.1} -> {:.1} {} : {} => {}", 1e3*t0.elapsed().as_secs_f64(), effort.steps, cost0, fit.objective(), fit.settled, show(&start), show(&fit.contacts));
+        }
+        Some(fit)
+    }
+
+    /// A step that lowers what is left, and by how much it was expected to; `None` if there is none.
     fn step(
         &self,
-        at: &[Contact],
-        residuals: &[f64],
+        fit: &DiscFit,
         target: &Target,
-        (normal, gradient): (&DMatrix<f64>, &DVector<f64>),
+        gradient: &DVector<f64>,
         damping: &mut f64,
-    ) -> Option<(Vec<Contact>, Vec<f64>)> {
+    ) -> Option<(DiscFit, f64)> {
         for _ in 0..TRIES {
-            let mut damped = normal.clone();
+            let mut damped = fit.normal.clone();
             (0..damped.nrows()).for_each(|i| damped[(i, i)] *= 1.0 + *damping);
-            let moved = Cholesky::new(damped).map(|factor| self.moved(at, factor.solve(gradient).as_slice()));
-            if let Some(moved) = moved
-                && let Some(left) = self.residuals(&moved, target)
-                && dot(&left, &left) < dot(residuals, residuals)
-            {
-                *damping = (*damping * 0.1).max(1e-6);
-                return Some((moved, left));
+            if let Some(step) = Cholesky::new(damped).map(|factor| factor.solve(gradient)) {
+                let expected = 2.0 * step.dot(gradient) - step.dot(&(&fit.normal * &step));
+                let contacts = self.moved(&fit.contacts, &fit.slopes.at, step.as_slice());
+                if let Some(next) = self.next(fit, contacts, target)
+                    && next.objective() <= fit.objective()
+                {
+                    *damping = (*damping * 0.1).max(LEAST_DAMPING);
+                    return Some((next, expected));
+                }
             }
             *damping *= 10.0;
         }
         None
     }
 
-    /// Contacts after a step in their parameters: places in radii.
-    fn moved(&self, at: &[Contact], step: &[f64]) -> Vec<Contact> {
-        let (steps, _) = step.as_chunks::<PARAMETERS>();
-        let moved = |(contact, [by_x, by_y, by_s, by_m]): (&Contact, &[f64; PARAMETERS])| {
-            let shorten = (2.0 / by_x.hypot(*by_y)).min(1.0) * contact.radius_m;
-            let limited = |log: f64| log.clamp(-LONGEST_LOG, LONGEST_LOG).exp();
-            let place_m = [contact.x_m, contact.y_m, contact.z_m];
-            let (place_m, [first, second]) = self.fields.footing(place_m);
-            let place_m = space::along(space::along(place_m, shorten * by_x, first), shorten * by_y, second);
-            let [x_m, y_m, z_m] = self.fields.footing(place_m).0;
-            Contact {
-                x_m,
-                y_m,
-                z_m,
-                conductance_s: contact.conductance_s * limited(*by_s),
-                radius_m: (contact.radius_m * limited(*by_m)).min(self.widest_m),
-            }
-        };
-        at.iter().zip(steps).map(moved).collect()
-    }
-
-    /// Weighted differences of the readings from those of contacts; then those of the parameters from what is usual.
-    fn residuals(&self, contacts: &[Contact], target: &Target) -> Option<Vec<f64>> {
-        let impedance_ohm = self.model.impedance_ohm(contacts).ok()?;
-        let volts = readings_v(&impedance_ohm, self.detector);
-        let mut residuals = target.residuals(volts.volts());
-        for contact in contacts {
-            residuals.push(-(contact.conductance_s / self.sheet_s).ln() / CONDUCTANCE_DEVIATION);
-            residuals.push(-(contact.radius_m / self.usual_radius_m).ln() / RADIUS_DEVIATION);
-        }
-        residuals.iter().all(|residual| residual.is_finite()).then_some(residuals)
-    }
-
-    fn equations(&self, at: &[Contact], residuals: &[f64], target: &Target) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let size = PARAMETERS * at.len();
-        let slopes = (0..size)
-            .map(|parameter| {
-                let mut step = vec![0.0; size];
-                // Backwards if the edge is in the way.
-                step[parameter] = DIFFERENCE;
-                let mut moved = self.moved(at, &step);
-                if moved == at {
-                    step[parameter] = -DIFFERENCE;
-                    moved = self.moved(at, &step);
+    /// A fit at other contacts, with the derivatives that there are.
+    fn next(&self, fit: &DiscFit, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
+        let offset = fit.slopes.offset(&contacts);
+        let volts = match fit.bend(&offset) < LINEAR {
+            true => {
+                let mut volts = fit.slopes.volts.clone();
+                for (slope, offset) in fit.slopes.by.iter().zip(&offset) {
+                    volts.iter_mut().zip(slope).for_each(|(volts, slope)| *volts += offset * slope);
                 }
-                let left = self.residuals(&moved, target)?;
-                Some(left.iter().zip(residuals).map(|(after, before)| (before - after) / step[parameter]).collect())
-            })
-            .collect::<Option<Vec<Vec<f64>>>>()?;
-        let normal = DMatrix::from_fn(size, size, |i, j| dot(&slopes[i], &slopes[j]));
-        let gradient = DVector::from_iterator(size, slopes.iter().map(|slope| dot(slope, residuals)));
-        Some((normal, gradient))
+                volts
+            }
+            false => self.volts(&contacts)?,
+        };
+        let (cost, known) = (target.cost(&volts), self.known(&contacts));
+        cost.is_finite().then(|| DiscFit {
+            contacts,
+            volts,
+            cost,
+            known,
+            slopes: Arc::clone(&fit.slopes),
+            normal: fit.normal.clone(),
+            settled: false,
+        })
     }
+
+    /// A fit with derivatives taken where it is.
+    fn renewed(&self, fit: DiscFit, target: &Target) -> Option<DiscFit> {
+        let slopes = Arc::new(self.slopes(fit.contacts)?);
+        let (contacts, volts) = (slopes.at.clone(), slopes.volts.clone());
+        self.at(contacts, volts, slopes, target)
+    }
+
+    fn at(&self, contacts: Vec<Contact>, volts: Vec<f64>, slopes: Arc<Slopes>, target: &Target) -> Option<DiscFit> {
+        let (cost, known) = (target.cost(&volts), self.known(&contacts));
+        let normal = self.normal(&slopes, target);
+        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, settled: false })
+    }
+
+    fn normal(&self, slopes: &Slopes, target: &Target) -> DMatrix<f64> {
+        let whitened: Vec<_> = slopes.by.iter().map(|slope| target.whitened(slope)).collect();
+        let size = whitened.len();
+        let mut normal = DMatrix::zeros(size, size);
+        for i in 0..size {
+            for j in 0..=i {
+                let product = dot(&whitened[i], &whitened[j]);
+                (normal[(i, j)], normal[(j, i)]) = (product, product);
+            }
+        }
+        for k in 0..size / PARAMETERS {
+            normal[(PARAMETERS * k + 2, PARAMETERS * k + 2)] += CONDUCTANCE_DEVIATION.powi(-2);
+            normal[(PARAMETERS * k + 3, PARAMETERS * k + 3)] += self.radius_deviation.powi(-2);
+        }
+        normal
+    }
+
+    /// Half of the negative derivative of what the fit lowers.
+    fn gradient(&self, fit: &DiscFit, target: &Target) -> DVector<f64> {
+        let mut residuals = target.residuals(&fit.volts);
+        target.whiten_transposed(&mut residuals);
+        let mut gradient: Vec<_> = fit.slopes.by.iter().map(|slope| dot(slope, &residuals)).collect();
+        for (k, contact) in fit.contacts.iter().enumerate() {
+            let [conductance, radius] = self.unusual(contact);
+            gradient[PARAMETERS * k + 2] -= conductance / CONDUCTANCE_DEVIATION;
+            gradient[PARAMETERS * k + 3] -= radius / self.radius_deviation;
+        }
+        gradient.into()
+    }
+
+    /// How far a contact's conductance and radius are from what is usual, in standard deviations.
+    fn unusual(&self, contact: &Contact) -> [f64; 2] {
+        [
+            (contact.conductance_s / self.sheet_s).ln() / CONDUCTANCE_DEVIATION,
+            (contact.radius_m / self.usual_radius_m).ln() / self.radius_deviation,
+        ]
+    }
+
+    fn known(&self, contacts: &[Contact]) -> f64 {
+        contacts.iter().flat_map(|contact| self.unusual(contact)).map(|deviation| deviation * deviation).sum()
+    }
+
+    /// Readings of the forward model (V).
+    pub fn volts(&self, contacts: &[Contact]) -> Option<Vec<f64>> {
+        let impedance_ohm = self.model.impedance_ohm(contacts).ok()?;
+        Some(readings_v(&impedance_ohm, self.detector).volts().to_vec())
+    }
+
+    /// Derivatives at contacts.
+    fn slopes(&self, at: Vec<Contact>) -> Option<Slopes> {
+        let size = PARAMETERS * at.len();
+        let mut steps = Vec::with_capacity(size);
+        let mut replaced = Vec::with_capacity(size);
+        for parameter in 0..size {
+            let (k, mut step) = (parameter / PARAMETERS, [0.0; PARAMETERS]);
+            step[parameter % PARAMETERS] = DIFFERENCE;
+            let mut moved = self.moved(&at[k..=k], &at[k..=k], &step)[0];
+            if moved == at[k] {
+                // Backwards if the edge is in the way.
+                step[parameter % PARAMETERS] = -DIFFERENCE;
+                moved = self.moved(&at[k..=k], &at[k..=k], &step)[0];
+            }
+            steps.push(step[parameter % PARAMETERS]);
+            replaced.push((k, moved));
+        }
+        let (impedance_ohm, changes_ohm) = self.model.impedance_with_changes_ohm(&at, &replaced).ok()?;
+        let volts = readings_v(&impedance_ohm, self.detector).volts().to_vec();
+        let by = changes_ohm.iter().zip(&steps).map(|(change, step)| self.slope(&impedance_ohm, change, *step));
+        let by: Vec<Vec<f64>> = by.collect();
+        let sound = volts.iter().chain(by.iter().flatten()).all(|value| value.is_finite());
+        let along = at.iter().map(|contact| self.fields.footing(place_m(contact)).1).collect();
+        sound.then_some(Slopes { at, along, volts, by })
+    }
+
+    /// Derivative of the readings from a small change of the impedances: `V = Vcc (1 - Z[e][g] / L)`, `L = Z[g][g] + R_on`.
+    fn slope(&self, impedance_ohm: &DMatrix<f64>, change: &DMatrix<f64>, step: f64) -> Vec<f64> {
+        let n = impedance_ohm.nrows();
+        let volts = |g: usize, e: usize| {
+            let load_ohm = impedance_ohm[(g, g)] + self.detector.on_resistance_ohm;
+            let share = impedance_ohm[(e, g)] / load_ohm;
+            -self.detector.drive_v * (change[(e, g)] - share * change[(g, g)]) / (load_ohm * step)
+        };
+        (0..n * n).map(|i| volts(i / n, i % n)).collect()
+    }
+
+    /// Contacts after a step in their parameters, with places in radii of `units`.
+    fn moved(&self, at: &[Contact], units: &[Contact], step: &[f64]) -> Vec<Contact> {
+        let (steps, _) = step.as_chunks::<PARAMETERS>();
+        let moved = |((contact, unit), [first, second, by_s, by_m]): ((&Contact, &Contact), &[f64; PARAMETERS])| {
+            let shorten = (LONGEST_WAY / first.hypot(*second)).min(1.0) * unit.radius_m;
+            let factor = |log: f64, longest: f64| log.clamp(-longest, longest).exp();
+            let (from_m, along) = self.fields.footing(place_m(contact));
+            let to_m = space::along(space::along(from_m, shorten * first, along[0]), shorten * second, along[1]);
+            let ([x_m, y_m, z_m], _) = self.fields.footing(to_m);
+            let conductance_s = contact.conductance_s * factor(*by_s, LONGEST_CONDUCTANCE);
+            let radius_m = contact.radius_m * factor(*by_m, LONGEST_RADIUS);
+            self.held(Contact { x_m, y_m, z_m, conductance_s, radius_m })
+        };
+        at.iter().zip(units).zip(steps).map(moved).collect()
+    }
+
+    /// A contact with conductance and radius held within what makes sense.
+    pub fn held(&self, contact: Contact) -> Contact {
+        let [least, most] = CONDUCTANCES.map(|sheets| sheets * self.sheet_s);
+        Contact {
+            conductance_s: contact.conductance_s.clamp(least, most),
+            radius_m: contact.radius_m.clamp(NARROWEST * self.usual_radius_m, self.widest_m),
+            ..contact
+        }
+    }
+}
+
+pub(super) fn place_m(contact: &Contact) -> Place {
+    [contact.x_m, contact.y_m, contact.z_m]
 }

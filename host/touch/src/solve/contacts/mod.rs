@@ -1,17 +1,14 @@
 //! A few contacts fitted to the full contact physics, off any grid.
 //!
-//! Each contact is a spot ([`network`]) with a place and a resistance; spots are fitted with exact derivatives ([`fit`]) from
-//! a look at all places ([`scan`]), one more at a time as long as the readings ask for more ([`search`]). What spots leave out
-//! of discs of contact is taken from the forward model at the contacts found, and the fit repeated: so the answer is that of
-//! the full model, at the cost of the small one. Where contacts of the usual radius cannot explain the readings, their radii
-//! are found too ([`discs`]). From one frame to the next the fit starts where it was.
+//! Each contact is a disc with a place, a conductance and a radius. Discs are fitted with the forward model itself ([`discs`]), one
+//! more at a time from where it would explain most ([`scan`], in which contacts are spots of a small [`network`]), as long as
+//! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
 
 mod discs;
-mod fit;
+mod evidence;
 mod network;
 #[cfg(test)]
 mod places_tests;
-mod radii;
 mod scan;
 mod search;
 mod solver;
@@ -21,10 +18,9 @@ mod tests;
 
 use nalgebra::DMatrix;
 
-use self::discs::DiscFit;
-use self::fit::Fit;
-use self::network::{FitSpot, Network};
-use self::radii::Radii;
+use self::discs::{DiscFit, PARAMETERS};
+use self::evidence::Prior;
+use self::network::Network;
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(super) use self::solver::{ContactFollower, ContactSearcher};
@@ -33,24 +29,28 @@ use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::readings::Readings;
-use tactomo_physics::scene::Contact;
 
 /// Places of the scan.
 const SCAN_PLACES: usize = 600;
 /// Conductance of a contact in sheet conductances above which it is taken as saturated.
-const MOST_CONDUCTANCE: f64 = 300.0;
+const SATURATED: f64 = 270.0;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
 const FULL: f64 = 0.995;
-/// Mean square of what is left, in what noise and model error make, above which the readings do not fit.
-const MISFIT: f64 = 3.0;
+/// Standard deviations by which the mean square of what is left is over what noise and model error leave, where the readings do not fit:
+/// noise alone does so in 1 of 3 million frames.
+const MISFIT: f64 = 5.0;
+/// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
+const KNOWN: f64 = 0.2;
 
 /// How contacts are fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSettings {
     /// Most contacts.
     pub most: usize,
-    /// Radius that contacts are taken to have (m) where the readings do not tell.
+    /// Usual radius of contacts (m): what is known of it before anything is read, a fingertip's or that of the indenter.
     pub radius_m: f64,
+    /// Standard deviation of the logarithm of a radius: 0.7 is a factor of two or so.
+    pub radius_deviation: f64,
     /// Error of the forward model, as a share of the largest reading.
     pub model_error: f64,
     /// Error of the model's, or the builder's, impedance of a pad, as a share of it.
@@ -62,8 +62,8 @@ impl ContactSettings {
     pub fn of(problem: &Problem) -> Self {
         // Against three times its nodes, a shell of 2000 is off by 0.0005 (curved) to 0.002 (0.4 mm of square-60), in the root of
         // the mean square and but for the pads' own impedances; the slab by 0.0002 to 0.0005.
-        let model_error = if problem.model.name() == "shell" { 0.0015 } else { 0.0007 };
-        Self { most: 5, radius_m: problem.spacing_m() / 6.0, model_error, pad_error: 0.03 }
+        let model_error = if problem.model.name() == "shell" { 0.0015 } else { 0.0003 };
+        Self { most: 5, radius_m: problem.spacing_m() / 6.0, radius_deviation: 0.7, model_error, pad_error: 0.03 }
     }
 }
 
@@ -79,6 +79,7 @@ pub(super) struct ContactFinder {
     /// Widest radius of a disc (m).
     widest_m: f64,
     errors: Errors,
+    prior: Prior,
 }
 
 /// Contacts that explain a frame, for another frame to go on from.
@@ -87,35 +88,18 @@ pub(super) struct Found(Explanation);
 
 /// Contacts that explain a frame.
 #[derive(Clone, Debug)]
-enum Explanation {
-    /// Spots, what the forward model's readings of contacts of these radii are over theirs (V), and the radii.
-    Spots(Fit, Vec<f64>, Radii),
-    /// Discs.
-    Discs(DiscFit),
+struct Explanation {
+    fit: DiscFit,
+    /// Probability of their count, among the counts that were tried.
+    certainty: f64,
 }
 
 impl Explanation {
-    /// Sum of squares of the weighted residuals.
-    fn cost(&self) -> f64 {
-        match self {
-            Self::Spots(fit, ..) => fit.cost,
-            Self::Discs(fit) => fit.cost,
-        }
-    }
-
-    /// Number of parameters that were fitted.
-    fn parameters(&self) -> usize {
-        match self {
-            Self::Spots(fit, ..) => 3 * fit.spots.len(),
-            Self::Discs(fit) => discs::PARAMETERS * fit.contacts.len(),
-        }
-    }
-
-    fn is_settled(&self) -> bool {
-        match self {
-            Self::Spots(fit, ..) => fit.settled,
-            Self::Discs(fit) => fit.settled,
-        }
+    /// A fit, with the logarithms of the evidence for each count.
+    fn new(fit: DiscFit, by_count: &[f64]) -> Self {
+        let of = by_count[fit.contacts.len()];
+        let all: f64 = by_count.iter().map(|other| (other - of).exp()).sum();
+        Self { fit, certainty: 1.0 / all }
     }
 }
 
@@ -145,6 +129,10 @@ impl ContactFinder {
             sheet_s: detector.sheet_conductance_s(),
             spacing_m: problem.spacing_m(),
             widest_m: discs::widest_m(problem),
+            prior: Prior {
+                area_m2: problem.jacobian.image_mesh.node_areas_m2.iter().sum(),
+                radius_deviation: settings.radius_deviation,
+            },
             problem: problem.clone(),
             settings,
         })
@@ -169,70 +157,57 @@ impl ContactFinder {
     }
 
     /// Readings that are left to noise, which is the sum of squares that noise alone leaves.
-    fn freedom(&self, found: &Explanation, target: &Target) -> f64 {
-        target.count().saturating_sub(found.parameters()).max(1) as f64
+    fn freedom(&self, fit: &DiscFit, target: &Target) -> f64 {
+        target.count().saturating_sub(PARAMETERS * fit.contacts.len()).max(1) as f64
     }
 
-    fn contact(&self, spot: &FitSpot, radius_m: f64) -> Contact {
-        let [x_m, y_m, z_m] = spot.spot.place_m;
-        Contact { z_m, ..Contact::flat(x_m, y_m, radius_m, self.conductance_s(spot)) }
-    }
-
-    /// Conductance of the contact of a spot (S), of which what is beyond an edge does nothing.
-    fn conductance_s(&self, spot: &FitSpot) -> f64 {
-        1.0 / (spot.ohm - spot.spot.own_ohm).max(1.0 / self.most_s()) / spot.spot.share
-    }
-
-    fn most_s(&self) -> f64 {
-        MOST_CONDUCTANCE * self.sheet_s
+    /// Whether more is left than noise and model error leave.
+    fn is_misfit(&self, fit: &DiscFit, target: &Target) -> bool {
+        let freedom = self.freedom(fit, target);
+        fit.cost > freedom + MISFIT * (2.0 * freedom).sqrt()
     }
 
     fn solution(&self, found: &Explanation, target: &Target) -> Solution {
-        let contacts = match found {
-            Explanation::Spots(fit, _, radii) => {
-                let covariance = fit.covariance.as_ref().map(|covariance| radii.widened(covariance));
-                let of = |(k, spot)| {
-                    let found = self.found_spot(spot, k, covariance.as_ref());
-                    FoundContact { radius_m: radii.known_m(k), ..found }
-                };
-                fit.spots.iter().enumerate().map(of).collect()
-            }
-            Explanation::Discs(fit) => {
-                let of = |(k, contact)| found_disc(contact, k, fit.covariance.as_ref());
-                fit.contacts.iter().enumerate().map(of).collect::<Vec<_>>()
-            }
-        };
-        let left = found.cost() / self.freedom(found, target);
-        let is_perfect = |contact: &FoundContact| contact.conductance_s > 0.9 * self.most_s();
+        let fit = &found.fit;
+        let covariance = fit.covariance();
+        let contacts: Vec<_> = (0..fit.contacts.len()).map(|k| found_contact(fit, k, covariance.as_ref())).collect();
+        let is_perfect = |contact: &FoundContact| contact.conductance_s > SATURATED * self.sheet_s;
         let flags = Flags {
             saturated: target.is_saturated() || contacts.iter().any(is_perfect),
-            misfit: left > MISFIT,
-            unfinished: !found.is_settled(),
+            misfit: self.is_misfit(fit, target),
+            unfinished: !fit.settled,
             excluded: Vec::new(),
         };
+        let left = fit.cost / self.freedom(fit, target);
         let residual = Some(left.sqrt() * target.deviation_v() / self.errors.noise_v);
         Solution { contacts, residual, flags, ..Solution::default() }
     }
+}
 
-    fn found_spot(&self, spot: &FitSpot, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
-        let [x_m, y_m, z_m] = spot.spot.place_m;
-        let conductance_s = self.conductance_s(spot);
-        let uncertainty = covariance.map(|all| radii::uncertainty(all, k, spot, conductance_s));
-        FoundContact { z_m, uncertainty, ..FoundContact::flat(x_m, y_m, conductance_s) }
+/// A contact of a fit with its standard errors.
+fn found_contact(fit: &DiscFit, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
+    let contact = fit.contacts[k];
+    let start = PARAMETERS * k;
+    let is_known = covariance.is_some_and(|all| all[(start + 3, start + 3)] < KNOWN * KNOWN);
+    FoundContact {
+        z_m: contact.z_m,
+        uncertainty: covariance.map(|all| uncertainty(fit, k, all)),
+        radius_m: is_known.then_some(contact.radius_m),
+        ..FoundContact::flat(contact.x_m, contact.y_m, contact.conductance_s)
     }
 }
 
-fn found_disc(contact: &Contact, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
-    let Contact { x_m, y_m, z_m, radius_m, conductance_s } = *contact;
-    let uncertainty = covariance.map(|all| uncertainty(all, discs::PARAMETERS * k, radius_m, conductance_s));
-    FoundContact { z_m, uncertainty, radius_m: Some(radius_m), ..FoundContact::flat(x_m, y_m, conductance_s) }
-}
-
-/// Standard errors from a covariance where a contact's parameters start: places in `metres`, then a logarithm of which one is
-/// `per_log_s` of conductance.
-fn uncertainty(covariance: &DMatrix<f64>, start: usize, metres: f64, per_log_s: f64) -> Uncertainty {
-    let of = |i: usize, j: usize| covariance[(start + i, start + j)];
-    let [x, y, log] = [0, 1, 2].map(|i| of(i, i).max(0.0).sqrt());
-    let correlation = (of(0, 1) / (x * y).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
-    Uncertainty { x_m: x * metres, y_m: y * metres, correlation, conductance_s: per_log_s * log }
+/// Standard errors of a contact.
+fn uncertainty(fit: &DiscFit, k: usize, covariance: &DMatrix<f64>) -> Uncertainty {
+    let of = |i: usize, j: usize| covariance[(PARAMETERS * k + i, PARAMETERS * k + j)];
+    let (along, unit_m) = fit.along(k);
+    // Directions along the surface to x and y.
+    let parts = |axis: usize| [along[0][axis], along[1][axis]];
+    let between = |a: [f64; 2], b: [f64; 2]| {
+        (0..4).map(|index| (index / 2, index % 2)).map(|(i, j)| a[i] * b[j] * of(i, j)).sum::<f64>()
+    };
+    let [x, y] = [0, 1].map(|axis| between(parts(axis), parts(axis)).max(0.0).sqrt());
+    let correlation = (between(parts(0), parts(1)) / (x * y).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
+    let conductance_s = fit.contacts[k].conductance_s * of(2, 2).max(0.0).sqrt();
+    Uncertainty { x_m: x * unit_m, y_m: y * unit_m, correlation, conductance_s }
 }

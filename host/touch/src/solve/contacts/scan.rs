@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::fit::{Fit, Fitter};
-use super::network::{FitSpot, Network};
+use super::discs::DiscFit;
+use super::network::{LoadedSpot, Network};
 use super::target::{Target, dot};
 use crate::solve::balance;
 use tactomo_physics::forward::spots::{Spot, SpotFields};
@@ -13,6 +13,9 @@ use tactomo_physics::space;
 
 /// Every so many places one is looked at in pairs.
 const PAIR_STRIDE: usize = 2;
+
+/// Share of a pattern that is taken for new, at least: where nothing is new, a gain would be a quotient of errors.
+const LEAST_NEW: f64 = 0.02;
 
 /// Places that are looked at.
 #[derive(Clone, Debug)]
@@ -28,6 +31,8 @@ struct FirstLook {
     basis: DMatrix<f64>,
     /// Change of the readings by conductance in these (V/S): a column for each place.
     patterns: DMatrix<f64>,
+    /// Squares of their lengths.
+    squares: Vec<f64>,
     /// Scalar products of the patterns of places that are looked at in pairs.
     pairs: DMatrix<f64>,
     /// Mean of `E[g][g] - 2 f + R` at each place (ohm).
@@ -38,8 +43,8 @@ struct FirstLook {
 pub(super) struct Looks<'a> {
     /// Whitened change of the readings by conductance (1/S): a column for each place.
     patterns: Cow<'a, DMatrix<f64>>,
-    /// Scalar products of those that are looked at in pairs, if they are known.
-    pairs: Option<&'a DMatrix<f64>>,
+    /// Of each, the square of its length, but for what the contacts that there are could do as well.
+    squares: Cow<'a, [f64]>,
     /// Whitened readings that are left.
     left: DVector<f64>,
     /// Resistance besides that of a contact alone that its share of the readings stands for (ohm); none if there is none.
@@ -72,35 +77,55 @@ impl Scan {
         balance::balance(&mut volts, network.electrodes(), network.drive_v);
         Looks {
             patterns: Cow::Borrowed(&self.first.patterns),
-            pairs: Some(&self.first.pairs),
+            squares: Cow::Borrowed(&self.first.squares),
             left: self.first.basis.tr_mul(&DVector::from_vec(volts)),
             load_ohm: &self.first.load_ohm,
             gain: target.deviation_v().powi(-2),
         }
     }
 
-    /// Looks for more contacts beside those of a fit.
-    pub fn beside(&self, fitter: &Fitter<'_>, fit: &Fit, target: &Target) -> Looks<'_> {
-        let n = fitter.network.electrodes();
+    /// Looks for more contacts beside those of a fit, which are `spots`: what they would explain that a change of those would not.
+    ///
+    /// With the fit's derivatives `S` and normal matrix `H`, of a pattern `p` only `p - S H^-1 S^T p` is new; what is left, `r`, has no
+    /// part along `S`, as the fit is at its minimum.
+    pub fn beside(
+        &self,
+        network: &Network,
+        fields: &dyn SpotFields,
+        spots: &[LoadedSpot],
+        fit: &DiscFit,
+        target: &Target,
+    ) -> Option<Looks<'_>> {
+        let n = network.electrodes();
+        let solved = network.solve(spots, fields)?;
         let mut patterns = DMatrix::zeros(n * n, self.spots.len());
         for (mut column, spot) in patterns.column_iter_mut().zip(&self.spots) {
-            let potentials_ohm = fitter.network.potentials_ohm(&fit.solved, &fit.spots, spot, fitter.fields);
-            fitter.network.volts_per_s(&fit.solved, &potentials_ohm, column.as_mut_slice());
+            let potentials_ohm = network.potentials_ohm(&solved, spots, spot, fields);
+            network.volts_per_s(&solved, &potentials_ohm, column.as_mut_slice());
             target.whiten(column.as_mut_slice());
         }
-        Looks {
+        let whitened: Vec<_> = fit.slopes_v().iter().map(|slope| target.whitened(slope)).collect();
+        let slopes = DMatrix::from_fn(whitened.len(), n * n, |parameter, i| whitened[parameter][i]);
+        let mut shared = slopes * &patterns;
+        let factor = Cholesky::new(fit.normal.clone())?;
+        factor.l_dirty().solve_lower_triangular_mut(&mut shared);
+        let news = patterns.column_iter().zip(shared.column_iter()).map(|(pattern, shared)| {
+            let (all, old) = (pattern.norm_squared(), shared.norm_squared());
+            (all - old).max(LEAST_NEW * all)
+        });
+        Some(Looks {
+            squares: news.collect::<Vec<_>>().into(),
             patterns: Cow::Owned(patterns),
-            pairs: None,
             left: target.residuals(&fit.volts).into(),
             load_ohm: &[],
             gain: 1.0,
-        }
+        })
     }
 
     /// The best places for one contact, each apart from better ones.
     pub fn ones(&self, looks: &Looks<'_>, count: usize, apart_m: f64) -> Vec<Candidate> {
         let all = looks.patterns.column_iter().enumerate().filter_map(|(place, pattern)| {
-            let (along, square) = (dot(pattern.as_slice(), looks.left.as_slice()), pattern.norm_squared());
+            let (along, square) = (dot(pattern.as_slice(), looks.left.as_slice()), looks.squares[place]);
             (along > 0.0).then(|| Candidate {
                 contacts: vec![(place, along / square)],
                 gain: looks.gain * along * along / square,
@@ -109,11 +134,11 @@ impl Scan {
         self.best(all.collect(), count, apart_m)
     }
 
-    /// The best places for two contacts at once, over all pairs of a coarser choice of places.
+    /// The best places for two contacts at once where there are none yet, over all pairs of a coarser choice of places.
     pub fn pairs(&self, looks: &Looks<'_>, count: usize, apart_m: f64) -> Vec<Candidate> {
         let places = paired(self.spots.len());
         let patterns = looks.patterns.select_columns(&places);
-        let products = looks.pairs.map_or_else(|| Cow::Owned(patterns.transpose() * &patterns), Cow::Borrowed);
+        let products = &self.first.pairs;
         let along = patterns.tr_mul(&looks.left);
         let mut all = Vec::new();
         let mut floor = 0.0;
@@ -139,12 +164,11 @@ impl Scan {
     }
 
     /// The spots of a candidate.
-    pub fn start(&self, fitter: &Fitter<'_>, looks: &Looks<'_>, candidate: &Candidate) -> Vec<FitSpot> {
+    pub fn start(&self, looks: &Looks<'_>, candidate: &Candidate) -> Vec<LoadedSpot> {
         let spot = |(place, conductance_s): &(usize, f64)| {
             let spot = self.spots[*place].clone();
             let load_ohm = looks.load_ohm.get(*place).copied().unwrap_or_default();
-            let ohm = (1.0 / conductance_s - load_ohm).max(spot.own_ohm);
-            fitter.spot(spot, ohm)
+            LoadedSpot { ohm: (1.0 / conductance_s - load_ohm).max(spot.own_ohm), spot }
         };
         candidate.contacts.iter().map(spot).collect()
     }
@@ -198,6 +222,7 @@ impl FirstLook {
         };
         Self {
             basis: factor.q(),
+            squares: patterns.column_iter().map(|pattern| pattern.norm_squared()).collect(),
             pairs: chosen.transpose() * &chosen,
             load_ohm: spots.iter().map(mean_ohm).collect(),
             patterns,

@@ -1,97 +1,43 @@
 //! How many contacts, and where each fit starts.
+//!
+//! One contact more at a time: what each place would explain that the contacts so far cannot ([`scan`](super::scan)), a fit of
+//! discs from the best of them, and the evidence for the answer ([`evidence`](super::evidence)). Then one fewer at a time, as long as
+//! that is more likely.
 
-use std::f64::consts::TAU;
-
-use nalgebra::DMatrix;
-
-use super::discs::{DiscFit, DiscFitter, PARAMETERS};
-use super::fit::{Fit, Fitter};
-use super::network::FitSpot;
-use super::radii::Radii;
-use super::scan::{Candidate, Looks};
+use super::discs::{DiscFit, DiscFitter, Effort, place_m};
+use super::network::LoadedSpot;
 use super::target::Target;
 use super::{ContactFinder, Explanation};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
-use tactomo_physics::space::{self, Place};
+use tactomo_physics::space;
 
-/// Steps from each of some starts, how many of them go on, steps of those, and steps from the frame before.
-const FIRST_STEPS: usize = 5;
+/// A few steps from each start, and the way to the minimum from the best.
+const FIRST: Effort = Effort { steps: 4, gain: 1.0, share: 0.02 };
+const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
+/// From the frame before.
+const WARM: Effort = Effort { steps: 3, gain: 0.1, share: 0.0 };
+/// Starts of one more contact, and how many of them go on.
+const STARTS: usize = 4;
 const FINALISTS: usize = 2;
-const COLD_STEPS: usize = 12;
-const WARM_STEPS: usize = 4;
-/// Steps after the readings were corrected, and how often they are at most: in corners, where spots are worst, five times do.
-const CORRECTED_STEPS: usize = 3;
-const CORRECTIONS: usize = 8;
-/// Steps of discs from spots, and from the frame before.
-const COLD_DISC_STEPS: usize = 12;
-const WARM_DISC_STEPS: usize = 3;
-/// Places that a fit starts from.
-const STARTS: usize = 3;
-/// By how much each parameter has to lower the sum of squares: the Bayesian information criterion for 256 readings asks for
-/// 5.5; this leaves room for the many places that are looked at.
-const WORTH: f64 = 7.0;
-/// The same for there being any contact at all.
-pub(super) const WORTH_FIRST: f64 = 60.0;
-/// Starts around a single contact, and the cost over its, or over what noise makes, up to which a minimum there is looked at.
-const BESIDE: usize = 8;
-const OTHER: f64 = 5.0;
-/// Half the distance of two contacts that one is split into, in mean distances of electrodes.
-const SPLIT: f64 = 0.25;
-/// Mean square of what is left below which a fit is nearly right.
-const NEARLY: f64 = 100.0;
-/// The same below which several contacts may only have to be wider.
-const HOPEFUL: f64 = 20.0;
-/// The same below which the search for more ends with the first one that does not pay.
-const ENOUGH: f64 = 2.0;
-/// The sum of squares may be this times that of the frame before.
-pub(super) const WORSE: f64 = 1.3;
-/// Standard errors that spots may move before the forward model is asked again.
-const NEAR: f64 = 3.0;
-/// A contact is lost when the logarithm of its resistance is known no better than this.
-const WEAK: f64 = 0.2;
+/// Gain in the sum of squares, in the linear theory, below which one more contact is not tried.
+const WORTH_A_TRY: f64 = 8.0;
+/// The same for there being any contact at all: noise alone has 1 in 10^7 frames above it.
+const WORTH_FIRST: f64 = 40.0;
+/// A contact is lost when the logarithm of its conductance is known no better than this, and it is light.
+const WEAK: f64 = 0.3;
+/// Radii that contacts may have while their number is not yet right, in usual ones: too few contacts would be made as wide as may be.
+const PLAUSIBLE: f64 = 3.0;
+/// Places of two fits that are so near, in radii, are taken for one.
+const ALIKE: f64 = 0.3;
+/// Contacts nearer to each other than so many sums of their radii may be one.
+const TOUCHING: f64 = 2.0;
 
 impl ContactFinder {
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
         let target = Target::new(readings, &self.errors);
-        let looks = self.scan.at_first(&self.network, &target);
-        let first = self.scan.ones(&looks, STARTS, self.apart_m());
-        Some(self.lowest_of(&looks, &first, &target)?.cost / target.count().max(1) as f64)
-    }
-
-    /// One contact corrected; or one beside it, which near edges and pads may be another minimum that is as deep until it is corrected.
-    fn or_beside(&self, one: Fit, target: &Target) -> (Fit, Explanation) {
-        let fitter = self.fitter();
-        let from = &one.spots[0];
-        let beside = (0..BESIDE).filter_map(|turn| {
-            let (sin, cos) = (TAU * turn as f64 / BESIDE as f64).sin_cos();
-            let way = space::along(scaled(cos, from.spot.along[0]), sin, from.spot.along[1]);
-            let place_m = space::along(from.spot.place_m, self.apart_m(), way);
-            let start = fitter.spot(self.fields.spot(place_m), from.ohm);
-            fitter.fit(vec![start], target, FIRST_STEPS)
-        });
-        let is_another = |fit: &Fit| {
-            space::distance(fit.spots[0].spot.place_m, from.spot.place_m) > 0.25 * self.apart_m()
-                && fit.cost < OTHER * one.cost.max(target.count() as f64)
-        };
-        let mut others: Vec<_> = beside.filter(is_another).collect();
-        others.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost));
-        others.truncate(FINALISTS);
-        let corrected = |fit: Fit| {
-            let explanation = self.correct(fit.clone(), &self.usual(1), target, CORRECTIONS);
-            (fit, explanation)
-        };
-        let first = corrected(one);
-        let others = others.into_iter().map(corrected);
-        others.fold(first, |best, other| if other.1.cost() < best.1.cost() { other } else { best })
-    }
-
-    /// The best fit from some candidates.
-    fn lowest_of(&self, looks: &Looks<'_>, candidates: &[Candidate], target: &Target) -> Option<Fit> {
-        let fitter = self.fitter();
-        let starts = candidates.iter().map(|candidate| self.scan.start(&fitter, looks, candidate)).collect();
-        lowest(&fitter, starts, target)
+        Some(self.one(&target)?.cost / target.count().max(1) as f64)
     }
 
     /// Whether there is any contact at all, as far as single ones tell.
@@ -100,140 +46,212 @@ impl ContactFinder {
         self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= WORTH_FIRST)
     }
 
-    /// What explains a frame, from what explains it so far: one contact more if that is all it takes, else from
-    /// nothing. Each better explanation on the way goes to `better`.
+    /// What explains a frame, from what explains it so far if that leads there, else from nothing. Each better explanation on the way
+    /// goes to `better`.
     pub(super) fn search(
         &self,
         from: Option<&Explanation>,
         target: &Target,
         better: &mut dyn FnMut(&Explanation),
     ) -> Option<Explanation> {
-        let grown = from.and_then(|from| self.with_one_more(from, target));
-        let found = grown.or_else(|| self.explanation(target, better));
-        found.map(|found| self.with_radii(found, target))
+        let grown = from.and_then(|from| self.disc_fitter().go_on(&from.fit, target, COLD));
+        let grown = grown.map(|fit| self.grow(fit, &[], target, better));
+        if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.fit, target)) {
+            return Some(grown.clone());
+        }
+        let anew = self.one(target).map(|one| {
+            let looks = self.scan.at_first(&self.network, target);
+            let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
+            let starts: Vec<_> = pairs.iter().map(|pair| self.discs_of(&self.scan.start(&looks, pair))).collect();
+            self.grow(one, &starts, target, better)
+        });
+        [grown, anew].into_iter().flatten().max_by(|a, b| self.evidence(&a.fit).total_cmp(&self.evidence(&b.fit)))
     }
 
-    /// The contacts of an explanation and one more, if these explain all.
-    fn with_one_more(&self, from: &Explanation, target: &Target) -> Option<Explanation> {
-        let Explanation::Spots(fit, ..) = from else { return None };
-        let is_room = !fit.spots.is_empty() && fit.spots.len() < self.settings.most;
-        let is_short = is_room && !explains(from, target);
-        let more = is_short.then(|| self.one_more(&self.fitter(), std::slice::from_ref(fit), Vec::new(), target))??;
-        (explains(&more, target) && !self.is_weak(&more)).then_some(more)
+    /// The best single contact, if anything stands out.
+    fn one(&self, target: &Target) -> Option<DiscFit> {
+        let looks = self.scan.at_first(&self.network, target);
+        let ones = self.scan.ones(&looks, STARTS, self.apart_m());
+        if ones.first().is_none_or(|best| best.gain < WORTH_FIRST) {
+            return None;
+        }
+        let starts = ones.iter().map(|candidate| self.discs_of(&self.scan.start(&looks, candidate)));
+        self.best_of(starts.collect(), target)
+    }
+
+    /// A fit with radii free, if it is at the widest that is plausible; else what it is.
+    fn released(&self, fit: DiscFit, target: &Target) -> DiscFit {
+        let is_wide = |contact: &Contact| contact.radius_m > 0.99 * PLAUSIBLE * self.settings.radius_m;
+        let free = if fit.contacts.iter().any(is_wide) {
+            self.disc_fitter().go_on(&fit, target, COLD)
+        } else {
+            None
+        };
+        free.unwrap_or(fit)
+    }
+
+    /// More contacts as long as the evidence for them grows, then fewer. `starts` are tried for the second one.
+    fn grow(
+        &self,
+        first: DiscFit,
+        starts: &[Vec<Contact>],
+        target: &Target,
+        better: &mut dyn FnMut(&Explanation),
+    ) -> Explanation {
+        let mut by_count = vec![f64::NEG_INFINITY; self.settings.most + 1];
+        let mut last = first.clone();
+        let mut best = self.noted(self.released(first, target), &mut by_count);
+        let mut starts = starts.to_vec();
+        while last.contacts.len() < self.settings.most {
+            let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
+            let more = self.noted(more, &mut by_count);
+            last = more.0.clone();
+            if more.1 > best.1 {
+                best = more;
+                better(&Explanation::new(best.0.clone(), &by_count));
+            } else if !self.is_misfit(&best.0, target) || last.contacts.len() > best.0.contacts.len() + 1 {
+                break;
+            }
+        }
+        if self.is_misfit(&best.0, target) {
+            best = self.noted(self.released(best.0, target), &mut by_count);
+        }
+        while let Some(fewer) = self.one_fewer(&best.0, target).map(|fewer| self.noted(fewer, &mut by_count)) {
+            if fewer.1 <= best.1 {
+                break;
+            }
+            best = fewer;
+        }
+        Explanation::new(best.0, &by_count)
+    }
+
+    /// A fit with its evidence, which is noted as that of its count if it is the best of it.
+    fn noted(&self, fit: DiscFit, by_count: &mut [f64]) -> (DiscFit, f64) {
+        let evidence = self.evidence(&fit);
+        if let Some(best) = by_count.get_mut(fit.contacts.len()) {
+            *best = best.max(evidence);
+        }
+        (fit, evidence)
+    }
+
+    /// The best fit with one more contact, from some starts or from where it would explain most.
+    fn one_more(&self, fit: &DiscFit, mut starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
+        let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
+        if let Some(looks) = self.scan.beside(&self.network, &*self.fields, &spots, fit, target) {
+            let ones = self.scan.ones(&looks, STARTS, self.apart_m());
+            if ones.first().is_some_and(|best| best.gain > WORTH_A_TRY) {
+                let more = ones.iter().map(|one| self.discs_of(&self.scan.start(&looks, one)));
+                starts.extend(more.map(|more| fit.contacts.iter().copied().chain(more).collect()));
+            }
+        }
+        self.best_of(starts, target)
+    }
+
+    /// The best fit with one contact fewer: without each weak one, and with two that nearly touch taken for one.
+    fn one_fewer(&self, fit: &DiscFit, target: &Target) -> Option<DiscFit> {
+        let count = fit.contacts.len();
+        if count < 2 {
+            return None;
+        }
+        let without = |k: usize| -> Vec<_> {
+            fit.contacts.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, contact)| *contact).collect()
+        };
+        let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (a, b)));
+        let merged = pairs.filter_map(|(a, b)| {
+            let [one, other] = [a, b].map(|k| fit.contacts[k]);
+            let near_m = TOUCHING * (one.radius_m + other.radius_m);
+            (space::distance(place_m(&one), place_m(&other)) < near_m).then(|| {
+                let mut merged = without(a);
+                merged[b] = self.merged(&one, &other);
+                merged
+            })
+        });
+        self.best_of(self.weak(fit).into_iter().map(without).chain(merged).collect(), target)
+    }
+
+    fn merged(&self, a: &Contact, b: &Contact) -> Contact {
+        let conductance_s = a.conductance_s + b.conductance_s;
+        let share = b.conductance_s / conductance_s;
+        let between = |a: f64, b: f64| a + share * (b - a);
+        let place_m = [between(a.x_m, b.x_m), between(a.y_m, b.y_m), between(a.z_m, b.z_m)];
+        let [x_m, y_m, z_m] = self.fields.footing(place_m).0;
+        Contact { x_m, y_m, z_m, conductance_s, radius_m: a.radius_m.hypot(b.radius_m) }
+    }
+
+    /// The best fit from some starts: a few steps from each, then to the minimum from the best.
+    fn best_of(&self, starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
+        let fitter = self.disc_fitter();
+        let widest_m = fitter.widest_m.min(PLAUSIBLE * self.settings.radius_m);
+        let fitter = DiscFitter { widest_m, ..fitter };
+        let objective = |fit: &DiscFit| fit.cost + fit.known;
+        let mut fits: Vec<_> = starts.into_iter().filter_map(|start| fitter.fit(start, target, FIRST)).collect();
+        fits.sort_unstable_by(|a, b| objective(a).total_cmp(&objective(b)));
+        // Starts often lead to one minimum.
+        fits.dedup_by(|later, first| self.is_alike(first, later));
+        fits.truncate(FINALISTS);
+        fits.into_iter()
+            .filter_map(|fit| fitter.go_on(&fit, target, COLD))
+            .min_by(|a, b| objective(a).total_cmp(&objective(b)))
+    }
+
+    /// Whether each contact of one fit is where one of the other is.
+    fn is_alike(&self, a: &DiscFit, b: &DiscFit) -> bool {
+        let near = |a: &Contact, b: &Contact| {
+            space::distance(place_m(a), place_m(b)) < ALIKE * a.radius_m.min(b.radius_m)
+        };
+        a.contacts.iter().all(|a| b.contacts.iter().any(|b| near(a, b)))
     }
 
     /// An explanation of some frames ago, brought to this one.
     pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
-        match found {
-            Explanation::Spots(fit, correction_v, radii) => {
-                let moved = self.fitter().fit(fit.spots, &target.less(&correction_v), COLD_STEPS)?;
-                Some(self.correct(moved, &radii, target, CORRECTIONS))
-            }
-            Explanation::Discs(fit) => {
-                self.disc_fitter().fit(fit.contacts, target, COLD_DISC_STEPS).map(Explanation::Discs)
-            }
-        }
+        let fit = self.disc_fitter().go_on(&found.fit, target, COLD)?;
+        Some(Explanation { fit, ..found })
     }
 
-    /// The explanation without the contacts that may not be there, fitted again, if the readings ask for no more.
-    pub(super) fn without_weak(&self, found: &Explanation, target: &Target) -> Option<Explanation> {
-        let Explanation::Spots(fit, correction_v, radii) = found else { return None };
-        let is_sure = |k: &usize| !is_uncertain(fit.covariance.as_ref(), 3 * k + 2);
-        let sure: Vec<_> = (0..fit.spots.len()).filter(is_sure).collect();
-        if sure.is_empty() {
-            return None;
+    /// The explanation, or what is left of it without the contacts that may not be there if that is more likely; `None` if nothing is.
+    pub(super) fn without_weak(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+        let weak = self.weak(&found.fit);
+        if weak.is_empty() {
+            return Some(found);
         }
-        let spots = sure.iter().map(|k| fit.spots[*k].clone()).collect();
-        let fewer = self.fitter().fit(spots, &target.less(correction_v), WARM_STEPS)?;
-        let fewer = self.correct(fewer, &radii.of(&sure), target, 1);
-        (score(&fewer) < score(found)).then_some(fewer)
+        let evidence = self.evidence(&found.fit);
+        let kept = found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
+        let kept: Vec<_> = kept.collect();
+        if kept.is_empty() {
+            return (evidence > self.evidence_of_nothing(target)).then_some(found);
+        }
+        match self.disc_fitter().fit(kept, target, WARM) {
+            Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, ..found }),
+            _ => Some(found),
+        }
     }
 
     /// The same contacts in the next frame; `None` if that makes no sense.
-    pub(super) fn follow(&self, last: Explanation, target: &Target) -> Option<Explanation> {
-        Some(match last {
-            Explanation::Spots(fit, correction_v, radii) => {
-                let moved = self.fitter().fit(fit.spots.clone(), &target.less(&correction_v), WARM_STEPS)?;
-                if is_near(&fit.spots, &moved, self.settings.radius_m) {
-                    Explanation::Spots(moved, correction_v, radii)
-                } else {
-                    self.correct(moved, &radii, target, 1)
-                }
-            }
-            Explanation::Discs(fit) => {
-                Explanation::Discs(self.disc_fitter().fit(fit.contacts, target, WARM_DISC_STEPS)?)
-            }
-        })
+    pub(super) fn follow(&self, last: &Explanation, target: &Target) -> Option<Explanation> {
+        let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
+        Some(Explanation { fit, certainty: last.certainty })
     }
 
-    /// What explains a frame, from nothing.
-    fn explanation(&self, target: &Target, found: &mut dyn FnMut(&Explanation)) -> Option<Explanation> {
-        let fitter = self.fitter();
-        let looks = self.scan.at_first(&self.network, target);
-        let first = self.scan.ones(&looks, STARTS, self.apart_m());
-        if first.first().is_none_or(|best| best.gain < WORTH_FIRST) {
-            return None;
-        }
-        let one = self.lowest_of(&looks, &first, target)?;
-        let (one, mut best) = self.or_beside(one, target);
-        let mut fits = vec![one];
-        let mut starts: Vec<Vec<FitSpot>> = match explains(&best, target) {
-            true => Vec::new(),
-            false => {
-                let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
-                pairs.iter().map(|pair| self.scan.start(&fitter, &looks, pair)).collect()
-            }
+    /// Contacts so weak that they may not be there. The conductance of a firm one is not known well either: more of it would change
+    /// little.
+    pub(super) fn weak(&self, fit: &DiscFit) -> Vec<usize> {
+        let covariance = fit.covariance();
+        let is_weak = |k: &usize| {
+            let log = super::discs::PARAMETERS * k + 2;
+            let is_unsure = covariance.as_ref().is_none_or(|all| all[(log, log)] > WEAK * WEAK);
+            is_unsure && fit.contacts[*k].conductance_s < self.sheet_s
         };
-        while fits.len() < self.settings.most && !explains(&best, target) {
-            found(&best);
-            let Some(more) = self.one_more(&fitter, &fits, starts, target) else { break };
-            let Explanation::Spots(fit, ..) = &more else { break };
-            let fit = fit.clone();
-            let is_hopeful = |fewer: &Fit| fits.len() == 1 || fewer.cost < HOPEFUL * target.count() as f64;
-            if score(&more) < score(&best)
-                && let Some(fewer) = fits.last().filter(|fewer| is_hopeful(fewer))
-            {
-                // Before one more is believed, those that there are may be wider.
-                best = better(best, self.discs(fewer, target).map(Explanation::Discs));
-            }
-            fits.push(fit);
-            let is_better = score(&more) < score(&best);
-            if !is_better && fits.len() > 2 && best.cost() < ENOUGH * target.count() as f64 {
-                break;
-            }
-            best = better(best, Some(more));
-            starts = Vec::new();
-        }
-        Some(best)
+        (0..fit.contacts.len()).filter(is_weak).collect()
     }
 
-    /// One more contact than the last of some fits has: from starts, from that fit, and from two more than the fit before it has.
-    fn one_more(
-        &self,
-        fitter: &Fitter<'_>,
-        fits: &[Fit],
-        mut starts: Vec<Vec<FitSpot>>,
-        target: &Target,
-    ) -> Option<Explanation> {
-        let (last, before) = fits.split_last()?;
-        // What spots leave out of a wrong fit is of no use.
-        let is_near = last.cost < NEARLY * target.count() as f64;
-        let correction_v = is_near.then(|| self.correction_v(last, &self.usual(last.spots.len()))).flatten();
-        let corrected = correction_v.map_or_else(|| target.clone(), |correction_v| target.less(&correction_v));
-        let mut add = |fit: &Fit, of: &dyn Fn(&Looks<'_>) -> Vec<Candidate>| {
-            let looks = self.scan.beside(fitter, fit, &corrected);
-            for candidate in of(&looks) {
-                starts.push(fit.spots.iter().cloned().chain(self.scan.start(fitter, &looks, &candidate)).collect());
-            }
-        };
-        add(last, &|looks| self.scan.ones(looks, STARTS, self.apart_m()));
-        if let Some(before) = before.last() {
-            add(before, &|looks| self.scan.pairs(looks, STARTS, self.apart_m()));
-        }
-        starts.extend((0..last.spots.len()).flat_map(|k| self.split(fitter, &last.spots, k)));
-        let fit = lowest(fitter, starts, &corrected)?;
-        let radii = self.usual(fit.spots.len());
-        Some(self.correct(fit, &radii, target, CORRECTIONS))
+    /// Logarithm of the evidence for a fit.
+    pub(super) fn evidence(&self, fit: &DiscFit) -> f64 {
+        self.prior.ln_evidence(fit)
+    }
+
+    /// The same for there being no contact.
+    pub(super) fn evidence_of_nothing(&self, target: &Target) -> f64 {
+        -0.5 * target.cost(&vec![0.0; target.volts.len()])
     }
 
     /// Starts nearer to each other are one (m).
@@ -241,144 +259,34 @@ impl ContactFinder {
         self.spacing_m / 3.0
     }
 
-    /// Starts with one contact taken for two beside each other, in some directions.
-    fn split(&self, fitter: &Fitter<'_>, spots: &[FitSpot], k: usize) -> Vec<Vec<FitSpot>> {
-        let half_m = SPLIT * self.spacing_m;
-        let directions = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]];
-        let start = |[a, b]: [f64; 2]| {
-            let spot = &spots[k];
-            let way = space::along(scaled(a, spot.spot.along[0]), b, spot.spot.along[1]);
-            let halves = [-half_m, half_m].map(|way_m| {
-                let place_m = space::along(spot.spot.place_m, way_m, way);
-                fitter.spot(self.fields.spot(place_m), 2.0 * spot.ohm)
-            });
-            let others = spots.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, spot)| spot.clone());
-            others.chain(halves).collect()
+    /// Discs of the usual radius where spots are.
+    fn discs_of(&self, spots: &[LoadedSpot]) -> Vec<Contact> {
+        let disc = |spot: &LoadedSpot| {
+            let [x_m, y_m, z_m] = spot.spot.place_m;
+            // What is better than its own spreading allows is nearly perfect.
+            let ohm = (spot.ohm - spot.spot.own_ohm).max(0.2 * spot.spot.own_ohm);
+            let contact = Contact::flat(x_m, y_m, self.settings.radius_m, 1.0 / (ohm * spot.spot.share));
+            self.disc_fitter().held(Contact { z_m, ..contact })
         };
-        directions.map(start).into()
+        spots.iter().map(disc).collect()
     }
 
-    /// Repeats a fit with the forward model's readings, so many times or until they settle.
-    pub(super) fn correct(&self, mut fit: Fit, radii: &Radii, target: &Target, times: usize) -> Explanation {
-        let mut used_v = vec![0.0; fit.volts.len()];
-        for _ in 0..times {
-            let Some(correction_v) = self.correction_v(&fit, radii) else { break };
-            let changed_v = correction_v.iter().zip(&used_v).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            let corrected = target.less(&correction_v);
-            let Some(next) = self.fitter().fit(fit.spots.clone(), &corrected, CORRECTED_STEPS) else { break };
-            (fit, used_v) = (next, correction_v);
-            if changed_v < 0.3 * self.errors.noise_v {
-                break;
-            }
-        }
-        Explanation::Spots(fit, used_v, radii.clone())
+    /// The spot that a disc acts as from afar: a wider one meets less of its own spreading resistance.
+    fn spot_of(&self, contact: &Contact) -> LoadedSpot {
+        let spot = self.fields.spot(place_m(contact));
+        let own_ohm = spot.own_ohm * self.settings.radius_m / contact.radius_m;
+        LoadedSpot { ohm: own_ohm + 1.0 / (spot.share * contact.conductance_s), spot }
     }
 
-    /// Readings of the forward model over those of the spots (V).
-    fn correction_v(&self, fit: &Fit, radii: &Radii) -> Option<Vec<f64>> {
-        let contact = |(k, spot)| self.contact(spot, radii.radius_m(k));
-        let exact_v = self.exact_v(&fit.spots.iter().enumerate().map(contact).collect::<Vec<_>>())?;
-        Some(exact_v.iter().zip(&fit.volts).map(|(exact, spots)| exact - spots).collect())
-    }
-
-    /// Radii as is usual.
-    fn usual(&self, count: usize) -> Radii {
-        Radii::usual(self.settings.radius_m, count)
-    }
-
-    /// Discs with radii of their own, from where spots are.
-    fn discs(&self, fit: &Fit, target: &Target) -> Option<DiscFit> {
-        let start = fit.spots.iter().map(|spot| {
-            let contact = self.contact(spot, self.settings.radius_m);
-            // A contact that is better than perfect is a wider one.
-            let wider = (spot.spot.own_ohm / spot.ohm).max(1.0);
-            let conductance_s = contact.conductance_s.min(10.0 * self.sheet_s);
-            Contact { radius_m: wider * contact.radius_m, conductance_s, ..contact }
-        });
-        self.disc_fitter().fit(start.collect(), target, COLD_DISC_STEPS)
-    }
-
-    /// Whether a contact is so weak that it may not be there.
-    pub(super) fn is_weak(&self, found: &Explanation) -> bool {
-        match found {
-            Explanation::Spots(fit, ..) => {
-                (0..fit.spots.len()).any(|k| is_uncertain(fit.covariance.as_ref(), 3 * k + 2))
-            }
-            // That of a firm disc is not known well either: more of it would change little.
-            Explanation::Discs(fit) => fit.contacts.iter().enumerate().any(|(k, contact)| {
-                contact.conductance_s < self.sheet_s && is_uncertain(fit.covariance.as_ref(), PARAMETERS * k + 2)
-            }),
-        }
-    }
-
-    fn fitter(&self) -> Fitter<'_> {
-        Fitter {
-            network: &self.network,
-            fields: &*self.fields,
-            longest_m: self.spacing_m / 3.0,
-            sheet_ohm: 1.0 / self.sheet_s,
-        }
-    }
-
-    fn disc_fitter(&self) -> DiscFitter<'_> {
-        let detector = self.problem.detector();
+    pub(super) fn disc_fitter(&self) -> DiscFitter<'_> {
         DiscFitter {
             model: &*self.problem.model,
             usual_radius_m: self.settings.radius_m,
+            radius_deviation: self.settings.radius_deviation,
             sheet_s: self.sheet_s,
             fields: &*self.fields,
             widest_m: self.widest_m,
-            detector,
+            detector: self.problem.detector(),
         }
     }
-}
-
-/// The fit of lowest cost over some starts: a few steps from each, then more from the best.
-fn lowest(fitter: &Fitter<'_>, starts: Vec<Vec<FitSpot>>, target: &Target) -> Option<Fit> {
-    let mut fits: Vec<_> = starts.into_iter().filter_map(|start| fitter.fit(start, target, FIRST_STEPS)).collect();
-    fits.sort_unstable_by(|a, b| a.cost.total_cmp(&b.cost));
-    fits.truncate(FINALISTS);
-    fits.into_iter()
-        .filter_map(|fit| fitter.fit(fit.spots, target, COLD_STEPS))
-        .min_by(|a, b| a.cost.total_cmp(&b.cost))
-}
-
-/// Sum of squares with a price on each parameter: what is lower is believed.
-pub(super) fn score(found: &Explanation) -> f64 {
-    found.cost() + WORTH * found.parameters() as f64
-}
-
-/// Which of two is believed.
-fn better(best: Explanation, other: Option<Explanation>) -> Explanation {
-    match other {
-        Some(other) if score(&other) < score(&best) => other,
-        _ => best,
-    }
-}
-
-/// Whether a logarithm is hardly known; without a covariance, a contact does nothing that the readings show.
-fn is_uncertain(covariance: Option<&DMatrix<f64>>, log: usize) -> bool {
-    covariance.is_none_or(|all| all[(log, log)] > WEAK * WEAK)
-}
-
-fn scaled(share: f64, a: Place) -> Place {
-    space::along([0.0; 3], share, a)
-}
-
-/// Whether no more than noise and model error is left.
-fn explains(found: &Explanation, target: &Target) -> bool {
-    found.cost() < 0.75 * target.count() as f64
-}
-
-/// Whether spots have moved so little that the forward model's correction still holds: it is some per cent of the readings, so it
-/// changes by as much of what the spots have moved.
-fn is_near(before: &[FitSpot], fit: &Fit, radius_m: f64) -> bool {
-    let error = |parameter: usize| {
-        fit.covariance.as_ref().map_or(0.0, |covariance| NEAR * covariance[(parameter, parameter)].max(0.0).sqrt())
-    };
-    before.iter().zip(&fit.spots).enumerate().all(|(k, (before, after))| {
-        let moved_m = space::distance(before.spot.place_m, after.spot.place_m);
-        let log = (before.ohm / after.ohm).ln().abs();
-        moved_m < error(3 * k).hypot(error(3 * k + 1)).max(0.02 * radius_m) && log < error(3 * k + 2).max(0.005)
-    })
 }

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::search::{WORSE, WORTH_FIRST, score};
 use super::{ContactFinder, ContactSettings, Explanation, Found, Target};
 use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search};
 use crate::solve::track::Tracker;
@@ -12,6 +11,8 @@ use tactomo_physics::readings::Readings;
 
 /// Weight of the newest frame in the running mean of what is left.
 const NEWEST: f64 = 0.1;
+/// The sum of squares may be this times that of the frame before.
+const WORSE: f64 = 1.3;
 /// Rise of that mean over what the last search left, or over what noise alone leaves, that asks for a new search: many frames show
 /// what one frame's noise hides.
 const RISE: f64 = 0.12;
@@ -78,21 +79,15 @@ impl ContactFollower {
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
         let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
-        let Some(moved) = self.finder.follow(last.clone(), target) else {
+        let Some(moved) = self.finder.follow(&last, target) else {
             (self.last, self.is_stale) = (Some(last), true);
             return true;
         };
-        let is_weak = self.finder.is_weak(&moved);
-        let fewer = if is_weak { self.finder.without_weak(&moved, target) } else { None };
-        let is_weak = is_weak && fewer.is_none();
-        let found = fewer.unwrap_or(moved);
         self.is_stale = false;
-        self.mean += NEWEST * (found.cost() - self.mean);
-        let has_risen = self.mean > (1.0 + RISE) * self.searched.max(self.finder.freedom(&found, target));
-        let search = is_weak || found.cost() > self.enough(target) || has_risen;
-        if is_weak && !self.finder.stands_out(target) {
-            return false;
-        }
+        let Some(found) = self.finder.without_weak(moved, target) else { return false };
+        self.mean += NEWEST * (found.fit.cost - self.mean);
+        let has_risen = self.mean > (1.0 + RISE) * self.searched.max(self.finder.freedom(&found.fit, target));
+        let search = found.fit.cost > self.enough(target) || has_risen;
         self.last = Some(found);
         search
     }
@@ -100,16 +95,18 @@ impl ContactFollower {
     /// Takes what a search has found, if it explains this frame better than what is followed; whether the search has to be repeated, because
     /// what it has found does not explain this frame as well as its own.
     pub fn adopt(&mut self, found: Option<Found>, target: &Target) -> bool {
-        let left = found.as_ref().map_or(0.0, |Found(found)| found.cost());
+        let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
         let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
-        let nothing = target.cost(&vec![0.0; target.volts.len()]) - WORTH_FIRST;
-        let score_of = |found: &Option<Explanation>| found.as_ref().map_or(nothing, score);
-        if self.is_stale || score_of(&caught_up) <= score_of(&self.last) {
+        let evidence = |found: &Option<Explanation>| {
+            let of = |found: &Explanation| self.finder.evidence(&found.fit);
+            found.as_ref().map_or_else(|| self.finder.evidence_of_nothing(target), of)
+        };
+        if self.is_stale || evidence(&caught_up) >= evidence(&self.last) {
             (self.last, self.is_stale) = (caught_up, false);
         }
         let Some(last) = &self.last else { return self.finder.stands_out(target) };
-        (self.searched, self.mean) = (left.max(self.finder.freedom(last, target)), last.cost());
-        last.cost() > self.enough(target)
+        (self.searched, self.mean) = (left.max(self.finder.freedom(&last.fit, target)), last.fit.cost);
+        last.fit.cost > self.enough(target)
     }
 
     /// Sum of squares up to which what is followed explains a frame.

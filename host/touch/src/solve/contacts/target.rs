@@ -60,6 +60,22 @@ impl Target {
         }
     }
 
+    /// A whitened copy of volts.
+    pub fn whitened(&self, volts: &[f64]) -> Vec<f64> {
+        let mut all = volts.to_vec();
+        self.whiten(&mut all);
+        all
+    }
+
+    /// The transpose of [`whiten`](Self::whiten), which takes whitened residuals to derivatives by volts.
+    pub fn whiten_transposed(&self, whitened: &mut [f64]) {
+        for (row, load) in whitened.chunks_exact_mut(self.electrodes).zip(self.loads.chunks_exact(self.electrodes)) {
+            let share = dot(row, load);
+            row.iter_mut().zip(load).for_each(|(volts, load)| *volts -= share * load);
+        }
+        whitened.iter_mut().zip(&self.weights).for_each(|(volts, weight)| *volts *= weight);
+    }
+
     /// Whitened differences of the readings from predicted ones.
     pub fn residuals(&self, volts: &[f64]) -> Vec<f64> {
         let mut all: Vec<_> = self.volts.iter().zip(volts).map(|(ours, theirs)| ours - theirs).collect();
@@ -71,12 +87,6 @@ impl Target {
     pub fn cost(&self, volts: &[f64]) -> f64 {
         let residuals = self.residuals(volts);
         dot(&residuals, &residuals)
-    }
-
-    /// The same without some volts in each reading.
-    pub fn less(&self, volts: &[f64]) -> Self {
-        let volts = self.volts.iter().zip(volts).map(|(ours, less)| ours - less).collect();
-        Self { volts, ..self.clone() }
     }
 
     /// Standard deviation of a reading that counts (V).

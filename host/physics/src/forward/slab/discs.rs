@@ -1,0 +1,269 @@
+//! Discs of contact on a slab: the system that they make, and how readings change where one of them is replaced.
+
+use nalgebra::DMatrix;
+
+use super::cut::CutDisc;
+use super::disc::{DiscBasis, MAX_DEGREE};
+use super::pads::between;
+use super::{Slab, from_corner};
+use crate::forward::ForwardError;
+use crate::forward::contact::{Contacted, ContactSystem};
+use crate::scene::Contact;
+
+/// Degree of the densities that the kernel's changes are taken for.
+const CHANGE_DEGREE: usize = 1;
+
+/// A contact, ready to be put into the system.
+struct Disc {
+    contact: Contact,
+    centre_m: [f64; 2],
+    /// Of the part on the detector (S), and the radius of a whole disc of its area (m).
+    conductance_s: f64,
+    own_radius_m: f64,
+    cut: Option<CutDisc>,
+    basis: &'static DiscBasis,
+    /// Means under the densities, of the electrodes' fields (ohm): `densities x electrodes`, and of the pads' correction (square root
+    /// of ohm): `columns x densities`.
+    electrodes_ohm: DMatrix<f64>,
+    inner: DMatrix<f64>,
+}
+
+/// Some discs, with the fields between them.
+pub(super) struct Discs<'a> {
+    slab: &'a Slab,
+    discs: Vec<Disc>,
+    /// Fields between the densities of two discs (ohm), without their own singular parts: lower triangle, row by row.
+    between: Vec<DMatrix<f64>>,
+    /// Of each, the matrix of its resistance and its own singular field, times its conductance.
+    own: Vec<DMatrix<f64>>,
+}
+
+impl Slab {
+    /// The discs of contacts.
+    ///
+    /// # Errors
+    /// [`ForwardError::Contact`] if one cannot be on this detector.
+    pub(super) fn discs(&self, contacts: &[Contact]) -> Result<Discs<'_>, ForwardError> {
+        let disc = |(index, contact): (usize, &Contact)| {
+            self.check_contact(contact).map_err(|what| ForwardError::Contact { index, what })?;
+            Ok(self.disc(contact, DiscBasis::of_degree(self.contact_degree(contact.radius_m))))
+        };
+        let discs = contacts.iter().enumerate().map(disc).collect::<Result<Vec<_>, _>>()?;
+        let pairs = discs.iter().enumerate().flat_map(|(k, disc)| discs[..=k].iter().map(move |other| (disc, other)));
+        let between = pairs.map(|(disc, other)| self.between(disc, other)).collect();
+        let own = discs.iter().map(|disc| self.own(disc)).collect();
+        Ok(Discs { slab: self, discs, between, own })
+    }
+
+    fn disc(&self, contact: &Contact, basis: &'static DiscBasis) -> Disc {
+        let centre_m = from_corner(self.size_m, [contact.x_m, contact.y_m]);
+        let cut = CutDisc::new(self.size_m, centre_m, contact.radius_m);
+        let share = cut.map_or(1.0, |cut| cut.share());
+        let [electrodes_ohm, inner] = self.pads.under_disc(basis, &nodes_m(basis, centre_m, contact.radius_m, cut));
+        Disc {
+            contact: *contact,
+            centre_m,
+            conductance_s: share * contact.conductance_s,
+            own_radius_m: share.sqrt() * contact.radius_m,
+            cut,
+            basis,
+            electrodes_ohm,
+            inner,
+        }
+    }
+
+    /// The smooth part of the kernel varies over a split length: a disc that is wider needs more degrees.
+    fn contact_degree(&self, radius_m: f64) -> usize {
+        let wider = (radius_m / self.top.split_m() - 1.0).max(0.0);
+        (self.resolution.contact_degree + (2.0 * wider).ceil() as usize).min(MAX_DEGREE)
+    }
+
+    /// Fields between the densities of two discs, or of one, without its own singular part (ohm). The floating pads below are a short
+    /// way for the current between contacts.
+    fn between(&self, disc: &Disc, other: &Disc) -> DMatrix<f64> {
+        let mut all = -disc.inner.tr_mul(&other.inner);
+        // Of contacts far apart, only the first densities see each other.
+        let distance_m = (disc.centre_m[0] - other.centre_m[0]).hypot(disc.centre_m[1] - other.centre_m[1]);
+        let degrees = match std::ptr::eq(disc, other) {
+            true => [disc, other].map(|disc| disc.basis.degree()),
+            false => [disc, other].map(|disc| disc.basis.degree_seen_from(disc.contact.radius_m / distance_m)),
+        };
+        let kernel = self.kernel_between(disc, other, degrees);
+        let mut near = all.view_mut((0, 0), kernel.shape());
+        near += kernel;
+        all
+    }
+
+    /// The kernel's part of that, for densities up to some degrees.
+    fn kernel_between(&self, disc: &Disc, other: &Disc, degrees: [usize; 2]) -> DMatrix<f64> {
+        let [radius_m, other_m] = [disc, other].map(|disc| disc.contact.radius_m);
+        let images = self.top.images(disc.centre_m, other.centre_m, radius_m + other_m);
+        let of = |disc: &Disc, degree: usize| {
+            let basis = DiscBasis::of_degree(degree);
+            (basis, nodes_m(basis, disc.centre_m, disc.contact.radius_m, disc.cut))
+        };
+        let (basis, nodes) = of(disc, degrees[0]);
+        if std::ptr::eq(disc, other) {
+            return between(basis, &nodes, basis, &nodes, &self.top, &images, true);
+        }
+        let (other_basis, other_nodes) = of(other, degrees[1]);
+        between(basis, &nodes, other_basis, &other_nodes, &self.top, &images, false)
+    }
+
+    /// The first densities' part of it, which has all but a per cent of how it changes with the disc.
+    fn first_between(&self, disc: &Disc, other: &Disc) -> DMatrix<f64> {
+        self.kernel_between(disc, other, [CHANGE_DEGREE; 2])
+    }
+
+    fn own(&self, disc: &Disc) -> DMatrix<f64> {
+        self.own_of(disc.own_radius_m, disc.basis, disc.conductance_s)
+    }
+
+    fn own_of(&self, radius_m: f64, basis: &DiscBasis, conductance_s: f64) -> DMatrix<f64> {
+        self.top.disc_self(radius_m).reduced(basis, 1.0, conductance_s)
+    }
+}
+
+impl Discs<'_> {
+    /// The impedance matrix; `None` if none conducts.
+    pub fn impedance_ohm(&self) -> Option<DMatrix<f64>> {
+        self.system().impedance_ohm()
+    }
+
+    /// The impedance matrix, and to first order by how much it changes (ohm) where one of the contacts is replaced by another.
+    ///
+    /// With the system `S y = -b` of all discs and `Z = E + b^T y`, a change of the discs changes `Z` by
+    /// `dZ = db^T y + y^T db + y^T dS y`, in which only rows and columns of the disc that is replaced are not zero.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if a contact cannot be on the detector or none conducts.
+    pub fn with_changes_ohm(
+        &self,
+        replaced: &[(usize, Contact)],
+    ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), ForwardError> {
+        let at = Solved::new(self)?;
+        let mut before: Vec<Option<Vec<DMatrix<f64>>>> = vec![None; self.discs.len()];
+        let changes = replaced.iter().map(|(k, contact)| {
+            self.slab.check_contact(contact).map_err(|what| ForwardError::Contact { index: *k, what })?;
+            let disc = &self.discs[*k];
+            let unscaled = Contact { conductance_s: disc.contact.conductance_s, ..*contact };
+            if unscaled == disc.contact {
+                return Ok(self.change_of_conductance_ohm(&at, *k, contact));
+            }
+            let of = |other: &Disc| self.slab.first_between(disc, other);
+            let before = before[*k].get_or_insert_with(|| self.discs.iter().map(of).collect());
+            Ok(self.change_of_place_ohm(&at, *k, contact, before))
+        });
+        let changes = changes.collect::<Result<_, _>>()?;
+        Ok((at.contacted.impedance_ohm, changes))
+    }
+
+    fn change_of_conductance_ohm(&self, at: &Solved, k: usize, contact: &Contact) -> DMatrix<f64> {
+        let disc = &self.discs[k];
+        let factor = contact.conductance_s / disc.contact.conductance_s;
+        let own = self.slab.own_of(disc.own_radius_m, disc.basis, factor * disc.conductance_s);
+        at.symmetric(k, self.scaled(at, k, factor) + (own - &self.own[k]) * at.of(k) * 0.5)
+    }
+
+    fn change_of_place_ohm(&self, at: &Solved, k: usize, contact: &Contact, before: &[DMatrix<f64>]) -> DMatrix<f64> {
+        let disc = &self.discs[k];
+        let after = self.slab.disc(contact, disc.basis);
+        let scale = after.conductance_s.sqrt();
+        let mut change = (&after.electrodes_ohm - &disc.electrodes_ohm) * scale;
+        change += (&disc.inner - &after.inner).tr_mul(&at.inner) * scale;
+        for (l, (other, before)) in self.discs.iter().zip(before).enumerate() {
+            let (now, half) = if l == k { (&after, 0.5) } else { (other, 1.0) };
+            let moved = if l == k && after.contact.radius_m != disc.contact.radius_m {
+                // Within a disc that widens, all densities change.
+                let kernel = |disc: &Disc| self.slab.kernel_between(disc, disc, [disc.basis.degree(); 2]);
+                kernel(&after) - kernel(disc)
+            } else {
+                self.slab.first_between(&after, now) - before
+            };
+            let scales = half * scale * now.conductance_s.sqrt();
+            let mut first = change.rows_mut(0, moved.nrows());
+            first += &moved * at.of(l).rows(0, moved.ncols()) * scales;
+        }
+        if after.conductance_s != disc.conductance_s {
+            change += self.scaled(at, k, after.conductance_s / disc.conductance_s);
+        }
+        if (after.conductance_s, after.own_radius_m) != (disc.conductance_s, disc.own_radius_m) {
+            change += (self.slab.own(&after) - &self.own[k]) * at.of(k) * 0.5;
+        }
+        at.symmetric(k, change)
+    }
+
+    /// What a factor of the conductance of a disc makes of its rows but for its own resistance: the unknowns' scale is its root, and by
+    /// the system itself the fields of all unknowns at the disc are what the electrodes' and the constant are, with the other sign.
+    fn scaled(&self, at: &Solved, k: usize, factor: f64) -> DMatrix<f64> {
+        -(&self.own[k] * at.of(k)) * (factor.sqrt() - 1.0)
+    }
+
+    fn system(&self) -> ContactSystem<'_> {
+        let electrodes = self.slab.pads.electrodes();
+        let size = self.discs.iter().map(|disc| disc.basis.len()).sum();
+        let mut contacts = DMatrix::zeros(size, size);
+        let mut cross_and_current = DMatrix::zeros(size, electrodes + 1);
+        let mut row = 0;
+        for (k, disc) in self.discs.iter().enumerate() {
+            let scale = disc.conductance_s.sqrt();
+            cross_and_current[(row, electrodes)] = scale;
+            let cross = &disc.electrodes_ohm * scale;
+            cross_and_current.view_mut((row, 0), cross.shape()).copy_from(&cross);
+            let mut column = 0;
+            for (l, other) in self.discs[..=k].iter().enumerate() {
+                let block = &self.between[k * (k + 1) / 2 + l] * (scale * other.conductance_s.sqrt());
+                contacts.view_mut((row, column), block.shape()).copy_from(&block);
+                column += other.basis.len();
+            }
+            let mut own = contacts.view_mut((row, row), self.own[k].shape());
+            own += &self.own[k];
+            row += disc.basis.len();
+        }
+        ContactSystem { electrodes: &self.slab.pads.electrodes_ohm, contacts, cross_and_current }
+    }
+}
+
+/// A solved system.
+struct Solved {
+    contacted: Contacted,
+    /// First unknown of each disc, and the number of all.
+    starts: Vec<usize>,
+    /// Correction of the pads by all unknowns, scaled: `columns x electrodes`.
+    inner: DMatrix<f64>,
+}
+
+impl Solved {
+    fn new(discs: &Discs<'_>) -> Result<Self, ForwardError> {
+        let contacted = discs.system().solve().ok_or(ForwardError::NoContact)?;
+        let mut starts = vec![0];
+        for disc in &discs.discs {
+            starts.push(starts.last().map_or(0, |start| start + disc.basis.len()));
+        }
+        let mut at = Self { contacted, starts, inner: DMatrix::zeros(0, 0) };
+        let sum = discs.discs.iter().enumerate().map(|(k, disc)| &disc.inner * at.of(k) * disc.conductance_s.sqrt());
+        at.inner = sum.reduce(|sum, other| sum + other).ok_or(ForwardError::NoContact)?;
+        Ok(at)
+    }
+
+    /// The unknowns of a disc: `densities x electrodes`.
+    fn of(&self, k: usize) -> MatrixView<'_> {
+        self.contacted.unknowns.rows(self.starts[k], self.starts[k + 1] - self.starts[k])
+    }
+
+    /// Change of the impedances by one of a disc's rows.
+    fn symmetric(&self, k: usize, change: DMatrix<f64>) -> DMatrix<f64> {
+        let half = self.of(k).tr_mul(&change);
+        &half + half.transpose()
+    }
+}
+
+type MatrixView<'a> = nalgebra::DMatrixView<'a, f64, nalgebra::U1, nalgebra::Dyn>;
+
+/// The points of a basis on a disc, or on what walls leave of it (m).
+fn nodes_m(basis: &DiscBasis, centre_m: [f64; 2], radius_m: f64, cut: Option<CutDisc>) -> Vec<[f64; 2]> {
+    match cut {
+        Some(cut) => basis.mapped_nodes_m(centre_m, radius_m, |node| cut.map(node)),
+        None => basis.nodes_m(centre_m, radius_m),
+    }
+}

@@ -1,0 +1,48 @@
+//! How much the readings speak for some contacts, against others or more of them.
+//!
+//! The marginal likelihood, `p(readings | K contacts)`, is the integral of likelihood times prior over places, conductances and
+//! radii. By Laplace's approximation about the best fit, with `S` the sum of squares of residuals and priors and `H` half its second
+//! derivative,
+//!
+//! ```text
+//! ln p = -S / 2 + sum of ln(prior densities' peaks) + P / 2 ln(2 pi) - 1/2 ln det H + ln K!
+//! ```
+//!
+//! (Kass and Raftery, Bayes factors, 1995). Places are alike likely all over the detector, logarithms of conductance and radius
+//! normal; contacts have no order, so that `K!` fits are the same. What one more contact costs follows: the share of the places
+//! and conductances that would do as well.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Cholesky;
+
+use super::discs::{CONDUCTANCE_DEVIATION, DiscFit, PARAMETERS};
+
+/// What is known of contacts before anything is read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    /// Area that they can be on (m2).
+    pub area_m2: f64,
+    /// Standard deviation of the logarithm of a radius.
+    pub radius_deviation: f64,
+}
+
+/// One more contact is less likely than one fewer, by the logarithm of this factor, before anything is read: scenes of few contacts are
+/// more common, and places that are looked at are chosen.
+const FEWER: f64 = 1.5;
+
+impl Prior {
+    /// Logarithm of the evidence for a fit; nothing speaks for one that is not determined.
+    pub fn ln_evidence(&self, fit: &DiscFit) -> f64 {
+        let Some(factor) = Cholesky::new(fit.normal.clone()) else { return f64::NEG_INFINITY };
+        let ln_determinant: f64 = 2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let count = fit.contacts.len();
+        let peak = -self.area_m2.ln() - (CONDUCTANCE_DEVIATION * self.radius_deviation * TAU).ln();
+        // Places are in units of their own.
+        let units: f64 = (0..count).map(|k| 2.0 * fit.along(k).1.ln()).sum();
+        let orders: f64 = (1..=count).map(|k| (k as f64).ln()).sum();
+        -0.5 * (fit.cost + fit.known) + count as f64 * (peak - FEWER) + units + orders
+            + 0.5 * (PARAMETERS * count) as f64 * TAU.ln()
+            - 0.5 * ln_determinant
+    }
+}
