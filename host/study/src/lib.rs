@@ -4,6 +4,7 @@
 
 mod bound;
 pub mod case;
+pub mod contacts;
 mod experiment;
 mod machine;
 pub mod page;
