@@ -11,6 +11,7 @@ pub mod page;
 mod scenes;
 mod score;
 pub mod stability;
+mod stopwatch;
 pub mod tradeoff;
 pub mod validate;
 mod variant;

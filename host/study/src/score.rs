@@ -1,8 +1,9 @@
 //! Scores of solutions, frame by frame, and their summary.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::experiment::{Experiment, Frame};
+use super::stopwatch::timed;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
 use tactomo_physics::scene::{Contact, Shape, Touch};
@@ -77,9 +78,7 @@ impl Scorer {
     }
 
     fn frame(&mut self, solver: &mut dyn Solver, frame: &Frame) -> Result<Score, ForwardError> {
-        let start = Instant::now();
-        let result = solver.solve(&frame.readings);
-        let time = start.elapsed();
+        let (result, time) = timed(|| solver.solve(&frame.readings));
         match result {
             Ok(solution) => Ok(Score { time, ..self.score(frame, &solution)? }),
             Err(_) => Ok(Score { time, failed: true, ..Score::default() }),

@@ -8,12 +8,12 @@ mod table;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Instant;
 
 use self::scenes::RandomScene;
 use super::bound::cramer_rao;
 use super::experiment::{Experiment, StudyError};
 use super::machine::Machine;
+use super::stopwatch::timed;
 use tactomo_physics::detector::{Detector, FOAMS, Layer};
 use tactomo_physics::scene::Touch;
 use tactomo_touch::solve::{Method, SolveError, Solver};
@@ -158,9 +158,8 @@ fn try_scene(
     let mut solutions = Vec::with_capacity(read.len());
     solver.reset();
     for frame in &read {
-        let begin = Instant::now();
-        let solution = solver.solve(&frame.readings);
-        times_us.push(1e6 * begin.elapsed().as_secs_f64());
+        let (solution, time) = timed(|| solver.solve(&frame.readings));
+        times_us.push(1e6 * time.as_secs_f64());
         solutions.push(solution.map_err(|error| refused(solver, error))?);
     }
     let detector = &experiment.detector;
