@@ -17,9 +17,19 @@ fn failure(args: &[&str]) -> (Option<i32>, String) {
 
 #[test]
 fn every_command_has_a_help_with_an_example() {
-    for command in
-        ["live", "ports", "record", "replay", "forward", "validate", "reconstruct", "detector", "tradeoff", "stability"]
-    {
+    for command in [
+        "live",
+        "ports",
+        "record",
+        "replay",
+        "forward",
+        "validate",
+        "reconstruct",
+        "detector",
+        "tradeoff",
+        "stability",
+        "study",
+    ] {
         let output = tactomo(&[command, "--help"]);
         let text = String::from_utf8(output.stdout).unwrap();
         assert_eq!(output.status.code(), Some(0));
@@ -44,6 +54,7 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["forward", "--fault", "open"], "open:3, short:2,7"),
         (&["forward", "--press", "0,0,2.5"], "tip_radius_mm,force_n"),
         (&["forward", "--contact", "0,0,1,1e-3", "--time", "2"], "--scene"),
+        (&["study", "contacts", "--scenes", "0"], "--scenes"),
         (&["dance"], "dance"),
     ] {
         let (code, message) = failure(args);
@@ -147,6 +158,30 @@ fn a_detector_goes_through_its_file_into_the_model() {
     assert_eq!(from_file.status.code(), Some(0), "{}", String::from_utf8_lossy(&from_file.stderr));
     assert_eq!(from_file.stdout, preset.stdout);
     assert_eq!(again.stdout, shown.stdout);
+}
+
+#[test]
+fn the_study_of_contacts_has_a_row_for_each_class_and_shows_the_worst_scene() {
+    let args = ["study", "contacts", "--detector", "square-60", "--scenes", "5", "--worst", "1"];
+    let output = tactomo(&args);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    for class in [
+        "1 contact ",
+        "5 contacts ",
+        "all ",
+        "contrast above 100",
+        "in corners",
+        "radius above 3.5 mm",
+        "above 1 sheet",
+    ] {
+        assert_eq!(text.lines().filter(|line| line.starts_with(class)).count(), 1, "{class}: {text}");
+    }
+    assert!(text.contains("on square-60: ") && text.contains(" visible, "), "{text}");
+    let output = tactomo(&[&args[..], &["--json"]].concat());
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&report["rows"][5]["class"], &report["rows"][5]["scenes"]["scenes"]), (&"all".into(), &5.into()));
+    assert_eq!(report["worst"].as_array().map(Vec::len), Some(1));
 }
 
 #[test]

@@ -40,6 +40,7 @@ enum Command {
     Validate(validate::Args),
     Tradeoff(tradeoff::Args),
     Stability(stability::Args),
+    Study(study::Args),
     Reconstruct(reconstruct::Args),
 }
 
@@ -55,6 +56,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Validate(args) => validate::run(&args),
         Command::Tradeoff(args) => tradeoff::run(&args),
         Command::Stability(args) => stability::run(&args),
+        Command::Study(args) => study::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
     }
 }

@@ -4,12 +4,14 @@
 
 mod bound;
 pub mod case;
+pub mod contacts;
 mod experiment;
 mod machine;
 pub mod page;
 mod scenes;
 mod score;
 pub mod stability;
+mod stopwatch;
 pub mod tradeoff;
 pub mod validate;
 mod variant;

@@ -1,8 +1,9 @@
 //! Scores of solutions, frame by frame, and their summary.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::experiment::{Experiment, Frame};
+use super::stopwatch::timed;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
 use tactomo_physics::scene::{Contact, Shape, Touch};
@@ -77,9 +78,7 @@ impl Scorer {
     }
 
     fn frame(&mut self, solver: &mut dyn Solver, frame: &Frame) -> Result<Score, ForwardError> {
-        let start = Instant::now();
-        let result = solver.solve(&frame.readings);
-        let time = start.elapsed();
+        let (result, time) = timed(|| solver.solve(&frame.readings));
         match result {
             Ok(solution) => Ok(Score { time, ..self.score(frame, &solution)? }),
             Err(_) => Ok(Score { time, failed: true, ..Score::default() }),
@@ -270,10 +269,9 @@ impl Summary {
 
 impl Times {
     fn of(times: impl Iterator<Item = Duration>) -> Self {
-        let mut us: Vec<_> = times.map(|time| time.as_secs_f64() * 1e6).collect();
-        us.sort_by(f64::total_cmp);
-        let at = |share: f64| us.get((share * (us.len().max(1) - 1) as f64).round() as usize).copied().unwrap_or(0.0);
-        Self { median: at(0.5), p99: at(0.99), max: at(1.0) }
+        let us = times.map(|time| time.as_secs_f64() * 1e6);
+        let [median, p99, max] = quantiles(us, [0.5, 0.99, 1.0]).unwrap_or_default();
+        Self { median, p99, max }
     }
 }
 
@@ -283,9 +281,15 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    quantiles(values, [0.5]).map(|[median]| median)
+}
+
+/// The values below which such shares of all of them lie; `None` without a value.
+pub(crate) fn quantiles<const N: usize>(values: impl Iterator<Item = f64>, shares: [f64; N]) -> Option<[f64; N]> {
     let mut values: Vec<_> = values.collect();
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    let last = values.len().checked_sub(1)?;
+    Some(shares.map(|share| values[(share * last as f64).round() as usize]))
 }
 
 #[cfg(test)]

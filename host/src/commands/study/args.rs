@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use tactomo::solve::Method;
 
-use super::choice;
+use crate::commands::choice;
 
 /// What a study tries, and where its page goes.
 #[derive(Debug, clap::Args)]

@@ -1,0 +1,29 @@
+//! `tactomo study`: studies by name; and what these and others share.
+
+mod args;
+mod contacts;
+
+pub use self::args::StudyArgs;
+
+/// Studies of how well touch is found.
+///
+/// Example:
+///   tactomo study contacts --scenes 60
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    #[command(subcommand)]
+    study: Study,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Study {
+    Contacts(contacts::Args),
+}
+
+/// Runs the study that was asked for.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    match &args.study {
+        Study::Contacts(args) => contacts::run(args),
+    }
+}
