@@ -34,7 +34,7 @@ pub struct Args {
     /// Seed of scenes and noise: the same seed gives the same figures, but for times
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Scenes tried at a time; times mean little with more than one
+    /// Scenes tried at a time; times are right with one only
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     threads: u8,
     /// Prints this many of the worst scenes, with what was found of each contact

@@ -42,7 +42,10 @@ pub fn table(report: &Report) -> String {
             .to_owned(),
     );
     if report.threads > 1 {
-        lines.push(format!("Times mean little: {} scenes were tried at a time.", report.threads));
+        lines.push(format!(
+            "Times are too long: {} scenes were tried at a time, which share caches and cores.",
+            report.threads
+        ));
     }
     lines.extend(report.worst.iter().map(worst));
     lines.join("\n")

@@ -2,6 +2,7 @@
 
 mod bounds;
 mod breakdown;
+mod errors;
 mod faults;
 mod page;
 mod scenes;
@@ -11,6 +12,7 @@ mod wrong;
 
 pub use self::bounds::{BoundChart, BoundCurve, BoundReport};
 pub use self::breakdown::{Break, Breakdown, CellReport};
+pub use self::errors::{ErrorCurve, ErrorRange};
 pub use self::page::page;
 pub use self::sweep::{Plan, PointReport, Report, SolverRow, SweepReport, run};
 pub use self::table::table;

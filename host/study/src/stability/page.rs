@@ -1,12 +1,15 @@
 //! The report as a page.
 
 use super::bounds::{BoundChart, BoundCurve};
-use super::{Breakdown, CellReport, Report, SolverRow, SweepReport};
+use super::table::millimetres;
+use super::{Breakdown, CellReport, ErrorCurve, Report, SolverRow, SweepReport};
 use crate::page::{Axis, Cell, Chart, Heat, Mark, Row, Series, Unit, html, machine};
 use tactomo_touch::solve::Method;
 
 /// Errors below this show there (m).
 const FLOOR_M: f64 = 1e-6;
+/// Shares of points below this show there.
+const FLOOR_SHARE: f64 = 0.01;
 
 const READ: &str = "<p class=\"lead-in\">Green holds, red is useless. <b class=\"flag\">⚑</b> marks where the solver itself reports that something is wrong: \
     <b>red without a flag is the danger</b>.</p>\n\
@@ -19,6 +22,8 @@ pub fn page(report: &Report) -> String {
         "<h1>Where solvers break</h1>".to_owned(),
         READ.to_owned(),
         overview(report),
+        "<h2>How far off</h2>".to_owned(),
+        errors(report),
         "<h2>Against what noise allows</h2>".to_owned(),
         bounds(report),
         "<h2>Every point</h2>".to_owned(),
@@ -34,16 +39,28 @@ pub fn page(report: &Report) -> String {
 
 /// A row for each solver, a column for each sweep.
 fn overview(report: &Report) -> String {
+    let title = format!("{}: first break of each solver", report.detector);
+    let note = "The mildest point of each sweep that breaks a solver: its error is above 15 % of the mean distance of electrodes and twice its own at \
+                the harmless point, or it miscounts, slows down or answers with no finite number. Where it holds: its error in mm at the harmless \
+                point and its largest, for what is off by 5 mm from the start holds up to 10.";
+    sweeps_by_solvers(report, title, note, overview_cell)
+}
+
+/// A map of the width of the page: a row for each sweep, a column for each solver.
+fn sweeps_by_solvers(report: &Report, title: String, note: &str, cell: fn(&SolverRow) -> Cell) -> String {
     let Some(all) = report.sweeps.iter().max_by_key(|sweep| sweep.solvers.len()) else { return String::new() };
+    let cell_of = |sweep: &SweepReport, solver: &str| {
+        sweep.solvers.iter().find(|row| row.solver == solver).map_or_else(Cell::default, |row| {
+            if row.cells.iter().any(Option::is_some) { cell(row) } else { self::cell(&None) }
+        })
+    };
     let rows = report.sweeps.iter().map(|sweep| Row {
         name: sweep.title.clone(),
-        cells: all.solvers.iter().map(|solver| overview_cell(sweep, &solver.solver)).collect(),
+        cells: all.solvers.iter().map(|solver| cell_of(sweep, &solver.solver)).collect(),
     });
     Heat {
-        title: format!("{}: first break of each solver", report.detector),
-        note: "The mildest point of each sweep that breaks a solver: its error is above 15 % of the mean distance of electrodes and twice that at \
-               the harmless point, or it miscounts, slows down or answers with no finite number. Where it holds: its largest error."
-            .to_owned(),
+        title,
+        note: note.to_owned(),
         columns: all.solvers.iter().map(|row| row.solver.clone()).collect(),
         rows: rows.collect(),
         is_whole: true,
@@ -51,18 +68,19 @@ fn overview(report: &Report) -> String {
     .html()
 }
 
-fn overview_cell(sweep: &SweepReport, solver: &str) -> Cell {
-    let Some(row) = sweep.solvers.iter().find(|row| row.solver == solver) else { return Cell::default() };
-    let cells = || row.cells.iter().flatten();
-    if cells().next().is_none() {
-        return cell(&None);
-    }
+/// Colour of a row's worst cell.
+fn worst_level(row: &SolverRow) -> Option<u8> {
+    row.cells.iter().flatten().map(|cell| cell.level).max()
+}
+
+fn overview_cell(row: &SolverRow) -> Cell {
+    let errors = [row.errors.harmless_m, row.errors.largest_m].map(|error_m| error_m.map_or_else(dash, millimetres));
+    let [harmless, largest] = errors;
     let Some(found) = &row.breaks else {
-        let worst_m = cells().filter_map(|cell| cell.error_m).fold(0.0, f64::max);
         return Cell {
-            level: cells().map(|cell| cell.level).max(),
+            level: worst_level(row),
             text: "holds".to_owned(),
-            detail: format!("{} mm", millimetres(worst_m)),
+            detail: format!("{harmless} – {largest}"),
             ..Cell::default()
         };
     };
@@ -76,8 +94,63 @@ fn overview_cell(sweep: &SweepReport, solver: &str) -> Cell {
         text: found.at.clone(),
         detail: found.how.name().to_owned(),
         is_flagged: found.is_reported,
-        tooltip: format!("holds at {:.0} % of the points", 100.0 * found.survives),
+        tooltip: format!(
+            "holds at {:.0} % of the points; {harmless} mm at the harmless point, {largest} mm at most",
+            100.0 * found.survives
+        ),
     }
+}
+
+fn dash() -> String {
+    "–".to_owned()
+}
+
+/// Errors in millimetres, whatever they are at the harmless point.
+fn errors(report: &Report) -> String {
+    let title = format!("{}: errors of each solver, mm", report.detector);
+    let note = "The median over the points of each sweep; below it, that at the harmless point and the largest. Colours are of the largest.";
+    let map = sweeps_by_solvers(report, title, note, |row| {
+        let [harmless, median, largest] = [row.errors.harmless_m, row.errors.median_m, row.errors.largest_m]
+            .map(|error_m| error_m.map_or_else(dash, millimetres));
+        Cell { level: worst_level(row), text: median, detail: format!("{harmless} – {largest}"), ..Cell::default() }
+    });
+    // What is missed or invented counts the mean distance of electrodes: no error is beyond it.
+    let series: Vec<Series> = report.errors.iter().map(|curve| error_series(curve, report.reach_m)).collect();
+    let marks = || series.iter().flat_map(|series| &series.marks);
+    let chart = Chart {
+        title: "How often which error is exceeded".to_owned(),
+        subtitle: "share of the points of all sweeps".to_owned(),
+        x: Axis::over("error", Unit::Metres, marks().map(|mark| mark.x), FLOOR_M, 1.0),
+        y: Axis::over("", Unit::Plain, marks().map(|mark| mark.y), FLOOR_SHARE, 1.0),
+        series,
+        has_front: false,
+        guide: None,
+        size: [640.0, 460.0],
+    };
+    format!("{map}\n<div class=\"single\">{}</div>", chart.svg())
+}
+
+fn error_series(curve: &ErrorCurve, reach_m: f64) -> Series {
+    let mark = |[error_m, share]: &[f64; 2]| Mark {
+        x: *error_m,
+        y: *share,
+        tooltip: format!(
+            "{}: above {} at {:.0} % of {} points",
+            curve.solver,
+            Unit::Metres.text(*error_m),
+            100.0 * share,
+            curve.count
+        ),
+    };
+    let marks: Vec<Mark> = curve.points.iter().filter(|[error_m, _]| *error_m < reach_m).map(mark).collect();
+    // The label is where half of the points are worse.
+    let main = marks.iter().position(|mark| mark.y < 0.5).unwrap_or(marks.len().saturating_sub(1));
+    Series { name: curve.solver.clone(), class: class(&curve.solver), marks, main, is_joined: true }
+}
+
+/// Class of a solver's colour.
+fn class(solver: &str) -> &'static str {
+    solver.parse::<Method>().map_or("bound", |method| method.family().class())
 }
 
 fn heat(sweep: &SweepReport) -> Heat {
@@ -96,7 +169,7 @@ fn cell(cell: &Option<CellReport>) -> Cell {
         let tooltip = "cannot be made for this model".to_owned();
         return Cell { text: "n/a".to_owned(), tooltip, ..Cell::default() };
     };
-    let number = cell.error_m.map_or_else(|| "–".to_owned(), millimetres);
+    let number = cell.error_m.map_or_else(dash, millimetres);
     let marks = [
         (cell.not_finite > 0.0, " NaN"),
         (cell.failed > 0.0, " ∅"),
@@ -120,11 +193,6 @@ fn cell(cell: &Option<CellReport>) -> Cell {
             100.0 * cell.flagged
         ),
     }
-}
-
-/// A distance (m) in millimetres, without the unit.
-fn millimetres(metres: f64) -> String {
-    if metres < 9.95e-4 { format!("{:.2}", metres * 1e3) } else { format!("{:.1}", metres * 1e3) }
 }
 
 fn bounds(report: &Report) -> String {
@@ -156,11 +224,10 @@ fn bound_chart(report: &BoundChart) -> Chart {
 }
 
 fn curve(curve: &BoundCurve) -> Series {
-    let method = curve.solver.as_deref().and_then(|name| name.parse::<Method>().ok());
     let mark = |[x, y]: &[f64; 2]| Mark { x: *x, y: *y, tooltip: format!("{}: {}", x, Unit::Metres.text(*y)) };
     Series {
         name: curve.solver.clone().unwrap_or_else(|| "noise limit".to_owned()),
-        class: method.map_or("bound", |method| method.family().class()),
+        class: curve.solver.as_deref().map_or("bound", class),
         marks: curve.points.iter().map(mark).collect(),
         main: curve.points.len() / 2,
         is_joined: true,

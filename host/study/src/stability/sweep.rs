@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::bounds::{self, BoundReport};
 use super::breakdown::{Break, CellReport, breaks};
+use super::errors::{self, ErrorCurve, ErrorRange};
 use super::{faults, scenes, wrong};
 use crate::experiment::{Experiment, Frame, StudyError};
 use crate::machine::Machine;
@@ -56,6 +57,8 @@ pub struct Report {
     pub frames: usize,
     /// The sweeps.
     pub sweeps: Vec<SweepReport>,
+    /// How often each solver is how far off, over the points of all sweeps.
+    pub errors: Vec<ErrorCurve>,
     /// What noise allows, beside what solvers reach.
     pub bounds: BoundReport,
 }
@@ -89,6 +92,8 @@ pub struct SolverRow {
     pub solver: String,
     /// One for each point; `None` where the solver cannot be made for the model.
     pub cells: Vec<Option<CellReport>>,
+    /// Its errors, however they compare with each other.
+    pub errors: ErrorRange,
     /// The mildest point at which it breaks, if it does.
     pub breaks: Option<Break>,
 }
@@ -197,6 +202,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         seed: plan.seed,
         places: plan.places,
         frames: plan.frames,
+        errors: errors::curves(&sweeps),
         sweeps,
         bounds,
     })
@@ -231,7 +237,8 @@ fn try_sweep(plan: &Plan, sweep: Sweep, trials: &mut Trials) -> Result<SweepRepo
             let severities: Vec<f64> = sweep.points.iter().map(|point| point.severity).collect();
             let labels: Vec<&str> = sweep.points.iter().map(|point| point.label.as_str()).collect();
             let breaks = breaks(&labels, &severities, &mut cells);
-            Ok(SolverRow { solver: method.name().to_owned(), cells, breaks })
+            let errors = ErrorRange::of(&severities, &cells);
+            Ok(SolverRow { solver: method.name().to_owned(), cells, errors, breaks })
         })
         .collect::<Result<_, StudyError>>()?;
     let point = |point: Point| PointReport { label: point.label, severity: point.severity };
@@ -364,6 +371,12 @@ mod tests {
         for sweep in &report.sweeps {
             assert!(page.contains(&sweep.title) && table.contains(&sweep.title), "{}", sweep.title);
         }
+        for (part, of) in [("How often which error is exceeded", &page), ("Error up to, mm", &table)] {
+            assert!(of.contains(part), "{part}");
+        }
+        let row = |row: &SolverRow| row.errors.median_m.zip(row.errors.largest_m);
+        let errors: Vec<_> = report.sweeps.iter().flat_map(|sweep| &sweep.solvers).filter_map(row).collect();
+        assert!(errors.len() > 20 && errors.iter().all(|(median_m, largest_m)| median_m <= largest_m));
         let fits = page.find("heat whole").is_some_and(|at| at < page.find("Against what noise allows").unwrap());
         assert!(fits, "the overview takes the width of the page, whatever its columns");
         assert!(page.contains("tactomo &lt;stability&gt;") && page.contains("noise limit"));

@@ -1,6 +1,6 @@
 //! Speed against accuracy: every solver, over scenes that span the use.
 //!
-//! Times are of one thread with nothing else of this program running. Memory is what is allocated beyond what was before, as a
+//! Times are processor times of one thread with nothing else of this program running. Memory is what is allocated beyond what was before, as a
 //! [`Heap`] counts it.
 
 mod page;

@@ -284,7 +284,7 @@ fn footer(report: &Report) -> String {
         "Error: mean distance of contacts found from those that are there, where one missed or invented (none within the mean distance of \
          electrodes) counts that distance: OSPA of order 1. Correlation: of the image with the true conductance, both smoothed by a \
          thirtieth of the shorter side; of a solver without an image, its contacts are drawn as one. Readings come from a finer model than any that is inverted, with \
-         the converter's noise and steps. {} places of each kind of scene, {} frames at each, which solvers read one after the other; seed {}. Times are medians of one thread. Memory is what is allocated beyond the model, counted by the allocator.",
+         the converter's noise and steps. {} places of each kind of scene, {} frames at each, which solvers read one after the other; seed {}. Times are medians of the processor time of one thread. Memory is what is allocated beyond the model, counted by the allocator.",
         report.places, report.frames, report.seed
     );
     format!("<h2>How it was measured</h2>\n<p class=\"note\">{text}</p>\n{}", machine(&report.machine, &report.command))
