@@ -16,7 +16,12 @@ use tactomo_physics::forward::{ForwardModel, readings_v};
 use tactomo_physics::scene::Contact;
 use tactomo_physics::space::{self, Place};
 
-/// Parameters of a disc: its place along two directions in radii, logarithm of the conductance, logarithm of the radius.
+/// Parameters of a disc: its place along two directions in radii, logarithm of the conductance, and logarithm of the radius with the
+/// conductance changed along with it, so that the readings change least.
+///
+/// A firm disc that is narrower and conducts better acts nearly as before: what counts is the resistance of the contact with that of the
+/// crowded current under it, `1/C + S r0 / r`. So a change of the radius `r` from `r0` at constant sum takes `1/C` to `1/C + S (1 -
+/// r0 / r)`; `S` is found from the derivatives by both.
 pub(super) const PARAMETERS: usize = 4;
 /// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
 pub(super) const CONDUCTANCE_DEVIATION: f64 = 4.0;
@@ -38,7 +43,7 @@ const TRUE: f64 = 0.5;
 /// is an image's business.
 const WIDEST: f64 = 0.6;
 /// Tries of one step, each damped ten times more.
-const TRIES: usize = 4;
+const TRIES: usize = 6;
 const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-7;
 /// Smallest and largest conductance, in sheet conductances.
@@ -56,6 +61,8 @@ struct Slopes {
     volts: Vec<f64>,
     /// Of the readings (V), for each parameter of each contact.
     by: Vec<Vec<f64>>,
+    /// Resistance of the crowded current under each (ohm), as far as it acts as the contact's.
+    spreading_ohm: Vec<f64>,
 }
 
 /// Discs that fit best.
@@ -93,6 +100,8 @@ pub(super) struct DiscFitter<'a> {
     /// Standard deviation of the logarithm of a radius before anything is read.
     pub radius_deviation: f64,
     pub sheet_s: f64,
+    /// Variance of each coordinate of a place (m2) before anything is read.
+    pub place_variance_m2: f64,
     /// Where a disc may be.
     pub fields: &'a dyn SpotFields,
     /// Widest radius (m).
@@ -131,10 +140,9 @@ impl DiscFit {
         offset.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
-    /// Whether the derivatives were taken too far from here.
-    fn is_far(&self) -> bool {
-        let offset = self.slopes.offset(&self.contacts);
-        self.bend(&offset) > NEAR || offset.iter().any(|offset| offset.abs() > NEAR_AT_MOST)
+    /// Whether an offset is too far for the derivatives to serve.
+    fn is_far(&self, offset: &[f64]) -> bool {
+        self.bend(offset) > NEAR || offset.iter().any(|offset| offset.abs() > NEAR_AT_MOST)
     }
 
     /// What the fit lowers: both sums of squares.
@@ -152,19 +160,23 @@ impl Slopes {
             let along = |direction: usize| {
                 self.along[k][direction].iter().zip(way).map(|(a, b)| a * b).sum::<f64>() / before.radius_m
             };
-            let conductance = (now.conductance_s / before.conductance_s).ln();
-            [along(0), along(1), conductance, (now.radius_m / before.radius_m).ln()]
+            let narrower_ohm = self.spreading_ohm[k] * (1.0 - before.radius_m / now.radius_m);
+            let ohm = (1.0 / now.conductance_s - narrower_ohm).max(f64::MIN_POSITIVE);
+            [along(0), along(1), -(ohm * before.conductance_s).ln(), (now.radius_m / before.radius_m).ln()]
         };
         contacts.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// Change of the logarithm of a conductance by the last parameter of its contact, with the other sign.
+    fn exchange(&self, k: usize) -> f64 {
+        self.spreading_ohm[k] * self.at[k].conductance_s
     }
 }
 
 impl DiscFitter<'_> {
     /// The nearest minimum from a start; `None` if the start makes no sense.
     pub fn fit(&self, start: Vec<Contact>, target: &Target, effort: Effort) -> Option<DiscFit> {
-        let slopes = Arc::new(self.slopes(start)?);
-        let (contacts, volts) = (slopes.at.clone(), slopes.volts.clone());
-        self.descend(self.at(contacts, volts, slopes, target)?, target, effort)
+        self.descend(self.anew(start, target)?, target, effort)
     }
 
     /// The nearest minimum for other readings from a fit to some.
@@ -175,20 +187,19 @@ impl DiscFitter<'_> {
 
     fn descend(&self, mut fit: DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
         let mut damping = FIRST_DAMPING;
-        let t0 = std::time::Instant::now();
-        let start = fit.contacts.clone();
-        let cost0 = fit.objective();
-        let mut nn = 0;
         for _ in 0..effort.steps {
-            nn += 1;
-            if fit.is_far() {
-                fit = self.renewed(fit, target)?;
-            }
             let gradient = self.gradient(&fit, target);
+            let possible = Cholesky::new(fit.normal.clone()).map(|factor| gradient.dot(&factor.solve(&gradient)));
+            // A fit that is far off is wrong: it need not be wrong to many digits.
+            let enough = effort.gain.max(effort.share * (fit.objective() - target.count() as f64));
+            if possible.is_some_and(|possible| possible < enough) {
+                fit.settled = true;
+                break;
+            }
             let Some((next, expected)) = self.step(&fit, target, &gradient, &mut damping) else {
                 // The derivatives may be too old for a step that lowers anything.
                 if fit.contacts != fit.slopes.at {
-                    fit = self.renewed(fit, target)?;
+                    fit = self.anew(fit.contacts, target)?;
                     continue;
                 }
                 fit.settled = true;
@@ -196,18 +207,9 @@ impl DiscFitter<'_> {
             };
             let gained = fit.objective() - next.objective();
             fit = next;
-            // A fit that is far off is wrong: it need not be wrong to many digits.
-            if expected < effort.gain.max(effort.share * (fit.objective() - target.count() as f64)) {
-                fit.settled = true;
-                break;
+            if gained < TRUE * expected && fit.contacts != fit.slopes.at {
+                fit = self.anew(fit.contacts, target)?;
             }
-            if gained < TRUE * expected {
-                fit = self.renewed(fit, target)?;
-            }
-        }
-        if std::env::var("DBG").is_ok() {
-            let show = |all: &[Contact]| all.iter().map(|c| format!("({:.1} {:.1} r{:.2} C{:.1e})", 1e3*c.x_m, 1e3*c.y_m, 1e3*c.radius_m, c.conductance_s)).collect::<Vec<_>>().join(" ");
-            eprintln!("{:.1} ms {nn}/{} {:.1} -> {:.1} {} : {} => {}", 1e3*t0.elapsed().as_secs_f64(), effort.steps, cost0, fit.objective(), fit.settled, show(&start), show(&fit.contacts));
         }
         Some(fit)
     }
@@ -225,7 +227,7 @@ impl DiscFitter<'_> {
             (0..damped.nrows()).for_each(|i| damped[(i, i)] *= 1.0 + *damping);
             if let Some(step) = Cholesky::new(damped).map(|factor| factor.solve(gradient)) {
                 let expected = 2.0 * step.dot(gradient) - step.dot(&(&fit.normal * &step));
-                let contacts = self.moved(&fit.contacts, &fit.slopes.at, step.as_slice());
+                let contacts = self.moved(fit, step.as_slice());
                 if let Some(next) = self.next(fit, contacts, target)
                     && next.objective() <= fit.objective()
                 {
@@ -238,9 +240,12 @@ impl DiscFitter<'_> {
         None
     }
 
-    /// A fit at other contacts, with the derivatives that there are.
+    /// A fit at other contacts: with the derivatives that there are, unless it is far from where they were taken.
     fn next(&self, fit: &DiscFit, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
         let offset = fit.slopes.offset(&contacts);
+        if fit.is_far(&offset) {
+            return self.anew(contacts, target);
+        }
         let volts = match fit.bend(&offset) < LINEAR {
             true => {
                 let mut volts = fit.slopes.volts.clone();
@@ -252,20 +257,13 @@ impl DiscFitter<'_> {
             false => self.volts(&contacts)?,
         };
         let (cost, known) = (target.cost(&volts), self.known(&contacts));
-        cost.is_finite().then(|| DiscFit {
-            contacts,
-            volts,
-            cost,
-            known,
-            slopes: Arc::clone(&fit.slopes),
-            normal: fit.normal.clone(),
-            settled: false,
-        })
+        let (slopes, normal) = (Arc::clone(&fit.slopes), fit.normal.clone());
+        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, settled: false })
     }
 
     /// A fit with derivatives taken where it is.
-    fn renewed(&self, fit: DiscFit, target: &Target) -> Option<DiscFit> {
-        let slopes = Arc::new(self.slopes(fit.contacts)?);
+    fn anew(&self, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
+        let slopes = Arc::new(self.slopes(contacts)?);
         let (contacts, volts) = (slopes.at.clone(), slopes.volts.clone());
         self.at(contacts, volts, slopes, target)
     }
@@ -286,9 +284,15 @@ impl DiscFitter<'_> {
                 (normal[(i, j)], normal[(j, i)]) = (product, product);
             }
         }
-        for k in 0..size / PARAMETERS {
-            normal[(PARAMETERS * k + 2, PARAMETERS * k + 2)] += CONDUCTANCE_DEVIATION.powi(-2);
-            normal[(PARAMETERS * k + 3, PARAMETERS * k + 3)] += self.radius_deviation.powi(-2);
+        for (k, contact) in slopes.at.iter().enumerate() {
+            let place = contact.radius_m * contact.radius_m / self.place_variance_m2;
+            (0..2).for_each(|i| normal[(PARAMETERS * k + i, PARAMETERS * k + i)] += place);
+            let (conductance, exchange) = (CONDUCTANCE_DEVIATION.powi(-2), slopes.exchange(k));
+            let (c, r) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
+            normal[(c, c)] += conductance;
+            normal[(c, r)] -= exchange * conductance;
+            normal[(r, c)] -= exchange * conductance;
+            normal[(r, r)] += exchange * exchange * conductance + self.radius_deviation.powi(-2);
         }
         normal
     }
@@ -300,8 +304,9 @@ impl DiscFitter<'_> {
         let mut gradient: Vec<_> = fit.slopes.by.iter().map(|slope| dot(slope, &residuals)).collect();
         for (k, contact) in fit.contacts.iter().enumerate() {
             let [conductance, radius] = self.unusual(contact);
-            gradient[PARAMETERS * k + 2] -= conductance / CONDUCTANCE_DEVIATION;
-            gradient[PARAMETERS * k + 3] -= radius / self.radius_deviation;
+            let pull = conductance / CONDUCTANCE_DEVIATION;
+            gradient[PARAMETERS * k + 2] -= pull;
+            gradient[PARAMETERS * k + 3] += fit.slopes.exchange(k) * pull - radius / self.radius_deviation;
         }
         gradient.into()
     }
@@ -332,11 +337,11 @@ impl DiscFitter<'_> {
         for parameter in 0..size {
             let (k, mut step) = (parameter / PARAMETERS, [0.0; PARAMETERS]);
             step[parameter % PARAMETERS] = DIFFERENCE;
-            let mut moved = self.moved(&at[k..=k], &at[k..=k], &step)[0];
+            let mut moved = self.stepped(&at[k], at[k].radius_m, 0.0, &step);
             if moved == at[k] {
                 // Backwards if the edge is in the way.
                 step[parameter % PARAMETERS] = -DIFFERENCE;
-                moved = self.moved(&at[k..=k], &at[k..=k], &step)[0];
+                moved = self.stepped(&at[k], at[k].radius_m, 0.0, &step);
             }
             steps.push(step[parameter % PARAMETERS]);
             replaced.push((k, moved));
@@ -344,10 +349,18 @@ impl DiscFitter<'_> {
         let (impedance_ohm, changes_ohm) = self.model.impedance_with_changes_ohm(&at, &replaced).ok()?;
         let volts = readings_v(&impedance_ohm, self.detector).volts().to_vec();
         let by = changes_ohm.iter().zip(&steps).map(|(change, step)| self.slope(&impedance_ohm, change, *step));
-        let by: Vec<Vec<f64>> = by.collect();
+        let mut by: Vec<Vec<f64>> = by.collect();
+        let spreading_ohm = at.iter().enumerate().map(|(k, contact)| {
+            let (by_conductance, by_radius) = by[PARAMETERS * k + 2..PARAMETERS * (k + 1)].split_at_mut(1);
+            let (by_conductance, by_radius) = (&by_conductance[0], &mut by_radius[0]);
+            let exchange = (dot(by_conductance, by_radius) / dot(by_conductance, by_conductance)).max(0.0);
+            by_radius.iter_mut().zip(by_conductance).for_each(|(radius, c)| *radius -= exchange * c);
+            exchange / contact.conductance_s
+        });
+        let spreading_ohm = spreading_ohm.collect();
         let sound = volts.iter().chain(by.iter().flatten()).all(|value| value.is_finite());
         let along = at.iter().map(|contact| self.fields.footing(place_m(contact)).1).collect();
-        sound.then_some(Slopes { at, along, volts, by })
+        sound.then_some(Slopes { at, along, volts, by, spreading_ohm })
     }
 
     /// Derivative of the readings from a small change of the impedances: `V = Vcc (1 - Z[e][g] / L)`, `L = Z[g][g] + R_on`.
@@ -361,20 +374,31 @@ impl DiscFitter<'_> {
         (0..n * n).map(|i| volts(i / n, i % n)).collect()
     }
 
-    /// Contacts after a step in their parameters, with places in radii of `units`.
-    fn moved(&self, at: &[Contact], units: &[Contact], step: &[f64]) -> Vec<Contact> {
+    /// Contacts after a step in their parameters.
+    fn moved(&self, fit: &DiscFit, step: &[f64]) -> Vec<Contact> {
         let (steps, _) = step.as_chunks::<PARAMETERS>();
-        let moved = |((contact, unit), [first, second, by_s, by_m]): ((&Contact, &Contact), &[f64; PARAMETERS])| {
-            let shorten = (LONGEST_WAY / first.hypot(*second)).min(1.0) * unit.radius_m;
-            let factor = |log: f64, longest: f64| log.clamp(-longest, longest).exp();
-            let (from_m, along) = self.fields.footing(place_m(contact));
-            let to_m = space::along(space::along(from_m, shorten * first, along[0]), shorten * second, along[1]);
-            let ([x_m, y_m, z_m], _) = self.fields.footing(to_m);
-            let conductance_s = contact.conductance_s * factor(*by_s, LONGEST_CONDUCTANCE);
-            let radius_m = contact.radius_m * factor(*by_m, LONGEST_RADIUS);
-            self.held(Contact { x_m, y_m, z_m, conductance_s, radius_m })
+        let moved = |(k, contact): (usize, &Contact)| {
+            let unit = fit.slopes.at[k];
+            // What it is for the radius that the contact has now.
+            let spreading_ohm = fit.slopes.spreading_ohm[k] * unit.radius_m / contact.radius_m;
+            self.stepped(contact, unit.radius_m, spreading_ohm, &steps[k])
         };
-        at.iter().zip(units).zip(steps).map(moved).collect()
+        fit.contacts.iter().enumerate().map(moved).collect()
+    }
+
+    /// A contact after a step in its parameters: the unit of the place (m), and the resistance of the crowded current under it (ohm).
+    fn stepped(&self, contact: &Contact, unit_m: f64, spreading_ohm: f64, step: &[f64; PARAMETERS]) -> Contact {
+        let [first, second, by_s, by_m] = step;
+        let shorten = (LONGEST_WAY / first.hypot(*second)).min(1.0) * unit_m;
+        let factor = |log: f64, longest: f64| log.clamp(-longest, longest).exp();
+        let (from_m, along) = self.fields.footing(place_m(contact));
+        let to_m = space::along(space::along(from_m, shorten * first, along[0]), shorten * second, along[1]);
+        let ([x_m, y_m, z_m], _) = self.fields.footing(to_m);
+        let wider = factor(*by_m, LONGEST_RADIUS);
+        let ohm = 1.0 / (contact.conductance_s * factor(*by_s, LONGEST_CONDUCTANCE));
+        // No step makes a contact much better at once, whatever its narrowness asks for.
+        let ohm = (ohm + spreading_ohm * (1.0 - 1.0 / wider)).max(ohm * (-LONGEST_CONDUCTANCE).exp());
+        self.held(Contact { x_m, y_m, z_m, conductance_s: 1.0 / ohm, radius_m: wider * contact.radius_m })
     }
 
     /// A contact with conductance and radius held within what makes sense.

@@ -32,6 +32,11 @@ pub(super) struct Prior {
 const FEWER: f64 = 1.5;
 
 impl Prior {
+    /// Variance of each coordinate of a place that is anywhere on a square of the area (m2).
+    pub fn place_variance_m2(&self) -> f64 {
+        self.area_m2 / 12.0
+    }
+
     /// Logarithm of the evidence for a fit; nothing speaks for one that is not determined.
     pub fn ln_evidence(&self, fit: &DiscFit) -> f64 {
         let Some(factor) = Cholesky::new(fit.normal.clone()) else { return f64::NEG_INFINITY };

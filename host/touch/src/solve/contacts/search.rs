@@ -13,7 +13,7 @@ use tactomo_physics::scene::Contact;
 use tactomo_physics::space;
 
 /// A few steps from each start, and the way to the minimum from the best.
-const FIRST: Effort = Effort { steps: 4, gain: 1.0, share: 0.02 };
+const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
 const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
 /// From the frame before.
 const WARM: Effort = Effort { steps: 3, gain: 0.1, share: 0.0 };
@@ -28,6 +28,13 @@ const WORTH_FIRST: f64 = 40.0;
 const WEAK: f64 = 0.3;
 /// Radii that contacts may have while their number is not yet right, in usual ones: too few contacts would be made as wide as may be.
 const PLAUSIBLE: f64 = 3.0;
+/// Radius, in usual ones, above which a contact may be two, and the directions that it is split along.
+const WIDE: f64 = 1.6;
+const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]];
+/// Standard deviations of the sum of squares over what noise leaves, where another set of contacts is looked for, and by how much the
+/// logarithm of the evidence for it has to be higher.
+const DOUBTFUL: f64 = 1.5;
+const CLEARLY: f64 = 0.5;
 /// Places of two fits that are so near, in radii, are taken for one.
 const ALIKE: f64 = 0.3;
 /// Contacts nearer to each other than so many sums of their radii may be one.
@@ -65,6 +72,24 @@ impl ContactFinder {
             let starts: Vec<_> = pairs.iter().map(|pair| self.discs_of(&self.scan.start(&looks, pair))).collect();
             self.grow(one, &starts, target, better)
         });
+        if let Ok(truth) = std::env::var("TRUTH") {
+            let all: Vec<f64> = std::fs::read_to_string(truth).unwrap().split_whitespace().map(|v| v.parse().unwrap()).collect();
+            let start: Vec<Contact> = all.chunks(4).map(|c| Contact::flat(c[0], c[1], c[2], c[3])).collect();
+            let show = |all: &[Contact]| all.iter().map(|c| format!("({:.1} {:.1} r{:.2} C{:.1e})", 1e3*c.x_m, 1e3*c.y_m, 1e3*c.radius_m, c.conductance_s)).collect::<Vec<_>>().join(" ");
+            let mut best: Option<(f64, DiscFit)> = None;
+            for mask in 1..1u32 << start.len() {
+                let some: Vec<Contact> = (0..start.len()).filter(|k| mask >> k & 1 == 1).map(|k| start[k]).collect();
+                if let Some(fit) = self.disc_fitter().fit(some, target, COLD) {
+                    let e = self.evidence(&fit);
+                    if best.as_ref().is_none_or(|b| b.0 < e) { best = Some((e, fit)); }
+                }
+            }
+            if let (Some((e, fit)), Some(found)) = (best, &anew) {
+                let mine = self.evidence(&found.fit);
+                println!("{} of {} truth evidence {e:.1} cost {:.1} known {:.1}; found {} evidence {mine:.1} cost {:.1} known {:.1} certainty {:.2}   {}", fit.contacts.len(), start.len(), fit.cost, fit.known, found.fit.contacts.len(), found.fit.cost, found.fit.known, found.certainty, if e > mine + 1.0 { "SEARCH" } else if found.fit.contacts.len() > start.len() {"STAT"} else {""});
+                println!("{} | {} | {}", show(&start), show(&fit.contacts), show(&found.fit.contacts));
+            }
+        }
         [grown, anew].into_iter().flatten().max_by(|a, b| self.evidence(&a.fit).total_cmp(&self.evidence(&b.fit)))
     }
 
@@ -113,6 +138,11 @@ impl ContactFinder {
                 break;
             }
         }
+        while self.is_doubtful(&best.0, target) {
+            let Some(other) = self.swapped(&best, target).map(|other| self.noted(other, &mut by_count)) else { break };
+            best = other;
+            better(&Explanation::new(best.0.clone(), &by_count));
+        }
         if self.is_misfit(&best.0, target) {
             best = self.noted(self.released(best.0, target), &mut by_count);
         }
@@ -128,6 +158,10 @@ impl ContactFinder {
     /// A fit with its evidence, which is noted as that of its count if it is the best of it.
     fn noted(&self, fit: DiscFit, by_count: &mut [f64]) -> (DiscFit, f64) {
         let evidence = self.evidence(&fit);
+        if std::env::var("TRUTH").is_ok() {
+            let show = |all: &[Contact]| all.iter().map(|c| format!("({:.1} {:.1} r{:.2} C{:.1e})", 1e3*c.x_m, 1e3*c.y_m, 1e3*c.radius_m, c.conductance_s)).collect::<Vec<_>>().join(" ");
+            println!("  noted {} {evidence:.1} {:.1} {:.1} {} {}", fit.contacts.len(), fit.cost, fit.known, fit.settled, show(&fit.contacts));
+        }
         if let Some(best) = by_count.get_mut(fit.contacts.len()) {
             *best = best.max(evidence);
         }
@@ -144,7 +178,52 @@ impl ContactFinder {
                 starts.extend(more.map(|more| fit.contacts.iter().copied().chain(more).collect()));
             }
         }
+        starts.extend(self.splits(fit));
         self.best_of(starts, target)
+    }
+
+    /// Starts with a wide contact taken for two beside each other, in some directions.
+    fn splits(&self, fit: &DiscFit) -> Vec<Vec<Contact>> {
+        let widest = (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
+        let is_wide = |k: &usize| fit.contacts[*k].radius_m > WIDE * self.settings.radius_m;
+        let Some(k) = widest.filter(is_wide) else { return Vec::new() };
+        let wide = fit.contacts[k];
+        let (along, _) = fit.along(k);
+        let split = |[a, b]: [f64; 2]| {
+            let half = |sign: f64| {
+                let way_m = sign * wide.radius_m;
+                let to_m = space::along(space::along(place_m(&wide), way_m * a, along[0]), way_m * b, along[1]);
+                let [x_m, y_m, z_m] = self.fields.footing(to_m).0;
+                let radius_m = self.settings.radius_m;
+                Contact { x_m, y_m, z_m, radius_m, conductance_s: 0.5 * wide.conductance_s }
+            };
+            let mut contacts = fit.contacts.clone();
+            contacts[k] = half(1.0);
+            contacts.push(half(-1.0));
+            contacts
+        };
+        DIRECTIONS.map(split).into()
+    }
+
+    /// Whether a fit leaves a little more than noise should, or needs a contact as wide as may be.
+    fn is_doubtful(&self, fit: &DiscFit, target: &Target) -> bool {
+        let freedom = self.freedom(fit, target);
+        let widest_m = 0.95 * PLAUSIBLE * self.settings.radius_m;
+        let is_wide = fit.contacts.len() > 1 && fit.contacts.iter().any(|contact| contact.radius_m > widest_m);
+        fit.cost > freedom + DOUBTFUL * (2.0 * freedom).sqrt() || is_wide
+    }
+
+    /// A more likely fit with one of the contacts taken away and put where it explains most.
+    fn swapped(&self, (best, evidence): &(DiscFit, f64), target: &Target) -> Option<DiscFit> {
+        let mut order: Vec<_> = (0..best.contacts.len()).collect();
+        order.sort_unstable_by(|a, b| best.contacts[*b].radius_m.total_cmp(&best.contacts[*a].radius_m));
+        order.into_iter().filter(|_| best.contacts.len() > 1).find_map(|k| {
+            let mut others = best.contacts.clone();
+            others.remove(k);
+            let fewer = self.plausible_fitter().fit(others, target, FIRST)?;
+            let other = self.one_more(&fewer, Vec::new(), target)?;
+            (self.evidence(&other) > evidence + CLEARLY).then_some(other)
+        })
     }
 
     /// The best fit with one contact fewer: without each weak one, and with two that nearly touch taken for one.
@@ -180,9 +259,7 @@ impl ContactFinder {
 
     /// The best fit from some starts: a few steps from each, then to the minimum from the best.
     fn best_of(&self, starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
-        let fitter = self.disc_fitter();
-        let widest_m = fitter.widest_m.min(PLAUSIBLE * self.settings.radius_m);
-        let fitter = DiscFitter { widest_m, ..fitter };
+        let fitter = self.plausible_fitter();
         let objective = |fit: &DiscFit| fit.cost + fit.known;
         let mut fits: Vec<_> = starts.into_iter().filter_map(|start| fitter.fit(start, target, FIRST)).collect();
         fits.sort_unstable_by(|a, b| objective(a).total_cmp(&objective(b)));
@@ -278,12 +355,18 @@ impl ContactFinder {
         LoadedSpot { ohm: own_ohm + 1.0 / (spot.share * contact.conductance_s), spot }
     }
 
+    fn plausible_fitter(&self) -> DiscFitter<'_> {
+        let fitter = self.disc_fitter();
+        DiscFitter { widest_m: fitter.widest_m.min(PLAUSIBLE * self.settings.radius_m), ..fitter }
+    }
+
     pub(super) fn disc_fitter(&self) -> DiscFitter<'_> {
         DiscFitter {
             model: &*self.problem.model,
             usual_radius_m: self.settings.radius_m,
             radius_deviation: self.settings.radius_deviation,
             sheet_s: self.sheet_s,
+            place_variance_m2: self.prior.place_variance_m2(),
             fields: &*self.fields,
             widest_m: self.widest_m,
             detector: self.problem.detector(),
