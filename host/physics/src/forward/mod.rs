@@ -15,6 +15,8 @@ pub mod spots;
 mod spread;
 mod through;
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 
 pub use self::auto::Auto;
@@ -68,6 +70,12 @@ pub trait ForwardModel: Send + Sync {
         });
         let changes = changes.collect::<Result<_, _>>()?;
         Ok((before, changes))
+    }
+
+    /// The same detector with contacts a few times cheaper and readings off by up to a per cent or so, to look where they may be; `None`
+    /// if there is no such thing.
+    fn rough(&self) -> Option<Arc<dyn ForwardModel>> {
+        None
     }
 
     /// The impedance matrix and the fields under the image's nodes with a conductance at each of them (S): an image of contact,

@@ -71,6 +71,10 @@ impl ForwardModel for Through {
         Ok((before, changes))
     }
 
+    fn rough(&self) -> Option<Arc<dyn ForwardModel>> {
+        Some(Arc::new(Self::new(self.model.rough()?, self.kept.clone(), self.joints.clone())))
+    }
+
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
         let all = self.model.image_fields(image_s)?;
         let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);

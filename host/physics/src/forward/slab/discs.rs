@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::cut::CutDisc;
-use super::disc::{DiscBasis, MAX_DEGREE};
+use super::disc::DiscBasis;
 use super::pads::between;
 use super::{Slab, from_corner};
 use crate::forward::ForwardError;
@@ -75,7 +75,7 @@ impl Slab {
     /// The smooth part of the kernel varies over a split length: a disc that is wider needs more degrees.
     fn contact_degree(&self, radius_m: f64) -> usize {
         let wider = (radius_m / self.top.split_m() - 1.0).max(0.0);
-        (self.resolution.contact_degree + (2.0 * wider).ceil() as usize).min(MAX_DEGREE)
+        (self.resolution.contact_degree + (2.0 * wider).ceil() as usize).min(self.most_degree)
     }
 
     /// Fields between the densities of two discs, or of one, without its own singular part (ohm). The floating pads below are a short

@@ -17,12 +17,12 @@ mod spots;
 #[cfg(test)]
 mod tests;
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 
-use self::disc::DiscBasis;
+use self::disc::{DiscBasis, MAX_DEGREE};
 use self::green::{Surface, SurfaceGreen};
 use self::image::{CellFields, ImageGrid};
 use self::pads::{Across, Pad, PadFields, pad_impedances};
@@ -61,10 +61,15 @@ pub struct Slab {
     detector: Detector,
     size_m: [f64; 2],
     resolution: Resolution,
-    top: SurfaceGreen,
-    pads: PadFields,
-    image: Image,
+    /// Highest degree on contacts, however wide.
+    most_degree: usize,
+    top: Arc<SurfaceGreen>,
+    pads: Arc<PadFields>,
+    image: Arc<Image>,
 }
+
+/// Degree on the contacts of a [rough](ForwardModel::rough) slab.
+const ROUGH_DEGREE: usize = 2;
 
 /// The grid that images are on.
 #[derive(Clone, Debug)]
@@ -97,12 +102,20 @@ impl Slab {
             .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
         let top = SurfaceGreen::new(size_m, split_m(detector, size_m), &mut planner, &top_surface(detector));
         let image = Image::new(ImageGrid::new(size_m, IMAGE_NODES), &pads);
-        Ok(Self { detector: detector.clone(), size_m, resolution, top, pads, image })
+        Ok(Self {
+            detector: detector.clone(),
+            size_m,
+            resolution,
+            most_degree: MAX_DEGREE,
+            top: top.into(),
+            pads: pads.into(),
+            image: image.into(),
+        })
     }
 
     /// The same model with images of about `nodes` nodes instead of 2000; at least 9.
     pub fn on_image(self, nodes: usize) -> Self {
-        Self { image: Image::new(ImageGrid::new(self.size_m, nodes), &self.pads), ..self }
+        Self { image: Image::new(ImageGrid::new(self.size_m, nodes), &self.pads).into(), ..self }
     }
 
     fn cells(&self) -> &CellFields {
@@ -160,6 +173,10 @@ impl ForwardModel for Slab {
         replaced: &[(usize, Contact)],
     ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), ForwardError> {
         self.discs(contacts)?.with_changes_ohm(replaced)
+    }
+
+    fn rough(&self) -> Option<Arc<dyn ForwardModel>> {
+        Some(Arc::new(Self { most_degree: ROUGH_DEGREE, ..self.clone() }))
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {

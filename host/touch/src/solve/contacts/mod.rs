@@ -16,6 +16,8 @@ mod target;
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 
 use self::discs::{DiscFit, PARAMETERS};
@@ -26,7 +28,7 @@ pub use self::solver::Contacts;
 pub(super) use self::solver::{ContactFollower, ContactSearcher};
 use self::target::{Errors, Target};
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
-use tactomo_physics::forward::ForwardError;
+use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::readings::Readings;
 
@@ -70,6 +72,8 @@ impl ContactSettings {
 /// What finds contacts: the same for all frames, and shared by the threads that follow and search.
 pub(super) struct ContactFinder {
     problem: Problem,
+    /// To look where contacts may be.
+    rough: Arc<dyn ForwardModel>,
     settings: ContactSettings,
     network: Network,
     fields: Box<dyn SpotFields>,
@@ -133,6 +137,7 @@ impl ContactFinder {
                 area_m2: problem.jacobian.image_mesh.node_areas_m2.iter().sum(),
                 radius_deviation: settings.radius_deviation,
             },
+            rough: problem.model.rough().unwrap_or_else(|| Arc::clone(&problem.model)),
             problem: problem.clone(),
             settings,
         })

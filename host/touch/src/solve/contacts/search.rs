@@ -14,6 +14,7 @@ use tactomo_physics::space;
 
 /// A few steps from each start, and the way to the minimum from the best.
 const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
+const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
 const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
 /// From the frame before.
 const WARM: Effort = Effort { steps: 3, gain: 0.1, share: 0.0 };
@@ -220,7 +221,8 @@ impl ContactFinder {
         order.into_iter().filter(|_| best.contacts.len() > 1).find_map(|k| {
             let mut others = best.contacts.clone();
             others.remove(k);
-            let fewer = self.plausible_fitter().fit(others, target, FIRST)?;
+            let rough = DiscFitter { model: &*self.rough, ..self.plausible_fitter() };
+            let fewer = rough.fit(others, target, FIRST)?;
             let other = self.one_more(&fewer, Vec::new(), target)?;
             (self.evidence(&other) > evidence + CLEARLY).then_some(other)
         })
@@ -257,18 +259,20 @@ impl ContactFinder {
         Contact { x_m, y_m, z_m, conductance_s, radius_m: a.radius_m.hypot(b.radius_m) }
     }
 
-    /// The best fit from some starts: a few steps from each, then to the minimum from the best.
+    /// The best fit from some starts: with the rough model a few steps from each, then more from the best; last with the full one.
     fn best_of(&self, starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
-        let fitter = self.plausible_fitter();
+        let full = self.plausible_fitter();
+        let rough = DiscFitter { model: &*self.rough, ..full };
         let objective = |fit: &DiscFit| fit.cost + fit.known;
-        let mut fits: Vec<_> = starts.into_iter().filter_map(|start| fitter.fit(start, target, FIRST)).collect();
-        fits.sort_unstable_by(|a, b| objective(a).total_cmp(&objective(b)));
+        let by_objective = |a: &DiscFit, b: &DiscFit| objective(a).total_cmp(&objective(b));
+        let mut fits: Vec<_> = starts.into_iter().filter_map(|start| rough.fit(start, target, FIRST)).collect();
+        fits.sort_unstable_by(by_objective);
         // Starts often lead to one minimum.
         fits.dedup_by(|later, first| self.is_alike(first, later));
         fits.truncate(FINALISTS);
-        fits.into_iter()
-            .filter_map(|fit| fitter.go_on(&fit, target, COLD))
-            .min_by(|a, b| objective(a).total_cmp(&objective(b)))
+        let fits = fits.into_iter().filter_map(|fit| rough.go_on(&fit, target, ROUGH));
+        let best = fits.min_by(by_objective)?;
+        full.fit(best.contacts, target, COLD)
     }
 
     /// Whether each contact of one fit is where one of the other is.
