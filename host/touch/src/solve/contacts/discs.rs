@@ -47,7 +47,7 @@ const TRIES: usize = 6;
 const FIRST_DAMPING: f64 = 1e-3;
 const LEAST_DAMPING: f64 = 1e-7;
 /// Smallest and largest conductance, in sheet conductances.
-const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
+pub(super) const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
 /// Smallest radius, in usual ones.
 const NARROWEST: f64 = 0.05;
 
@@ -126,6 +126,11 @@ impl DiscFit {
     /// Unit vectors of the directions that the parameters of a contact's place are along, and their unit (m).
     pub fn along(&self, k: usize) -> ([Place; 2], f64) {
         (self.slopes.along[k], self.slopes.at[k].radius_m)
+    }
+
+    /// Resistance of the crowded current under a contact (ohm), as far as it acts as the contact's.
+    pub fn spreading_ohm(&self, k: usize) -> f64 {
+        self.slopes.spreading_ohm[k] * self.slopes.at[k].radius_m / self.contacts[k].radius_m
     }
 
     /// Derivatives of the readings by all parameters (V).
@@ -379,9 +384,7 @@ impl DiscFitter<'_> {
         let (steps, _) = step.as_chunks::<PARAMETERS>();
         let moved = |(k, contact): (usize, &Contact)| {
             let unit = fit.slopes.at[k];
-            // What it is for the radius that the contact has now.
-            let spreading_ohm = fit.slopes.spreading_ohm[k] * unit.radius_m / contact.radius_m;
-            self.stepped(contact, unit.radius_m, spreading_ohm, &steps[k])
+            self.stepped(contact, unit.radius_m, fit.spreading_ohm(k), &steps[k])
         };
         fit.contacts.iter().enumerate().map(moved).collect()
     }

@@ -6,6 +6,7 @@
 
 mod discs;
 mod evidence;
+mod exchange;
 mod network;
 #[cfg(test)]
 mod places_tests;
@@ -20,8 +21,9 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use self::discs::{DiscFit, PARAMETERS};
+use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
 use self::evidence::Prior;
+use self::exchange::Usual;
 use self::network::Network;
 use self::scan::Scan;
 pub use self::solver::Contacts;
@@ -175,7 +177,7 @@ impl ContactFinder {
     fn solution(&self, found: &Explanation, target: &Target) -> Solution {
         let fit = &found.fit;
         let covariance = fit.covariance();
-        let contacts: Vec<_> = (0..fit.contacts.len()).map(|k| found_contact(fit, k, covariance.as_ref())).collect();
+        let contacts: Vec<_> = (0..fit.contacts.len()).map(|k| self.found_contact(fit, k, covariance.as_ref())).collect();
         let is_perfect = |contact: &FoundContact| contact.conductance_s > SATURATED * self.sheet_s;
         let flags = Flags {
             saturated: target.is_saturated() || contacts.iter().any(is_perfect),
@@ -187,23 +189,34 @@ impl ContactFinder {
         let residual = Some(left.sqrt() * target.deviation_v() / self.errors.noise_v);
         Solution { contacts, residual, flags, ..Solution::default() }
     }
-}
 
-/// A contact of a fit with its standard errors.
-fn found_contact(fit: &DiscFit, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
-    let contact = fit.contacts[k];
-    let start = PARAMETERS * k;
-    let is_known = covariance.is_some_and(|all| all[(start + 3, start + 3)] < KNOWN * KNOWN);
-    FoundContact {
-        z_m: contact.z_m,
-        uncertainty: covariance.map(|all| uncertainty(fit, k, all)),
-        radius_m: is_known.then_some(contact.radius_m),
-        ..FoundContact::flat(contact.x_m, contact.y_m, contact.conductance_s)
+    /// A contact of a fit with its standard errors.
+    fn found_contact(&self, fit: &DiscFit, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
+        let usual = Usual {
+            conductance_s: self.sheet_s,
+            most_s: CONDUCTANCES[1] * self.sheet_s,
+            radius_m: self.settings.radius_m,
+            radius_deviation: self.settings.radius_deviation,
+        };
+        let contact = fit.contacts[k];
+        let logs = covariance.and_then(|covariance| usual.logs(fit, k, covariance));
+        let conductance_s = logs.map_or(contact.conductance_s, |logs| logs.conductance[0].exp());
+        let known = logs.filter(|logs| logs.radius[1] < KNOWN);
+        let uncertainty = covariance.zip(logs).map(|(covariance, logs)| Uncertainty {
+            conductance_s: conductance_s * logs.conductance[1],
+            ..place_uncertainty(fit, k, covariance)
+        });
+        FoundContact {
+            z_m: contact.z_m,
+            uncertainty,
+            radius_m: known.map(|logs| logs.radius[0].exp()),
+            ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)
+        }
     }
 }
 
-/// Standard errors of a contact.
-fn uncertainty(fit: &DiscFit, k: usize, covariance: &DMatrix<f64>) -> Uncertainty {
+/// Standard errors of a contact's place.
+fn place_uncertainty(fit: &DiscFit, k: usize, covariance: &DMatrix<f64>) -> Uncertainty {
     let of = |i: usize, j: usize| covariance[(PARAMETERS * k + i, PARAMETERS * k + j)];
     let (along, unit_m) = fit.along(k);
     // Directions along the surface to x and y.
@@ -213,6 +226,5 @@ fn uncertainty(fit: &DiscFit, k: usize, covariance: &DMatrix<f64>) -> Uncertaint
     };
     let [x, y] = [0, 1].map(|axis| between(parts(axis), parts(axis)).max(0.0).sqrt());
     let correlation = (between(parts(0), parts(1)) / (x * y).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
-    let conductance_s = fit.contacts[k].conductance_s * of(2, 2).max(0.0).sqrt();
-    Uncertainty { x_m: x * unit_m, y_m: y * unit_m, correlation, conductance_s }
+    Uncertainty { x_m: x * unit_m, y_m: y * unit_m, correlation, conductance_s: 0.0 }
 }

@@ -1,0 +1,94 @@
+//! What readings say of a contact's conductance and radius apart.
+//!
+//! Of a firm contact they give the resistance of the contact with that of the crowded current under it, `1/C + S`, far better than
+//! either: `C` may be anything from some value on, the better the narrower the contact. So its logarithm is not normally
+//! distributed, and its mean and deviation are sums over a grid of the fit's two parameters, in which the readings are nearly
+//! linear: the likelihood's parabola times the prior of both logarithms.
+
+use super::discs::{CONDUCTANCE_DEVIATION, DiscFit, PARAMETERS};
+use nalgebra::{DMatrix, Matrix2, Vector2};
+
+/// Points along each parameter, and how far they reach (standard deviations).
+const POINTS: [usize; 2] = [9, 33];
+const REACH: f64 = 3.5;
+
+/// Mean and standard deviation of two logarithms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Logs {
+    /// Of the conductance (S).
+    pub conductance: [f64; 2],
+    /// Of the radius (m).
+    pub radius: [f64; 2],
+}
+
+/// What is known of both before anything is read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Usual {
+    pub conductance_s: f64,
+    pub most_s: f64,
+    pub radius_m: f64,
+    pub radius_deviation: f64,
+}
+
+impl Usual {
+    /// Logarithms of a contact's conductance and radius, from the fit and its covariance; `None` where they are not determined.
+    pub fn logs(&self, fit: &DiscFit, k: usize, covariance: &DMatrix<f64>) -> Option<Logs> {
+        let contact = fit.contacts[k];
+        let start = PARAMETERS * k + 2;
+        let of = |i: usize, j: usize| covariance[(start + i, start + j)];
+        let posterior = Matrix2::new(of(0, 0), of(0, 1), of(1, 0), of(1, 1));
+        let spreading_ohm = fit.spreading_ohm(k);
+        let exchange = spreading_ohm * contact.conductance_s;
+        let weights = [CONDUCTANCE_DEVIATION.powi(-2), self.radius_deviation.powi(-2)];
+        // Of the likelihood alone: without the prior's curvature, and with what pulls against the prior's slope.
+        let by_conductance = Vector2::new(1.0, -exchange);
+        let by_radius = Vector2::new(0.0, 1.0);
+        let prior = by_conductance * by_conductance.transpose() * weights[0] + by_radius * by_radius.transpose() * weights[1];
+        let likelihood = posterior.try_inverse()? - prior;
+        let at = [(contact.conductance_s / self.conductance_s).ln(), (contact.radius_m / self.radius_m).ln()];
+        let pull = by_conductance * (at[0] * weights[0]) + by_radius * (at[1] * weights[1]);
+        // Along the first parameter about its mean for each of the second's.
+        let deviations = [(of(0, 0) - of(0, 1) * of(0, 1) / of(1, 1)).max(0.0).sqrt(), of(1, 1).sqrt().min(self.radius_deviation)];
+        let slope = of(0, 1) / of(1, 1);
+        let mut points = Vec::with_capacity(POINTS[0] * POINTS[1]);
+        for j in 0..POINTS[1] {
+            let wider = REACH * deviations[1] * spread(j, POINTS[1]);
+            for i in 0..POINTS[0] {
+                let more = slope * wider + REACH * deviations[0] * spread(i, POINTS[0]);
+                let softness = (-more).exp();
+                let ohm = softness / contact.conductance_s + spreading_ohm * (1.0 - (-wider).exp());
+                if ohm <= 1.0 / self.most_s {
+                    continue;
+                }
+                let step = Vector2::new(more, wider);
+                let logs = [-(ohm * self.conductance_s).ln(), at[1] + wider];
+                let ln_weight = pull.dot(&step) - 0.5 * step.dot(&(likelihood * step))
+                    - 0.5 * (logs[0] * logs[0] * weights[0] + logs[1] * logs[1] * weights[1])
+                    // From the step to the logarithm of the conductance.
+                    + (softness / (contact.conductance_s * ohm)).ln();
+                points.push((ln_weight, logs));
+            }
+        }
+        let highest = points.iter().map(|(weight, _)| *weight).fold(f64::NEG_INFINITY, f64::max);
+        let mean = |of: &dyn Fn(&[f64; 2]) -> f64| {
+            let sums = points.iter().map(|(weight, logs)| ((weight - highest).exp(), of(logs)));
+            let (all, sum) = sums.fold((0.0, 0.0), |(all, sum), (weight, value)| (all + weight, sum + weight * value));
+            sum / all
+        };
+        let of = |log: usize| {
+            let middle = mean(&|logs| logs[log]);
+            [middle, mean(&|logs| (logs[log] - middle).powi(2)).sqrt()]
+        };
+        let ([conductance, conductance_deviation], [radius, radius_deviation]) = (of(0), of(1));
+        let found = Logs {
+            conductance: [conductance + self.conductance_s.ln(), conductance_deviation],
+            radius: [radius + self.radius_m.ln(), radius_deviation],
+        };
+        (found.conductance.iter().chain(&found.radius).all(|value| value.is_finite())).then_some(found)
+    }
+}
+
+/// Points from -1 to 1.
+fn spread(i: usize, count: usize) -> f64 {
+    2.0 * i as f64 / (count - 1) as f64 - 1.0
+}
