@@ -21,10 +21,13 @@ use tactomo_physics::space::{self, Place};
 ///
 /// A firm disc that is narrower and conducts better acts nearly as before: what counts is the resistance of the contact with that of the
 /// crowded current under it, `1/C + S r0 / r`. So a change of the radius `r` from `r0` at constant sum takes `1/C` to `1/C + S (1 -
-/// r0 / r)`; `S` is found from the derivatives by both.
+/// r0 / r)`; `S` is found from the derivatives by both. Where `S` is far larger than `1/C`, no conductance makes up for a radius, and
+/// steps only change it by [`MOST_EXCHANGE`].
 pub(super) const PARAMETERS: usize = 4;
 /// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
 pub(super) const CONDUCTANCE_DEVIATION: f64 = 4.0;
+/// Most that a step changes the logarithm of a conductance for that of a radius.
+const MOST_EXCHANGE: f64 = 2.0;
 /// Differences that derivatives are taken over.
 const DIFFERENCE: f64 = 1e-3;
 /// Longest way in a step, in radii, and longest changes of the logarithms of a conductance and of a radius: where contacts are too
@@ -61,8 +64,9 @@ struct Slopes {
     volts: Vec<f64>,
     /// Of the readings (V), for each parameter of each contact.
     by: Vec<Vec<f64>>,
-    /// Resistance of the crowded current under each (ohm), as far as it acts as the contact's.
-    spreading_ohm: Vec<f64>,
+    /// Of each, the change of the logarithm of the conductance that makes up for that of the radius, with the other sign: the resistance
+    /// of the crowded current under it over the contact's own.
+    exchange: Vec<f64>,
 }
 
 /// Discs that fit best.
@@ -128,9 +132,12 @@ impl DiscFit {
         (self.slopes.along[k], self.slopes.at[k].radius_m)
     }
 
-    /// Resistance of the crowded current under a contact (ohm), as far as it acts as the contact's.
-    pub fn spreading_ohm(&self, k: usize) -> f64 {
-        self.slopes.spreading_ohm[k] * self.slopes.at[k].radius_m / self.contacts[k].radius_m
+    /// By how much the logarithm of a contact's conductance has to change for that of its radius, with the other sign, for the readings to
+    /// stay as they are; and by how much it does in the last parameter.
+    pub fn exchange(&self, k: usize) -> [f64; 2] {
+        let now = self.slopes.at[k].radius_m / self.contacts[k].radius_m * self.contacts[k].conductance_s
+            / self.slopes.at[k].conductance_s;
+        [self.slopes.exchange[k], self.slopes.stepped_exchange(k)].map(|exchange| now * exchange)
     }
 
     /// Derivatives of the readings by all parameters (V).
@@ -165,7 +172,7 @@ impl Slopes {
             let along = |direction: usize| {
                 self.along[k][direction].iter().zip(way).map(|(a, b)| a * b).sum::<f64>() / before.radius_m
             };
-            let narrower_ohm = self.spreading_ohm[k] * (1.0 - before.radius_m / now.radius_m);
+            let narrower_ohm = self.stepped_exchange(k) / before.conductance_s * (1.0 - before.radius_m / now.radius_m);
             let ohm = (1.0 / now.conductance_s - narrower_ohm).max(f64::MIN_POSITIVE);
             [along(0), along(1), -(ohm * before.conductance_s).ln(), (now.radius_m / before.radius_m).ln()]
         };
@@ -173,8 +180,8 @@ impl Slopes {
     }
 
     /// Change of the logarithm of a conductance by the last parameter of its contact, with the other sign.
-    fn exchange(&self, k: usize) -> f64 {
-        self.spreading_ohm[k] * self.at[k].conductance_s
+    fn stepped_exchange(&self, k: usize) -> f64 {
+        self.exchange[k].min(MOST_EXCHANGE)
     }
 }
 
@@ -292,7 +299,7 @@ impl DiscFitter<'_> {
         for (k, contact) in slopes.at.iter().enumerate() {
             let place = contact.radius_m * contact.radius_m / self.place_variance_m2;
             (0..2).for_each(|i| normal[(PARAMETERS * k + i, PARAMETERS * k + i)] += place);
-            let (conductance, exchange) = (CONDUCTANCE_DEVIATION.powi(-2), slopes.exchange(k));
+            let (conductance, exchange) = (CONDUCTANCE_DEVIATION.powi(-2), slopes.stepped_exchange(k));
             let (c, r) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
             normal[(c, c)] += conductance;
             normal[(c, r)] -= exchange * conductance;
@@ -311,7 +318,7 @@ impl DiscFitter<'_> {
             let [conductance, radius] = self.unusual(contact);
             let pull = conductance / CONDUCTANCE_DEVIATION;
             gradient[PARAMETERS * k + 2] -= pull;
-            gradient[PARAMETERS * k + 3] += fit.slopes.exchange(k) * pull - radius / self.radius_deviation;
+            gradient[PARAMETERS * k + 3] += fit.slopes.stepped_exchange(k) * pull - radius / self.radius_deviation;
         }
         gradient.into()
     }
@@ -355,17 +362,18 @@ impl DiscFitter<'_> {
         let volts = readings_v(&impedance_ohm, self.detector).volts().to_vec();
         let by = changes_ohm.iter().zip(&steps).map(|(change, step)| self.slope(&impedance_ohm, change, *step));
         let mut by: Vec<Vec<f64>> = by.collect();
-        let spreading_ohm = at.iter().enumerate().map(|(k, contact)| {
+        let exchange = (0..at.len()).map(|k| {
             let (by_conductance, by_radius) = by[PARAMETERS * k + 2..PARAMETERS * (k + 1)].split_at_mut(1);
             let (by_conductance, by_radius) = (&by_conductance[0], &mut by_radius[0]);
             let exchange = (dot(by_conductance, by_radius) / dot(by_conductance, by_conductance)).max(0.0);
-            by_radius.iter_mut().zip(by_conductance).for_each(|(radius, c)| *radius -= exchange * c);
-            exchange / contact.conductance_s
+            let stepped = exchange.min(MOST_EXCHANGE);
+            by_radius.iter_mut().zip(by_conductance).for_each(|(radius, c)| *radius -= stepped * c);
+            exchange
         });
-        let spreading_ohm = spreading_ohm.collect();
+        let exchange = exchange.collect();
         let sound = volts.iter().chain(by.iter().flatten()).all(|value| value.is_finite());
         let along = at.iter().map(|contact| self.fields.footing(place_m(contact)).1).collect();
-        sound.then_some(Slopes { at, along, volts, by, spreading_ohm })
+        sound.then_some(Slopes { at, along, volts, by, exchange })
     }
 
     /// Derivative of the readings from a small change of the impedances: `V = Vcc (1 - Z[e][g] / L)`, `L = Z[g][g] + R_on`.
@@ -384,13 +392,13 @@ impl DiscFitter<'_> {
         let (steps, _) = step.as_chunks::<PARAMETERS>();
         let moved = |(k, contact): (usize, &Contact)| {
             let unit = fit.slopes.at[k];
-            self.stepped(contact, unit.radius_m, fit.spreading_ohm(k), &steps[k])
+            self.stepped(contact, unit.radius_m, fit.exchange(k)[1], &steps[k])
         };
         fit.contacts.iter().enumerate().map(moved).collect()
     }
 
-    /// A contact after a step in its parameters: the unit of the place (m), and the resistance of the crowded current under it (ohm).
-    fn stepped(&self, contact: &Contact, unit_m: f64, spreading_ohm: f64, step: &[f64; PARAMETERS]) -> Contact {
+    /// A contact after a step in its parameters: the unit of its place (m), and what its conductance changes for its radius.
+    fn stepped(&self, contact: &Contact, unit_m: f64, exchange: f64, step: &[f64; PARAMETERS]) -> Contact {
         let [first, second, by_s, by_m] = step;
         let shorten = (LONGEST_WAY / first.hypot(*second)).min(1.0) * unit_m;
         let factor = |log: f64, longest: f64| log.clamp(-longest, longest).exp();
@@ -400,7 +408,7 @@ impl DiscFitter<'_> {
         let wider = factor(*by_m, LONGEST_RADIUS);
         let ohm = 1.0 / (contact.conductance_s * factor(*by_s, LONGEST_CONDUCTANCE));
         // No step makes a contact much better at once, whatever its narrowness asks for.
-        let ohm = (ohm + spreading_ohm * (1.0 - 1.0 / wider)).max(ohm * (-LONGEST_CONDUCTANCE).exp());
+        let ohm = (ohm + exchange / contact.conductance_s * (1.0 - 1.0 / wider)).max(ohm * (-LONGEST_CONDUCTANCE).exp());
         self.held(Contact { x_m, y_m, z_m, conductance_s: 1.0 / ohm, radius_m: wider * contact.radius_m })
     }
 

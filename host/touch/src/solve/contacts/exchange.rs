@@ -35,10 +35,12 @@ impl Usual {
     pub fn logs(&self, fit: &DiscFit, k: usize, covariance: &DMatrix<f64>) -> Option<Logs> {
         let contact = fit.contacts[k];
         let start = PARAMETERS * k + 2;
-        let of = |i: usize, j: usize| covariance[(start + i, start + j)];
-        let posterior = Matrix2::new(of(0, 0), of(0, 1), of(1, 0), of(1, 1));
-        let spreading_ohm = fit.spreading_ohm(k);
-        let exchange = spreading_ohm * contact.conductance_s;
+        let [exchange, stepped] = fit.exchange(k);
+        let spreading_ohm = exchange / contact.conductance_s;
+        // From the fit's parameters to those that keep the readings.
+        let kept = Matrix2::new(1.0, exchange - stepped, 0.0, 1.0);
+        let posterior = kept * covariance.fixed_view::<2, 2>(start, start) * kept.transpose();
+        let of = |i: usize, j: usize| posterior[(i, j)];
         let weights = [CONDUCTANCE_DEVIATION.powi(-2), self.radius_deviation.powi(-2)];
         // Of the likelihood alone: without the prior's curvature, and with what pulls against the prior's slope.
         let by_conductance = Vector2::new(1.0, -exchange);
