@@ -36,10 +36,12 @@ const LONGEST_WAY: f64 = 2.0;
 const LONGEST_CONDUCTANCE: f64 = 1.0;
 const LONGEST_RADIUS: f64 = 0.25;
 /// What the readings' curvature makes of the way from where derivatives were taken, in standard deviations: up to the first, readings are
-/// taken as linear; up to the second, the derivatives serve for steps, if no parameter has changed by more than the third.
+/// taken as linear; up to the second, the derivatives serve for steps, if no parameter has changed by more than the third and by so
+/// many of its standard errors.
 const LINEAR: f64 = 0.1;
 const NEAR: f64 = 3.0;
 const NEAR_AT_MOST: f64 = 0.4;
+const SIGNIFICANT: f64 = 3.0;
 /// Share of the expected gain that a step has to bring, or derivatives are taken anew.
 const TRUE: f64 = 0.5;
 /// Widest radius of a disc, in halves of the side of a square of the detector's area, or of its outline's shorter side: what is wider
@@ -152,9 +154,13 @@ impl DiscFit {
         offset.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
-    /// Whether an offset is too far for the derivatives to serve.
+    /// Whether an offset is too far for the derivatives to serve. A light contact that noise moves about is not: what the derivatives are
+    /// wrong by is little against its standard error.
     fn is_far(&self, offset: &[f64]) -> bool {
-        self.bend(offset) > NEAR || offset.iter().any(|offset| offset.abs() > NEAR_AT_MOST)
+        let is_long = |(i, offset): (usize, &f64)| {
+            offset.abs() > NEAR_AT_MOST && offset.abs() * self.normal[(i, i)].sqrt() > SIGNIFICANT
+        };
+        self.bend(offset) > NEAR || offset.iter().enumerate().any(is_long)
     }
 
     /// What the fit lowers: both sums of squares.

@@ -17,7 +17,7 @@ const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
 const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
 const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
 /// From the frame before.
-const WARM: Effort = Effort { steps: 3, gain: 0.1, share: 0.0 };
+const WARM: Effort = Effort { steps: 2, gain: 0.2, share: 0.0 };
 /// Starts of one more contact, and how many of them go on.
 const STARTS: usize = 4;
 const FINALISTS: usize = 2;
@@ -36,6 +36,10 @@ const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.
 /// logarithm of the evidence for it has to be higher.
 const DOUBTFUL: f64 = 1.5;
 const CLEARLY: f64 = 0.5;
+/// Mean square of what a fit with the rough model leaves, where no other start is tried.
+const EXPLAINS: f64 = 1.5;
+/// Mean square of what a fit of wide contacts leaves with the rough model, above which it is wrong with any.
+const HOPELESS: f64 = 50.0;
 /// Places of two fits that are so near, in radii, are taken for one.
 const ALIKE: f64 = 0.3;
 /// Contacts nearer to each other than so many sums of their radii may be one.
@@ -63,15 +67,18 @@ impl ContactFinder {
         better: &mut dyn FnMut(&Explanation),
     ) -> Option<Explanation> {
         let grown = from.and_then(|from| self.disc_fitter().go_on(&from.fit, target, COLD));
-        let grown = grown.map(|fit| self.grow(fit, &[], target, better));
+        let grown = grown.map(|fit| self.grow(fit, Vec::new(), target, better));
         if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.fit, target)) {
             return Some(grown.clone());
         }
         let anew = self.one(target).map(|one| {
-            let looks = self.scan.at_first(&self.network, target);
-            let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
-            let starts: Vec<_> = pairs.iter().map(|pair| self.discs_of(&self.scan.start(&looks, pair))).collect();
-            self.grow(one, &starts, target, better)
+            let mut starts = Vec::new();
+            if self.is_doubtful(&one, target) {
+                let looks = self.scan.at_first(&self.network, target);
+                let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
+                starts.extend(pairs.iter().map(|pair| self.discs_of(&self.scan.start(&looks, pair))));
+            }
+            self.grow(one, starts, target, better)
         });
         if let Ok(truth) = std::env::var("TRUTH") {
             let all: Vec<f64> = std::fs::read_to_string(truth).unwrap().split_whitespace().map(|v| v.parse().unwrap()).collect();
@@ -108,11 +115,14 @@ impl ContactFinder {
     /// A fit with radii free, if it is at the widest that is plausible; else what it is.
     fn released(&self, fit: DiscFit, target: &Target) -> DiscFit {
         let is_wide = |contact: &Contact| contact.radius_m > 0.99 * PLAUSIBLE * self.settings.radius_m;
-        let free = if fit.contacts.iter().any(is_wide) {
-            self.disc_fitter().go_on(&fit, target, COLD)
-        } else {
-            None
-        };
+        if !fit.contacts.iter().any(is_wide) {
+            return fit;
+        }
+        let full = self.disc_fitter();
+        let rough = DiscFitter { model: &*self.rough, ..full };
+        let free = rough.fit(fit.contacts.clone(), target, ROUGH);
+        let free = free.filter(|free| free.cost < HOPELESS * target.count() as f64);
+        let free = free.and_then(|free| full.fit(free.contacts, target, COLD));
         free.unwrap_or(fit)
     }
 
@@ -120,14 +130,13 @@ impl ContactFinder {
     fn grow(
         &self,
         first: DiscFit,
-        starts: &[Vec<Contact>],
+        mut starts: Vec<Vec<Contact>>,
         target: &Target,
         better: &mut dyn FnMut(&Explanation),
     ) -> Explanation {
         let mut by_count = vec![f64::NEG_INFINITY; self.settings.most + 1];
         let mut last = first.clone();
         let mut best = self.noted(self.released(first, target), &mut by_count);
-        let mut starts = starts.to_vec();
         while last.contacts.len() < self.settings.most {
             let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
             let more = self.noted(more, &mut by_count);
@@ -169,15 +178,18 @@ impl ContactFinder {
         (fit, evidence)
     }
 
-    /// The best fit with one more contact, from some starts or from where it would explain most.
+    /// The best fit with one more contact, from some starts or from where it would explain most; `None` if the readings ask for none.
     fn one_more(&self, fit: &DiscFit, mut starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
         let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
-        if let Some(looks) = self.scan.beside(&self.network, &*self.fields, &spots, fit, target) {
-            let ones = self.scan.ones(&looks, STARTS, self.apart_m());
-            if ones.first().is_some_and(|best| best.gain > WORTH_A_TRY) {
-                let more = ones.iter().map(|one| self.discs_of(&self.scan.start(&looks, one)));
-                starts.extend(more.map(|more| fit.contacts.iter().copied().chain(more).collect()));
-            }
+        let looks = self.scan.beside(&self.network, &*self.fields, &spots, fit, target);
+        let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
+        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > WORTH_A_TRY);
+        if !is_worth_a_try && !self.is_doubtful(fit, target) {
+            return None;
+        }
+        for (looks, one) in looks.iter().flat_map(|looks| ones.iter().map(move |one| (looks, one))) {
+            let more = self.discs_of(&self.scan.start(looks, one));
+            starts.push(fit.contacts.iter().copied().chain(more).collect());
         }
         starts.extend(self.splits(fit));
         self.best_of(starts, target)
@@ -265,7 +277,14 @@ impl ContactFinder {
         let rough = DiscFitter { model: &*self.rough, ..full };
         let objective = |fit: &DiscFit| fit.cost + fit.known;
         let by_objective = |a: &DiscFit, b: &DiscFit| objective(a).total_cmp(&objective(b));
-        let mut fits: Vec<_> = starts.into_iter().filter_map(|start| rough.fit(start, target, FIRST)).collect();
+        let mut fits = Vec::with_capacity(starts.len());
+        for fit in starts.into_iter().filter_map(|start| rough.fit(start, target, FIRST)) {
+            let explains = fit.cost < EXPLAINS * target.count() as f64;
+            fits.push(fit);
+            if explains {
+                break;
+            }
+        }
         fits.sort_unstable_by(by_objective);
         // Starts often lead to one minimum.
         fits.dedup_by(|later, first| self.is_alike(first, later));
