@@ -8,16 +8,23 @@ use tactomo_physics::scene::Contact;
 /// Step of a place, as a share of the contact's radius, and of a conductance, as a share of it.
 const STEP: f64 = 0.02;
 
+/// Standard deviation of the logarithm of a radius that is not known: a factor of two.
+pub const RADIUS_DEVIATION: f64 = 0.7;
+/// Unknowns of a contact: x, y, logarithm of the conductance, logarithm of the radius.
+const UNKNOWNS: usize = 4;
+
 /// Smallest standard errors that an unbiased method can have for a contact.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Bound {
     /// Of the place (m): the root of the sum of both coordinates' variances.
     pub position_m: f64,
+    /// The same where the radius is not known, but for [`RADIUS_DEVIATION`].
+    pub position_any_radius_m: f64,
     /// Of the conductance, as a share of it.
     pub conductance: f64,
 }
 
-/// The Cramer-Rao bound of contacts of known number and radius, each with place and conductance unknown, from one frame of readings with
+/// The Cramer-Rao bound of contacts of known number, each with place and conductance unknown and its radius known or not, from one frame of readings with
 /// independent normal noise of a standard deviation (V).
 ///
 /// With `J` the derivatives of the readings by the unknowns, Fisher's information is `J'J / deviation^2`, and no unbiased estimate has
@@ -32,31 +39,38 @@ pub fn cramer_rao(
     deviation_v: f64,
 ) -> Result<Option<Vec<Bound>>, ForwardError> {
     let jacobian_v = derivatives(model, contacts)?;
-    let information = jacobian_v.transpose() * jacobian_v / (deviation_v * deviation_v);
-    let Some(covariance) = information.cholesky().map(|factor| factor.inverse()) else { return Ok(None) };
-    let variance = |unknown: usize| covariance[(unknown, unknown)];
-    let of = |(index, contact): (usize, &Contact)| {
-        let scale_m = contact.radius_m;
-        let place = variance(3 * index) + variance(3 * index + 1);
-        Bound { position_m: scale_m * place.sqrt(), conductance: variance(3 * index + 2).sqrt() }
+    let mut information = jacobian_v.transpose() * jacobian_v / (deviation_v * deviation_v);
+    let known: Vec<_> = (0..UNKNOWNS * contacts.len()).filter(|unknown| unknown % UNKNOWNS < 3).collect();
+    let of_known = information.select_rows(&known).select_columns(&known);
+    (0..contacts.len()).for_each(|k| information[(UNKNOWNS * k + 3, UNKNOWNS * k + 3)] += RADIUS_DEVIATION.powi(-2));
+    let inverse = |information: DMatrix<f64>| information.cholesky().map(|factor| factor.inverse());
+    let (Some(known), Some(any)) = (inverse(of_known), inverse(information)) else { return Ok(None) };
+    let of = |(k, contact): (usize, &Contact)| {
+        let position_m = |all: &DMatrix<f64>, x: usize| contact.radius_m * (all[(x, x)] + all[(x + 1, x + 1)]).sqrt();
+        Bound {
+            position_m: position_m(&known, 3 * k),
+            position_any_radius_m: position_m(&any, UNKNOWNS * k),
+            conductance: known[(3 * k + 2, 3 * k + 2)].sqrt(),
+        }
     };
     Ok(Some(contacts.iter().enumerate().map(of).collect()))
 }
 
-/// Derivatives of the readings (V) by x and y in radii and by the logarithm of the conductance of each contact: alike in size, so that
+/// Derivatives of the readings (V) by x and y in radii and by the logarithms of conductance and radius of each contact: alike in size, so that
 /// the information is well scaled.
 fn derivatives(model: &dyn ForwardModel, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
     let readings = |contacts: &[Contact]| Ok(readings_v(&model.impedance_ohm(contacts)?, model.detector()));
     let electrodes = model.detector().electrodes.len();
-    let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, 3 * contacts.len());
+    let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, UNKNOWNS * contacts.len());
     for (unknown, mut column) in jacobian_v.column_iter_mut().enumerate() {
         let stepped = |step: f64| {
             let mut contacts = contacts.to_vec();
-            let contact = &mut contacts[unknown / 3];
-            match unknown % 3 {
+            let contact = &mut contacts[unknown / UNKNOWNS];
+            match unknown % UNKNOWNS {
                 0 => contact.x_m += step * contact.radius_m,
                 1 => contact.y_m += step * contact.radius_m,
-                _ => contact.conductance_s *= step.exp(),
+                2 => contact.conductance_s *= step.exp(),
+                _ => contact.radius_m *= step.exp(),
             }
             readings(&contacts)
         };
@@ -108,6 +122,7 @@ mod tests {
         let (slab, contact, noise_v) = (slab(), firm(-0.011, 0.003), 1e-3);
         let bound = cramer_rao(&slab, &[contact], noise_v).unwrap().unwrap()[0];
         let jacobian_v = derivatives(&slab, &[contact]).unwrap();
+        let jacobian_v = jacobian_v.columns(0, 3).into_owned();
         let inverse = jacobian_v.clone().pseudo_inverse(1e-12).unwrap();
         let mut noise = Noise::new(3);
         let trials = 2000;

@@ -16,7 +16,7 @@ pub mod tradeoff;
 pub mod validate;
 mod variant;
 
-pub use self::bound::{Bound, cramer_rao};
+pub use self::bound::{Bound, RADIUS_DEVIATION, cramer_rao};
 pub use self::experiment::{Experiment, Frame, StudyError};
 pub use self::machine::Machine;
 pub use self::scenes::{Group, SceneKind};

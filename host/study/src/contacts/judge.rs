@@ -10,7 +10,9 @@ use tactomo_touch::solve::{FoundContact, Solution};
 
 /// A contact counts as found if what was found is within this share of the electrodes' mean distance.
 const REACH: f64 = 1.0 / 3.0;
-/// A contact is visible if the bound on the logarithm of its conductance is below this.
+/// What was found further off stands for an invisible contact that nothing else stands for, if it is within so many of its bounds.
+const BOUNDS: f64 = 3.0;
+/// A contact is visible if the bound on the logarithm of its conductance, for a known radius, is below this.
 const VISIBLE: f64 = 0.2;
 /// A contact is in a corner if both coordinates are beyond this share of the half sides: where single contacts were lost on `square-60`.
 const CORNER: f64 = 0.72;
@@ -46,7 +48,7 @@ pub struct TrueContact {
     pub sheets: f64,
     /// Where it is.
     pub place: Place,
-    /// The Cramer-Rao bound, with its radius known; `None` if the readings do not separate the contacts.
+    /// The Cramer-Rao bound; `None` if the readings do not separate the contacts.
     pub bound: Option<Bound>,
     /// Whether it can be found at this noise.
     pub is_visible: bool,
@@ -73,7 +75,7 @@ pub struct Match {
     pub index: usize,
     /// Distance (m).
     pub error_m: f64,
-    /// The distance over its bound.
+    /// The distance over its bound for an unknown radius.
     pub over_bound: Option<f64>,
     /// Errors of x and y in standard errors as the solver claims them, if it does.
     pub place_sigmas: Option<[f64; 2]>,
@@ -85,8 +87,24 @@ impl Judged {
     /// Compares a solution with the contacts that are there and the bounds of their errors.
     pub(super) fn new(detector: &Detector, truth: &[Contact], bounds: Option<&[Bound]>, solution: &Solution) -> Self {
         let matching = Matching::within(REACH * electrode_distance_m(detector), truth, &solution.contacts);
+        let bound_of = |index: usize| bounds.and_then(|bounds| bounds.get(index)).copied();
+        let is_place_of = |found: &FoundContact, index: usize| {
+            let distance_m = (found.x_m - truth[index].x_m).hypot(found.y_m - truth[index].y_m);
+            bound_of(index).is_some_and(|bound| {
+                bound.conductance >= VISIBLE && distance_m < BOUNDS * bound.position_any_radius_m
+            })
+        };
+        let mut missed = matching.missed.clone();
+        let mut invented = matching.invented.clone();
+        invented.retain(|found| match missed.iter().position(|index| is_place_of(&solution.contacts[*found], *index)) {
+            Some(at) => {
+                missed.remove(at);
+                false
+            }
+            None => true,
+        });
         let of = |(index, contact): (usize, &Contact)| {
-            let bound = bounds.and_then(|bounds| bounds.get(index)).copied();
+            let bound = bound_of(index);
             let pair = matching.pairs.iter().find(|pair| pair.truth == index);
             TrueContact {
                 contact: *contact,
@@ -101,7 +119,7 @@ impl Judged {
         Self {
             truth: truth.iter().enumerate().map(of).collect(),
             found: solution.contacts.clone(),
-            invented: matching.invented,
+            invented,
             misfit: solution.flags.misfit,
             residual: solution.residual,
             choice: solution.choice.as_ref().map(|choice| format!("{}: {}", choice.what, choice.why)),
@@ -158,7 +176,7 @@ impl Match {
         Self {
             index: pair.found,
             error_m: pair.distance_m,
-            over_bound: bound.map(|bound| pair.distance_m / bound.position_m),
+            over_bound: bound.map(|bound| pair.distance_m / bound.position_any_radius_m),
             place_sigmas: found.uncertainty.map(|claimed| {
                 [sigmas(found.x_m - truth.x_m, claimed.x_m), sigmas(found.y_m - truth.y_m, claimed.y_m)]
             }),
@@ -174,8 +192,8 @@ mod tests {
     use super::*;
     use tactomo_touch::solve::{Flags, Uncertainty};
 
-    const CLEAR: Bound = Bound { position_m: 1e-4, conductance: 0.05 };
-    const FAINT: Bound = Bound { position_m: 4e-3, conductance: 0.5 };
+    const CLEAR: Bound = Bound { position_m: 1e-4, position_any_radius_m: 1e-4, conductance: 0.05 };
+    const FAINT: Bound = Bound { position_m: 2e-3, position_any_radius_m: 2e-3, conductance: 0.5 };
 
     fn there(x_mm: f64, y_mm: f64) -> Contact {
         Contact::flat(1e-3 * x_mm, 1e-3 * y_mm, 2e-3, 1e-3)
@@ -207,6 +225,10 @@ mod tests {
         assert_eq!((answer.faults(), &answer.invented[..]), (1, &[2][..]));
         let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 5.1), seen(24.0, 0.0)]);
         assert_eq!((answer.faults(), &answer.invented[..], answer.is_count_right()), (2, &[0][..], true));
+        let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 0.1), seen(25.9, 0.0)]);
+        assert_eq!((answer.faults(), answer.truth[1].found), (0, None), "within three of its bounds");
+        let answer = judged(&truth, &[CLEAR, FAINT], vec![seen(0.0, 0.1), seen(26.1, 0.0)]);
+        assert_eq!(answer.faults(), 1);
     }
 
     #[test]
