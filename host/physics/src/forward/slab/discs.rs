@@ -13,6 +13,9 @@ use crate::scene::Contact;
 /// Degree of the densities that the kernel's changes are taken for.
 const CHANGE_DEGREE: usize = 1;
 
+/// Distance of a wall, in radii, up to which the image in it is near: further off, degree 1 has the changes to some per cent.
+const WALL_RADII: f64 = 2.5;
+
 /// A contact, ready to be put into the system.
 struct Disc {
     contact: Contact,
@@ -115,6 +118,12 @@ impl Slab {
         self.kernel_between(disc, other, [CHANGE_DEGREE; 2])
     }
 
+    /// Whether a disc is so near to a wall that its image there bends its densities.
+    fn is_at_wall(&self, disc: &Disc) -> bool {
+        let near_m = WALL_RADII * disc.contact.radius_m;
+        (0..2).any(|axis| disc.centre_m[axis].min(self.size_m[axis] - disc.centre_m[axis]) < near_m)
+    }
+
     fn own(&self, disc: &Disc) -> DMatrix<f64> {
         self.own_of(disc.own_radius_m, disc.basis, disc.conductance_s)
     }
@@ -173,8 +182,8 @@ impl Discs<'_> {
         change += (&disc.inner - &after.inner).tr_mul(&at.inner) * scale;
         for (l, (other, before)) in self.discs.iter().zip(before).enumerate() {
             let (now, half) = if l == k { (&after, 0.5) } else { (other, 1.0) };
-            let moved = if l == k && after.contact.radius_m != disc.contact.radius_m {
-                // Within a disc that widens, all densities change.
+            let moved = if l == k && (after.contact.radius_m != disc.contact.radius_m || self.slab.is_at_wall(disc)) {
+                // Within a disc that widens, or sees its own image, all densities change.
                 let kernel = |disc: &Disc| self.slab.kernel_between(disc, disc, [disc.basis.degree(); 2]);
                 kernel(&after) - kernel(disc)
             } else {

@@ -394,7 +394,7 @@ impl DiscFitter<'_> {
     }
 
     /// Contacts after a step in their parameters.
-    fn moved(&self, fit: &DiscFit, step: &[f64]) -> Vec<Contact> {
+    pub fn moved(&self, fit: &DiscFit, step: &[f64]) -> Vec<Contact> {
         let (steps, _) = step.as_chunks::<PARAMETERS>();
         let moved = |(k, contact): (usize, &Contact)| {
             let unit = fit.slopes.at[k];

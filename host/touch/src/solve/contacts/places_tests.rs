@@ -6,6 +6,7 @@ use super::*;
 use crate::solve::Solver;
 use tactomo_physics::detector::{Detector, Layer};
 use tactomo_physics::forward::{Auto, ForwardModel, Resolution, Slab, readings_v};
+use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, finer_model, measured};
 use tactomo_physics::space;
 

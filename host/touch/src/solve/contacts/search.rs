@@ -4,13 +4,15 @@
 //! discs from the best of them, and the evidence for the answer ([`evidence`](super::evidence)). Then one fewer at a time, as long as
 //! that is more likely.
 
+use std::f64::consts::TAU;
+
 use super::discs::{DiscFit, DiscFitter, Effort, place_m};
 use super::network::LoadedSpot;
 use super::target::Target;
 use super::{ContactFinder, Explanation};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
-use tactomo_physics::space;
+use tactomo_physics::space::{self, Place};
 
 /// A few steps from each start, and the way to the minimum from the best.
 const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
@@ -24,11 +26,14 @@ const FINALISTS: usize = 2;
 /// Gain in the sum of squares, in the linear theory, below which one more contact is not tried.
 const WORTH_A_TRY: f64 = 8.0;
 /// The same for there being any contact at all: noise alone has 1 in 10^7 frames above it.
-const WORTH_FIRST: f64 = 40.0;
+const WORTH_FIRST: f64 = 60.0;
 /// A contact is lost when the logarithm of its conductance is known no better than this, and it is light.
 const WEAK: f64 = 0.3;
 /// Radii that contacts may have while their number is not yet right, in usual ones: too few contacts would be made as wide as may be.
 const PLAUSIBLE: f64 = 3.0;
+/// Starts around a single contact, and the mean square of what it leaves up to which they are tried.
+const BESIDE: usize = 8;
+const NEARLY: f64 = 5.0;
 /// Radius, in usual ones, above which a contact may be two, and the directions that it is split along.
 const WIDE: f64 = 1.6;
 const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]];
@@ -42,6 +47,8 @@ const EXPLAINS: f64 = 1.5;
 const HOPELESS: f64 = 50.0;
 /// Places of two fits that are so near, in radii, are taken for one.
 const ALIKE: f64 = 0.3;
+/// Share of the conductance of the frame before, below which a contact may be let go.
+const LIFTED: f64 = 0.6;
 /// Contacts nearer to each other than so many sums of their radii may be one.
 const TOUCHING: f64 = 2.0;
 
@@ -80,24 +87,6 @@ impl ContactFinder {
             }
             self.grow(one, starts, target, better)
         });
-        if let Ok(truth) = std::env::var("TRUTH") {
-            let all: Vec<f64> = std::fs::read_to_string(truth).unwrap().split_whitespace().map(|v| v.parse().unwrap()).collect();
-            let start: Vec<Contact> = all.chunks(4).map(|c| Contact::flat(c[0], c[1], c[2], c[3])).collect();
-            let show = |all: &[Contact]| all.iter().map(|c| format!("({:.1} {:.1} r{:.2} C{:.1e})", 1e3*c.x_m, 1e3*c.y_m, 1e3*c.radius_m, c.conductance_s)).collect::<Vec<_>>().join(" ");
-            let mut best: Option<(f64, DiscFit)> = None;
-            for mask in 1..1u32 << start.len() {
-                let some: Vec<Contact> = (0..start.len()).filter(|k| mask >> k & 1 == 1).map(|k| start[k]).collect();
-                if let Some(fit) = self.disc_fitter().fit(some, target, COLD) {
-                    let e = self.evidence(&fit);
-                    if best.as_ref().is_none_or(|b| b.0 < e) { best = Some((e, fit)); }
-                }
-            }
-            if let (Some((e, fit)), Some(found)) = (best, &anew) {
-                let mine = self.evidence(&found.fit);
-                println!("{} of {} truth evidence {e:.1} cost {:.1} known {:.1}; found {} evidence {mine:.1} cost {:.1} known {:.1} certainty {:.2}   {}", fit.contacts.len(), start.len(), fit.cost, fit.known, found.fit.contacts.len(), found.fit.cost, found.fit.known, found.certainty, if e > mine + 1.0 { "SEARCH" } else if found.fit.contacts.len() > start.len() {"STAT"} else {""});
-                println!("{} | {} | {}", show(&start), show(&fit.contacts), show(&found.fit.contacts));
-            }
-        }
         [grown, anew].into_iter().flatten().max_by(|a, b| self.evidence(&a.fit).total_cmp(&self.evidence(&b.fit)))
     }
 
@@ -109,7 +98,12 @@ impl ContactFinder {
             return None;
         }
         let starts = ones.iter().map(|candidate| self.discs_of(&self.scan.start(&looks, candidate)));
-        self.best_of(starts.collect(), target)
+        let best = self.best_of(starts.collect(), target)?;
+        if best.cost > NEARLY * target.count() as f64 {
+            return Some(best);
+        }
+        let beside = self.best_of(self.beside(&best.contacts[0], best.along(0).0), target);
+        Some(beside.filter(|beside| self.evidence(beside) > self.evidence(&best)).unwrap_or(best))
     }
 
     /// A fit with radii free, if it is at the widest that is plausible; else what it is.
@@ -168,10 +162,6 @@ impl ContactFinder {
     /// A fit with its evidence, which is noted as that of its count if it is the best of it.
     fn noted(&self, fit: DiscFit, by_count: &mut [f64]) -> (DiscFit, f64) {
         let evidence = self.evidence(&fit);
-        if std::env::var("TRUTH").is_ok() {
-            let show = |all: &[Contact]| all.iter().map(|c| format!("({:.1} {:.1} r{:.2} C{:.1e})", 1e3*c.x_m, 1e3*c.y_m, 1e3*c.radius_m, c.conductance_s)).collect::<Vec<_>>().join(" ");
-            println!("  noted {} {evidence:.1} {:.1} {:.1} {} {}", fit.contacts.len(), fit.cost, fit.known, fit.settled, show(&fit.contacts));
-        }
         if let Some(best) = by_count.get_mut(fit.contacts.len()) {
             *best = best.max(evidence);
         }
@@ -228,9 +218,12 @@ impl ContactFinder {
 
     /// A more likely fit with one of the contacts taken away and put where it explains most.
     fn swapped(&self, (best, evidence): &(DiscFit, f64), target: &Target) -> Option<DiscFit> {
+        if best.contacts.len() < 2 {
+            return None;
+        }
         let mut order: Vec<_> = (0..best.contacts.len()).collect();
         order.sort_unstable_by(|a, b| best.contacts[*b].radius_m.total_cmp(&best.contacts[*a].radius_m));
-        order.into_iter().filter(|_| best.contacts.len() > 1).find_map(|k| {
+        order.into_iter().find_map(|k| {
             let mut others = best.contacts.clone();
             others.remove(k);
             let rough = DiscFitter { model: &*self.rough, ..self.plausible_fitter() };
@@ -238,6 +231,18 @@ impl ContactFinder {
             let other = self.one_more(&fewer, Vec::new(), target)?;
             (self.evidence(&other) > evidence + CLEARLY).then_some(other)
         })
+    }
+
+    /// Starts around a contact: near edges and pads there may be another minimum that is nearly as deep.
+    fn beside(&self, one: &Contact, along: [Place; 2]) -> Vec<Vec<Contact>> {
+        let start = |turn: usize| {
+            let (sin, cos) = (TAU * turn as f64 / BESIDE as f64).sin_cos();
+            let away_m = self.apart_m();
+            let to_m = space::along(space::along(place_m(one), away_m * cos, along[0]), away_m * sin, along[1]);
+            let [x_m, y_m, z_m] = self.fields.footing(to_m).0;
+            vec![Contact { x_m, y_m, z_m, radius_m: self.settings.radius_m, ..*one }]
+        };
+        (0..BESIDE).map(start).collect()
     }
 
     /// The best fit with one contact fewer: without each weak one, and with two that nearly touch taken for one.
@@ -311,14 +316,17 @@ impl ContactFinder {
     /// The explanation, or what is left of it without the contacts that may not be there if that is more likely; `None` if nothing is.
     pub(super) fn without_weak(&self, found: Explanation, target: &Target) -> Option<Explanation> {
         let weak = self.weak(&found.fit);
-        if weak.is_empty() {
+        if weak.is_empty() && !self.is_misfit(&found.fit, target) {
             return Some(found);
         }
         let evidence = self.evidence(&found.fit);
+        if self.evidence_of_nothing(target) > evidence {
+            return None;
+        }
         let kept = found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
         let kept: Vec<_> = kept.collect();
-        if kept.is_empty() {
-            return (evidence > self.evidence_of_nothing(target)).then_some(found);
+        if weak.is_empty() || kept.is_empty() {
+            return Some(found);
         }
         match self.disc_fitter().fit(kept, target, WARM) {
             Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, ..found }),
@@ -326,10 +334,26 @@ impl ContactFinder {
         }
     }
 
-    /// The same contacts in the next frame; `None` if that makes no sense.
+    /// The same contacts in the next frame, less those that were let go; `None` if that makes no sense.
     pub(super) fn follow(&self, last: &Explanation, target: &Target) -> Option<Explanation> {
         let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
+        let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
         Some(Explanation { fit, certainty: last.certainty })
+    }
+
+    /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each
+    /// step, however light the contact is to become.
+    fn without_lifted(&self, before: &DiscFit, fit: DiscFit, target: &Target) -> DiscFit {
+        let is_lighter = |(now, before): &(&Contact, &Contact)| now.conductance_s < LIFTED * before.conductance_s;
+        let kept = fit.contacts.iter().zip(&before.contacts).filter(|pair| !is_lighter(pair)).map(|(now, _)| *now);
+        let kept: Vec<_> = kept.collect();
+        if kept.is_empty() || kept.len() == fit.contacts.len() {
+            return fit;
+        }
+        match self.disc_fitter().fit(kept, target, WARM) {
+            Some(fewer) if self.evidence(&fewer) > self.evidence(&fit) => fewer,
+            _ => fit,
+        }
     }
 
     /// Contacts so weak that they may not be there. The conductance of a firm one is not known well either: more of it would change

@@ -2,10 +2,12 @@
 
 use std::sync::LazyLock;
 
+use super::discs::Effort;
 use super::*;
 use crate::solve::Solver;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
+use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, measured};
 
 static PROBLEM: LazyLock<Problem> = LazyLock::new(|| {
@@ -50,34 +52,25 @@ fn error_m((truth, found): &(Contact, FoundContact)) -> f64 {
 #[test]
 fn the_readings_follow_their_derivatives() {
     let solver = solver();
-    let solver = solver.finder();
-    let fields = &*solver.fields;
-    let spots: Vec<_> = [([0.003, -0.008], 900.0), ([-0.012, 0.004], 2500.0), ([0.0271, 0.0262], 700.0)]
-        .map(|([x_m, y_m], ohm)| FitSpot { spot: fields.spot([x_m, y_m, 0.0]), ohm })
-        .into();
-    let solved = solver.network.solve(&spots, fields).unwrap();
-    let slopes = solver.network.slopes(&spots, &solved);
-    let step = 1e-5;
-    for (parameter, slope) in slopes.iter().enumerate() {
+    let finder = solver.finder();
+    let fitter = finder.disc_fitter();
+    let target = finder.target(&frame(&[contact(0.01, 0.0, 1.0)], &mut Noise::new(1))).unwrap();
+    let firm = Contact { radius_m: 0.0032, ..contact(-0.012, 0.004, 30.0) };
+    let at = vec![contact(0.003, -0.008, 0.1), firm, contact(0.0271, 0.0262, 1.0)];
+    let unmoved = Effort { steps: 0, gain: 0.0, share: 0.0 };
+    let fit = fitter.fit(at, &target, unmoved).unwrap();
+    for parameter in 0..PARAMETERS * 3 {
         let volts = |step: f64| {
-            let mut moved = spots.clone();
-            let spot = &mut moved[parameter / 3];
-            match parameter % 3 {
-                2 => spot.ohm *= (step * 100.0).exp(),
-                axis => {
-                    let mut place_m = spot.spot.place_m;
-                    place_m[axis] += step;
-                    spot.spot = fields.spot(place_m);
-                }
-            }
-            solver.network.volts(&solver.network.solve(&moved, fields).unwrap())
+            let mut steps = [0.0; 3 * PARAMETERS];
+            steps[parameter] = step;
+            fitter.volts(&fitter.moved(&fit, &steps)).unwrap()
         };
-        let scale = if parameter % 3 == 2 { 100.0 } else { 1.0 };
-        let differences = volts(step).into_iter().zip(volts(-step)).map(|(a, b)| (a - b) / (2.0 * step * scale));
-        let largest = slope.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-        for (difference, slope) in differences.zip(slope) {
-            assert!((difference - slope).abs() < 5e-3 * largest, "{parameter}: {difference} {slope} of {largest}");
-        }
+        let differences = volts(1e-3).into_iter().zip(volts(-1e-3)).map(|(a, b)| (a - b) / 2e-3);
+        let slope = &fit.slopes_v()[parameter];
+        let (off, all) = differences.zip(slope).fold((0.0, 0.0), |(off, all), (difference, slope)| {
+            (off + (difference - slope).powi(2), all + slope * slope)
+        });
+        assert!(off < 0.08f64.powi(2) * all, "{parameter}: {} of {}", off.sqrt(), all.sqrt());
     }
 }
 
