@@ -90,18 +90,19 @@ impl Judged {
         let bound_of = |index: usize| bounds.and_then(|bounds| bounds.get(index)).copied();
         let is_place_of = |found: &FoundContact, index: usize| {
             let distance_m = (found.x_m - truth[index].x_m).hypot(found.y_m - truth[index].y_m);
-            bound_of(index).is_some_and(|bound| {
-                bound.conductance >= VISIBLE && distance_m < BOUNDS * bound.position_any_radius_m
-            })
+            bound_of(index)
+                .is_some_and(|bound| bound.conductance >= VISIBLE && distance_m < BOUNDS * bound.position_any_radius_m)
         };
         let mut missed = matching.missed.clone();
         let mut invented = matching.invented.clone();
-        invented.retain(|found| match missed.iter().position(|index| is_place_of(&solution.contacts[*found], *index)) {
-            Some(at) => {
-                missed.remove(at);
-                false
+        invented.retain(|found| {
+            match missed.iter().position(|index| is_place_of(&solution.contacts[*found], *index)) {
+                Some(at) => {
+                    missed.remove(at);
+                    false
+                }
+                None => true,
             }
-            None => true,
         });
         let of = |(index, contact): (usize, &Contact)| {
             let bound = bound_of(index);

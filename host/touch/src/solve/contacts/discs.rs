@@ -16,18 +16,17 @@ use tactomo_physics::forward::{ForwardModel, readings_v};
 use tactomo_physics::scene::Contact;
 use tactomo_physics::space::{self, Place};
 
-/// Parameters of a disc: its place along two directions in radii, logarithm of the conductance, and logarithm of the radius with the
-/// conductance changed along with it, so that the readings change least.
+/// Parameters of a disc: its place along two directions in radii, logarithm of the conductance of the contact with the crowded current
+/// under it, logarithm of the radius.
 ///
-/// A firm disc that is narrower and conducts better acts nearly as before: what counts is the resistance of the contact with that of the
-/// crowded current under it, `1/C + S r0 / r`. So a change of the radius `r` from `r0` at constant sum takes `1/C` to `1/C + S (1 -
-/// r0 / r)`; `S` is found from the derivatives by both. Where `S` is far larger than `1/C`, no conductance makes up for a radius, and
-/// steps only change it by [`MOST_EXCHANGE`].
+/// A firm disc that is narrower and conducts better acts nearly as before: what counts is the resistance `A = 1/C + S r0 / r`, where `S`,
+/// of the crowded current under the disc of radius `r0`, is found from the derivatives by conductance and radius. In `A` and `r` the
+/// readings are nearly linear, and the valley of fits that are nearly as good is straight.
 pub(super) const PARAMETERS: usize = 4;
 /// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
 pub(super) const CONDUCTANCE_DEVIATION: f64 = 4.0;
-/// Most that a step changes the logarithm of a conductance for that of a radius.
-const MOST_EXCHANGE: f64 = 2.0;
+/// Most of the ratio of `S` and `1/C` that is told from errors of the derivatives.
+const MOST_EXCHANGE: f64 = 1e3;
 /// Differences that derivatives are taken over.
 const DIFFERENCE: f64 = 1e-3;
 /// Longest way in a step, in radii, and longest changes of the logarithms of a conductance and of a radius: where contacts are too
@@ -66,8 +65,7 @@ struct Slopes {
     volts: Vec<f64>,
     /// Of the readings (V), for each parameter of each contact.
     by: Vec<Vec<f64>>,
-    /// Of each, the change of the logarithm of the conductance that makes up for that of the radius, with the other sign: the resistance
-    /// of the crowded current under it over the contact's own.
+    /// Of each, the resistance of the crowded current under it over the contact's own, `S C`.
     exchange: Vec<f64>,
 }
 
@@ -134,12 +132,10 @@ impl DiscFit {
         (self.slopes.along[k], self.slopes.at[k].radius_m)
     }
 
-    /// By how much the logarithm of a contact's conductance has to change for that of its radius, with the other sign, for the readings to
-    /// stay as they are; and by how much it does in the last parameter.
-    pub fn exchange(&self, k: usize) -> [f64; 2] {
-        let now = self.slopes.at[k].radius_m / self.contacts[k].radius_m * self.contacts[k].conductance_s
-            / self.slopes.at[k].conductance_s;
-        [self.slopes.exchange[k], self.slopes.stepped_exchange(k)].map(|exchange| now * exchange)
+    /// Resistance of the crowded current under a contact over its own.
+    pub fn exchange(&self, k: usize) -> f64 {
+        let (before, now) = (self.slopes.at[k], self.contacts[k]);
+        self.slopes.exchange[k] * now.conductance_s / before.conductance_s * before.radius_m / now.radius_m
     }
 
     /// Derivatives of the readings by all parameters (V).
@@ -178,16 +174,11 @@ impl Slopes {
             let along = |direction: usize| {
                 self.along[k][direction].iter().zip(way).map(|(a, b)| a * b).sum::<f64>() / before.radius_m
             };
-            let narrower_ohm = self.stepped_exchange(k) / before.conductance_s * (1.0 - before.radius_m / now.radius_m);
-            let ohm = (1.0 / now.conductance_s - narrower_ohm).max(f64::MIN_POSITIVE);
-            [along(0), along(1), -(ohm * before.conductance_s).ln(), (now.radius_m / before.radius_m).ln()]
+            let own = before.conductance_s / now.conductance_s;
+            let ohm = (own + self.exchange[k] * before.radius_m / now.radius_m) / (1.0 + self.exchange[k]);
+            [along(0), along(1), -ohm.ln(), (now.radius_m / before.radius_m).ln()]
         };
         contacts.iter().enumerate().flat_map(of).collect()
-    }
-
-    /// Change of the logarithm of a conductance by the last parameter of its contact, with the other sign.
-    fn stepped_exchange(&self, k: usize) -> f64 {
-        self.exchange[k].min(MOST_EXCHANGE)
     }
 }
 
@@ -305,12 +296,13 @@ impl DiscFitter<'_> {
         for (k, contact) in slopes.at.iter().enumerate() {
             let place = contact.radius_m * contact.radius_m / self.place_variance_m2;
             (0..2).for_each(|i| normal[(PARAMETERS * k + i, PARAMETERS * k + i)] += place);
-            let (conductance, exchange) = (CONDUCTANCE_DEVIATION.powi(-2), slopes.stepped_exchange(k));
+            let weight = CONDUCTANCE_DEVIATION.powi(-2);
+            let [by_first, by_second] = by_parameters(slopes.exchange[k]);
             let (c, r) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
-            normal[(c, c)] += conductance;
-            normal[(c, r)] -= exchange * conductance;
-            normal[(r, c)] -= exchange * conductance;
-            normal[(r, r)] += exchange * exchange * conductance + self.radius_deviation.powi(-2);
+            normal[(c, c)] += by_first * by_first * weight;
+            normal[(c, r)] += by_first * by_second * weight;
+            normal[(r, c)] += by_first * by_second * weight;
+            normal[(r, r)] += by_second * by_second * weight + self.radius_deviation.powi(-2);
         }
         normal
     }
@@ -323,8 +315,9 @@ impl DiscFitter<'_> {
         for (k, contact) in fit.contacts.iter().enumerate() {
             let [conductance, radius] = self.unusual(contact);
             let pull = conductance / CONDUCTANCE_DEVIATION;
-            gradient[PARAMETERS * k + 2] -= pull;
-            gradient[PARAMETERS * k + 3] += fit.slopes.stepped_exchange(k) * pull - radius / self.radius_deviation;
+            let [by_first, by_second] = by_parameters(fit.slopes.exchange[k]);
+            gradient[PARAMETERS * k + 2] -= by_first * pull;
+            gradient[PARAMETERS * k + 3] -= by_second * pull + radius / self.radius_deviation;
         }
         gradient.into()
     }
@@ -370,10 +363,11 @@ impl DiscFitter<'_> {
         let mut by: Vec<Vec<f64>> = by.collect();
         let exchange = (0..at.len()).map(|k| {
             let (by_conductance, by_radius) = by[PARAMETERS * k + 2..PARAMETERS * (k + 1)].split_at_mut(1);
-            let (by_conductance, by_radius) = (&by_conductance[0], &mut by_radius[0]);
-            let exchange = (dot(by_conductance, by_radius) / dot(by_conductance, by_conductance)).max(0.0);
-            let stepped = exchange.min(MOST_EXCHANGE);
-            by_radius.iter_mut().zip(by_conductance).for_each(|(radius, c)| *radius -= stepped * c);
+            let (by_conductance, by_radius) = (&mut by_conductance[0], &mut by_radius[0]);
+            let exchange =
+                (dot(by_conductance, by_radius) / dot(by_conductance, by_conductance)).clamp(0.0, MOST_EXCHANGE);
+            by_radius.iter_mut().zip(&*by_conductance).for_each(|(radius, c)| *radius -= exchange * c);
+            by_conductance.iter_mut().for_each(|c| *c *= 1.0 + exchange);
             exchange
         });
         let exchange = exchange.collect();
@@ -398,12 +392,13 @@ impl DiscFitter<'_> {
         let (steps, _) = step.as_chunks::<PARAMETERS>();
         let moved = |(k, contact): (usize, &Contact)| {
             let unit = fit.slopes.at[k];
-            self.stepped(contact, unit.radius_m, fit.exchange(k)[1], &steps[k])
+            self.stepped(contact, unit.radius_m, fit.exchange(k), &steps[k])
         };
         fit.contacts.iter().enumerate().map(moved).collect()
     }
 
-    /// A contact after a step in its parameters: the unit of its place (m), and what its conductance changes for its radius.
+    /// A contact after a step in its parameters: the unit of its place (m), and the resistance of the crowded current under it
+    /// over its own.
     fn stepped(&self, contact: &Contact, unit_m: f64, exchange: f64, step: &[f64; PARAMETERS]) -> Contact {
         let [first, second, by_s, by_m] = step;
         let shorten = (LONGEST_WAY / first.hypot(*second)).min(1.0) * unit_m;
@@ -412,10 +407,16 @@ impl DiscFitter<'_> {
         let to_m = space::along(space::along(from_m, shorten * first, along[0]), shorten * second, along[1]);
         let ([x_m, y_m, z_m], _) = self.fields.footing(to_m);
         let wider = factor(*by_m, LONGEST_RADIUS);
-        let ohm = 1.0 / (contact.conductance_s * factor(*by_s, LONGEST_CONDUCTANCE));
-        // No step makes a contact much better at once, whatever its narrowness asks for.
-        let ohm = (ohm + exchange / contact.conductance_s * (1.0 - 1.0 / wider)).max(ohm * (-LONGEST_CONDUCTANCE).exp());
-        self.held(Contact { x_m, y_m, z_m, conductance_s: 1.0 / ohm, radius_m: wider * contact.radius_m })
+        // Of the contact's own, in what it was: no step makes it much better at once.
+        let ohm = (1.0 + exchange) / factor(*by_s, LONGEST_CONDUCTANCE) - exchange / wider;
+        let ohm = ohm.max((-LONGEST_CONDUCTANCE).exp());
+        self.held(Contact {
+            x_m,
+            y_m,
+            z_m,
+            conductance_s: contact.conductance_s / ohm,
+            radius_m: wider * contact.radius_m,
+        })
     }
 
     /// A contact with conductance and radius held within what makes sense.
@@ -427,6 +428,11 @@ impl DiscFitter<'_> {
             ..contact
         }
     }
+}
+
+/// Derivatives of the logarithm of a conductance by the last two parameters.
+pub(super) fn by_parameters(exchange: f64) -> [f64; 2] {
+    [1.0 + exchange, -exchange]
 }
 
 pub(super) fn place_m(contact: &Contact) -> Place {

@@ -30,8 +30,8 @@ pub use self::solver::Contacts;
 pub(super) use self::solver::{ContactFollower, ContactSearcher};
 use self::target::{Errors, Target};
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
-use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::forward::spots::SpotFields;
+use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
 
 /// Places of the scan.
@@ -177,7 +177,8 @@ impl ContactFinder {
     fn solution(&self, found: &Explanation, target: &Target) -> Solution {
         let fit = &found.fit;
         let covariance = fit.covariance();
-        let contacts: Vec<_> = (0..fit.contacts.len()).map(|k| self.found_contact(fit, k, covariance.as_ref())).collect();
+        let contacts: Vec<_> =
+            (0..fit.contacts.len()).map(|k| self.found_contact(fit, k, covariance.as_ref())).collect();
         let is_perfect = |contact: &FoundContact| contact.conductance_s > SATURATED * self.sheet_s;
         let flags = Flags {
             saturated: target.is_saturated() || contacts.iter().any(is_perfect),

@@ -187,7 +187,8 @@ impl ContactFinder {
 
     /// Starts with a wide contact taken for two beside each other, in some directions.
     fn splits(&self, fit: &DiscFit) -> Vec<Vec<Contact>> {
-        let widest = (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
+        let widest =
+            (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
         let is_wide = |k: &usize| fit.contacts[*k].radius_m > WIDE * self.settings.radius_m;
         let Some(k) = widest.filter(is_wide) else { return Vec::new() };
         let wide = fit.contacts[k];
@@ -301,9 +302,8 @@ impl ContactFinder {
 
     /// Whether each contact of one fit is where one of the other is.
     fn is_alike(&self, a: &DiscFit, b: &DiscFit) -> bool {
-        let near = |a: &Contact, b: &Contact| {
-            space::distance(place_m(a), place_m(b)) < ALIKE * a.radius_m.min(b.radius_m)
-        };
+        let near =
+            |a: &Contact, b: &Contact| space::distance(place_m(a), place_m(b)) < ALIKE * a.radius_m.min(b.radius_m);
         a.contacts.iter().all(|a| b.contacts.iter().any(|b| near(a, b)))
     }
 
@@ -323,7 +323,8 @@ impl ContactFinder {
         if self.evidence_of_nothing(target) > evidence {
             return None;
         }
-        let kept = found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
+        let kept =
+            found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
         let kept: Vec<_> = kept.collect();
         if weak.is_empty() || kept.is_empty() {
             return Some(found);
