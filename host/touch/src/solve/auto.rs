@@ -173,9 +173,7 @@ impl Follower for AutoFollower {
     fn lead(&self) -> Lead {
         let mean = self.still.mean();
         match (&self.imaged, self.image.descent(), &self.contacts) {
-            (Some(why), Some(descent), _) => {
-                Lead { known: Known::Image(Box::new(descent.clone()), why.clone()), mean }
-            }
+            (Some(why), Some(descent), _) => Lead { known: Known::Image(Box::new(descent.clone()), why.clone()), mean },
             (_, _, Some(contacts)) => Lead::of_contacts(contacts.found(), mean),
             _ => Lead { mean, ..Lead::default() },
         }

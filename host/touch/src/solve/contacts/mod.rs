@@ -26,12 +26,12 @@ use self::network::Network;
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(super) use self::solver::{ContactFollower, ContactSearcher};
-use self::target::{Errors, Target};
 pub(super) use self::target::dot;
+use self::target::{Errors, Target};
 use super::still::{self, Mean, Still};
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
-use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::forward::spots::SpotFields;
+use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
 
 /// Places of the scan.
