@@ -12,6 +12,7 @@
 //! each contact that is known, which finds much less. Where they differ, the frames before are forgotten.
 
 use std::collections::VecDeque;
+use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -22,17 +23,19 @@ use tactomo_physics::readings::Readings;
 /// Frames that are looked at, at most: a fifth of a second of 1200 frames/s.
 pub(super) const LONGEST: usize = 256;
 /// One in so many of the frames that look still is averaged.
-const SHARE: usize = 4;
+const SHARE: usize = 5;
 /// First frames that are all averaged, as long as nothing has moved since the beginning.
 const FIRST: usize = 16;
 /// Share of still frames in which a contact is taken to move, by each of the tests of a contact in each window of one frame. Windows
 /// of more frames overlap, and have as many times more.
 const FALSE_ALARMS: f64 = 3e-5;
 /// The same for the first frames to be averaged no longer than others.
-const FALSE_DOUBTS: f64 = 0.01;
+const FALSE_DOUBTS: f64 = 0.003;
 /// Standard deviations by which the mean square of all differences is over what noise leaves, of frames that are not of one scene: of
 /// 256 readings noise alone does so in 1 of 30 000.
 const OTHER: f64 = 4.4;
+/// Terms of the series of the error by rounding: they leave out less than 1 %.
+const TERMS: u32 = 50;
 /// Parameters of a contact that are tested together: the place, and the strength with the size.
 const TOGETHER: usize = 2;
 
@@ -236,8 +239,150 @@ impl<'a> Moves<'a> {
 }
 
 /// Standard deviation of what rounding to codes leaves in the mean of any number of readings (V): noise of half a code takes nearly all
-/// of it away, none leaves the root of 1/12. The first term of the series in Widrow and Kollar, Quantization noise, 2008.
+/// of it away, none leaves the root of 1/12 (Widrow and Kollar, Quantization noise, 2008: a Fourier series of the mean error, damped by the
+/// characteristic function of the noise).
 pub(super) fn rounding_v(adc: &Adc) -> f64 {
-    let spread = (std::f64::consts::TAU * adc.noise_lsb).powi(2);
-    ((-spread).exp() / 12.0).sqrt() * adc.lsb_v()
+    let term = |k: u32| {
+        let k = f64::from(k) * PI;
+        (-(2.0 * k * adc.noise_lsb).powi(2)).exp() / (2.0 * k * k)
+    };
+    (1..=TERMS).map(term).sum::<f64>().sqrt() * adc.lsb_v()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOISE_V: f64 = 1e-3;
+    const READINGS: usize = 256;
+
+    /// Frames of a scene that moves along some derivatives.
+    struct Bench {
+        random: fastrand::Rng,
+        slopes_v: Vec<Vec<f64>>,
+        still: Still,
+    }
+
+    impl Bench {
+        /// The place of the contact is known to 0.1 by one frame, the strength to 0.01.
+        fn new(seed: u64) -> Self {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let mut slope_v = |deviation: f64| {
+                let scale = NOISE_V / deviation / (READINGS as f64 / 12.0).sqrt();
+                (0..READINGS).map(|_| scale * (random.f64() - 0.5)).collect::<Vec<_>>()
+            };
+            let slopes_v = vec![slope_v(0.1), slope_v(0.1), slope_v(0.01), slope_v(1.0)];
+            Self { random, slopes_v, still: Still::new(NOISE_V) }
+        }
+
+        fn frame(&mut self, moved: f64) -> Vec<f64> {
+            let noise = |random: &mut fastrand::Rng| (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+            self.slopes_v[0].iter().map(|slope| 0.5 + moved * slope + NOISE_V * noise(&mut self.random)).collect()
+        }
+
+        fn add(&mut self, moved: f64) {
+            let volts = self.frame(moved);
+            self.still.add_beside(&volts, &self.slopes_v);
+        }
+
+        /// Error of the mean along the place, in what noise makes of it.
+        fn error(&self, moved: f64) -> f64 {
+            let slope = &self.slopes_v[0];
+            let truth = slope.iter().map(|slope| 0.5 + moved * slope);
+            let left: Vec<_> = self.still.mean_v().iter().zip(truth).map(|(mean, truth)| mean - truth).collect();
+            let deviation = NOISE_V * dot(slope, slope).sqrt() / (self.still.count() as f64).sqrt();
+            dot(slope, &left) / deviation
+        }
+    }
+
+    #[test]
+    fn still_frames_are_averaged_and_a_move_begins_anew() {
+        let mut bench = Bench::new(4);
+        for count in 1..=16 {
+            bench.add(0.0);
+            assert_eq!(bench.still.count(), count);
+        }
+        let error_v = (bench.still.mean_v().iter().map(|volts| (volts - 0.5).powi(2)).sum::<f64>() / 256.0).sqrt();
+        assert!((0.85..1.15).contains(&(4.0 * error_v / NOISE_V)), "a quarter of the noise: {error_v}");
+        bench.add(2.0);
+        assert_eq!(bench.still.count(), 1, "20 standard deviations");
+        (0..9).for_each(|_| bench.add(2.0));
+        assert_eq!(bench.still.count(), 2, "what has just moved may move on slowly");
+    }
+
+    #[test]
+    fn a_still_scene_is_seldom_taken_to_move() {
+        let mut counts = Vec::new();
+        for seed in 0..8 {
+            let mut bench = Bench::new(seed);
+            counts.extend((0..2000).map(|_| {
+                bench.add(0.0);
+                bench.still.count() as f64
+            }));
+        }
+        let mean = counts.iter().sum::<f64>() / counts.len() as f64;
+        assert!(mean > 36.0, "{mean} of 51");
+    }
+
+    #[test]
+    fn the_mean_does_not_lag_behind_what_moves_slowly() {
+        // From one thousandth of what a frame's noise makes of it to ten times that.
+        for speed in [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 10.0].map(|deviations| 0.1 * deviations) {
+            let (mut squares, mut inside, mut frames) = (0.0, 0, 0);
+            for seed in 0..6 {
+                let mut bench = Bench::new(seed);
+                for frame in 0..1500 {
+                    let moved = speed * f64::from(frame);
+                    bench.add(moved);
+                    let error = bench.error(moved);
+                    squares += error * error;
+                    inside += u32::from(error.abs() < 1.0);
+                    frames += 1;
+                }
+            }
+            let (rms, inside) = ((squares / f64::from(frames)).sqrt(), f64::from(inside) / f64::from(frames));
+            assert!(rms < 1.2 && inside > 0.62, "{speed}: {rms} standard deviations, {inside} within one");
+        }
+    }
+
+    #[test]
+    fn a_known_contact_is_seen_to_move_where_all_readings_hide_it() {
+        let mut bench = Bench::new(5);
+        let mut blind = Still::new(NOISE_V);
+        // Half a standard deviation of its place.
+        let frames: Vec<_> = (0..200).map(|frame| bench.frame(if frame < 100 { 0.0 } else { 0.05 })).collect();
+        for frame in &frames {
+            blind.add(frame);
+            bench.still.add_beside(frame, &bench.slopes_v);
+        }
+        assert!(bench.still.frames() <= 130 && blind.frames() == 200, "{} {}", bench.still.frames(), blind.frames());
+    }
+
+    #[test]
+    fn other_readings_begin_anew() {
+        let mut still = Still::new(NOISE_V);
+        assert_eq!((still.count(), still.mean()), (0, None));
+        (0..5).for_each(|_| still.add(&[0.5; 16]));
+        still.add(&[0.5; 9]);
+        assert_eq!((still.count(), still.mean_v().len()), (1, 9));
+    }
+
+    #[test]
+    fn rounding_is_averaged_by_noise_only() {
+        let adc = |noise_lsb: f64| Adc { bits: 12, full_scale_v: 4.096, noise_lsb };
+        assert!((rounding_v(&adc(0.0)) / 1e-3 * 12f64.sqrt() - 1.0).abs() < 0.01);
+        // The mean of many conversions of each voltage, against the voltage.
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut noise = |deviation: f64| deviation * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+        for noise_lsb in [0.0, 0.1, 0.2, 0.3] {
+            let mut squares = 0.0;
+            for step in 0..50 {
+                let truth = f64::from(step) / 50.0;
+                let mean = (0..3000).map(|_| (truth + noise(noise_lsb)).round()).sum::<f64>() / 3000.0;
+                squares += (mean - truth).powi(2) / 50.0;
+            }
+            let expected = rounding_v(&adc(noise_lsb)) / 1e-3;
+            assert!((0.85..1.15).contains(&(squares.sqrt() / expected)), "{noise_lsb}: {} {expected}", squares.sqrt());
+        }
+    }
 }

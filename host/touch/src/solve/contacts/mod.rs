@@ -6,6 +6,8 @@
 
 mod discs;
 mod evidence;
+#[cfg(test)]
+mod motion_tests;
 mod network;
 #[cfg(test)]
 mod places_tests;
