@@ -7,7 +7,7 @@ use super::disc::DiscBasis;
 use super::pads::between;
 use super::{Slab, from_corner};
 use crate::forward::ForwardError;
-use crate::forward::contact::{ContactSystem, Contacted};
+use crate::forward::contact::{Contacted, ContactSystem};
 use crate::scene::Contact;
 
 /// Degree of the densities that the kernel's changes are taken for.

@@ -46,10 +46,7 @@ impl Prior {
         // Places are in units of their own.
         let units: f64 = (0..count).map(|k| 2.0 * fit.along(k).1.ln()).sum();
         let orders: f64 = (1..=count).map(|k| (k as f64).ln()).sum();
-        -0.5 * (fit.cost + fit.known)
-            + count as f64 * (peak - FEWER)
-            + units
-            + orders
+        -0.5 * (fit.cost + fit.known) + count as f64 * (peak - FEWER) + units + orders
             + 0.5 * (PARAMETERS * count) as f64 * TAU.ln()
             - 0.5 * ln_determinant
     }

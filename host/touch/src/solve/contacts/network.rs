@@ -99,13 +99,7 @@ impl Network {
     }
 
     /// Potentials under one more spot that carries no current (ohm), for 1 A into each electrode.
-    pub fn potentials_ohm(
-        &self,
-        solved: &Solved,
-        spots: &[LoadedSpot],
-        at: &Spot,
-        fields: &dyn SpotFields,
-    ) -> Vec<f64> {
+    pub fn potentials_ohm(&self, solved: &Solved, spots: &[LoadedSpot], at: &Spot, fields: &dyn SpotFields) -> Vec<f64> {
         let n = self.electrodes();
         let mut potentials: Vec<_> =
             at.electrodes_ohm.iter().zip(&solved.currents[spots.len() * n..]).map(|(ohm, c)| ohm - c).collect();

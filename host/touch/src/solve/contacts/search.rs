@@ -74,53 +74,20 @@ impl ContactFinder {
             self.grow(one, &starts, target, better)
         });
         if let Ok(truth) = std::env::var("TRUTH") {
-            let all: Vec<f64> =
-                std::fs::read_to_string(truth).unwrap().split_whitespace().map(|v| v.parse().unwrap()).collect();
+            let all: Vec<f64> = std::fs::read_to_string(truth).unwrap().split_whitespace().map(|v| v.parse().unwrap()).collect();
             let start: Vec<Contact> = all.chunks(4).map(|c| Contact::flat(c[0], c[1], c[2], c[3])).collect();
-            let show = |all: &[Contact]| {
-                all.iter()
-                    .map(|c| {
-                        format!(
-                            "({:.1} {:.1} r{:.2} C{:.1e})",
-                            1e3 * c.x_m,
-                            1e3 * c.y_m,
-                            1e3 * c.radius_m,
-                            c.conductance_s
-                        )
-                    })
-                    .collect::<Vec<_>>()
-                    .join(" ")
-            };
+            let show = |all: &[Contact]| all.iter().map(|c| format!("({:.1} {:.1} r{:.2} C{:.1e})", 1e3*c.x_m, 1e3*c.y_m, 1e3*c.radius_m, c.conductance_s)).collect::<Vec<_>>().join(" ");
             let mut best: Option<(f64, DiscFit)> = None;
             for mask in 1..1u32 << start.len() {
                 let some: Vec<Contact> = (0..start.len()).filter(|k| mask >> k & 1 == 1).map(|k| start[k]).collect();
                 if let Some(fit) = self.disc_fitter().fit(some, target, COLD) {
                     let e = self.evidence(&fit);
-                    if best.as_ref().is_none_or(|b| b.0 < e) {
-                        best = Some((e, fit));
-                    }
+                    if best.as_ref().is_none_or(|b| b.0 < e) { best = Some((e, fit)); }
                 }
             }
             if let (Some((e, fit)), Some(found)) = (best, &anew) {
                 let mine = self.evidence(&found.fit);
-                println!(
-                    "{} of {} truth evidence {e:.1} cost {:.1} known {:.1}; found {} evidence {mine:.1} cost {:.1} known {:.1} certainty {:.2}   {}",
-                    fit.contacts.len(),
-                    start.len(),
-                    fit.cost,
-                    fit.known,
-                    found.fit.contacts.len(),
-                    found.fit.cost,
-                    found.fit.known,
-                    found.certainty,
-                    if e > mine + 1.0 {
-                        "SEARCH"
-                    } else if found.fit.contacts.len() > start.len() {
-                        "STAT"
-                    } else {
-                        ""
-                    }
-                );
+                println!("{} of {} truth evidence {e:.1} cost {:.1} known {:.1}; found {} evidence {mine:.1} cost {:.1} known {:.1} certainty {:.2}   {}", fit.contacts.len(), start.len(), fit.cost, fit.known, found.fit.contacts.len(), found.fit.cost, found.fit.known, found.certainty, if e > mine + 1.0 { "SEARCH" } else if found.fit.contacts.len() > start.len() {"STAT"} else {""});
                 println!("{} | {} | {}", show(&start), show(&fit.contacts), show(&found.fit.contacts));
             }
         }
@@ -141,7 +108,11 @@ impl ContactFinder {
     /// A fit with radii free, if it is at the widest that is plausible; else what it is.
     fn released(&self, fit: DiscFit, target: &Target) -> DiscFit {
         let is_wide = |contact: &Contact| contact.radius_m > 0.99 * PLAUSIBLE * self.settings.radius_m;
-        let free = if fit.contacts.iter().any(is_wide) { self.disc_fitter().go_on(&fit, target, COLD) } else { None };
+        let free = if fit.contacts.iter().any(is_wide) {
+            self.disc_fitter().go_on(&fit, target, COLD)
+        } else {
+            None
+        };
         free.unwrap_or(fit)
     }
 
@@ -189,28 +160,8 @@ impl ContactFinder {
     fn noted(&self, fit: DiscFit, by_count: &mut [f64]) -> (DiscFit, f64) {
         let evidence = self.evidence(&fit);
         if std::env::var("TRUTH").is_ok() {
-            let show = |all: &[Contact]| {
-                all.iter()
-                    .map(|c| {
-                        format!(
-                            "({:.1} {:.1} r{:.2} C{:.1e})",
-                            1e3 * c.x_m,
-                            1e3 * c.y_m,
-                            1e3 * c.radius_m,
-                            c.conductance_s
-                        )
-                    })
-                    .collect::<Vec<_>>()
-                    .join(" ")
-            };
-            println!(
-                "  noted {} {evidence:.1} {:.1} {:.1} {} {}",
-                fit.contacts.len(),
-                fit.cost,
-                fit.known,
-                fit.settled,
-                show(&fit.contacts)
-            );
+            let show = |all: &[Contact]| all.iter().map(|c| format!("({:.1} {:.1} r{:.2} C{:.1e})", 1e3*c.x_m, 1e3*c.y_m, 1e3*c.radius_m, c.conductance_s)).collect::<Vec<_>>().join(" ");
+            println!("  noted {} {evidence:.1} {:.1} {:.1} {} {}", fit.contacts.len(), fit.cost, fit.known, fit.settled, show(&fit.contacts));
         }
         if let Some(best) = by_count.get_mut(fit.contacts.len()) {
             *best = best.max(evidence);
@@ -234,8 +185,7 @@ impl ContactFinder {
 
     /// Starts with a wide contact taken for two beside each other, in some directions.
     fn splits(&self, fit: &DiscFit) -> Vec<Vec<Contact>> {
-        let widest =
-            (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
+        let widest = (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
         let is_wide = |k: &usize| fit.contacts[*k].radius_m > WIDE * self.settings.radius_m;
         let Some(k) = widest.filter(is_wide) else { return Vec::new() };
         let wide = fit.contacts[k];
@@ -327,8 +277,9 @@ impl ContactFinder {
 
     /// Whether each contact of one fit is where one of the other is.
     fn is_alike(&self, a: &DiscFit, b: &DiscFit) -> bool {
-        let near =
-            |a: &Contact, b: &Contact| space::distance(place_m(a), place_m(b)) < ALIKE * a.radius_m.min(b.radius_m);
+        let near = |a: &Contact, b: &Contact| {
+            space::distance(place_m(a), place_m(b)) < ALIKE * a.radius_m.min(b.radius_m)
+        };
         a.contacts.iter().all(|a| b.contacts.iter().any(|b| near(a, b)))
     }
 
@@ -345,8 +296,7 @@ impl ContactFinder {
             return Some(found);
         }
         let evidence = self.evidence(&found.fit);
-        let kept =
-            found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
+        let kept = found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
         let kept: Vec<_> = kept.collect();
         if kept.is_empty() {
             return (evidence > self.evidence_of_nothing(target)).then_some(found);
