@@ -14,7 +14,6 @@ use super::maker::{Made, Maker, Order};
 use super::notice::NoticeBoard;
 use super::plan::{Listener, LiveError, Solving};
 use super::searcher::SearchThread;
-use super::steady::Steady;
 use super::{FrameSnapshot, SolvedFrame};
 
 /// Longest wait for a frame: then the rate shown falls.
@@ -88,13 +87,10 @@ struct FollowLoop {
 /// What belongs to one detector.
 struct BoardState {
     detector: Arc<Detector>,
-    noise_v: f64,
     baseline: Baseline,
     watch: ElectrodeWatch,
     /// `None` until the first solver is made.
     follower: Option<Box<dyn Follower>>,
-    /// The mean of what was followed, for searches.
-    steady: Option<Steady>,
 }
 
 /// A frame that was answered.
@@ -147,7 +143,6 @@ impl FollowLoop {
                     self.search.forget();
                     (self.solved, self.wants_search) = (None, false);
                     if let Some(board) = &mut self.board {
-                        board.steady = None;
                         board.follower.as_mut().into_iter().for_each(|follower| follower.reset());
                     }
                 }
@@ -191,7 +186,7 @@ impl FollowLoop {
             && let Some(follower) = &board.follower
         {
             self.wants_search = false;
-            self.search.search(follower.lead(), board.for_search(&solved.touch));
+            self.search.search(follower.lead(), solved.touch.clone());
         }
         self.notice.keep_fresh();
     }
@@ -206,12 +201,10 @@ impl FollowLoop {
     /// Begins with a board's detector, or with another.
     fn begin_with(&mut self, detector: Arc<Detector>) {
         self.board = Some(BoardState {
-            noise_v: detector.adc.deviation_v(),
             baseline: Baseline::new(&detector),
             watch: ElectrodeWatch::new(&detector),
             detector,
             follower: None,
-            steady: None,
         });
         self.solved = None;
         self.order(self.maker.method());
@@ -263,7 +256,6 @@ impl FollowLoop {
         }
         let mut touch = frame.mean.clone();
         board.baseline.subtract(frame.mean.volts(), touch.volts_mut());
-        board.keep_steady(&touch);
         let changed = board.watch.note(&touch);
         let Some(follower) = &mut board.follower else { return Ok(()) };
         let followed = follower.follow(&touch)?;
@@ -294,7 +286,7 @@ impl FollowLoop {
                 && self.pause.is_over(&solution, now)
                 && let Some(follower) = &board.follower
             {
-                self.search.search(follower.lead(), board.for_search(&solved.touch));
+                self.search.search(follower.lead(), solved.touch.clone());
             }
         }
         self.found.clone_from(&solution.contacts);
@@ -312,22 +304,6 @@ impl BoardState {
     /// The solver of a method for this detector as it is.
     fn order(&self, method: Method) -> Order {
         Order { method, detector: Arc::clone(&self.detector), faulty: self.watch.faulty().clone() }
-    }
-
-    fn keep_steady(&mut self, touch: &Readings) {
-        match &mut self.steady {
-            Some(steady) => steady.add(touch.volts(), self.noise_v),
-            None => self.steady = Some(Steady::of(touch.volts())),
-        }
-    }
-
-    /// The mean of what has stood still up to now.
-    fn for_search(&self, touch: &Readings) -> Readings {
-        let mut readings = touch.clone();
-        if let Some(steady) = &self.steady {
-            readings.volts_mut().copy_from_slice(steady.mean_v());
-        }
-        readings
     }
 }
 

@@ -9,10 +9,9 @@ use std::time::{Duration, Instant};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_protocol::Status;
-use tactomo_touch::solve::{Lead, Look, Method, Parts, Solver};
+use tactomo_touch::solve::{Lead, Look, Method, Parts, Solver, Still};
 
 use super::maker::Made;
-use super::steady::Steady;
 
 /// Longest wait before it is asked whether there is still something to wait for.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
@@ -84,7 +83,8 @@ pub struct Inbox {
 struct State {
     events: std::collections::VecDeque<Event>,
     pending: Option<Taken>,
-    steady: Option<Steady>,
+    /// The frames since the last one was taken.
+    still: Option<Still>,
     ready: bool,
     closed: bool,
 }
@@ -109,7 +109,7 @@ impl Inbox {
     /// Says that the frames to come do not follow those before, which nobody wants any more.
     pub fn jump(&self) {
         let mut state = self.lock();
-        (state.pending, state.steady) = (None, None);
+        (state.pending, state.still) = (None, None);
         state.events.push_back(Event::Jumped);
         drop(state);
         self.changed.notify_all();
@@ -188,15 +188,15 @@ impl Inbox {
 
 impl State {
     fn add(&mut self, mut frame: Taken, noise_v: f64) {
-        if let (Some(pending), Some(steady)) = (self.pending.take(), &mut self.steady) {
-            steady.add(frame.newest.volts(), noise_v);
-            frame.came += pending.came;
-            frame.averaged = steady.count();
-            frame.mean = pending.mean;
-            frame.mean.volts_mut().copy_from_slice(steady.mean_v());
-        } else {
-            self.steady = Some(Steady::of(frame.newest.volts()));
+        let before = self.pending.take();
+        let mut still = self.still.take().filter(|_| before.is_some()).unwrap_or_else(|| Still::new(noise_v));
+        still.add(frame.newest.volts());
+        if let Some(before) = before {
+            frame.came += before.came;
+            frame.averaged = still.count() as u32;
+            frame.mean.volts_mut().copy_from_slice(&still.mean_v());
         }
+        self.still = Some(still);
         self.pending = Some(frame);
     }
 }

@@ -13,7 +13,6 @@ pub mod plan;
 mod reader;
 mod searcher;
 mod statistics;
-mod steady;
 mod talk;
 
 pub use self::inbox::Taken;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::contacts::{ContactFinder, ContactFollower, ContactSearcher};
 use super::follow::{Followed, Follower, Known, Lead, Parts, Searcher, follow_and_search};
+use super::still::{Mean, Still};
 use super::{
     Choice, ContactSettings, FoundContact, Nonlinear, NonlinearSettings, Problem, Solution, SolveError, Solver,
 };
@@ -25,6 +26,8 @@ pub struct Auto {
 
 /// Follows whichever model was chosen last.
 struct AutoFollower {
+    electrodes: usize,
+    still: Still,
     contacts: Option<ContactFollower>,
     image: Nonlinear,
     /// Why an image is followed; `None` while contacts are.
@@ -52,6 +55,8 @@ impl Auto {
         let finder = ContactFinder::new(problem, ContactSettings::of(problem)).ok().map(Arc::new);
         let image = Nonlinear::new(problem, NonlinearSettings::default())?;
         let follower = AutoFollower {
+            electrodes: problem.detector().electrodes.len(),
+            still: Still::new(problem.detector().adc.deviation_v()),
             contacts: finder.clone().map(ContactFollower::new),
             image: image.clone(),
             imaged: None,
@@ -99,9 +104,21 @@ impl AutoFollower {
             let search = !self.image.is_rest(readings);
             return Ok(Followed { solution: nothing(Solution::default(), search), search });
         };
-        let target = contacts.finder().target(readings)?;
+        let target = contacts.finder().target_of(&self.still.mean_or(readings))?;
         let search = contacts.follow(&target);
         Ok(Followed { solution: as_contacts(contacts.solution(&target), search), search })
+    }
+
+    fn follow_known(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
+        match self.imaged.take() {
+            Some(why) if !self.image.is_rest(readings) => self.follow_image(readings, why),
+            _ => self.follow_contacts(readings),
+        }
+    }
+
+    /// Derivatives of the readings by the parameters of the contacts that are followed (V).
+    fn slopes_v(contacts: Option<&ContactFollower>) -> &[Vec<f64>] {
+        contacts.map_or(&[], ContactFollower::slopes_v)
     }
 
     fn begin_with_contacts(&mut self) {
@@ -111,17 +128,19 @@ impl AutoFollower {
 
 impl Follower for AutoFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
-        match self.imaged.take() {
-            Some(why) if !self.image.is_rest(readings) => self.follow_image(readings, why),
-            _ => self.follow_contacts(readings),
-        }
+        super::check(readings, self.electrodes)?;
+        self.still.add_beside(readings.volts(), Self::slopes_v(self.contacts.as_ref()));
+        self.follow_known(readings)
     }
 
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
-        match lead.0 {
+        super::check(readings, self.electrodes)?;
+        self.still.add_if_new(readings.volts(), Self::slopes_v(self.contacts.as_ref()));
+        let mean = lead.mean;
+        match lead.known {
             Known::Image(descent, why) if !self.image.is_rest(readings) => {
                 // An image of the past is no better than contacts that explain the present.
-                let followed = self.follow(readings)?;
+                let followed = self.follow_known(readings)?;
                 if self.imaged.is_none() && !followed.solution.contacts.is_empty() && !followed.solution.flags.misfit {
                     return Ok(Followed { search: false, ..followed });
                 }
@@ -137,9 +156,10 @@ impl Follower for AutoFollower {
                 // Nor are contacts of the past better than an image that explains the present.
                 let image = self.imaged.take().map(|why| self.follow_image(readings, why)).transpose()?;
                 let Some(contacts) = &mut self.contacts else { return self.follow_contacts(readings) };
-                let target = contacts.finder().target(readings)?;
-                let search = contacts.adopt(Lead(known).into_contacts(), &target);
-                if let Some(image) = image.filter(|image| contacts.residual(&target) > image.solution.residual) {
+                let target = contacts.finder().target_of(&self.still.mean_or(readings))?;
+                let search = contacts.adopt(Lead { known, mean }, &target);
+                let left = contacts.residual(readings)?;
+                if let Some(image) = image.filter(|image| left > image.solution.residual) {
                     contacts.let_go();
                     return Ok(image);
                 }
@@ -151,10 +171,11 @@ impl Follower for AutoFollower {
     }
 
     fn lead(&self) -> Lead {
+        let mean = self.still.mean();
         match (&self.imaged, self.image.descent(), &self.contacts) {
-            (Some(why), Some(descent), _) => Lead(Known::Image(Box::new(descent.clone()), why.clone())),
-            (_, _, Some(contacts)) => Lead::of_contacts(contacts.found()),
-            _ => Lead::default(),
+            (Some(why), Some(descent), _) => Lead { known: Known::Image(Box::new(descent.clone()), why.clone()), mean },
+            (_, _, Some(contacts)) => Lead::of_contacts(contacts.found(), mean),
+            _ => Lead { mean, ..Lead::default() },
         }
     }
 
@@ -168,6 +189,7 @@ impl Follower for AutoFollower {
         if let Some(contacts) = &mut self.contacts {
             contacts.reset();
         }
+        self.still.reset();
         self.image.reset();
         self.begin_with_contacts();
     }
@@ -175,43 +197,51 @@ impl Follower for AutoFollower {
 
 impl Searcher for AutoSearcher {
     fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
-        let Some(searcher) = &self.contacts else {
-            return self.search_image(from, readings, "this model has no fields of single contacts".to_owned());
-        };
-        let (contacts, from) = match from.0 {
-            Known::Contacts(contacts) => (Some(*contacts), Lead::default()),
-            known => (None, Lead(known)),
-        };
-        // A picture does not change to contacts that may not explain it.
-        let mut nowhere = |_| {};
-        let found = if matches!(from.0, Known::Image(..)) { &mut nowhere } else { found };
-        let Some((found, solution)) = searcher.contacts(contacts, readings, found)? else {
-            return Ok(Lead::default());
-        };
-        if !solution.flags.misfit {
-            return Ok(Lead::of_contacts(Some(found)));
-        }
-        let left = solution.residual.unwrap_or_default();
-        let why = format!("{} would leave a residual of {left:.1} x noise", counted(solution.contacts.len()));
-        let image = self.search_image(from, readings, why)?;
-        // An image that explains less than contacts do is no better.
-        let is_better = self.residual.is_none_or(|residual| residual <= left);
-        Ok(if is_better { image } else { Lead::of_contacts(Some(found)) })
+        let mean = from.mean_or(readings);
+        let known = self.search_mean(from.known, &mean, found)?;
+        Ok(Lead { known, mean: Some(mean) })
     }
 }
 
 impl AutoSearcher {
-    fn search_image(&mut self, from: Lead, readings: &Readings, why: String) -> Result<Lead, SolveError> {
-        if self.image.is_rest(readings) {
-            return Ok(Lead::default());
+    fn search_mean(&mut self, from: Known, mean: &Mean, found: &mut dyn FnMut(Lead)) -> Result<Known, SolveError> {
+        let Some(searcher) = &self.contacts else {
+            let why = "this model has no fields of single contacts".to_owned();
+            return self.search_image(from, &mean.readings, why);
+        };
+        // A picture does not change to contacts that may not explain it.
+        let mut nowhere = |_| {};
+        let (contacts, from, found): (_, _, &mut dyn FnMut(Lead)) = match from {
+            Known::Contacts(contacts) => (Some(*contacts), Known::Nothing, found),
+            Known::Nothing => (None, from, found),
+            Known::Image(..) => (None, from, &mut nowhere),
+        };
+        let Some((found, solution)) = searcher.contacts(contacts, mean, found)? else {
+            return Ok(Known::Nothing);
+        };
+        if !solution.flags.misfit {
+            return Ok(Known::Contacts(Box::new(found)));
         }
-        self.image.go_on_from(match from.0 {
+        let left = solution.residual.unwrap_or_default();
+        let why = format!("{} would leave a residual of {left:.1} x noise", counted(solution.contacts.len()));
+        let image = self.search_image(from, &mean.readings, why)?;
+        // An image that explains less than contacts do is no better. What it leaves is in the noise of one frame.
+        let averaged = (mean.frames as f64).sqrt();
+        let is_better = self.residual.is_none_or(|residual| residual * averaged <= left);
+        Ok(if is_better { image } else { Known::Contacts(Box::new(found)) })
+    }
+
+    fn search_image(&mut self, from: Known, readings: &Readings, why: String) -> Result<Known, SolveError> {
+        if self.image.is_rest(readings) {
+            return Ok(Known::Nothing);
+        }
+        self.image.go_on_from(match from {
             Known::Image(descent, _) => Some(*descent),
             Known::Nothing | Known::Contacts(_) => None,
         });
         self.residual = self.image.begin(readings)?.residual;
         let image = self.image.descent().cloned();
-        Ok(image.map_or_else(Lead::default, |descent| Lead(Known::Image(Box::new(descent), why))))
+        Ok(image.map_or(Known::Nothing, |descent| Known::Image(Box::new(descent), why)))
     }
 }
 

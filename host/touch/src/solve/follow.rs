@@ -5,6 +5,7 @@
 
 use super::contacts::Found;
 use super::nonlinear::Descent;
+use super::still::Mean;
 use super::{FoundContact, Solution, SolveError, Solver};
 use tactomo_physics::readings::Readings;
 
@@ -17,7 +18,7 @@ pub trait Follower: Send {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError>;
 
     /// Goes on from what a search has found, if that explains these readings better than what is followed; the answer for these
-    /// readings.
+    /// readings, which are those of the frame that was followed last, or of the next one.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
@@ -37,8 +38,8 @@ pub trait Follower: Send {
 
 /// Searches what explains a frame.
 pub trait Searcher: Send {
-    /// What explains `readings`; `from` is what was followed up to now, and explains them partly. What is better than nothing on the way
-    /// there goes to `found`.
+    /// What explains `readings`, or the mean that `from` has of them and of those before; `from` is what was followed up to now, and
+    /// explains them partly. What is better than nothing on the way there goes to `found`.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
@@ -71,7 +72,11 @@ impl Parts {
 
 /// What a frame was explained by, for another frame to go on from.
 #[derive(Clone, Debug, Default)]
-pub struct Lead(pub(super) Known);
+pub struct Lead {
+    pub(super) known: Known,
+    /// The mean of the frames up to it as far as they stood still, of a follower that averages.
+    pub(super) mean: Option<Mean>,
+}
 
 /// What is known of a scene.
 #[derive(Clone, Debug, Default)]
@@ -86,16 +91,23 @@ pub(super) enum Known {
 }
 
 impl Lead {
-    /// Contacts, or nothing.
-    pub(super) fn of_contacts(found: Option<Found>) -> Self {
-        Self(found.map_or(Known::Nothing, |found| Known::Contacts(Box::new(found))))
+    /// Contacts, or nothing, in the mean of some frames.
+    pub(super) fn of_contacts(found: Option<Found>, mean: Option<Mean>) -> Self {
+        Self { known: found.map_or(Known::Nothing, |found| Known::Contacts(Box::new(found))), mean }
     }
 
+    /// The mean that it is of, or else a frame.
+    pub(super) fn mean_or(&self, readings: &Readings) -> Mean {
+        self.mean.clone().unwrap_or_else(|| Mean { readings: readings.clone(), frames: 1 })
+    }
+}
+
+impl Known {
     /// The contacts, if it is contacts.
     pub(super) fn into_contacts(self) -> Option<Found> {
-        match self.0 {
-            Known::Contacts(found) => Some(*found),
-            Known::Nothing | Known::Image(..) => None,
+        match self {
+            Self::Contacts(found) => Some(*found),
+            Self::Nothing | Self::Image(..) => None,
         }
     }
 }

@@ -20,6 +20,7 @@ mod noser;
 mod problem;
 #[cfg(test)]
 mod samples;
+mod still;
 mod tikhonov;
 mod track;
 mod tsvd;
@@ -40,6 +41,7 @@ pub use self::method::{Family, Method, Parameter, ParameterKind};
 pub use self::nonlinear::{Nonlinear, NonlinearSettings};
 pub use self::nonnegative::Nonnegative;
 pub use self::problem::Problem;
+pub use self::still::Still;
 pub use self::tikhonov::{Tikhonov, Variant};
 pub use self::tsvd::Tsvd;
 pub use self::tv::Tv;

@@ -7,6 +7,8 @@
 mod discs;
 mod evidence;
 mod exchange;
+#[cfg(test)]
+mod motion_tests;
 mod network;
 #[cfg(test)]
 mod places_tests;
@@ -28,7 +30,9 @@ use self::network::Network;
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(super) use self::solver::{ContactFollower, ContactSearcher};
+pub(super) use self::target::dot;
 use self::target::{Errors, Target};
+use super::still::{self, Mean, Still};
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
@@ -127,6 +131,7 @@ impl ContactFinder {
             fields,
             errors: Errors {
                 noise_v: detector.adc.deviation_v(),
+                rounding_v: still::rounding_v(&detector.adc),
                 model: settings.model_error,
                 pad: settings.pad_error,
                 drive_v: detector.drive_v,
@@ -145,20 +150,42 @@ impl ContactFinder {
         })
     }
 
+    /// Checks that readings can be those of the detector.
+    ///
+    /// # Errors
+    /// [`SolveError`] if they cannot.
+    pub fn check(&self, readings: &Readings) -> Result<(), SolveError> {
+        super::check(readings, self.network.electrodes())
+    }
+
     /// What a frame's readings are fitted as.
     ///
     /// # Errors
     /// [`SolveError`] if they cannot be those of the detector.
     pub fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
-        super::check(readings, self.network.electrodes())?;
+        self.check(readings)?;
         Ok(Target::new(readings, &self.errors))
+    }
+
+    /// What the mean of some frames is fitted as.
+    ///
+    /// # Errors
+    /// [`SolveError`] if they cannot be those of the detector.
+    pub fn target_of(&self, mean: &Mean) -> Result<Target, SolveError> {
+        self.check(&mean.readings)?;
+        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors))
+    }
+
+    /// What averages frames that stand still.
+    pub fn still(&self) -> Still {
+        Still::new(self.errors.noise_v)
     }
 
     /// What is known where there is no contact.
     pub fn nothing(&self, target: &Target) -> Solution {
         // No voltage of a board is far beyond its drive.
         let held = |volts: &f64| volts.clamp(-2.0 * self.errors.drive_v, 2.0 * self.errors.drive_v);
-        let squares: f64 = target.volts.iter().map(|volts| (held(volts) / self.errors.noise_v).powi(2)).sum();
+        let squares: f64 = target.volts.iter().map(|volts| (held(volts) / target.noise_v).powi(2)).sum();
         let residual = Some((squares / target.volts.len().max(1) as f64).sqrt());
         Solution { residual, ..Solution::default() }
     }
@@ -174,6 +201,11 @@ impl ContactFinder {
         fit.cost > freedom + MISFIT * (2.0 * freedom).sqrt()
     }
 
+    /// What a fit leaves whose sum of squares is `cost`: root mean square, in standard deviations of the noise.
+    fn residual(&self, fit: &DiscFit, cost: f64, target: &Target) -> f64 {
+        (cost / self.freedom(fit, target)).sqrt() * target.deviation_v() / target.noise_v
+    }
+
     fn solution(&self, found: &Explanation, target: &Target) -> Solution {
         let fit = &found.fit;
         let covariance = fit.covariance();
@@ -186,8 +218,7 @@ impl ContactFinder {
             unfinished: !fit.settled,
             excluded: Vec::new(),
         };
-        let left = fit.cost / self.freedom(fit, target);
-        let residual = Some(left.sqrt() * target.deviation_v() / self.errors.noise_v);
+        let residual = Some(self.residual(fit, fit.cost, target));
         Solution { contacts, residual, flags, ..Solution::default() }
     }
 

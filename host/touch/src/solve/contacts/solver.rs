@@ -2,36 +2,48 @@
 
 use std::sync::Arc;
 
+use super::discs::DiscFit;
 use super::{ContactFinder, ContactSettings, Explanation, Found, Target};
 use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search};
+use crate::solve::still::{Mean, Still};
 use crate::solve::track::Tracker;
 use crate::solve::{FoundContact, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
-/// Weight of the newest frame in the running mean of what is left.
-const NEWEST: f64 = 0.1;
-/// The sum of squares may be this times that of the frame before.
+/// The sum of squares may be this times what the last search would leave of as many frames.
 const WORSE: f64 = 1.3;
-/// Rise of that mean over what the last search left, or over what noise alone leaves, that asks for a new search: many frames show
-/// what one frame's noise hides.
-const RISE: f64 = 0.12;
+/// A scene that has not changed is searched again with so many times the frames: many frames show what one frame's noise hides.
+const MORE: usize = 2;
 
 /// Fits contacts.
 pub struct Contacts {
-    follower: ContactFollower,
+    follower: FrameFollower,
+}
+
+/// Follows contacts in the mean of the frames that stand still.
+struct FrameFollower {
+    still: Still,
+    contacts: ContactFollower,
 }
 
 /// Follows contacts from frame to frame.
 pub(in crate::solve) struct ContactFollower {
     finder: Arc<ContactFinder>,
     last: Option<Explanation>,
-    /// Sum of squares that the last search left, and its running mean since.
-    searched: f64,
-    mean: f64,
+    searched: Searched,
     /// Whether what is followed could not be brought to the newest frame.
     is_stale: bool,
     tracker: Tracker,
+}
+
+/// What the last search has left.
+#[derive(Clone, Copy, Debug, Default)]
+struct Searched {
+    /// Sum of squares over what noise leaves.
+    excess: f64,
+    /// Frames in whose mean it has searched.
+    frames: usize,
 }
 
 /// Searches contacts.
@@ -45,17 +57,18 @@ impl Contacts {
     /// # Errors
     /// [`ForwardError::Detector`] if the model has no spots.
     pub fn new(problem: &Problem, settings: ContactSettings) -> Result<Self, ForwardError> {
-        Ok(Self { follower: ContactFollower::new(Arc::new(ContactFinder::new(problem, settings)?)) })
+        let contacts = ContactFollower::new(Arc::new(ContactFinder::new(problem, settings)?));
+        Ok(Self { follower: FrameFollower { still: contacts.finder.still(), contacts } })
     }
 
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
-        self.follower.finder.left_by_one(readings)
+        self.follower.contacts.finder.left_by_one(readings)
     }
 
     #[cfg(test)]
     pub(super) fn finder(&self) -> &ContactFinder {
-        &self.follower.finder
+        &self.follower.contacts.finder
     }
 }
 
@@ -63,7 +76,7 @@ impl ContactFollower {
     /// Follows nothing yet.
     pub fn new(finder: Arc<ContactFinder>) -> Self {
         let tracker = Tracker::new(finder.spacing_m);
-        Self { finder, last: None, searched: 0.0, mean: 0.0, is_stale: false, tracker }
+        Self { finder, last: None, searched: Searched::default(), is_stale: false, tracker }
     }
 
     /// What finds the contacts.
@@ -76,6 +89,11 @@ impl ContactFollower {
         self.last.clone().map(Found)
     }
 
+    /// Derivatives of the readings by the parameters of what is followed (V).
+    pub fn slopes_v(&self) -> &[Vec<f64>] {
+        self.last.as_ref().map_or(&[], |last| last.fit.slopes_v())
+    }
+
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
         let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
@@ -85,16 +103,16 @@ impl ContactFollower {
         };
         self.is_stale = false;
         let Some(found) = self.finder.without_weak(moved, target) else { return false };
-        self.mean += NEWEST * (found.fit.cost - self.mean);
-        let has_risen = self.mean > (1.0 + RISE) * self.searched.max(self.finder.freedom(&found.fit, target));
-        let search = found.fit.cost > self.enough(target) || has_risen;
+        let search = found.fit.cost > self.enough(&found.fit, target) || target.frames >= MORE * self.searched.frames;
         self.last = Some(found);
         search
     }
 
     /// Takes what a search has found, if it explains this frame better than what is followed; whether the search has to be repeated, because
     /// what it has found does not explain this frame as well as its own.
-    pub fn adopt(&mut self, found: Option<Found>, target: &Target) -> bool {
+    pub fn adopt(&mut self, lead: Lead, target: &Target) -> bool {
+        let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
+        let found = lead.known.into_contacts();
         let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
         let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
         let evidence = |found: &Option<Explanation>| {
@@ -105,19 +123,21 @@ impl ContactFollower {
             (self.last, self.is_stale) = (caught_up, false);
         }
         let Some(last) = &self.last else { return self.finder.stands_out(target) };
-        (self.searched, self.mean) = (left.max(self.finder.freedom(&last.fit, target)), last.fit.cost);
-        last.fit.cost > self.enough(target)
+        self.searched = Searched { excess: (left - self.finder.freedom(&last.fit, target)).max(0.0), frames };
+        last.fit.cost > self.enough(&last.fit, target)
     }
 
-    /// Sum of squares up to which what is followed explains a frame.
-    fn enough(&self, target: &Target) -> f64 {
-        (WORSE * self.searched).max(target.count() as f64)
+    /// Sum of squares up to which what is followed explains the mean of some frames: what is not noise stands out by their number.
+    fn enough(&self, fit: &DiscFit, target: &Target) -> f64 {
+        let more = target.frames as f64 / self.searched.frames.max(1) as f64;
+        WORSE * (self.finder.freedom(fit, target) + more * self.searched.excess)
     }
 
-    /// What is left of a frame: root mean square, in standard deviations of the noise.
-    pub fn residual(&self, target: &Target) -> Option<f64> {
-        let found = self.last.as_ref();
-        found.map_or_else(|| self.finder.nothing(target), |found| self.finder.solution(found, target)).residual
+    /// What is left of one frame: root mean square, in standard deviations of the noise.
+    pub fn residual(&self, readings: &Readings) -> Result<Option<f64>, SolveError> {
+        let target = self.finder.target(readings)?;
+        let Some(last) = &self.last else { return Ok(self.finder.nothing(&target).residual) };
+        Ok(Some(self.finder.residual(&last.fit, target.cost(&last.fit.volts), &target)))
     }
 
     /// Numbers contacts on from those that were found before.
@@ -136,7 +156,7 @@ impl ContactFollower {
 
     /// Follows nothing for a time, and keeps the numbers of contacts.
     pub fn let_go(&mut self) {
-        (self.last, self.searched, self.mean, self.is_stale) = (None, 0.0, 0.0, false);
+        (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
     }
 
     /// Forgets all.
@@ -146,29 +166,40 @@ impl ContactFollower {
     }
 }
 
-impl Follower for ContactFollower {
+impl FrameFollower {
+    fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
+        self.contacts.finder.target_of(&self.still.mean_or(readings))
+    }
+}
+
+impl Follower for FrameFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
-        let target = self.finder.target(readings)?;
-        let search = ContactFollower::follow(self, &target);
-        Ok(Followed { solution: self.solution(&target), search })
+        self.contacts.finder.check(readings)?;
+        self.still.add_beside(readings.volts(), self.contacts.slopes_v());
+        let target = self.target(readings)?;
+        let search = self.contacts.follow(&target);
+        Ok(Followed { solution: self.contacts.solution(&target), search })
     }
 
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
-        let target = self.finder.target(readings)?;
-        let search = ContactFollower::adopt(self, lead.into_contacts(), &target);
-        Ok(Followed { solution: self.solution(&target), search })
+        self.contacts.finder.check(readings)?;
+        self.still.add_if_new(readings.volts(), self.contacts.slopes_v());
+        let target = self.target(readings)?;
+        let search = self.contacts.adopt(lead, &target);
+        Ok(Followed { solution: self.contacts.solution(&target), search })
     }
 
     fn lead(&self) -> Lead {
-        Lead::of_contacts(self.found())
+        Lead::of_contacts(self.contacts.found(), self.still.mean())
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {
-        ContactFollower::inherit(self, before);
+        self.contacts.inherit(before);
     }
 
     fn reset(&mut self) {
-        ContactFollower::reset(self);
+        self.still.reset();
+        self.contacts.reset();
     }
 }
 
@@ -178,16 +209,17 @@ impl ContactSearcher {
         Self { finder }
     }
 
-    /// The contacts that explain the readings, and the solution that they are; `None` if nothing touches. Better ones on the way there go
+    /// The contacts that explain the mean of some frames, and the solution that they are; `None` if nothing touches. Better ones on the way there go
     /// to `found`.
     pub fn contacts(
         &self,
         from: Option<Found>,
-        readings: &Readings,
+        mean: &Mean,
         found: &mut dyn FnMut(Lead),
     ) -> Result<Option<(Found, Solution)>, SolveError> {
-        let target = self.finder.target(readings)?;
-        let mut better = |better: &Explanation| found(Lead::of_contacts(Some(Found(better.clone()))));
+        let target = self.finder.target_of(mean)?;
+        let mut better =
+            |better: &Explanation| found(Lead::of_contacts(Some(Found(better.clone())), Some(mean.clone())));
         let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
         Ok(found.map(|found| {
             let solution = self.finder.solution(&found, &target);
@@ -198,7 +230,9 @@ impl ContactSearcher {
 
 impl Searcher for ContactSearcher {
     fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
-        Ok(Lead::of_contacts(self.contacts(from.into_contacts(), readings, found)?.map(|(found, _)| found)))
+        let mean = from.mean_or(readings);
+        let found = self.contacts(from.known.into_contacts(), &mean, found)?.map(|(found, _)| found);
+        Ok(Lead::of_contacts(found, Some(mean)))
     }
 }
 
@@ -208,7 +242,7 @@ impl Solver for Contacts {
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        let mut searcher = ContactSearcher::new(Arc::clone(&self.follower.finder));
+        let mut searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
         follow_and_search(&mut self.follower, &mut searcher, readings)
     }
 
@@ -217,7 +251,7 @@ impl Solver for Contacts {
     }
 
     fn split(self: Box<Self>) -> Parts {
-        let searcher = ContactSearcher::new(Arc::clone(&self.follower.finder));
+        let searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
         Parts { follower: Box::new(self.follower), searcher: Some(Box::new(searcher)) }
     }
 }

@@ -13,6 +13,8 @@ use tactomo_physics::readings::Readings;
 pub(super) struct Errors {
     /// Standard deviation by noise (V).
     pub noise_v: f64,
+    /// The part of it that is the same in every frame (V).
+    pub rounding_v: f64,
     /// Error of the model, as a share of the largest reading.
     pub model: f64,
     /// Error of a pad's own impedance, as a share of it.
@@ -23,10 +25,22 @@ pub(super) struct Errors {
     pub full_v: f64,
 }
 
+impl Errors {
+    /// Standard deviation of the mean of some frames by noise (V).
+    fn of_mean_v(&self, frames: usize) -> f64 {
+        let [all, fixed] = [self.noise_v, self.rounding_v].map(|deviation_v| deviation_v * deviation_v);
+        (fixed + (all - fixed).max(0.0) / frames.max(1) as f64).sqrt()
+    }
+}
+
 /// Readings with what their errors are like.
 #[derive(Clone, Debug)]
 pub(in crate::solve) struct Target {
     electrodes: usize,
+    /// Frames that the readings are the mean of.
+    pub(super) frames: usize,
+    /// Standard deviation of the readings by noise (V).
+    pub(super) noise_v: f64,
     /// Readings, less what spots cannot say (V).
     pub(super) volts: Vec<f64>,
     /// One over the standard deviation of each (1/V); zero leaves a reading out.
@@ -38,8 +52,14 @@ pub(in crate::solve) struct Target {
 impl Target {
     /// The target of some readings.
     pub(super) fn new(readings: &Readings, errors: &Errors) -> Self {
+        Self::of_mean(readings, 1, errors)
+    }
+
+    /// The target of the mean of some frames. Their noise averages; the errors of the model and of the pads do not.
+    pub(super) fn of_mean(readings: &Readings, frames: usize, errors: &Errors) -> Self {
         let electrodes = readings.electrodes();
-        let deviation_v = errors.noise_v.hypot(errors.model * readings.largest_v());
+        let noise_v = errors.of_mean_v(frames);
+        let deviation_v = noise_v.hypot(errors.model * readings.largest_v());
         let weight = |volts: &f64| if *volts < errors.full_v { 1.0 / deviation_v } else { 0.0 };
         let weights: Vec<_> = readings.volts().iter().map(weight).collect();
         let mut loads = Vec::with_capacity(weights.len());
@@ -48,7 +68,7 @@ impl Target {
         {
             loads.extend(load_pattern(g, row, weights, errors));
         }
-        Self { electrodes, volts: readings.volts().to_vec(), weights, loads }
+        Self { electrodes, frames, noise_v, volts: readings.volts().to_vec(), weights, loads }
     }
 
     /// Makes the errors of volts alike, independent and of deviation one.
@@ -122,7 +142,7 @@ fn load_pattern(g: usize, row: &[f64], weights: &[f64], errors: &Errors) -> Vec<
 }
 
 /// Scalar product, in four sums for the processor to do at once.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(in crate::solve) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a_lanes, a_rest) = a.as_chunks::<4>();
     let (b_lanes, b_rest) = b.as_chunks::<4>();
     let mut sums = [0.0; 4];
