@@ -45,6 +45,14 @@ impl Through {
     fn seen(&self, impedance_ohm: &DMatrix<f64>) -> DMatrix<f64> {
         square(&Exchanges::new(impedance_ohm, &self.joints).applied(impedance_ohm), &self.kept)
     }
+
+    fn seen_fields(&self, all: &ContactFields) -> ContactFields {
+        let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);
+        ContactFields {
+            impedance_ohm: self.seen(&all.impedance_ohm),
+            nodes_ohm: nodes_ohm.select_columns(&self.kept),
+        }
+    }
 }
 
 impl ForwardModel for Through {
@@ -61,12 +69,11 @@ impl ForwardModel for Through {
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
-        let all = self.model.image_fields(image_s)?;
-        let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);
-        Ok(ContactFields {
-            impedance_ohm: self.seen(&all.impedance_ohm),
-            nodes_ohm: nodes_ohm.select_columns(&self.kept),
-        })
+        Ok(self.seen_fields(&self.model.image_fields(image_s)?))
+    }
+
+    fn touched_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
+        Ok(self.seen_fields(&self.model.touched_fields(image_s)?))
     }
 
     fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {

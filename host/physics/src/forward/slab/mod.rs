@@ -274,6 +274,12 @@ impl ForwardModel for Slab {
         self.touched(image_s)?.1.impedance_ohm().ok_or(ForwardError::NoContact)
     }
 
+    fn touched_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
+        let (touched, system) = self.touched(image_s)?;
+        let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
+        system.fields(&conductance_s).ok_or(ForwardError::NoContact)
+    }
+
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {
         Ok(Box::new(self.clone().on_image(nodes)))
     }
