@@ -48,10 +48,7 @@ impl Through {
 
     fn seen_fields(&self, all: &ContactFields) -> ContactFields {
         let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);
-        ContactFields {
-            impedance_ohm: self.seen(&all.impedance_ohm),
-            nodes_ohm: nodes_ohm.select_columns(&self.kept),
-        }
+        ContactFields { impedance_ohm: self.seen(&all.impedance_ohm), nodes_ohm: nodes_ohm.select_columns(&self.kept) }
     }
 }
 

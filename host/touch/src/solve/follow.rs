@@ -5,6 +5,7 @@
 
 use super::contacts::Found;
 use super::nonlinear::Descent;
+use super::shapes::StripFit;
 use super::{FoundContact, Solution, SolveError, Solver};
 use tactomo_physics::readings::Readings;
 
@@ -71,32 +72,31 @@ impl Parts {
 
 /// What a frame was explained by, for another frame to go on from.
 #[derive(Clone, Debug, Default)]
-pub struct Lead(pub(super) Known);
+pub struct Lead {
+    /// Contacts: the answer, or what is kept beside it.
+    pub(super) contacts: Option<Box<Found>>,
+    /// What explains the frame better than they do, and why it is believed.
+    pub(super) whole: Option<(Whole, String)>,
+}
 
-/// What is known of a scene.
-#[derive(Clone, Debug, Default)]
-pub(super) enum Known {
-    /// No contact.
-    #[default]
-    Nothing,
-    /// Contacts.
-    Contacts(Box<Found>),
-    /// An image, and why it is not contacts.
-    Image(Box<Descent>, String),
+/// What touches as one, rather than as contacts.
+#[derive(Clone, Debug)]
+pub(super) enum Whole {
+    /// A line or a ring.
+    Shape(Box<StripFit>),
+    /// An image.
+    Image(Box<Descent>),
 }
 
 impl Lead {
     /// Contacts, or nothing.
     pub(super) fn of_contacts(found: Option<Found>) -> Self {
-        Self(found.map_or(Known::Nothing, |found| Known::Contacts(Box::new(found))))
+        Self { contacts: found.map(Box::new), whole: None }
     }
 
-    /// The contacts, if it is contacts.
+    /// The contacts, as an answer or beside it.
     pub(super) fn into_contacts(self) -> Option<Found> {
-        match self.0 {
-            Known::Contacts(found) => Some(*found),
-            Known::Nothing | Known::Image(..) => None,
-        }
+        self.contacts.map(|found| *found)
     }
 }
 

@@ -26,9 +26,12 @@ use self::fit::Fit;
 use self::network::{FitSpot, Network};
 use self::radii::Radii;
 use self::scan::Scan;
+pub(super) use self::search::WORTH as PRICE;
 pub use self::solver::Contacts;
 pub(super) use self::solver::{ContactFollower, ContactSearcher};
-use self::target::{Errors, Target};
+use self::target::Errors;
+pub(super) use self::target::Target;
+use super::evidence::{Evidence, misfit_limit};
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::forward::spots::SpotFields;
@@ -41,8 +44,6 @@ const SCAN_PLACES: usize = 600;
 const MOST_CONDUCTANCE: f64 = 300.0;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
 const FULL: f64 = 0.995;
-/// Mean square of what is left, in what noise and model error make, above which the readings do not fit.
-const MISFIT: f64 = 3.0;
 
 /// How contacts are fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +86,13 @@ pub(super) struct ContactFinder {
 #[derive(Clone, Debug)]
 pub(super) struct Found(Explanation);
 
+impl Found {
+    /// What they leave of the frame, and what they take for that.
+    pub fn evidence(&self) -> Evidence {
+        self.0.evidence()
+    }
+}
+
 /// Contacts that explain a frame.
 #[derive(Clone, Debug)]
 enum Explanation {
@@ -109,6 +117,10 @@ impl Explanation {
             Self::Spots(fit, ..) => 3 * fit.spots.len(),
             Self::Discs(fit) => discs::PARAMETERS * fit.contacts.len(),
         }
+    }
+
+    fn evidence(&self) -> Evidence {
+        Evidence { cost: self.cost(), parameters: self.parameters() as f64 }
     }
 
     fn is_settled(&self) -> bool {
@@ -206,7 +218,7 @@ impl ContactFinder {
         let is_perfect = |contact: &FoundContact| contact.conductance_s > 0.9 * self.most_s();
         let flags = Flags {
             saturated: target.is_saturated() || contacts.iter().any(is_perfect),
-            misfit: left > MISFIT,
+            misfit: left > misfit_limit(self.freedom(found, target)),
             unfinished: !found.is_settled(),
             excluded: Vec::new(),
         };

@@ -30,7 +30,7 @@ const WARM_DISC_STEPS: usize = 3;
 const STARTS: usize = 3;
 /// By how much each parameter has to lower the sum of squares: the Bayesian information criterion for 256 readings asks for
 /// 5.5; this leaves room for the many places that are looked at.
-const WORTH: f64 = 7.0;
+pub(in crate::solve) const WORTH: f64 = 7.0;
 /// The same for there being any contact at all.
 pub(super) const WORTH_FIRST: f64 = 60.0;
 /// Starts around a single contact, and the cost over its, or over what noise makes, up to which a minimum there is looked at.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::search::{WORSE, WORTH_FIRST, score};
 use super::{ContactFinder, ContactSettings, Explanation, Found, Target};
+use crate::solve::evidence::Evidence;
 use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search};
 use crate::solve::track::Tracker;
 use crate::solve::{FoundContact, Problem, Solution, SolveError, Solver};
@@ -117,10 +118,10 @@ impl ContactFollower {
         (WORSE * self.searched).max(target.count() as f64)
     }
 
-    /// What is left of a frame: root mean square, in standard deviations of the noise.
-    pub fn residual(&self, target: &Target) -> Option<f64> {
-        let found = self.last.as_ref();
-        found.map_or_else(|| self.finder.nothing(target), |found| self.finder.solution(found, target)).residual
+    /// What is left of the frame that was followed last, and what that takes; of nothing, all of it.
+    pub fn evidence(&self, target: &Target) -> Evidence {
+        let nothing = || Evidence { cost: target.cost(&vec![0.0; target.volts.len()]), parameters: 0.0 };
+        self.last.as_ref().map_or_else(nothing, Explanation::evidence)
     }
 
     /// Numbers contacts on from those that were found before.

@@ -7,7 +7,7 @@
 //! ratio of the gain to that foretold, Nielsen, "Damping parameter in Marquardt's method", 1999). Nodes whose conductance
 //! vanishes drop out, and come back where the sum would fall with more: so a step costs what the touched surface costs.
 
-use faer::linalg::solvers::Solve;
+use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, MatRef, Side};
 use nalgebra::{DMatrix, DVector};
 
@@ -86,6 +86,11 @@ impl Scene {
 }
 
 impl Descent {
+    /// How many numbers the readings say of the image: the trace of `A (A' A + s)^-1 A'`, what the prior leaves of as many unknowns.
+    pub(super) fn determined(&self, scene: &Scene, target: &Target) -> f64 {
+        Linear::new(scene, target, &self.image).determined()
+    }
+
     /// Begins at an image.
     pub(super) fn new(image: Image) -> Self {
         Self { image, damping: None, settled: false, begun: f64::INFINITY }
@@ -175,6 +180,15 @@ impl Linear {
     fn first_damping(&self) -> f64 {
         let largest = self.derivatives.column_iter().map(|column| column.norm_squared()).fold(0.0, f64::max);
         FIRST_DAMPING * largest
+    }
+
+    fn determined(&self) -> f64 {
+        let mut matrix = self.squares.clone();
+        let size = matrix.nrows();
+        (0..size).for_each(|i| matrix[(i, i)] += self.sparsity);
+        let Ok(factor) = matrix.llt(Side::Lower) else { return size as f64 };
+        let inverse = factor.inverse();
+        size as f64 - self.sparsity * (0..size).map(|i| inverse[(i, i)]).sum::<f64>()
     }
 
     /// `(A' A + (s + d))^-1` times the pull, in the smaller of both spaces.
