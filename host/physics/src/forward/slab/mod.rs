@@ -176,7 +176,7 @@ impl Slab {
         let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
         let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
         let cross = self.image.fields_ohm.select_rows(&touched);
-        let patches = self.cells().between(&touched, &touched);
+        let patches = self.cells().within(&touched);
         Ok((touched, conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)))
     }
 

@@ -169,6 +169,8 @@ impl Follower for AutoFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         let target = self.target(readings)?;
         if !matches!(self.answer, Answer::Contacts) && self.image.is_rest(readings) {
+            // The contacts beside it explain nothing of that.
+            self.contacts.iter_mut().for_each(ContactFollower::let_go);
             self.take(Answer::Contacts);
         }
         let whole = match (self.answer.clone(), &target) {

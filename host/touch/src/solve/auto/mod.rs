@@ -17,6 +17,7 @@ use self::searcher::AutoSearcher;
 use super::contacts::{ContactFinder, ContactFollower, ContactSearcher, Target};
 use super::evidence::Evidence;
 use super::follow::{Follower, Parts, follow_and_search};
+use super::nonlinear::Complexity;
 use super::shapes::{ShapeFinder, ShapeFollower};
 use super::{ContactSettings, Nonlinear, NonlinearSettings, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
@@ -36,14 +37,17 @@ impl Auto {
     pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
         // A model without fields of single contacts has images only.
         let contacts = ContactFinder::new(problem, ContactSettings::of(problem)).ok().map(Arc::new);
-        let shapes = contacts.as_ref().and_then(|_| ShapeFinder::new(problem)).map(Arc::new);
+        let shapes = match contacts {
+            Some(_) => ShapeFinder::new(problem)?.map(Arc::new),
+            None => None,
+        };
         let image = Nonlinear::new(problem, NonlinearSettings::default())?;
         let follower = AutoFollower::new(
             contacts.clone().map(ContactFollower::new),
             shapes.clone().map(ShapeFollower::new),
             image.clone(),
         );
-        let searcher = AutoSearcher::new(contacts, shapes, image);
+        let searcher = AutoSearcher::new(contacts, shapes, image, problem.detector().adc.deviation_v());
         Ok(Self { follower, searcher })
     }
 }
@@ -70,5 +74,8 @@ impl Solver for Auto {
 /// What an image leaves of a frame, by the errors that contacts are judged by; `None` without an image.
 fn image_evidence(image: &Nonlinear, readings: &Readings, target: &Target) -> Result<Option<Evidence>, SolveError> {
     let explains = image.explains(readings)?;
-    Ok(explains.map(|(volts, parameters)| Evidence { cost: target.cost(&volts), parameters }))
+    Ok(explains.map(|(volts, Complexity { determined, price })| {
+        let cost = target.cost(&volts);
+        Evidence { cost, price, parameters: determined }
+    }))
 }

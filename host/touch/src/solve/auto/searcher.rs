@@ -11,7 +11,7 @@ use crate::solve::follow::{Lead, Searcher, Whole};
 use crate::solve::shapes::StripFit;
 use tactomo_physics::readings::Readings;
 
-/// As many contacts may stand for a line or a ring.
+/// So many contacts may stand for something else, if they leave more than noise does.
 const SUSPICIOUS: usize = 3;
 
 /// Chooses the model.
@@ -19,11 +19,17 @@ pub(super) struct AutoSearcher {
     finder: Option<Arc<ContactFinder>>,
     shapes: Option<Arc<ShapeFinder>>,
     image: Nonlinear,
+    noise_v: f64,
 }
 
 impl AutoSearcher {
-    pub fn new(finder: Option<Arc<ContactFinder>>, shapes: Option<Arc<ShapeFinder>>, image: Nonlinear) -> Self {
-        Self { finder, shapes, image }
+    pub fn new(
+        finder: Option<Arc<ContactFinder>>,
+        shapes: Option<Arc<ShapeFinder>>,
+        image: Nonlinear,
+        noise_v: f64,
+    ) -> Self {
+        Self { finder, shapes, image, noise_v }
     }
 
     pub fn reset(&mut self) {
@@ -42,9 +48,9 @@ impl AutoSearcher {
             Some((Whole::Shape(fit), _)) => Some(&**fit),
             _ => None,
         };
-        let may_be = solution.contacts.len() >= SUSPICIOUS || evidence.is_misfit(target.count()) || from.is_some();
-        let shapes = self.shapes.as_ref().filter(|_| may_be)?;
-        let shape = shapes.search(&solution.contacts, from, target)?;
+        let shapes = self.shapes.as_ref()?;
+        let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
+        let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
         (shape.evidence().score() < evidence.score()).then_some(shape)
     }
 
@@ -78,7 +84,9 @@ impl AutoSearcher {
         let shape = self.shape((solution, contacts.evidence()), from.as_ref(), target);
         let best = shape.as_ref().map_or_else(|| contacts.evidence(), StripFit::evidence);
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
-        if !best.is_misfit(target.count()) {
+        let noise_share = (self.noise_v / target.deviation_v()).powi(2);
+        let is_doubtful = solution.contacts.len() >= SUSPICIOUS && best.may_be_better(noise_share, target.count());
+        if !(is_doubtful || best.is_misfit(target.count())) {
             return Ok(shape);
         }
         let image = self.image(from, readings)?;

@@ -1,11 +1,13 @@
 //! Tests of the choice between contacts, shapes and images.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::*;
 use crate::solve::follow::Lead;
 use crate::solve::{FoundContact, Solution};
 use tactomo_physics::detector::Detector;
-use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
-use tactomo_physics::scene::Contact;
+use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v, touched_impedance_ohm};
+use tactomo_physics::scene::{Contact, Shape, Touch};
 use tactomo_physics::simulate::{Noise, measured};
 
 struct Bench {
@@ -21,7 +23,7 @@ impl Bench {
         detector.adc.noise_lsb = 1.5;
         let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
         let auto = Auto::new(&Problem::new(slab)).unwrap();
-        let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap().on_image(900);
+        let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap().on_image(3000);
         Self { detector, fine, auto, noise: Noise::new(11) }
     }
 
@@ -39,13 +41,24 @@ impl Bench {
         measured(&exact, &self.detector.adc, &mut self.noise)
     }
 
-    /// Readings of a frame all around: nothing that a few discs can be.
-    fn frame_around(&mut self) -> Readings {
-        let nodes = &self.fine.image_mesh().nodes_m;
-        let ring: Vec<_> =
-            nodes.iter().map(|[x, y]| f64::from(u8::from((x.hypot(*y) - 0.018).abs() < 0.002)) * 2e-4).collect();
-        let exact = readings_v(&self.fine.image_impedance_ohm(&ring).unwrap(), &self.detector);
+    /// Readings of shapes at places (m), of conductances in sheet conductances.
+    fn shaped(&mut self, shapes: &[([f64; 2], Shape, f64)]) -> Readings {
+        let sheet_s = self.detector.sheet_conductance_s();
+        let touch =
+            |(at_m, shape, sheets): &([f64; 2], Shape, f64)| Touch::flat(*at_m, shape.clone(), sheets * sheet_s);
+        let touches: Vec<_> = shapes.iter().map(touch).collect();
+        let exact = readings_v(&touched_impedance_ohm(&self.fine, &touches).unwrap(), &self.detector);
         measured(&exact, &self.detector.adc, &mut self.noise)
+    }
+
+    /// The frame of a square: no line, no ring, no few discs.
+    fn frame(&mut self) -> Readings {
+        let side = |turn: u8| {
+            let angle_rad = 0.2 + f64::from(turn) * FRAC_PI_2;
+            let (sin, cos) = angle_rad.sin_cos();
+            ([-0.018 * sin, 0.018 * cos], Shape::Line { length_m: 0.036, width_m: 0.003, angle_rad }, 1.0)
+        };
+        self.shaped(&[side(0), side(1), side(2), side(3)])
     }
 
     fn problem(&self) -> Problem {
@@ -68,9 +81,10 @@ fn it_takes_no_more_than_the_scene_needs() {
     assert_eq!((what(&one), one.contacts.len()), ("1 contact", 1));
     let two = bench.touched(&[a, b]);
     assert_eq!((what(&two), two.contacts.len()), ("2 contacts", 2));
-    let around = bench.frame_around();
-    let image = bench.auto.solve(&around).unwrap();
+    let frame = bench.frame();
+    let image = bench.auto.solve(&frame).unwrap();
     assert_eq!((what(&image), image.image_s_per_m2.is_some()), ("image", true), "{:?}", image.choice);
+    assert!(image.shape.is_none() && image.contacts.len() > 2, "contacts are kept beside it: {image:?}");
     let again = bench.touched(&[a]);
     assert_eq!(what(&again), "1 contact", "the image no longer explains anything");
 }
@@ -128,14 +142,58 @@ fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
     let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
     let mut searcher = searcher.unwrap();
     let a = [Contact::flat(0.01, 0.004, 0.0025, 3e-4)];
-    let frame_around = bench.frame_around();
-    let image = searcher.search(Lead::default(), &frame_around, &mut |_| {}).unwrap();
+    let frame = bench.frame();
+    let image = searcher.search(Lead::default(), &frame, &mut |_| {}).unwrap();
     let contact = searcher.search(Lead::default(), &bench.measured(&a), &mut |_| {}).unwrap();
     follower.adopt(contact.clone(), &bench.measured(&a)).unwrap();
     let kept = follower.adopt(image.clone(), &bench.measured(&a)).unwrap();
     assert_eq!(what(&kept.solution), "1 contact");
     follower.reset();
-    follower.adopt(image, &frame_around).unwrap();
-    let kept = follower.adopt(contact, &frame_around).unwrap();
+    follower.adopt(image, &frame).unwrap();
+    let kept = follower.adopt(contact, &frame).unwrap();
     assert_eq!(what(&kept.solution), "image");
+}
+
+#[test]
+fn shapes_are_shapes_with_contacts_beside_them() {
+    let mut bench = Bench::new();
+    let line = Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 };
+    let ring = Shape::Ring { radius_m: 0.013, width_m: 0.003 };
+    for (shape, name) in [(line, "line"), (ring, "ring")] {
+        let readings = bench.shaped(&[([0.002, -0.003], shape.clone(), 1.5)]);
+        let solution = bench.auto.solve(&readings).unwrap();
+        assert_eq!(what(&solution), name);
+        assert_eq!(solution.shape.map(|shape| shape.name()), Some(name));
+        assert!(!solution.flags.misfit && solution.contacts.len() > 1 && !solution.is_contacts(), "{solution:?}");
+        let ids: Vec<_> = solution.contacts.iter().map(|contact| contact.id).collect();
+        let readings = bench.shaped(&[([0.002, -0.003], shape, 1.5)]);
+        let next = bench.auto.solve(&readings).unwrap();
+        assert_eq!((what(&next), next.contacts.iter().map(|contact| contact.id).collect::<Vec<_>>()), (name, ids));
+    }
+    let one = bench.touched(&[Contact::flat(0.01, 0.004, 0.0025, 3e-4)]);
+    assert_eq!((what(&one), one.shape, one.image_s_per_m2.is_none()), ("1 contact", None, true));
+    let readings = bench.shaped(&[([0.002, -0.003], Shape::Ring { radius_m: 0.013, width_m: 0.003 }, 1.5)]);
+    assert_eq!(what(&bench.auto.solve(&readings).unwrap()), "ring");
+    let gone = bench.solve(&Readings::from_fn(16, |_, _| 0.0));
+    assert_eq!((what(&gone), gone.contacts.len()), ("nothing", 0));
+}
+
+#[test]
+fn a_shape_and_contacts_of_the_past_do_not_replace_each_other() {
+    let mut bench = Bench::new();
+    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut searcher = searcher.unwrap();
+    let pair = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
+    let bar = [([0.002, -0.003], Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 }, 1.5)];
+    let line = searcher.search(Lead::default(), &bench.shaped(&bar), &mut |_| {}).unwrap();
+    let contacts = searcher.search(Lead::default(), &bench.measured(&pair), &mut |_| {}).unwrap();
+    follower.adopt(contacts.clone(), &bench.measured(&pair)).unwrap();
+    let kept = follower.adopt(line.clone(), &bench.measured(&pair)).unwrap();
+    assert!(kept.solution.is_contacts() && !kept.search, "{kept:?}");
+    follower.reset();
+    follower.adopt(line, &bench.shaped(&bar)).unwrap();
+    let kept = follower.adopt(contacts, &bench.shaped(&bar)).unwrap();
+    assert_eq!((what(&kept.solution), kept.search), ("line", false));
+    let lifted = follower.follow(&bench.measured(&pair)).unwrap();
+    assert!(lifted.search, "two fingers are no bar");
 }

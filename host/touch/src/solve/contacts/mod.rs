@@ -120,7 +120,7 @@ impl Explanation {
     }
 
     fn evidence(&self) -> Evidence {
-        Evidence { cost: self.cost(), parameters: self.parameters() as f64 }
+        Evidence::of(self.cost(), self.parameters())
     }
 
     fn is_settled(&self) -> bool {

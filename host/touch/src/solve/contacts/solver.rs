@@ -120,7 +120,7 @@ impl ContactFollower {
 
     /// What is left of the frame that was followed last, and what that takes; of nothing, all of it.
     pub fn evidence(&self, target: &Target) -> Evidence {
-        let nothing = || Evidence { cost: target.cost(&vec![0.0; target.volts.len()]), parameters: 0.0 };
+        let nothing = || Evidence::of(target.cost(&vec![0.0; target.volts.len()]), 0);
         self.last.as_ref().map_or_else(nothing, Explanation::evidence)
     }
 

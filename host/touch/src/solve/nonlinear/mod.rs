@@ -11,8 +11,8 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-pub(super) use self::descent::Descent;
 use self::descent::Scene;
+pub(super) use self::descent::{Complexity, Descent};
 use super::evidence::misfit_limit;
 use super::interpolate::Interpolation;
 use super::locate::Locator;
@@ -233,13 +233,13 @@ impl Nonlinear {
         self.last.as_ref()
     }
 
-    /// What the image that is followed makes of the readings (V), and how many numbers they say of it.
-    pub(super) fn explains(&self, readings: &Readings) -> Result<Option<(Vec<f64>, f64)>, SolveError> {
+    /// What the image that is followed makes of the readings (V), and how much it says.
+    pub(super) fn explains(&self, readings: &Readings) -> Result<Option<(Vec<f64>, Complexity)>, SolveError> {
         let target = self.shared.checked(readings)?;
         let scene = &self.shared.scene;
         Ok(self.last.as_ref().map(|descent| {
             let volts = readings_v(&descent.image.fields.impedance_ohm, &scene.detector).volts().to_vec();
-            (volts, descent.determined(scene, &target))
+            (volts, descent.complexity(scene, &target))
         }))
     }
 

@@ -17,13 +17,13 @@ pub enum FoundShape {
 /// A straight strip of contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundLine {
-    /// One end (m), on the strip's middle line.
+    /// One end (m), on the strip's middle line; where it crosses an edge of the detector, that place.
     pub from_m: Point,
     /// The other one (m).
     pub to_m: Point,
     /// Width (m).
     pub width_m: f64,
-    /// Conductance of all of it (S); a part beyond an edge of the detector touches nothing.
+    /// Conductance of what of it is on the detector (S).
     pub conductance_s: f64,
     /// Standard errors, if they are known.
     pub uncertainty: Option<LineUncertainty>,
@@ -51,7 +51,7 @@ pub struct FoundRing {
     pub radius_m: f64,
     /// Width (m).
     pub width_m: f64,
-    /// Conductance of all of it (S); a part beyond an edge of the detector touches nothing.
+    /// Conductance of what of it is on the detector (S).
     pub conductance_s: f64,
     /// Standard errors, if they are known.
     pub uncertainty: Option<RingUncertainty>,
@@ -86,7 +86,7 @@ impl FoundShape {
         }
     }
 
-    /// Conductance of all of it (S).
+    /// Conductance of what of it is on the detector (S).
     pub fn conductance_s(&self) -> f64 {
         match self {
             Self::Line(line) => line.conductance_s,

@@ -73,10 +73,14 @@ impl Cloud {
     }
 }
 
-/// Strips of a usual width that contacts may stand for.
+/// Strips of a usual width that contacts may stand for: two of them for a line, one for a ring, more for both.
 pub(super) fn starts(contacts: &[FoundContact], usual_width_m: f64, most_s: f64) -> Vec<Strip> {
     let Some(cloud) = Cloud::of(contacts, 0.5 * usual_width_m, most_s) else { return Vec::new() };
-    let mut courses = vec![cloud.line(), cloud.ring()];
+    let mut courses = match contacts.len() {
+        1 => vec![cloud.ring()],
+        2 => vec![cloud.line()],
+        _ => vec![cloud.line(), cloud.ring()],
+    };
     if contacts.len() > 2
         && let Some(circle) = cloud.circle()
         && are_apart(&cloud.ring(), &circle)

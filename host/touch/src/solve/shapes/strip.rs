@@ -56,6 +56,22 @@ impl Course {
         }
     }
 
+    /// What of a line is within a box of these corners; a circle is all of it.
+    pub fn within(&self, [low, high]: [Point; 2]) -> Self {
+        let Self::Line([from, to]) = *self else { return *self };
+        // Shares of the line at which it enters and leaves the box.
+        let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
+        for axis in 0..2 {
+            let along = to[axis] - from[axis];
+            if along != 0.0 {
+                let [a, b] = [low, high].map(|corner| (corner[axis] - from[axis]) / along);
+                (enters, leaves) = (enters.max(a.min(b)), leaves.min(a.max(b)));
+            }
+        }
+        let at = |share: f64| [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+        if enters < leaves { Self::Line([at(enters), at(leaves)]) } else { *self }
+    }
+
     /// Distance of a place from it (m), a line's ends moved inwards by `inset_m`.
     fn distance_m(&self, at: Point, inset_m: f64) -> f64 {
         match self {
@@ -70,6 +86,11 @@ impl Course {
 }
 
 impl Strip {
+    /// Whether it goes along a line.
+    pub fn is_line(&self) -> bool {
+        matches!(self.course, Course::Line(_))
+    }
+
     /// Where its parameters are.
     pub(super) fn layout(&self) -> Layout {
         match self.course {
@@ -202,6 +223,16 @@ mod tests {
             let breadth_m = (12.0 * (squares / total_s + cell_m2)).sqrt();
             assert!((breadth_m / strip.width_m - 1.0).abs() < 0.12, "{breadth_m} of {strip:?}");
         }
+    }
+
+    #[test]
+    fn lines_end_at_the_edges() {
+        let bounds_m = [[-0.03, -0.02], [0.03, 0.02]];
+        let line = Course::Line([[-0.05, 0.0], [0.01, 0.03]]);
+        let Course::Line([from, to]) = line.within(bounds_m) else { panic!("{line:?}") };
+        assert!(geometry::distance(from, [-0.03, 0.01]) < 1e-12 && geometry::distance(to, [-0.01, 0.02]) < 1e-12);
+        let inside = Course::Line([[-0.01, 0.0], [0.01, 0.01]]);
+        assert_eq!(inside.within(bounds_m), inside);
     }
 
     #[test]
