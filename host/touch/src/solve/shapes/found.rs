@@ -15,7 +15,7 @@ pub enum FoundShape {
 }
 
 /// A straight strip of contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FoundLine {
     /// One end (m), on the strip's middle line; where it crosses an edge of the detector, that place.
     pub from_m: Point,
@@ -43,7 +43,7 @@ pub struct LineUncertainty {
 }
 
 /// A circular strip of contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FoundRing {
     /// Centre (m).
     pub centre_m: Point,
@@ -83,6 +83,14 @@ impl FoundShape {
         match self {
             Self::Line(_) => "line",
             Self::Ring(_) => "ring",
+        }
+    }
+
+    /// Width (m).
+    pub fn width_m(&self) -> f64 {
+        match self {
+            Self::Line(line) => line.width_m,
+            Self::Ring(ring) => ring.width_m,
         }
     }
 
