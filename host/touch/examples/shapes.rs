@@ -1,4 +1,4 @@
-//! How surely lines and rings are told from contacts: `cargo run --release --package tactomo-touch --example shapes [SEED [SCENES]]`.
+//! How surely lines and rings are told from contacts: `cargo run --release --package tactomo-touch --example shapes [SEED [SCENES [CLASS]]]`.
 //!
 //! Random bars, rims and contacts on `square-60`, read by a finer model with 12 bits and 1.5 LSB of noise. For each class: what `auto` takes
 //! them for, from a cold start; how far off ends, centres, radii, widths and conductances of shapes are, and how many of the errors are within
@@ -28,32 +28,28 @@ type Made = Vec<Touch>;
 struct Class {
     name: &'static str,
     make: fn(&mut fastrand::Rng) -> Made,
-    /// What it should be taken for; `None` for contacts.
-    shape: Option<&'static str>,
 }
 
-const CLASSES: [Class; 11] = [
-    Class { name: "line, light", make: |random| line(random, [0.015, 0.045], [0.03, 0.1], 0.0), shape: Some("line") },
-    Class { name: "line, short", make: |random| line(random, [0.015, 0.025], [0.1, 3.0], 0.0), shape: Some("line") },
-    Class { name: "line", make: |random| line(random, [0.025, 0.045], [0.1, 3.0], 0.0), shape: Some("line") },
-    Class {
-        name: "line across an edge",
-        make: |random| line(random, [0.025, 0.045], [0.1, 3.0], 0.3),
-        shape: Some("line"),
-    },
-    Class { name: "ring, light", make: |random| ring(random, [0.03, 0.1], 0.0), shape: Some("ring") },
-    Class { name: "ring", make: |random| ring(random, [0.1, 3.0], 0.0), shape: Some("ring") },
-    Class { name: "ring across an edge", make: |random| ring(random, [0.1, 3.0], 0.3), shape: Some("ring") },
-    Class { name: "1 or 2 contacts", make: |random| contacts(random, 1, 2), shape: None },
-    Class { name: "2 contacts, near", make: |random| row(random, 2), shape: None },
-    Class { name: "3 contacts in a row", make: |random| row(random, 3), shape: None },
-    Class { name: "3 to 5 contacts", make: |random| contacts(random, 3, 5), shape: None },
+const CLASSES: [Class; 12] = [
+    Class { name: "line, 25 - 45 mm", make: |random| line(random, [0.025, 0.045], [0.3, 3.0], 0.0) },
+    Class { name: "line, 15 - 25 mm", make: |random| line(random, [0.015, 0.025], [0.3, 3.0], 0.0) },
+    Class { name: "line, light", make: |random| line(random, [0.025, 0.045], [0.03, 0.3], 0.0) },
+    Class { name: "line across an edge", make: |random| line(random, [0.025, 0.045], [0.3, 3.0], 0.3) },
+    Class { name: "ring, radius 10 - 20 mm", make: |random| ring(random, [0.010, 0.020], [0.3, 3.0], 0.0) },
+    Class { name: "ring, radius 8 - 10 mm", make: |random| ring(random, [0.008, 0.010], [0.3, 3.0], 0.0) },
+    Class { name: "ring, light", make: |random| ring(random, [0.010, 0.020], [0.03, 0.3], 0.0) },
+    Class { name: "ring across an edge", make: |random| ring(random, [0.010, 0.020], [0.3, 3.0], 0.3) },
+    Class { name: "2 contacts, near", make: |random| row(random, 2) },
+    Class { name: "3 contacts in a row", make: |random| row(random, 3) },
+    Class { name: "1 or 2 contacts", make: |random| contacts(random, 1, 2) },
+    Class { name: "3 to 5 contacts", make: |random| contacts(random, 3, 5) },
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let seed: u64 = words.next().map_or(Ok(1), |word| word.parse())?;
     let scenes: usize = words.next().map_or(Ok(SCENES), |word| word.parse())?;
+    let only = words.next().unwrap_or_default();
     let detector = Detector::preset(Detector::DEFAULT).ok_or("no preset")?;
     let problem = Problem::of(&detector)?;
     let fine = finer_model(&detector, &[], seed)?;
@@ -61,7 +57,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| scene | taken for | place, median / p90, mm | width, conductance: median error | within 1 / 2 sigma | correlation, mean / worst | misfit | first frame, next ones, ms |"
     );
     println!("|---|---|---|---|---|---|---|---|");
-    let only = std::env::var("ONLY").unwrap_or_default();
     for class in CLASSES.iter().filter(|class| class.name.contains(&only)) {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut tally = Tally::new(&problem);
@@ -69,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let touches = (class.make)(&mut random);
             tally.add(&touches, &*fine, &problem, random.u64(..))?;
         }
-        println!("| {} | {} |", class.name, tally.row(class.shape));
+        println!("| {} | {} |", class.name, tally.row());
     }
     Ok(())
 }
@@ -97,9 +92,9 @@ fn line(random: &mut fastrand::Rng, lengths_m: [f64; 2], sheets: [f64; 2], beyon
     }
 }
 
-fn ring(random: &mut fastrand::Rng, sheets: [f64; 2], beyond: f64) -> Made {
+fn ring(random: &mut fastrand::Rng, radii_m: [f64; 2], sheets: [f64; 2], beyond: f64) -> Made {
     loop {
-        let radius_m = 0.008 + 0.012 * random.f64();
+        let radius_m = radii_m[0] + (radii_m[1] - radii_m[0]) * random.f64();
         let width_m = log_uniform(random, [0.0015, 0.006]);
         let centre_m = [0, 1].map(|_| 0.05 * (random.f64() - 0.5));
         let touch = Touch::flat(centre_m, Shape::Ring { radius_m, width_m }, sheet_s() * log_uniform(random, sheets));
@@ -233,9 +228,6 @@ impl<'a> Tally<'a> {
         let truth = truth_s_per_m2(mesh, touches)?;
         self.correlations.push(self.comparison.of(&truth, &image).correlation.unwrap_or(0.0));
         self.misfits += usize::from(solution.flags.misfit);
-        if std::env::var_os("SHOW").is_some() {
-            println!("{touches:?}\n   {:?} {:?}", solution.choice, solution.shape);
-        }
         self.note(&solution, touches);
         Ok(())
     }
@@ -289,7 +281,7 @@ impl<'a> Tally<'a> {
         }
     }
 
-    fn row(mut self, _shape: Option<&str>) -> String {
+    fn row(mut self) -> String {
         self.taken_for.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
         let scenes: usize = self.taken_for.iter().map(|(_, count)| count).sum();
         let taken: Vec<_> = self

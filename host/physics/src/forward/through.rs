@@ -206,6 +206,9 @@ mod tests {
         let full = some.image_fields(&image_s)?;
         assert!((&patches.impedance_ohm - &full.impedance_ohm).amax() < 1e-6 * full.impedance_ohm.amax());
         assert!((&patches.nodes_ohm - &full.nodes_ohm).amax() < 1e-6 * full.nodes_ohm.amax());
+        let touched = some.touched_fields(&image_s)?;
+        assert!((&touched.impedance_ohm - &full.impedance_ohm).amax() < 1e-6 * full.impedance_ohm.amax());
+        assert!((&touched.nodes_ohm - &full.of_touched(&image_s).nodes_ohm).amax() < 1e-6 * touched.nodes_ohm.amax());
         // Two spots by theirs.
         let contacts = [Contact::flat(0.006, 0.012, 0.002, 1e-5), Contact::flat(-0.016, -0.003, 0.002, 2e-5)];
         let fields = some.spots(0.002).unwrap();

@@ -16,10 +16,10 @@ use tactomo_physics::geometry::Point;
 const DIFFERENCE: f64 = 1e-5;
 /// Longest step of a coordinate, in mean distances of electrodes, and of a logarithm.
 const LONGEST: f64 = 0.5;
-const LONGEST_LOG: f64 = 0.7;
+const LONGEST_LOG: f64 = 0.5;
 /// First damping, as a share of the diagonal; tries of one step, and the share of the sum that a step gains below which it is the last.
 const DAMPING: f64 = 1e-3;
-const TRIES: usize = 3;
+const TRIES: usize = 5;
 const SMALL: f64 = 2e-3;
 /// Narrowest strip, in usual widths: below, the readings no longer tell.
 const NARROWEST: f64 = 0.02;

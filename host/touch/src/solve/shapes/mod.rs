@@ -38,7 +38,7 @@ const WARM_STEPS: usize = 2;
 const COARSE: f64 = 0.4;
 /// What leaves so many times the rival's score after the first steps, and after all on that mesh, is given up.
 const HOPELESS: f64 = 4.0;
-const NEAR: f64 = 1.25;
+const NEAR: f64 = 2.0;
 /// Shortest line and smallest ring, in mean distances of electrodes: discs of 6 mm on `square-60` are as well explained by rings of 4 mm.
 const SHORTEST: f64 = 0.7;
 const SMALLEST: f64 = 0.35;
@@ -145,7 +145,7 @@ impl ShapeFinder {
         let spacing_m = self.usual.spacing_m;
         match strip.course {
             Course::Line(_) => strip.course.length_m() > (2.0 * strip.width_m).max(SHORTEST * spacing_m),
-            Course::Ring { radius_m, .. } => radius_m > strip.width_m.max(SMALLEST * spacing_m),
+            Course::Ring { radius_m, .. } => radius_m > (1.5 * strip.width_m).max(SMALLEST * spacing_m),
         }
     }
 
