@@ -190,11 +190,11 @@ impl Follower for AutoFollower {
     }
 
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
-        let (Some(target), false) = (self.target(readings)?, self.image.is_rest(readings)) else {
-            return self.adopt_alone(lead.whole, readings);
-        };
-        // What is followed and what was found some frames ago are all brought to this frame: the lowest score is believed.
+        let Some(target) = self.target(readings)? else { return self.adopt_alone(lead.whole, readings) };
+        // What is followed and what was found some frames ago are all brought to this frame: the lowest score is believed. Where no
+        // reading stands out there may be a very light contact still.
         let Lead { contacts: found, whole } = lead;
+        let whole = whole.filter(|_| !self.image.is_rest(readings));
         let search = self.contacts.as_mut().is_some_and(|contacts| contacts.adopt(found.map(|found| *found), &target));
         let (shape, image, new_why) = match whole {
             Some((Whole::Shape(fit), why)) => (Some(fit), None, Some(why)),

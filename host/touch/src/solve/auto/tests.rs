@@ -155,6 +155,16 @@ fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
 }
 
 #[test]
+fn a_contact_whose_readings_all_hide_in_the_noise_is_found() {
+    let mut bench = Bench::new();
+    let light = [Contact::flat(0.004, -0.009, 0.0025, 1.2e-6)];
+    let readings = bench.measured(&light);
+    assert!(readings.largest_v() < 5.0 * bench.detector.adc.deviation_v(), "{}", readings.largest_v());
+    let solution = bench.auto.solve(&readings).unwrap();
+    assert_eq!(what(&solution), "1 contact", "{solution:?}");
+}
+
+#[test]
 fn shapes_are_shapes_with_contacts_beside_them() {
     let mut bench = Bench::new();
     let line = Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 };
