@@ -55,7 +55,7 @@ pub struct Args {
     /// Keeps all bytes that come in a new file
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Writes each answer as a line of JSON to a new file, or to stdout with `-`: `{time_s, sequence, contacts, choice, flags, age_us}`
+    /// Writes each answer as a line of JSON to a new file, or to stdout with `-`: `{time_s, sequence, contacts, shape?, choice, flags, age_us}`
     #[arg(long, value_name = "FILE|-")]
     pub stream: Option<PathBuf>,
     /// ELF file of the board's firmware, to print its log

@@ -62,7 +62,7 @@ pub struct Args {
     /// Writes images too, of solvers that make images
     #[arg(long)]
     images: bool,
-    /// Prints each frame as a JSON object: `{frame, sequence, time_s, lost_before, frame_us, contacts, residual, flags, choice}`
+    /// Prints each frame as a JSON object: `{frame, sequence, time_s, lost_before, frame_us, contacts, shape?, residual, flags, choice}`
     #[arg(long)]
     json: bool,
     /// Writes a file: one contact a row (.csv), arrays (.npz), or one frame a line (.json, .jsonl)

@@ -6,8 +6,8 @@ use super::experiment::{Experiment, Frame};
 use super::stopwatch::timed;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
-use tactomo_physics::scene::{Contact, Shape, Touch};
-use tactomo_touch::metrics::{Comparison, Greit, ImageMetrics, Matching, PaperFigures, truth_s_per_m2};
+use tactomo_physics::scene::{Contact, Touch};
+use tactomo_touch::metrics::{Comparison, Greit, ImageMetrics, Matching, PaperFigures, found_s_per_m2, truth_s_per_m2};
 use tactomo_touch::solve::{Flags, FoundContact, Solution, Solver};
 
 /// Images are smoothed by this share of the shorter side before they are compared: by 2 mm on 60 mm.
@@ -116,10 +116,7 @@ impl Scorer {
     }
 
     fn score_image(&mut self, frame: &Frame, solution: &Solution, score: &mut Score) -> Result<(), ForwardError> {
-        let image = match &solution.image_s_per_m2 {
-            Some(image) if image.len() == self.mesh.nodes_m.len() => image.clone(),
-            _ => self.image_of(&solution.contacts),
-        };
+        let image = found_s_per_m2(&self.mesh, solution, self.smoothing_m);
         self.see(&frame.touches)?;
         if let Some((_, truth)) = &self.last {
             score.image = self.comparison.of(truth, &image);
@@ -138,20 +135,6 @@ impl Scorer {
             self.last = Some((touches.to_vec(), truth_s_per_m2(&self.mesh, touches)?));
         }
         Ok(())
-    }
-
-    /// Contacts found as an image, for a method that makes none: discs of their radius, or of the smoothing's where they have none.
-    fn image_of(&self, contacts: &[FoundContact]) -> Vec<f32> {
-        let mut image = vec![0.0; self.mesh.nodes_m.len()];
-        for contact in contacts {
-            let shape = Shape::Disc { radius_m: contact.radius_m.unwrap_or(self.smoothing_m) };
-            let touch = Touch::flat([contact.x_m, contact.y_m], shape, contact.conductance_s);
-            // What was found beside the detector shows nowhere.
-            if let Ok(one) = truth_s_per_m2(&self.mesh, &[touch]) {
-                image.iter_mut().zip(one).for_each(|(sum, value)| *sum += value);
-            }
-        }
-        image
     }
 }
 

@@ -1,13 +1,13 @@
 //! What a solved frame is called outside of the program: the one schema behind JSON, CSV, NPZ and the page's socket.
 //!
-//! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of its contacts [`CONTACT_COLUMNS`]; a column that is
-//! added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
+//! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of its contacts [`CONTACT_COLUMNS`], those of its shape
+//! [`SHAPE_COLUMNS`]; a column that is added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
 //! newtons, `_us` microseconds. `sigma_` is a standard error. What is not known is absent in JSON, empty in CSV and NaN elsewhere.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use crate::solve::{Choice, Flags, FoundContact, Solution, Uncertainty};
+use crate::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
 /// A number of a contact, by its name.
 pub struct ContactColumn {
@@ -63,6 +63,87 @@ impl Serialize for FoundContact {
     }
 }
 
+/// A number of a shape, by its name.
+pub struct ShapeColumn {
+    /// Name with unit, after `shape_`; in JSON, where the shape is an object, without that.
+    pub name: &'static str,
+    of: fn(&FoundShape) -> Option<f64>,
+}
+
+/// The numbers of a shape, in the order of every format: ends of a line, centre and radius of a ring, width and conductance of both, and the
+/// standard errors of all.
+pub const SHAPE_COLUMNS: [ShapeColumn; 18] = [
+    ShapeColumn { name: "shape_from_x_m", of: |shape| line(shape, |line| Some(line.from_m[0])) },
+    ShapeColumn { name: "shape_from_y_m", of: |shape| line(shape, |line| Some(line.from_m[1])) },
+    ShapeColumn { name: "shape_to_x_m", of: |shape| line(shape, |line| Some(line.to_m[0])) },
+    ShapeColumn { name: "shape_to_y_m", of: |shape| line(shape, |line| Some(line.to_m[1])) },
+    ShapeColumn { name: "shape_x_m", of: |shape| ring(shape, |ring| Some(ring.centre_m[0])) },
+    ShapeColumn { name: "shape_y_m", of: |shape| ring(shape, |ring| Some(ring.centre_m[1])) },
+    ShapeColumn { name: "shape_radius_m", of: |shape| ring(shape, |ring| Some(ring.radius_m)) },
+    ShapeColumn { name: "shape_width_m", of: |shape| Some(shape.width_m()) },
+    ShapeColumn { name: "shape_conductance_s", of: |shape| Some(shape.conductance_s()) },
+    ShapeColumn { name: "shape_sigma_from_x_m", of: |shape| line(shape, |line| Some(line.uncertainty?.from_m[0])) },
+    ShapeColumn { name: "shape_sigma_from_y_m", of: |shape| line(shape, |line| Some(line.uncertainty?.from_m[1])) },
+    ShapeColumn { name: "shape_sigma_to_x_m", of: |shape| line(shape, |line| Some(line.uncertainty?.to_m[0])) },
+    ShapeColumn { name: "shape_sigma_to_y_m", of: |shape| line(shape, |line| Some(line.uncertainty?.to_m[1])) },
+    ShapeColumn { name: "shape_sigma_x_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.centre_m[0])) },
+    ShapeColumn { name: "shape_sigma_y_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.centre_m[1])) },
+    ShapeColumn { name: "shape_sigma_radius_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.radius_m)) },
+    ShapeColumn {
+        name: "shape_sigma_width_m",
+        of: |shape| {
+            line(shape, |line| Some(line.uncertainty?.width_m)).or(ring(shape, |ring| Some(ring.uncertainty?.width_m)))
+        },
+    },
+    ShapeColumn {
+        name: "shape_sigma_conductance_s",
+        of: |shape| {
+            line(shape, |line| Some(line.uncertainty?.conductance_s))
+                .or(ring(shape, |ring| Some(ring.uncertainty?.conductance_s)))
+        },
+    },
+];
+
+fn line(shape: &FoundShape, of: fn(&FoundLine) -> Option<f64>) -> Option<f64> {
+    match shape {
+        FoundShape::Line(line) => of(line),
+        FoundShape::Ring(_) => None,
+    }
+}
+
+fn ring(shape: &FoundShape, of: fn(&FoundRing) -> Option<f64>) -> Option<f64> {
+    match shape {
+        FoundShape::Line(_) => None,
+        FoundShape::Ring(ring) => of(ring),
+    }
+}
+
+impl ShapeColumn {
+    /// Its value, if it is known.
+    pub fn value(&self, shape: &FoundShape) -> Option<f64> {
+        (self.of)(shape)
+    }
+}
+
+/// The numbers of a shape in the order of [`SHAPE_COLUMNS`]; NaN where not known. For binary layouts.
+pub fn shape_values(shape: &FoundShape) -> [f32; SHAPE_COLUMNS.len()] {
+    std::array::from_fn(|index| SHAPE_COLUMNS[index].value(shape).map_or(f32::NAN, |value| value as f32))
+}
+
+/// `{kind, from_x_m?, ..., x_m?, ..., width_m, conductance_s, sigma_...?}`; the kind is `line` or `ring`.
+impl Serialize for FoundShape {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("kind", self.name())?;
+        for column in &SHAPE_COLUMNS {
+            if let Some(value) = column.value(self) {
+                map.serialize_entry(column.name.trim_start_matches("shape_"), &value)?;
+            }
+        }
+        map.end()
+    }
+}
+
 /// A solved frame as it leaves the program: a line of JSON.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameReport<'a> {
@@ -84,8 +165,11 @@ pub struct FrameReport<'a> {
     /// Age of the answer: time since the last byte of the frame arrived (us).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_us: Option<f64>,
-    /// The contacts found.
+    /// The contacts found: the answer, or beside the shape or image that is.
     pub contacts: &'a [FoundContact],
+    /// The shape found, if that is the answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<&'a FoundShape>,
     /// Root mean square of what the answer leaves of the readings, in standard deviations of the noise.
     pub residual: Option<f64>,
     /// What to know before this is believed.
@@ -106,6 +190,7 @@ impl<'a> FrameReport<'a> {
     pub fn of(solution: &'a Solution) -> Self {
         Self {
             contacts: &solution.contacts,
+            shape: solution.shape.as_ref(),
             residual: solution.residual,
             flags: Some(&solution.flags),
             choice: solution.choice.as_ref(),
@@ -156,18 +241,20 @@ pub fn texts(frame: &FrameReport) -> [String; TEXT_COLUMNS.len()] {
     [excluded.unwrap_or_default(), frame.choice.map(|choice| choice.what.clone()).unwrap_or_default()]
 }
 
-/// Heads of a CSV table with a contact a row: a frame's columns, `contact` (from 0), a contact's columns in that order,
+/// Heads of a CSV table with a contact a row: a frame's columns, its shape's, `contact` (from 0), a contact's columns in that order,
 /// and the texts.
 pub fn csv_heads() -> Vec<&'static str> {
     let frame = FRAME_COLUMNS.iter().map(|column| column.name);
+    let shape = SHAPE_COLUMNS.iter().map(|column| column.name);
     let contact = CONTACT_COLUMNS.iter().map(|column| column.name);
-    frame.chain(["contact"]).chain(contact).chain(TEXT_COLUMNS).collect()
+    frame.chain(shape).chain(["contact"]).chain(contact).chain(TEXT_COLUMNS).collect()
 }
 
 /// Rows of that table: one for each contact, or one without a contact.
 pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
     let text = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-    let start: Vec<_> = FRAME_COLUMNS.iter().map(|column| text(column.value(frame))).collect();
+    let shape = SHAPE_COLUMNS.iter().map(|column| text(frame.shape.and_then(|shape| column.value(shape))));
+    let start: Vec<_> = FRAME_COLUMNS.iter().map(|column| text(column.value(frame))).chain(shape).collect();
     let end = texts(frame);
     let row = |contact: Option<(usize, &FoundContact)>| {
         let index = contact.map_or_else(String::new, |(index, _)| index.to_string());
@@ -183,6 +270,7 @@ pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::LineUncertainty;
 
     fn contact() -> FoundContact {
         FoundContact {
@@ -231,6 +319,32 @@ mod tests {
     }
 
     #[test]
+    fn a_shape_is_an_object_and_columns_of_its_frame() {
+        let uncertainty = Some(LineUncertainty { from_m: [0.1; 2], to_m: [0.2; 2], width_m: 0.3, conductance_s: 0.4 });
+        let line = FoundLine { from_m: [1.0, 2.0], to_m: [3.0, 4.0], width_m: 5.0, conductance_s: 6.0, uncertainty };
+        let ring =
+            FoundRing { centre_m: [1.0, 2.0], radius_m: 3.0, width_m: 4.0, conductance_s: 5.0, uncertainty: None };
+        let json = serde_json::to_value(FoundShape::Ring(ring)).unwrap();
+        let known = serde_json::json!({
+            "kind": "ring", "x_m": 1.0, "y_m": 2.0, "radius_m": 3.0, "width_m": 4.0, "conductance_s": 5.0
+        });
+        assert_eq!(json, known);
+        let solution = Solution { shape: Some(FoundShape::Line(line)), ..solution() };
+        let json = serde_json::to_value(FrameReport::of(&solution)).unwrap();
+        let (heads, rows) = (csv_heads(), csv_rows(&FrameReport::of(&solution)));
+        for column in &SHAPE_COLUMNS {
+            let value = column.value(&FoundShape::Line(line));
+            let name = column.name.trim_start_matches("shape_");
+            assert_eq!(json["shape"].get(name).and_then(serde_json::Value::as_f64), value, "{name}");
+            let cell = heads.iter().position(|head| *head == column.name).unwrap();
+            assert_eq!(rows[1][cell].parse().ok(), value, "{name}");
+        }
+        assert_eq!(json["shape"].as_object().map(serde_json::Map::len), Some(13));
+        let values = shape_values(&FoundShape::Line(line));
+        assert!(values[0] == 1.0 && values[4].is_nan() && values[17] == 0.4, "{values:?}");
+    }
+
+    #[test]
     fn what_is_not_known_is_absent() {
         let flat = FoundContact::flat(1.0, 2.0, 8.0);
         assert_eq!(serde_json::to_string(&flat).unwrap(), r#"{"x_m":1.0,"y_m":2.0,"conductance_s":8.0}"#);
@@ -257,7 +371,7 @@ mod tests {
         assert_eq!(json["flags"]["excluded"], serde_json::json!([3, 14]));
         assert_eq!(json["choice"]["what"], "2 contacts");
         assert_eq!(json["contacts"].as_array().map(Vec::len), Some(2));
-        assert!(json.get("image_s_per_m2").is_none() && json.get("frame").is_none());
+        assert!(json.get("image_s_per_m2").is_none() && json.get("frame").is_none() && json.get("shape").is_none());
         let rows = csv_rows(&FrameReport::of(&solution));
         assert_eq!(rows[1][csv_heads().len() - 2..], ["3 14", "2 contacts"]);
     }

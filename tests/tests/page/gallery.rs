@@ -36,7 +36,9 @@ async fn gallery() -> Result<()> {
     let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
     scripted(folder).await?;
-    solved(folder, SceneName::Ring, Method::Nonlinear, "ring").await?;
+    solved(folder, SceneName::Ring, Method::Nonlinear, "ring-image").await?;
+    solved(folder, SceneName::Ring, Method::Auto, "ring").await?;
+    solved(folder, SceneName::Line, Method::Auto, "line").await?;
     solved(folder, SceneName::FiveFingers, Method::Auto, "five-fingers").await
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use tactomo::run::LinkState;
-use tactomo::solve::{Flags, FoundContact, Solution, Uncertainty};
+use tactomo::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
 use crate::chromium::Browser;
 use crate::script::Script;
@@ -50,6 +50,50 @@ async fn heat_is_drawn_where_a_contact_is() -> Result<()> {
             let (found, heat) = hottest(&stage.browser).await?;
             ensure!((found[0] - place[0]).hypot(found[1] - place[1]) < 1.0, "{found:?} instead of {place:?}");
             ensure!(heat > 0.3, "hardly to be seen: {heat}");
+        }
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_shape_is_named_outlined_and_listed_without_the_contacts_beside_it() -> Result<()> {
+    let line = FoundLine {
+        from_m: [-0.018, -0.01],
+        to_m: [0.014, 0.014],
+        width_m: 0.004,
+        conductance_s: 2e-3,
+        uncertainty: None,
+    };
+    let ring = FoundRing { centre_m: [0.005, 0.0], radius_m: 0.013, width_m: 0.004, ..FoundRing::default() };
+    let script = "const dark = (xM, yM) => { const canvas = document.getElementById('marks');
+            const image = document.getElementById('image');
+            const ratio = canvas.width / canvas.clientWidth;
+            const [x, y] = [image.offsetLeft + (xM / 0.06 + 0.5) * image.clientWidth, image.offsetTop + (0.5 - yM / 0.06) * image.clientHeight];
+            const { data } = canvas.getContext('2d').getImageData(x * ratio - 4, y * ratio - 4, 8, 8);
+            let most = 0; for (let i = 3; i < data.length; i += 4) most = Math.max(most, data[i]); return most; };
+        return [document.getElementById('choice').textContent, document.getElementById('contacts').textContent,
+            dark(-0.0032, 0.0036), dark(0.005, 0.015), dark(-0.01, 0.02)];";
+    in_front_of!(Script::start(), stage, {
+        let shapes = [
+            (FoundShape::Line(line), "Line, 40 mm", "to 14.0, 14.0", 2),
+            (FoundShape::Ring(ring), "Ring, 26 mm", "5.0, 0.0", 3),
+        ];
+        for (shape, name, place, outlined) in shapes {
+            stage.behind.solution(Solution {
+                contacts: vec![contact(1, [-10.0, 20.0], 2e-4)],
+                shape: Some(shape),
+                residual: Some(1.0),
+                choice: Some(Choice { what: shape.name().to_owned(), why: "residual 1.0 x noise".to_owned() }),
+                ..Solution::default()
+            });
+            settled(&stage).await;
+            let told = stage.browser.told().await?;
+            ensure!(told.text("shape") == shape.name() && told.text("contacts") == "0", "{told:?}");
+            let shown = stage.browser.run(script).await?;
+            let text = |i: usize| shown[i].as_str().unwrap_or_default().to_owned();
+            ensure!(text(0).starts_with(name) && text(1).contains(place), "{shown}");
+            ensure!(shown[outlined].as_u64() > Some(60), "its outline: {shown}");
+            ensure!(shown[4].as_u64() == Some(0), "the contact beside it is drawn: {shown}");
         }
         Ok(())
     })

@@ -63,6 +63,14 @@ impl ContactSystem<'_> {
         Some(Contacted { impedance_ohm, unknowns, constant_ohm })
     }
 
+    /// Impedances and the potentials under patches whose unknowns are currents over the roots of their conductances (S), as
+    /// [`conducting_patches`] makes them: by Ohm's law at each. `None` as for [`impedance_ohm`](Self::impedance_ohm).
+    pub fn fields(self, conductance_s: &[f64]) -> Option<ContactFields> {
+        let Contacted { impedance_ohm, unknowns: mut nodes_ohm, .. } = self.solve()?;
+        nodes_ohm.row_iter_mut().zip(conductance_s).for_each(|(mut row, s)| row /= -s.sqrt());
+        Some(ContactFields { impedance_ohm, nodes_ohm })
+    }
+
     /// Leaves `L` in place of the contacts' block and `L^-1` times the right sides in their place; gives impedances and constants.
     fn eliminate(&mut self) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let (size, electrodes) = (self.contacts.nrows(), self.electrodes.nrows());
@@ -119,11 +127,17 @@ pub fn conducting_patches<'a>(
 pub struct ContactFields {
     /// At the electrodes (ohm): the impedance matrix `Z`, `electrodes x electrodes`.
     pub impedance_ohm: DMatrix<f64>,
-    /// Under the nodes of the image (ohm): `nodes x electrodes`.
+    /// Under the nodes of the image, or those of them that conduct (ohm): `nodes x electrodes`.
     pub nodes_ohm: DMatrix<f64>,
 }
 
 impl ContactFields {
+    /// Those of the nodes of an image (S) that conduct, in their order.
+    pub(super) fn of_touched(self, image_s: &[f64]) -> Self {
+        let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
+        Self { nodes_ohm: self.nodes_ohm.select_rows(&touched), ..self }
+    }
+
     /// Derivative of the impedance by the conductance of a node (ohm per S): `dZ[e][g] / dC[k] = -Z[e][k] Z[k][g]`.
     ///
     /// # Panics

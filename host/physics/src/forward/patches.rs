@@ -83,6 +83,10 @@ mod tests {
                 assert!(off < 1e-6 * expected.impedance_ohm.amax(), "{}: {off}", model.name());
                 let off = (&found.nodes_ohm - &expected.nodes_ohm).amax();
                 assert!(off < 1e-6 * expected.nodes_ohm.amax(), "{}: {off}", model.name());
+                let touched = model.touched_fields(&image_s).unwrap();
+                let off = (&touched.nodes_ohm - &expected.of_touched(&image_s).nodes_ohm).amax();
+                assert!(off < 1e-6 * touched.nodes_ohm.amax(), "{}: {off}", model.name());
+                assert!((&touched.impedance_ohm - &found.impedance_ohm).amax() < 1e-6 * found.impedance_ohm.amax());
             }
             assert_eq!(patches.fields(&vec![0.0; patches.nodes()]), None);
         }

@@ -45,6 +45,11 @@ impl Through {
     fn seen(&self, impedance_ohm: &DMatrix<f64>) -> DMatrix<f64> {
         square(&Exchanges::new(impedance_ohm, &self.joints).applied(impedance_ohm), &self.kept)
     }
+
+    fn seen_fields(&self, all: &ContactFields) -> ContactFields {
+        let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);
+        ContactFields { impedance_ohm: self.seen(&all.impedance_ohm), nodes_ohm: nodes_ohm.select_columns(&self.kept) }
+    }
 }
 
 impl ForwardModel for Through {
@@ -76,12 +81,11 @@ impl ForwardModel for Through {
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
-        let all = self.model.image_fields(image_s)?;
-        let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);
-        Ok(ContactFields {
-            impedance_ohm: self.seen(&all.impedance_ohm),
-            nodes_ohm: nodes_ohm.select_columns(&self.kept),
-        })
+        Ok(self.seen_fields(&self.model.image_fields(image_s)?))
+    }
+
+    fn touched_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
+        Ok(self.seen_fields(&self.model.touched_fields(image_s)?))
     }
 
     fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
@@ -217,6 +221,9 @@ mod tests {
         let full = some.image_fields(&image_s)?;
         assert!((&patches.impedance_ohm - &full.impedance_ohm).amax() < 1e-6 * full.impedance_ohm.amax());
         assert!((&patches.nodes_ohm - &full.nodes_ohm).amax() < 1e-6 * full.nodes_ohm.amax());
+        let touched = some.touched_fields(&image_s)?;
+        assert!((&touched.impedance_ohm - &full.impedance_ohm).amax() < 1e-6 * full.impedance_ohm.amax());
+        assert!((&touched.nodes_ohm - &full.of_touched(&image_s).nodes_ohm).amax() < 1e-6 * touched.nodes_ohm.amax());
         // Two spots by theirs.
         let contacts = [Contact::flat(0.006, 0.012, 0.002, 1e-5), Contact::flat(-0.016, -0.003, 0.002, 2e-5)];
         let fields = some.spots(0.002).unwrap();

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
 use tactomo::forward::ImageMesh;
-use tactomo::schema::{self, CONTACT_COLUMNS, FRAME_COLUMNS, FrameReport};
-use tactomo::solve::FoundContact;
+use tactomo::schema::{self, CONTACT_COLUMNS, FRAME_COLUMNS, FrameReport, SHAPE_COLUMNS};
+use tactomo::solve::{FoundContact, FoundShape};
 use tactomo::table::{CsvWriter, NpzWriter};
 
 use super::super::output::{NewFile, unless_closed};
@@ -30,6 +30,8 @@ enum Form {
 #[derive(Default)]
 struct Arrays {
     frames: [Vec<f64>; FRAME_COLUMNS.len()],
+    /// Of each frame, whether it has a shape or not.
+    shapes: [Vec<f64>; SHAPE_COLUMNS.len()],
     /// Number of the frame of each contact, and the contacts' own columns.
     contact_frames: Vec<f64>,
     contacts: [Vec<f64>; CONTACT_COLUMNS.len()],
@@ -106,13 +108,27 @@ fn sentence(frame: &FrameReport) -> String {
     let contacts: Vec<_> = frame.contacts.iter().map(contact).collect();
     let number = frame.frame.map_or_else(String::new, |number| format!(" {number}"));
     let time = frame.time_s.map_or_else(String::new, |time_s| format!(" at {time_s:.3} s"));
-    let contacts = if contacts.is_empty() { "no contact".to_owned() } else { contacts.join(", ") };
+    let found = match frame.shape {
+        Some(shape) => shape_sentence(shape),
+        None if contacts.is_empty() => "no contact".to_owned(),
+        None => contacts.join(", "),
+    };
     let misfit = if frame.flags.is_some_and(|flags| flags.misfit) { "; does not fit the readings" } else { "" };
     let lost = match frame.lost_before {
         None | Some(0) => String::new(),
         Some(count) => format!(" ({count} lost before it)"),
     };
-    format!("frame{number}{time}{lost}: {contacts}{misfit}")
+    format!("frame{number}{time}{lost}: {found}{misfit}")
+}
+
+/// A shape for people.
+fn shape_sentence(shape: &FoundShape) -> String {
+    let place = |[x_m, y_m]: [f64; 2]| format!("({:.2}, {:.2}) mm", x_m * 1e3, y_m * 1e3);
+    let where_it_is = match shape {
+        FoundShape::Line(line) => format!("line from {} to {}", place(line.from_m), place(line.to_m)),
+        FoundShape::Ring(ring) => format!("ring about {}, radius {:.2} mm", place(ring.centre_m), 1e3 * ring.radius_m),
+    };
+    format!("{where_it_is}, {:.1} mm wide, {:.2e} S", 1e3 * shape.width_m(), shape.conductance_s())
 }
 
 impl Arrays {
@@ -120,6 +136,9 @@ impl Arrays {
         let number = frame.frame.map_or(f64::NAN, |frame| frame as f64);
         for (column, values) in FRAME_COLUMNS.iter().zip(&mut self.frames) {
             values.push(column.value(frame).unwrap_or(f64::NAN));
+        }
+        for (column, values) in SHAPE_COLUMNS.iter().zip(&mut self.shapes) {
+            values.push(frame.shape.and_then(|shape| column.value(shape)).unwrap_or(f64::NAN));
         }
         for contact in frame.contacts {
             self.contact_frames.push(number);
@@ -138,6 +157,9 @@ impl Arrays {
         let mut column = |name: &str, values: &[f64]| writer.add(name, &[values.len()], values);
         for (frame, values) in FRAME_COLUMNS.iter().zip(&self.frames) {
             column(frame.name, values)?;
+        }
+        for (shape, values) in SHAPE_COLUMNS.iter().zip(&self.shapes) {
+            column(shape.name, values)?;
         }
         column("contact_frame", &self.contact_frames)?;
         for (contact, values) in CONTACT_COLUMNS.iter().zip(&self.contacts) {

@@ -17,6 +17,7 @@ const ASSETS: &[Asset] = &[
     ("/style.css", CSS, include_str!("web/style.css")),
     ("/icon.svg", SVG, include_str!("web/icon.svg")),
     ("/app.js", SCRIPT, include_str!("web/app.js")),
+    ("/bars.js", SCRIPT, include_str!("web/bars.js")),
     ("/board.js", SCRIPT, include_str!("web/board.js")),
     ("/camera.js", SCRIPT, include_str!("web/camera.js")),
     ("/colours.js", SCRIPT, include_str!("web/colours.js")),

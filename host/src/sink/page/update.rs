@@ -4,21 +4,22 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 8 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; flags: 1 saturated, 2 the readings do not fit, 4 unfinished; electrodes left out: bit `e` is electrode `e` |
+//! | 9 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; shape: 0 none, 1 a line, 2 a ring; flags: 1 saturated, 2 the readings do not fit, 4 unfinished; electrodes left out: bit `e` is electrode `e` |
 //! | f32 | residual of the readings: root mean square, in standard deviations of the noise |
 //! | f32 | age of the answer when this was sent: since the last byte of its frame came (s) |
 //! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
 //! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
 //! | k x (u32, 12 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
+//! | 18 x f32 | with a shape: its [columns](tactomo_touch::schema::SHAPE_COLUMNS); then the contacts are beside it |
 //! | the rest | UTF-8: what was chosen, a line feed, why; nothing if the solver does not choose |
 
 use crate::run::FrameSnapshot;
 use tactomo_physics::detector::Detector;
-use tactomo_touch::schema::{CONTACT_COLUMNS, contact_values};
-use tactomo_touch::solve::{Flags, FoundContact};
+use tactomo_touch::schema::{CONTACT_COLUMNS, contact_values, shape_values};
+use tactomo_touch::solve::{Flags, FoundContact, FoundShape};
 
 /// Version of the layout; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 4;
+pub(super) const LAYOUT: u32 = 5;
 
 /// Numbers of a contact: the columns after its id, and its place on the map.
 const CONTACT_FLOATS: usize = CONTACT_COLUMNS.len() - 1 + 2;
@@ -30,7 +31,8 @@ pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) ->
     let image = solution.image_s_per_m2.as_deref().unwrap_or_default();
     let counts = [image.len(), frame.readings.electrodes(), solution.contacts.len()].map(|count| count as u32);
     // The page counts modulo 2^32.
-    let head = [LAYOUT, frame.sequence as u32, frames as u32].into_iter().chain(counts).chain(flags(&solution.flags));
+    let head = [LAYOUT, frame.sequence as u32, frames as u32].into_iter().chain(counts);
+    let head = head.chain([kind(solution.shape.as_ref())]).chain(flags(&solution.flags));
     let readings = frame.readings.volts().iter().map(|&volt| volt as f32);
     let values = [known(solution.residual), age_s].into_iter().chain(image.iter().copied()).chain(readings);
     let mut bytes: Vec<u8> = head.flat_map(u32::to_le_bytes).chain(values.flat_map(f32::to_le_bytes)).collect();
@@ -38,10 +40,21 @@ pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) ->
         bytes.extend(found.id.unwrap_or(0).to_le_bytes());
         bytes.extend(contact(found, detector).into_iter().flat_map(f32::to_le_bytes));
     }
+    if let Some(shape) = &solution.shape {
+        bytes.extend(shape_values(shape).into_iter().flat_map(f32::to_le_bytes));
+    }
     if let Some(choice) = &solution.choice {
         bytes.extend([choice.what.as_bytes(), b"\n", choice.why.as_bytes()].concat());
     }
     bytes
+}
+
+fn kind(shape: Option<&FoundShape>) -> u32 {
+    match shape {
+        None => 0,
+        Some(FoundShape::Line(_)) => 1,
+        Some(FoundShape::Ring(_)) => 2,
+    }
 }
 
 fn flags(flags: &Flags) -> [u32; 2] {
@@ -68,7 +81,7 @@ fn known(value: Option<f64>) -> f32 {
 mod tests {
     use super::*;
     use tactomo_physics::readings::Readings;
-    use tactomo_touch::solve::{Choice, Solution, Uncertainty};
+    use tactomo_touch::solve::{Choice, FoundRing, Solution, Uncertainty};
 
     fn bytes_of(solution: Solution) -> Vec<u8> {
         let frame = FrameSnapshot {
@@ -106,27 +119,43 @@ mod tests {
             contacts: vec![known, FoundContact::flat(1.0, 2.0, 3.0)],
             residual: Some(1.25),
             flags: Flags { saturated: true, misfit: false, unfinished: true, excluded: vec![3, 31] },
+            shape: None,
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
-        assert_eq!(words(&bytes[..32]), [LAYOUT, 9, 300, 3, 2, 2, 0b101, 1 << 31 | 1 << 3]);
-        let head = floats(&bytes[32..68]);
+        assert_eq!(words(&bytes[..36]), [LAYOUT, 9, 300, 3, 2, 2, 0, 0b101, 1 << 31 | 1 << 3]);
+        let head = floats(&bytes[36..72]);
         assert_eq!(head[0], 1.25);
         assert!((0.0..5.0).contains(&head[1]), "{} s old", head[1]);
         assert_eq!(head[2..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0]);
-        assert_eq!(words(&bytes[68..72]), [6]);
-        assert_eq!(floats(&bytes[72..120]), [0.25, -0.5, 0.0, 2.0, 1.5, 3.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5]);
-        assert_eq!(words(&bytes[120..124]), [0]);
-        assert_eq!(floats(&bytes[124..140]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[140..164]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[164..172]), [1.0, 2.0]);
-        assert_eq!(&bytes[172..], "2 contacts\nµ".as_bytes());
+        assert_eq!(words(&bytes[72..76]), [6]);
+        assert_eq!(floats(&bytes[76..124]), [0.25, -0.5, 0.0, 2.0, 1.5, 3.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5]);
+        assert_eq!(words(&bytes[124..128]), [0]);
+        assert_eq!(floats(&bytes[128..144]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[144..168]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[168..176]), [1.0, 2.0]);
+        assert_eq!(&bytes[176..], "2 contacts\nµ".as_bytes());
+    }
+
+    #[test]
+    fn a_shape_follows_the_contacts_beside_it() {
+        let ring =
+            FoundRing { centre_m: [0.25, -0.5], radius_m: 2.0, width_m: 0.5, conductance_s: 3.0, uncertainty: None };
+        let bytes = bytes_of(Solution {
+            contacts: vec![FoundContact::flat(1.0, 2.0, 3.0)],
+            shape: Some(FoundShape::Ring(ring)),
+            ..Solution::default()
+        });
+        assert_eq!(words(&bytes[20..28]), [1, 2]);
+        let shape = floats(&bytes[44 + 4 * 4 + 52..]);
+        assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
+        assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }
 
     #[test]
     fn nothing_found_is_head_and_readings_alone() {
         let bytes = bytes_of(Solution::default());
-        assert_eq!(words(&bytes[..32]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0]);
-        assert!(floats(&bytes[32..36])[0].is_nan());
-        assert_eq!(bytes.len(), 40 + 4 * 4);
+        assert_eq!(words(&bytes[..36]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0, 0]);
+        assert!(floats(&bytes[36..40])[0].is_nan());
+        assert_eq!(bytes.len(), 44 + 4 * 4);
     }
 }

@@ -1,7 +1,8 @@
 //! Images found against the image that is there.
 
+use crate::solve::Solution;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
-use tactomo_physics::scene::Touch;
+use tactomo_physics::scene::{Shape, Touch};
 use tactomo_physics::space;
 
 /// A Gaussian is cut off at so many standard deviations.
@@ -18,6 +19,23 @@ pub fn truth_s_per_m2(mesh: &ImageMesh, touches: &[Touch]) -> Result<Vec<f32>, F
     let conductances_s = mesh.conductances_s(touches)?;
     let density = |(s, area_m2): (f64, &f64)| (s / area_m2) as f32;
     Ok(conductances_s.into_iter().zip(&mesh.node_areas_m2).map(density).collect())
+}
+
+/// What a solution says touches, as an image on a mesh (S/m2): its image if it has one there, else its contacts as discs of the radii found,
+/// of `usual_radius_m` where none was. What was found beside the detector shows nowhere.
+pub fn found_s_per_m2(mesh: &ImageMesh, solution: &Solution, usual_radius_m: f64) -> Vec<f32> {
+    if let Some(image) = solution.image_s_per_m2.as_ref().filter(|image| image.len() == mesh.nodes_m.len()) {
+        return image.clone();
+    }
+    let mut image = vec![0.0; mesh.nodes_m.len()];
+    for contact in &solution.contacts {
+        let shape = Shape::Disc { radius_m: contact.radius_m.unwrap_or(usual_radius_m) };
+        let touch = Touch::flat([contact.x_m, contact.y_m], shape, contact.conductance_s);
+        if let Ok(one) = truth_s_per_m2(mesh, &[touch]) {
+            image.iter_mut().zip(one).for_each(|(sum, value)| *sum += value);
+        }
+    }
+    image
 }
 
 /// Compares images on one mesh, both smoothed: a contact found a little beside the truth is nearly right, not wholly wrong.
@@ -120,7 +138,7 @@ fn upper_half(image: &[f32]) -> Option<Vec<bool>> {
 mod tests {
     use super::super::tests::{grid, image};
     use super::*;
-    use tactomo_physics::scene::Shape;
+    use crate::solve::FoundContact;
 
     fn near(found: Option<f64>, expected: f64) {
         assert!(found.is_some_and(|found| (found - expected).abs() < 1e-6), "{found:?} {expected}");
@@ -139,6 +157,20 @@ mod tests {
         // The middle of the disc: 1 mS over 25 pi mm2.
         let middle = f64::from(truth[15 * 31 + 17]);
         assert!((middle * std::f64::consts::PI * 25e-6 / 1e-3 - 1.0).abs() < 1e-3, "{middle}");
+    }
+
+    #[test]
+    fn contacts_are_discs_of_their_radii_and_an_image_is_itself() {
+        let mesh = grid(31, 1e-3);
+        let wide = FoundContact { radius_m: Some(0.006), ..FoundContact::flat(0.002, 0.0, 1e-3) };
+        let contacts = vec![wide, FoundContact::flat(-0.01, 0.003, 2e-3), FoundContact::flat(0.5, 0.0, 1.0)];
+        let mut solution = Solution { contacts, ..Solution::default() };
+        let disc = |at_m, radius_m, s| Touch::flat(at_m, Shape::Disc { radius_m }, s);
+        let touches = [disc([0.002, 0.0], 0.006, 1e-3), disc([-0.01, 0.003], 0.002, 2e-3)];
+        let truth = truth_s_per_m2(&mesh, &touches).unwrap();
+        assert_eq!(found_s_per_m2(&mesh, &solution, 0.002), truth);
+        solution.image_s_per_m2 = Some(vec![0.5; 31 * 31]);
+        assert_eq!(found_s_per_m2(&mesh, &solution, 0.002), vec![0.5; 31 * 31]);
     }
 
     #[test]

@@ -199,7 +199,7 @@ impl Solver for Bsbl {
             image_s_per_m2: Some(image),
             residual: Some(self.left_v(&rows, &amounts) / self.noise_v),
             flags: Flags { unfinished: !settled, ..Flags::default() },
-            choice: None,
+            ..Solution::default()
         })
     }
 }

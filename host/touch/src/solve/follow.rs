@@ -5,6 +5,7 @@
 
 use super::contacts::Found;
 use super::nonlinear::Descent;
+use super::shapes::StripFit;
 use super::still::Mean;
 use super::{FoundContact, Solution, SolveError, Solver};
 use tactomo_physics::readings::Readings;
@@ -73,42 +74,32 @@ impl Parts {
 /// What a frame was explained by, for another frame to go on from.
 #[derive(Clone, Debug, Default)]
 pub struct Lead {
-    pub(super) known: Known,
+    /// Contacts: the answer, or what is kept beside it.
+    pub(super) contacts: Option<Box<Found>>,
+    /// What explains the frame better than they do, and why it is believed.
+    pub(super) whole: Option<(Whole, String)>,
     /// The mean of the frames up to it as far as they stood still, of a follower that averages.
     pub(super) mean: Option<Mean>,
 }
 
-/// What is known of a scene.
-#[derive(Clone, Debug, Default)]
-pub(super) enum Known {
-    /// No contact.
-    #[default]
-    Nothing,
-    /// Contacts.
-    Contacts(Box<Found>),
-    /// An image, and why it is not contacts.
-    Image(Box<Descent>, String),
+/// What touches as one, rather than as contacts.
+#[derive(Clone, Debug)]
+pub(super) enum Whole {
+    /// A line or a ring.
+    Shape(Box<StripFit>),
+    /// An image.
+    Image(Box<Descent>),
 }
 
 impl Lead {
     /// Contacts, or nothing, in the mean of some frames.
     pub(super) fn of_contacts(found: Option<Found>, mean: Option<Mean>) -> Self {
-        Self { known: found.map_or(Known::Nothing, |found| Known::Contacts(Box::new(found))), mean }
+        Self { contacts: found.map(Box::new), whole: None, mean }
     }
 
     /// The mean that it is of, or else a frame.
     pub(super) fn mean_or(&self, readings: &Readings) -> Mean {
         self.mean.clone().unwrap_or_else(|| Mean { readings: readings.clone(), frames: 1 })
-    }
-}
-
-impl Known {
-    /// The contacts, if it is contacts.
-    pub(super) fn into_contacts(self) -> Option<Found> {
-        match self {
-            Self::Contacts(found) => Some(*found),
-            Self::Nothing | Self::Image(..) => None,
-        }
     }
 }
 

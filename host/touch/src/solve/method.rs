@@ -11,7 +11,7 @@ use tactomo_physics::forward::ForwardError;
 /// A solver by its name; the order is that of the [table](Method::ALL).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Chooses between nothing, contacts and an image.
+    /// Chooses between nothing, contacts, a line, a ring and an image.
     Auto,
     /// Fits a few contacts with the full contact physics.
     Contacts,
@@ -158,7 +158,7 @@ const TABLE: [Row; 12] = [
     Row {
         method: Method::Auto,
         name: "auto",
-        explanation: "for most uses: decides for each frame between nothing, contacts and an image",
+        explanation: "for most uses: decides for each frame between nothing, contacts, a line, a ring and an image",
         family: Family::Auto,
         parameter: None,
         build: |problem, _| Ok(Box::new(Auto::new(problem)?)),

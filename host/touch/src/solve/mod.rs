@@ -4,6 +4,7 @@ mod auto;
 mod balance;
 mod bsbl;
 mod contacts;
+mod evidence;
 mod follow;
 mod guard;
 mod health;
@@ -20,6 +21,7 @@ mod noser;
 mod problem;
 #[cfg(test)]
 mod samples;
+mod shapes;
 mod still;
 mod tikhonov;
 mod track;
@@ -41,6 +43,7 @@ pub use self::method::{Family, Method, Parameter, ParameterKind};
 pub use self::nonlinear::{Nonlinear, NonlinearSettings};
 pub use self::nonnegative::Nonnegative;
 pub use self::problem::Problem;
+pub use self::shapes::{FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty};
 pub use self::still::Still;
 pub use self::tikhonov::{Tikhonov, Variant};
 pub use self::tsvd::Tsvd;
@@ -74,15 +77,27 @@ pub struct Solution {
     /// Contact conductance per area at each node of the model's image mesh (S/m2), if the method makes an image. A density,
     /// so that it does not change where the mesh is finer; times the nodes' areas, it is conductance (S).
     pub image_s_per_m2: Option<Vec<f32>>,
-    /// Contacts found.
+    /// Contacts found. Where a shape or, by a solver that chooses, an image is the answer, the contacts that would explain the readings best
+    /// are kept beside it: [`is_contacts`](Self::is_contacts) tells.
     pub contacts: Vec<FoundContact>,
+    /// The one shape that explains the readings, if a solver that knows shapes chose it; then the image is that of the shape.
+    pub shape: Option<FoundShape>,
     /// How far the readings are from those of what was found: root mean square, in standard deviations of the noise; if the
     /// method predicts readings. About 1 where noise is all that is left.
     pub residual: Option<f64>,
     /// What to know before this is believed.
     pub flags: Flags,
+    /// Probability that as many contacts touch as were found, against other numbers of contacts; of a method that weighs them.
+    pub certainty: Option<f64>,
     /// What was chosen and why, by a solver that chooses.
     pub choice: Option<Choice>,
+}
+
+impl Solution {
+    /// Whether the contacts are the answer, not beside it: no shape and no image.
+    pub fn is_contacts(&self) -> bool {
+        self.shape.is_none() && self.image_s_per_m2.is_none()
+    }
 }
 
 /// What to know before a solution is believed.
@@ -101,7 +116,7 @@ pub struct Flags {
 /// What a solver chose.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Choice {
-    /// The model of the scene: `nothing`, `2 contacts`, `image`.
+    /// The model of the scene: `nothing`, `2 contacts`, `line`, `ring`, `image`.
     pub what: String,
     /// Why, with the figures that decided.
     pub why: String,

@@ -132,7 +132,7 @@ impl Solver for Nonnegative {
             image_s_per_m2: Some(image),
             residual: Some(spectrum.deviations(left.norm_squared() + spectrum.outside_v2)),
             flags: Flags { unfinished: !settled, ..Flags::default() },
-            choice: None,
+            ..Solution::default()
         })
     }
 }

@@ -178,7 +178,7 @@ impl Solver for Tv {
             image_s_per_m2: Some(image),
             residual: Some(spectrum.deviations(left_v2)),
             flags: Flags { unfinished: !settled, ..Flags::default() },
-            choice: None,
+            ..Solution::default()
         })
     }
 }

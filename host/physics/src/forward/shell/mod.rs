@@ -28,7 +28,7 @@ use self::locate::Locator;
 pub use self::mesh::Mesh;
 use self::spots::{ShellSpots, SpotTable};
 use self::system::{Factor, Singular, System};
-use super::contact::{ContactFields, conducting_patches};
+use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image};
 use crate::detector::{Detector, Electrode};
@@ -130,9 +130,9 @@ impl Shell {
         })
     }
 
-    /// The impedance matrix from the fields between the few nodes that conduct (Woodbury's identity), which costs less than
-    /// factorising anew. `None` if they are many.
-    fn touched_impedance_ohm(&self, image_s: &[f64]) -> Option<DMatrix<f64>> {
+    /// What the few nodes that conduct make of the fields between them (Woodbury's identity), which costs less than factorising anew:
+    /// their system, and their conductances (S). `None` if they are many.
+    fn touched(&self, image_s: &[f64]) -> Option<(ContactSystem<'_>, Vec<f64>)> {
         let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
         if touched.len() > MOST_TOUCHED {
             return None;
@@ -141,7 +141,7 @@ impl Shell {
         let cross = self.fields_ohm.select_rows(&touched);
         let nodes = symmetric(touched.len(), |k, l| fields.ohm(touched[k], touched[l]));
         let conductances_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
-        conducting_patches(&self.electrode_fields_ohm, &cross, nodes, &conductances_s).impedance_ohm()
+        Some((conducting_patches(&self.electrode_fields_ohm, &cross, nodes, &conductances_s), conductances_s))
     }
 
     fn between_nodes(&self) -> Result<BetweenNodes, Singular> {
@@ -205,7 +205,7 @@ impl ForwardModel for Shell {
 
     fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
         check_image(image_s, self.mesh.nodes_m.len())?;
-        match self.touched_impedance_ohm(image_s) {
+        match self.touched(image_s).and_then(|(system, _)| system.impedance_ohm()) {
             Some(impedance_ohm) => Ok(impedance_ohm),
             None => Ok(self.image_fields(image_s)?.impedance_ohm),
         }
@@ -218,6 +218,14 @@ impl ForwardModel for Shell {
         let currents_a = Mat::from_fn(self.system.pad(pads), pads, |i, j| f64::from(u8::from(i == self.system.pad(j))));
         let (nodes_ohm, impedance_ohm) = factor.solve(currents_a);
         Ok(ContactFields { impedance_ohm, nodes_ohm })
+    }
+
+    fn touched_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
+        check_image(image_s, self.mesh.nodes_m.len())?;
+        match self.touched(image_s).and_then(|(system, conductances_s)| system.fields(&conductances_s)) {
+            Some(fields) => Ok(fields),
+            None => Ok(self.image_fields(image_s)?.of_touched(image_s)),
+        }
     }
 
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {

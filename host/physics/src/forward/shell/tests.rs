@@ -288,7 +288,7 @@ fn touched_nodes_give_what_factorising_anew_gives() -> Result<(), ForwardError> 
     for contacts in [vec![press(1e-5)], vec![press(10.0)], vec![press(1e-3), contact(-0.02, -0.02, 0.004, 1e-4)]] {
         let conductances_s = shell.node_conductances_s(&contacts)?;
         let anew = shell.image_fields(&conductances_s)?.impedance_ohm;
-        let touched = shell.touched_impedance_ohm(&conductances_s).unwrap_or_default();
+        let touched = shell.touched(&conductances_s).and_then(|(system, _)| system.impedance_ohm()).unwrap_or_default();
         let apart = (touched - &anew).amax() / anew.amax();
         assert!(apart < 1e-8, "{apart}: {contacts:?}");
     }

@@ -4,6 +4,8 @@
 //! impedance between two cells is four look-ups in a table of differences and sums of their indices, without interpolation.
 //! Nodes lie on the edges too: half a cell and its mirror image in the wall are a whole one.
 
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
 use super::pads::PadFields;
@@ -109,6 +111,32 @@ impl CellFields {
             }
         }
         all
+    }
+
+    /// The lower triangle of the impedances (ohm) between some of the cells and themselves.
+    pub fn within(&self, nodes: &[usize]) -> DMatrix<f64> {
+        let corrections = self.corrections.select_columns(nodes);
+        let (rows, count) = corrections.shape();
+        let all = MatRef::from_column_major_slice(corrections.as_slice(), rows, count);
+        let mut fields = DMatrix::zeros(count, count);
+        matmul(
+            MatMut::from_column_major_slice_mut(fields.as_mut_slice(), count, count),
+            BlockStructure::TriangularLower,
+            Accum::Replace,
+            all.transpose(),
+            BlockStructure::Rectangular,
+            all,
+            BlockStructure::Rectangular,
+            -1.0,
+            Par::Seq,
+        );
+        let indices: Vec<_> = nodes.iter().map(|node| self.grid.indices(*node)).collect();
+        for (column, [i, j]) in indices.iter().enumerate() {
+            for (row, [k, l]) in indices.iter().enumerate().skip(column) {
+                fields[(row, column)] += self.bare(*i, *j, *k, *l);
+            }
+        }
+        fields
     }
 
     /// Impedance between cells `(i, j)` and `(k, l)` of the slab without pads.

@@ -149,7 +149,7 @@ impl Slab {
         let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
         let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
         let cross = self.image.fields_ohm.select_rows(&touched);
-        let patches = self.cells().between(&touched, &touched);
+        let patches = self.cells().within(&touched);
         Ok((touched, conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)))
     }
 }
@@ -199,6 +199,12 @@ impl ForwardModel for Slab {
 
     fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
         self.touched(image_s)?.1.impedance_ohm().ok_or(ForwardError::NoContact)
+    }
+
+    fn touched_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
+        let (touched, system) = self.touched(image_s)?;
+        let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
+        system.fields(&conductance_s).ok_or(ForwardError::NoContact)
     }
 
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {

@@ -1,5 +1,6 @@
 // The contacts found, as a table.
 
+import { errorOf, placesOf } from "./bars.js";
 import { ellipseOf } from "./marks.js";
 import { hueOf } from "./palette.js";
 import { count, millimetres, withPrefix } from "./units.js";
@@ -47,7 +48,18 @@ function row(contact, sheetS) {
     element("td", "error", placeError(ellipseOf(contact))), value, bar(Math.max(1e-9, conductanceS / sheetS)));
 }
 
-/** The table of contacts. */
+function shapeRow(shape, sheetS) {
+  const { conductanceS, errorS } = shape;
+  const value = element("td", "value", withPrefix(conductanceS, "S"));
+  value.title = errorS === null ? value.textContent : `${value.textContent} ± ${withPrefix(errorS, "S", 2)}`;
+  const errorM = errorOf(shape);
+  return element("tr", hueOf(null),
+    element("td", "id", element("span", "badge-id", "\u2013")),
+    element("td", "", ...placesOf(shape).map((place) => element("div", "", place))),
+    element("td", "error", placeError(errorM === null ? null : { longM: errorM })), value, bar(Math.max(1e-9, conductanceS / sheetS)));
+}
+
+/** The table of contacts, or of the shape that touches. */
 export class ContactTable {
   constructor({ sheet_conductance_s: sheetS }) {
     this.sheetS = sheetS;
@@ -59,13 +71,14 @@ export class ContactTable {
   }
 
   /** Shows the contacts of an update. */
-  show({ contacts, image }, now) {
+  show({ contacts, image, shape }, now) {
     if (now - this.shown < SHOWN_EVERY_MS) return;
     this.shown = now;
     const sorted = [...contacts].sort((a, b) => (a.id ?? 0) - (b.id ?? 0) || b.conductanceS - a.conductanceS);
-    this.body.replaceChildren(...sorted.slice(0, ROWS).map((contact) => row(contact, this.sheetS)));
+    const rows = shape ? [shapeRow(shape, this.sheetS)] : sorted.slice(0, ROWS).map((contact) => row(contact, this.sheetS));
+    this.body.replaceChildren(...rows);
     this.strength.textContent = contacts.some(({ forceN }) => forceN !== null) ? "force" : "conductance";
-    this.rest.hidden = contacts.length > 0;
+    this.rest.hidden = rows.length > 0;
     this.rest.textContent = image.length ? "The image has no single contacts." : "Nothing touches.";
     this.more.textContent = contacts.length > ROWS ? `and ${count(contacts.length - ROWS)} more` : "";
   }

@@ -20,14 +20,16 @@ export class HeatField {
     this.height = this.raster.height;
     this.values = new Float32Array(this.width * this.height);
     this.contacts = [];
+    this.shape = null;
     this.image = null;
     this.peak = 0;
   }
 
-  /** Takes an update. Contacts that come with an image are its peaks: they are not drawn again. */
-  take({ image, contacts }) {
+  /** Takes an update. Contacts that come with an image stand for what it shows: they are not drawn again. */
+  take({ image, contacts, shape }) {
     this.image = image.length && image.length === this.nodes ? image : null;
     this.contacts = contacts;
+    this.shape = shape;
     if (this.image) this.raster.interpolate(this.image, this.values);
     else this.#drawContacts();
     this.peak = this.image

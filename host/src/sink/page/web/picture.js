@@ -34,8 +34,8 @@ export class Picture {
   }
 
   /** Shows an update. */
-  show({ image, contacts, excluded }, now) {
-    this.field.take({ image, contacts });
+  show({ image, contacts, shape, excluded }, now) {
+    this.field.take({ image, contacts, shape });
     this.trails.take(contacts, now);
     this.excluded = excluded;
     if (this.unfitted) this.scale.fit(this.field.peak, now);
@@ -114,10 +114,10 @@ export class Picture {
   }
 
   #tell() {
-    const { contacts } = this.field;
+    const { contacts, shape } = this.field;
     const places = contacts.map(({ xM, yM }) => [xM, yM].map((m) => Number((m * 1e3).toFixed(3))));
     Object.assign(document.documentElement.dataset, {
-      contacts: String(contacts.length), placesMm: JSON.stringify(places), image: String(Boolean(this.field.image)),
+      contacts: String(contacts.length), placesMm: JSON.stringify(places), image: String(Boolean(this.field.image)), shape: shape?.kind ?? "",
       scaleMaxSPerM2: String(this.scale.max), excluded: this.excluded.join(" "),
     });
   }

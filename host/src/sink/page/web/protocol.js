@@ -2,9 +2,9 @@
 // the same.
 
 /** Version of the layout below; the setup carries the program's. */
-export const LAYOUT = 4;
+export const LAYOUT = 5;
 
-const HEAD_WORDS = 8;
+const HEAD_WORDS = 9;
 // From the lowest bit on.
 const FLAGS = ["saturated", "misfit", "unfinished"];
 
@@ -42,23 +42,41 @@ function contact(taker) {
   return { id, xM, yM, conductanceS, radiusM, forceN, xErrorM, yErrorM, correlation, errorS, place: [x, y, z] };
 }
 
+const SHAPES = [null, "line", "ring"];
+
+// What touches as one: a line or a ring.
+function shape(taker, kind) {
+  const [fromX, fromY, toX, toY, x, y, ...others] = [...taker.floats(18)].map(known);
+  const [radiusM, widthM, conductanceS] = others;
+  const errorsM = others.slice(3, 10);
+  return kind === "line"
+    ? { kind, from: [fromX, fromY], to: [toX, toY], widthM, conductanceS, errorsM: errorsM.slice(0, 4), errorS: others[11] }
+    : { kind, centre: [x, y], radiusM, widthM, conductanceS, errorsM: errorsM.slice(4), errorS: others[11] };
+}
+
 function choice(text) {
   const [what, why] = text.split("\n");
   return why === undefined ? null : { what, why };
 }
 
-/** An update: the newest frame and what the solver says of it. What is not known is null. */
+/**
+ * An update: the newest frame and what the solver says of it. What is not known is null. Contacts beside a shape are not what touches, and
+ * are kept apart from the others.
+ */
 export function decodeUpdate(buffer) {
   const taker = new Taker(buffer);
-  const [layout, sequence, frames, nodes, electrodes, contacts, flags, excluded] =
+  const [layout, sequence, frames, nodes, electrodes, count, kind, flags, excluded] =
     Array.from({ length: HEAD_WORDS }, () => taker.word());
   if (layout !== LAYOUT) throw new Error("The program is of another version than this page: reload it.");
   const [residual, ageS] = [...taker.floats(2)].map(known);
+  const [image, readings] = [taker.floats(nodes), taker.floats(electrodes * electrodes)];
+  const contacts = Array.from({ length: count }, () => contact(taker));
   return {
     sequence, frames, residual, ageS, electrodes, flags: bitsOf(flags).map((bit) => FLAGS[bit]), excluded: bitsOf(excluded),
-    image: taker.floats(nodes),
-    readings: taker.floats(electrodes * electrodes),
-    contacts: Array.from({ length: contacts }, () => contact(taker)),
+    image, readings,
+    contacts: kind ? [] : contacts,
+    beside: kind ? contacts : [],
+    shape: kind ? shape(taker, SHAPES[kind]) : null,
     choice: choice(taker.text()),
   };
 }

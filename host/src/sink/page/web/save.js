@@ -29,13 +29,13 @@ export function savePicture(layers, background) {
   whole.toBlob((blob) => download(blob, `tactomo-${stamp()}.png`));
 }
 
-/** An update as CSV: the contacts, an empty line, the readings, a row for each grounded electrode. */
-export function csvOf({ contacts, readings, electrodes }) {
+/** An update as CSV: the contacts, also those beside a shape, an empty line, the readings, a row for each grounded electrode. */
+export function csvOf({ contacts, beside = [], readings, electrodes }) {
   const cell = (value) => (value === null ? "" : String(value));
   const contact = (c) => [c.id, ...c.place, c.conductanceS, c.errorS, c.radiusM, c.forceN, c.xErrorM, c.yErrorM, c.correlation].map(cell).join(",");
   const heads = ["grounded", ...Array.from({ length: electrodes }, (_, e) => `electrode_${e}_v`)];
   const row = (g) => [g, ...readings.slice(g * electrodes, (g + 1) * electrodes)].join(",");
-  return `${[FIELDS.join(","), ...contacts.map(contact), "", heads.join(","), ...Array.from({ length: electrodes }, (_, g) => row(g))].join("\n")}\n`;
+  return `${[FIELDS.join(","), ...[...contacts, ...beside].map(contact), "", heads.join(","), ...Array.from({ length: electrodes }, (_, g) => row(g))].join("\n")}\n`;
 }
 
 /** Saves an update as CSV. */

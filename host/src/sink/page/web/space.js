@@ -1,5 +1,6 @@
 // The view in space: height is pressure.
 
+import { labelled, middleOf } from "./bars.js";
 import { Camera } from "./camera.js";
 import { colourMaps } from "./colours.js";
 import { drawBar } from "./frame.js";
@@ -79,6 +80,11 @@ export class SpaceView {
       const [x, y] = at(...shape.topOf(contact, view.field, view.scale));
       return { contact, x, y, radius: 8 };
     });
+    if (view.field.shape) {
+      const [xM, yM] = middleOf(view.field.shape);
+      const [x, y] = at(...shape.topOf({ xM, yM, place: [xM, yM, 0] }, view.field, view.scale));
+      spots.push({ contact: labelled(view.field.shape), x, y, radius: 8 });
+    }
     drawLabels(over, spots, view.colours, { width, height });
     const narrow = width < 520;
     drawBar(over, { left: 0, width: width - (narrow ? 58 : 96), top: 14, height: Math.min(360, height - 44), narrow }, view);

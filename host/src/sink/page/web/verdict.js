@@ -1,5 +1,6 @@
 // The first line of the picture: what touches, and what to know before it is believed.
 
+import { nameOf } from "./bars.js";
 import { fixed } from "./units.js";
 
 // A warning stays this long after the last frame with it, and words until the next are due: what flickers cannot be read.
@@ -21,11 +22,13 @@ function chip(kind, text, title) {
 }
 
 // What a passer-by calls it.
-function headline({ choice, contacts, image }) {
+function headline({ choice, contacts, image, shape }) {
   const what = choice?.what ?? "";
   if (what === "searching") return "Something touches";
   const counted = (word) => (contacts.length === 1 ? `1 ${word}` : `${contacts.length} ${word}s`);
-  if (image.length && what !== "nothing") return contacts.length ? `Image, ${counted("peak")}` : "Image";
+  if (shape) return nameOf(shape);
+  // Of a solver that chooses, contacts beside an image are what `contacts` would find; of others, they are its peaks.
+  if (image.length && what !== "nothing") return contacts.length ? `Image, ${counted(what === "image" ? "contact" : "peak")}` : "Image";
   if (contacts.length) return counted("contact");
   return "Nothing touches";
 }

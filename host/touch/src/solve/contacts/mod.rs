@@ -30,8 +30,10 @@ use self::network::Network;
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(super) use self::solver::{ContactFollower, ContactSearcher};
+use self::target::Errors;
+pub(super) use self::target::Target;
 pub(super) use self::target::dot;
-use self::target::{Errors, Target};
+use super::evidence::{Evidence, misfit_limit};
 use super::still::{self, Mean, Still};
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
 use tactomo_physics::forward::spots::SpotFields;
@@ -44,9 +46,6 @@ const SCAN_PLACES: usize = 600;
 const SATURATED: f64 = 270.0;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
 const FULL: f64 = 0.995;
-/// Standard deviations by which the mean square of what is left is over what noise and model error leave, where the readings do not fit:
-/// noise alone does so in 1 of 3 million frames.
-const MISFIT: f64 = 5.0;
 /// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
 const KNOWN: f64 = 0.2;
 
@@ -158,15 +157,6 @@ impl ContactFinder {
         super::check(readings, self.network.electrodes())
     }
 
-    /// What a frame's readings are fitted as.
-    ///
-    /// # Errors
-    /// [`SolveError`] if they cannot be those of the detector.
-    pub fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
-        self.check(readings)?;
-        Ok(Target::new(readings, &self.errors))
-    }
-
     /// What the mean of some frames is fitted as.
     ///
     /// # Errors
@@ -198,7 +188,18 @@ impl ContactFinder {
     /// Whether more is left than noise and model error leave.
     fn is_misfit(&self, fit: &DiscFit, target: &Target) -> bool {
         let freedom = self.freedom(fit, target);
-        fit.cost > freedom + MISFIT * (2.0 * freedom).sqrt()
+        fit.cost > freedom * misfit_limit(freedom)
+    }
+
+    /// What contacts leave of the frames, and what they take for that.
+    pub fn evidence_of_found(&self, found: &Found) -> Evidence {
+        self.evidence_of(&found.0.fit)
+    }
+
+    /// What a fit leaves, and what its contacts take for that: in squares, what the logarithm of their evidence has besides.
+    fn evidence_of(&self, fit: &DiscFit) -> Evidence {
+        let parameters = (PARAMETERS * fit.contacts.len()) as f64;
+        Evidence { cost: fit.cost, price: -2.0 * self.evidence(fit) - fit.cost, parameters }
     }
 
     /// What a fit leaves whose sum of squares is `cost`: root mean square, in standard deviations of the noise.
@@ -219,7 +220,7 @@ impl ContactFinder {
             excluded: Vec::new(),
         };
         let residual = Some(self.residual(fit, fit.cost, target));
-        Solution { contacts, residual, flags, ..Solution::default() }
+        Solution { contacts, residual, flags, certainty: Some(found.certainty), ..Solution::default() }
     }
 
     /// A contact of a fit with its standard errors.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::discs::DiscFit;
 use super::{ContactFinder, ContactSettings, Explanation, Found, Target};
+use crate::solve::evidence::Evidence;
 use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search};
 use crate::solve::still::{Mean, Still};
 use crate::solve::track::Tracker;
@@ -108,11 +109,9 @@ impl ContactFollower {
         search
     }
 
-    /// Takes what a search has found, if it explains this frame better than what is followed; whether the search has to be repeated, because
+    /// Takes what a search has found in the mean of some frames, if it explains this frame better than what is followed; whether the search has to be repeated, because
     /// what it has found does not explain this frame as well as its own.
-    pub fn adopt(&mut self, lead: Lead, target: &Target) -> bool {
-        let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
-        let found = lead.known.into_contacts();
+    pub fn adopt(&mut self, found: Option<Found>, frames: usize, target: &Target) -> bool {
         let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
         let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
         let evidence = |found: &Option<Explanation>| {
@@ -133,11 +132,10 @@ impl ContactFollower {
         WORSE * (self.finder.freedom(fit, target) + more * self.searched.excess)
     }
 
-    /// What is left of one frame: root mean square, in standard deviations of the noise.
-    pub fn residual(&self, readings: &Readings) -> Result<Option<f64>, SolveError> {
-        let target = self.finder.target(readings)?;
-        let Some(last) = &self.last else { return Ok(self.finder.nothing(&target).residual) };
-        Ok(Some(self.finder.residual(&last.fit, target.cost(&last.fit.volts), &target)))
+    /// What is left of the frames that were followed last, and what that takes; of nothing, all of it.
+    pub fn evidence(&self, target: &Target) -> Evidence {
+        let nothing = || Evidence::of(target.cost(&vec![0.0; target.volts.len()]), 0);
+        self.last.as_ref().map_or_else(nothing, |last| self.finder.evidence_of(&last.fit))
     }
 
     /// Numbers contacts on from those that were found before.
@@ -185,7 +183,8 @@ impl Follower for FrameFollower {
         self.contacts.finder.check(readings)?;
         self.still.add_if_new(readings.volts(), self.contacts.slopes_v());
         let target = self.target(readings)?;
-        let search = self.contacts.adopt(lead, &target);
+        let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
+        let search = self.contacts.adopt(lead.contacts.map(|found| *found), frames, &target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
     }
 
@@ -231,7 +230,7 @@ impl ContactSearcher {
 impl Searcher for ContactSearcher {
     fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
         let mean = from.mean_or(readings);
-        let found = self.contacts(from.known.into_contacts(), &mean, found)?.map(|(found, _)| found);
+        let found = self.contacts(from.contacts.map(|found| *found), &mean, found)?.map(|(found, _)| found);
         Ok(Lead::of_contacts(found, Some(mean)))
     }
 }

@@ -40,7 +40,7 @@ pub(in crate::solve) struct Target {
     /// Frames that the readings are the mean of.
     pub(super) frames: usize,
     /// Standard deviation of the readings by noise (V).
-    pub(super) noise_v: f64,
+    pub noise_v: f64,
     /// Readings, less what spots cannot say (V).
     pub(super) volts: Vec<f64>,
     /// One over the standard deviation of each (1/V); zero leaves a reading out.

@@ -54,7 +54,8 @@ fn the_readings_follow_their_derivatives() {
     let solver = solver();
     let finder = solver.finder();
     let fitter = finder.disc_fitter();
-    let target = finder.target(&frame(&[contact(0.01, 0.0, 1.0)], &mut Noise::new(1))).unwrap();
+    let readings = frame(&[contact(0.01, 0.0, 1.0)], &mut Noise::new(1));
+    let target = finder.target_of(&Mean { readings, frames: 1 }).unwrap();
     let firm = Contact { radius_m: 0.0032, ..contact(-0.012, 0.004, 30.0) };
     let at = vec![contact(0.003, -0.008, 0.1), firm, contact(0.0271, 0.0262, 1.0)];
     let unmoved = Effort { steps: 0, gain: 0.0, share: 0.0 };

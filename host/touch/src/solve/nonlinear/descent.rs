@@ -7,7 +7,7 @@
 //! ratio of the gain to that foretold, Nielsen, "Damping parameter in Marquardt's method", 1999). Nodes whose conductance
 //! vanishes drop out, and come back where the sum would fall with more: so a step costs what the touched surface costs.
 
-use faer::linalg::solvers::Solve;
+use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, MatRef, Side};
 use nalgebra::{DMatrix, DVector};
 
@@ -61,6 +61,15 @@ pub(in crate::solve) struct Descent {
     pub(super) begun: f64,
 }
 
+/// How much an image says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::solve) struct Complexity {
+    /// Numbers that the readings determine.
+    pub determined: f64,
+    /// What saying them costs, in squares of deviations.
+    pub price: f64,
+}
+
 impl Scene {
     /// Conductances (S).
     pub fn image_s(&self, roots: &DVector<f64>) -> Vec<f64> {
@@ -86,6 +95,11 @@ impl Scene {
 }
 
 impl Descent {
+    /// How many numbers the readings determine of the image, and what it costs to say them.
+    pub(super) fn complexity(&self, scene: &Scene, target: &Target) -> Complexity {
+        Linear::new(scene, target, &self.image).complexity()
+    }
+
     /// Begins at an image.
     pub(super) fn new(image: Image) -> Self {
         Self { image, damping: None, settled: false, begun: f64::INFINITY }
@@ -175,6 +189,22 @@ impl Linear {
     fn first_damping(&self) -> f64 {
         let largest = self.derivatives.column_iter().map(|column| column.norm_squared()).fold(0.0, f64::max);
         FIRST_DAMPING * largest
+    }
+
+    /// With `l` the eigenvalues of `A' A`, the trace of `A (A' A + s)^-1 A'` is the sum of `l / (l + s)`, what the prior leaves of as many
+    /// unknowns; and twice the logarithm of the evidence loses the sum of `ln(1 + l / s)` and `s |x|^2` (Laplace's approximation).
+    fn complexity(&self) -> Complexity {
+        let size = self.squares.nrows();
+        let mut matrix = self.squares.clone();
+        (0..size).for_each(|i| matrix[(i, i)] += self.sparsity);
+        let prior = self.sparsity * self.roots.norm_squared();
+        let Ok(factor) = matrix.llt(Side::Lower) else {
+            return Complexity { determined: size as f64, price: f64::INFINITY };
+        };
+        let (lower, inverse) = (factor.L(), factor.inverse());
+        let over_prior: f64 = (0..size).map(|i| 2.0 * lower[(i, i)].ln() - self.sparsity.ln()).sum();
+        let left: f64 = (0..size).map(|i| self.sparsity * inverse[(i, i)]).sum();
+        Complexity { determined: size as f64 - left, price: prior + over_prior }
     }
 
     /// `(A' A + (s + d))^-1` times the pull, in the smaller of both spaces.

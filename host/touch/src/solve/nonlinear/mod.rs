@@ -11,8 +11,9 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
-pub(super) use self::descent::Descent;
 use self::descent::Scene;
+pub(super) use self::descent::{Complexity, Descent};
+use super::evidence::misfit_limit;
 use super::interpolate::Interpolation;
 use super::locate::Locator;
 use super::{Flags, Problem, Solution, SolveError, Solver};
@@ -23,8 +24,8 @@ use tactomo_physics::readings::Readings;
 const FULL: f64 = 0.995;
 /// Even contacts that a first frame is compared with: roots of the conductance of a node, in units of the sheet conductance.
 const EVEN: [f64; 12] = [0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.25, 0.5];
-/// Mean square of what is left, in what noise and model error make, above which the readings do not fit.
-const MISFIT: f64 = 3.0;
+/// Error of the model on the coarse mesh, as a share of the largest reading, that is no misfit: as of the model that contacts are fitted with.
+const MODEL_ERROR: f64 = 0.0007;
 /// What is left may be so many times what the last fresh start left before the next one: jumping presses leave hundreds of times as much,
 /// a scene that moves 2 mm a frame twice as much.
 const LOST: f64 = 4.0;
@@ -142,7 +143,7 @@ impl Shared {
         let deviation_v = 1.0 / target.weights.iter().copied().fold(0.0, f64::max).max(1.0);
         let flags = Flags {
             saturated: counted < target.volts.len(),
-            misfit: left > MISFIT,
+            misfit: left > self.misfit_limit(target),
             unfinished: !descent.settled,
             excluded: Vec::new(),
         };
@@ -151,8 +152,14 @@ impl Shared {
             image_s_per_m2: Some(image),
             residual: Some(left.sqrt() * deviation_v / self.noise_v),
             flags,
-            choice: None,
+            ..Solution::default()
         }
+    }
+
+    /// Mean square of what is left, in what noise makes, above which the readings do not fit.
+    fn misfit_limit(&self, target: &Target) -> f64 {
+        let model_v = MODEL_ERROR * target.volts.iter().copied().fold(0.0, f64::max);
+        misfit_limit(target.counted() as f64) * (1.0 + (model_v / self.noise_v).powi(2))
     }
 
     fn nothing(&self, target: &Target) -> Solution {
@@ -189,11 +196,20 @@ impl Nonlinear {
         let solution = self.shared.solution(&descent, &target);
         let left = self.shared.left(&descent, &target);
         // The warm start has to be given up: what is left is no noise, and much more than a fresh start left.
-        let is_lost = left > MISFIT && left > LOST * descent.begun;
+        let is_lost = left > self.shared.misfit_limit(&target) && left > LOST * descent.begun;
         // A first frame of a finger that lands may leave much; what later ones leave counts.
         descent.begun = descent.begun.min(left);
         self.last = Some(descent);
         Ok((solution, is_lost))
+    }
+
+    /// The image that was followed last, as a solution for the readings that it was brought to.
+    pub(super) fn solution(&self, readings: &Readings) -> Result<Solution, SolveError> {
+        let target = self.shared.checked(readings)?;
+        Ok(match &self.last {
+            Some(descent) => self.shared.solution(descent, &target),
+            None => self.shared.nothing(&target),
+        })
     }
 
     /// Finds the image anew, from even contact or from where the last one is, whichever is nearer.
@@ -215,6 +231,16 @@ impl Nonlinear {
     /// The image that is followed.
     pub(super) fn descent(&self) -> Option<&Descent> {
         self.last.as_ref()
+    }
+
+    /// What the image that is followed makes of the readings (V), and how much it says.
+    pub(super) fn explains(&self, readings: &Readings) -> Result<Option<(Vec<f64>, Complexity)>, SolveError> {
+        let target = self.shared.checked(readings)?;
+        let scene = &self.shared.scene;
+        Ok(self.last.as_ref().map(|descent| {
+            let volts = readings_v(&descent.image.fields.impedance_ohm, &scene.detector).volts().to_vec();
+            (volts, descent.complexity(scene, &target))
+        }))
     }
 
     /// Goes on from an image of some frames ago.

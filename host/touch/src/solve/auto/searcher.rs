@@ -1,0 +1,112 @@
+//! The thorough half: which model explains a frame at the lowest price.
+
+use std::sync::Arc;
+
+use super::words::instead_of;
+use super::{
+    ContactFinder, ContactSearcher, Evidence, Nonlinear, ShapeFinder, Solution, SolveError, Target, image_evidence,
+};
+use crate::solve::follow::{Lead, Searcher, Whole};
+use crate::solve::shapes::StripFit;
+use tactomo_physics::readings::Readings;
+
+/// So many contacts may stand for something else, if they leave more than noise does.
+const SUSPICIOUS: usize = 3;
+
+/// Chooses the model.
+pub(super) struct AutoSearcher {
+    finder: Option<Arc<ContactFinder>>,
+    shapes: Option<Arc<ShapeFinder>>,
+    image: Nonlinear,
+}
+
+impl AutoSearcher {
+    pub fn new(finder: Option<Arc<ContactFinder>>, shapes: Option<Arc<ShapeFinder>>, image: Nonlinear) -> Self {
+        Self { finder, shapes, image }
+    }
+
+    pub fn reset(&mut self) {
+        self.image.go_on_from(None);
+    }
+
+    /// The line or ring that explains a frame better than contacts, if there may be one.
+    fn shape(
+        &self,
+        contacts: (&Solution, Evidence),
+        from: Option<&(Whole, String)>,
+        target: &Target,
+    ) -> Option<StripFit> {
+        let (solution, evidence) = contacts;
+        let from = match from {
+            Some((Whole::Shape(fit), _)) => Some(&**fit),
+            _ => None,
+        };
+        let shapes = self.shapes.as_ref()?;
+        let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
+        let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
+        (shape.evidence().score() < evidence.score()).then_some(shape)
+    }
+
+    /// The image that explains a frame, from the one that was followed if it was one.
+    fn image(&mut self, from: Option<(Whole, String)>, readings: &Readings) -> Result<Option<Whole>, SolveError> {
+        self.image.go_on_from(match from {
+            Some((Whole::Image(descent), _)) => Some(*descent),
+            _ => None,
+        });
+        self.image.begin(readings)?;
+        Ok(self.image.descent().cloned().map(|descent| Whole::Image(Box::new(descent))))
+    }
+
+    /// All that there is to know without contacts.
+    fn image_alone(&mut self, from: Lead, readings: &Readings) -> Result<Lead, SolveError> {
+        if self.image.is_rest(readings) {
+            return Ok(Lead::default());
+        }
+        let why = "this model has no fields of single contacts".to_owned();
+        let whole = self.image(from.whole, readings)?.map(|image| (image, why));
+        Ok(Lead { whole, ..Lead::default() })
+    }
+
+    /// What explains the frame as a whole better than contacts do, if anything.
+    fn whole(
+        &mut self,
+        (contacts, solution): (Evidence, &Solution),
+        from: Option<(Whole, String)>,
+        target: &Target,
+        readings: &Readings,
+    ) -> Result<Option<Whole>, SolveError> {
+        let shape = self.shape((solution, contacts), from.as_ref(), target);
+        let best = shape.as_ref().map_or(contacts, StripFit::evidence);
+        let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
+        let noise_share = (target.noise_v / target.deviation_v()).powi(2);
+        let is_doubtful = solution.contacts.len() >= SUSPICIOUS && best.may_be_better(noise_share, target.count());
+        if !(is_doubtful || best.is_misfit(target.count())) {
+            return Ok(shape);
+        }
+        let image = self.image(from, readings)?;
+        let evidence = image_evidence(&self.image, readings, target)?;
+        let is_better = evidence.is_some_and(|evidence| evidence.score() < best.score());
+        Ok(if is_better { image } else { shape })
+    }
+}
+
+impl Searcher for AutoSearcher {
+    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
+        let mean = from.mean_or(readings);
+        let readings = &mean.readings;
+        let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings) };
+        let Lead { contacts, whole: from, .. } = from;
+        // A picture does not change to contacts that may not explain it.
+        let mut nowhere = |_| {};
+        let (contacts, found) =
+            if from.is_some() { (None, &mut nowhere as &mut dyn FnMut(Lead)) } else { (contacts, found) };
+        let target = finder.target_of(&mean)?;
+        let searcher = ContactSearcher::new(Arc::clone(&finder));
+        let Some((contacts, solution)) = searcher.contacts(contacts.map(|found| *found), &mean, found)? else {
+            return Ok(Lead { mean: Some(mean), ..Lead::default() });
+        };
+        let whole = self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?;
+        let whole = whole.map(|whole| (whole, instead_of(&solution)));
+        Ok(Lead { contacts: Some(Box::new(contacts)), whole, mean: Some(mean) })
+    }
+}
