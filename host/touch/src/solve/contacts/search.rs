@@ -20,6 +20,8 @@ const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
 const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
 /// From the frame before.
 const WARM: Effort = Effort { steps: 2, gain: 0.2, share: 0.0 };
+/// From some frames ago.
+const CAUGHT_UP: Effort = Effort { steps: 6, gain: 0.2, share: 0.0 };
 /// Starts of one more contact, and how many of them go on.
 const STARTS: usize = 4;
 const FINALISTS: usize = 2;
@@ -131,6 +133,7 @@ impl ContactFinder {
         let mut by_count = vec![f64::NEG_INFINITY; self.settings.most + 1];
         let mut last = first.clone();
         let mut best = self.noted(self.released(first, target), &mut by_count);
+        better(&Explanation::new(best.0.clone(), &by_count));
         while last.contacts.len() < self.settings.most {
             let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
             let more = self.noted(more, &mut by_count);
@@ -309,7 +312,7 @@ impl ContactFinder {
 
     /// An explanation of some frames ago, brought to this one.
     pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
-        let fit = self.disc_fitter().go_on(&found.fit, target, COLD)?;
+        let fit = self.disc_fitter().go_on(&found.fit, target, CAUGHT_UP)?;
         Some(Explanation { fit, ..found })
     }
 
