@@ -172,6 +172,9 @@ pub struct FrameReport<'a> {
     pub shape: Option<&'a FoundShape>,
     /// Root mean square of what the answer leaves of the readings, in standard deviations of the noise.
     pub residual: Option<f64>,
+    /// Probability that as many contacts touch as were found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certainty: Option<f64>,
     /// What to know before this is believed.
     pub flags: Option<&'a Flags>,
     /// What was chosen and why.
@@ -192,6 +195,7 @@ impl<'a> FrameReport<'a> {
             contacts: &solution.contacts,
             shape: solution.shape.as_ref(),
             residual: solution.residual,
+            certainty: solution.certainty,
             flags: Some(&solution.flags),
             choice: solution.choice.as_ref(),
             ..Self::default()

@@ -120,6 +120,7 @@ mod tests {
             residual: Some(1.25),
             flags: Flags { saturated: true, misfit: false, unfinished: true, excluded: vec![3, 31] },
             shape: None,
+            certainty: Some(0.75),
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
         assert_eq!(words(&bytes[..36]), [LAYOUT, 9, 300, 3, 2, 2, 0, 0b101, 1 << 31 | 1 << 3]);

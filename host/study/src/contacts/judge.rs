@@ -86,7 +86,10 @@ pub struct Match {
 impl Judged {
     /// Compares a solution with the contacts that are there and the bounds of their errors.
     pub(super) fn new(detector: &Detector, truth: &[Contact], bounds: Option<&[Bound]>, solution: &Solution) -> Self {
-        let matching = Matching::within(REACH * electrode_distance_m(detector), truth, &solution.contacts);
+        // Contacts that are kept beside a shape or an image are not the answer.
+        let is_image = solution.choice.as_ref().is_some_and(|choice| choice.what == "image");
+        let found = if solution.shape.is_some() || is_image { &[] } else { &solution.contacts[..] };
+        let matching = Matching::within(REACH * electrode_distance_m(detector), truth, found);
         let bound_of = |index: usize| bounds.and_then(|bounds| bounds.get(index)).copied();
         let is_place_of = |found: &FoundContact, index: usize| {
             let distance_m = (found.x_m - truth[index].x_m).hypot(found.y_m - truth[index].y_m);
@@ -119,7 +122,7 @@ impl Judged {
         };
         Self {
             truth: truth.iter().enumerate().map(of).collect(),
-            found: solution.contacts.clone(),
+            found: found.to_vec(),
             invented,
             misfit: solution.flags.misfit,
             residual: solution.residual,

@@ -57,11 +57,9 @@ fn contacts(detector: &Detector, count: usize, random: &mut fastrand::Rng) -> Ve
     let sizes: Vec<Contact> = (0..count)
         .map(|_| Contact::flat(0.0, 0.0, scale * log_uniform(RADII_M, random), log_uniform(CONDUCTANCES_S, random)))
         .collect();
-    loop {
-        if let Some(contacts) = placed(&detector.outline, &sizes, scale, random) {
-            return contacts;
-        }
-    }
+    let tried = (0..TRIES).find_map(|_| placed(&detector.outline, &sizes, scale, random));
+    // A detector that is too narrow for so many has fewer.
+    tried.unwrap_or_else(|| sizes.iter().take(1).copied().collect())
 }
 
 fn placed(outline: &Outline, sizes: &[Contact], scale: f64, random: &mut fastrand::Rng) -> Option<Vec<Contact>> {

@@ -173,12 +173,26 @@ impl Still {
         for newest in windows(all) {
             let difference = self.difference(newest, moves);
             let alarm = -2.0 * (FALSE_ALARMS * newest as f64).ln();
-            if difference.overall > OTHER || difference.of_contacts > alarm {
-                self.sums_v.drain(..all - newest);
-                self.has_moved = true;
+            // A reading that is no voltage of a board makes sums that nothing can be told from.
+            if difference.overall.is_nan() || difference.overall > OTHER || difference.of_contacts > alarm {
+                self.begin_with_newest(newest);
                 return;
             }
             self.has_moved |= difference.of_contacts > -2.0 * FALSE_DOUBTS.ln() && newest == all / 2;
+        }
+    }
+
+    /// Forgets all but so many of the newest frames, and what their sums began with: that may be far larger than they are.
+    fn begin_with_newest(&mut self, newest: usize) {
+        self.has_moved = true;
+        self.sums_v.drain(..self.frames() - newest);
+        if newest == 1 {
+            self.sums_v = VecDeque::from([vec![0.0; self.newest_v.len()], self.newest_v.clone()]);
+            return;
+        }
+        let begun_with = self.sums_v[0].clone();
+        for sums_v in &mut self.sums_v {
+            sums_v.iter_mut().zip(&begun_with).for_each(|(sum, begun)| *sum -= begun);
         }
     }
 

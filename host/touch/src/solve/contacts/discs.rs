@@ -185,6 +185,7 @@ impl Slopes {
 impl DiscFitter<'_> {
     /// The nearest minimum from a start; `None` if the start makes no sense.
     pub fn fit(&self, start: Vec<Contact>, target: &Target, effort: Effort) -> Option<DiscFit> {
+        let start = start.into_iter().map(|contact| self.held(contact)).collect();
         self.descend(self.anew(start, target)?, target, effort)
     }
 

@@ -8,6 +8,9 @@
 //! ln p = -S / 2 + sum of ln(prior densities' peaks) + P / 2 ln(2 pi) - 1/2 ln det H + ln K!
 //! ```
 //!
+//! plus, as the fit's parameters are not the logarithms that the prior is of but the resistance `A` of contact and crowded current, the
+//! logarithms of `d(ln C) / d(ln A) = 1 + S C` (see [`PARAMETERS`](super::discs::PARAMETERS)).
+//!
 //! (Kass and Raftery, Bayes factors, 1995). Places are alike likely all over the detector, logarithms of conductance and radius
 //! normal; contacts have no order, so that `K!` fits are the same. What one more contact costs follows: the share of the places
 //! and conductances that would do as well.
@@ -45,10 +48,12 @@ impl Prior {
         let peak = -self.area_m2.ln() - (CONDUCTANCE_DEVIATION * self.radius_deviation * TAU).ln();
         // Places are in units of their own.
         let units: f64 = (0..count).map(|k| 2.0 * fit.along(k).1.ln()).sum();
+        let from_logs: f64 = (0..count).map(|k| fit.exchange(k).ln_1p()).sum();
         let orders: f64 = (1..=count).map(|k| (k as f64).ln()).sum();
         -0.5 * (fit.cost + fit.known)
             + count as f64 * (peak - FEWER)
             + units
+            + from_logs
             + orders
             + 0.5 * (PARAMETERS * count) as f64 * TAU.ln()
             - 0.5 * ln_determinant

@@ -25,7 +25,7 @@ use nalgebra::DMatrix;
 
 use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
 use self::evidence::Prior;
-use self::exchange::Usual;
+use self::exchange::{Logs, Usual};
 use self::network::Network;
 use self::scan::Scan;
 pub use self::solver::Contacts;
@@ -99,8 +99,8 @@ pub(super) struct Found(Explanation);
 #[derive(Clone, Debug)]
 struct Explanation {
     fit: DiscFit,
-    /// Probability of their count, among the counts that were tried.
-    certainty: f64,
+    /// Probability of their count, among the counts that were tried; none once it has changed without a search.
+    certainty: Option<f64>,
 }
 
 impl Explanation {
@@ -108,7 +108,7 @@ impl Explanation {
     fn new(fit: DiscFit, by_count: &[f64]) -> Self {
         let of = by_count[fit.contacts.len()];
         let all: f64 = by_count.iter().map(|other| (other - of).exp()).sum();
-        Self { fit, certainty: 1.0 / all }
+        Self { fit, certainty: Some(1.0 / all).filter(|share| share.is_finite()) }
     }
 }
 
@@ -210,41 +210,50 @@ impl ContactFinder {
     fn solution(&self, found: &Explanation, target: &Target) -> Solution {
         let fit = &found.fit;
         let covariance = fit.covariance();
+        let logs: Vec<_> = (0..fit.contacts.len()).map(|k| self.logs(fit, k, covariance.as_ref())).collect();
         let contacts: Vec<_> =
-            (0..fit.contacts.len()).map(|k| self.found_contact(fit, k, covariance.as_ref())).collect();
-        let is_perfect = |contact: &FoundContact| contact.conductance_s > SATURATED * self.sheet_s;
+            logs.iter().enumerate().map(|(k, logs)| found_contact(fit, k, covariance.as_ref().zip(*logs))).collect();
+        // A standard error more and it is as good as perfect.
+        let perfect = (SATURATED * self.sheet_s).ln();
+        let is_perfect = |logs: &Option<Logs>| {
+            logs.is_some_and(|Logs { conductance: [mean, deviation], .. }| mean + deviation > perfect)
+        };
         let flags = Flags {
-            saturated: target.is_saturated() || contacts.iter().any(is_perfect),
+            saturated: target.is_saturated() || logs.iter().any(is_perfect),
             misfit: self.is_misfit(fit, target),
             unfinished: !fit.settled,
             excluded: Vec::new(),
         };
         let residual = Some(self.residual(fit, fit.cost, target));
-        Solution { contacts, residual, flags, certainty: Some(found.certainty), ..Solution::default() }
+        Solution { contacts, residual, flags, certainty: found.certainty, ..Solution::default() }
     }
 
-    /// A contact of a fit with its standard errors.
-    fn found_contact(&self, fit: &DiscFit, k: usize, covariance: Option<&DMatrix<f64>>) -> FoundContact {
+    /// What the readings say of a contact's conductance and radius.
+    fn logs(&self, fit: &DiscFit, k: usize, covariance: Option<&DMatrix<f64>>) -> Option<Logs> {
         let usual = Usual {
             conductance_s: self.sheet_s,
             most_s: CONDUCTANCES[1] * self.sheet_s,
             radius_m: self.settings.radius_m,
             radius_deviation: self.settings.radius_deviation,
         };
-        let contact = fit.contacts[k];
-        let logs = covariance.and_then(|covariance| usual.logs(fit, k, covariance));
-        let conductance_s = logs.map_or(contact.conductance_s, |logs| logs.conductance[0].exp());
-        let known = logs.filter(|logs| logs.radius[1] < KNOWN);
-        let uncertainty = covariance.zip(logs).map(|(covariance, logs)| Uncertainty {
-            conductance_s: conductance_s * logs.conductance[1],
-            ..place_uncertainty(fit, k, covariance)
-        });
-        FoundContact {
-            z_m: contact.z_m,
-            uncertainty,
-            radius_m: known.map(|logs| logs.radius[0].exp()),
-            ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)
-        }
+        usual.logs(fit, k, covariance?)
+    }
+}
+
+/// A contact of a fit with its standard errors.
+fn found_contact(fit: &DiscFit, k: usize, known: Option<(&DMatrix<f64>, Logs)>) -> FoundContact {
+    let contact = fit.contacts[k];
+    let conductance_s = known.map_or(contact.conductance_s, |(_, logs)| logs.conductance[0].exp());
+    let uncertainty = known.map(|(covariance, logs)| Uncertainty {
+        conductance_s: conductance_s * logs.conductance[1],
+        ..place_uncertainty(fit, k, covariance)
+    });
+    let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
+    FoundContact {
+        z_m: contact.z_m,
+        uncertainty,
+        radius_m: radius.map(|[mean, _]| mean.exp()),
+        ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)
     }
 }
 

@@ -72,8 +72,8 @@ fn standard_errors_shrink_with_frames_until_the_model_is_the_limit() {
     assert!(sigmas_m[0] / sigmas_m[399] > 5.0, "{} {}", sigmas_m[0], sigmas_m[399]);
     bench.touch(&[contact(0.007, -0.004, 100.0)]);
     (0..300).for_each(|_| drop(bench.solve()));
-    let [noise, model] = [bench.solve(), bench.solve()].map(|solution| sigma_m(&solution));
-    assert!(noise > 2e-6 && model > 2e-6, "the model is no better than that: {noise} {model}");
+    let firm_m = sigma_m(&bench.solve());
+    assert!(firm_m > 2e-6, "the model is no better than that: {firm_m}");
 }
 
 #[test]

@@ -145,7 +145,10 @@ impl ContactFinder {
                 break;
             }
         }
-        while self.is_doubtful(&best.0, target) {
+        for _ in 0..self.settings.most {
+            if !self.is_doubtful(&best.0, target) {
+                break;
+            }
             let Some(other) = self.swapped(&best, target).map(|other| self.noted(other, &mut by_count)) else { break };
             best = other;
             better(&Explanation::new(best.0.clone(), &by_count));
@@ -268,7 +271,8 @@ impl ContactFinder {
                 merged
             })
         });
-        self.best_of(self.weak(fit).into_iter().map(without).chain(merged).collect(), target)
+        let fewer = self.best_of(self.weak(fit).into_iter().map(without).chain(merged).collect(), target)?;
+        Some(self.released(fewer, target))
     }
 
     fn merged(&self, a: &Contact, b: &Contact) -> Contact {
@@ -333,7 +337,7 @@ impl ContactFinder {
             return Some(found);
         }
         match self.disc_fitter().fit(kept, target, WARM) {
-            Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, ..found }),
+            Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, certainty: None }),
             _ => Some(found),
         }
     }
@@ -342,7 +346,8 @@ impl ContactFinder {
     pub(super) fn follow(&self, last: &Explanation, target: &Target) -> Option<Explanation> {
         let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
         let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
-        Some(Explanation { fit, certainty: last.certainty })
+        let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
+        Some(Explanation { fit, certainty })
     }
 
     /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each

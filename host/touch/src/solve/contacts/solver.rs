@@ -36,6 +36,8 @@ pub(in crate::solve) struct ContactFollower {
     /// Whether what is followed could not be brought to the newest frame.
     is_stale: bool,
     tracker: Tracker,
+    /// The tracker before this frame: a frame that has several answers is one frame.
+    before: Tracker,
 }
 
 /// What the last search has left.
@@ -77,7 +79,7 @@ impl ContactFollower {
     /// Follows nothing yet.
     pub fn new(finder: Arc<ContactFinder>) -> Self {
         let tracker = Tracker::new(finder.spacing_m);
-        Self { finder, last: None, searched: Searched::default(), is_stale: false, tracker }
+        Self { finder, last: None, searched: Searched::default(), is_stale: false, before: tracker.clone(), tracker }
     }
 
     /// What finds the contacts.
@@ -97,13 +99,14 @@ impl ContactFollower {
 
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
+        self.before = self.tracker.clone();
         let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
         let Some(moved) = self.finder.follow(&last, target) else {
             (self.last, self.is_stale) = (Some(last), true);
             return true;
         };
         self.is_stale = false;
-        let Some(found) = self.finder.without_weak(moved, target) else { return false };
+        let Some(found) = self.finder.without_weak(moved, target) else { return self.finder.stands_out(target) };
         let search = found.fit.cost > self.enough(&found.fit, target) || target.frames >= MORE * self.searched.frames;
         self.last = Some(found);
         search
@@ -112,6 +115,7 @@ impl ContactFollower {
     /// Takes what a search has found in the mean of some frames, if it explains this frame better than what is followed; whether the search has to be repeated, because
     /// what it has found does not explain this frame as well as its own.
     pub fn adopt(&mut self, found: Option<Found>, frames: usize, target: &Target) -> bool {
+        self.tracker = self.before.clone();
         let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
         let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
         let evidence = |found: &Option<Explanation>| {
@@ -122,7 +126,8 @@ impl ContactFollower {
             (self.last, self.is_stale) = (caught_up, false);
         }
         let Some(last) = &self.last else { return self.finder.stands_out(target) };
-        self.searched = Searched { excess: (left - self.finder.freedom(&last.fit, target)).max(0.0), frames };
+        self.searched =
+            Searched { excess: (left.min(last.fit.cost) - self.finder.freedom(&last.fit, target)).max(0.0), frames };
         last.fit.cost > self.enough(&last.fit, target)
     }
 
@@ -141,6 +146,7 @@ impl ContactFollower {
     /// Numbers contacts on from those that were found before.
     pub fn inherit(&mut self, before: &[FoundContact]) {
         self.tracker.inherit(before);
+        self.before = self.tracker.clone();
     }
 
     /// What is followed, as a solution, with the numbers that contacts keep.
@@ -161,6 +167,7 @@ impl ContactFollower {
     pub fn reset(&mut self) {
         self.let_go();
         self.tracker.reset();
+        self.before = self.tracker.clone();
     }
 }
 

@@ -24,7 +24,7 @@ use tactomo_physics::readings::Readings;
 const FULL: f64 = 0.995;
 /// Even contacts that a first frame is compared with: roots of the conductance of a node, in units of the sheet conductance.
 const EVEN: [f64; 12] = [0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.25, 0.5];
-/// Error of the model on the coarse mesh, as a share of the largest reading, that is no misfit: as of the model that contacts are fitted with.
+/// Error of the model on the coarse mesh, as a share of the largest reading, that is no misfit.
 const MODEL_ERROR: f64 = 0.0007;
 /// What is left may be so many times what the last fresh start left before the next one: jumping presses leave hundreds of times as much,
 /// a scene that moves 2 mm a frame twice as much.

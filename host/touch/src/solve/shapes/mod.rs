@@ -6,7 +6,7 @@
 //!
 //! How well the nodes carry a thin strip was measured on `square-60` (45 x 45 nodes, 1.4 mm apart) against exact polygons on 141 x 141
 //! finer cells: lines of 36 mm and rings of 13 mm radius, 1.5 to 6 mm wide, of 0.1 and 2 sheet conductances. What the best strip leaves is
-//! 0.00007 to 0.0003 of the largest reading in the root of the mean square, less than the 0.0007 that contacts allow for the model; ends are
+//! 0.00007 to 0.0003 of the largest reading in the root of the mean square, no more than the 0.0003 that contacts allow for the slab; ends are
 //! right to 0.1 mm, radii to 0.03 mm (but where noise-free readings do not tell the width, and that is taken as usual), conductances to 2 %.
 
 mod fit;
@@ -66,7 +66,6 @@ pub(super) struct ShapeFinder {
     /// Of the mesh that solutions' images are on.
     image_ground: Ground,
     usual: Usual,
-    noise_v: f64,
 }
 
 /// A model and the nodes of its image.
@@ -106,7 +105,6 @@ impl ShapeFinder {
             coarse: Grid::new(coarse.into()),
             image_ground: Ground::new(&problem.jacobian.image_mesh),
             usual,
-            noise_v: detector.adc.deviation_v(),
             problem: problem.clone(),
         }))
     }
@@ -216,7 +214,7 @@ impl ShapeFinder {
         Solution {
             image_s_per_m2: Some(self.image_ground.image_s_per_m2(fit.strip())),
             shape: Some(self.shape(fit)),
-            residual: Some(left.sqrt() * target.deviation_v() / self.noise_v),
+            residual: Some(left.sqrt() * target.deviation_v() / target.noise_v),
             flags,
             ..Solution::default()
         }
