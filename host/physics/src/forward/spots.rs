@@ -1,9 +1,8 @@
 //! Fields of small contacts that may be anywhere, for solvers that look for a few of them.
 //!
-//! A spot carries one current, so a scene of `K` of them is a system of `K` unknowns, with derivatives by the places. It is
-//! near to a small contact of any conductance: what the current's spread over the contact adds is a few per cent, and
-//! smooth in the place, so that a solver can take it from [`ForwardModel::impedance_ohm`](super::ForwardModel::impedance_ohm)
-//! as a correction.
+//! A spot carries one current, so a scene of `K` of them is a system of `K` unknowns. It is near to a small contact of any
+//! conductance: what the current's spread over the contact adds is a few per cent. So many places can be looked at, before contacts
+//! are fitted with [`ForwardModel::impedance_ohm`](super::ForwardModel::impedance_ohm).
 
 use crate::geometry::Point;
 use crate::space::Place;
@@ -16,19 +15,14 @@ pub trait SpotFields: Send + Sync {
     /// The spot at the place of the detector that is nearest.
     fn spot(&self, place_m: Place) -> Spot;
 
-    /// Field of one spot at another, and its derivatives.
-    fn between(&self, a: &Spot, b: &Spot) -> Between;
+    /// Field of one spot at another (ohm).
+    fn between_ohm(&self, a: &Spot, b: &Spot) -> f64;
 
     /// The place of the detector that is nearest to another (m), and unit vectors of two directions along the surface there.
     fn footing(&self, place_m: Place) -> (Place, [Place; 2]);
 
     /// About so many places, at most [`MOST_PLACES`], spread over the detector (m).
     fn places_m(&self, count: usize) -> Vec<Place>;
-
-    /// Field between two spots alone (ohm).
-    fn between_ohm(&self, a: &Spot, b: &Spot) -> f64 {
-        self.between(a, b).ohm
-    }
 }
 
 /// A place where current may enter, with its fields in the gauge of the model's.
@@ -36,36 +30,18 @@ pub trait SpotFields: Send + Sync {
 pub struct Spot {
     /// Where it is (m).
     pub place_m: Place,
-    /// Unit vectors of the two directions that derivatives are by, along the surface.
-    pub along: [Place; 2],
     /// Field of each electrode here (ohm).
     pub electrodes_ohm: Vec<f64>,
-    /// Its derivatives along the two directions (ohm/m).
-    pub slopes_ohm_per_m: [Vec<f64>; 2],
     /// Field of its own current, mean over the contact (ohm).
     pub own_ohm: f64,
     /// Part of the contact that is on the detector: the rest, beyond an edge, touches nothing.
     pub share: f64,
-    /// Its derivatives along the two directions (1/m).
-    pub share_slopes_per_m: [f64; 2],
-    /// What the model needs besides: values, and derivatives along both directions.
-    pub(super) inner: [Vec<f32>; 3],
-    /// The middle of the part that is on the detector, in coordinates of the model's (m), and its derivatives along both directions.
+    /// What the model needs besides (square root of ohm).
+    pub(super) inner: Vec<f32>,
+    /// The middle of the part that is on the detector, in coordinates of the model's (m).
     pub(super) middle_m: Point,
-    pub(super) middle_by: [Point; 2],
-    /// Fields of currents between joined electrodes (square root of ohm), and derivatives along both directions.
-    pub(super) joined: [Vec<f64>; 3],
-}
-
-/// Field of a spot at another.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Between {
-    /// The field (ohm).
-    pub ohm: f64,
-    /// Its derivatives by the first spot's place (ohm/m).
-    pub by_first: [f64; 2],
-    /// Its derivatives by the second spot's place (ohm/m).
-    pub by_second: [f64; 2],
+    /// Fields of currents between joined electrodes (square root of ohm).
+    pub(super) joined: Vec<f64>,
 }
 
 /// Scalar product of what spots carry, in eight sums for the processor to do at once.

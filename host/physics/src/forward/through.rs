@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::joined::{Exchanges, Joint};
-use super::spots::{Between, Spot, SpotFields};
+use super::spots::{Spot, SpotFields};
 use super::{ContactFields, ForwardError, ForwardModel, ImageMesh};
 use crate::detector::Detector;
 use crate::scene::Contact;
@@ -129,12 +129,9 @@ struct SpotsThrough {
 impl SpotFields for SpotsThrough {
     fn spot(&self, place_m: Place) -> Spot {
         let mut spot = self.spots.spot(place_m);
-        let [by_first, by_second] = &mut spot.slopes_ohm_per_m;
-        for (all, joined) in [&mut spot.electrodes_ohm, by_first, by_second].into_iter().zip(&mut spot.joined) {
-            *joined = self.exchanges.apply(all);
-            *all = self.kept.iter().map(|e| all[*e]).collect();
-        }
-        spot.own_ohm -= product(&spot.joined[0], &spot.joined[0]);
+        spot.joined = self.exchanges.apply(&mut spot.electrodes_ohm);
+        spot.electrodes_ohm = self.kept.iter().map(|e| spot.electrodes_ohm[*e]).collect();
+        spot.own_ohm -= product(&spot.joined, &spot.joined);
         spot
     }
 
@@ -146,18 +143,8 @@ impl SpotFields for SpotsThrough {
         self.spots.places_m(count)
     }
 
-    fn between(&self, a: &Spot, b: &Spot) -> Between {
-        let mut field = self.spots.between(a, b);
-        field.ohm -= product(&a.joined[0], &b.joined[0]);
-        for axis in 0..2 {
-            field.by_first[axis] -= product(&a.joined[1 + axis], &b.joined[0]);
-            field.by_second[axis] -= product(&a.joined[0], &b.joined[1 + axis]);
-        }
-        field
-    }
-
     fn between_ohm(&self, a: &Spot, b: &Spot) -> f64 {
-        self.spots.between_ohm(a, b) - product(&a.joined[0], &b.joined[0])
+        self.spots.between_ohm(a, b) - product(&a.joined, &b.joined)
     }
 }
 

@@ -17,7 +17,7 @@ use super::contact::{cover, disc_m2};
 use super::locate::Locator;
 use super::mesh::Mesh;
 use crate::forward::ForwardError;
-use crate::forward::spots::{Between, MOST_PLACES, Spot, SpotFields, dot};
+use crate::forward::spots::{MOST_PLACES, Spot, SpotFields, dot};
 use crate::geometry::{Point, cross};
 use crate::space::{self, Place};
 
@@ -91,30 +91,25 @@ impl SpotTable {
         Ok(Self { mesh, locator, electrodes, columns, rows, tangents, spread })
     }
 
-    /// All columns at a place of a triangle: values and derivatives along the triangle's tangents.
-    fn sample(&self, triangle: u32, place_m: Place) -> [Vec<f32>; 3] {
+    /// All columns at a place of a triangle.
+    fn sample(&self, triangle: u32, place_m: Place) -> Vec<f32> {
         let corners = self.mesh.triangles[triangle as usize];
         let (points, at, _) = self.mesh.seen_from(corners, place_m);
         let cubic = Cubic::new(points, at);
-        let mut sums = [(); 3].map(|()| vec![0.0_f32; self.columns]);
+        let mut sums = vec![0.0_f32; self.columns];
         for i in 0..3 {
             let [first, second] = self.tangents[corners[i] as usize];
-            let mut coefficients = [cubic.value[i], [0.0; 3], [0.0; 3]];
+            let mut coefficients = [cubic.value[i], 0.0, 0.0];
             for (edge, j) in [(0, (i + 1) % 3), (1, (i + 2) % 3)] {
                 let way = space::sub(self.mesh.place_m(corners[j]), self.mesh.place_m(corners[i]));
-                let along = [space::dot(way, first), space::dot(way, second)];
-                for (coefficients, along) in coefficients[1..].iter_mut().zip(along) {
-                    coefficients.iter_mut().zip(cubic.slope[i][edge]).for_each(|(sum, slope)| *sum += slope * along);
-                }
+                coefficients[1] += cubic.slope[i][edge] * space::dot(way, first);
+                coefficients[2] += cubic.slope[i][edge] * space::dot(way, second);
             }
             let start = corners[i] as usize * 3 * self.columns;
-            for (row, by_part) in
-                self.rows[start..start + 3 * self.columns].chunks_exact(self.columns).zip(coefficients)
-            {
-                for (sum, coefficient) in sums.iter_mut().zip(by_part) {
-                    let coefficient = coefficient as f32;
-                    sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += coefficient * value);
-                }
+            let rows = self.rows[start..start + 3 * self.columns].chunks_exact(self.columns);
+            for (row, coefficient) in rows.zip(coefficients) {
+                let coefficient = coefficient as f32;
+                sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += coefficient * value);
             }
         }
         sums
@@ -126,20 +121,15 @@ impl SpotFields for ShellSpots {
         let table = &*self.0;
         let foot = table.locator.nearest(&table.mesh, place_m);
         let mut sampled = table.sample(foot.triangle, foot.place_m);
-        let last = |all: &mut Vec<f32>| all.pop().map(f64::from).unwrap_or_default();
-        let share = [0, 1, 2].map(|part| last(&mut sampled[part]));
-        let own = [0, 1, 2].map(|part| last(&mut sampled[part]));
-        let inner = [0, 1, 2].map(|part| sampled[part].split_off(table.electrodes));
-        let [electrodes_ohm, first, second] = sampled.map(|all| all.into_iter().map(f64::from).collect());
+        let mut last = || sampled.pop().map(f64::from).unwrap_or_default();
+        let (share, own_ohm) = (last(), last());
+        let inner = sampled.split_off(table.electrodes);
         Spot {
             place_m: foot.place_m,
-            along: table.mesh.tangents(foot.triangle),
-            electrodes_ohm,
-            slopes_ohm_per_m: [first, second],
-            own_ohm: own[0],
+            electrodes_ohm: sampled.into_iter().map(f64::from).collect(),
+            own_ohm,
             // A cubic may overshoot by some per mille.
-            share: share[0].clamp(1e-3, 1.0),
-            share_slopes_per_m: [share[1], share[2]],
+            share: share.clamp(1e-3, 1.0),
             inner,
             ..Spot::default()
         }
@@ -154,16 +144,8 @@ impl SpotFields for ShellSpots {
         self.0.spread.iter().take(count).map(|node| self.0.mesh.place_m(*node)).collect()
     }
 
-    fn between(&self, a: &Spot, b: &Spot) -> Between {
-        Between {
-            ohm: dot(&a.inner[0], &b.inner[0]),
-            by_first: [1, 2].map(|part| dot(&a.inner[part], &b.inner[0])),
-            by_second: [1, 2].map(|part| dot(&a.inner[0], &b.inner[part])),
-        }
-    }
-
     fn between_ohm(&self, a: &Spot, b: &Spot) -> f64 {
-        dot(&a.inner[0], &b.inner[0])
+        dot(&a.inner, &b.inner)
     }
 }
 
@@ -291,40 +273,22 @@ fn node_tangents(mesh: &Mesh) -> Vec<[Place; 2]> {
     normals.into_iter().map(tangents).collect()
 }
 
-/// Shape functions of Bazeley and others' triangle at a point, and their derivatives along the plane's two directions.
+/// Shape functions of Bazeley and others' triangle at a point.
 struct Cubic {
     /// Of the value at each corner.
-    value: [[f64; 3]; 3],
+    value: [f64; 3],
     /// Of the derivatives at each corner by the ways to the next corner and to the one after it.
-    slope: [[[f64; 3]; 2]; 3],
+    slope: [[f64; 2]; 3],
 }
 
 impl Cubic {
     fn new([a, b, c]: [Point; 3], at: Point) -> Self {
         let twice_m2 = cross(a, b, c);
-        let opposite = [(b, c), (c, a), (a, b)];
-        // Barycentric coordinates, each with its derivatives.
-        let l = opposite.map(|(from, to)| {
-            [cross(from, to, at) / twice_m2, (from[1] - to[1]) / twice_m2, (to[0] - from[0]) / twice_m2]
-        });
-        let [l0, l1, l2] = l;
-        let bubble = product(product(l0, l1), l2);
-        let value = l.map(|l| {
-            let square = product(l, l);
-            let cube = product(square, l);
-            [0, 1, 2].map(|part| 3.0 * square[part] - 2.0 * cube[part] + 2.0 * bubble[part])
-        });
-        let slope = [0, 1, 2].map(|i| {
-            [l[(i + 1) % 3], l[(i + 2) % 3]].map(|to| {
-                let way = product(product(l[i], l[i]), to);
-                [0, 1, 2].map(|part| way[part] + 0.5 * bubble[part])
-            })
-        });
+        // Barycentric coordinates.
+        let l = [(b, c), (c, a), (a, b)].map(|(from, to)| cross(from, to, at) / twice_m2);
+        let bubble = l[0] * l[1] * l[2];
+        let value = l.map(|l| 3.0 * l * l - 2.0 * l * l * l + 2.0 * bubble);
+        let slope = [0, 1, 2].map(|i| [l[(i + 1) % 3], l[(i + 2) % 3]].map(|to| l[i] * l[i] * to + 0.5 * bubble));
         Self { value, slope }
     }
-}
-
-/// Product of two functions with their derivatives along two directions.
-fn product(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] * b[0], a[1] * b[0] + a[0] * b[1], a[2] * b[0] + a[0] * b[2]]
 }

@@ -11,8 +11,7 @@ use realfft::RealFftPlanner;
 
 use super::disc::DiscSelf;
 use super::quadrature::panels;
-use super::spline::{Grid, Taps};
-use crate::forward::spots::Between;
+use super::spline::Grid;
 
 /// `k R` at which the smooth part's factor has fallen to 2e-5.
 const SMOOTH_END: f64 = 6.6;
@@ -98,46 +97,6 @@ impl SurfaceGreen {
         0.25 * sum
     }
 
-    /// Smooth part between two points with its derivatives.
-    pub fn smooth(&self, a: [f64; 2], b: [f64; 2]) -> Between {
-        let taps = |axis: usize| {
-            [a[axis] - b[axis], a[axis] + b[axis]].map(|u_m| (self.grid.taps(axis, u_m), self.grid.slopes(axis, u_m)))
-        };
-        let (x, y) = (taps(0), taps(1));
-        let mut field = Between::default();
-        for (y_sign, (y_taps, y_slopes)) in [-1.0, 1.0].into_iter().zip(&y) {
-            for (x_sign, (x_taps, x_slopes)) in [-1.0, 1.0].into_iter().zip(&x) {
-                let [ohm, by_x, by_y] = self.smooth_part(x_taps, x_slopes, y_taps, y_slopes);
-                field.ohm += 0.25 * ohm;
-                for (axis, slope, sign) in [(0, by_x, x_sign), (1, by_y, y_sign)] {
-                    field.by_first[axis] += 0.25 * slope;
-                    field.by_second[axis] += 0.25 * sign * slope;
-                }
-            }
-        }
-        field
-    }
-
-    /// One of the four look-ups: value and derivatives along both directions.
-    fn smooth_part(&self, x: &Taps, x_slopes: &[f64; 4], y: &Taps, y_slopes: &[f64; 4]) -> [f64; 3] {
-        let stride = self.grid.nodes(1);
-        let (mut values, mut slopes) = ([0.0; 4], [0.0; 4]);
-        for (i, (weight, slope)) in x.1.iter().zip(x_slopes).enumerate() {
-            let start = (x.0 + i) * stride + y.0;
-            for (lane, value) in self.smooth[start..start + 4].iter().enumerate() {
-                values[lane] += weight * value;
-                slopes[lane] += slope * value;
-            }
-        }
-        let along = |lanes: &[f64; 4], weights: &[f64; 4]| lanes.iter().zip(weights).map(|(a, b)| a * b).sum::<f64>();
-        [along(&values, &y.1), along(&slopes, &y.1), along(&values, y_slopes)]
-    }
-
-    /// Near part at a distance (ohm), and its derivative (ohm/m).
-    pub fn near(&self, distance_m: f64) -> [f64; 2] {
-        self.near.with_slope(distance_m)
-    }
-
     /// Near part at a distance (ohm).
     pub fn near_ohm(&self, distance_m: f64) -> f64 {
         self.near.at(distance_m)
@@ -184,11 +143,6 @@ impl Image {
     /// Where the image of a point is (m).
     pub fn of(&self, point: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| self.sign[axis] * point[axis] + self.offset_m[axis])
-    }
-
-    /// Whether it is mirrored along each direction: -1, else 1.
-    pub fn sign(&self) -> [f64; 2] {
-        self.sign
     }
 
     /// Whether this is the point itself.
@@ -261,17 +215,6 @@ impl NearPart {
         }
         let part = at - cell as f64;
         (self.values[cell] * (1.0 - part) + self.values[cell + 1] * part) / distance_m
-    }
-
-    fn with_slope(&self, distance_m: f64) -> [f64; 2] {
-        let value = self.at(distance_m);
-        let steps_per_m = NEAR_STEPS as f64 / self.reach_m;
-        let cell = (distance_m * steps_per_m) as usize;
-        if cell >= NEAR_STEPS || distance_m <= self.spread_m {
-            return [value, 0.0];
-        }
-        let slope = (self.values[cell + 1] - self.values[cell]) * steps_per_m;
-        [value, (slope - value) / distance_m]
     }
 }
 

@@ -194,26 +194,6 @@ impl PadFields {
         }
     }
 
-    /// All fields at a point of the top, as [`sample`](Self::sample) gives them, and their derivatives along both directions (per m).
-    pub fn sample_with_slopes(&self, at_m: [f64; 2]) -> [Vec<f32>; 3] {
-        let [x, y] = [0, 1].map(|axis| (self.grid.taps(axis, at_m[axis]), self.grid.slopes(axis, at_m[axis])));
-        let ((column, x_weights), x_slopes) = x;
-        let ((row, y_weights), y_slopes) = y;
-        let mut sums = [0, 1, 2].map(|_| vec![0.0f32; self.columns]);
-        for i in 0..4 {
-            for j in 0..4 {
-                let node = (column + i) * self.grid.nodes(1) + row + j;
-                let values = &self.table[node * self.columns..][..self.columns];
-                let weights = [x_weights[i] * y_weights[j], x_slopes[i] * y_weights[j], x_weights[i] * y_slopes[j]];
-                for (sum, weight) in sums.iter_mut().zip(weights) {
-                    let weight = weight as f32;
-                    sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
-                }
-            }
-        }
-        sums
-    }
-
     /// Means under the densities of a disc, of the electrodes' fields, `densities x electrodes`, and of the correction, `columns x
     /// densities`.
     pub fn under_disc(&self, basis: &DiscBasis, nodes: &[[f64; 2]]) -> [DMatrix<f64>; 2] {

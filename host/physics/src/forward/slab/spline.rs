@@ -47,19 +47,6 @@ impl Grid {
         (cell, cubic_weights(at - cell as f64))
     }
 
-    /// Derivatives of the weights of [`taps`](Self::taps) by `u_m` (1/m).
-    #[inline]
-    pub fn slopes(&self, axis: usize, u_m: f64) -> [f64; 4] {
-        let (size_m, per_m) = (self.size_m[axis], self.cells_per_m[axis]);
-        let (folded_m, turned) = match u_m.abs() > size_m {
-            true => ((2.0 * size_m - u_m.abs()).abs(), (2.0 * size_m - u_m.abs()).signum() * -u_m.signum()),
-            false => (u_m.abs(), u_m.signum()),
-        };
-        let at = folded_m * per_m;
-        let cell = (at as usize).min(self.cells[axis] - 1);
-        cubic_slopes(at - cell as f64).map(|slope| slope * turned * per_m)
-    }
-
     /// Spline coefficients at all nodes, `x` running slowest, of the cosine series with `amplitude[m * (ny + 1) + n]`.
     pub fn synthesise(&self, planner: &mut RealFftPlanner<f64>, mut amplitude: Vec<f64>) -> Vec<f64> {
         let [nx, ny] = self.cells;
@@ -86,13 +73,6 @@ fn cubic_weights(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     let (t_cubed, s_cubed) = (SIXTH * t * t * t, SIXTH * s * s * s);
     [s_cubed, 4.0 * SIXTH - t * t + 3.0 * t_cubed, 4.0 * SIXTH - s * s + 3.0 * s_cubed, t_cubed]
-}
-
-/// Derivatives of [`cubic_weights`] by `t`.
-#[inline]
-fn cubic_slopes(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
-    [-0.5 * s * s, -2.0 * t + 1.5 * t * t, 2.0 * s - 1.5 * s * s, 0.5 * t * t]
 }
 
 /// Factor from the coefficients of a B-spline to its values at the nodes, for one mode.
@@ -140,11 +120,6 @@ mod tests {
             let value: f64 =
                 (0..16).map(|tap| wx[tap / 4] * wy[tap % 4] * table[(i + tap / 4) * grid.nodes(1) + j + tap % 4]).sum();
             assert!((value - 2.0 * (kx * x).cos() * (ky * y).cos()).abs() < 2e-4, "at {x} {y}: {value}");
-            let sx = grid.slopes(0, x);
-            let slope: f64 =
-                (0..16).map(|tap| sx[tap / 4] * wy[tap % 4] * table[(i + tap / 4) * grid.nodes(1) + j + tap % 4]).sum();
-            let expected = -2.0 * kx * (kx * x).sin() * (ky * y).cos();
-            assert!((slope - expected).abs() < 4e-3 * kx, "at {x} {y}: {slope} {expected}");
         }
     }
 }

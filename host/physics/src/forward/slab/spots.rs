@@ -1,4 +1,4 @@
-//! Spots on a slab: points of the kernel's and the pads' tables, with the tables' own derivatives.
+//! Spots on a slab: points of the kernel's and the pads' tables.
 //!
 //! Near a wall, where a point's field has no slope across it, a spot is four points that have the means and the second moments of
 //! the contact's disc, or of what the wall leaves of it. They part from the middle between two radii and one from the wall.
@@ -8,30 +8,11 @@ use super::disc::DiscBasis;
 use super::green::Image;
 use super::image::ImageGrid;
 use super::{Slab, from_corner};
-use crate::forward::spots::{Between, MOST_PLACES, Spot, SpotFields, dot};
+use crate::forward::spots::{MOST_PLACES, Spot, SpotFields, dot};
 use crate::space::Place;
 
 /// Points of a disc of radius one with its second moments.
 const POINTS: [[f64; 2]; 4] = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]];
-/// Way over which the points' derivatives are taken, in radii.
-const DIFFERENCE: f64 = 1e-4;
-
-/// A point (from the corner, m), and how it moves with the place of its spot along both directions.
-#[derive(Clone, Copy, Debug)]
-struct MovingPoint {
-    at_m: [f64; 2],
-    by: [[f64; 2]; 2],
-}
-
-impl MovingPoint {
-    fn middle(points: &[Self]) -> Self {
-        let mean = |of: &dyn Fn(&Self) -> f64| points.iter().map(of).sum::<f64>() / points.len() as f64;
-        Self {
-            at_m: [0, 1].map(|axis| mean(&|point| point.at_m[axis])),
-            by: [0, 1].map(|by| [0, 1].map(|axis| mean(&|point| point.by[by][axis]))),
-        }
-    }
-}
 
 /// Spots of a slab.
 #[derive(Debug)]
@@ -72,101 +53,48 @@ impl SlabSpots {
         (POINTS.map(place).into(), cut.map_or(1.0, |cut| cut.share()))
     }
 
-    /// The points with their derivatives by the place along both directions, and the share with its.
-    fn moving_points(&self, at_m: [f64; 2]) -> (Vec<MovingPoint>, [f64; 3]) {
-        let (points, share) = self.points(at_m);
-        if points.len() == 1 {
-            return (vec![MovingPoint { at_m, by: [[1.0, 0.0], [0.0, 1.0]] }], [1.0, 0.0, 0.0]);
-        }
-        let mut moving: Vec<_> = points.iter().map(|at_m| MovingPoint { at_m: *at_m, by: [[0.0; 2]; 2] }).collect();
-        let mut shares = [share, 0.0, 0.0];
-        for axis in 0..2 {
-            let moved = |way: f64| {
-                let mut at_m = at_m;
-                at_m[axis] = (at_m[axis] + way * DIFFERENCE * self.radius_m).clamp(0.0, self.slab.size_m[axis]);
-                at_m
-            };
-            let (low_m, high_m) = (moved(-1.0), moved(1.0));
-            let per_m = 1.0 / (high_m[axis] - low_m[axis]);
-            let ((low, low_share), (high, high_share)) = (self.points(low_m), self.points(high_m));
-            // At the onset one of the two may still be a point.
-            let of = |points: &[[f64; 2]], i: usize| points[i.min(points.len() - 1)];
-            for (i, point) in moving.iter_mut().enumerate() {
-                point.by[axis] = [0, 1].map(|to| per_m * (of(&high, i)[to] - of(&low, i)[to]));
-            }
-            shares[1 + axis] = per_m * (high_share - low_share);
-        }
-        (moving, shares)
-    }
-
-    /// All fields of the pads, means over points, with their derivatives by the place.
-    fn sample(&self, points: &[MovingPoint]) -> [Vec<f32>; 3] {
-        let mut sums: Option<[Vec<f32>; 3]> = None;
+    /// All fields of the pads, means over points.
+    fn sample(&self, points: &[[f64; 2]]) -> Vec<f32> {
+        let pads = &self.slab.pads;
+        let (mut sums, mut sample) = (vec![0.0; pads.columns()], vec![0.0; pads.columns()]);
         let weight = 1.0 / points.len() as f32;
         for point in points {
-            let [values, by_x, by_y] = self.slab.pads.sample_with_slopes(point.at_m);
-            let moved = point.by.map(|[x, y]| {
-                let along = |(a, b): (&f32, &f32)| weight * (x as f32 * a + y as f32 * b);
-                by_x.iter().zip(&by_y).map(along).collect::<Vec<_>>()
-            });
-            let [first, second] = moved;
-            let all = [values.iter().map(|value| weight * value).collect(), first, second];
-            match &mut sums {
-                None => sums = Some(all),
-                Some(sums) => sums.iter_mut().zip(&all).for_each(|(sums, all)| {
-                    sums.iter_mut().zip(all).for_each(|(sum, value)| *sum += value);
-                }),
-            }
+            pads.sample(*point, &mut sample);
+            sums.iter_mut().zip(&sample).for_each(|(sum, value)| *sum += weight * value);
         }
-        sums.unwrap_or_default()
+        sums
     }
 
-    /// The kernel of the top between two places from the corner; of a place with itself without its singular part.
-    fn kernel(&self, a: [f64; 2], b: [f64; 2], same: bool) -> Between {
-        let mut field = self.slab.top.smooth(a, b);
-        let images = self.slab.top.images(a, b, 0.0);
-        for image in images.iter().filter(|image| !(same && image.in_place())) {
-            self.add_near(image, a, b, &mut field);
-        }
-        field
-    }
-
-    fn add_near(&self, image: &Image, a: [f64; 2], b: [f64; 2], field: &mut Between) {
-        let at = image.of(b);
-        let apart = [0, 1].map(|axis| a[axis] - at[axis]);
-        let distance_m = apart[0].hypot(apart[1]);
-        let [ohm, ohm_per_m] = self.slab.top.near(distance_m);
-        field.ohm += ohm;
-        for (axis, apart_m) in apart.into_iter().enumerate() {
-            let slope = ohm_per_m * apart_m / distance_m.max(f64::MIN_POSITIVE);
-            field.by_first[axis] += slope;
-            field.by_second[axis] -= slope * image.sign()[axis];
-        }
+    /// The kernel of the top between two places from the corner (ohm); of a place with itself without its singular part.
+    fn kernel_ohm(&self, a: [f64; 2], b: [f64; 2], same: bool) -> f64 {
+        let top = &self.slab.top;
+        let distance_m = |image: &Image| {
+            let at = image.of(b);
+            (a[0] - at[0]).hypot(a[1] - at[1])
+        };
+        let images = top.images(a, b, 0.0);
+        let others = images.iter().filter(|image| !(same && image.in_place()));
+        top.smooth_ohm(a, b) + others.map(|image| top.near_ohm(distance_m(image))).sum::<f64>()
     }
 }
 
 impl SpotFields for SlabSpots {
     fn spot(&self, place_m: Place) -> Spot {
-        let (place_m, along) = self.footing(place_m);
+        let (place_m, _) = self.footing(place_m);
         let corner_m = from_corner(self.slab.size_m, [place_m[0], place_m[1]]);
-        let (points, share) = self.moving_points(corner_m);
-        let sampled = self.sample(&points);
-        let electrodes = self.slab.pads.electrodes();
-        let middle = MovingPoint::middle(&points);
-        let fields = |all: &[f32]| all[..electrodes].iter().map(|ohm| f64::from(*ohm)).collect();
-        let square: f64 = sampled[0][electrodes..].iter().map(|value| f64::from(*value).powi(2)).sum();
+        let (points, share) = self.points(corner_m);
+        let middle_m = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / points.len() as f64);
+        let mut sampled = self.sample(&points);
+        let inner = sampled.split_off(self.slab.pads.electrodes());
+        let square: f64 = inner.iter().map(|value| f64::from(*value).powi(2)).sum();
         Spot {
             place_m,
-            along,
-            electrodes_ohm: fields(&sampled[0]),
-            slopes_ohm_per_m: [fields(&sampled[1]), fields(&sampled[2])],
-            own_ohm: self.local_ohm / share[0].sqrt() + self.kernel(middle.at_m, middle.at_m, true).ohm - square,
-            inner: sampled.map(|mut all| all.split_off(electrodes)),
-            share: share[0],
-            share_slopes_per_m: [share[1], share[2]],
-            middle_m: middle.at_m,
-            middle_by: middle.by,
-            ..Spot::default()
+            electrodes_ohm: sampled.into_iter().map(f64::from).collect(),
+            own_ohm: self.local_ohm / share.sqrt() + self.kernel_ohm(middle_m, middle_m, true) - square,
+            share,
+            inner,
+            middle_m,
+            joined: Vec::new(),
         }
     }
 
@@ -181,28 +109,7 @@ impl SpotFields for SlabSpots {
         mesh.nodes_m.iter().map(|[x_m, y_m]| [*x_m, *y_m, 0.0]).collect()
     }
 
-    fn between(&self, a: &Spot, b: &Spot) -> Between {
-        let mut field = self.kernel(a.middle_m, b.middle_m, false);
-        let chain = |slopes: [f64; 2], by: [[f64; 2]; 2]| by.map(|[x, y]| slopes[0] * x + slopes[1] * y);
-        field.by_first = chain(field.by_first, a.middle_by);
-        field.by_second = chain(field.by_second, b.middle_by);
-        field.ohm -= dot(&a.inner[0], &b.inner[0]);
-        for axis in 0..2 {
-            field.by_first[axis] -= dot(&a.inner[1 + axis], &b.inner[0]);
-            field.by_second[axis] -= dot(&a.inner[0], &b.inner[1 + axis]);
-        }
-        field
-    }
-
     fn between_ohm(&self, a: &Spot, b: &Spot) -> f64 {
-        let [a_m, b_m] = [a.middle_m, b.middle_m];
-        let top = &self.slab.top;
-        let images = top.images(a_m, b_m, 0.0);
-        let distance_m = |image: &Image| {
-            let at = image.of(b_m);
-            (a_m[0] - at[0]).hypot(a_m[1] - at[1])
-        };
-        let near: f64 = images.iter().map(|image| top.near_ohm(distance_m(image))).sum();
-        top.smooth_ohm(a_m, b_m) + near - dot(&a.inner[0], &b.inner[0])
+        self.kernel_ohm(a.middle_m, b.middle_m, false) - dot(&a.inner, &b.inner)
     }
 }
