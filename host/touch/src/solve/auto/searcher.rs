@@ -75,6 +75,9 @@ impl AutoSearcher {
         target: &Target,
         readings: &Readings,
     ) -> Result<Option<Whole>, SolveError> {
+        if self.image.is_rest(readings) {
+            return Ok(None);
+        }
         let shape = self.shape((solution, contacts), from.as_ref(), target);
         let best = shape.as_ref().map_or(contacts, StripFit::evidence);
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
