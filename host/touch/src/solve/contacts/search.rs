@@ -18,6 +18,8 @@ use tactomo_physics::space::{self, Place};
 const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
 const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
 const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
+/// With radii free: each step of a wide disc costs as much as ten of a fingertip's.
+const RELEASED: Effort = Effort { steps: 6, gain: 0.2, share: 0.02 };
 /// From the frame before.
 const WARM: Effort = Effort { steps: 2, gain: 0.2, share: 0.0 };
 /// From some frames ago.
@@ -118,7 +120,7 @@ impl ContactFinder {
         let rough = DiscFitter { model: &*self.rough, ..full };
         let free = rough.fit(fit.contacts.clone(), target, ROUGH);
         let free = free.filter(|free| free.cost < HOPELESS * target.count() as f64);
-        let free = free.and_then(|free| full.fit(free.contacts, target, COLD));
+        let free = free.and_then(|free| full.fit(free.contacts, target, RELEASED));
         free.unwrap_or(fit)
     }
 
@@ -132,8 +134,9 @@ impl ContactFinder {
     ) -> Explanation {
         let mut by_count = vec![f64::NEG_INFINITY; self.settings.most + 1];
         let mut last = first.clone();
-        let mut best = self.noted(self.released(first, target), &mut by_count);
-        better(&Explanation::new(best.0.clone(), &by_count));
+        let mut best = self.noted(first.clone(), &mut by_count);
+        better(&Explanation::new(first.clone(), &by_count));
+        best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
         while last.contacts.len() < self.settings.most {
             let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
             let more = self.noted(more, &mut by_count);
@@ -163,6 +166,11 @@ impl ContactFinder {
             best = fewer;
         }
         Explanation::new(best.0, &by_count)
+    }
+
+    /// The more likely one.
+    fn better_of(one: (DiscFit, f64), other: (DiscFit, f64)) -> (DiscFit, f64) {
+        if other.1 > one.1 { other } else { one }
     }
 
     /// A fit with its evidence, which is noted as that of its count if it is the best of it.
