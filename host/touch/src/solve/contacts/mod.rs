@@ -7,6 +7,7 @@
 mod discs;
 mod evidence;
 mod exchange;
+mod keep;
 #[cfg(test)]
 mod motion_tests;
 mod network;

@@ -20,10 +20,6 @@ const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
 const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
 /// With radii free: each step of a wide disc costs as much as ten of a fingertip's.
 const RELEASED: Effort = Effort { steps: 6, gain: 0.2, share: 0.02 };
-/// From the frame before.
-const WARM: Effort = Effort { steps: 2, gain: 0.2, share: 0.0 };
-/// From some frames ago.
-const CAUGHT_UP: Effort = Effort { steps: 6, gain: 0.2, share: 0.0 };
 /// Starts of one more contact, and how many of them go on.
 const STARTS: usize = 4;
 const FINALISTS: usize = 2;
@@ -31,8 +27,6 @@ const FINALISTS: usize = 2;
 const WORTH_A_TRY: f64 = 8.0;
 /// The same for there being any contact at all: noise alone has 1 in 10^7 frames above it.
 const WORTH_FIRST: f64 = 60.0;
-/// A contact is lost when the logarithm of its conductance is known no better than this, and it is light.
-const WEAK: f64 = 0.3;
 /// Radii that contacts may have while their number is not yet right, in usual ones: too few contacts would be made as wide as may be.
 const PLAUSIBLE: f64 = 3.0;
 /// Starts around a single contact, and the mean square of what it leaves up to which they are tried.
@@ -51,8 +45,6 @@ const EXPLAINS: f64 = 1.5;
 const HOPELESS: f64 = 50.0;
 /// Places of two fits that are so near, in radii, are taken for one.
 const ALIKE: f64 = 0.3;
-/// Share of the conductance of the frame before, below which a contact may be let go.
-const LIFTED: f64 = 0.6;
 /// Contacts nearer to each other than so many sums of their radii may be one.
 const TOUCHING: f64 = 2.0;
 
@@ -320,69 +312,6 @@ impl ContactFinder {
         let near =
             |a: &Contact, b: &Contact| space::distance(place_m(a), place_m(b)) < ALIKE * a.radius_m.min(b.radius_m);
         a.contacts.iter().all(|a| b.contacts.iter().any(|b| near(a, b)))
-    }
-
-    /// An explanation of some frames ago, brought to this one.
-    pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
-        let fit = self.disc_fitter().go_on(&found.fit, target, CAUGHT_UP)?;
-        Some(Explanation { fit, ..found })
-    }
-
-    /// The explanation, or what is left of it without the contacts that may not be there if that is more likely; `None` if nothing is.
-    pub(super) fn without_weak(&self, found: Explanation, target: &Target) -> Option<Explanation> {
-        let weak = self.weak(&found.fit);
-        if weak.is_empty() && !self.is_misfit(&found.fit, target) {
-            return Some(found);
-        }
-        let evidence = self.evidence(&found.fit);
-        if self.evidence_of_nothing(target) > evidence {
-            return None;
-        }
-        let kept =
-            found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
-        let kept: Vec<_> = kept.collect();
-        if weak.is_empty() || kept.is_empty() {
-            return Some(found);
-        }
-        match self.disc_fitter().fit(kept, target, WARM) {
-            Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, certainty: None }),
-            _ => Some(found),
-        }
-    }
-
-    /// The same contacts in the next frame, less those that were let go; `None` if that makes no sense.
-    pub(super) fn follow(&self, last: &Explanation, target: &Target) -> Option<Explanation> {
-        let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
-        let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
-        let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
-        Some(Explanation { fit, certainty })
-    }
-
-    /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each
-    /// step, however light the contact is to become.
-    fn without_lifted(&self, before: &DiscFit, fit: DiscFit, target: &Target) -> DiscFit {
-        let is_lighter = |(now, before): &(&Contact, &Contact)| now.conductance_s < LIFTED * before.conductance_s;
-        let kept = fit.contacts.iter().zip(&before.contacts).filter(|pair| !is_lighter(pair)).map(|(now, _)| *now);
-        let kept: Vec<_> = kept.collect();
-        if kept.is_empty() || kept.len() == fit.contacts.len() {
-            return fit;
-        }
-        match self.disc_fitter().fit(kept, target, WARM) {
-            Some(fewer) if self.evidence(&fewer) > self.evidence(&fit) => fewer,
-            _ => fit,
-        }
-    }
-
-    /// Contacts so weak that they may not be there. The conductance of a firm one is not known well either: more of it would change
-    /// little.
-    pub(super) fn weak(&self, fit: &DiscFit) -> Vec<usize> {
-        let covariance = fit.covariance();
-        let is_weak = |k: &usize| {
-            let log = super::discs::PARAMETERS * k + 2;
-            let is_unsure = covariance.as_ref().is_none_or(|all| all[(log, log)] > WEAK * WEAK);
-            is_unsure && fit.contacts[*k].conductance_s < self.sheet_s
-        };
-        (0..fit.contacts.len()).filter(is_weak).collect()
     }
 
     /// Logarithm of the evidence for a fit.
