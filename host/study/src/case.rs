@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::DMatrix;
 use serde::Deserialize;
 
-use tactomo_physics::detector::{Adc, Detector, Electrode, Layer, Outline};
+use tactomo_physics::detector::{Adc, Detector, Electrode, Layer, Outline, Tolerances, Unevenness};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
@@ -174,11 +174,15 @@ impl File {
                 outline: Outline::rectangle(width_m, height_m),
                 surface: None,
                 layers: self.conductivity_s_per_m.into_layers(thickness_m),
+                unevenness: Unevenness::default(),
                 electrodes: self.electrodes.into_list(),
                 contact_impedance_ohm_m2: self.electrode_contact_impedance_ohm_m2,
                 drive_v: self.drive_v,
                 on_resistance_ohm: self.multiplexer_on_resistance_ohm,
                 adc: Adc::default(),
+                // What was solved is what the case describes.
+                tolerances: Tolerances::EXACT,
+                calibration: None,
             },
             contacts: self.contacts,
             impedance_ohm: DMatrix::from_fn(count, count, |i, j| self.impedance_ohm[i][j]),

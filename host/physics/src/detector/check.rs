@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Adc, Detector, Layer, Outline};
+use super::{Adc, Detector, Layer, Outline, Tolerances};
 use crate::geometry::{Point, area, cross, distance, edges, is_inside, segment_distance};
 use crate::space::{self, Place};
 
@@ -13,6 +13,11 @@ pub(super) const LENGTH_M: RangeInclusive<f64> = 1e-6..=10.0;
 const CONDUCTIVITY_S_PER_M: RangeInclusive<f64> = 1e-9..=1e9;
 /// Contact impedances that a pad may have (ohm m2).
 const IMPEDANCE_OHM_M2: RangeInclusive<f64> = 0.0..=1e3;
+/// Amplitudes of unevenness, as logarithms: a factor of e.
+const UNEVEN_LOG: RangeInclusive<f64> = -1.0..=1.0;
+const MAX_UNEVEN_MODES: usize = 9;
+/// What a channel may read, over what is there.
+const GAIN: RangeInclusive<f64> = 0.5..=2.0;
 const DRIVE_V: RangeInclusive<f64> = 1e-3..=1e3;
 const BITS: RangeInclusive<u8> = 1..=24;
 const MAX_LAYERS: usize = 16;
@@ -50,10 +55,13 @@ impl Detector {
             self.outline.check()?;
         }
         self.check_layers()?;
+        self.check_unevenness()?;
         self.check_electrodes()?;
         within("contact_impedance_ohm_m2", self.contact_impedance_ohm_m2, IMPEDANCE_OHM_M2)?;
         within("drive_v", self.drive_v, DRIVE_V)?;
         within("on_resistance_ohm", self.on_resistance_ohm, 0.0..=1e9)?;
+        self.tolerances.check()?;
+        self.check_calibration()?;
         self.adc.check()
     }
 
@@ -63,6 +71,29 @@ impl Detector {
             return Err(Problem::new("layers", what));
         }
         self.layers.iter().enumerate().try_for_each(|(index, layer)| layer.check(&format!("layers[{index}]")))
+    }
+
+    fn check_calibration(&self) -> Result<(), Problem> {
+        let known = self.calibration.iter().flat_map(|calibration| &calibration.parameters);
+        let electrodes = self.electrodes.len();
+        match known.map(|known| known.parameter).find(|it| it.electrode().is_some_and(|e| e >= electrodes)) {
+            Some(other) => {
+                let what = format!("names `{other}`, but the detector has {electrodes} electrodes, counted from 0");
+                Err(Problem::new("calibration.parameters", what))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn check_unevenness(&self) -> Result<(), Problem> {
+        let rows = &self.unevenness.log_amplitudes;
+        let longest = rows.iter().map(Vec::len).chain([rows.len()]).max().unwrap_or(0);
+        if longest > MAX_UNEVEN_MODES {
+            let what = format!("has {longest} amplitudes along a side, but may have {MAX_UNEVEN_MODES}");
+            return Err(Problem::new("uneven_log_amplitudes", what));
+        }
+        let mut all = rows.iter().flatten();
+        all.try_for_each(|amplitude| within("uneven_log_amplitudes", *amplitude, UNEVEN_LOG))
     }
 
     fn check_electrodes(&self) -> Result<(), Problem> {
@@ -80,6 +111,7 @@ impl Detector {
         within(&format!("electrodes.diameters_m[{index}]"), 2.0 * pad.radius_m, LENGTH_M)?;
         let impedance = format!("electrodes.contact_impedances_ohm_m2[{index}]");
         within(&impedance, self.pad_impedance_ohm_m2(&pad), IMPEDANCE_OHM_M2)?;
+        within(&format!("electrodes.gains[{index}]"), pad.gain, GAIN)?;
         let at = pad.place_m();
         let position = format!("electrodes.positions_m[{index}]");
         at.iter().try_for_each(|&at_m| within(&position, at_m, -LENGTH_M.end()..=*LENGTH_M.end()))?;
@@ -109,6 +141,20 @@ impl Detector {
             Some(_) => format!("({:.3}, {:.3}, {:.3})", at[0] * 1e3, at[1] * 1e3, at[2] * 1e3),
             None => millimetres([at[0], at[1]]),
         }
+    }
+}
+
+impl Tolerances {
+    fn check(&self) -> Result<(), Problem> {
+        self.named().iter().try_for_each(|(name, value)| {
+            let allowed = match *name {
+                "electrodes_m" => 0.0..=0.1,
+                "offset_lsb" => 0.0..=1e4,
+                name if name.ends_with("_factor") => 1.0..=1e3,
+                _ => 0.0..=1.0,
+            };
+            within(&format!("tolerances.{name}"), *value, allowed)
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! Detectors as TOML files.
 
+mod calibration;
 mod electrodes;
 
 use std::fmt::Write as _;
@@ -10,11 +11,12 @@ use std::path::Path;
 use serde::Deserialize;
 use toml::de::{DeTable, DeValue};
 
+use self::calibration::CalibrationTable;
 use self::electrodes::ElectrodeTable;
 use super::check::{LENGTH_M, Problem, within};
 use super::material::Foam;
 use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
-use super::{Adc, Detector, Layer, Outline, Surface, SurfaceError};
+use super::{Adc, Detector, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
 use crate::geometry::area;
 
 /// No detector's file is longer (bytes).
@@ -69,10 +71,15 @@ struct Document {
     surface: Option<String>,
     surface_unit: Option<String>,
     outline: Option<OutlineTable>,
+    #[serde(default)]
+    uneven_log_amplitudes: Vec<Vec<f64>>,
     layers: Vec<LayerTable>,
     electrodes: ElectrodeTable,
     #[serde(default)]
     adc: AdcTable,
+    #[serde(default)]
+    tolerances: Tolerances,
+    calibration: Option<CalibrationTable>,
 }
 
 #[derive(Deserialize)]
@@ -162,6 +169,9 @@ impl Detector {
         writeln!(text, "contact_impedance_ohm_m2 = {:?}", self.contact_impedance_ohm_m2)?;
         writeln!(text, "drive_v = {:?}", self.drive_v)?;
         writeln!(text, "on_resistance_ohm = {:?}", self.on_resistance_ohm)?;
+        if !self.unevenness.is_even() {
+            writeln!(text, "uneven_log_amplitudes = {:?}", self.unevenness.log_amplitudes)?;
+        }
         match &self.surface {
             Some(surface) => surface.write_toml(text)?,
             None => self.outline.write_toml(text)?,
@@ -170,7 +180,21 @@ impl Detector {
         self.write_electrodes(text)?;
         writeln!(text, "\n[adc]\nbits = {}", self.adc.bits)?;
         writeln!(text, "full_scale_v = {:?}", self.adc.full_scale_v)?;
-        writeln!(text, "noise_lsb = {:?}", self.adc.noise_lsb)
+        writeln!(text, "noise_lsb = {:?}", self.adc.noise_lsb)?;
+        if self.tolerances != Tolerances::default() {
+            self.tolerances.write_toml(text)?;
+        }
+        match &self.calibration {
+            Some(calibration) => calibration.write_toml(text),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Tolerances {
+    fn write_toml(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "\n[tolerances]")?;
+        self.named().iter().try_for_each(|(name, value)| writeln!(text, "{name} = {value:?}"))
     }
 }
 
@@ -256,10 +280,13 @@ impl Document {
             electrodes: self.electrodes.into_list(&outline, surface.as_ref(), shift_m)?,
             outline,
             surface,
+            unevenness: Unevenness { log_amplitudes: self.uneven_log_amplitudes },
             contact_impedance_ohm_m2: self.contact_impedance_ohm_m2.unwrap_or(CONTACT_IMPEDANCE_OHM_M2),
             drive_v: self.drive_v.unwrap_or(DRIVE_V),
             on_resistance_ohm: self.on_resistance_ohm.unwrap_or(ON_RESISTANCE_OHM),
             adc: self.adc.into_adc(),
+            tolerances: self.tolerances,
+            calibration: self.calibration.map(CalibrationTable::into_calibration).transpose()?,
         })
     }
 }

@@ -1,18 +1,26 @@
 //! What a detector is: outline, layers, electrodes, and how it is measured.
 
+mod calibration;
 mod check;
 mod file;
 mod material;
+mod parameters;
 mod preset;
 pub mod surface;
 mod svg;
+mod tolerances;
+mod uneven;
 
+pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
 pub use self::check::{ELECTRODES, Problem};
 pub use self::file::{FileError, TomlError};
 pub use self::material::{FOAMS, Foam, Stack};
+pub use self::parameters::Parameter;
 pub use self::surface::edges_of;
 pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
 pub use self::svg::short;
+pub use self::tolerances::Tolerances;
+pub use self::uneven::Unevenness;
 use crate::geometry;
 
 /// A detection layer with its electrodes and the circuit that measures it.
@@ -28,6 +36,9 @@ pub struct Detector {
     pub surface: Option<Surface>,
     /// Bottom (electrode side) first.
     pub layers: Vec<Layer>,
+    /// How the layers' conductivity differs across the plane.
+    #[serde(default)]
+    pub unevenness: Unevenness,
     /// In the order of the channels.
     pub electrodes: Vec<Electrode>,
     /// Contact impedance between pad and layer, in ohm square metres (ohm m2), of pads that have none of their own.
@@ -38,6 +49,12 @@ pub struct Detector {
     pub on_resistance_ohm: f64,
     /// How the voltages become numbers.
     pub adc: Adc,
+    /// How far it may be from this description.
+    #[serde(default)]
+    pub tolerances: Tolerances,
+    /// Where its quantities come from, if they were not told but calibrated.
+    #[serde(skip)]
+    pub calibration: Option<Calibration>,
 }
 
 /// Closed polygons, without repeating the first corner (m).
@@ -75,6 +92,13 @@ pub struct Electrode {
     /// Contact impedance (ohm m2), where it is not the detector's.
     #[serde(default)]
     pub contact_impedance_ohm_m2: Option<f64>,
+    /// What its channel reads, over what is there.
+    #[serde(default = "one")]
+    pub gain: f64,
+}
+
+const fn one() -> f64 {
+    1.0
 }
 
 /// The analogue-to-digital converter.
@@ -119,6 +143,12 @@ impl Detector {
         }
     }
 
+    /// Logarithm of the factor by which unevenness changes the conductivity at a place of the map (m).
+    pub fn log_unevenness(&self, map_m: [f64; 2]) -> f64 {
+        let [low, high] = self.outline.bounds();
+        self.unevenness.log_at([0, 1].map(|axis| (map_m[axis] - low[axis]) / (high[axis] - low[axis])))
+    }
+
     /// Contact impedance of one of its pads (ohm m2).
     pub fn pad_impedance_ohm_m2(&self, pad: &Electrode) -> f64 {
         pad.contact_impedance_ohm_m2.unwrap_or(self.contact_impedance_ohm_m2)
@@ -138,7 +168,7 @@ impl Electrode {
 
     /// A pad of a flat detector.
     pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
-        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None }
+        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None, gain: 1.0 }
     }
 }
 

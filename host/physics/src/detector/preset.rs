@@ -1,7 +1,7 @@
 //! Detectors of the paper, by name.
 
 use super::material::FOAMS;
-use super::{Adc, Detector, Electrode, Layer, Outline};
+use super::{Adc, Detector, Electrode, Layer, Outline, Tolerances, Unevenness};
 
 /// Contact impedance where none is given (ohm m2).
 pub(super) const CONTACT_IMPEDANCE_OHM_M2: f64 = 1e-5;
@@ -43,11 +43,14 @@ impl Detector {
             outline: Outline::rectangle(width_m, height_m),
             surface: None,
             layers: vec![Layer::uniform(thickness_m, FOAMS[0].conductivity_s_per_m)],
+            unevenness: Unevenness::default(),
             electrodes: electrode_grid(width_m, height_m, columns, rows, diameter_m / 2.0),
             contact_impedance_ohm_m2: CONTACT_IMPEDANCE_OHM_M2,
             drive_v: DRIVE_V,
             on_resistance_ohm: ON_RESISTANCE_OHM,
             adc: Adc::default(),
+            tolerances: Tolerances::default(),
+            calibration: None,
         }
     }
 }

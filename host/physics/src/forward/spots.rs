@@ -4,6 +4,7 @@
 //! conductance: what the current's spread over the contact adds is a few per cent. So many places can be looked at, before contacts
 //! are fitted with [`ForwardModel::impedance_ohm`](super::ForwardModel::impedance_ohm).
 
+use super::slab::UnevenPlace;
 use crate::geometry::Point;
 use crate::space::Place;
 
@@ -40,6 +41,8 @@ pub struct Spot {
     pub(super) inner: Vec<f32>,
     /// The middle of the part that is on the detector, in coordinates of the model's (m).
     pub(super) middle_m: Point,
+    /// What uneven conductivity does here.
+    pub(super) uneven: Option<UnevenPlace>,
     /// Fields of currents between joined electrodes (square root of ohm).
     pub(super) joined: Vec<f64>,
 }

@@ -17,6 +17,7 @@ pub(super) struct ElectrodeTable {
     diameter_m: Option<f64>,
     diameters_m: Option<Vec<f64>>,
     contact_impedances_ohm_m2: Option<Vec<f64>>,
+    gains: Option<Vec<f64>>,
 }
 
 impl Detector {
@@ -44,11 +45,15 @@ impl Detector {
             }
             _ => writeln!(text, "diameters_m = {diameters_m:?}")?,
         }
-        if self.electrodes.iter().all(|pad| pad.contact_impedance_ohm_m2.is_none()) {
-            return Ok(());
+        if self.electrodes.iter().any(|pad| pad.contact_impedance_ohm_m2.is_some()) {
+            let ohm_m2: Vec<f64> = self.electrodes.iter().map(|pad| self.pad_impedance_ohm_m2(pad)).collect();
+            writeln!(text, "contact_impedances_ohm_m2 = {ohm_m2:?}")?;
         }
-        let ohm_m2: Vec<f64> = self.electrodes.iter().map(|pad| self.pad_impedance_ohm_m2(pad)).collect();
-        writeln!(text, "contact_impedances_ohm_m2 = {ohm_m2:?}")
+        if self.electrodes.iter().any(|pad| pad.gain != 1.0) {
+            let gains: Vec<f64> = self.electrodes.iter().map(|pad| pad.gain).collect();
+            writeln!(text, "gains = {gains:?}")?;
+        }
+        Ok(())
     }
 
     /// Columns and rows, if the electrodes are a grid.
@@ -59,7 +64,9 @@ impl Detector {
         }
         let [width_m, height_m] = self.outline.size_m();
         let is_grid = |&[columns, rows]: &[usize; 2]| {
-            electrode_grid(width_m, height_m, columns, rows, radius_m) == self.electrodes
+            let grid = electrode_grid(width_m, height_m, columns, rows, radius_m);
+            let places_m = |pads: &[Electrode]| pads.iter().map(Electrode::place_m).collect::<Vec<_>>();
+            places_m(&grid) == places_m(&self.electrodes)
         };
         (1..=count).filter(|columns| count % columns == 0).map(|columns| [columns, count / columns]).find(is_grid)
     }
@@ -86,6 +93,10 @@ impl ElectrodeTable {
         if let Some(each) = self.contact_impedances_ohm_m2 {
             let each = one_for_each("electrodes.contact_impedances_ohm_m2", each, electrodes.len())?;
             electrodes.iter_mut().zip(each).for_each(|(pad, ohm_m2)| pad.contact_impedance_ohm_m2 = Some(ohm_m2));
+        }
+        if let Some(each) = self.gains {
+            let each = one_for_each("electrodes.gains", each, electrodes.len())?;
+            electrodes.iter_mut().zip(each).for_each(|(pad, gain)| pad.gain = gain);
         }
         if let Some(surface) = surface {
             electrodes.iter_mut().enumerate().try_for_each(|(index, pad)| pad.lay_on(surface, index))?;

@@ -103,7 +103,10 @@ impl Shell {
             detector.electrodes.iter().map(|pad| pad_impedance_ohm_m2(detector, pad)).collect();
         let sheet_conductance_s = detector.sheet_conductance_s();
         let mesh = Mesh::new(detector, nodes)?;
-        let sheet_s = |triangle| factor(mesh.centroid_m(triangle)) * sheet_conductance_s;
+        let sheet_s = |triangle| {
+            let at_m = mesh.centroid_m(triangle);
+            factor(at_m) * detector.log_unevenness(detector.map_m(at_m)).exp() * sheet_conductance_s
+        };
         let system = System::new(&mesh, sheet_s, &pad_impedance_ohm_m2).map_err(singular)?;
         let node_areas_m2 = mesh.node_areas_m2();
         // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.

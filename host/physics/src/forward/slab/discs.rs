@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::cut::CutDisc;
 use super::disc::DiscBasis;
 use super::pads::between;
+use super::uneven::UnevenPlace;
 use super::{Slab, from_corner};
 use crate::forward::ForwardError;
 use crate::forward::contact::{ContactSystem, Contacted};
@@ -29,6 +30,7 @@ struct Disc {
     /// of ohm): `columns x densities`.
     electrodes_ohm: DMatrix<f64>,
     inner: DMatrix<f64>,
+    uneven: Option<UnevenPlace>,
 }
 
 /// Some discs, with the fields between them.
@@ -72,6 +74,7 @@ impl Slab {
             basis,
             electrodes_ohm,
             inner,
+            uneven: self.uneven.as_ref().map(|uneven| uneven.place(centre_m)),
         }
     }
 
@@ -106,11 +109,17 @@ impl Slab {
             (basis, nodes_m(basis, disc.centre_m, disc.contact.radius_m, disc.cut))
         };
         let (basis, nodes) = of(disc, degrees[0]);
-        if std::ptr::eq(disc, other) {
-            return between(basis, &nodes, basis, &nodes, &self.top, &images, true);
+        let mut kernel = if std::ptr::eq(disc, other) {
+            between(basis, &nodes, basis, &nodes, &self.top, &images, true)
+        } else {
+            let (other_basis, other_nodes) = of(other, degrees[1]);
+            between(basis, &nodes, other_basis, &other_nodes, &self.top, &images, false)
+        };
+        if let (Some(here), Some(there)) = (&disc.uneven, &other.uneven) {
+            kernel[(0, 0)] += here.correction_ohm(there);
+            kernel *= here.inverse_root * there.inverse_root;
         }
-        let (other_basis, other_nodes) = of(other, degrees[1]);
-        between(basis, &nodes, other_basis, &other_nodes, &self.top, &images, false)
+        kernel
     }
 
     /// The first densities' part of it, which has all but a per cent of how it changes with the disc.
@@ -125,11 +134,12 @@ impl Slab {
     }
 
     fn own(&self, disc: &Disc) -> DMatrix<f64> {
-        self.own_of(disc.own_radius_m, disc.basis, disc.conductance_s)
+        self.own_with(disc, disc.conductance_s)
     }
 
-    fn own_of(&self, radius_m: f64, basis: &DiscBasis, conductance_s: f64) -> DMatrix<f64> {
-        self.top.disc_self(radius_m).reduced(basis, 1.0, conductance_s)
+    fn own_with(&self, disc: &Disc, conductance_s: f64) -> DMatrix<f64> {
+        let even = disc.uneven.as_ref().map_or(1.0, |uneven| uneven.inverse_root.powi(2));
+        self.top.disc_self(disc.own_radius_m).reduced(disc.basis, 1.0, even * conductance_s)
     }
 }
 
@@ -170,7 +180,7 @@ impl Discs<'_> {
     fn change_of_conductance_ohm(&self, at: &Solved, k: usize, contact: &Contact) -> DMatrix<f64> {
         let disc = &self.discs[k];
         let factor = contact.conductance_s / disc.contact.conductance_s;
-        let own = self.slab.own_of(disc.own_radius_m, disc.basis, factor * disc.conductance_s);
+        let own = self.slab.own_with(disc, factor * disc.conductance_s);
         at.symmetric(k, self.scaled(at, k, factor) + (own - &self.own[k]) * at.of(k) * 0.5)
     }
 

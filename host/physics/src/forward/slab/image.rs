@@ -9,6 +9,7 @@ use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
 use super::pads::PadFields;
+use super::uneven::{Uneven, UnevenPlace, uneven_ohm};
 use crate::forward::ImageMesh;
 
 /// Modes summed along a side, for each cell of it: what is left out is below 1e-3 of a cell's own impedance.
@@ -31,6 +32,8 @@ pub(super) struct CellFields {
     table: Vec<f64>,
     /// Of the pads' correction, mean over each cell: `columns x nodes`.
     corrections: DMatrix<f64>,
+    /// Of each node, where conductivity is uneven.
+    uneven: Option<Vec<UnevenPlace>>,
 }
 
 impl ImageGrid {
@@ -48,6 +51,12 @@ impl ImageGrid {
     /// Indices of a node along both directions.
     fn indices(&self, node: usize) -> [usize; 2] {
         [node % (self.cells[0] + 1), node / (self.cells[0] + 1)]
+    }
+
+    /// Where a node is, from the corner (m).
+    fn from_corner(&self, node: usize) -> [f64; 2] {
+        let indices = self.indices(node);
+        [0, 1].map(|axis| self.step_m(axis) * indices[axis] as f64)
     }
 
     fn step_m(&self, axis: usize) -> f64 {
@@ -93,21 +102,26 @@ impl ImageGrid {
 impl CellFields {
     /// Sums the modes; `response` is the top's potential per normal current density for a wave number, `floating` what is left of
     /// it at zero.
-    pub fn new(grid: ImageGrid, pads: &PadFields, response: impl Fn(f64) -> f64, floating: f64) -> Self {
+    pub fn new(
+        grid: ImageGrid,
+        pads: &PadFields,
+        uneven: Option<&Uneven>,
+        response: impl Fn(f64) -> f64,
+        floating: f64,
+    ) -> Self {
         let all = grid.means(pads, pads.columns());
         let corrections = all.rows(pads.electrodes(), pads.columns() - pads.electrodes()).into_owned();
-        Self { grid, table: table(&grid, response, floating), corrections }
+        let uneven = uneven.map(|uneven| (0..grid.nodes()).map(|node| uneven.place(grid.from_corner(node))).collect());
+        Self { grid, table: table(&grid, response, floating), corrections, uneven }
     }
 
     /// Impedances (ohm) between some of the cells, with the floating pads below them: `rows x columns`.
     pub fn between(&self, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
         let correction = |nodes: &[usize]| self.corrections.select_columns(nodes);
         let mut all = correction(rows).transpose() * correction(columns);
-        let indices: Vec<_> = rows.iter().map(|node| self.grid.indices(*node)).collect();
         for (mut column, node) in all.column_iter_mut().zip(columns) {
-            let [i, j] = self.grid.indices(*node);
-            for (value, [k, l]) in column.iter_mut().zip(&indices) {
-                *value = self.bare(i, j, *k, *l) - *value;
+            for (value, row) in column.iter_mut().zip(rows) {
+                *value = self.without_pads(*node, *row) - *value;
             }
         }
         all
@@ -130,17 +144,23 @@ impl CellFields {
             -1.0,
             Par::Seq,
         );
-        let indices: Vec<_> = nodes.iter().map(|node| self.grid.indices(*node)).collect();
-        for (column, [i, j]) in indices.iter().enumerate() {
-            for (row, [k, l]) in indices.iter().enumerate().skip(column) {
-                fields[(row, column)] += self.bare(*i, *j, *k, *l);
+        for (column, node) in nodes.iter().enumerate() {
+            for (row, other) in nodes.iter().enumerate().skip(column) {
+                fields[(row, column)] += self.without_pads(*node, *other);
             }
         }
         fields
     }
 
-    /// Impedance between cells `(i, j)` and `(k, l)` of the slab without pads.
-    fn bare(&self, i: usize, j: usize, k: usize, l: usize) -> f64 {
+    /// Impedance between two cells of the slab without pads.
+    fn without_pads(&self, node: usize, other: usize) -> f64 {
+        let even_ohm = self.even(self.grid.indices(node), self.grid.indices(other));
+        let place = |node: usize| self.uneven.as_ref().map(|all| &all[node]);
+        uneven_ohm(even_ohm, place(node), place(other))
+    }
+
+    /// The same of an even slab.
+    fn even(&self, [i, j]: [usize; 2], [k, l]: [usize; 2]) -> f64 {
         let [nx, ny] = self.grid.cells;
         let folded = |sum: usize, cells: usize| if sum > cells { 2 * cells - sum } else { sum };
         let (x, y) = ([i.abs_diff(k), folded(i + k, nx)], [j.abs_diff(l), folded(j + l, ny)]);

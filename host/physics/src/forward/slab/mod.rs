@@ -2,7 +2,8 @@
 //!
 //! The slab is diagonal in cosine modes in the plane and exact in depth ([`layers`]). Its kernel between points of a surface
 //! is a look-up ([`kernel`]); pads and contacts are discs of a few densities ([`disc`]); the pads are eliminated once
-//! ([`pads`]), so that a contact costs a few look-ups and a small solve.
+//! ([`pads`]), so that a contact costs a few look-ups and a small solve. Conductivity that differs across the plane changes the kernels
+//! ([`uneven`]).
 
 mod cut;
 mod disc;
@@ -16,6 +17,9 @@ mod spline;
 mod spots;
 #[cfg(test)]
 mod tests;
+mod uneven;
+#[cfg(test)]
+mod uneven_tests;
 
 use std::sync::{Arc, OnceLock};
 
@@ -27,6 +31,8 @@ use self::green::{Surface, SurfaceGreen};
 use self::image::{CellFields, ImageGrid};
 use self::pads::{Across, Pad, PadFields, pad_impedances};
 use self::spots::SlabSpots;
+use self::uneven::Uneven;
+pub(super) use self::uneven::UnevenPlace;
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image};
@@ -46,13 +52,15 @@ pub struct Resolution {
     pub pad_degree: usize,
     /// On contacts that are small against the thickness; wider ones get more.
     pub contact_degree: usize,
+    /// Half waves along a side of the modes that unevenness couples.
+    pub uneven_modes: usize,
 }
 
 impl Resolution {
     /// Enough for readings within a few tenths of a per cent: against reference readings, one degree more changes nothing.
-    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2 };
+    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2, uneven_modes: 10 };
     /// Finer than any solver needs.
-    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4 };
+    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, uneven_modes: 16 };
 }
 
 /// A rectangular detector, layered in depth.
@@ -65,6 +73,8 @@ pub struct Slab {
     most_degree: usize,
     top: Arc<SurfaceGreen>,
     pads: Arc<PadFields>,
+    /// `None` where the conductivity is even across the plane.
+    uneven: Option<Arc<Uneven>>,
     image: Arc<Image>,
 }
 
@@ -98,7 +108,8 @@ impl Slab {
         let wrong = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
         let size_m = check(detector).map_err(wrong)?;
         let mut planner = RealFftPlanner::new();
-        let pads = bare(detector, size_m, resolution, &mut planner)
+        let uneven = Uneven::new(size_m, &detector.unevenness, &detector.layers, resolution.uneven_modes);
+        let pads = bare(detector, size_m, resolution, uneven.as_ref(), &mut planner)
             .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
         let top = SurfaceGreen::new(size_m, split_m(detector, size_m), &mut planner, &top_surface(detector));
         let image = Image::new(ImageGrid::new(size_m, IMAGE_NODES), &pads);
@@ -109,6 +120,7 @@ impl Slab {
             most_degree: MAX_DEGREE,
             top: top.into(),
             pads: pads.into(),
+            uneven: uneven.map(Arc::new),
             image: image.into(),
         })
     }
@@ -121,7 +133,7 @@ impl Slab {
     fn cells(&self) -> &CellFields {
         self.image.cells.get_or_init(|| {
             let top = top_surface(&self.detector);
-            CellFields::new(self.image.grid, &self.pads, top.response, top.floating)
+            CellFields::new(self.image.grid, &self.pads, self.uneven.as_deref(), top.response, top.floating)
         })
     }
 
@@ -300,6 +312,7 @@ fn bare(
     detector: &Detector,
     size_m: [f64; 2],
     resolution: Resolution,
+    uneven: Option<&Uneven>,
     planner: &mut RealFftPlanner<f64>,
 ) -> Option<PadFields> {
     let pads: Vec<_> = detector
@@ -314,12 +327,13 @@ fn bare(
     let basis = DiscBasis::of_degree(resolution.pad_degree);
     let split_m = split_m(detector, size_m);
     let kernel = SurfaceGreen::new(size_m, split_m, planner, &bottom_surface(detector));
-    let impedances = pad_impedances(&pads, basis, &kernel);
+    let impedances = pad_impedances(&pads, basis, &kernel, uneven);
     let across = Across {
         size_m,
         thickness_m: detector.thickness_m(),
         response: |k| layers::response(&detector.layers, k).tb,
         floating: layers::floating_response(&detector.layers).tb,
+        uneven,
     };
     PadFields::new(&pads, basis, &impedances, &across, planner)
 }

@@ -6,12 +6,15 @@
 //! correction of low rank to the kernel of the top, for the pads shorten the way of the contacts' current:
 //! `N(x, x') -> N(x, x') - w(x) . w(x')`.
 
+use std::collections::HashMap;
+
 use nalgebra::{Cholesky, DMatrix};
 use realfft::RealFftPlanner;
 
 use super::disc::DiscBasis;
 use super::green::SurfaceGreen;
 use super::spline::Grid;
+use super::uneven::Uneven;
 
 /// `k T` at which the field across the slab has fallen to 3e-5.
 const ACROSS_END: f64 = 11.0;
@@ -37,21 +40,33 @@ impl Pad {
 }
 
 /// Impedances between all densities of all pads (ohm): pad by pad.
-pub(super) fn pad_impedances(pads: &[Pad], basis: &DiscBasis, kernel: &SurfaceGreen) -> DMatrix<f64> {
+pub(super) fn pad_impedances(
+    pads: &[Pad],
+    basis: &DiscBasis,
+    kernel: &SurfaceGreen,
+    uneven: Option<&Uneven>,
+) -> DMatrix<f64> {
     let size = basis.len();
     let nodes: Vec<_> = pads.iter().map(|pad| basis.nodes_m(pad.centre_m, pad.radius_m)).collect();
+    let places: Vec<_> = nodes.iter().map(|nodes| uneven.map(|uneven| uneven.under_pad(nodes))).collect();
     let mut all = DMatrix::zeros(pads.len() * size, pads.len() * size);
     let mut own: Option<(Pad, DMatrix<f64>)> = None;
     for (e, pad) in pads.iter().enumerate() {
         for (f, other) in pads.iter().enumerate().take(e + 1) {
             let gap_m = pad.radius_m + other.radius_m;
             let images = kernel.images(pad.centre_m, other.centre_m, gap_m);
-            let mut block = between(basis, &nodes[e], basis, &nodes[f], kernel, &images, e == f);
+            let mut points = between_points(&nodes[e], &nodes[f], kernel, &images, e == f);
+            if let (Some(here), Some(there)) = (&places[e], &places[f]) {
+                here.apply(there, &mut points);
+            }
+            let mut block = basis.weights() * points * basis.weights().transpose();
             if e == f {
-                let local = own.take_if(|(like, _)| pad.is_made_as(like)).unwrap_or_else(|| {
+                let even = uneven.map_or(1.0, |uneven| uneven.inverse_root(pad.centre_m).powi(2));
+                let like = |(like, _): &mut (Pad, DMatrix<f64>)| uneven.is_none() && pad.is_made_as(like);
+                let local = own.take_if(like).unwrap_or_else(|| {
                     let area_m2 = std::f64::consts::PI * pad.radius_m * pad.radius_m;
                     let local = kernel.disc_self(pad.radius_m);
-                    (*pad, local.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, 1.0))
+                    (*pad, local.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, even))
                 });
                 block += &local.1;
                 own = Some(local);
@@ -68,6 +83,17 @@ pub(super) fn between(
     basis: &DiscBasis,
     nodes: &[[f64; 2]],
     other_basis: &DiscBasis,
+    other_nodes: &[[f64; 2]],
+    kernel: &SurfaceGreen,
+    images: &[super::green::Image],
+    same: bool,
+) -> DMatrix<f64> {
+    basis.weights() * between_points(nodes, other_nodes, kernel, images, same) * other_basis.weights().transpose()
+}
+
+/// The same between the points themselves.
+fn between_points(
+    nodes: &[[f64; 2]],
     other_nodes: &[[f64; 2]],
     kernel: &SurfaceGreen,
     images: &[super::green::Image],
@@ -94,7 +120,7 @@ pub(super) fn between(
             }
         }
     }
-    basis.weights() * points * other_basis.weights().transpose()
+    points
 }
 
 /// Fields of the pads on the top, as a table of all of them at once.
@@ -117,7 +143,7 @@ struct Mode {
 }
 
 /// The way from the pads to the top.
-pub(super) struct Across<F: Fn(f64) -> f64> {
+pub(super) struct Across<'a, F: Fn(f64) -> f64> {
     /// Length and width (m).
     pub size_m: [f64; 2],
     /// Thickness (m).
@@ -126,6 +152,7 @@ pub(super) struct Across<F: Fn(f64) -> f64> {
     pub response: F,
     /// What is left of it at 0 (ohm m2).
     pub floating: f64,
+    pub uneven: Option<&'a Uneven>,
 }
 
 impl PadFields {
@@ -134,7 +161,7 @@ impl PadFields {
         pads: &[Pad],
         basis: &DiscBasis,
         impedances: &DMatrix<f64>,
-        across: &Across<impl Fn(f64) -> f64>,
+        across: &Across<'_, impl Fn(f64) -> f64>,
         planner: &mut RealFftPlanner<f64>,
     ) -> Option<Self> {
         let smallest_m = pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min);
@@ -150,16 +177,20 @@ impl PadFields {
         let coupling = &inverse * impedances.select_rows(&others).select_columns(&uniform);
         let electrodes_ohm = impedances.select_rows(&uniform).select_columns(&uniform) - coupling.tr_mul(&coupling);
 
-        let fields = pad_modes(pads, basis, &grid, &modes);
+        let fields = pad_modes(pads, basis, &grid, &modes, across.uneven);
         let correction = fields.select_columns(&others) * inverse.transpose();
         let electrode_fields = fields.select_columns(&uniform) - &correction * coupling;
         let columns = pads.len() + others.len();
         let mut table = vec![0.0; grid.nodes(0) * grid.nodes(1) * columns];
         let all = electrode_fields.column_iter().chain(correction.column_iter());
+        let roots = across.uneven.map(|uneven| grid.values(|at_m| uneven.inverse_root(at_m)));
         for (column, amplitudes) in all.enumerate() {
             let mut amplitude = vec![0.0; (grid.modes(0) + 1) * (grid.modes(1) + 1)];
             for (mode, value) in modes.iter().zip(amplitudes.iter()) {
                 amplitude[mode.m * (grid.modes(1) + 1) + mode.n] = *value;
+            }
+            if let Some(roots) = &roots {
+                amplitude = grid.multiply(planner, amplitude, roots);
             }
             let values = grid.synthesise(planner, amplitude);
             for (node, value) in values.into_iter().enumerate() {
@@ -210,7 +241,7 @@ impl PadFields {
     }
 }
 
-impl<F: Fn(f64) -> f64> Across<F> {
+impl<F: Fn(f64) -> f64> Across<'_, F> {
     fn modes(&self, grid: &Grid) -> Vec<Mode> {
         let area_m2 = self.size_m[0] * self.size_m[1];
         let response = |m: usize, n: usize| {
@@ -225,8 +256,10 @@ impl<F: Fn(f64) -> f64> Across<F> {
     }
 }
 
-/// Amplitudes of the field on the top of each density of each pad: `modes x densities`.
-fn pad_modes(pads: &[Pad], basis: &DiscBasis, grid: &Grid, modes: &[Mode]) -> DMatrix<f64> {
+/// Amplitudes of the field on the top of each density of each pad: `modes x densities`; with unevenness but for the root of its factor at
+/// the top.
+fn pad_modes(pads: &[Pad], basis: &DiscBasis, grid: &Grid, modes: &[Mode], uneven: Option<&Uneven>) -> DMatrix<f64> {
+    let rows: HashMap<_, _> = modes.iter().enumerate().map(|(row, mode)| ([mode.m, mode.n], row)).collect();
     let mut all = DMatrix::zeros(modes.len(), pads.len() * basis.len());
     for (e, pad) in pads.iter().enumerate() {
         let nodes = basis.nodes_m(pad.centre_m, pad.radius_m);
@@ -235,9 +268,18 @@ fn pad_modes(pads: &[Pad], basis: &DiscBasis, grid: &Grid, modes: &[Mode]) -> DM
                 (grid.wave_number(axis, m) * nodes[q][axis]).cos()
             })
         });
-        let at_nodes = DMatrix::from_fn(nodes.len(), modes.len(), |q, i| {
+        let mut at_nodes = DMatrix::from_fn(nodes.len(), modes.len(), |q, i| {
             modes[i].amplitude * cosines[0][(q, modes[i].m)] * cosines[1][(q, modes[i].n)]
         });
+        if let Some(uneven) = uneven {
+            for (node, mut at_node) in nodes.iter().zip(at_nodes.row_iter_mut()) {
+                // Modes that do not cross the slab are not in the table, and their correction is nothing.
+                for (mode, amplitude) in uneven.across_ohm(*node) {
+                    rows.get(&mode).into_iter().for_each(|row| at_node[*row] += amplitude);
+                }
+                at_node *= uneven.inverse_root(*node);
+            }
+        }
         let of_densities = basis.weights() * at_nodes;
         all.view_mut((0, e * basis.len()), (modes.len(), basis.len())).tr_copy_from(&of_densities);
     }

@@ -47,6 +47,27 @@ impl Grid {
         (cell, cubic_weights(at - cell as f64))
     }
 
+    /// Values at the cells' corners, `x` running slowest, of a function of the place (m).
+    pub fn values(&self, function: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
+        let [nx, ny] = self.cells;
+        let at_m = |axis: usize, node: usize| node as f64 / self.cells_per_m[axis];
+        (0..=nx).flat_map(|i| (0..=ny).map(move |j| [i, j])).map(|[i, j]| function([at_m(0, i), at_m(1, j)])).collect()
+    }
+
+    /// Amplitudes of the cosine series with amplitudes given as for [`synthesise`](Self::synthesise), times [`values`](Self::values).
+    pub fn multiply(&self, planner: &mut RealFftPlanner<f64>, mut amplitude: Vec<f64>, values: &[f64]) -> Vec<f64> {
+        let [nx, ny] = self.cells;
+        cosine_transform_rows(planner, &mut amplitude, ny);
+        let mut turned = transpose(&amplitude, nx + 1, ny + 1);
+        cosine_transform_rows(planner, &mut turned, nx);
+        let mut products = transpose(&turned, ny + 1, nx + 1);
+        products.iter_mut().zip(values).for_each(|(product, value)| *product *= value);
+        analyse_rows(planner, &mut products, ny);
+        let mut turned = transpose(&products, nx + 1, ny + 1);
+        analyse_rows(planner, &mut turned, nx);
+        transpose(&turned, ny + 1, nx + 1)
+    }
+
     /// Spline coefficients at all nodes, `x` running slowest, of the cosine series with `amplitude[m * (ny + 1) + n]`.
     pub fn synthesise(&self, planner: &mut RealFftPlanner<f64>, mut amplitude: Vec<f64>) -> Vec<f64> {
         let [nx, ny] = self.cells;
@@ -78,6 +99,20 @@ fn cubic_weights(t: f64) -> [f64; 4] {
 /// Factor from the coefficients of a B-spline to its values at the nodes, for one mode.
 fn spline_symbol(mode: usize, cells: usize) -> f64 {
     (2.0 + (std::f64::consts::PI * mode as f64 / cells as f64).cos()) / 3.0
+}
+
+/// The reverse of [`cosine_transform_rows`]: amplitudes of each row of values at the nodes, in place. Both are the same sum but for weights.
+fn analyse_rows(planner: &mut RealFftPlanner<f64>, rows: &mut [f64], cells: usize) {
+    let halve_ends = |rows: &mut [f64]| {
+        for row in rows.chunks_exact_mut(cells + 1) {
+            row[0] *= 0.5;
+            row[cells] *= 0.5;
+        }
+    };
+    halve_ends(rows);
+    cosine_transform_rows(planner, rows, cells);
+    halve_ends(rows);
+    rows.iter_mut().for_each(|value| *value *= 2.0 / cells as f64);
 }
 
 /// Sums each row's cosine series at its nodes: `a_m -> sum a_m cos(pi m j / cells)`, in place.

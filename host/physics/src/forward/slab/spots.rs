@@ -7,6 +7,7 @@ use super::cut::CutDisc;
 use super::disc::DiscBasis;
 use super::green::Image;
 use super::image::ImageGrid;
+use super::uneven::uneven_ohm;
 use super::{Slab, from_corner};
 use crate::forward::spots::{MOST_PLACES, Spot, SpotFields, dot};
 use crate::space::Place;
@@ -87,11 +88,14 @@ impl SpotFields for SlabSpots {
         let mut sampled = self.sample(&points);
         let inner = sampled.split_off(self.slab.pads.electrodes());
         let square: f64 = inner.iter().map(|value| f64::from(*value).powi(2)).sum();
+        let uneven = self.slab.uneven.as_ref().map(|uneven| uneven.place(middle_m));
+        let even_ohm = self.local_ohm / share.sqrt() + self.kernel_ohm(middle_m, middle_m, true);
         Spot {
             place_m,
             electrodes_ohm: sampled.into_iter().map(f64::from).collect(),
-            own_ohm: self.local_ohm / share.sqrt() + self.kernel_ohm(middle_m, middle_m, true) - square,
+            own_ohm: uneven_ohm(even_ohm, uneven.as_ref(), uneven.as_ref()) - square,
             share,
+            uneven,
             inner,
             middle_m,
             joined: Vec::new(),
@@ -110,6 +114,7 @@ impl SpotFields for SlabSpots {
     }
 
     fn between_ohm(&self, a: &Spot, b: &Spot) -> f64 {
-        self.kernel_ohm(a.middle_m, b.middle_m, false) - dot(&a.inner, &b.inner)
+        let even_ohm = self.kernel_ohm(a.middle_m, b.middle_m, false);
+        uneven_ohm(even_ohm, a.uneven.as_ref(), b.uneven.as_ref()) - dot(&a.inner, &b.inner)
     }
 }

@@ -38,7 +38,7 @@ fn more_densities_change_next_to_nothing() {
     let mut detector = square(0.01, 0.002);
     detector.layers = vec![Layer { thickness_m: 0.01, bottom_s_per_m: 1.0, top_s_per_m: 0.01 }];
     let contacts = [contact(-0.01, 0.012, 0.002, 1e-3), contact(0.012, -0.02, 0.006, 1e-2)];
-    let finest = Resolution { pad_degree: 4, contact_degree: 6 };
+    let finest = Resolution { pad_degree: 4, contact_degree: 6, ..Resolution::FINE };
     let [coarse, fine] = [Resolution::STANDARD, finest]
         .map(|resolution| Slab::with_resolution(&detector, resolution).unwrap().impedance_ohm(&contacts).unwrap());
     assert!(apart(&detector, &coarse, &fine) < 2e-3, "{}", apart(&detector, &coarse, &fine));

@@ -1,0 +1,66 @@
+//! What a calibration says of a detector besides its quantities.
+
+use super::Parameter;
+
+/// Where a detector's quantities come from, and what is still unknown of them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Calibration {
+    /// Identity of the board that measured it; none for tables.
+    pub board: Option<String>,
+    /// When it was calibrated, as a date of ISO 8601.
+    pub date: String,
+    /// Frames that were used.
+    pub frames: usize,
+    /// Presses that were used.
+    pub presses: usize,
+    /// Parameters, each with its standard error in its unit, and whether the readings said next to nothing of it.
+    pub parameters: Vec<CalibratedParameter>,
+    /// What is left unknown, as independent directions of one standard deviation: each has a step of each parameter, in their order.
+    pub directions: Vec<Vec<f64>>,
+}
+
+/// A parameter after calibration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CalibratedParameter {
+    /// Which it is.
+    pub parameter: Parameter,
+    /// Its standard error, in its unit.
+    pub standard_error: f64,
+    /// Whether its standard error is still about that before: what is told of it is the description.
+    pub is_prior: bool,
+}
+
+/// Ways in which a detector may differ from what is known of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Unknowns {
+    /// Independent directions of one standard deviation: steps of some parameters, in their units.
+    pub directions: Vec<Vec<(Parameter, f64)>>,
+}
+
+/// Shortest wave of unevenness that is reckoned with, as a share of the shorter side: shorter ones have a hundredth of its power.
+pub const SHORTEST_WAVE: f64 = 0.45;
+
+impl super::Detector {
+    /// What is not known of this detector: after a calibration what that left, else its tolerances.
+    pub fn unknowns(&self) -> Unknowns {
+        let directions = match &self.calibration {
+            Some(calibration) => calibration.unknown_directions(),
+            None => Parameter::all(self, SHORTEST_WAVE)
+                .into_iter()
+                .map(|parameter| vec![(parameter, self.tolerances.deviation(self, parameter))])
+                .filter(|direction| direction[0].1 > 0.0)
+                .collect(),
+        };
+        Unknowns { directions }
+    }
+}
+
+impl Calibration {
+    fn unknown_directions(&self) -> Vec<Vec<(Parameter, f64)>> {
+        let named = |steps: &Vec<f64>| {
+            let pairs = self.parameters.iter().map(|known| known.parameter).zip(steps.iter().copied());
+            pairs.filter(|(_, step)| *step != 0.0).collect()
+        };
+        self.directions.iter().map(named).collect()
+    }
+}

@@ -1,0 +1,120 @@
+//! How far a detector may be from its description.
+
+use std::f64::consts::PI;
+
+use super::{Detector, Parameter};
+
+/// Standard deviations between a detector on paper and the one that was built. Without any, the description is taken as exact.
+///
+/// The defaults are what a hobbyist's bench gives: foam cut by hand, of a supplier who tells the conductivity of a batch and not where in it
+/// a sheet comes from; electrodes placed on a printed mark; pads pressed or glued on; converters within their data sheet.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Tolerances {
+    /// Of the thickness, as a share of it.
+    pub thickness_share: f64,
+    /// Of the conductivity, as a share of it.
+    pub conductivity_share: f64,
+    /// Of the top's conductivity over the bottom's: a factor, of at least 1.
+    pub top_over_bottom_factor: f64,
+    /// Of the conductivity from place to place, as a share of it; it changes over a quarter of the shorter side.
+    pub uneven_share: f64,
+    /// Of an electrode's x and y (m).
+    pub electrodes_m: f64,
+    /// Of all pads' contact impedance: a factor, of at least 1.
+    pub contact_impedance_factor: f64,
+    /// Of a pad's contact impedance from that of the others, as a share of it.
+    pub contact_impedance_spread: f64,
+    /// Of what a channel reads, as a share of what is there.
+    pub gain_share: f64,
+    /// Of what a channel reads where nothing is, in codes of the converter (LSB). A baseline takes it away.
+    pub offset_lsb: f64,
+    /// Of the multiplexer's on-resistance, as a share of it.
+    pub on_resistance_share: f64,
+}
+
+/// Length over which the conductivity changes, as a share of the shorter side.
+const UNEVEN_LENGTH: f64 = 0.25;
+
+impl Tolerances {
+    /// None: the detector is as it is described.
+    pub const EXACT: Self = Self {
+        thickness_share: 0.0,
+        conductivity_share: 0.0,
+        top_over_bottom_factor: 1.0,
+        uneven_share: 0.0,
+        electrodes_m: 0.0,
+        contact_impedance_factor: 1.0,
+        contact_impedance_spread: 0.0,
+        gain_share: 0.0,
+        offset_lsb: 0.0,
+        on_resistance_share: 0.0,
+    };
+
+    /// Whether there are none.
+    pub fn is_exact(&self) -> bool {
+        *self == Self::EXACT
+    }
+
+    /// All of them by the names that they have in a file.
+    pub fn named(&self) -> [(&'static str, f64); 10] {
+        [
+            ("thickness_share", self.thickness_share),
+            ("conductivity_share", self.conductivity_share),
+            ("top_over_bottom_factor", self.top_over_bottom_factor),
+            ("uneven_share", self.uneven_share),
+            ("electrodes_m", self.electrodes_m),
+            ("contact_impedance_factor", self.contact_impedance_factor),
+            ("contact_impedance_spread", self.contact_impedance_spread),
+            ("gain_share", self.gain_share),
+            ("offset_lsb", self.offset_lsb),
+            ("on_resistance_share", self.on_resistance_share),
+        ]
+    }
+
+    /// Standard deviation of one of the detector's parameters, in its unit.
+    pub fn deviation(&self, detector: &Detector, parameter: Parameter) -> f64 {
+        match parameter {
+            Parameter::Thickness => self.thickness_share,
+            Parameter::Conductivity => self.conductivity_share,
+            Parameter::TopOverBottom => self.top_over_bottom_factor.ln(),
+            Parameter::Uneven(mode) => self.uneven_share * uneven_share_of(detector, mode),
+            Parameter::ElectrodeX(_) | Parameter::ElectrodeY(_) => self.electrodes_m,
+            Parameter::Pads => self.contact_impedance_factor.ln(),
+            Parameter::Pad(_) => self.contact_impedance_spread,
+            Parameter::Gain(_) => self.gain_share,
+            Parameter::OnResistance => self.on_resistance_share,
+        }
+    }
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Self {
+            thickness_share: 0.1,
+            conductivity_share: 0.2,
+            top_over_bottom_factor: 2.0,
+            uneven_share: 0.06,
+            electrodes_m: 0.3e-3,
+            contact_impedance_factor: 3.0,
+            contact_impedance_spread: 0.3,
+            gain_share: 0.003,
+            offset_lsb: 2.0,
+            on_resistance_share: 0.25,
+        }
+    }
+}
+
+/// Standard deviation of a cosine's amplitude, where that of the logarithm of the conductivity is one over the plane: its covariance is
+/// `exp(-d^2 / 2 l^2)`, so that the power of a mode is `exp(-k^2 l^2 / 2)`.
+fn uneven_share_of(detector: &Detector, mode: [usize; 2]) -> f64 {
+    let size_m = detector.outline.size_m();
+    let length_m = UNEVEN_LENGTH * size_m[0].min(size_m[1]);
+    let power = |[i, j]: [usize; 2]| {
+        let k = [i, j].iter().zip(size_m).map(|(m, side_m)| (*m as f64 * PI / side_m).powi(2)).sum::<f64>();
+        (-0.5 * k * length_m * length_m).exp()
+    };
+    let all: f64 = Parameter::uneven_modes(detector, f64::INFINITY).map(power).sum();
+    let mean_square: f64 = mode.iter().map(|m| if *m == 0 { 1.0 } else { 0.5 }).product();
+    (power(mode) / all / mean_square).sqrt()
+}
