@@ -56,6 +56,24 @@ impl super::Detector {
 }
 
 impl Calibration {
+    /// What it says of some of the electrodes only.
+    pub(super) fn keeping(&self, kept: &[usize]) -> Self {
+        let renumbered = |known: &CalibratedParameter| match known.parameter.electrode() {
+            Some(e) => kept.iter().position(|kept| *kept == e).map(|to| known.parameter.with_electrode(to)),
+            None => Some(known.parameter),
+        };
+        let left: Vec<_> = self.parameters.iter().map(renumbered).collect();
+        let of_left = |all: &Vec<f64>| all.iter().zip(&left).filter_map(|(step, to)| to.map(|_| *step)).collect();
+        let parameters = self.parameters.iter().zip(&left);
+        Self {
+            parameters: parameters
+                .filter_map(|(known, to)| to.map(|parameter| CalibratedParameter { parameter, ..*known }))
+                .collect(),
+            directions: self.directions.iter().map(of_left).collect(),
+            ..self.clone()
+        }
+    }
+
     fn unknown_directions(&self) -> Vec<Vec<(Parameter, f64)>> {
         let named = |steps: &Vec<f64>| {
             let pairs = self.parameters.iter().map(|known| known.parameter).zip(steps.iter().copied());

@@ -95,6 +95,9 @@ pub struct Electrode {
     /// What its channel reads, over what is there.
     #[serde(default = "one")]
     pub gain: f64,
+    /// What its channel reads where nothing is (V): in simulated detectors only, since a baseline takes it away.
+    #[serde(skip)]
+    pub offset_v: f64,
 }
 
 const fn one() -> f64 {
@@ -143,6 +146,25 @@ impl Detector {
         }
     }
 
+    /// This detector with some of its electrodes only, in the order given.
+    ///
+    /// # Panics
+    /// If there is no such electrode.
+    #[must_use]
+    pub fn keeping(&self, kept: &[usize]) -> Self {
+        Self {
+            electrodes: kept.iter().map(|e| self.electrodes[*e]).collect(),
+            calibration: self.calibration.as_ref().map(|calibration| calibration.keeping(kept)),
+            ..self.clone()
+        }
+    }
+
+    /// This detector with its description taken as exact.
+    #[must_use]
+    pub fn taken_as_exact(&self) -> Self {
+        Self { tolerances: Tolerances::EXACT, calibration: None, ..self.clone() }
+    }
+
     /// Logarithm of the factor by which unevenness changes the conductivity at a place of the map (m).
     pub fn log_unevenness(&self, map_m: [f64; 2]) -> f64 {
         let [low, high] = self.outline.bounds();
@@ -168,7 +190,7 @@ impl Electrode {
 
     /// A pad of a flat detector.
     pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
-        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None, gain: 1.0 }
+        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None, gain: 1.0, offset_v: 0.0 }
     }
 }
 

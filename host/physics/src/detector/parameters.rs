@@ -63,6 +63,17 @@ impl Parameter {
         }
     }
 
+    /// The same of another electrode, if it is one's.
+    pub(super) fn with_electrode(self, e: usize) -> Self {
+        match self {
+            Self::ElectrodeX(_) => Self::ElectrodeX(e),
+            Self::ElectrodeY(_) => Self::ElectrodeY(e),
+            Self::Pad(_) => Self::Pad(e),
+            Self::Gain(_) => Self::Gain(e),
+            other => other,
+        }
+    }
+
     /// Whether it belongs to the board that measures, and not to the detector.
     pub fn is_of_board(self) -> bool {
         matches!(self, Self::Gain(_) | Self::OnResistance)

@@ -112,6 +112,12 @@ pub trait ForwardModel: Send + Sync {
     /// [`ForwardError::Detector`] if there is no such model of the detector.
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError>;
 
+    /// The same kind of model of a detector that is nearly the same, at as little cost as can be: derivatives by what a detector is made of.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if there is no such model of the detector.
+    fn of_similar(&self, detector: &Detector) -> Result<Arc<dyn ForwardModel>, ForwardError>;
+
     /// Fields of spots that stand for contacts of a radius (m); none if the model has no such thing.
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>>;
 

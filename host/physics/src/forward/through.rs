@@ -4,7 +4,7 @@
 //! that is joined to another carries what current makes their potentials alike ([`super::joined`]): the two are one electrode, and
 //! it is enough to keep one of them, to be grounded and read.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 
@@ -23,7 +23,8 @@ pub struct Through {
     /// Of the bare detector.
     exchanges: Exchanges,
     detector: Detector,
-    fields_ohm: DMatrix<f64>,
+    /// Made when they are asked for.
+    fields_ohm: OnceLock<DMatrix<f64>>,
     electrode_fields_ohm: DMatrix<f64>,
 }
 
@@ -33,12 +34,10 @@ impl Through {
     /// # Panics
     /// If there is no such electrode.
     pub fn new(model: Arc<dyn ForwardModel>, kept: Vec<usize>, joints: Vec<Joint>) -> Self {
-        let mut detector = model.detector().clone();
-        detector.electrodes = kept.iter().map(|e| detector.electrodes[*e]).collect();
+        let detector = model.detector().keeping(&kept);
         let exchanges = Exchanges::new(model.electrode_fields_ohm(), &joints);
-        let fields_ohm = exchanges.applied(model.fields_ohm()).select_columns(&kept);
         let electrode_fields_ohm = square(&exchanges.applied(model.electrode_fields_ohm()), &kept);
-        Self { model, kept, joints, exchanges, detector, fields_ohm, electrode_fields_ohm }
+        Self { model, kept, joints, exchanges, detector, fields_ohm: OnceLock::new(), electrode_fields_ohm }
     }
 
     /// What is seen of an impedance matrix of all electrodes.
@@ -105,8 +104,17 @@ impl ForwardModel for Through {
         Some(Box::new(SpotsThrough { spots, kept: self.kept.clone(), exchanges: self.exchanges.clone() }))
     }
 
+    fn of_similar(&self, detector: &Detector) -> Result<Arc<dyn ForwardModel>, ForwardError> {
+        // What belongs to the detector as a whole, and to the electrodes that are seen.
+        let all = self.model.detector();
+        let mut whole = Detector { electrodes: all.electrodes.clone(), calibration: None, ..detector.clone() };
+        self.kept.iter().zip(&detector.electrodes).for_each(|(e, pad)| whole.electrodes[*e] = *pad);
+        Ok(Arc::new(Self::new(self.model.of_similar(&whole)?, self.kept.clone(), self.joints.clone())))
+    }
+
     fn fields_ohm(&self) -> &DMatrix<f64> {
-        &self.fields_ohm
+        let fields_ohm = || self.exchanges.applied(self.model.fields_ohm()).select_columns(&self.kept);
+        self.fields_ohm.get_or_init(fields_ohm)
     }
 
     fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {

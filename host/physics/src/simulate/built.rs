@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::Fault;
 use super::noise::{Noise, Stream};
-use crate::detector::Detector;
+use crate::detector::{Detector, Parameter, Tolerances};
 use crate::forward::ForwardError;
 use crate::forward::shell::Shell;
 use crate::space::Place;
@@ -26,6 +26,21 @@ pub fn as_built(detector: &Detector, faults: &[Fault], seed: u64) -> Detector {
         }
     }
     detector
+}
+
+/// A detector as it may have been built by a description: each of its parameters off by its tolerance, and `seed` chooses by how much. What
+/// is returned is exact: it is what was built, which solvers do not know. Pads stay apart and within the outline.
+pub fn drawn(detector: &Detector, seed: u64) -> Detector {
+    let mut noise = Noise::of(seed, Stream::AsBuilt);
+    let all = Parameter::all(detector, 0.0);
+    let step = |parameter: Parameter| (parameter, detector.tolerances.deviation(detector, parameter) * noise.normal());
+    let steps: Vec<_> = all.into_iter().map(step).collect();
+    let mut built = detector.stepped(&steps);
+    let code_v = detector.adc.lsb_v();
+    for pad in &mut built.electrodes {
+        pad.offset_v = detector.tolerances.offset_lsb * code_v * noise.normal();
+    }
+    Detector { calibration: None, tolerances: Tolerances::EXACT, ..built }
 }
 
 fn scale(detector: &mut Detector, factor: f64) {

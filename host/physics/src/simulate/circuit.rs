@@ -45,7 +45,7 @@ impl Circuit {
             open: vec![false; electrodes],
             shorts: Vec::new(),
             channels: (0..electrodes).collect(),
-            gain: vec![Gain { offset_v: 0.0, factor: 1.0 }; electrodes],
+            gain: detector.electrodes.iter().map(|pad| Gain { offset_v: pad.offset_v, factor: pad.gain }).collect(),
             clip_v: [f64::NEG_INFINITY, f64::INFINITY],
         };
         faults.iter().for_each(|fault| circuit.add(fault, detector));

@@ -15,7 +15,7 @@ mod noise;
 use crate::readings::Readings;
 
 pub use board::{Simulation, SimulationError, finer_model};
-pub use built::{as_built, uneven_shell};
+pub use built::{as_built, drawn, uneven_shell};
 pub use controls::Controls;
 pub use fault::{Fault, FaultError};
 pub use measure::{code, measured};

@@ -15,6 +15,7 @@ pub(super) enum Stream {
     Floating,
     ContactSpread,
     Uneven,
+    AsBuilt,
 }
 
 impl Noise {

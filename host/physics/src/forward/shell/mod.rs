@@ -235,6 +235,10 @@ impl ForwardModel for Shell {
         Ok(Box::new(Self::with_nodes(&self.detector, nodes)?))
     }
 
+    fn of_similar(&self, detector: &Detector) -> Result<Arc<dyn ForwardModel>, ForwardError> {
+        Ok(Arc::new(Self::with_nodes(detector, self.mesh.nodes_m.len())?))
+    }
+
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
         Some(Box::new(ShellSpots(self.spot_table(radius_m)?)))
     }

@@ -71,6 +71,7 @@ pub struct Slab {
     resolution: Resolution,
     /// Highest degree on contacts, however wide.
     most_degree: usize,
+    bottom: Arc<SurfaceGreen>,
     top: Arc<SurfaceGreen>,
     pads: Arc<PadFields>,
     /// `None` where the conductivity is even across the plane.
@@ -81,13 +82,12 @@ pub struct Slab {
 /// Degree on the contacts of a [rough](ForwardModel::rough) slab.
 const ROUGH_DEGREE: usize = 2;
 
-/// The grid that images are on.
+/// The grid that images are on, and what is made when the first image is asked for.
 #[derive(Clone, Debug)]
 struct Image {
     grid: ImageGrid,
-    mesh: ImageMesh,
-    fields_ohm: DMatrix<f64>,
-    /// Made when the first image is asked for.
+    mesh: OnceLock<ImageMesh>,
+    fields_ohm: OnceLock<DMatrix<f64>>,
     cells: OnceLock<CellFields>,
 }
 
@@ -105,29 +105,53 @@ impl Slab {
     /// # Errors
     /// As for [`new`](Self::new).
     pub fn with_resolution(detector: &Detector, resolution: Resolution) -> Result<Self, ForwardError> {
+        Self::like(None, detector, resolution)
+    }
+
+    /// Makes the model, with what a slab of a detector that is nearly the same has in common with it.
+    fn like(like: Option<&Self>, detector: &Detector, resolution: Resolution) -> Result<Self, ForwardError> {
         let wrong = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
         let size_m = check(detector).map_err(wrong)?;
         let mut planner = RealFftPlanner::new();
-        let uneven = Uneven::new(size_m, &detector.unevenness, &detector.layers, resolution.uneven_modes);
-        let pads = bare(detector, size_m, resolution, uneven.as_ref(), &mut planner)
+        let split_m = split_m(detector, size_m);
+        let as_even = like.filter(|like| {
+            let other = &like.detector;
+            (like.size_m, &other.layers, self::split_m(other, size_m)) == (size_m, &detector.layers, split_m)
+        });
+        let [bottom, top] = match as_even {
+            Some(like) => [Arc::clone(&like.bottom), Arc::clone(&like.top)],
+            None => [
+                SurfaceGreen::new(size_m, split_m, &mut planner, &bottom_surface(detector)).into(),
+                SurfaceGreen::new(size_m, split_m, &mut planner, &top_surface(detector)).into(),
+            ],
+        };
+        let uneven = match as_even.filter(|like| like.detector.unevenness == detector.unevenness) {
+            Some(like) => like.uneven.clone(),
+            None => Uneven::new(size_m, &detector.unevenness, &detector.layers, resolution.uneven_modes).map(Arc::new),
+        };
+        let pads = bare(detector, resolution, &bottom, uneven.as_deref(), &mut planner)
             .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
-        let top = SurfaceGreen::new(size_m, split_m(detector, size_m), &mut planner, &top_surface(detector));
-        let image = Image::new(ImageGrid::new(size_m, IMAGE_NODES), &pads);
         Ok(Self {
             detector: detector.clone(),
             size_m,
             resolution,
             most_degree: MAX_DEGREE,
-            top: top.into(),
+            bottom,
+            top,
             pads: pads.into(),
-            uneven: uneven.map(Arc::new),
-            image: image.into(),
+            uneven,
+            image: Image::new(ImageGrid::new(size_m, IMAGE_NODES)).into(),
         })
     }
 
     /// The same model with images of about `nodes` nodes instead of 2000; at least 9.
     pub fn on_image(self, nodes: usize) -> Self {
-        Self { image: Image::new(ImageGrid::new(self.size_m, nodes), &self.pads).into(), ..self }
+        Self { image: Image::new(ImageGrid::new(self.size_m, nodes)).into(), ..self }
+    }
+
+    fn image_fields_ohm(&self) -> &DMatrix<f64> {
+        let fields_ohm = || self.image.grid.means(&self.pads, self.pads.electrodes()).transpose();
+        self.image.fields_ohm.get_or_init(fields_ohm)
     }
 
     fn cells(&self) -> &CellFields {
@@ -157,10 +181,10 @@ impl Slab {
 
     /// The nodes of an image that conduct, and their system.
     fn touched(&self, image_s: &[f64]) -> Result<(Vec<usize>, ContactSystem<'_>), ForwardError> {
-        check_image(image_s, self.image.mesh.nodes_m.len())?;
+        check_image(image_s, self.image.grid.nodes())?;
         let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
         let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
-        let cross = self.image.fields_ohm.select_rows(&touched);
+        let cross = self.image_fields_ohm().select_rows(&touched);
         let patches = self.cells().within(&touched);
         Ok((touched, conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)))
     }
@@ -198,7 +222,7 @@ impl ForwardModel for Slab {
         solved.unknowns.row_iter_mut().enumerate().for_each(|(row, mut currents)| currents *= scaled(row));
         let untouched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] == 0.0).collect();
         let cells = self.cells();
-        let fields_ohm = &self.image.fields_ohm;
+        let fields_ohm = self.image_fields_ohm();
         let mut elsewhere = fields_ohm.select_rows(&untouched) + cells.between(&untouched, &touched) * &solved.unknowns;
         elsewhere.column_iter_mut().zip(&solved.constant_ohm).for_each(|(mut e, ohm)| e.add_scalar_mut(*ohm));
         let mut nodes_ohm = DMatrix::zeros(image_s.len(), fields_ohm.ncols());
@@ -228,15 +252,19 @@ impl ForwardModel for Slab {
     }
 
     fn image_mesh(&self) -> &ImageMesh {
-        &self.image.mesh
+        self.image.mesh.get_or_init(|| self.image.grid.mesh())
+    }
+
+    fn of_similar(&self, detector: &Detector) -> Result<Arc<dyn ForwardModel>, ForwardError> {
+        Ok(Arc::new(Self { most_degree: self.most_degree, ..Self::like(Some(self), detector, self.resolution)? }))
     }
 
     fn fields_ohm(&self) -> &DMatrix<f64> {
-        &self.image.fields_ohm
+        self.image_fields_ohm()
     }
 
     fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
-        let nodes: Vec<_> = (0..self.image.mesh.nodes_m.len()).collect();
+        let nodes: Vec<_> = (0..self.image.grid.nodes()).collect();
         Ok(self.cells().between(&nodes, &nodes))
     }
 
@@ -310,11 +338,12 @@ fn bottom_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {
 /// The bare slab with its pads eliminated.
 fn bare(
     detector: &Detector,
-    size_m: [f64; 2],
     resolution: Resolution,
+    bottom: &SurfaceGreen,
     uneven: Option<&Uneven>,
     planner: &mut RealFftPlanner<f64>,
 ) -> Option<PadFields> {
+    let size_m = detector.outline.size_m();
     let pads: Vec<_> = detector
         .electrodes
         .iter()
@@ -325,9 +354,7 @@ fn bare(
         })
         .collect();
     let basis = DiscBasis::of_degree(resolution.pad_degree);
-    let split_m = split_m(detector, size_m);
-    let kernel = SurfaceGreen::new(size_m, split_m, planner, &bottom_surface(detector));
-    let impedances = pad_impedances(&pads, basis, &kernel, uneven);
+    let impedances = pad_impedances(&pads, basis, bottom, uneven);
     let across = Across {
         size_m,
         thickness_m: detector.thickness_m(),
@@ -339,8 +366,7 @@ fn bare(
 }
 
 impl Image {
-    fn new(grid: ImageGrid, pads: &PadFields) -> Self {
-        let fields_ohm = grid.means(pads, pads.electrodes()).transpose();
-        Self { grid, mesh: grid.mesh(), fields_ohm, cells: OnceLock::new() }
+    fn new(grid: ImageGrid) -> Self {
+        Self { grid, mesh: OnceLock::new(), fields_ohm: OnceLock::new(), cells: OnceLock::new() }
     }
 }
