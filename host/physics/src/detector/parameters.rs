@@ -64,7 +64,8 @@ impl Parameter {
     }
 
     /// The same of another electrode, if it is one's.
-    pub(super) fn with_electrode(self, e: usize) -> Self {
+    #[must_use]
+    pub fn with_electrode(self, e: usize) -> Self {
         match self {
             Self::ElectrodeX(_) => Self::ElectrodeX(e),
             Self::ElectrodeY(_) => Self::ElectrodeY(e),
@@ -72,6 +73,11 @@ impl Parameter {
             Self::Gain(_) => Self::Gain(e),
             other => other,
         }
+    }
+
+    /// Whether its steps are logarithms.
+    pub fn is_log(self) -> bool {
+        !matches!(self, Self::ElectrodeX(_) | Self::ElectrodeY(_))
     }
 
     /// Whether it belongs to the board that measures, and not to the detector.

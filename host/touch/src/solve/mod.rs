@@ -45,6 +45,7 @@ pub use self::nonnegative::Nonnegative;
 pub use self::problem::Problem;
 pub use self::shapes::{FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty};
 pub use self::still::Still;
+pub(crate) use self::still::rounding_v;
 pub use self::tikhonov::{Tikhonov, Variant};
 pub use self::tsvd::Tsvd;
 pub use self::tv::Tv;
