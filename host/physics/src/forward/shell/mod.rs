@@ -29,6 +29,7 @@ pub use self::mesh::Mesh;
 use self::spots::{ShellSpots, SpotTable};
 use self::system::{Factor, Singular, System};
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
+use super::driving::DrivingLayer;
 use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image, leaks};
 use crate::detector::{Detector, Electrode};
@@ -133,10 +134,21 @@ impl Shell {
         })
     }
 
-    /// The same model with a driving layer that touches it lightly everywhere, by so much conductance in all (S).
-    pub fn leaking(self, leak_s: f64) -> Self {
-        let area_m2: f64 = self.image_mesh.node_areas_m2.iter().sum();
-        Self { leak_s_per_m2: leak_s / area_m2, ..self }
+    /// The same model with a driving layer that need not be ideal: one that leaks.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the layer has a sheet resistance, which only the slab can have.
+    pub fn under(self, driving: DrivingLayer) -> Result<Self, ForwardError> {
+        if driving.sheet_ohm > 0.0 {
+            let what = "its driving layer has a sheet resistance, which only the slab can have: a flat rectangle whose conductivity is \
+                        even in the plane";
+            return Err(ForwardError::Detector { detector: self.detector.name.clone(), what: what.to_owned() });
+        }
+        Ok(Self { leak_s_per_m2: driving.leak_s / self.area_m2(), ..self })
+    }
+
+    fn area_m2(&self) -> f64 {
+        self.image_mesh.node_areas_m2.iter().sum()
     }
 
     /// Whether `image_s` can be an image on this model; one of nothing if it leaks.
@@ -248,8 +260,9 @@ impl ForwardModel for Shell {
     }
 
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {
-        let leak_s = self.leak_s_per_m2 * self.image_mesh.node_areas_m2.iter().sum::<f64>();
-        Ok(Box::new(Self::with_nodes(&self.detector, nodes)?.leaking(leak_s)))
+        let leak_s = self.leak_s_per_m2 * self.area_m2();
+        let driving = DrivingLayer { leak_s, ..DrivingLayer::default() };
+        Ok(Box::new(Self::with_nodes(&self.detector, nodes)?.under(driving)?))
     }
 
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
