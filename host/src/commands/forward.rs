@@ -84,9 +84,9 @@ struct Report<'a> {
 
 /// Computes and prints.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let (detector, Pressed { touches, factor }) = pressed(args)?;
+    let (detector, pressed) = pressed(args)?;
     let leaks = simulate::driving_layer(&detector, &args.scene.fault).leak_s > 0.0;
-    let (computes, saves) = (leaks || !touches.is_empty(), args.save_jacobian.is_some());
+    let (computes, saves) = (leaks || !pressed.touches.is_empty(), args.save_jacobian.is_some());
     ensure!(
         computes || saves,
         "nothing to compute: give --contact, --press, --touches, --scene (at a time when something touches), --case or --save-jacobian"
@@ -102,14 +102,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if !computes {
         return Ok(());
     }
-    let impedance_ohm = touched_impedance_ohm(&*model, &touches)? / factor;
+    let impedance_ohm = touched_impedance_ohm(&*model, &pressed.before_drift())? / pressed.factor;
     let readings = readings(args, &detector, &impedance_ohm)?;
     if args.json {
         let report = Report {
             model: model.name(),
             detector: &detector.name,
             image_nodes: model.image_mesh().nodes_m.len(),
-            touches: &touches,
+            touches: &pressed.touches,
             faults: args.scene.fault.iter().map(ToString::to_string).collect(),
             readings_v: rows_of_readings(&readings),
             impedance_ohm: rows(&impedance_ohm),

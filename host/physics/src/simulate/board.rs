@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::controls::{Built, Changes, Controls};
-use super::{Fault, FaultError, Physics, Pressed, as_built, uneven_shell};
+use super::{Fault, FaultError, Physics, as_built, uneven_shell};
 use crate::detector::Detector;
 use crate::forward::shell::Shell;
 use crate::forward::{DrivingLayer, ForwardError, ForwardModel, Resolution, Slab, touched_impedance_ohm};
@@ -126,12 +126,13 @@ impl Physics for Simulation {
         self.take_changes(time_s);
         let mut touches = self.scene.at(time_s - self.scene_from_s);
         touches.extend(self.pressed.iter().copied().map(Touch::from));
-        let Pressed { touches, factor } = self.built.foam.press(touches, time_s - self.built_from_s);
+        let pressed = self.built.foam.press(touches, time_s - self.built_from_s);
+        let touches = pressed.before_drift();
         let impedance_ohm = match self.last.take() {
             Some((last, impedance_ohm)) if last == touches => impedance_ohm,
             _ => impedance_ohm(&*self.built.model, touches.clone()),
         };
-        let drifted_ohm = impedance_ohm.as_ref().map(|impedance_ohm| impedance_ohm / factor);
+        let drifted_ohm = impedance_ohm.as_ref().map(|impedance_ohm| impedance_ohm / pressed.factor);
         let readings = self.built.measurement.pad_voltages(drifted_ohm.as_ref());
         self.last = Some((touches, impedance_ohm));
         readings

@@ -44,10 +44,18 @@ pub struct Foam {
 /// What presses, as a foam has it at a moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pressed {
-    /// The touches, to be put on the model of a detector that does not drift.
+    /// The touches.
     pub touches: Vec<Touch>,
-    /// The factor of the conductivity: that model's impedances are to be divided by it.
+    /// The factor of the conductivity.
     pub factor: f64,
+}
+
+impl Pressed {
+    /// The touches that make the same readings on a detector that has not drifted: its impedances are to be divided by the factor.
+    pub fn before_drift(&self) -> Vec<Touch> {
+        let scaled = |touch: &Touch| Touch { conductance_s: touch.conductance_s / self.factor, ..touch.clone() };
+        self.touches.iter().map(scaled).collect()
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -107,8 +115,7 @@ impl Foam {
     /// What presses at `time_s` seconds after the foam was made, not before the last time.
     pub fn press(&mut self, touches: Vec<Touch>, time_s: f64) -> Pressed {
         let factor = self.factor(time_s);
-        let mut touches = if self.remembers() { self.remembered(touches, time_s) } else { touches };
-        touches.iter_mut().for_each(|touch| touch.conductance_s /= factor);
+        let touches = if self.remembers() { self.remembered(touches, time_s) } else { touches };
         Pressed { touches, factor }
     }
 
@@ -333,8 +340,9 @@ mod tests {
         assert_near(factor("drift:-0.5:60", 60.0), 0.5);
         assert_near(factor("drift:0:60:0.05", 21600.0), 1.05);
         let mut foam = Foam::new(&faults(&["drift:0.2:60"]));
-        let Pressed { touches, factor } = foam.press(vec![disc(0.0, C_S)], 60.0);
-        assert_near(touches[0].conductance_s * factor, C_S);
+        let pressed = foam.press(vec![disc(0.0, C_S)], 60.0);
+        assert_eq!(pressed.touches, [disc(0.0, C_S)]);
+        assert_near(pressed.before_drift()[0].conductance_s, C_S / 1.2);
     }
 
     #[test]
