@@ -34,6 +34,12 @@ pub enum StudyError {
         /// Why.
         error: SolveError,
     },
+    /// Frames have no time.
+    #[error("fault {fault} acts through time, which the frames of a study do not have; `live --simulate` plays it")]
+    OfTime {
+        /// The fault.
+        fault: String,
+    },
     /// A detector on which not all scenes can be.
     #[error("detector {detector} is curved: studies press flat detectors, where contacts of any shape have a model")]
     Curved {
@@ -103,10 +109,10 @@ impl Experiment {
     /// # Errors
     /// [`StudyError`] if it cannot have them.
     pub fn with_faults(&self, faults: &[Fault], seed: u64) -> Result<Self, StudyError> {
-        let changes_model = |fault: &Fault| {
-            matches!(fault, Fault::ContactSpread { .. } | Fault::Conductivity { .. } | Fault::Uneven { .. })
-        };
-        let truth = match faults.iter().any(changes_model) {
+        if let Some(fault) = faults.iter().find(|fault| fault.is_of_time()) {
+            return Err(StudyError::OfTime { fault: fault.to_string() });
+        }
+        let truth: Arc<dyn ForwardModel> = match faults.iter().any(Fault::is_of_model) {
             true => finer_model(&self.detector, faults, seed)?.into(),
             false => Arc::clone(&self.truth),
         };
@@ -163,8 +169,10 @@ impl Experiment {
     /// The baseline (V): the mean of the first frames.
     fn baseline_v(&self, measurement: &mut Measurement) -> Readings {
         let mut rest = Readings::from_fn(self.detector.electrodes.len(), |_, _| 0.0);
+        // Of a detector that leaks there is something to read even then.
+        let rest_ohm = self.rest_ohm.clone().or_else(|| self.truth.impedance_ohm(&[]).ok());
         for _ in 0..BASELINE_FRAMES {
-            let frame = measurement.readings_v(self.rest_ohm.as_ref());
+            let frame = measurement.readings_v(rest_ohm.as_ref());
             let share = |(sum, volts): (&mut f64, &f64)| *sum += volts / f64::from(BASELINE_FRAMES);
             rest.volts_mut().iter_mut().zip(frame.volts()).for_each(share);
         }
@@ -188,8 +196,10 @@ impl Experiment {
         for touches in touches {
             let impedance_ohm = match last.take() {
                 Some((before, impedance_ohm)) if before == touches => impedance_ohm,
-                _ if touches.is_empty() => None,
-                _ => Some(touched_impedance_ohm(&*self.truth, touches)?),
+                _ => match touched_impedance_ohm(&*self.truth, touches) {
+                    Err(ForwardError::NoContact) if touches.is_empty() => None,
+                    impedance_ohm => Some(impedance_ohm?),
+                },
             };
             let mut readings = measurement.readings_v(impedance_ohm.as_ref());
             readings.volts_mut().iter_mut().zip(rest.volts()).for_each(|(volts, rest)| *volts -= rest);
@@ -266,6 +276,23 @@ mod tests {
         let contact = SceneKind::Firm.frames(&experiment.detector, 1, 1)[0][0].disc().unwrap();
         let loaded = readings(&experiment.with_baseline(&[contact]).unwrap(), 1);
         assert!(loaded.volts().iter().all(|volts| volts.abs() < 0.01), "the same contact is no change");
+    }
+
+    #[test]
+    fn a_leak_is_a_baseline_under_all_that_presses() {
+        let experiment = experiment();
+        let leaking = experiment.with_faults(&["leak:0.01".parse().unwrap()], 1).unwrap();
+        let rest = leaking.frames(&vec![Vec::new(); 10], 1).unwrap();
+        assert!(rest.iter().all(|frame| frame.readings.volts().iter().all(|volts| volts.abs() < 0.01)));
+        let (sound, leaking) = (readings(&experiment, 1), readings(&leaking, 1));
+        let off = sound.volts().iter().zip(leaking.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off > 0.005 && off < 0.1 * sound.largest_v(), "{off} {}", sound.largest_v());
+    }
+
+    #[test]
+    fn faults_of_time_are_refused() {
+        let error = experiment().with_faults(&["creep:0.2:3".parse().unwrap()], 1).err().unwrap();
+        assert_eq!(error, StudyError::OfTime { fault: "creep:0.2:3".to_owned() });
     }
 
     #[test]

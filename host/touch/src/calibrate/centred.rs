@@ -60,8 +60,7 @@ impl Centred {
 pub(super) fn between_others(impedance: &DMatrix<f64>) -> DMatrix<f64> {
     let n = impedance.nrows();
     // Least squares of Z[i][j] = a[i] + a[j] over i < j: the mean of row i is a[i] (n - 2) / (n - 1) + sum / (n - 1).
-    let row: Vec<f64> =
-        (0..n).map(|i| (0..n).filter(|j| *j != i).map(|j| impedance[(i, j)]).sum::<f64>()).collect();
+    let row: Vec<f64> = (0..n).map(|i| (0..n).filter(|j| *j != i).map(|j| impedance[(i, j)]).sum::<f64>()).collect();
     let sum = row.iter().sum::<f64>() / (2.0 * (n as f64 - 1.0));
     let part: Vec<f64> = row.iter().map(|row| (row - sum) / (n as f64 - 2.0)).collect();
     DMatrix::from_fn(n, n, |i, j| if i == j { 0.0 } else { impedance[(i, j)] - part[i] - part[j] })

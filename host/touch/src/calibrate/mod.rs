@@ -67,7 +67,9 @@ pub enum CalibrateError {
         faulty: Vec<usize>,
     },
     /// Readings of another number of electrodes.
-    #[error("the readings are of {readings} electrodes, the detector {detector} has {electrodes}: choose the detector that was rubbed")]
+    #[error(
+        "the readings are of {readings} electrodes, the detector {detector} has {electrodes}: choose the detector that was rubbed"
+    )]
     Count {
         /// Electrodes of the readings.
         readings: usize,

@@ -36,7 +36,9 @@ impl Posterior {
     /// Independent directions of one standard deviation, in the parameters' units, those that change readings most first: what is left of
     /// others changes none.
     pub fn directions(&self, parameters: &[(Parameter, f64)]) -> Vec<Vec<f64>> {
-        let Some(root) = Cholesky::new(self.covariance.clone()).map(|factor| factor.unpack()) else { return Vec::new() };
+        let Some(root) = Cholesky::new(self.covariance.clone()).map(|factor| factor.unpack()) else {
+            return Vec::new();
+        };
         let effect = root.tr_mul(&(&self.of_press * &root));
         let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(effect);
         let mut order: Vec<usize> = (0..eigenvalues.len()).collect();
@@ -44,7 +46,9 @@ impl Posterior {
         let all = root * eigenvectors;
         let matters = order.into_iter().filter(|index| eigenvalues[*index] > NEGLIGIBLE * NEGLIGIBLE);
         matters
-            .map(|index| all.column(index).iter().zip(parameters).map(|(step, (_, deviation))| step * deviation).collect())
+            .map(|index| {
+                all.column(index).iter().zip(parameters).map(|(step, (_, deviation))| step * deviation).collect()
+            })
             .collect()
     }
 }

@@ -153,9 +153,7 @@ fn means(touched: &[&Frame], kept: &[usize], detector: &Detector) -> Vec<Mean> {
     let mut groups: Vec<&[&Frame]> = Vec::new();
     let mut from = 0;
     for index in 1..=touched.len() {
-        let ends = index == touched.len()
-            || index - from == MOST_AVERAGED
-            || !is_same(touched[from], touched[index]);
+        let ends = index == touched.len() || index - from == MOST_AVERAGED || !is_same(touched[from], touched[index]);
         if ends {
             groups.push(&touched[from..index]);
             from = index;

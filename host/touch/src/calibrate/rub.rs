@@ -106,10 +106,8 @@ fn wired(chosen: &Chosen, nominal: &Detector, problem: &Problem) -> Result<Vec<O
     let fields_ohm = problem.model.electrode_fields_ohm();
     let described = between_others(&fields_ohm.select_rows(&chosen.kept).select_columns(&chosen.kept));
     let described = &described / described.norm();
-    let as_told = Order {
-        electrodes: (0..chosen.kept.len()).collect(),
-        distance: (&described - &chosen.centred).norm(),
-    };
+    let as_told =
+        Order { electrodes: (0..chosen.kept.len()).collect(), distance: (&described - &chosen.centred).norm() };
     // Which electrode is missing and how the others are exchanged cannot both be told.
     let found = match chosen.kept.len() == nominal.electrodes.len() {
         true => orders(&chosen.centred, &described),
@@ -240,5 +238,10 @@ fn calibrated(nominal: &Detector, chosen: &Chosen, bundle: &Bundle, normal: &Nor
         directions: posterior.directions(&bundle.parameters),
         ..Calibration::default()
     };
-    Some(Detector { name: nominal.name.clone(), tolerances: nominal.tolerances, calibration: Some(calibration), ..detector })
+    Some(Detector {
+        name: nominal.name.clone(),
+        tolerances: nominal.tolerances,
+        calibration: Some(calibration),
+        ..detector
+    })
 }

@@ -72,9 +72,7 @@ fn improved(measured: &DMatrix<f64>, described: &DMatrix<f64>, mut electrodes: V
 fn gain(measured: &DMatrix<f64>, described: &DMatrix<f64>, electrodes: &[usize], (i, j): (usize, usize)) -> f64 {
     let (a, b) = (electrodes[i], electrodes[j]);
     let others = electrodes.iter().enumerate().filter(|(k, _)| *k != i && *k != j);
-    others
-        .map(|(k, e)| (measured[(i, k)] - measured[(j, k)]) * (described[(b, *e)] - described[(a, *e)]))
-        .sum::<f64>()
+    others.map(|(k, e)| (measured[(i, k)] - measured[(j, k)]) * (described[(b, *e)] - described[(a, *e)])).sum::<f64>()
         * 2.0
 }
 

@@ -15,6 +15,7 @@
 //! between the two surfaces, whatever the layers (Green's identity in depth). The sheet's matrix is scaled by that quotient.
 //!
 //! Left out: how depth changes the second order in `q`; slopes of `s` and of `D` over a contact; and those over a pad in its own singular field.
+//! The resistance of a driving layer and a leak are scaled with the foam, though they are even.
 
 use std::f64::consts::PI;
 
