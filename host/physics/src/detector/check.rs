@@ -112,6 +112,7 @@ impl Detector {
         let impedance = format!("electrodes.contact_impedances_ohm_m2[{index}]");
         within(&impedance, self.pad_impedance_ohm_m2(&pad), IMPEDANCE_OHM_M2)?;
         within(&format!("electrodes.gains[{index}]"), pad.gain, GAIN)?;
+        within(&format!("electrodes.unseen_offsets_v[{index}]"), pad.unseen_offset_v, -1.0..=1.0)?;
         let at = pad.place_m();
         let position = format!("electrodes.positions_m[{index}]");
         at.iter().try_for_each(|&at_m| within(&position, at_m, -LENGTH_M.end()..=*LENGTH_M.end()))?;

@@ -95,6 +95,9 @@ pub struct Electrode {
     /// What its channel reads, over what is there.
     #[serde(default = "one")]
     pub gain: f64,
+    /// What its channel reads too much, though at rest it does not show (V): a converter reads nothing below zero.
+    #[serde(default)]
+    pub unseen_offset_v: f64,
     /// What its channel reads where nothing is (V): in simulated detectors only, since a baseline takes it away.
     #[serde(skip)]
     pub offset_v: f64,
@@ -190,7 +193,7 @@ impl Electrode {
 
     /// A pad of a flat detector.
     pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
-        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None, gain: 1.0, offset_v: 0.0 }
+        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None, gain: 1.0, unseen_offset_v: 0.0, offset_v: 0.0 }
     }
 }
 

@@ -27,6 +27,8 @@ pub enum Parameter {
     Pad(usize),
     /// What a channel reads over what is there (logarithm).
     Gain(usize),
+    /// What a channel reads besides what is there, and at rest does not show (V).
+    Offset(usize),
     /// On-resistance of the multiplexer (logarithm).
     OnResistance,
 }
@@ -40,7 +42,9 @@ impl Parameter {
         let electrodes = || 0..detector.electrodes.len();
         let one = [Self::Thickness, Self::Conductivity, Self::TopOverBottom, Self::OnResistance, Self::Pads];
         let uneven = Self::uneven_modes(detector, 2.0 / shortest_wave).map(Self::Uneven);
-        let each = electrodes().flat_map(|e| [Self::ElectrodeX(e), Self::ElectrodeY(e), Self::Pad(e), Self::Gain(e)]);
+        let of_electrode =
+            |e| [Self::ElectrodeX(e), Self::ElectrodeY(e), Self::Pad(e), Self::Gain(e), Self::Offset(e)];
+        let each = electrodes().flat_map(of_electrode);
         one.into_iter().chain(uneven).chain(each).collect()
     }
 
@@ -58,7 +62,7 @@ impl Parameter {
     /// The electrode that it is of, if it is one's.
     pub fn electrode(self) -> Option<usize> {
         match self {
-            Self::ElectrodeX(e) | Self::ElectrodeY(e) | Self::Pad(e) | Self::Gain(e) => Some(e),
+            Self::ElectrodeX(e) | Self::ElectrodeY(e) | Self::Pad(e) | Self::Gain(e) | Self::Offset(e) => Some(e),
             _ => None,
         }
     }
@@ -71,18 +75,19 @@ impl Parameter {
             Self::ElectrodeY(_) => Self::ElectrodeY(e),
             Self::Pad(_) => Self::Pad(e),
             Self::Gain(_) => Self::Gain(e),
+            Self::Offset(_) => Self::Offset(e),
             other => other,
         }
     }
 
     /// Whether its steps are logarithms.
     pub fn is_log(self) -> bool {
-        !matches!(self, Self::ElectrodeX(_) | Self::ElectrodeY(_))
+        !matches!(self, Self::ElectrodeX(_) | Self::ElectrodeY(_) | Self::Offset(_))
     }
 
     /// Whether it belongs to the board that measures, and not to the detector.
     pub fn is_of_board(self) -> bool {
-        matches!(self, Self::Gain(_) | Self::OnResistance)
+        matches!(self, Self::Gain(_) | Self::Offset(_) | Self::OnResistance)
     }
 }
 
@@ -111,6 +116,7 @@ impl Detector {
                 self.scale_pad(e, step.exp());
             }
             Parameter::Gain(e) => self.electrodes[e].gain *= step.exp(),
+            Parameter::Offset(e) => self.electrodes[e].unseen_offset_v += step,
             Parameter::OnResistance => self.on_resistance_ohm *= step.exp(),
         }
     }
@@ -159,7 +165,7 @@ impl Layer {
 
 /// Form of all parameters, for messages.
 const FORMS: &str =
-    "thickness, conductivity, top-over-bottom, uneven:1,0, x:3, y:3, pads, pad:3, gain:3 or on-resistance";
+    "thickness, conductivity, top-over-bottom, uneven:1,0, x:3, y:3, pads, pad:3, gain:3, offset:3 or on-resistance";
 
 impl fmt::Display for Parameter {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -173,6 +179,7 @@ impl fmt::Display for Parameter {
             Self::Pads => formatter.write_str("pads"),
             Self::Pad(e) => write!(formatter, "pad:{e}"),
             Self::Gain(e) => write!(formatter, "gain:{e}"),
+            Self::Offset(e) => write!(formatter, "offset:{e}"),
             Self::OnResistance => formatter.write_str("on-resistance"),
         }
     }
@@ -195,6 +202,7 @@ impl FromStr for Parameter {
             "y" => Ok(Self::ElectrodeY(number(index)?)),
             "pad" => Ok(Self::Pad(number(index)?)),
             "gain" => Ok(Self::Gain(number(index)?)),
+            "offset" => Ok(Self::Offset(number(index)?)),
             "uneven" => {
                 let (i, j) = index.split_once(',').ok_or_else(wrong)?;
                 Ok(Self::Uneven([number(i)?, number(j)?]))

@@ -27,7 +27,8 @@ pub struct Tolerances {
     pub contact_impedance_spread: f64,
     /// Of what a channel reads, as a share of what is there.
     pub gain_share: f64,
-    /// Of what a channel reads where nothing is, in codes of the converter (LSB). A baseline takes it away.
+    /// Of what a channel reads where nothing is, in codes of the converter (LSB). A baseline takes it away, where the converter does not
+    /// cut it off at zero.
     pub offset_lsb: f64,
     /// Of the multiplexer's on-resistance, as a share of it.
     pub on_resistance_share: f64,
@@ -83,6 +84,7 @@ impl Tolerances {
             Parameter::Pads => self.contact_impedance_factor.ln(),
             Parameter::Pad(_) => self.contact_impedance_spread,
             Parameter::Gain(_) => self.gain_share,
+            Parameter::Offset(_) => self.offset_lsb * detector.adc.lsb_v(),
             Parameter::OnResistance => self.on_resistance_share,
         }
     }

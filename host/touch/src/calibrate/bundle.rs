@@ -10,11 +10,11 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use tactomo_physics::detector::{Detector, Parameter};
-use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
+use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-use super::slopes::Slopes;
+use super::slopes::{Slopes, as_read};
 use super::{CalibrateError, Step};
 use crate::threads::map;
 
@@ -25,11 +25,10 @@ const RADIUS_DEVIATION: f64 = 0.5;
 const CONDUCTANCE_DEVIATION: f64 = 3.0;
 /// Unknowns of a press.
 const OF_PRESS: usize = 4;
-/// Iterations in which derivatives by the detector are made anew, and all.
-const RENEWED: usize = 3;
+/// Most iterations.
 const MOST_ITERATIONS: usize = 9;
 /// Share of the sum of squares by which an iteration has to better it for there to be another one.
-const WORTH: f64 = 1e-3;
+const WORTH: f64 = 5e-3;
 /// Dampings that are tried, as shares of the information.
 const DAMPINGS: [f64; 4] = [0.0, 0.01, 0.1, 1.0];
 /// Steps of a contact on a new detector, and share of its sum of squares that one has to better.
@@ -123,19 +122,10 @@ impl Bundle {
         press.readings.volts().iter().enumerate().map(weight).collect()
     }
 
-    /// Predicted readings (V).
-    fn predicted_v(detector: &Detector, impedance_ohm: &DMatrix<f64>) -> Vec<f64> {
-        let n = detector.electrodes.len();
-        let mut volts = readings_v(impedance_ohm, detector);
-        let gained = volts.volts_mut().iter_mut().enumerate();
-        gained.for_each(|(index, volts)| *volts *= detector.electrodes[index % n].gain);
-        volts.volts().to_vec()
-    }
-
     /// Sum of squares of a press and of what is known of it before.
     fn cost(&self, model: &dyn ForwardModel, press: &Press, contact: &Contact) -> f64 {
         let Ok(impedance_ohm) = model.impedance_ohm(&[*contact]) else { return f64::INFINITY };
-        let predicted = Self::predicted_v(model.detector(), &impedance_ohm);
+        let predicted = as_read(&impedance_ohm, model.detector());
         let pairs = press.readings.volts().iter().zip(&predicted).zip(self.weights(press));
         pairs.map(|((ours, theirs), weight)| (weight * (ours - theirs)).powi(2)).sum::<f64>()
             + press.prior(contact).iter().map(|(off, _)| off * off).sum::<f64>()
@@ -177,11 +167,11 @@ impl Bundle {
         let replaced: Vec<_> = near.iter().map(|(contact, _)| (0, *contact)).collect();
         let (impedance_ohm, changes) = model.impedance_with_changes_ohm(&[*contact], &replaced).ok()?;
         let weights = DVector::from_vec(self.weights(press));
-        let predicted = DVector::from_vec(Self::predicted_v(detector, &impedance_ohm));
+        let predicted = DVector::from_vec(as_read(&impedance_ohm, detector));
         let volts = DVector::from_column_slice(press.readings.volts());
         let residual = weights.component_mul(&(volts - &predicted));
         let column = |(change, (_, step)): (&DMatrix<f64>, &(Contact, f64))| {
-            let moved = DVector::from_vec(Self::predicted_v(detector, &(&impedance_ohm + change)));
+            let moved = DVector::from_vec(as_read(&(&impedance_ohm + change), detector));
             weights.component_mul(&((moved - &predicted) / *step))
         };
         let columns: Vec<_> = changes.iter().zip(&near).map(column).collect();
@@ -213,14 +203,18 @@ impl Bundle {
         Some(OfPress { cost: contact.cost, information, known, slope, step, coupling })
     }
 
-    /// Adjusts everything; tells after each iteration how far it is.
-    pub fn adjust(&mut self, told: &mut dyn FnMut(Step) -> bool) -> Result<Normal, CalibrateError> {
+    /// Adjusts everything, with derivatives made anew for some iterations; tells after each how far it is.
+    pub fn adjust(
+        &mut self,
+        renewed: usize,
+        told: &mut dyn FnMut(Step) -> bool,
+    ) -> Result<Normal, CalibrateError> {
         let mut slopes = Slopes::new(&*self.model, &self.parameters)?;
         let mut normal = self.normal(&slopes);
         for iteration in 1..=MOST_ITERATIONS {
             let before = self.objective(&normal, &self.steps);
             let bettered = self.step(&normal)?;
-            if iteration <= RENEWED && bettered {
+            if iteration <= renewed && bettered {
                 slopes = Slopes::new(&*self.model, &self.parameters)?;
             }
             normal = self.normal(&slopes);
@@ -228,7 +222,7 @@ impl Bundle {
             if !told(Step { iteration, most: MOST_ITERATIONS, chi_square: self.chi_square(&normal) }) {
                 return Err(CalibrateError::Stopped);
             }
-            if !bettered || (iteration > RENEWED && before - after < WORTH * before) {
+            if !bettered || before - after < WORTH * before {
                 break;
             }
         }

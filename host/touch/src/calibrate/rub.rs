@@ -57,6 +57,8 @@ const FAR: f64 = 0.45;
 const OFF_SPACINGS: f64 = 0.5;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
 const FULL: f64 = 0.995;
+/// Iterations in which derivatives by the detector are made anew.
+const RENEWED: usize = 3;
 /// Sum of squares, in those of most presses, above which a press is sought anew.
 const LOST: f64 = 2.0;
 
@@ -199,7 +201,7 @@ fn started(problem: &Problem, means: &[Mean], settings: &RubSettings) -> Result<
 /// at the start.
 fn adjusted(bundle: &mut Bundle, told: &mut dyn FnMut(Step) -> bool) -> Result<(f64, Normal), CalibrateError> {
     let mut first = None;
-    let mut normal = bundle.adjust(&mut |step| {
+    let mut normal = bundle.adjust(RENEWED, &mut |step| {
         first.get_or_insert(step.chi_square);
         told(step)
     })?;
@@ -214,7 +216,7 @@ fn adjusted(bundle: &mut Bundle, told: &mut dyn FnMut(Step) -> bool) -> Result<(
         if !bundle.offer(&lost, &found) {
             break;
         }
-        normal = bundle.adjust(told)?;
+        normal = bundle.adjust(1, told)?;
     }
     Ok((first.unwrap_or(f64::NAN), normal))
 }

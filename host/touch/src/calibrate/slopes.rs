@@ -25,6 +25,8 @@ enum Slope {
     Board(Detector),
     /// A channel's gain, by this logarithm.
     Gain(usize, f64),
+    /// A channel's offset (V).
+    Offset(usize, f64),
 }
 
 impl Slopes {
@@ -37,6 +39,7 @@ impl Slopes {
             let step = STEP * deviation;
             Ok(match *parameter {
                 Parameter::Gain(channel) => Slope::Gain(channel, *deviation),
+                Parameter::Offset(channel) => Slope::Offset(channel, *deviation),
                 Parameter::OnResistance => Slope::Board(model.detector().stepped(&[(*parameter, step)])),
                 _ => Slope::Model(model.of_similar(&model.detector().stepped(&[(*parameter, step)]))?),
             })
@@ -58,14 +61,20 @@ impl Slopes {
             let stepped = match slope {
                 Slope::Gain(channel, deviation) => {
                     change_v.fill(0.0);
-                    let own = |index: &usize| index % n == *channel;
-                    (0..n * n).filter(own).for_each(|index| change_v[index] = deviation * predicted[index]);
+                    let own = (*channel..n * n).step_by(n);
+                    own.for_each(|index| change_v[index] = deviation * predicted[index]);
                     give(column, &change_v);
                     continue;
                 }
-                Slope::Board(detector) => with_gains(readings_v(impedance_ohm, detector).volts(), detector),
+                Slope::Offset(channel, offset_v) => {
+                    change_v.fill(0.0);
+                    (*channel..n * n).step_by(n).for_each(|index| change_v[index] = *offset_v);
+                    give(column, &change_v);
+                    continue;
+                }
+                Slope::Board(detector) => as_read(impedance_ohm, detector),
                 Slope::Model(model) => match model.impedance_ohm(&[*contact]) {
-                    Ok(other_ohm) => with_gains(readings_v(&other_ohm, model.detector()).volts(), model.detector()),
+                    Ok(other_ohm) => as_read(&other_ohm, model.detector()),
                     Err(_) => continue,
                 },
             };
@@ -76,7 +85,13 @@ impl Slopes {
     }
 }
 
-fn with_gains(volts: &[f64], detector: &Detector) -> Vec<f64> {
+/// Readings as a detector's channels read them (V), with their gains and offsets.
+pub(super) fn as_read(impedance_ohm: &DMatrix<f64>, detector: &Detector) -> Vec<f64> {
     let n = detector.electrodes.len();
-    volts.iter().enumerate().map(|(index, volts)| volts * detector.electrodes[index % n].gain).collect()
+    let mut volts = readings_v(impedance_ohm, detector);
+    for (index, volts) in volts.volts_mut().iter_mut().enumerate() {
+        let pad = &detector.electrodes[index % n];
+        *volts = pad.gain * *volts + pad.unseen_offset_v;
+    }
+    volts.volts().to_vec()
 }
