@@ -21,6 +21,7 @@ pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
 pub use self::svg::short;
 pub use self::tolerances::Tolerances;
 pub use self::uneven::Unevenness;
+pub(crate) use self::uneven::cosines;
 use crate::geometry;
 
 /// A detection layer with its electrodes and the circuit that measures it.

@@ -203,21 +203,21 @@ impl Bundle {
         Some(OfPress { cost: contact.cost, information, known, slope, step, coupling })
     }
 
-    /// Adjusts everything, with derivatives made anew for some iterations; tells after each how far it is.
+    /// Adjusts everything, with derivatives that are made anew in the first iterations; tells after each how far it is.
     pub fn adjust(
         &mut self,
+        slopes: &mut Slopes,
         renewed: usize,
         told: &mut dyn FnMut(Step) -> bool,
     ) -> Result<Normal, CalibrateError> {
-        let mut slopes = Slopes::new(&*self.model, &self.parameters)?;
-        let mut normal = self.normal(&slopes);
+        let mut normal = self.normal(slopes);
         for iteration in 1..=MOST_ITERATIONS {
             let before = self.objective(&normal, &self.steps);
             let bettered = self.step(&normal)?;
             if iteration <= renewed && bettered {
-                slopes = Slopes::new(&*self.model, &self.parameters)?;
+                *slopes = Slopes::new(&*self.model, &self.parameters)?;
             }
-            normal = self.normal(&slopes);
+            normal = self.normal(slopes);
             let after = self.objective(&normal, &self.steps);
             if !told(Step { iteration, most: MOST_ITERATIONS, chi_square: self.chi_square(&normal) }) {
                 return Err(CalibrateError::Stopped);

@@ -10,6 +10,7 @@ use super::bundle::{Bundle, Normal, Press};
 use super::centred::between_others;
 use super::posterior::Posterior;
 use super::presses::{Chosen, Mean};
+use super::slopes::Slopes;
 use super::wires::{Order, orders};
 use super::{CalibrateError, Frame, Step};
 use crate::solve::{ContactSettings, Contacts, Problem, Solver};
@@ -58,7 +59,7 @@ const OFF_SPACINGS: f64 = 0.5;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
 const FULL: f64 = 0.995;
 /// Iterations in which derivatives by the detector are made anew.
-const RENEWED: usize = 3;
+const RENEWED: usize = 2;
 /// Sum of squares, in those of most presses, above which a press is sought anew.
 const LOST: f64 = 2.0;
 
@@ -201,7 +202,8 @@ fn started(problem: &Problem, means: &[Mean], settings: &RubSettings) -> Result<
 /// at the start.
 fn adjusted(bundle: &mut Bundle, told: &mut dyn FnMut(Step) -> bool) -> Result<(f64, Normal), CalibrateError> {
     let mut first = None;
-    let mut normal = bundle.adjust(RENEWED, &mut |step| {
+    let mut slopes = Slopes::new(&*bundle.model, &bundle.parameters)?;
+    let mut normal = bundle.adjust(&mut slopes, RENEWED, &mut |step| {
         first.get_or_insert(step.chi_square);
         told(step)
     })?;
@@ -216,7 +218,7 @@ fn adjusted(bundle: &mut Bundle, told: &mut dyn FnMut(Step) -> bool) -> Result<(
         if !bundle.offer(&lost, &found) {
             break;
         }
-        normal = bundle.adjust(1, told)?;
+        normal = bundle.adjust(&mut slopes, 0, told)?;
     }
     Ok((first.unwrap_or(f64::NAN), normal))
 }
