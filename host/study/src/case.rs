@@ -179,6 +179,7 @@ impl File {
                 drive_v: self.drive_v,
                 on_resistance_ohm: self.multiplexer_on_resistance_ohm,
                 adc: Adc::default(),
+                force: None,
             },
             contacts: self.contacts,
             impedance_ohm: DMatrix::from_fn(count, count, |i, j| self.impedance_ohm[i][j]),

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Adc, Detector, Layer, Outline};
+use super::{Adc, Detector, ForceLaw, Layer, Outline};
 use crate::geometry::{Point, area, cross, distance, edges, is_inside, segment_distance};
 use crate::space::{self, Place};
 
@@ -54,7 +54,8 @@ impl Detector {
         within("contact_impedance_ohm_m2", self.contact_impedance_ohm_m2, IMPEDANCE_OHM_M2)?;
         within("drive_v", self.drive_v, DRIVE_V)?;
         within("on_resistance_ohm", self.on_resistance_ohm, 0.0..=1e9)?;
-        self.adc.check()
+        self.adc.check()?;
+        self.force.as_ref().map_or(Ok(()), ForceLaw::check)
     }
 
     fn check_layers(&self) -> Result<(), Problem> {

@@ -14,7 +14,7 @@ use self::electrodes::ElectrodeTable;
 use super::check::{LENGTH_M, Problem, within};
 use super::material::Foam;
 use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
-use super::{Adc, Detector, Layer, Outline, Surface, SurfaceError};
+use super::{Adc, Detector, ForceLaw, Layer, Outline, Surface, SurfaceError};
 use crate::geometry::area;
 
 /// No detector's file is longer (bytes).
@@ -73,6 +73,7 @@ struct Document {
     electrodes: ElectrodeTable,
     #[serde(default)]
     adc: AdcTable,
+    force: Option<ForceLaw>,
 }
 
 #[derive(Deserialize)]
@@ -170,7 +171,8 @@ impl Detector {
         self.write_electrodes(text)?;
         writeln!(text, "\n[adc]\nbits = {}", self.adc.bits)?;
         writeln!(text, "full_scale_v = {:?}", self.adc.full_scale_v)?;
-        writeln!(text, "noise_lsb = {:?}", self.adc.noise_lsb)
+        writeln!(text, "noise_lsb = {:?}", self.adc.noise_lsb)?;
+        self.force.as_ref().map_or(Ok(()), |law| law.write_toml(text))
     }
 }
 
@@ -260,6 +262,7 @@ impl Document {
             drive_v: self.drive_v.unwrap_or(DRIVE_V),
             on_resistance_ohm: self.on_resistance_ohm.unwrap_or(ON_RESISTANCE_OHM),
             adc: self.adc.into_adc(),
+            force: self.force,
         })
     }
 }

@@ -2,6 +2,7 @@
 
 mod check;
 mod file;
+mod force;
 mod material;
 mod preset;
 pub mod surface;
@@ -9,6 +10,7 @@ mod svg;
 
 pub use self::check::{ELECTRODES, Problem};
 pub use self::file::{FileError, TomlError};
+pub use self::force::{ForceLaw, Newtons, SATURATED_SHARE};
 pub use self::material::{FOAMS, Foam, Stack};
 pub use self::surface::edges_of;
 pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
@@ -38,6 +40,8 @@ pub struct Detector {
     pub on_resistance_ohm: f64,
     /// How the voltages become numbers.
     pub adc: Adc,
+    /// Newtons from conductances, once that is calibrated.
+    pub force: Option<ForceLaw>,
 }
 
 /// Closed polygons, without repeating the first corner (m).

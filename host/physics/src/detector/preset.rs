@@ -48,6 +48,7 @@ impl Detector {
             drive_v: DRIVE_V,
             on_resistance_ohm: ON_RESISTANCE_OHM,
             adc: Adc::default(),
+            force: None,
         }
     }
 }

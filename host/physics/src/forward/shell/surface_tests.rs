@@ -33,6 +33,7 @@ fn flat(outline: Outline, electrodes: Vec<Electrode>) -> Detector {
         drive_v: 2.0,
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
+        force: None,
     }
 }
 
