@@ -1,0 +1,3 @@
+//! What makes a detector on paper the one that was built.
+
+pub mod force;
