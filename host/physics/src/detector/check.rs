@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Adc, Detector, Layer, Outline, Tolerances};
+use super::{Adc, Detector, ForceLaw, Layer, Outline, Tolerances};
 use crate::geometry::{Point, area, cross, distance, edges, is_inside, segment_distance};
 use crate::space::{self, Place};
 
@@ -62,7 +62,8 @@ impl Detector {
         within("on_resistance_ohm", self.on_resistance_ohm, 0.0..=1e9)?;
         self.tolerances.check()?;
         self.check_calibration()?;
-        self.adc.check()
+        self.adc.check()?;
+        self.force.as_ref().map_or(Ok(()), ForceLaw::check)
     }
 
     fn check_layers(&self) -> Result<(), Problem> {

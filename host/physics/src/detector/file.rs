@@ -16,7 +16,7 @@ use self::electrodes::ElectrodeTable;
 use super::check::{LENGTH_M, Problem, within};
 use super::material::Foam;
 use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
-use super::{Adc, Detector, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
+use super::{Adc, Detector, ForceLaw, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
 use crate::geometry::area;
 
 /// No detector's file is longer (bytes).
@@ -80,6 +80,7 @@ struct Document {
     #[serde(default)]
     tolerances: Tolerances,
     calibration: Option<CalibrationTable>,
+    force: Option<ForceLaw>,
 }
 
 #[derive(Deserialize)]
@@ -184,6 +185,9 @@ impl Detector {
         if self.tolerances != Tolerances::default() {
             self.tolerances.write_toml(text)?;
         }
+        if let Some(law) = &self.force {
+            law.write_toml(text)?;
+        }
         match &self.calibration {
             Some(calibration) => calibration.write_toml(text),
             None => Ok(()),
@@ -287,6 +291,7 @@ impl Document {
             adc: self.adc.into_adc(),
             tolerances: self.tolerances,
             calibration: self.calibration.map(CalibrationTable::into_calibration).transpose()?,
+            force: self.force,
         })
     }
 }

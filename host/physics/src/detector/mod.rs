@@ -3,6 +3,7 @@
 mod calibration;
 mod check;
 mod file;
+mod force;
 mod material;
 mod parameters;
 mod preset;
@@ -14,6 +15,7 @@ mod uneven;
 pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
 pub use self::check::{ELECTRODES, Problem};
 pub use self::file::{FileError, TomlError};
+pub use self::force::{ForceLaw, Newtons, SATURATED_SHARE};
 pub use self::material::{FOAMS, Foam, Stack};
 pub use self::parameters::Parameter;
 pub use self::surface::edges_of;
@@ -56,6 +58,8 @@ pub struct Detector {
     /// Where its quantities come from, if they were not told but calibrated.
     #[serde(skip)]
     pub calibration: Option<Calibration>,
+    /// Newtons from conductances, once that is calibrated.
+    pub force: Option<ForceLaw>,
 }
 
 /// Closed polygons, without repeating the first corner (m).

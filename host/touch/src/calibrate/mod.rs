@@ -7,6 +7,7 @@
 
 mod bundle;
 mod centred;
+pub mod force;
 mod posterior;
 mod presses;
 mod rub;

@@ -35,6 +35,7 @@ fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
         drive_v: 2.0,
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
+        force: None,
     }
 }
 
