@@ -96,7 +96,7 @@ pub struct Electrode {
     #[serde(default = "one")]
     pub gain: f64,
     /// What its channel reads where nothing is (V): in simulated detectors only, since a baseline takes it away.
-    #[serde(skip)]
+    #[serde(default)]
     pub offset_v: f64,
 }
 
