@@ -56,6 +56,23 @@ impl Tolerances {
         *self == Self::EXACT
     }
 
+    /// All of them so many times: factors to that power. At 0 there are none.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            thickness_share: factor * self.thickness_share,
+            conductivity_share: factor * self.conductivity_share,
+            top_over_bottom_factor: self.top_over_bottom_factor.powf(factor),
+            uneven_share: factor * self.uneven_share,
+            electrodes_m: factor * self.electrodes_m,
+            contact_impedance_factor: self.contact_impedance_factor.powf(factor),
+            contact_impedance_spread: factor * self.contact_impedance_spread,
+            gain_share: factor * self.gain_share,
+            offset_lsb: factor * self.offset_lsb,
+            on_resistance_share: factor * self.on_resistance_share,
+        }
+    }
+
     /// All of them by the names that they have in a file.
     pub fn named(&self) -> [(&'static str, f64); 10] {
         [
@@ -135,6 +152,16 @@ mod tests {
         let exact = |parameter| Tolerances::EXACT.deviation(&detector, parameter);
         assert!(Parameter::all(&detector, 0.0).into_iter().all(|parameter| exact(parameter) == 0.0));
         assert!(Tolerances::EXACT.is_exact() && !Tolerances::default().is_exact());
+    }
+
+    #[test]
+    fn tolerances_scale_in_their_units() {
+        let (detector, twice) = (Detector::default(), Tolerances::default().times(2.0));
+        for parameter in Parameter::all(&detector, 0.5) {
+            let of = |tolerances: &Tolerances| tolerances.deviation(&detector, parameter);
+            assert!((of(&twice) / of(&detector.tolerances) - 2.0).abs() < 1e-12, "{parameter}");
+        }
+        assert_eq!((twice.offset_lsb, Tolerances::default().times(0.0)), (4.0, Tolerances::EXACT));
     }
 
     /// Mean square of the unevenness over the plane and over all detectors, and its correlation a quarter of the width apart: `exp(-1/2)`.
