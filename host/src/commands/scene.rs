@@ -9,6 +9,7 @@ use tactomo::hertz::{Hertz, POISSON, SURFACE_DEPTH_M, Skin};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
+use super::as_built::AsBuiltArgs;
 use super::output::message;
 
 /// Default seed.
@@ -39,6 +40,8 @@ pub struct SceneArgs {
     /// clip:0.14,1.8 (V); give it again for more
     #[arg(long, value_name = "FAULT")]
     pub fault: Vec<Fault>,
+    #[command(flatten)]
+    pub as_built: AsBuiltArgs,
     /// Seed of places, noise and faults [default: 1]
     #[arg(long)]
     seed: Option<u64>,
@@ -46,7 +49,8 @@ pub struct SceneArgs {
 
 impl SceneArgs {
     /// Names of the arguments.
-    pub const NAMES: [&str; 8] = ["scene", "force", "tip", "elasticity", "poisson", "surface_depth", "fault", "seed"];
+    pub const NAMES: [&str; 9] =
+        ["scene", "force", "tip", "elasticity", "poisson", "surface_depth", "fault", AsBuiltArgs::NAME, "seed"];
 
     /// The seed.
     pub fn seed(&self) -> u64 {
