@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::baseline::Baseline;
 use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
-use tactomo::board::measured;
+use tactomo::board::{identity, measured};
 use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
@@ -223,7 +223,12 @@ fn solved(args: &Args) -> anyhow::Result<Opened> {
     };
     let electrodes = chosen.electrodes.len();
     let detector = match file.board() {
-        Some(board) => measured::as_measured(&chosen, board)?,
+        Some(board) => {
+            if let Some(notice) = identity::other_board(&chosen, board) {
+                message!("warning: {notice}");
+            }
+            measured::as_measured(&chosen, board)?
+        }
         None => chosen,
     };
     if file.channels() != electrodes * electrodes {
