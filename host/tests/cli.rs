@@ -50,6 +50,9 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["record"], "FILE"),
         (&["live", "--scene", "ring"], "--simulate"),
         (&["record", "some.file", "--fault", "open:3"], "--simulate"),
+        (&["live", "--as-built", "7"], "--simulate"),
+        (&["forward", "--as-built", "7", "--save-jacobian", "some.file"], "--save-jacobian"),
+        (&["forward", "--as-built", "-7"], "a seed, or a detector"),
         (&["forward", "--scene", "jazz"], "rolling-ball"),
         (&["forward", "--fault", "open"], "open:3, short:2,7"),
         (&["forward", "--press", "0,0,2.5"], "tip_radius_mm,force_n"),
@@ -221,6 +224,33 @@ fn foam_creeps_and_drifts_up_to_the_time_asked_for() {
     let [drifted, told] =
         [drifted, report(&["--fault", "conductivity:1.2"])].map(|report| report["readings_v"][5][10].as_f64().unwrap());
     assert!((drifted / told - 1.0).abs() < 2e-3, "{drifted} {told}");
+}
+
+#[test]
+fn what_was_built_is_told_and_can_be_simulated_again() {
+    let contact = ["forward", "--contact", "3,-4,2.5,0.001", "--json", "--as-built"];
+    let report = |args: &[&str]| -> serde_json::Value {
+        let output = tactomo(args);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let built = report(&[&contact[..], &["7"]].concat());
+    let shown = tactomo(&["detector", "show", "square-60", "--as-built", "7"]);
+    let toml = String::from_utf8(shown.stdout).unwrap();
+    assert_eq!(built["as_built"].as_str().unwrap().trim_end(), toml.trim_end());
+    assert_eq!(built["detector"], "square-60");
+    let path = std::env::temp_dir().join(format!("tactomo-as-built-{}.toml", std::process::id()));
+    std::fs::write(&path, toml).unwrap();
+    let again = report(&[&contact[..], &[path.to_str().unwrap()]].concat());
+    let exact =
+        tactomo(&["forward", "--contact", "0,0,1,1e-3", "--detector", path.to_str().unwrap(), "--as-built", "1"]);
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(again["readings_v"], built["readings_v"]);
+    assert_eq!(exact.status.code(), Some(1));
+    assert!(String::from_utf8(exact.stderr).unwrap().contains("nothing to draw"));
+    let described = report(&contact[..4]);
+    assert!(described.get("as_built").is_none() && described["readings_v"] != built["readings_v"]);
+    assert_ne!(report(&[&contact[..], &["8"]].concat())["readings_v"], built["readings_v"]);
 }
 
 #[test]

@@ -74,7 +74,7 @@ pub enum Chosen {
 
 impl Chosen {
     /// The detector.
-    fn get(&self) -> anyhow::Result<Detector> {
+    pub fn get(&self) -> anyhow::Result<Detector> {
         match self {
             Self::Preset(detector) => Ok((**detector).clone()),
             Self::File(path) => Ok(Detector::read(path)?),

@@ -14,6 +14,7 @@ use tactomo::scene::{Contact, SceneName, Touch};
 use tactomo::simulate::{self, Foam, Measurement, Pressed};
 use tactomo::study::case::Case;
 
+use super::as_built::AsBuiltArgs;
 use super::choice::{self, DetectorArgs, Model};
 use super::output::{self, NewFile, message};
 use super::scene::{self, Press, SceneArgs};
@@ -24,6 +25,7 @@ use super::scene::{self, Press, SceneArgs};
 ///   tactomo forward --detector square-60 --contact 3,-4,2.5,0.001 --json
 ///   tactomo forward --model slab --press 3,-4,2.5,0.5 --fault open:3 --measured
 ///   tactomo forward --model slab --scene ring --force 5 --seed 7 --json
+///   tactomo forward --scene single --as-built 7 --measured --json
 ///   tactomo forward --save-jacobian square-60.jacobian
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -59,12 +61,12 @@ pub struct Args {
     #[arg(long, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     nodes: Option<u32>,
     /// Saves the Jacobian to a file, for `live --jacobian`
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = AsBuiltArgs::NAME)]
     save_jacobian: Option<PathBuf>,
     /// Replaces the file if it exists
     #[arg(long, requires = "save_jacobian")]
     overwrite: bool,
-    /// Prints `{model, detector, image_nodes, touches, faults, readings_v, impedance_ohm}` as JSON
+    /// Prints `{model, detector, as_built?, image_nodes, touches, faults, readings_v, impedance_ohm}` as JSON
     #[arg(long)]
     json: bool,
 }
@@ -73,6 +75,9 @@ pub struct Args {
 struct Report<'a> {
     model: &'a str,
     detector: &'a str,
+    /// The detector that was simulated, as TOML, where that is not the one described.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    as_built: Option<String>,
     image_nodes: usize,
     touches: &'a [Touch],
     faults: Vec<String>,
@@ -93,7 +98,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     );
     ensure!(!(leaks && saves), "a detector that leaks has no Jacobian at no contact: leave out --fault leak");
     let jacobian = NewFile::optional(args.save_jacobian.as_ref(), args.overwrite)?;
-    let model = model(args, &detector)?;
+    let built = args.scene.as_built.of(&detector)?;
+    let model = model(args, &built)?;
     if let (Some(file), Some(path)) = (jacobian, &args.save_jacobian) {
         Jacobian::of(&*model).save(file.unfinished_path())?;
         file.finish()?;
@@ -103,11 +109,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return Ok(());
     }
     let impedance_ohm = touched_impedance_ohm(&*model, &pressed.before_drift())? / pressed.factor;
-    let readings = readings(args, &detector, &impedance_ohm)?;
+    let readings = readings(args, &built, &impedance_ohm)?;
     if args.json {
         let report = Report {
             model: model.name(),
             detector: &detector.name,
+            as_built: args.scene.as_built.is_given().then(|| built.to_toml()),
             image_nodes: model.image_mesh().nodes_m.len(),
             touches: &pressed.touches,
             faults: args.scene.fault.iter().map(ToString::to_string).collect(),

@@ -1,5 +1,6 @@
 //! The commands, one file each: its arguments and what it does.
 
+mod as_built;
 mod browser;
 mod choice;
 mod detector;

@@ -9,6 +9,7 @@ use tactomo::hertz::{Hertz, POISSON, SURFACE_DEPTH_M, Skin};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
+use super::as_built::AsBuiltArgs;
 use super::output::message;
 
 /// Default seed.
@@ -41,6 +42,8 @@ pub struct SceneArgs {
     /// (share of the conductivity in so many s), drift:0.2:86400:0.05 (with a daily wave); give it again for more
     #[arg(long, value_name = "FAULT")]
     pub fault: Vec<Fault>,
+    #[command(flatten)]
+    pub as_built: AsBuiltArgs,
     /// Seed of places, noise and faults [default: 1]
     #[arg(long)]
     seed: Option<u64>,
@@ -48,7 +51,8 @@ pub struct SceneArgs {
 
 impl SceneArgs {
     /// Names of the arguments.
-    pub const NAMES: [&str; 8] = ["scene", "force", "tip", "elasticity", "poisson", "surface_depth", "fault", "seed"];
+    pub const NAMES: [&str; 9] =
+        ["scene", "force", "tip", "elasticity", "poisson", "surface_depth", "fault", AsBuiltArgs::NAME, "seed"];
 
     /// The seed.
     pub fn seed(&self) -> u64 {

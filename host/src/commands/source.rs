@@ -85,8 +85,9 @@ pub fn board(
     let scene = args.scene.scene(SceneName::Wandering, chosen.foams(), detector)?;
     let finger = scene.hand().tip([0.0; 2], MOUSE_FIRMNESS, 1.0).disc().map(Finger::from);
     let seed = args.scene.seed();
-    let simulation = Simulation::new(detector, scene, &args.scene.fault, seed)?.at_speed(args.time_factor);
-    let link = SimulatedBoard::simulate(detector, simulation, Options { seed, ..Options::default() })?;
+    let built = args.scene.as_built.of(detector)?;
+    let simulation = Simulation::new(&built, scene, &args.scene.fault, seed)?.at_speed(args.time_factor);
+    let link = SimulatedBoard::simulate(&built, simulation, Options { seed, ..Options::default() })?;
     Ok((Box::new(Opened::new(Box::new(link))), finger))
 }
 

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 use nalgebra::DMatrix;
 
 use super::scenes::electrode_distance_m;
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Adc, Detector, Problem as Wrong, Tolerances};
 use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Contact, Touch};
-use tactomo_physics::simulate::{Fault, FaultError, Measurement, finer_model};
+use tactomo_physics::simulate::{Fault, FaultError, Measurement, drawn, finer_model};
 use tactomo_touch::solve::{Problem, SolveError};
 
 /// Frames before the first whose mean is the baseline, as many as live takes. It is never zero: the converter cuts off what noise would
@@ -40,6 +40,16 @@ pub enum StudyError {
         /// The fault.
         fault: String,
     },
+    /// Tolerances so wide that what was drawn is no detector.
+    #[error("{detector} as built with seed {seed}: {wrong}; its tolerances are too wide, or another seed is needed")]
+    AsBuilt {
+        /// Its name.
+        detector: String,
+        /// The seed.
+        seed: u64,
+        /// What is wrong with what was drawn.
+        wrong: Wrong,
+    },
     /// A detector on which not all scenes can be.
     #[error("detector {detector} is curved: studies press flat detectors, where contacts of any shape have a model")]
     Curved {
@@ -55,9 +65,13 @@ pub struct Frame {
     pub touches: Vec<Touch>,
     /// The same as contacts, if all are discs.
     pub contacts: Option<Vec<Contact>>,
-    /// Readings less the baseline (V).
+    /// Readings less the baseline, over the gains that the detector is described with (V).
     pub readings: Readings,
 }
+
+/// Finds what a detector is like from its readings: given one as it was built, of which it knows what a builder does ([`Experiment::detector`]
+/// and [`Experiment::frames`] of touches at a seed, which is the second argument), it gives the detector as calibrated.
+pub type Calibrate = fn(&Experiment, u64) -> Result<Detector, StudyError>;
 
 /// A detector, what it is simulated with and what is inverted.
 pub struct Experiment {
@@ -70,8 +84,8 @@ pub struct Experiment {
     /// Name of the inverted model.
     pub model: String,
     truth: Arc<dyn ForwardModel>,
-    /// The detector as it is measured in truth.
-    measured: Detector,
+    /// The detector as it is, and as it is measured: no solver sees it.
+    built: Detector,
     faults: Vec<Fault>,
     /// Impedance while the baseline is taken (ohm), if something presses meanwhile.
     rest_ohm: Option<DMatrix<f64>>,
@@ -98,7 +112,7 @@ impl Experiment {
             model_time,
             model: name,
             truth,
-            measured: detector.clone(),
+            built: detector.clone(),
             faults: Vec::new(),
             rest_ohm: None,
         })
@@ -113,10 +127,41 @@ impl Experiment {
             return Err(StudyError::OfTime { fault: fault.to_string() });
         }
         let truth: Arc<dyn ForwardModel> = match faults.iter().any(Fault::is_of_model) {
-            true => finer_model(&self.detector, faults, seed)?.into(),
+            true => finer_model(&self.built, faults, seed)?.into(),
             false => Arc::clone(&self.truth),
         };
         Ok(Self { truth, faults: faults.to_vec(), ..self.again() })
+    }
+
+    /// A sound detector, or one as it was [built](Self::as_built) with a seed.
+    ///
+    /// # Errors
+    /// As for both.
+    pub fn of(detector: &Detector, as_built: Option<u64>) -> Result<Self, StudyError> {
+        let sound = Self::new(detector)?;
+        match as_built {
+            Some(seed) => sound.as_built(seed),
+            None => Ok(sound),
+        }
+    }
+
+    /// The same, in truth drawn from the tolerances around the detector that is described.
+    ///
+    /// # Errors
+    /// [`StudyError`] if what is drawn is no detector or cannot be modelled.
+    pub fn as_built(&self, seed: u64) -> Result<Self, StudyError> {
+        self.as_built_within(self.detector.tolerances, seed)
+    }
+
+    /// The same with other tolerances, of which solvers do not know.
+    ///
+    /// # Errors
+    /// As for [`as_built`](Self::as_built).
+    pub fn as_built_within(&self, tolerances: Tolerances, seed: u64) -> Result<Self, StudyError> {
+        let built = drawn(&Detector { tolerances, ..self.detector.clone() }, seed);
+        let name = || self.detector.name.clone();
+        built.check().map_err(|wrong| StudyError::AsBuilt { detector: name(), seed, wrong })?;
+        self.with_truth(&built)
     }
 
     /// The same, in truth another detector than the one described: thicker, or noisier.
@@ -124,7 +169,26 @@ impl Experiment {
     /// # Errors
     /// [`StudyError`] if it cannot be modelled.
     pub fn with_truth(&self, detector: &Detector) -> Result<Self, StudyError> {
-        Ok(Self { truth: finer_model(detector, &[], 0)?.into(), measured: detector.clone(), ..self.again() })
+        let truth = match self.faults.is_empty() && unmeasured(detector) == unmeasured(&self.built) {
+            true => Arc::clone(&self.truth),
+            false => finer_model(detector, &[], 0)?.into(),
+        };
+        Ok(Self { truth, built: detector.clone(), ..self.again() })
+    }
+
+    /// The same truth, described to solvers in another way: as a calibration found it.
+    ///
+    /// # Errors
+    /// [`StudyError`] if that cannot be modelled.
+    pub fn known_as(&self, detector: &Detector) -> Result<Self, StudyError> {
+        let problem = Problem::of(detector)?;
+        let model = problem.model.name().to_owned();
+        Ok(Self { detector: detector.clone(), problem, model, ..self.again() })
+    }
+
+    /// The detector as it is, to compare with: never for a solver.
+    pub fn truth(&self) -> &Detector {
+        &self.built
     }
 
     /// The same, with such contacts while the baseline is taken.
@@ -138,7 +202,8 @@ impl Experiment {
     /// The same readings, measured by another converter or drive, which solvers know of.
     pub fn measured_as(&self, detector: &Detector) -> Self {
         let problem = self.problem.measured_as(detector);
-        Self { detector: detector.clone(), measured: detector.clone(), problem, ..self.again() }
+        let built = Detector { drive_v: detector.drive_v, adc: detector.adc, ..self.built.clone() };
+        Self { detector: detector.clone(), built, problem, ..self.again() }
     }
 
     /// The same, inverted on another model.
@@ -160,7 +225,7 @@ impl Experiment {
             model_time: self.model_time,
             model: self.model.clone(),
             truth: Arc::clone(&self.truth),
-            measured: self.measured.clone(),
+            built: self.built.clone(),
             faults: self.faults.clone(),
             rest_ohm: self.rest_ohm.clone(),
         }
@@ -189,7 +254,7 @@ impl Experiment {
     /// # Errors
     /// [`StudyError`] if a touch is off the detector.
     pub fn frames(&self, touches: &[Vec<Touch>], seed: u64) -> Result<Vec<Frame>, StudyError> {
-        let mut measurement = Measurement::new(&self.measured, &self.faults, seed)?;
+        let mut measurement = Measurement::new(&self.built, &self.faults, seed)?;
         let rest = self.baseline_v(&mut measurement);
         let mut frames: Vec<Frame> = Vec::with_capacity(touches.len());
         let mut last = None;
@@ -203,12 +268,20 @@ impl Experiment {
             };
             let mut readings = measurement.readings_v(impedance_ohm.as_ref());
             readings.volts_mut().iter_mut().zip(rest.volts()).for_each(|(volts, rest)| *volts -= rest);
+            readings.divide_by_gains(&self.detector);
             let contacts = touches.iter().map(Touch::disc).collect();
             frames.push(Frame { touches: touches.clone(), contacts, readings });
             last = Some((touches, impedance_ohm));
         }
         Ok(frames)
     }
+}
+
+/// A detector without what measures it: of detectors that are alike in this, one model is enough.
+fn unmeasured(detector: &Detector) -> Detector {
+    let mut bare = Detector { drive_v: 0.0, on_resistance_ohm: 0.0, adc: Adc::default(), ..detector.taken_as_exact() };
+    bare.electrodes.iter_mut().for_each(|pad| (pad.gain, pad.offset_v) = (1.0, 0.0));
+    bare
 }
 
 #[cfg(test)]
@@ -305,5 +378,53 @@ mod tests {
         let wrong = experiment.with_truth(&other).unwrap();
         assert_eq!(wrong.problem.detector(), &experiment.detector);
         assert_ne!(readings(&wrong, 1), readings(&experiment, 1));
+    }
+
+    #[test]
+    fn what_was_drawn_is_measured_and_solvers_know_the_description_only() {
+        let experiment = experiment();
+        let built = experiment.as_built(3).unwrap();
+        assert_eq!(built.problem.detector(), &experiment.detector);
+        assert_eq!(built.truth(), &drawn(&experiment.detector, 3));
+        assert_ne!(readings(&built, 1), readings(&experiment, 1));
+        assert_ne!(readings(&built, 1), readings(&experiment.as_built(4).unwrap(), 1));
+        let known = built.known_as(built.truth()).unwrap();
+        assert_eq!(known.problem.detector(), built.truth());
+        let mut wide = Detector { name: "wide".to_owned(), ..experiment.detector };
+        wide.tolerances.gain_share = 1.0;
+        let error = Experiment::of(&wide, Some(1)).err().unwrap().to_string();
+        assert!(error.starts_with("wide as built with seed 1: electrodes.gains["), "{error}");
+    }
+
+    /// One contact, found by who knows what was built, and missed by who knows the description.
+    #[test]
+    fn who_knows_the_truth_is_right_where_the_description_is_not() {
+        let built = experiment().as_built(2).unwrap();
+        let known = built.known_as(built.truth()).unwrap();
+        let touches = SceneKind::Firm.frames(&built.detector, 1, 1);
+        let error_m = |experiment: &Experiment| {
+            let frame = experiment.frames(&touches, 1).unwrap().remove(0);
+            let found = Method::Contacts.build(&experiment.problem).unwrap().solve(&frame.readings).unwrap().contacts;
+            tactomo_touch::metrics::position_error_m(&frame.contacts.unwrap(), &found).unwrap()
+        };
+        let [described_m, known_m] = [&built, &known].map(error_m);
+        assert!(known_m < 2e-4 && described_m > 5.0 * known_m, "{described_m} {known_m}");
+    }
+
+    #[test]
+    fn gains_that_are_described_are_taken_off_and_others_are_not() {
+        let experiment = experiment();
+        let mut told = experiment.detector.clone();
+        told.electrodes.iter_mut().enumerate().for_each(|(e, pad)| pad.gain = 1.0 + 0.02 * (e % 3) as f64);
+        let wrong = experiment.with_truth(&told).unwrap();
+        assert!(Arc::ptr_eq(&wrong.truth, &experiment.truth), "gains need no other model");
+        let right = wrong.known_as(&told).unwrap();
+        let off = |other: &Experiment| {
+            let pair = [readings(&experiment, 1), readings(other, 1)];
+            let volts = pair[0].volts().iter().zip(pair[1].volts()).map(|(a, b)| (a - b).abs());
+            volts.fold(0.0, f64::max) / pair[0].largest_v()
+        };
+        // Noise is that of one seed, so codes differ by rounding alone: 0.8 of 0.8 mV in 0.3 V.
+        assert!(off(&wrong) > 0.02 && off(&right) < 0.006, "{} {}", off(&wrong), off(&right));
     }
 }

@@ -29,7 +29,8 @@ pub fn answers(problem: &Problem, method: Method, live: &Live) -> Vec<Answer> {
         if is_answered || !SLOW.contains(&method) {
             let mut touch = frame.volts.clone();
             baseline.subtract(&frame.volts, &mut touch);
-            let readings = Readings::new(detector.electrodes.len(), touch).unwrap();
+            let mut readings = Readings::new(detector.electrodes.len(), touch).unwrap();
+            readings.divide_by_gains(detector);
             let solution = solver.solve(&readings).unwrap();
             if is_answered {
                 found.insert(sequence, solution);

@@ -408,4 +408,6 @@ fn line_of(text: &str, field: &str) -> Option<usize> {
 }
 
 #[cfg(test)]
+mod as_built_tests;
+#[cfg(test)]
 mod tests;

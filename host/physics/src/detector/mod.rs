@@ -104,7 +104,7 @@ pub struct Electrode {
     #[serde(default)]
     pub unseen_offset_v: f64,
     /// What its channel reads where nothing is (V): in simulated detectors only, since a baseline takes it away.
-    #[serde(skip)]
+    #[serde(default)]
     pub offset_v: f64,
 }
 
@@ -198,7 +198,16 @@ impl Electrode {
 
     /// A pad of a flat detector.
     pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
-        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None, gain: 1.0, unseen_offset_v: 0.0, offset_v: 0.0 }
+        Self {
+            x_m,
+            y_m,
+            z_m: 0.0,
+            radius_m,
+            contact_impedance_ohm_m2: None,
+            gain: 1.0,
+            unseen_offset_v: 0.0,
+            offset_v: 0.0,
+        }
     }
 }
 

@@ -34,11 +34,7 @@ impl Unevenness {
     pub fn log_at(&self, [u, v]: [f64; 2]) -> f64 {
         let most = self.log_amplitudes.iter().map(Vec::len).chain([self.log_amplitudes.len()]).max().unwrap_or(0);
         let (x, y) = (cosines(most, u), cosines(most, v));
-        self.log_amplitudes
-            .iter()
-            .zip(&x)
-            .map(|(row, x)| x * row.iter().zip(&y).map(|(a, y)| a * y).sum::<f64>())
-            .sum()
+        self.log_amplitudes.iter().zip(&x).map(|(row, x)| x * row.iter().zip(&y).map(|(a, y)| a * y).sum::<f64>()).sum()
     }
 
     /// Adds to one amplitude.

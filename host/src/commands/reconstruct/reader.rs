@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::baseline::Baseline;
 use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
-use tactomo::board::measured;
+use tactomo::board::{identity, measured};
 use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
@@ -38,7 +38,7 @@ enum Frames {
 /// What solves frames.
 enum Touch {
     /// A solver for a detector, as the file's board measures it, and the places of its images.
-    Solver { solver: Box<dyn Solver>, electrodes: usize, mesh: ImageMesh },
+    Solver { solver: Box<dyn Solver>, detector: Box<Detector>, mesh: ImageMesh },
     /// A kernel that has learned from presses in a file, on whatever they were made.
     Kernel(Box<Kernel>),
 }
@@ -92,8 +92,10 @@ impl Reader {
     /// What a frame's readings (V, less the baseline) say.
     pub fn solve(&mut self, readings_v: Vec<f64>) -> anyhow::Result<Solution> {
         match &mut self.touch {
-            Touch::Solver { solver, electrodes, .. } => {
-                let readings = Readings::new(*electrodes, readings_v).context("a frame of another length")?;
+            Touch::Solver { solver, detector, .. } => {
+                let readings = Readings::new(detector.electrodes.len(), readings_v);
+                let mut readings = readings.context("a frame of another length")?;
+                readings.divide_by_gains(detector);
                 Ok(solver.solve(&readings)?)
             }
             Touch::Kernel(kernel) => match kernel.press(&readings_v) {
@@ -221,7 +223,12 @@ fn solved(args: &Args) -> anyhow::Result<Opened> {
     };
     let electrodes = chosen.electrodes.len();
     let detector = match file.board() {
-        Some(board) => measured::as_measured(&chosen, board)?,
+        Some(board) => {
+            if let Some(notice) = identity::other_board(&chosen, board) {
+                message!("warning: {notice}");
+            }
+            measured::as_measured(&chosen, board)?
+        }
         None => chosen,
     };
     if file.channels() != electrodes * electrodes {
@@ -237,7 +244,7 @@ fn solved(args: &Args) -> anyhow::Result<Opened> {
     let problem = Problem::new(args.model.build(&detector, None)?);
     let solver = solver(args.solver, args.lambda, &problem)?;
     let mesh = problem.jacobian.image_mesh.clone();
-    Ok((file, Touch::Solver { solver, electrodes, mesh }, Some(detector)))
+    Ok((file, Touch::Solver { solver, detector: Box::new(detector.clone()), mesh }, Some(detector)))
 }
 
 /// The solver, which leaves out faulty electrodes; or, with a given lambda, of all electrodes.

@@ -8,6 +8,7 @@ mod page;
 mod scenes;
 mod sweep;
 mod table;
+mod tolerances;
 mod wrong;
 
 pub use self::bounds::{BoundChart, BoundCurve, BoundReport};

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use super::bounds::{self, BoundReport};
 use super::breakdown::{Break, CellReport, breaks};
 use super::errors::{self, ErrorCurve, ErrorRange};
-use super::{faults, scenes, wrong};
-use crate::experiment::{Experiment, Frame, StudyError};
+use super::{faults, scenes, tolerances, wrong};
+use crate::experiment::{Calibrate, Experiment, Frame, StudyError};
 use crate::machine::Machine;
 use crate::scenes::SceneKind;
-use crate::score::{Scorer, Summary};
+use crate::score::{Score, Scorer, Summary};
 use crate::variant::Variation;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
@@ -36,6 +36,10 @@ pub struct Plan {
     pub seed: u64,
     /// Whether only some of the points are tried.
     pub quick: bool,
+    /// If given, everything but the sweeps of tolerances is simulated on the detector as it was built with this seed.
+    pub as_built: Option<u64>,
+    /// If given, sweeps of tolerances are tried after a calibration too.
+    pub calibrate: Option<Calibrate>,
 }
 
 /// What came out.
@@ -51,6 +55,8 @@ pub struct Report {
     pub reach_m: f64,
     /// Seed.
     pub seed: u64,
+    /// The seed of the detector as it was built, if everything is simulated on one.
+    pub as_built: Option<u64>,
     /// Places of the contacts at each point.
     pub places: usize,
     /// Frames at each place.
@@ -112,6 +118,8 @@ pub(super) struct Point {
     pub experiment: Experiment,
     /// Frames of each place.
     pub places: Vec<Vec<Frame>>,
+    /// What solvers know at each place, where that is another detector each time; none if they know the experiment's everywhere.
+    pub known: Vec<Experiment>,
     /// What solvers' lambda is set to.
     pub lambda: Option<f64>,
 }
@@ -119,11 +127,16 @@ pub(super) struct Point {
 /// What sweeps are made from.
 pub(super) struct Bench<'a> {
     pub plan: &'a Plan,
-    /// The sound detector.
+    /// The sound detector: as it is described, or as it was built where that is asked for.
     pub sound: Experiment,
 }
 
 impl Bench<'_> {
+    /// Another detector, as it is described or as it was built where that is asked for.
+    pub fn experiment(&self, detector: &Detector) -> Result<Experiment, StudyError> {
+        Experiment::of(detector, self.plan.as_built)
+    }
+
     /// Seeds of the places.
     pub fn seeds(&self) -> Vec<u64> {
         (0..self.plan.places as u64).map(|place| self.plan.seed.wrapping_mul(1_000_003).wrapping_add(place)).collect()
@@ -162,7 +175,7 @@ impl Bench<'_> {
             .into_iter()
             .map(|seed| experiment.frames(&vec![touches(seed); self.plan.frames], seed))
             .collect::<Result<_, _>>()?;
-        Ok(Point { label, severity, experiment, places, lambda: None })
+        Ok(Point { label, severity, experiment, places, known: Vec::new(), lambda: None })
     }
 
     /// The one contact of a kind of scene at a seed.
@@ -182,8 +195,8 @@ type Maker = fn(&Bench) -> Result<Vec<Sweep>, StudyError>;
 /// # Errors
 /// [`StudyError`] if the detector cannot be modelled or is curved.
 pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result<Report, StudyError> {
-    let bench = Bench { plan, sound: Experiment::new(&plan.detector)? };
-    let makers: [Maker; 4] = [scenes::sweeps, wrong::sweeps, lambda, faults::sweeps];
+    let bench = Bench { plan, sound: Experiment::of(&plan.detector, plan.as_built)? };
+    let makers: [Maker; 5] = [scenes::sweeps, wrong::sweeps, tolerances::sweeps, lambda, faults::sweeps];
     let mut trials = Trials::default();
     let mut sweeps = Vec::new();
     for make in makers {
@@ -200,6 +213,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         detector: plan.detector.name.clone(),
         reach_m: bench.sound.reach_m(),
         seed: plan.seed,
+        as_built: plan.as_built,
         places: plan.places,
         frames: plan.frames,
         errors: errors::curves(&sweeps),
@@ -275,19 +289,33 @@ impl Trials {
             Some(lambda) => Variation::with_lambda(method, lambda),
             None => Variation::default_of(method),
         };
-        let jacobian = &point.experiment.problem.jacobian;
-        if !self.scorer.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, jacobian)) {
-            self.scorer = Some((Arc::clone(jacobian), Scorer::new(&point.experiment)));
-        }
-        let index = self.kept(variation, &point.experiment.problem);
-        let (Some((_, scorer)), Some(solver)) = (&mut self.scorer, &mut self.solvers[index].solver) else {
-            return Ok(None);
-        };
         let mut scores = Vec::new();
-        for frames in &point.places {
-            scores.extend(scorer.run(&mut **solver, frames)?);
+        for (place, frames) in point.places.iter().enumerate() {
+            let experiment = point.known.get(place).unwrap_or(&point.experiment);
+            match self.scores(variation, experiment, frames)? {
+                Some(more) => scores.extend(more),
+                None => return Ok(None),
+            }
         }
         Ok(Some(Summary::of(&scores)))
+    }
+
+    /// Scores of a solver on the frames of a place; `None` if it cannot be made for the model.
+    fn scores(
+        &mut self,
+        variation: Variation,
+        experiment: &Experiment,
+        frames: &[Frame],
+    ) -> Result<Option<Vec<Score>>, StudyError> {
+        let jacobian = &experiment.problem.jacobian;
+        if !self.scorer.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, jacobian)) {
+            self.scorer = Some((Arc::clone(jacobian), Scorer::new(experiment)));
+        }
+        let index = self.kept(variation, &experiment.problem);
+        match (&mut self.scorer, &mut self.solvers[index].solver) {
+            (Some((_, scorer)), Some(solver)) => Ok(Some(scorer.run(&mut **solver, frames)?)),
+            _ => Ok(None),
+        }
     }
 
     /// Where a solver is kept; makes it if there is none.
@@ -321,6 +349,8 @@ mod tests {
             frames: 1,
             seed: 2,
             quick: true,
+            as_built: None,
+            calibrate: Some(|experiment, _| Ok(experiment.truth().clone())),
         };
         run(&plan, "tactomo <stability>", &mut |_| {}).unwrap()
     });
@@ -346,6 +376,8 @@ mod tests {
             let sweep = report.sweeps.iter().find(|sweep| sweep.title == title).unwrap();
             sweep.solvers[0].breaks.clone()
         };
+        assert!(breaks("All tolerances").is_some(), "what is twice as wrong as a bench makes it is not found");
+        assert!(breaks("All tolerances, calibrated").is_none(), "who knows what was built finds what presses");
         assert!(breaks("Noise").is_some(), "nothing is found at 0 dB");
         assert!(breaks("Contact impedances that differ").is_none(), "a linear image does not feel them");
     }

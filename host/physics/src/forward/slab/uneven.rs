@@ -169,7 +169,8 @@ impl Potential {
     fn new(size_m: [f64; 2], unevenness: &Unevenness, most: usize) -> Self {
         let points = POINTS_PER_MODE * most.max(unevenness.most());
         let at = |i: usize| (i as f64 + 0.5) / points as f64;
-        let waves = |i: usize| (0..=unevenness.most()).map(move |m| (PI * m as f64 * at(i)).sin_cos()).map(|(s, c)| [c, s]);
+        let waves =
+            |i: usize| (0..=unevenness.most()).map(move |m| (PI * m as f64 * at(i)).sin_cos()).map(|(s, c)| [c, s]);
         let waves: Vec<Vec<[f64; 2]>> = (0..points).map(|i| waves(i).collect()).collect();
         let q = DMatrix::from_fn(points, points, |i, j| potential(size_m, unevenness, [&waves[i], &waves[j]]));
         let all: Vec<_> = (0..points).map(|i| cosines(2 * most, at(i))).collect();
