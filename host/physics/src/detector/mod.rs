@@ -10,7 +10,7 @@ mod svg;
 
 pub use self::check::{ELECTRODES, Problem};
 pub use self::file::{FileError, TomlError};
-pub use self::force::{ForceLaw, Newtons, SATURATED_SHARE};
+pub use self::force::{FARTHEST, ForceLaw, Newtons};
 pub use self::material::{FOAMS, Foam, Stack};
 pub use self::surface::edges_of;
 pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
