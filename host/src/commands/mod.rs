@@ -2,6 +2,7 @@
 
 mod as_built;
 mod browser;
+mod calibrate;
 mod choice;
 mod detector;
 mod forward;
@@ -43,6 +44,7 @@ enum Command {
     Stability(stability::Args),
     Study(study::Args),
     Reconstruct(reconstruct::Args),
+    Calibrate(calibrate::Args),
 }
 
 /// Runs the command that was asked for.
@@ -59,5 +61,6 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Stability(args) => stability::run(&args),
         Command::Study(args) => study::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
     }
 }

@@ -144,7 +144,11 @@ impl Detector {
         })
     }
 
-    fn from_toml_in(folder: &Path, text: &str, name: &str) -> Result<Self, TomlError> {
+    /// Reads a detector from TOML, as from a file in `folder`: a surface's file is sought there.
+    ///
+    /// # Errors
+    /// [`TomlError`] with field, line and what is allowed.
+    pub fn from_toml_in(folder: &Path, text: &str, name: &str) -> Result<Self, TomlError> {
         Self::from_toml_with(text, name, &|file, unit| {
             let path = folder.join(file);
             Surface::read(&path, file, unit).map_err(|error| surface_problem(&path.display().to_string(), error))

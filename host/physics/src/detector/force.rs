@@ -1,19 +1,14 @@
 //! Newtons from the conductance of a contact: the law that `tactomo calibrate force` finds for one detector and one tip.
 //!
 //! **Derivation.** The paper's eqs. (2) and (3) make a contact's own conductance `sigma S_c / l` a power of the force, `a F^gamma` (its
-//! eq. (5) hides `sigma / l` in `a`). Its eqs. (5) and (6) put that in series with the detector's volume resistance `R0` and look at
-//! the voltage between them, `phi = Vcc R0 a F^gamma / (1 + R0 a F^gamma)`, which saturates at `Vcc`. Solvers here have the detector, and `R0`
-//! with it, in their model: what they find is the conductance of the contact alone. So the plain law is
+//! eq. (5) hides `sigma / l` in `a`). Its eqs. (4) to (6) put that in series with the detector's volume resistance `R0` and look at
+//! the voltage between the two, `phi = Vcc R0 a F^gamma / (1 + R0 a F^gamma)`, which saturates at `Vcc`. Here the detector is in the model of
+//! the solver, and with it all of `R0` that depends on the place. What is left of a contact is its conductance `G` with the constriction of
+//! the current right under it, which readings tell far better than the contact's own (`tactomo_touch::solve` measures it): the
+//! same everywhere. With that constriction, and whatever else is in series and not in the model, as one resistance `R`,
 //!
 //! ```text
-//! S = a F^gamma,                                                  the power law of eq. (5)
-//! ```
-//!
-//! and what still saturates is what their model lacks: a driving layer and a lead that resist, a tip that is covered whole, a
-//! detector that is not as described. To first order all of that is one resistance `R` in series,
-//!
-//! ```text
-//! 1 / S = 1 / (a F^gamma) + R,   S = a / (F^-gamma + a R) = p1 / (F^p3 + p2)
+//! 1 / G = 1 / (a F^gamma) + R,   G = a / (F^-gamma + a R) = p1 / (F^p3 + p2),
 //! ```
 //!
 //! with `p1 = a`, `p2 = a R`, `p3 = -gamma`: eq. (6), of a conductance instead of a voltage. It saturates at `p1 / p2 = 1 / R`; nine tenths of
@@ -23,7 +18,12 @@
 //! FMAX = (9 / (a R))^(1 / gamma) = (p2 / 9)^(1 / p3).
 //! ```
 //!
-//! The paper prints `(p2 / 0.9)^(1 / p3)` as eq. (8), which does not follow from its eq. (6): see [`ForceLaw::printed_fmax_n`].
+//! The paper prints `(p2 / 0.9)^(1 / p3)` as eq. (8), which does not follow from its eq. (6): see [`ForceLaw::printed_fmax_n`]. Without `R` it is the
+//! power law of eq. (5), `G = a F^gamma`.
+//!
+//! The constriction is no constant: by Hertz a ball's radius of contact grows as `F^(1/3)`, so of `1 / G` one part falls as `F^(-2/3)`, the
+//! contact's own, and one as `F^(-1/3)`, the constriction. Exponents that are found are therefore between the two; over two decades of
+//! force eq. (6) follows that sum to 1 %.
 
 use std::fmt::{self, Write as _};
 use std::ops::RangeInclusive;
@@ -32,9 +32,10 @@ use super::check::{Problem, within};
 use super::svg::short;
 
 /// Share of the saturation at which a force is the largest that can be told: eq. (8).
-pub const SATURATED_SHARE: f64 = 0.9;
-/// Forces beyond the maximum are told up to so many times the maximum, and held there: a law says little of what it never saw.
-const FARTHEST: f64 = 2.0;
+const SATURATED_SHARE: f64 = 0.9;
+/// Forces beyond the maximum are told up to so many times the maximum, and held there, and no maximum is told that is so many times the largest
+/// press: a law says little of what it never saw.
+pub const FARTHEST: f64 = 2.0;
 
 const CONDUCTANCE_S: RangeInclusive<f64> = 1e-12..=1e6;
 /// Of Hertz's theory are 1/2 (a cylinder) and 2/3 (a ball); foams that stiffen or yield, and rough tips, are around that.
@@ -44,7 +45,7 @@ const FORCE_N: RangeInclusive<f64> = 1e-6..=1e6;
 /// Of the logarithm of a conductance: more than a factor of `e^10` is no law.
 const DEVIATION: RangeInclusive<f64> = 0.0..=10.0;
 
-/// How the conductance of a contact follows the force, for the tip that was calibrated.
+/// How the conductance of a contact, with its constriction, follows the force, for the tip that was calibrated.
 ///
 /// Parameters are `ln a`, `gamma` and, of a law that saturates, `R`; their covariance is in that order.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -54,7 +55,7 @@ pub struct ForceLaw {
     pub conductance_at_1_n_s: f64,
     /// `gamma`.
     pub exponent: f64,
-    /// `R`: what is in series with the contact and not in the solver's model (ohm); `None` for the power law, which does not saturate.
+    /// `R`: constriction, and what else is in series (ohm); `None` for the power law, which does not saturate.
     pub series_ohm: Option<f64>,
     /// Covariance of the parameters, a row each: 2 x 2, or 3 x 3 of a law that saturates.
     pub covariance: Vec<Vec<f64>>,
@@ -83,7 +84,24 @@ pub struct Newtons {
 }
 
 impl ForceLaw {
-    /// Force under a contact of such a conductance, of which `deviation_s` is the standard error (S); zero where it is not known.
+    /// The law by which a contact of one siemens is pressed with one newton, exactly: where conductances themselves are wanted, to find
+    /// another law from them.
+    pub fn siemens() -> Self {
+        Self {
+            conductance_at_1_n_s: 1.0,
+            exponent: 1.0,
+            series_ohm: None,
+            covariance: vec![vec![0.0; 2]; 2],
+            scatter: 0.0,
+            hysteresis: 0.0,
+            range_n: [*FORCE_N.start(), *FORCE_N.end()],
+            maximum_n: None,
+            presses: 0,
+        }
+    }
+
+    /// Force under a contact of such a conductance with its constriction, of which `deviation_s` is the standard error (S); zero where that is not
+    /// known.
     ///
     /// The error of the conductance that a force should have is that of the contact itself, scatter, hysteresis, and the parameters' through
     /// their slopes (the delta method). What that is in newtons is the difference to the force under a contact that conducts so much
@@ -105,7 +123,7 @@ impl ForceLaw {
         Newtons { force_n, deviation_n: more_n.max(less_n), beyond_maximum }
     }
 
-    /// Conductance of a contact that is pressed with such a force (S).
+    /// Conductance, with its constriction, of a contact that is pressed with such a force (S).
     pub fn conductance_s(&self, force_n: f64) -> f64 {
         let own_s = self.conductance_at_1_n_s * force_n.powf(self.exponent);
         own_s / (1.0 + own_s * self.series_ohm.unwrap_or(0.0))

@@ -15,7 +15,7 @@ mod uneven;
 pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
 pub use self::check::{ELECTRODES, Problem};
 pub use self::file::{FileError, TomlError};
-pub use self::force::{ForceLaw, Newtons, SATURATED_SHARE};
+pub use self::force::{FARTHEST, ForceLaw, Newtons};
 pub use self::material::{FOAMS, Foam, Stack};
 pub use self::parameters::Parameter;
 pub use self::surface::edges_of;

@@ -6,14 +6,36 @@ use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::baseline::Baseline;
 use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
 use tactomo::board::{identity, measured};
-use tactomo::detector::Detector;
+use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
 use tactomo::solve::{Guard, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver};
 
-use super::Args;
 use super::units::{self, Unit};
+use crate::commands::choice::{DetectorArgs, Model};
 use crate::commands::output::message;
+
+/// What is read, and what solves it.
+pub struct Input<'a> {
+    /// A recording, or a table of readings.
+    pub file: &'a Path,
+    /// On which detector.
+    pub detector: &'a DetectorArgs,
+    /// Forward model.
+    pub model: Model,
+    /// Solver.
+    pub solver: Method,
+    /// Its lambda, if that is not the default.
+    pub lambda: Option<Lambda>,
+    /// Presses that it learns from, instead of a detector.
+    pub presses: Option<&'a Path>,
+    /// Frames at the start that are the baseline, if that is said.
+    pub rest: Option<u32>,
+    /// Unit of a table, if that is said.
+    pub unit: Option<Unit>,
+    /// Law of force in place of the detector's own.
+    pub force: Option<ForceLaw>,
+}
 
 /// Frames and what solves them.
 pub struct Reader {
@@ -25,6 +47,8 @@ pub struct Reader {
     /// Frames still to come that are the baseline and nothing else, because the user said so.
     given: u32,
     touch: Touch,
+    /// The detector as it was chosen, of a solver for a detector.
+    detector: Option<Detector>,
 }
 
 /// Frames, one after the other.
@@ -45,18 +69,36 @@ enum Touch {
 
 impl Reader {
     /// Opens the file and makes what solves it.
-    pub fn open(args: &Args) -> anyhow::Result<Self> {
-        let (file, touch, detector) = match &args.presses {
-            Some(presses) => learned(args, Presses::read(presses)?)?,
-            None => solved(args)?,
+    pub fn open(input: &Input) -> anyhow::Result<Self> {
+        let Opened { file, touch, measured, chosen } = match input.presses {
+            Some(presses) => learned(input, Presses::read(presses)?)?,
+            None => solved(input)?,
         };
         // That of a recording is taken as live takes it, while its frames are solved.
-        let baseline = match (&detector, args.rest) {
+        let baseline = match (&measured, input.rest) {
             (Some(detector), None) if file.board().is_some() => Baseline::new(detector),
             (_, frames) => Baseline::over(frames.unwrap_or(0), file.channels()),
         };
-        let frames = Frames::of(file, args, detector.as_ref())?;
-        Ok(Self { path: args.file.clone(), frames, baseline, count: 0, given: args.rest.unwrap_or(0), touch })
+        let frames = Frames::of(file, input, measured.as_ref())?;
+        let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));
+        Ok(Self { path, frames, baseline, count: 0, given, touch, detector: chosen })
+    }
+
+    /// The detector as it was chosen, before its board was asked; `None` where presses were learned from.
+    pub fn detector(&self) -> Option<&Detector> {
+        self.detector.as_ref()
+    }
+
+    /// Whether the file is a recording, whose frames follow each other in time.
+    pub fn is_recording(&self) -> bool {
+        matches!(self.frames, Frames::Recording(_))
+    }
+
+    /// Forgets the frames before: the next one need not follow them.
+    pub fn reset(&mut self) {
+        if let Touch::Solver { solver, .. } = &mut self.touch {
+            solver.reset();
+        }
     }
 
     /// The next frame after those of the baseline, with readings (V) less the baseline.
@@ -145,16 +187,13 @@ impl Reader {
 
 impl Frames {
     /// Of a file, in volts.
-    fn of(mut file: FrameFile, args: &Args, detector: Option<&Detector>) -> anyhow::Result<Self> {
+    fn of(mut file: FrameFile, input: &Input, detector: Option<&Detector>) -> anyhow::Result<Self> {
+        let path = input.file.display();
         if file.board().is_some() {
-            ensure!(
-                args.unit.is_none(),
-                "leave out --unit: {} is a recording, which knows its unit",
-                args.file.display()
-            );
+            ensure!(input.unit.is_none(), "leave out --unit: {path} is a recording, which knows its unit");
             return Ok(Self::Recording(file));
         }
-        let unit = args.unit.unwrap_or(Unit::Volt);
+        let unit = input.unit.unwrap_or(Unit::Volt);
         let mut frames = Vec::new();
         while let Some(mut frame) = file.next_frame()? {
             frame.volts.iter_mut().for_each(|value| *value *= unit.volts());
@@ -163,7 +202,7 @@ impl Frames {
         let volts = || frames.iter().flat_map(|frame| &frame.volts);
         let largest_v = volts().map(|volts| volts.abs()).filter(|volts| volts.is_finite()).fold(0.0, f64::max);
         if let Some(detector) = detector {
-            units::check(largest_v, unit, detector).map_err(|what| anyhow!("{}: {what}", args.file.display()))?;
+            units::check(largest_v, unit, detector).map_err(|what| anyhow!("{path}: {what}"))?;
         }
         Ok(Self::Table(frames.into_iter()))
     }
@@ -184,13 +223,20 @@ impl Frames {
     }
 }
 
-/// A file, what solves it, and the detector that it must be of, if that is known.
-type Opened = (FrameFile, Touch, Option<Detector>);
+/// A file and what solves it.
+struct Opened {
+    file: FrameFile,
+    touch: Touch,
+    /// The detector that it must be of, as its board measures it, if that is known.
+    measured: Option<Detector>,
+    /// The same as it was chosen.
+    chosen: Option<Detector>,
+}
 
 /// A kernel that has learned from presses.
-fn learned(args: &Args, presses: Presses) -> anyhow::Result<Opened> {
-    if args.solver != Method::Kernel {
-        bail!("only the solver kernel learns from presses, not {}: give --solver kernel", args.solver.name());
+fn learned(input: &Input, presses: Presses) -> anyhow::Result<Opened> {
+    if input.solver != Method::Kernel {
+        bail!("only the solver kernel learns from presses, not {}: give --solver kernel", input.solver.name());
     }
     let kernel = Kernel::train(&presses)?;
     message!(
@@ -200,26 +246,26 @@ fn learned(args: &Args, presses: Presses) -> anyhow::Result<Opened> {
         kernel.left_out_m() * 1e3,
         kernel.left_out_strength() * 100.0
     );
-    let file = FrameFile::open(&args.file, Some(kernel.channels()))?;
+    let file = FrameFile::open(input.file, Some(kernel.channels()))?;
     if file.channels() != kernel.channels() {
         bail!(
             "{} has {} readings a frame, but the presses have {} channels",
-            args.file.display(),
+            input.file.display(),
             file.channels(),
             kernel.channels()
         );
     }
-    Ok((file, Touch::Kernel(Box::new(kernel)), None))
+    Ok(Opened { file, touch: Touch::Kernel(Box::new(kernel)), measured: None, chosen: None })
 }
 
 /// A solver for the detector.
-fn solved(args: &Args) -> anyhow::Result<Opened> {
+fn solved(input: &Input) -> anyhow::Result<Opened> {
     // That of a recording is in its header, unless another one is given.
-    let given = args.detector.get()?.electrodes.len();
-    let file = FrameFile::open(&args.file, Some(given * given))?;
+    let given = input.detector.get()?.electrodes.len();
+    let file = FrameFile::open(input.file, Some(given * given))?;
     let chosen = match file.header() {
-        Some(header) => args.detector.of_recording(&args.file, header)?,
-        None => args.detector.get()?,
+        Some(header) => input.detector.of_recording(input.file, header)?,
+        None => input.detector.get()?,
     };
     let electrodes = chosen.electrodes.len();
     let detector = match file.board() {
@@ -229,22 +275,24 @@ fn solved(args: &Args) -> anyhow::Result<Opened> {
             }
             measured::as_measured(&chosen, board)?
         }
-        None => chosen,
+        None => chosen.clone(),
     };
+    let detector = Detector { force: input.force.clone().or(detector.force), ..detector };
     if file.channels() != electrodes * electrodes {
         bail!(
             "{} has {} readings a frame, but the detector {} with its {electrodes} electrodes needs {}: give the right one with \
              --detector",
-            args.file.display(),
+            input.file.display(),
             file.channels(),
             detector.name,
             electrodes * electrodes
         );
     }
-    let problem = Problem::new(args.model.build(&detector, None)?);
-    let solver = solver(args.solver, args.lambda, &problem)?;
+    let problem = Problem::new(input.model.build(&detector, None)?);
+    let solver = solver(input.solver, input.lambda, &problem)?;
     let mesh = problem.jacobian.image_mesh.clone();
-    Ok((file, Touch::Solver { solver, detector: Box::new(detector.clone()), mesh }, Some(detector)))
+    let touch = Touch::Solver { solver, detector: Box::new(detector.clone()), mesh };
+    Ok(Opened { file, touch, measured: Some(detector), chosen: Some(chosen) })
 }
 
 /// The solver, which leaves out faulty electrodes; or, with a given lambda, of all electrodes.

@@ -8,14 +8,16 @@
 
 mod fit;
 mod order;
+mod stands;
 mod student;
 #[cfg(test)]
 mod tests;
 
-use tactomo_physics::detector::ForceLaw;
+use tactomo_physics::detector::{FARTHEST, ForceLaw};
 
 use self::fit::{Fitted, Form, Point};
 pub use self::order::Mistyped;
+pub use self::stands::{Moment, Stand, pairs, stands};
 
 /// Fewest presses: two or three parameters and a scatter, of which something is left.
 pub const FEWEST: usize = 5;
@@ -33,7 +35,8 @@ const BAND: f64 = 1.644_854;
 pub struct ForcePress {
     /// Force (N).
     pub force_n: f64,
-    /// Conductance that the solver found (S).
+    /// Conductance with its constriction (S): what a solver's contacts have as newtons on a detector with
+    /// [`ForceLaw::siemens`].
     pub conductance_s: f64,
     /// Its standard error (S); zero where it is not known.
     pub deviation_s: f64,
@@ -76,7 +79,8 @@ pub enum MaximumForce {
         /// Force (N).
         force_n: f64,
     },
-    /// The law saturates somewhere, and the presses do not tell where: a parameter of it may be nothing, at 95 % confidence.
+    /// The law saturates somewhere, and the presses do not tell where: a parameter of it may be nothing, at 95 % confidence, or the
+    /// maximum is beyond twice the largest press. The paper's sample D has 34975 N from presses of up to 5 N.
     NotDetermined,
 }
 
@@ -287,8 +291,10 @@ fn law_of(best: &Fitted, presses: &[ForcePress], left_out: &[usize]) -> (ForceLa
             MaximumForce::NotDetermined
         }
         Some(_) => match law.fmax_n().zip(law.fmax_deviation_n()) {
-            Some((force_n, deviation_n)) => MaximumForce::Saturation { force_n, deviation_n },
-            None => MaximumForce::NotDetermined,
+            Some((force_n, deviation_n)) if force_n < FARTHEST * law.range_n[1] => {
+                MaximumForce::Saturation { force_n, deviation_n }
+            }
+            _ => MaximumForce::NotDetermined,
         },
     };
     if let MaximumForce::Saturation { force_n, .. } = maximum {

@@ -331,11 +331,7 @@ impl Method {
     /// # Errors
     /// [`ForwardError`] if the model cannot give what the solver needs.
     pub fn build_with(self, problem: &Problem, parameter: Option<Parameter>) -> Result<Box<dyn Solver>, ForwardError> {
-        let solver = (self.row().build)(problem, parameter)?;
-        Ok(match &problem.detector().force {
-            Some(law) => newtons::with(law.clone(), solver),
-            None => solver,
-        })
+        Ok(newtons::with_newtons(problem, (self.row().build)(problem, parameter)?))
     }
 }
 

@@ -10,7 +10,7 @@ mod exchange;
 mod keep;
 #[cfg(test)]
 mod motion_tests;
-mod network;
+pub(super) mod network;
 #[cfg(test)]
 mod places_tests;
 mod scan;
