@@ -1,6 +1,6 @@
 //! The readings of one frame, in volts.
 
-use crate::detector::Detector;
+use crate::detector::{Detector, Electrode};
 
 /// `n x n` readings of one frame (V): reading `(g, e)` is electrode `e` while `g` is grounded.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,11 +52,12 @@ impl Readings {
         Self::from_fn(electrodes.len(), |g, e| self.at(electrodes[g], electrodes[e]))
     }
 
-    /// Divides what each channel reads by the gain that its detector says it has, which no model knows of. What a channel reads with nothing
-    /// on the detector is no part of it: the baseline is subtracted before.
-    pub fn divide_by_gains(&mut self, detector: &Detector) {
+    /// Takes from what each channel reads the offset that its detector says the baseline does not show, and divides it by its gain: no model
+    /// knows of either. What a channel reads with nothing on the detector is no part of it: the baseline is subtracted before.
+    pub fn correct_channels(&mut self, detector: &Detector) {
         for row in self.volts.chunks_mut(self.electrodes.max(1)) {
-            row.iter_mut().zip(&detector.electrodes).for_each(|(volts, pad)| *volts /= pad.gain);
+            let correct = |(volts, pad): (&mut f64, &Electrode)| *volts = (*volts - pad.unseen_offset_v) / pad.gain;
+            row.iter_mut().zip(&detector.electrodes).for_each(correct);
         }
     }
 
@@ -76,7 +77,7 @@ mod tests {
         detector.electrodes.truncate(3);
         detector.electrodes[1].gain = 1.25;
         let mut readings = Readings::from_fn(3, |g, e| (1 + g + 10 * e) as f64);
-        readings.divide_by_gains(&detector);
+        readings.correct_channels(&detector);
         let expected = Readings::from_fn(3, |g, e| (1 + g + 10 * e) as f64 / if e == 1 { 1.25 } else { 1.0 });
         assert_eq!(readings, expected);
     }

@@ -256,7 +256,7 @@ impl FollowLoop {
         }
         let mut touch = frame.mean.clone();
         board.baseline.subtract(frame.mean.volts(), touch.volts_mut());
-        touch.divide_by_gains(&board.detector);
+        touch.correct_channels(&board.detector);
         let changed = board.watch.note(&touch);
         let Some(follower) = &mut board.follower else { return Ok(()) };
         let followed = follower.follow(&touch)?;

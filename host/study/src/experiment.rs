@@ -268,7 +268,7 @@ impl Experiment {
             };
             let mut readings = measurement.readings_v(impedance_ohm.as_ref());
             readings.volts_mut().iter_mut().zip(rest.volts()).for_each(|(volts, rest)| *volts -= rest);
-            readings.divide_by_gains(&self.detector);
+            readings.correct_channels(&self.detector);
             let contacts = touches.iter().map(Touch::disc).collect();
             frames.push(Frame { touches: touches.clone(), contacts, readings });
             last = Some((touches, impedance_ohm));

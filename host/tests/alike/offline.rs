@@ -30,7 +30,7 @@ pub fn answers(problem: &Problem, method: Method, live: &Live) -> Vec<Answer> {
             let mut touch = frame.volts.clone();
             baseline.subtract(&frame.volts, &mut touch);
             let mut readings = Readings::new(detector.electrodes.len(), touch).unwrap();
-            readings.divide_by_gains(detector);
+            readings.correct_channels(detector);
             let solution = solver.solve(&readings).unwrap();
             if is_answered {
                 found.insert(sequence, solution);

@@ -234,6 +234,11 @@ impl Outline {
         Self { outer: vec![[-x, -y], [x, -y], [x, y], [-x, y]], holes: Vec::new() }
     }
 
+    /// Whether a point is inside, and in no hole (m).
+    pub fn holds(&self, at_m: [f64; 2]) -> bool {
+        geometry::is_inside(at_m, &self.outer) && !self.holes.iter().any(|hole| geometry::is_inside(at_m, hole))
+    }
+
     /// Width and height (m) if this is a rectangle about the origin, else `None`.
     pub fn as_rectangle(&self) -> Option<[f64; 2]> {
         let [x, y] = *self.outer.get(2)?;

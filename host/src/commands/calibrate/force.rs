@@ -4,9 +4,9 @@ mod gather;
 mod known;
 mod report;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use tactomo::calibrate::force::{Law, fit_force};
 use tactomo::detector::Detector;
 
@@ -69,26 +69,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let presses: Vec<_> = gathered.presses.iter().map(|press| press.press).collect();
     let fit = fit_force(&presses, args.law).map_err(|error| anyhow!("{}: {error}", args.file.display()))?;
     let calibrated = Detector { force: Some(fit.law.clone()), ..gathered.detector };
-    let text = calibrated.to_toml();
-    check(&text, &args.out)?;
-    out.write(&text)?;
+    super::write(&calibrated, &args.out, out)?;
     let report = Report::of(&calibrated.name, &args.out, &gathered.presses, &fit);
     message!("{}", report.table());
     if args.json {
         output::print(&serde_json::to_string(&report)?)?;
     }
     Ok(())
-}
-
-/// Checks that a detector can be read back from where it will be: a curved one names the file of its surface.
-fn check(text: &str, out: &Path) -> anyhow::Result<()> {
-    let folder = out.parent().unwrap_or(Path::new(""));
-    Detector::from_toml_in(folder, text, "").map(drop).with_context(|| {
-        format!(
-            "{} could not be read as a detector: write it into the folder of the surface that it names",
-            out.display()
-        )
-    })
 }
 
 fn newtons(text: &str) -> Result<f64, String> {

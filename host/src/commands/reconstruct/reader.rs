@@ -11,6 +11,8 @@ use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
 use tactomo::solve::{Guard, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver};
 
+use tactomo_protocol::Hello;
+
 use super::units::{self, Unit};
 use crate::commands::choice::{DetectorArgs, Model};
 use crate::commands::output::message;
@@ -89,6 +91,22 @@ impl Reader {
         self.detector.as_ref()
     }
 
+    /// The detector as the file's board measures it; `None` where presses were learned from.
+    pub fn measured(&self) -> Option<&Detector> {
+        match &self.touch {
+            Touch::Solver { detector, .. } => Some(detector),
+            Touch::Kernel(_) => None,
+        }
+    }
+
+    /// The board that a recording was taken from.
+    pub fn board(&self) -> Option<&Hello> {
+        match &self.frames {
+            Frames::Recording(file) => file.board(),
+            Frames::Table(_) => None,
+        }
+    }
+
     /// Whether the file is a recording, whose frames follow each other in time.
     pub fn is_recording(&self) -> bool {
         matches!(self.frames, Frames::Recording(_))
@@ -137,7 +155,7 @@ impl Reader {
             Touch::Solver { solver, detector, .. } => {
                 let readings = Readings::new(detector.electrodes.len(), readings_v);
                 let mut readings = readings.context("a frame of another length")?;
-                readings.divide_by_gains(detector);
+                readings.correct_channels(detector);
                 Ok(solver.solve(&readings)?)
             }
             Touch::Kernel(kernel) => match kernel.press(&readings_v) {

@@ -307,6 +307,23 @@ impl Bundle {
         best
     }
 
+    /// Standard error of the place (m) at which a contact would be found in one frame, by noise and by what is unknown of the detector with such a
+    /// covariance; `None` where the contact cannot be.
+    pub fn place_error_m(&self, contact: &Contact, slopes: &Slopes, covariance: &DMatrix<f64>) -> Option<f64> {
+        let predicted = as_read(&self.model.impedance_ohm(&[*contact]).ok()?, self.model.detector());
+        let press = Press {
+            readings: Readings::new(self.nominal.electrodes.len(), predicted)?,
+            noise_v: self.nominal.adc.deviation_v(),
+            known_m: None,
+            contact: *contact,
+            usual: *contact,
+        };
+        let own = Cholesky::new(self.of_contact(&*self.model, &press, contact)?.own)?.inverse();
+        let coupling = self.of_press(&press, slopes)?.coupling;
+        let by_detector = &coupling * covariance * coupling.transpose();
+        Some((0..2).map(|axis| own[(axis, axis)] + by_detector[(axis, axis)]).sum::<f64>().sqrt())
+    }
+
     /// Presses that fit so many times worse than most.
     pub fn lost(&self, normal: &Normal, times: f64) -> Vec<usize> {
         let mut sorted = normal.costs.clone();

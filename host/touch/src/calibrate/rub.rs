@@ -14,6 +14,7 @@ use super::slopes::Slopes;
 use super::wires::{Order, orders};
 use super::{CalibrateError, Frame, Step};
 use crate::solve::{ContactSettings, Contacts, Problem, Solver};
+use crate::threads::map;
 
 /// How a rub is used.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,9 +48,25 @@ pub struct Rub {
     pub single: usize,
     /// Presses that were fitted.
     pub presses: usize,
-    /// Sum of squares for each reading, in standard deviations, of the presses with the description and with what was found.
+    /// Those of them at known places.
+    pub known: usize,
+    /// Sum of squares for each reading, in standard deviations, of the presses after the first step and with what was found.
     pub chi_square: [f64; 2],
+    /// Places over the detector (m), with the standard error that a press of half a sheet conductance has there in one frame (m).
+    pub place_errors_m: Vec<([f64; 2], f64)>,
 }
+
+impl Rub {
+    /// Root of the mean square of the standard errors of places (m).
+    pub fn place_error_m(&self) -> f64 {
+        let squares = self.place_errors_m.iter().map(|(_, error_m)| error_m * error_m);
+        (squares.sum::<f64>() / self.place_errors_m.len().max(1) as f64).sqrt()
+    }
+}
+
+/// Places along a side that standard errors are told for, and how far they reach in shares of it.
+const PLACES: usize = 7;
+const REACH: f64 = 0.8;
 
 /// Most steps from the description, as a share of the centred matrix: detectors drawn from the default tolerances are up to 0.2 off.
 const FAR: f64 = 0.45;
@@ -79,6 +96,9 @@ pub fn rub(
         return Err(CalibrateError::Count { readings, detector: nominal.name.clone(), electrodes });
     }
     let chosen = Chosen::among(frames, nominal)?;
+    let told_channels = nominal;
+    // Readings are those of the channels: gains and offsets are fitted from none.
+    let nominal = &without_channels(nominal);
     let problem = Problem::of(&nominal.taken_as_exact())?;
     let found = wired(&chosen, nominal, &problem)?;
     let means = chosen.spread(settings.presses, nominal);
@@ -91,17 +111,47 @@ pub fn rub(
         .collect();
     let full_v = FULL * nominal.adc.full_scale_v.min(nominal.drive_v);
     let mut bundle = Bundle::new(Arc::clone(&problem.model), parameters, presses, full_v);
-    let (first, last) = adjusted(&mut bundle, told)?;
-    let detector = calibrated(nominal, &chosen, &bundle, &last);
+    let (first, last, slopes) = adjusted(&mut bundle, told)?;
+    let posterior = Posterior::new(&last.information, last.of_press.clone(), bundle.chi_square(&last))
+        .ok_or(CalibrateError::NotSingle { touched: chosen.touched, single: 0 })?;
+    let mut detector = calibrated(nominal, &chosen, &bundle, &posterior);
+    detector.force.clone_from(&told_channels.force);
     Ok(Rub {
-        detector: detector.ok_or(CalibrateError::NotSingle { touched: chosen.touched, single: 0 })?,
+        detector,
+        place_errors_m: place_errors_m(&bundle, &slopes, &posterior),
         wires: (!order.exchanged().is_empty()).then_some(order.electrodes),
         left_out: (0..electrodes).filter(|e| !chosen.kept.contains(e)).collect(),
         touched: chosen.touched,
         single: chosen.singles.iter().map(|mean| mean.frames).sum(),
         presses: bundle.presses.len(),
+        known: bundle.presses.iter().filter(|press| press.known_m.is_some()).count(),
         chi_square: [first, bundle.chi_square(&last)],
     })
+}
+
+/// A detector whose channels are taken to read what is there.
+fn without_channels(detector: &Detector) -> Detector {
+    let mut detector = detector.clone();
+    detector.electrodes.iter_mut().for_each(|pad| (pad.gain, pad.unseen_offset_v) = (1.0, 0.0));
+    detector
+}
+
+/// Standard errors of places over the detector.
+fn place_errors_m(bundle: &Bundle, slopes: &Slopes, posterior: &Posterior) -> Vec<([f64; 2], f64)> {
+    let detector = bundle.model.detector();
+    let [low, high] = detector.outline.bounds();
+    let at = |axis: usize, i: usize| {
+        let share = REACH * (i as f64 / (PLACES - 1) as f64 - 0.5);
+        (0.5 + share) * high[axis] + (0.5 - share) * low[axis]
+    };
+    let places: Vec<[f64; 2]> =
+        (0..PLACES * PLACES).map(|index| [at(0, index % PLACES), at(1, index / PLACES)]).collect();
+    let radius_m = bundle.presses.first().map_or(0.0, |press| press.usual.radius_m);
+    let error_m = |at_m: &[f64; 2]| {
+        let contact = Contact::flat(at_m[0], at_m[1], radius_m, 0.5 * detector.sheet_conductance_s());
+        Some((*at_m, bundle.place_error_m(&contact, slopes, &posterior.covariance)?))
+    };
+    map(&places, error_m).into_iter().flatten().collect()
 }
 
 /// Orders of the wires that fit, the likeliest first.
@@ -200,7 +250,7 @@ fn started(problem: &Problem, means: &[Mean], settings: &RubSettings) -> Result<
 
 /// Adjusts detector and presses, seeks presses anew that were lost in a wrong minimum, and adjusts again. Gives the sum of squares for each reading
 /// at the start.
-fn adjusted(bundle: &mut Bundle, told: &mut dyn FnMut(Step) -> bool) -> Result<(f64, Normal), CalibrateError> {
+fn adjusted(bundle: &mut Bundle, told: &mut dyn FnMut(Step) -> bool) -> Result<(f64, Normal, Slopes), CalibrateError> {
     let mut first = None;
     let mut slopes = Slopes::new(&*bundle.model, &bundle.parameters)?;
     let mut normal = bundle.adjust(&mut slopes, RENEWED, &mut |step| {
@@ -220,12 +270,11 @@ fn adjusted(bundle: &mut Bundle, told: &mut dyn FnMut(Step) -> bool) -> Result<(
         }
         normal = bundle.adjust(&mut slopes, 0, told)?;
     }
-    Ok((first.unwrap_or(f64::NAN), normal))
+    Ok((first.unwrap_or(f64::NAN), normal, slopes))
 }
 
 /// The detector of all electrodes, in the order of the channels, with what is left unknown.
-fn calibrated(nominal: &Detector, chosen: &Chosen, bundle: &Bundle, normal: &Normal) -> Option<Detector> {
-    let posterior = Posterior::new(&normal.information, normal.of_press.clone(), bundle.chi_square(normal))?;
+fn calibrated(nominal: &Detector, chosen: &Chosen, bundle: &Bundle, posterior: &Posterior) -> Detector {
     let fitted = bundle.detector();
     let mut detector = Detector { electrodes: nominal.electrodes.clone(), ..fitted.clone() };
     chosen.kept.iter().zip(&fitted.electrodes).for_each(|(channel, pad)| detector.electrodes[*channel] = *pad);
@@ -242,10 +291,5 @@ fn calibrated(nominal: &Detector, chosen: &Chosen, bundle: &Bundle, normal: &Nor
         directions: posterior.directions(&bundle.parameters),
         ..Calibration::default()
     };
-    Some(Detector {
-        name: nominal.name.clone(),
-        tolerances: nominal.tolerances,
-        calibration: Some(calibration),
-        ..detector
-    })
+    Detector { name: nominal.name.clone(), tolerances: nominal.tolerances, calibration: Some(calibration), ..detector }
 }
