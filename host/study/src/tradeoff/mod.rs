@@ -400,8 +400,11 @@ mod tests {
 
     #[test]
     fn detectors_as_built_are_tried_with_what_solvers_know_of_them() {
+        // The converter cuts off offsets below zero, which no calibration brings back.
+        let mut detector = Detector::default();
+        detector.tolerances.offset_lsb = 0.0;
         let plan = |as_built| Plan {
-            detectors: vec![Detector::default()],
+            detectors: vec![detector.clone()],
             methods: vec![Method::Contacts],
             sweep: false,
             places: 1,
