@@ -52,7 +52,7 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["record", "some.file", "--fault", "open:3"], "--simulate"),
         (&["live", "--as-built", "7"], "--simulate"),
         (&["forward", "--as-built", "7", "--save-jacobian", "some.file"], "--save-jacobian"),
-        (&["forward", "--as-built", "-7"], "a seed, or a detector"),
+        (&["forward", "--as-built", "seven"], "a seed, or a detector"),
         (&["forward", "--scene", "jazz"], "rolling-ball"),
         (&["forward", "--fault", "open"], "open:3, short:2,7"),
         (&["forward", "--press", "0,0,2.5"], "tip_radius_mm,force_n"),

@@ -307,6 +307,12 @@ async fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
         ensure!(shown[0] == "2 contacts", "{shown}");
         ensure!(shown[1].as_str().is_some_and(|text| text.starts_with("residual 1.0 × noise · answer ")), "{shown}");
         ensure!(shown[2] == "electrode 3 left out" && shown[3] == sentence, "{shown}");
+        let another = "my-skin was calibrated on another board.";
+        stage.behind.set(|snapshot| (snapshot.baseline, snapshot.calibration) = (None, Some(another.to_owned())));
+        settled(&stage).await;
+        let script = "const notice = document.getElementById('notice'); return [notice.textContent, notice.className]";
+        let shown = stage.browser.run(script).await?;
+        ensure!(shown[0] == another && shown[1] == "warning", "{shown}");
         Ok(())
     })
 }

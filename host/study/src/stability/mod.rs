@@ -9,6 +9,7 @@ mod scenes;
 mod sweep;
 mod table;
 mod tolerances;
+mod trials;
 mod wrong;
 
 pub use self::bounds::{BoundChart, BoundCurve, BoundReport};

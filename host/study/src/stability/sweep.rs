@@ -1,20 +1,16 @@
 //! Sweeps and how they are run.
 
-use std::sync::Arc;
-
 use super::bounds::{self, BoundReport};
 use super::breakdown::{Break, CellReport, breaks};
 use super::errors::{self, ErrorCurve, ErrorRange};
+use super::trials::Trials;
 use super::{faults, scenes, tolerances, wrong};
 use crate::experiment::{Calibrate, Experiment, Frame, StudyError};
 use crate::machine::Machine;
 use crate::scenes::SceneKind;
-use crate::score::{Score, Scorer, Summary};
-use crate::variant::Variation;
 use tactomo_physics::detector::Detector;
-use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::scene::{Contact, Hand, Touch};
-use tactomo_touch::solve::{Method, ParameterKind, Problem, Solver};
+use tactomo_touch::solve::{Method, ParameterKind};
 
 /// Lambda's sweep, in shares of the largest singular value.
 const LAMBDAS: [f64; 7] = [1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
@@ -264,75 +260,6 @@ fn try_sweep(plan: &Plan, sweep: Sweep, trials: &mut Trials) -> Result<SweepRepo
     })
 }
 
-/// Solvers and judges of the last problems, as long as they stay the same.
-#[derive(Default)]
-pub(super) struct Trials {
-    scorer: Option<(Arc<Jacobian>, Scorer)>,
-    solvers: Vec<Kept>,
-}
-
-/// A solver that is kept for the next point.
-struct Kept {
-    variation: Variation,
-    jacobian: Arc<Jacobian>,
-    /// None if it cannot be made for the model.
-    solver: Option<Box<dyn Solver>>,
-}
-
-/// Solvers that are kept at most.
-const MOST_KEPT: usize = 24;
-
-impl Trials {
-    /// What a solver makes of a point; `None` if it cannot be made for the model.
-    pub fn summary(&mut self, method: Method, point: &Point) -> Result<Option<Summary>, StudyError> {
-        let variation = match point.lambda {
-            Some(lambda) => Variation::with_lambda(method, lambda),
-            None => Variation::default_of(method),
-        };
-        let mut scores = Vec::new();
-        for (place, frames) in point.places.iter().enumerate() {
-            let experiment = point.known.get(place).unwrap_or(&point.experiment);
-            match self.scores(variation, experiment, frames)? {
-                Some(more) => scores.extend(more),
-                None => return Ok(None),
-            }
-        }
-        Ok(Some(Summary::of(&scores)))
-    }
-
-    /// Scores of a solver on the frames of a place; `None` if it cannot be made for the model.
-    fn scores(
-        &mut self,
-        variation: Variation,
-        experiment: &Experiment,
-        frames: &[Frame],
-    ) -> Result<Option<Vec<Score>>, StudyError> {
-        let jacobian = &experiment.problem.jacobian;
-        if !self.scorer.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, jacobian)) {
-            self.scorer = Some((Arc::clone(jacobian), Scorer::new(experiment)));
-        }
-        let index = self.kept(variation, &experiment.problem);
-        match (&mut self.scorer, &mut self.solvers[index].solver) {
-            (Some((_, scorer)), Some(solver)) => Ok(Some(scorer.run(&mut **solver, frames)?)),
-            _ => Ok(None),
-        }
-    }
-
-    /// Where a solver is kept; makes it if there is none.
-    fn kept(&mut self, variation: Variation, problem: &Problem) -> usize {
-        let same = |kept: &Kept| kept.variation == variation && Arc::ptr_eq(&kept.jacobian, &problem.jacobian);
-        if let Some(index) = self.solvers.iter().position(same) {
-            return index;
-        }
-        if self.solvers.len() >= MOST_KEPT {
-            self.solvers.remove(0);
-        }
-        let solver = variation.build(problem).ok();
-        self.solvers.push(Kept { variation, jacobian: Arc::clone(&problem.jacobian), solver });
-        self.solvers.len() - 1
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::LazyLock;
@@ -376,10 +303,21 @@ mod tests {
             let sweep = report.sweeps.iter().find(|sweep| sweep.title == title).unwrap();
             sweep.solvers[0].breaks.clone()
         };
-        assert!(breaks("All tolerances").is_some(), "what is twice as wrong as a bench makes it is not found");
-        assert!(breaks("All tolerances, calibrated").is_none(), "who knows what was built finds what presses");
         assert!(breaks("Noise").is_some(), "nothing is found at 0 dB");
         assert!(breaks("Contact impedances that differ").is_none(), "a linear image does not feel them");
+    }
+
+    #[test]
+    fn tolerances_of_nothing_are_the_description_and_a_calibration_shows_beyond() {
+        let errors_m = |title: &str| {
+            let sweep = REPORT.sweeps.iter().find(|sweep| sweep.title == title).unwrap();
+            let cells = sweep.solvers[0].cells.iter().map(|cell| cell.as_ref().unwrap().error_m.unwrap());
+            cells.collect::<Vec<_>>()
+        };
+        let (before, after) = (errors_m("All tolerances"), errors_m("All tolerances, calibrated"));
+        assert_eq!(before[0], after[0]);
+        assert_ne!(before.last(), after.last());
+        assert_eq!(before[0], errors_m("Unevenness")[0]);
     }
 
     #[test]

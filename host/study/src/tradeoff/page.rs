@@ -89,12 +89,12 @@ fn group_charts(report: &DetectorReport) -> Vec<String> {
 
 fn as_built_row(report: &AsBuiltReport, charts: &str) -> String {
     let what = match report.known {
-        Known::Described => "which solvers know by their description only",
-        Known::Calibrated => "after a calibration",
+        Known::Described => "the description, which is all that solvers know of them",
+        Known::Calibrated => "the description; solvers know what a calibration has found of each",
     };
     format!(
-        "<h3>{} detectors as built, {}</h3>\n<p class=\"quiet\">Drawn from the tolerances of the one on paper, {what}: a place of each kind \
-         of scene on each, solvers with their defaults. Axes are those of the charts above.</p>\n{charts}",
+        "<h3>{} detectors as built, {}</h3>\n<p class=\"quiet\">Drawn from the tolerances around {what}. One place of each kind of scene on \
+         each; solvers with their defaults. Axes are those of the charts above.</p>\n{charts}",
         report.detectors,
         report.known.name()
     )

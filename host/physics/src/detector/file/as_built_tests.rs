@@ -71,6 +71,27 @@ fn unevenness_gains_tolerances_and_calibration_are_read() {
 }
 
 #[test]
+fn the_documented_tables_are_read() {
+    let documentation = include_str!("../../../../../docs/detector.md");
+    let fragments = documentation.split("```toml fragment\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let sixteen = Detector::default().to_toml().replace("name = \"square-60\"\n", "");
+    let with = |fragment: &str| {
+        let (top, table) = if fragment.starts_with('[') { ("", fragment) } else { (fragment, "") };
+        Detector::from_toml(&[top, &sixteen, "\n", table].concat(), "documented").unwrap()
+    };
+    let all: Vec<Detector> = fragments.map(with).collect();
+    assert!(all.iter().any(|detector| !detector.unevenness.is_even()));
+    assert!(all.iter().any(|detector| detector.tolerances != Tolerances::default()));
+    assert!(all.iter().any(|detector| detector.calibration.is_some()));
+    let defaults = Tolerances::default();
+    for (name, value) in defaults.named() {
+        let row = documentation.lines().find(|line| line.starts_with(&format!("| `{name}` |"))).unwrap();
+        let told: f64 = row.split('|').nth(3).unwrap().trim().parse().unwrap();
+        assert_eq!(told, value, "{row}");
+    }
+}
+
+#[test]
 fn all_of_it_is_written_as_it_is_read() {
     let detector = square();
     assert_eq!(Detector::from_toml(&detector.to_toml(), "else").unwrap(), detector);
