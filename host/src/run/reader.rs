@@ -256,6 +256,7 @@ impl Reader {
             if *solved != *measured {
                 self.inbox.put(Event::Board(Arc::clone(&measured)));
             }
+            self.inbox.put(Event::Conversions(hello.settings.conversions()));
             let noise_v = measured.adc.deviation_v();
             self.notice.change(|snapshot| snapshot.hello = Some(hello.clone()));
             self.board = Some(Board { volts: Volts::of(&hello), hello, detector: measured, noise_v });

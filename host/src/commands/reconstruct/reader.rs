@@ -1,6 +1,7 @@
 //! Frames of a file, less the baseline, and what solves them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::baseline::Baseline;
@@ -8,6 +9,7 @@ use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
 use tactomo::board::measured;
 use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
+use tactomo::forward::jacobian::Jacobian;
 use tactomo::readings::Readings;
 use tactomo::solve::{Guard, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver};
 
@@ -46,16 +48,16 @@ enum Touch {
 impl Reader {
     /// Opens the file and makes what solves it.
     pub fn open(args: &Args) -> anyhow::Result<Self> {
-        let (file, touch, detector) = match &args.presses {
+        let (file, touch, jacobian) = match &args.presses {
             Some(presses) => learned(args, Presses::read(presses)?)?,
             None => solved(args)?,
         };
         // That of a recording is taken as live takes it, while its frames are solved.
-        let baseline = match (&detector, args.rest) {
-            (Some(detector), None) if file.board().is_some() => Baseline::new(detector),
-            (_, frames) => Baseline::over(frames.unwrap_or(0), file.channels()),
+        let baseline = match (&jacobian, args.rest, file.board()) {
+            (Some(jacobian), None, Some(board)) => Baseline::new(Arc::clone(jacobian), board.settings.conversions()),
+            (_, frames, _) => Baseline::over(frames.unwrap_or(0), file.channels()),
         };
-        let frames = Frames::of(file, args, detector.as_ref())?;
+        let frames = Frames::of(file, args, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
         Ok(Self { path: args.file.clone(), frames, baseline, count: 0, given: args.rest.unwrap_or(0), touch })
     }
 
@@ -64,7 +66,7 @@ impl Reader {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
             if self.given == 0 {
-                self.baseline.add(&frame.volts, 1, &[]);
+                self.baseline.add(&frame.volts, 1, frame.time_s.unwrap_or_default(), &[]);
                 let volts = frame.volts.clone();
                 self.baseline.subtract(&volts, &mut frame.volts);
                 return Ok(Some(frame));
@@ -72,7 +74,7 @@ impl Reader {
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
                 bail!("{}: the baseline needs finite readings, but some of these are not", self.place());
             }
-            self.baseline.add(&frame.volts, 1, &[]);
+            self.baseline.add(&frame.volts, 1, frame.time_s.unwrap_or_default(), &[]);
             self.given -= 1;
         }
         Ok(None)
@@ -182,8 +184,8 @@ impl Frames {
     }
 }
 
-/// A file, what solves it, and the detector that it must be of, if that is known.
-type Opened = (FrameFile, Touch, Option<Detector>);
+/// A file, what solves it, and the linear theory of the detector that it must be of, if that is known.
+type Opened = (FrameFile, Touch, Option<Arc<Jacobian>>);
 
 /// A kernel that has learned from presses.
 fn learned(args: &Args, presses: Presses) -> anyhow::Result<Opened> {
@@ -237,7 +239,7 @@ fn solved(args: &Args) -> anyhow::Result<Opened> {
     let problem = Problem::new(args.model.build(&detector, None)?);
     let solver = solver(args.solver, args.lambda, &problem)?;
     let mesh = problem.jacobian.image_mesh.clone();
-    Ok((file, Touch::Solver { solver, electrodes, mesh }, Some(detector)))
+    Ok((file, Touch::Solver { solver, electrodes, mesh }, Some(problem.jacobian)))
 }
 
 /// The solver, which leaves out faulty electrodes; or, with a given lambda, of all electrodes.
