@@ -9,12 +9,13 @@ use super::scenes::electrode_distance_m;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
 use tactomo_physics::readings::Readings;
+use tactomo_physics::rest::{Rest, RestSum};
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Fault, FaultError, Measurement, finer_model};
 use tactomo_touch::solve::{Problem, SolveError};
 
-/// Frames before the first whose mean is the baseline, as many as live takes. It is never zero: the converter cuts off what noise would
-/// be below zero, so at rest 1.5 LSB of noise read 0.6 LSB in the mean, which is a press to a solver that looks at 1024 readings.
+/// Frames before the first that the baseline is taken from, as many as live takes. At rest it is never zero: the converter cuts off what
+/// noise would be below zero, so 1.5 LSB of noise read 0.6 LSB in the mean, which is a press to a solver that looks at 1024 readings.
 const BASELINE_FRAMES: u8 = 32;
 
 /// Why a study cannot be made.
@@ -160,15 +161,13 @@ impl Experiment {
         }
     }
 
-    /// The baseline (V): the mean of the first frames.
-    fn baseline_v(&self, measurement: &mut Measurement) -> Readings {
-        let mut rest = Readings::from_fn(self.detector.electrodes.len(), |_, _| 0.0);
+    /// The baseline: what the first frames are.
+    fn rest(&self, measurement: &mut Measurement) -> Rest {
+        let mut sum = RestSum::default();
         for _ in 0..BASELINE_FRAMES {
-            let frame = measurement.readings_v(self.rest_ohm.as_ref());
-            let share = |(sum, volts): (&mut f64, &f64)| *sum += volts / f64::from(BASELINE_FRAMES);
-            rest.volts_mut().iter_mut().zip(frame.volts()).for_each(share);
+            sum.add(measurement.readings_v(self.rest_ohm.as_ref()).volts(), 1);
         }
-        rest
+        sum.rest(&self.detector.adc, 1)
     }
 
     /// Mean distance of electrodes (m): contacts further from the truth are counted as missed and invented.
@@ -182,7 +181,7 @@ impl Experiment {
     /// [`StudyError`] if a touch is off the detector.
     pub fn frames(&self, touches: &[Vec<Touch>], seed: u64) -> Result<Vec<Frame>, StudyError> {
         let mut measurement = Measurement::new(&self.measured, &self.faults, seed)?;
-        let rest = self.baseline_v(&mut measurement);
+        let rest = self.rest(&mut measurement);
         let mut frames: Vec<Frame> = Vec::with_capacity(touches.len());
         let mut last = None;
         for touches in touches {
@@ -191,8 +190,9 @@ impl Experiment {
                 _ if touches.is_empty() => None,
                 _ => Some(touched_impedance_ohm(&*self.truth, touches)?),
             };
-            let mut readings = measurement.readings_v(impedance_ohm.as_ref());
-            readings.volts_mut().iter_mut().zip(rest.volts()).for_each(|(volts, rest)| *volts -= rest);
+            let measured = measurement.readings_v(impedance_ohm.as_ref());
+            let mut readings = measured.clone();
+            rest.subtract(measured.volts(), readings.volts_mut());
             let contacts = touches.iter().map(Touch::disc).collect();
             frames.push(Frame { touches: touches.clone(), contacts, readings });
             last = Some((touches, impedance_ohm));
