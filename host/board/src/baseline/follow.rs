@@ -18,8 +18,8 @@ const FOLLOW_S: f64 = 60.0;
 const BEHIND: f64 = 256.0;
 /// Longest block (s).
 const BLOCK_S: f64 = 1.0;
-/// Drift of offsets that is expected without a look at the detector at rest (codes in a second): 5 codes in six hours.
-const DRIFT_CODES_PER_S: f64 = 5.0 / (6.0 * 3600.0);
+/// Drift that is expected without a look at the detector at rest (codes in a second): 3 codes in an hour, as while a board grows warm.
+const DRIFT_CODES_PER_S: f64 = 3.0 / 3600.0;
 /// Frames in a row that read less than at rest before the baseline is taken anew.
 const LESS: u32 = 8;
 
@@ -76,7 +76,9 @@ impl Following {
                     self.begun_s = time_s;
                 }
                 self.block.add(readings_v, frames);
-                let is_whole = self.block.frames() >= FRAMES || (time_s - self.begun_s).abs() >= BLOCK_S;
+                // What is hardly known need not be looked at for long.
+                let enough = self.worth_after(judge, away_s).min(f64::from(FRAMES));
+                let is_whole = f64::from(self.block.frames()) >= enough || (time_s - self.begun_s).abs() >= BLOCK_S;
                 if is_whole { self.settle(judge, rest_v, time_s) } else { Seen::Nothing }
             }
         }
@@ -115,13 +117,18 @@ impl Following {
 
     /// How far the baseline goes towards the mean of so many frames, which it has not seen for `away_s` (s).
     fn share(&mut self, judge: &Judge, frames: f64, away_s: f64) -> f64 {
-        let adc = &judge.detector().adc;
-        let drift = DRIFT_CODES_PER_S * away_s * adc.lsb_v() / adc.deviation_v();
-        self.worth = 1.0 / (1.0 / self.worth + drift * drift);
+        self.worth = self.worth_after(judge, away_s);
         let by_frames = frames / (self.worth + frames);
         let is_sure = self.worth + frames > BEHIND;
         self.worth = (self.worth + frames).min(BEHIND);
         if is_sure { by_frames.min(away_s / FOLLOW_S) } else { by_frames }
+    }
+
+    /// Frames that the baseline is worth after so long without a look at the detector at rest (s).
+    fn worth_after(&self, judge: &Judge, away_s: f64) -> f64 {
+        let adc = &judge.detector().adc;
+        let drift = DRIFT_CODES_PER_S * away_s * adc.lsb_v() / adc.deviation_v();
+        1.0 / (1.0 / self.worth + drift * drift)
     }
 }
 
