@@ -53,7 +53,10 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["forward", "--scene", "jazz"], "rolling-ball"),
         (&["forward", "--fault", "open"], "open:3, short:2,7"),
         (&["forward", "--press", "0,0,2.5"], "tip_radius_mm,force_n"),
-        (&["forward", "--contact", "0,0,1,1e-3", "--time", "2"], "--scene"),
+        (&["forward", "--contact", "0,0,1,1e-3", "--time=-2"], "0 or above"),
+        (&["forward", "--fault", "driving-sheet:100:3"], "1 or 2 points"),
+        (&["live", "--time-factor", "10"], "--simulate"),
+        (&["live", "--simulate", "--time-factor", "0"], "above 0"),
         (&["study", "contacts", "--scenes", "0"], "--scenes"),
         (&["dance"], "dance"),
     ] {
@@ -77,6 +80,11 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         (&["forward", "--scene", "rest"], "nothing to compute"),
         (&["forward", "--scene", "single", "--fault", "swap:3,16"], "swap:3,16: there is no electrode 16"),
         (&["forward", "--model", "slab", "--scene", "single", "--fault", "uneven:0.2"], "leave out --model slab"),
+        (
+            &["forward", "--model", "shell", "--scene", "single", "--fault", "driving-sheet:100"],
+            "its driving layer has a sheet resistance, which only the slab can have",
+        ),
+        (&["forward", "--fault", "leak:0.01", "--save-jacobian", "no.jacobian"], "leave out --fault leak"),
         (&["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"], "Poisson's ratio is 0.6"),
         (&["live", "--port", "/dev/null", "--elf", text, "--json"], elf),
         (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
@@ -195,6 +203,24 @@ fn scenes_faults_and_noise_repeat_with_their_seed() {
     };
     assert_eq!(measured("5"), measured("5"));
     assert_ne!(measured("5"), measured("6"));
+}
+
+#[test]
+fn foam_creeps_and_drifts_up_to_the_time_asked_for() {
+    let report = |more: &[&str]| -> serde_json::Value {
+        let output = tactomo(&[&["forward", "--contact", "0,0,3,1e-3", "--json"], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let conductance_s = |report: &serde_json::Value| report["touches"][0]["conductance_s"].as_f64().unwrap();
+    let crept = report(&["--fault", "creep:0.2:3", "--time", "3"]);
+    let expected_s = 1e-3 * (1.0 + 0.2 * (1.0 - (-1.0f64).exp()));
+    assert!((conductance_s(&crept) / expected_s - 1.0).abs() < 1e-5, "{}", conductance_s(&crept));
+    let drifted = report(&["--fault", "drift:0.2:86400", "--time", "86400"]);
+    assert_eq!(conductance_s(&drifted), 1e-3);
+    let [drifted, told] =
+        [drifted, report(&["--fault", "conductivity:1.2"])].map(|report| report["readings_v"][5][10].as_f64().unwrap());
+    assert!((drifted / told - 1.0).abs() < 2e-3, "{drifted} {told}");
 }
 
 #[test]

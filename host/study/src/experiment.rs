@@ -7,9 +7,10 @@ use nalgebra::DMatrix;
 
 use super::scenes::electrode_distance_m;
 use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
 use tactomo_physics::readings::Readings;
-use tactomo_physics::rest::{Rest, RestSum};
+use tactomo_physics::rest::{Leakage, Rest, RestPatterns, RestSum};
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Fault, FaultError, Measurement, finer_model};
 use tactomo_touch::solve::{Problem, SolveError};
@@ -34,6 +35,12 @@ pub enum StudyError {
         solver: String,
         /// Why.
         error: SolveError,
+    },
+    /// Frames have no time.
+    #[error("fault {fault} acts through time, which the frames of a study do not have; `live --simulate` plays it")]
+    OfTime {
+        /// The fault.
+        fault: String,
     },
     /// A detector on which not all scenes can be.
     #[error("detector {detector} is curved: studies press flat detectors, where contacts of any shape have a model")]
@@ -68,6 +75,8 @@ pub struct Experiment {
     /// The detector as it is measured in truth.
     measured: Detector,
     faults: Vec<Fault>,
+    /// The linear theory of all its electrodes, as it is described.
+    whole: Arc<Jacobian>,
     /// Impedance while the baseline is taken (ohm), if something presses meanwhile.
     rest_ohm: Option<DMatrix<f64>>,
 }
@@ -89,6 +98,7 @@ impl Experiment {
         let truth = finer_model(detector, &[], 0)?.into();
         Ok(Self {
             detector: detector.clone(),
+            whole: Arc::clone(&problem.jacobian),
             problem,
             model_time,
             model: name,
@@ -104,10 +114,10 @@ impl Experiment {
     /// # Errors
     /// [`StudyError`] if it cannot have them.
     pub fn with_faults(&self, faults: &[Fault], seed: u64) -> Result<Self, StudyError> {
-        let changes_model = |fault: &Fault| {
-            matches!(fault, Fault::ContactSpread { .. } | Fault::Conductivity { .. } | Fault::Uneven { .. })
-        };
-        let truth = match faults.iter().any(changes_model) {
+        if let Some(fault) = faults.iter().find(|fault| fault.is_of_time()) {
+            return Err(StudyError::OfTime { fault: fault.to_string() });
+        }
+        let truth: Arc<dyn ForwardModel> = match faults.iter().any(Fault::is_of_model) {
             true => finer_model(&self.detector, faults, seed)?.into(),
             false => Arc::clone(&self.truth),
         };
@@ -133,7 +143,8 @@ impl Experiment {
     /// The same readings, measured by another converter or drive, which solvers know of.
     pub fn measured_as(&self, detector: &Detector) -> Self {
         let problem = self.problem.measured_as(detector);
-        Self { detector: detector.clone(), measured: detector.clone(), problem, ..self.again() }
+        let whole = Jacobian { detector: detector.clone(), ..(*self.whole).clone() }.into();
+        Self { detector: detector.clone(), measured: detector.clone(), problem, whole, ..self.again() }
     }
 
     /// The same, inverted on another model.
@@ -156,6 +167,7 @@ impl Experiment {
             model: self.model.clone(),
             truth: Arc::clone(&self.truth),
             measured: self.measured.clone(),
+            whole: Arc::clone(&self.whole),
             faults: self.faults.clone(),
             rest_ohm: self.rest_ohm.clone(),
         }
@@ -163,11 +175,21 @@ impl Experiment {
 
     /// The baseline: what the first frames are.
     fn rest(&self, measurement: &mut Measurement) -> Rest {
+        // Of a detector that leaks there is something to read even then.
+        let rest_ohm = self.rest_ohm.clone().or_else(|| self.truth.impedance_ohm(&[]).ok());
         let mut sum = RestSum::default();
         for _ in 0..BASELINE_FRAMES {
-            sum.add(measurement.readings_v(self.rest_ohm.as_ref()).volts(), 1);
+            sum.add(measurement.readings_v(rest_ohm.as_ref()).volts(), 1);
         }
         sum.rest(&self.detector.adc, 1)
+    }
+
+    /// Leakage, and how much of it is in a baseline (sheet conductances); none on a detector that does not leak.
+    fn leakage(&self, rest: &Rest) -> Option<(Leakage, f64)> {
+        self.truth.impedance_ohm(&[]).ok()?;
+        let all: Vec<usize> = (0..self.whole.electrodes()).collect();
+        let found = RestPatterns::new(&self.whole, &all).explain(rest.offset_v());
+        Some((Leakage::new(&self.whole, &all), found.leakage_sheets)).filter(|(_, sheets)| *sheets > 0.0)
     }
 
     /// Mean distance of electrodes (m): contacts further from the truth are counted as missed and invented.
@@ -182,17 +204,23 @@ impl Experiment {
     pub fn frames(&self, touches: &[Vec<Touch>], seed: u64) -> Result<Vec<Frame>, StudyError> {
         let mut measurement = Measurement::new(&self.measured, &self.faults, seed)?;
         let rest = self.rest(&mut measurement);
+        let leakage = self.leakage(&rest);
         let mut frames: Vec<Frame> = Vec::with_capacity(touches.len());
         let mut last = None;
         for touches in touches {
             let impedance_ohm = match last.take() {
                 Some((before, impedance_ohm)) if before == touches => impedance_ohm,
-                _ if touches.is_empty() => None,
-                _ => Some(touched_impedance_ohm(&*self.truth, touches)?),
+                _ => match touched_impedance_ohm(&*self.truth, touches) {
+                    Err(ForwardError::NoContact) if touches.is_empty() => None,
+                    impedance_ohm => Some(impedance_ohm?),
+                },
             };
             let measured = measurement.readings_v(impedance_ohm.as_ref());
             let mut readings = measured.clone();
             rest.subtract(measured.volts(), readings.volts_mut());
+            if let Some((leakage, sheets)) = &leakage {
+                leakage.take_off(readings.volts_mut(), *sheets);
+            }
             let contacts = touches.iter().map(Touch::disc).collect();
             frames.push(Frame { touches: touches.clone(), contacts, readings });
             last = Some((touches, impedance_ohm));
@@ -266,6 +294,24 @@ mod tests {
         let contact = SceneKind::Firm.frames(&experiment.detector, 1, 1)[0][0].disc().unwrap();
         let loaded = readings(&experiment.with_baseline(&[contact]).unwrap(), 1);
         assert!(loaded.volts().iter().all(|volts| volts.abs() < 0.01), "the same contact is no change");
+    }
+
+    #[test]
+    fn a_leak_is_a_baseline_under_all_that_presses() {
+        let experiment = experiment();
+        let leaking = experiment.with_faults(&["leak:0.01".parse().unwrap()], 1).unwrap();
+        let rest = leaking.frames(&vec![Vec::new(); 10], 1).unwrap();
+        assert!(rest.iter().all(|frame| frame.readings.volts().iter().all(|volts| volts.abs() < 0.01)));
+        let (sound, leaking) = (readings(&experiment, 1), readings(&leaking, 1));
+        let off = sound.volts().iter().zip(leaking.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // Its voltages at rest alone would leave 16 mV. The noise is the same.
+        assert!(off < 0.003, "{off}");
+    }
+
+    #[test]
+    fn faults_of_time_are_refused() {
+        let error = experiment().with_faults(&["creep:0.2:3".parse().unwrap()], 1).err().unwrap();
+        assert_eq!(error, StudyError::OfTime { fault: "creep:0.2:3".to_owned() });
     }
 
     #[test]
