@@ -188,8 +188,9 @@ impl Experiment {
     fn leakage(&self, rest: &Rest) -> Option<(Leakage, f64)> {
         self.truth.impedance_ohm(&[]).ok()?;
         let all: Vec<usize> = (0..self.whole.electrodes()).collect();
-        let found = RestPatterns::new(&self.whole, &all).explain(rest.offset_v());
-        Some((Leakage::new(&self.whole, &all), found.leakage_sheets)).filter(|(_, sheets)| *sheets > 0.0)
+        let (patterns, leakage) = (RestPatterns::new(&self.whole, &all), Leakage::new(&self.whole, &all));
+        let sheets = leakage.at_rest(&patterns, rest.offset_v());
+        (sheets > 0.0).then_some((leakage, sheets))
     }
 
     /// Mean distance of electrodes (m): contacts further from the truth are counted as missed and invented.

@@ -29,6 +29,8 @@ const LEAKAGE: [f64; 2] = [0.06, 0.1];
 /// varies by 30 % looks like contacts of 13 to 26 % of it. The lightest contacts that solvers find well are ten times as large.
 const CONTACT: f64 = 0.003;
 const CONTACT_SHARE: f64 = 0.3;
+/// Share of the readings by leakage that its pattern may be wrong by: that of a detector with a builder's tolerances is by up to 15 %.
+const UNLIKE: f64 = 0.2;
 /// Share of the drive above which something presses, whatever a person says.
 const PRESSED: f64 = 0.05;
 
@@ -91,7 +93,7 @@ impl Judge {
 
     /// Leakage in readings at rest (V), in sheet conductances.
     pub fn leakage_sheets(&self, rest_v: &[f64]) -> f64 {
-        self.patterns.explain(rest_v).leakage_sheets.max(0.0)
+        self.leakage.at_rest(&self.patterns, rest_v)
     }
 
     /// What a change of the mean of some frames (V) is, `away_s` seconds after the detector was last seen at rest.
@@ -121,12 +123,13 @@ impl Judge {
         let Detector { drive_v, adc, .. } = self.detector();
         let by_itself_v = (OFFSET_CODES * adc.lsb_v()).max(OFFSET_SHARE * drive_v);
         let most_v = if asked { by_itself_v.max(PRESSED * drive_v) } else { by_itself_v };
+        let unlike_v = UNLIKE * leakage_sheets * self.patterns.leakage_v().iter().copied().fold(0.0, f64::max);
         let noise_v = DEVIATIONS * adc.deviation_v() / f64::from(frames.max(1)).sqrt();
         // No leakage is below zero.
         let is_contact = found.contact_v > self.limit_v(&found, frames)
             && found.contact_sheets.min(found.total_sheets) > CONTACT.max(CONTACT_SHARE * leakage_sheets);
-        let is_pressed = offset_v > most_v
-            || left_v > most_v + noise_v
+        let is_pressed = offset_v > most_v + unlike_v
+            || left_v > most_v + unlike_v + noise_v
             || leakage_sheets > LEAKAGE[usize::from(asked)]
             || is_contact && !asked;
         match (is_pressed, is_contact) {

@@ -16,7 +16,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::mean_fields_ohm;
+use super::{RestPatterns, mean_fields_ohm};
 use crate::forward::jacobian::Jacobian;
 
 /// Rounds of `touch = readings - rest - what the leakage does under that touch`.
@@ -68,6 +68,21 @@ impl Leakage {
         }
     }
 
+    /// Leakage in readings at rest (V), in sheet conductances, by the patterns of the same electrodes. The patterns are those of very little:
+    /// in truth the current to each electrode passes its resistance too.
+    pub fn at_rest(&self, patterns: &RestPatterns, rest_v: &[f64]) -> f64 {
+        let linear = patterns.explain(rest_v).leakage_sheets.max(0.0);
+        let mut sheets = linear;
+        for _ in 0..ROUNDS {
+            let mut like_that_v = vec![0.0; self.electrodes * self.electrodes];
+            if sheets > NOTHING {
+                self.put(&self.readings(&self.bare.add_scalar(1.0 / sheets)), &mut like_that_v);
+                sheets *= linear / patterns.explain(&like_that_v).leakage_sheets.max(0.5 * sheets);
+            }
+        }
+        sheets
+    }
+
     /// Takes off readings, which are less what they are at rest (V), what leakage of so many sheet conductances does under a touch
     /// otherwise than at rest.
     pub fn take_off(&self, touch_v: &mut [f64], sheets: f64) {
@@ -84,7 +99,16 @@ impl Leakage {
             let effect = self.readings(&self.beside(&impedance, sheets)) - self.readings(&impedance);
             touch = &measured + &at_rest - effect;
         }
-        (0..n).for_each(|g| (0..n).for_each(|e| touch_v[index(g, e)] = touch[(g, e)]));
+        self.put(&touch, touch_v);
+    }
+
+    /// Puts readings of the electrodes that are looked at among those of all (V).
+    fn put(&self, readings: &DMatrix<f64>, all_v: &mut [f64]) {
+        for (row, g) in self.kept.iter().enumerate() {
+            for (column, e) in self.kept.iter().enumerate() {
+                all_v[g * self.electrodes + e] = readings[(row, column)];
+            }
+        }
     }
 
     /// Impedances with leakage beside what touches.
@@ -214,6 +238,17 @@ mod tests {
                     "{sheets} {discs:?}: {before_v} {after_v}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn leakage_is_found_from_readings_at_rest() {
+        let all: Vec<usize> = (0..16).collect();
+        let bench = Bench::new(&all);
+        let patterns = RestPatterns::new(&Jacobian::of(&bench.fine), &all);
+        for sheets in [0.003, 0.01, 0.05] {
+            let found = bench.leakage.at_rest(&patterns, bench.readings(sheets, &[]).volts());
+            assert!((found / sheets - 1.0).abs() < 0.005, "{sheets}: {found}");
         }
     }
 
