@@ -257,6 +257,7 @@ impl Reader {
             if *solved != *measured {
                 self.inbox.put(Event::Board(Arc::clone(&measured)));
             }
+            self.inbox.put(Event::Conversions(hello.settings.conversions()));
             let noise_v = measured.adc.deviation_v();
             let other_board = identity::other_board(&measured, &hello);
             // Settings change its Hello, and not what it is.

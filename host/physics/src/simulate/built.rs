@@ -37,8 +37,10 @@ pub fn drawn(detector: &Detector, seed: u64) -> Detector {
     let mut noise = Noise::of(seed, Stream::AsBuilt);
     let all = Parameter::all(detector, 0.0);
     let step = |parameter: Parameter| (parameter, detector.tolerances.deviation(detector, parameter) * noise.normal());
+    // Offsets are the board's, and are drawn below.
+    let all = all.into_iter().filter(|parameter| !matches!(parameter, Parameter::Offset(_)));
     // What is exact stays as it is described, to the digit.
-    let steps: Vec<_> = all.into_iter().map(step).filter(|(_, step)| *step != 0.0).collect();
+    let steps: Vec<_> = all.map(step).filter(|(_, step)| *step != 0.0).collect();
     let mut built = detector.stepped(&steps);
     settle(&mut built, detector);
     let code_v = detector.adc.lsb_v();

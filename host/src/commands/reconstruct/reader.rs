@@ -1,6 +1,7 @@
 //! Frames of a file, less the baseline, and what solves them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::baseline::Baseline;
@@ -8,6 +9,7 @@ use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
 use tactomo::board::{identity, measured};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
+use tactomo::forward::jacobian::Jacobian;
 use tactomo::readings::Readings;
 use tactomo::solve::{Guard, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver};
 
@@ -72,16 +74,16 @@ enum Touch {
 impl Reader {
     /// Opens the file and makes what solves it.
     pub fn open(input: &Input) -> anyhow::Result<Self> {
-        let Opened { file, touch, measured, chosen } = match input.presses {
+        let Opened { file, touch, jacobian, chosen } = match input.presses {
             Some(presses) => learned(input, Presses::read(presses)?)?,
             None => solved(input)?,
         };
         // That of a recording is taken as live takes it, while its frames are solved.
-        let baseline = match (&measured, input.rest) {
-            (Some(detector), None) if file.board().is_some() => Baseline::new(detector),
-            (_, frames) => Baseline::over(frames.unwrap_or(0), file.channels()),
+        let baseline = match (&jacobian, input.rest, file.board()) {
+            (Some(jacobian), None, Some(board)) => Baseline::new(Arc::clone(jacobian), board.settings.conversions()),
+            (_, frames, _) => Baseline::over(frames.unwrap_or(0), file.channels()),
         };
-        let frames = Frames::of(file, input, measured.as_ref())?;
+        let frames = Frames::of(file, input, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
         let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));
         Ok(Self { path, frames, baseline, count: 0, given, touch, detector: chosen })
     }
@@ -124,7 +126,7 @@ impl Reader {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
             if self.given == 0 {
-                self.baseline.add(&frame.volts, 1, &[]);
+                self.baseline.add(&frame.volts, 1, frame.time_s.unwrap_or_default(), &[]);
                 let volts = frame.volts.clone();
                 self.baseline.subtract(&volts, &mut frame.volts);
                 return Ok(Some(frame));
@@ -132,7 +134,7 @@ impl Reader {
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
                 bail!("{}: the baseline needs finite readings, but some of these are not", self.place());
             }
-            self.baseline.add(&frame.volts, 1, &[]);
+            self.baseline.add(&frame.volts, 1, frame.time_s.unwrap_or_default(), &[]);
             self.given -= 1;
         }
         Ok(None)
@@ -245,8 +247,8 @@ impl Frames {
 struct Opened {
     file: FrameFile,
     touch: Touch,
-    /// The detector that it must be of, as its board measures it, if that is known.
-    measured: Option<Detector>,
+    /// The linear theory of the detector that it must be of, as its board measures it, if that is known.
+    jacobian: Option<Arc<Jacobian>>,
     /// The same as it was chosen.
     chosen: Option<Detector>,
 }
@@ -273,7 +275,7 @@ fn learned(input: &Input, presses: Presses) -> anyhow::Result<Opened> {
             kernel.channels()
         );
     }
-    Ok(Opened { file, touch: Touch::Kernel(Box::new(kernel)), measured: None, chosen: None })
+    Ok(Opened { file, touch: Touch::Kernel(Box::new(kernel)), jacobian: None, chosen: None })
 }
 
 /// A solver for the detector.
@@ -309,8 +311,8 @@ fn solved(input: &Input) -> anyhow::Result<Opened> {
     let problem = Problem::new(input.model.build(&detector, None)?);
     let solver = solver(input.solver, input.lambda, &problem)?;
     let mesh = problem.jacobian.image_mesh.clone();
-    let touch = Touch::Solver { solver, detector: Box::new(detector.clone()), mesh };
-    Ok(Opened { file, touch, measured: Some(detector), chosen: Some(chosen) })
+    let touch = Touch::Solver { solver, detector: Box::new(detector), mesh };
+    Ok(Opened { file, touch, jacobian: Some(problem.jacobian), chosen: Some(chosen) })
 }
 
 /// The solver, which leaves out faulty electrodes; or, with a given lambda, of all electrodes.

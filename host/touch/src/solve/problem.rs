@@ -55,8 +55,7 @@ impl Problem {
     /// The problem through some of its electrodes, in this order, with some of all its electrodes joined. Joined electrodes are one:
     /// one of them is kept.
     pub fn through(&self, kept: &[usize], joints: &[Joint]) -> Self {
-        let mut detector = self.detector().clone();
-        detector.electrodes = kept.iter().map(|e| detector.electrodes[*e]).collect();
+        let detector = self.detector().keeping(kept);
         let pads = &self.jacobian.electrode_fields_ohm;
         let exchanges = Exchanges::new(pads, joints);
         let jacobian = Jacobian {
