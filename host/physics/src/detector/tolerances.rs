@@ -56,6 +56,23 @@ impl Tolerances {
         *self == Self::EXACT
     }
 
+    /// A share of all of them.
+    #[must_use]
+    pub fn scaled(&self, share: f64) -> Self {
+        Self {
+            thickness_share: share * self.thickness_share,
+            conductivity_share: share * self.conductivity_share,
+            top_over_bottom_factor: self.top_over_bottom_factor.powf(share),
+            uneven_share: share * self.uneven_share,
+            electrodes_m: share * self.electrodes_m,
+            contact_impedance_factor: self.contact_impedance_factor.powf(share),
+            contact_impedance_spread: share * self.contact_impedance_spread,
+            gain_share: share * self.gain_share,
+            offset_lsb: share * self.offset_lsb,
+            on_resistance_share: share * self.on_resistance_share,
+        }
+    }
+
     /// All of them by the names that they have in a file.
     pub fn named(&self) -> [(&'static str, f64); 10] {
         [

@@ -1,10 +1,10 @@
 //! What solvers are made for.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
-use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Through};
+use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Nuisance, Through};
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -13,6 +13,8 @@ pub struct Problem {
     pub model: Arc<dyn ForwardModel>,
     /// The linear theory for the detector as measured, and the mesh that solvers' images are on.
     pub jacobian: Arc<Jacobian>,
+    /// What is not known of the detector; made when it is asked for first.
+    nuisance: Arc<OnceLock<Option<Nuisance>>>,
 }
 
 impl Problem {
@@ -28,7 +30,7 @@ impl Problem {
     pub fn new(model: impl Into<Arc<dyn ForwardModel>>) -> Self {
         let model = model.into();
         let jacobian = Arc::new(Jacobian::of(&*model));
-        Self { model, jacobian }
+        Self { model, jacobian, nuisance: Arc::default() }
     }
 
     /// The same with another linear theory, on a mesh of its own.
@@ -46,6 +48,19 @@ impl Problem {
         &self.jacobian.detector
     }
 
+    /// What is not known of the detector; `None` if it is taken as exact. The first call makes a model for each of some dozens of parameters,
+    /// which takes about a second.
+    pub fn nuisance(&self) -> Option<&Nuisance> {
+        let made = || {
+            let nuisance = Nuisance::new(&self.model);
+            nuisance.unwrap_or_else(|error| {
+                tracing::warn!("what is not known of the detector is left out: {error}");
+                None
+            })
+        };
+        self.nuisance.get_or_init(made).as_ref()
+    }
+
     /// Mean distance of electrodes (m): the side of a square that each has for itself.
     pub fn spacing_m(&self) -> f64 {
         let area_m2: f64 = self.jacobian.image_mesh.node_areas_m2.iter().sum();
@@ -55,8 +70,7 @@ impl Problem {
     /// The problem through some of its electrodes, in this order, with some of all its electrodes joined. Joined electrodes are one:
     /// one of them is kept.
     pub fn through(&self, kept: &[usize], joints: &[Joint]) -> Self {
-        let mut detector = self.detector().clone();
-        detector.electrodes = kept.iter().map(|e| detector.electrodes[*e]).collect();
+        let detector = self.detector().keeping(kept);
         let pads = &self.jacobian.electrode_fields_ohm;
         let exchanges = Exchanges::new(pads, joints);
         let jacobian = Jacobian {
@@ -66,6 +80,6 @@ impl Problem {
             ..(*self.jacobian).clone()
         };
         let model = Through::new(Arc::clone(&self.model), kept.to_vec(), joints.to_vec());
-        Self { model: Arc::new(model), jacobian: Arc::new(jacobian) }
+        Self { model: Arc::new(model), jacobian: Arc::new(jacobian), nuisance: Arc::default() }
     }
 }

@@ -4,6 +4,7 @@
 //! more at a time from where it would explain most ([`scan`], in which contacts are spots of a small [`network`]), as long as
 //! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
 
+mod covariance;
 mod discs;
 mod evidence;
 mod exchange;
@@ -24,6 +25,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+pub(super) use self::covariance::Covariance;
 use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
 use self::evidence::Prior;
 use self::exchange::{Logs, Usual};
@@ -38,8 +40,9 @@ use super::evidence::{Evidence, misfit_limit};
 use super::still::{self, Mean, Still};
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
 use tactomo_physics::forward::spots::SpotFields;
-use tactomo_physics::forward::{ForwardError, ForwardModel};
+use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
 use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
 
 /// Places of the scan.
 const SCAN_PLACES: usize = 600;
@@ -102,14 +105,24 @@ struct Explanation {
     fit: DiscFit,
     /// Probability of their count, among the counts that were tried; none once it has changed without a search.
     certainty: Option<f64>,
+    /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
+    covariance: Option<Arc<Covariance>>,
+}
+
+impl Found {
+    /// What the readings may be off by together, by which it was compared with others.
+    pub fn covariance(&self) -> Option<&Arc<Covariance>> {
+        self.0.covariance.as_ref()
+    }
 }
 
 impl Explanation {
     /// A fit, with the logarithms of the evidence for each count.
-    fn new(fit: DiscFit, by_count: &[f64]) -> Self {
+    fn new(fit: DiscFit, by_count: &[f64], target: &Target) -> Self {
         let of = by_count[fit.contacts.len()];
         let all: f64 = by_count.iter().map(|other| (other - of).exp()).sum();
-        Self { fit, certainty: Some(1.0 / all).filter(|share| share.is_finite()) }
+        let certainty = Some(1.0 / all).filter(|share| share.is_finite());
+        Self { fit, certainty, covariance: target.covariance().cloned() }
     }
 }
 
@@ -158,13 +171,28 @@ impl ContactFinder {
         super::check(readings, self.network.electrodes())
     }
 
-    /// What the mean of some frames is fitted as.
+    /// What the mean of some frames is fitted as; `covariance` is what they may be off by together, if the detector is not known exactly.
     ///
     /// # Errors
     /// [`SolveError`] if they cannot be those of the detector.
-    pub fn target_of(&self, mean: &Mean) -> Result<Target, SolveError> {
+    pub fn target_of(&self, mean: &Mean, covariance: Option<&Arc<Covariance>>) -> Result<Target, SolveError> {
         self.check(&mean.readings)?;
-        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors))
+        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, covariance))
+    }
+
+    /// The same target with what the readings of such contacts may be off by together; `None` if the detector is known exactly, or contacts make no sense.
+    fn informed(&self, target: &Target, contacts: &[Contact]) -> Option<Target> {
+        let detector = self.problem.detector();
+        let mut patterns_v = self.problem.nuisance()?.patterns_v(contacts, detector).ok()?;
+        let made_for = readings_v(&self.problem.model.impedance_ohm(contacts).ok()?, detector);
+        let of_pads = self.errors.pad_patterns_v(&made_for);
+        let (n, columns) = (detector.electrodes.len(), patterns_v.ncols());
+        patterns_v = patterns_v.resize_horizontally(columns + n, 0.0);
+        of_pads.iter().enumerate().for_each(|(row, volts)| patterns_v[(row, columns + row / n)] = *volts);
+        target.mask(&mut patterns_v);
+        let least_v = self.errors.least_v(made_for.largest_v());
+        let covariance = Covariance::of(&patterns_v, made_for.volts().to_vec(), least_v);
+        Some(target.with(covariance))
     }
 
     /// What averages frames that stand still.

@@ -20,6 +20,8 @@ const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
 const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
 /// With radii free: each step of a wide disc costs as much as ten of a fingertip's.
 const RELEASED: Effort = Effort { steps: 6, gain: 0.2, share: 0.02 };
+/// How often a search is repeated by what its own answer's readings may be off by.
+const RENEWALS: usize = 2;
 /// Starts of one more contact, and how many of them go on.
 const STARTS: usize = 4;
 const FINALISTS: usize = 2;
@@ -51,8 +53,15 @@ const TOUCHING: f64 = 2.0;
 impl ContactFinder {
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
-        let target = Target::new(readings, &self.errors);
-        Some(self.one(&target)?.cost / target.count().max(1) as f64)
+        let mut target = Target::of_mean(readings, 1, &self.errors, None);
+        let begun = self.begun(&target)?;
+        target = self.informed(&target, &begun).unwrap_or(target);
+        let mut one = self.one(&target)?;
+        if target.is_stale(&one.volts) {
+            target = self.informed(&target, &one.contacts).unwrap_or(target);
+            one = self.one(&target)?;
+        }
+        Some(one.cost / target.count().max(1) as f64)
     }
 
     /// Whether there is any contact at all, as far as single ones tell.
@@ -63,7 +72,37 @@ impl ContactFinder {
 
     /// What explains a frame, from what explains it so far if that leads there, else from nothing. Each better explanation on the way
     /// goes to `better`.
+    ///
+    /// All are compared by what the readings of one scene may be off by together; if the answer is another scene, they are compared again by
+    /// what its readings may be.
     pub(super) fn search(
+        &self,
+        from: Option<&Explanation>,
+        target: &Target,
+        better: &mut dyn FnMut(&Explanation),
+    ) -> Option<Explanation> {
+        let begun = from.map(|from| from.fit.contacts.clone()).or_else(|| self.begun(target))?;
+        let Some(mut target) = self.informed(target, &begun) else { return self.search_by(from, target, better) };
+        let mut found = self.search_by(from, &target, better)?;
+        for _ in 0..RENEWALS {
+            if !target.is_stale(&found.fit.volts) {
+                break;
+            }
+            target = self.informed(&target, &found.fit.contacts).unwrap_or(target);
+            found = self.search_by(Some(&found), &target, better)?;
+        }
+        Some(found)
+    }
+
+    /// A first guess of a single contact; `None` if nothing stands out.
+    fn begun(&self, target: &Target) -> Option<Vec<Contact>> {
+        let looks = self.scan.at_first(&self.network, target);
+        let best = self.scan.ones(&looks, 1, self.apart_m()).into_iter().next()?;
+        (best.gain >= WORTH_FIRST).then(|| self.discs_of(&self.scan.start(&looks, &best)))
+    }
+
+    /// The same, by what a target says of the readings' errors.
+    fn search_by(
         &self,
         from: Option<&Explanation>,
         target: &Target,
@@ -127,7 +166,7 @@ impl ContactFinder {
         let mut by_count = vec![f64::NEG_INFINITY; self.settings.most + 1];
         let mut last = first.clone();
         let mut best = self.noted(first.clone(), &mut by_count);
-        better(&Explanation::new(first.clone(), &by_count));
+        better(&Explanation::new(first.clone(), &by_count, target));
         best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
         while last.contacts.len() < self.settings.most {
             let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
@@ -135,7 +174,7 @@ impl ContactFinder {
             last = more.0.clone();
             if more.1 > best.1 {
                 best = more;
-                better(&Explanation::new(best.0.clone(), &by_count));
+                better(&Explanation::new(best.0.clone(), &by_count, target));
             } else if !self.is_misfit(&best.0, target) || last.contacts.len() > best.0.contacts.len() + 1 {
                 break;
             }
@@ -146,7 +185,7 @@ impl ContactFinder {
             }
             let Some(other) = self.swapped(&best, target).map(|other| self.noted(other, &mut by_count)) else { break };
             best = other;
-            better(&Explanation::new(best.0.clone(), &by_count));
+            better(&Explanation::new(best.0.clone(), &by_count, target));
         }
         if self.is_misfit(&best.0, target) {
             best = self.noted(self.released(best.0, target), &mut by_count);
@@ -157,7 +196,7 @@ impl ContactFinder {
             }
             best = fewer;
         }
-        Explanation::new(best.0, &by_count)
+        Explanation::new(best.0, &by_count, target)
     }
 
     /// The more likely one.
