@@ -24,7 +24,7 @@ pub use self::auto::Auto;
 pub use self::contact::ContactFields;
 pub use self::jacobian_file::JacobianFileError;
 pub use self::joined::{Exchanges, Joint};
-pub use self::nuisance::Nuisance;
+pub use self::nuisance::{Nuisance, Similar};
 pub use self::patches::Patches;
 pub use self::slab::{Resolution, Slab};
 use self::spots::SpotFields;

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::{ForwardError, ForwardModel, readings_v};
 use crate::detector::{Detector, Parameter};
@@ -53,7 +53,47 @@ struct Change {
     even: Option<Vec<f64>>,
 }
 
+/// A detector that differs from the described one in some of its parameters.
+pub struct Similar {
+    model: Arc<dyn ForwardModel>,
+    /// Steps of those that belong to the board.
+    board: Vec<(Parameter, f64)>,
+}
+
+impl Similar {
+    /// Readings of contacts (V), as the board that it is measured by has them.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if a contact is not on the detector or none conducts.
+    pub fn readings_v(&self, contacts: &[Contact], measured: &Detector) -> Result<Readings, ForwardError> {
+        let board = measured.stepped(&self.board);
+        let mut readings = readings_v(&self.model.impedance_ohm(contacts)?, &board);
+        let n = readings.electrodes();
+        // Described gains are taken out of readings before they get here.
+        let gains: Vec<_> = board.electrodes.iter().zip(&measured.electrodes).map(|(b, m)| b.gain / m.gain).collect();
+        readings.volts_mut().iter_mut().enumerate().for_each(|(index, volts)| *volts *= gains[index % n]);
+        Ok(readings)
+    }
+}
+
 impl Nuisance {
+    /// How many independent directions there are.
+    pub fn directions(&self) -> usize {
+        self.directions.ncols()
+    }
+
+    /// The detector after such steps in each direction, in standard deviations.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if it cannot be modelled.
+    pub fn similar(&self, steps: &[f64]) -> Result<Similar, ForwardError> {
+        let deviations = &self.directions * DVector::from_column_slice(steps);
+        let steps = self.parameters.iter().zip(&deviations).map(|(of, step)| (of.parameter, step * of.deviation));
+        let steps: Vec<_> = steps.collect();
+        let model = self.model.of_similar(&self.model.detector().stepped(&steps))?;
+        Ok(Similar { model, board: steps.into_iter().filter(|(parameter, _)| parameter.is_of_board()).collect() })
+    }
+
     /// Of all that is not known of a model's detector; `None` if that is nothing. It takes a model for most parameters, made in as many
     /// threads as there are cores.
     ///

@@ -4,7 +4,7 @@
 //! more at a time from where it would explain most ([`scan`], in which contacts are spots of a small [`network`]), as long as
 //! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
 
-mod covariance;
+mod approximation;
 mod discs;
 mod evidence;
 mod exchange;
@@ -25,7 +25,8 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-pub(super) use self::covariance::Covariance;
+pub(super) use self::approximation::ApproximationError;
+use self::approximation::Linearised;
 use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
 use self::evidence::Prior;
 use self::exchange::{Logs, Usual};
@@ -106,12 +107,12 @@ struct Explanation {
     /// Probability of their count, among the counts that were tried; none once it has changed without a search.
     certainty: Option<f64>,
     /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
-    covariance: Option<Arc<Covariance>>,
+    covariance: Option<Arc<ApproximationError>>,
 }
 
 impl Found {
     /// What the readings may be off by together, by which it was compared with others.
-    pub fn covariance(&self) -> Option<&Arc<Covariance>> {
+    pub fn covariance(&self) -> Option<&Arc<ApproximationError>> {
         self.0.covariance.as_ref()
     }
 }
@@ -175,15 +176,17 @@ impl ContactFinder {
     ///
     /// # Errors
     /// [`SolveError`] if they cannot be those of the detector.
-    pub fn target_of(&self, mean: &Mean, covariance: Option<&Arc<Covariance>>) -> Result<Target, SolveError> {
+    pub fn target_of(&self, mean: &Mean, covariance: Option<&Arc<ApproximationError>>) -> Result<Target, SolveError> {
         self.check(&mean.readings)?;
         Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, covariance))
     }
 
-    /// The same target with what the readings of such contacts may be off by together; `None` if the detector is known exactly, or contacts make no sense.
-    fn informed(&self, target: &Target, contacts: &[Contact]) -> Option<Target> {
+    /// The same target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
+    /// if the detector is known exactly, or contacts make no sense.
+    fn informed(&self, target: &Target, contacts: &[Contact], near: Option<&Arc<Linearised>>) -> Option<Target> {
         let detector = self.problem.detector();
-        let mut patterns_v = self.problem.nuisance()?.patterns_v(contacts, detector).ok()?;
+        let nuisance = self.problem.nuisance()?;
+        let mut patterns_v = nuisance.patterns_v(contacts, detector).ok()?;
         let made_for = readings_v(&self.problem.model.impedance_ohm(contacts).ok()?, detector);
         let of_pads = self.errors.pad_patterns_v(&made_for);
         let (n, columns) = (detector.electrodes.len(), patterns_v.ncols());
@@ -191,8 +194,23 @@ impl ContactFinder {
         of_pads.iter().enumerate().for_each(|(row, volts)| patterns_v[(row, columns + row / n)] = *volts);
         target.mask(&mut patterns_v);
         let least_v = self.errors.least_v(made_for.largest_v());
-        let covariance = Covariance::of(&patterns_v, made_for.volts().to_vec(), least_v);
-        Some(target.with(covariance))
+        let made_for = made_for.volts().to_vec();
+        let error = ApproximationError::of(&patterns_v, nuisance.directions(), made_for, least_v);
+        Some(target.with(match near {
+            Some(near) => error.about(near, near.detector.readings_v(contacts, detector).ok()?.volts()),
+            None => error,
+        }))
+    }
+
+    /// The detector that a fit makes most likely, if it is far from where the target is linear.
+    fn nearer_detector(&self, fit: &DiscFit, target: &Target) -> Option<Arc<Linearised>> {
+        let (nuisance, error) = (self.problem.nuisance()?, target.covariance()?);
+        let steps = target.steps(&fit.volts);
+        if !error.is_far(&steps) {
+            return None;
+        }
+        let detector = nuisance.similar(&steps).ok()?;
+        Some(Arc::new(Linearised { steps, detector }))
     }
 
     /// What averages frames that stand still.

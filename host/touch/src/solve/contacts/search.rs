@@ -55,10 +55,10 @@ impl ContactFinder {
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
         let mut target = Target::of_mean(readings, 1, &self.errors, None);
         let begun = self.begun(&target)?;
-        target = self.informed(&target, &begun).unwrap_or(target);
+        target = self.informed(&target, &begun, None).unwrap_or(target);
         let mut one = self.one(&target)?;
         if target.is_stale(&one.volts) {
-            target = self.informed(&target, &one.contacts).unwrap_or(target);
+            target = self.informed(&target, &one.contacts, None).unwrap_or(target);
             one = self.one(&target)?;
         }
         Some(one.cost / target.count().max(1) as f64)
@@ -82,13 +82,18 @@ impl ContactFinder {
         better: &mut dyn FnMut(&Explanation),
     ) -> Option<Explanation> {
         let begun = from.map(|from| from.fit.contacts.clone()).or_else(|| self.begun(target))?;
-        let Some(mut target) = self.informed(target, &begun) else { return self.search_by(from, target, better) };
+        let mut near = from.and_then(|from| from.covariance.as_ref()?.linearised.clone());
+        let Some(mut target) = self.informed(target, &begun, near.as_ref()) else {
+            return self.search_by(from, target, better);
+        };
         let mut found = self.search_by(from, &target, better)?;
         for _ in 0..RENEWALS {
-            if !target.is_stale(&found.fit.volts) {
+            let nearer = self.nearer_detector(&found.fit, &target);
+            if nearer.is_none() && !target.is_stale(&found.fit.volts) {
                 break;
             }
-            target = self.informed(&target, &found.fit.contacts).unwrap_or(target);
+            near = nearer.or(near);
+            target = self.informed(&target, &found.fit.contacts, near.as_ref()).unwrap_or(target);
             found = self.search_by(Some(&found), &target, better)?;
         }
         Some(found)

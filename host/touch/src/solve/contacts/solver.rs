@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::discs::DiscFit;
-use super::{ContactFinder, ContactSettings, Covariance, Explanation, Found, Target};
+use super::{ApproximationError, ContactFinder, ContactSettings, Explanation, Found, Target};
 use crate::solve::evidence::Evidence;
 use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search};
 use crate::solve::still::{Mean, Still};
@@ -98,7 +98,7 @@ impl ContactFollower {
     }
 
     /// What the readings of what is followed may be off by together.
-    pub fn covariance(&self) -> Option<&Arc<Covariance>> {
+    pub fn covariance(&self) -> Option<&Arc<ApproximationError>> {
         self.last.as_ref().and_then(|last| last.covariance.as_ref())
     }
 

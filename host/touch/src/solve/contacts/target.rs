@@ -1,7 +1,7 @@
 //! The readings that a fit is made to, and how far each may be from them.
 //!
 //! Three things part readings from a model's: noise, alike for all; a small error of the model's own, taken as alike for all too; and what is not
-//! known of the detector, which changes many readings together ([`Covariance`]). Of a detector that is as described the last is
+//! known of the detector, which changes many readings together ([`ApproximationError`]). Of a detector that is as described the last is
 //! the resistance between a pad and the layer alone, which meshes and polynomials get wrong first: it adds to `Z[g][g]`, so that
 //! `dV[g][e] = (Vcc - V[g][e]) d / (Z[g][g] + R)` for all `e` but `g`, one pattern for each ground.
 
@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::covariance::Covariance;
+use super::approximation::ApproximationError;
 use tactomo_physics::readings::Readings;
 
 /// What is known of the errors of readings.
@@ -66,7 +66,7 @@ pub(in crate::solve) struct Target {
     pub(super) volts: Vec<f64>,
     /// One over the standard deviation of each (1/V); zero leaves a reading out.
     weights: Vec<f64>,
-    covariance: Arc<Covariance>,
+    covariance: Arc<ApproximationError>,
     /// Whether that is of what is not known of the detector.
     is_informed: bool,
     /// `k` of each direction.
@@ -80,7 +80,7 @@ impl Target {
         readings: &Readings,
         frames: usize,
         errors: &Errors,
-        covariance: Option<&Arc<Covariance>>,
+        covariance: Option<&Arc<ApproximationError>>,
     ) -> Self {
         let noise_v = errors.of_mean_v(frames);
         let deviation_v = noise_v.hypot(errors.model * readings.largest_v());
@@ -90,7 +90,7 @@ impl Target {
             let mut patterns_v = errors.pad_patterns_v(readings);
             let counted = patterns_v.iter_mut().zip(&weights).filter(|(_, weight)| **weight == 0.0);
             counted.for_each(|(volts, _)| *volts = 0.0);
-            Arc::new(Covariance::of_rows(&patterns_v, readings.electrodes()))
+            Arc::new(ApproximationError::of_rows(&patterns_v, readings.electrodes()))
         };
         let is_informed = covariance.is_some();
         let covariance = covariance.map_or_else(of_pads, Arc::clone);
@@ -99,19 +99,26 @@ impl Target {
     }
 
     /// The same with what the readings may be off by together.
-    pub(super) fn with(&self, covariance: Covariance) -> Self {
+    pub(super) fn with(&self, covariance: ApproximationError) -> Self {
         let shares = covariance.shares(self.deviation_v());
         Self { covariance: Arc::new(covariance), is_informed: true, shares, ..self.clone() }
     }
 
     /// What the readings may be off by together; none of a detector that is as described.
-    pub(super) fn covariance(&self) -> Option<&Arc<Covariance>> {
+    pub(super) fn covariance(&self) -> Option<&Arc<ApproximationError>> {
         Some(&self.covariance).filter(|_| self.is_informed)
     }
 
     /// Whether what the readings may be off by together was made for others than `volts`.
     pub(super) fn is_stale(&self, volts: &[f64]) -> bool {
         self.is_informed && self.covariance.is_stale(volts)
+    }
+
+    /// Steps of the detector that are most likely where contacts have such readings (V).
+    pub(super) fn steps(&self, volts: &[f64]) -> Vec<f64> {
+        let mut pulls = self.residuals(volts);
+        self.whiten_transposed(&mut pulls);
+        self.covariance.steps(&pulls)
     }
 
     /// Leaves readings that do not count out of patterns.
@@ -146,6 +153,7 @@ impl Target {
     /// Whitened differences of the readings from predicted ones.
     pub fn residuals(&self, volts: &[f64]) -> Vec<f64> {
         let mut all: Vec<_> = self.volts.iter().zip(volts).map(|(ours, theirs)| ours - theirs).collect();
+        all.iter_mut().zip(&self.covariance.mean_v).for_each(|(left, mean)| *left -= mean);
         self.whiten(&mut all);
         all
     }
