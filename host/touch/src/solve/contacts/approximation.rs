@@ -25,7 +25,7 @@ const STALE: f64 = 0.25;
 const CURVED: f64 = 0.017;
 
 /// A detector near which readings are taken as linear in its parameters.
-pub(super) struct Linearised {
+pub(in crate::solve) struct Linearised {
     /// From the described one, in each direction, in standard deviations.
     pub steps: Vec<f64>,
     pub detector: Similar,

@@ -8,6 +8,7 @@ mod approximation;
 mod discs;
 mod evidence;
 mod exchange;
+mod informed;
 mod keep;
 #[cfg(test)]
 mod motion_tests;
@@ -26,7 +27,6 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 pub(super) use self::approximation::ApproximationError;
-use self::approximation::Linearised;
 use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
 use self::evidence::Prior;
 use self::exchange::{Logs, Usual};
@@ -41,9 +41,8 @@ use super::evidence::{Evidence, misfit_limit};
 use super::still::{self, Mean, Still};
 use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
 use tactomo_physics::forward::spots::SpotFields;
-use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
+use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
-use tactomo_physics::scene::Contact;
 
 /// Places of the scan.
 const SCAN_PLACES: usize = 600;
@@ -118,6 +117,11 @@ impl Found {
 }
 
 impl Explanation {
+    /// A fit whose count was not compared with others.
+    fn of(fit: DiscFit, target: &Target) -> Self {
+        Self { fit, certainty: None, covariance: target.covariance().cloned() }
+    }
+
     /// A fit, with the logarithms of the evidence for each count.
     fn new(fit: DiscFit, by_count: &[f64], target: &Target) -> Self {
         let of = by_count[fit.contacts.len()];
@@ -179,38 +183,6 @@ impl ContactFinder {
     pub fn target_of(&self, mean: &Mean, covariance: Option<&Arc<ApproximationError>>) -> Result<Target, SolveError> {
         self.check(&mean.readings)?;
         Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, covariance))
-    }
-
-    /// The same target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
-    /// if the detector is known exactly, or contacts make no sense.
-    fn informed(&self, target: &Target, contacts: &[Contact], near: Option<&Arc<Linearised>>) -> Option<Target> {
-        let detector = self.problem.detector();
-        let nuisance = self.problem.nuisance()?;
-        let mut patterns_v = nuisance.patterns_v(contacts, detector).ok()?;
-        let made_for = readings_v(&self.problem.model.impedance_ohm(contacts).ok()?, detector);
-        let of_pads = self.errors.pad_patterns_v(&made_for);
-        let (n, columns) = (detector.electrodes.len(), patterns_v.ncols());
-        patterns_v = patterns_v.resize_horizontally(columns + n, 0.0);
-        of_pads.iter().enumerate().for_each(|(row, volts)| patterns_v[(row, columns + row / n)] = *volts);
-        target.mask(&mut patterns_v);
-        let least_v = self.errors.least_v(made_for.largest_v());
-        let made_for = made_for.volts().to_vec();
-        let error = ApproximationError::of(&patterns_v, nuisance.directions(), made_for, least_v);
-        Some(target.with(match near {
-            Some(near) => error.about(near, near.detector.readings_v(contacts, detector).ok()?.volts()),
-            None => error,
-        }))
-    }
-
-    /// The detector that a fit makes most likely, if it is far from where the target is linear.
-    fn nearer_detector(&self, fit: &DiscFit, target: &Target) -> Option<Arc<Linearised>> {
-        let (nuisance, error) = (self.problem.nuisance()?, target.covariance()?);
-        let steps = target.steps(&fit.volts);
-        if !error.is_far(&steps) {
-            return None;
-        }
-        let detector = nuisance.similar(&steps).ok()?;
-        Some(Arc::new(Linearised { steps, detector }))
     }
 
     /// What averages frames that stand still.

@@ -147,7 +147,7 @@ impl ContactFollower {
 
     /// What is left of the frames that were followed last, and what that takes; of nothing, all of it.
     pub fn evidence(&self, target: &Target) -> Evidence {
-        let nothing = || Evidence::of(target.cost(&vec![0.0; target.volts.len()]), 0);
+        let nothing = || Evidence::of(target.cost_of_nothing(), 0);
         self.last.as_ref().map_or_else(nothing, |last| self.finder.evidence_of(&last.fit))
     }
 

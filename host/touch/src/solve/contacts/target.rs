@@ -164,6 +164,21 @@ impl Target {
         dot(&residuals, &residuals)
     }
 
+    /// The same for there being no contact, which reads nothing on any detector: with what is added to it where contacts, whose readings an
+    /// unknown detector changes, are judged without their determinant.
+    pub fn cost_of_nothing(&self) -> f64 {
+        if !self.is_informed {
+            return self.cost(&vec![0.0; self.volts.len()]);
+        }
+        let squares = self.volts.iter().zip(&self.weights).map(|(volts, weight)| (volts * weight).powi(2));
+        squares.sum::<f64>() - self.ln_determinant()
+    }
+
+    /// Logarithm of the determinant of the readings' covariance, in that of noise alone.
+    pub fn ln_determinant(&self) -> f64 {
+        self.shares.iter().map(|share| -2.0 * (1.0 - share).ln()).sum()
+    }
+
     /// Standard deviation of a reading that counts (V).
     pub fn deviation_v(&self) -> f64 {
         1.0 / self.weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
