@@ -21,8 +21,8 @@ use tactomo_physics::forward::Similar;
 const LEAST: f64 = 0.01;
 /// Share of the readings, in the root of the sum of squares, by which they may differ from those that the patterns were made for.
 const STALE: f64 = 0.25;
-/// Share of the readings that a step from where it was made linear may change: the square of that is about what is left out.
-const CURVED: f64 = 0.017;
+/// Share of the noise, in the root of the sum of squares, that may be left out by taking readings as linear.
+const CURVED: f64 = 0.03;
 
 /// A detector near which readings are taken as linear in its parameters.
 pub(in crate::solve) struct Linearised {
@@ -110,11 +110,13 @@ impl ApproximationError {
         self.patterns_v.tr_mul(&DVector::from_column_slice(pulls)).as_slice().to_vec()
     }
 
-    /// Whether steps of the detector are far from where it was made linear.
-    pub fn is_far(&self, steps: &[f64]) -> bool {
+    /// Whether steps of the detector are far from where it was made linear, for readings with noise of `deviation_v`: a change by some share of
+    /// the readings is not linear by about the square of that share.
+    pub fn is_far(&self, steps: &[f64], deviation_v: f64) -> bool {
         let from = self.linearised.as_ref();
         let way = DVector::from_fn(steps.len(), |i, _| steps[i] - from.map_or(0.0, |from| from.steps[i]));
-        (&self.patterns_v * way).norm() > CURVED * dot(&self.made_for, &self.made_for).sqrt()
+        let curved_v = CURVED * deviation_v * (self.made_for.len() as f64).sqrt();
+        (&self.patterns_v * way).norm_squared() > curved_v * dot(&self.made_for, &self.made_for).sqrt()
     }
 
     /// `k` of each direction, at a standard deviation of noise (V).

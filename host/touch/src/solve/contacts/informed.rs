@@ -17,6 +17,8 @@ use tactomo_physics::scene::Contact;
 
 /// How often a fit and what its readings may be off by are brought nearer to each other, at most.
 const RENEWALS: usize = 3;
+/// Mean square of what a fit leaves, above which it is the contacts that are wrong.
+const HOPELESS: f64 = 5.0;
 /// How often more contacts are looked for, at most.
 const GROWTHS: usize = 3;
 
@@ -74,7 +76,9 @@ impl ContactFinder {
     fn settled(&self, mut found: Informed) -> Informed {
         for _ in 0..RENEWALS {
             let Informed { explanation, target } = &found;
-            let nearer = self.nearer_detector(&explanation.fit, target);
+            // What contacts are missing for says nothing of the detector.
+            let is_hopeless = explanation.fit.cost > HOPELESS * target.count() as f64;
+            let nearer = if is_hopeless { None } else { self.nearer_detector(&explanation.fit, target) };
             if nearer.is_none() && !target.is_stale(&explanation.fit.volts) {
                 break;
             }
@@ -149,7 +153,7 @@ impl ContactFinder {
     fn nearer_detector(&self, fit: &DiscFit, target: &Target) -> Option<Arc<Linearised>> {
         let (nuisance, error) = (self.problem.nuisance()?, target.covariance()?);
         let steps = target.steps(&fit.volts);
-        if !error.is_far(&steps) {
+        if !error.is_far(&steps, target.deviation_v()) {
             return None;
         }
         let detector = nuisance.similar(&steps).ok()?;
