@@ -139,10 +139,19 @@ impl Nuisance {
         // Of a normal number of deviation one, the mean of the fourth power is 3.
         let even: Vec<_> = changes.iter().filter_map(|change| change.even.as_ref()).collect();
         let second = DMatrix::from_fn(size, even.len(), |row, column| 3f64.sqrt() * even[column][row]);
-        let columns = first.ncols();
-        let mut all = first.resize_horizontally(columns + even.len(), 0.0);
+        let (columns, offsets_v) = (first.ncols(), self.offsets_v(at.readings.electrodes(), measured));
+        let mut all = first.resize_horizontally(columns + even.len() + offsets_v.ncols(), 0.0);
         all.columns_mut(columns, even.len()).copy_from(&second);
+        all.columns_mut(columns + even.len(), offsets_v.ncols()).copy_from(&offsets_v);
         Ok(all)
+    }
+
+    /// What a baseline leaves of the channels' offsets (V), the same in all readings of a channel. Those below zero, half of them, are cut
+    /// off by the converter while nothing touches.
+    fn offsets_v(&self, electrodes: usize, measured: &Detector) -> DMatrix<f64> {
+        let offset_v = self.model.detector().tolerances.offset_lsb * measured.adc.lsb_v() * 0.5f64.sqrt();
+        let channels = if offset_v > 0.0 { electrodes } else { 0 };
+        DMatrix::from_fn(electrodes * electrodes, channels, |row, e| if row % electrodes == e { offset_v } else { 0.0 })
     }
 
     fn change_v(&self, changed: &Changed, at: &At<'_>) -> Result<Change, ForwardError> {

@@ -19,8 +19,10 @@ use tactomo_physics::forward::Similar;
 
 /// Share of the variance of noise below which a direction is left out.
 const LEAST: f64 = 0.01;
-/// Share of the readings, in the root of the sum of squares, by which they may differ from those that the patterns were made for.
+/// Share of the readings, in the root of the sum of squares, by which those of what is followed may differ from those that the patterns were
+/// made for; and the same where a search ends.
 const STALE: f64 = 0.25;
+const SETTLED: f64 = 0.02;
 /// Share of the noise, in the root of the sum of squares, that may be left out by taking readings as linear.
 const CURVED: f64 = 0.03;
 
@@ -127,8 +129,17 @@ impl ApproximationError {
 
     /// Whether other readings (V) would have other patterns.
     pub fn is_stale(&self, volts: &[f64]) -> bool {
+        self.is_moved(volts, STALE)
+    }
+
+    /// Whether other readings (V) are those that the patterns are of, as near as a search needs.
+    pub fn is_settled(&self, volts: &[f64]) -> bool {
+        !self.is_moved(volts, SETTLED)
+    }
+
+    fn is_moved(&self, volts: &[f64], share: f64) -> bool {
         let square = |all: &mut dyn Iterator<Item = f64>| all.map(|volts| volts * volts).sum::<f64>();
         let moved = square(&mut self.made_for.iter().zip(volts).map(|(a, b)| a - b));
-        moved > STALE * STALE * square(&mut self.made_for.iter().copied())
+        moved > share * share * square(&mut self.made_for.iter().copied())
     }
 }

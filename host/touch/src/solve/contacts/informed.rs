@@ -16,7 +16,7 @@ use tactomo_physics::forward::readings_v;
 use tactomo_physics::scene::Contact;
 
 /// How often a fit and what its readings may be off by are brought nearer to each other, at most.
-const RENEWALS: usize = 3;
+const RENEWALS: usize = 6;
 /// Mean square of what a fit leaves, above which it is the contacts that are wrong.
 const HOPELESS: f64 = 5.0;
 /// How often more contacts are looked for, at most.
@@ -79,7 +79,8 @@ impl ContactFinder {
             // What contacts are missing for says nothing of the detector.
             let is_hopeless = explanation.fit.cost > HOPELESS * target.count() as f64;
             let nearer = if is_hopeless { None } else { self.nearer_detector(&explanation.fit, target) };
-            if nearer.is_none() && !target.is_stale(&explanation.fit.volts) {
+            let is_settled = target.covariance().is_none_or(|error| error.is_settled(&explanation.fit.volts));
+            if nearer.is_none() && is_settled {
                 break;
             }
             let near = nearer.or_else(|| explanation.covariance.as_ref()?.linearised.clone());
