@@ -3,6 +3,7 @@
 //! Data always come from a [finer model](tactomo_physics::simulate::finer_model) than any that is inverted, through wires, noise and converter.
 
 mod bound;
+pub mod built;
 pub mod case;
 pub mod contacts;
 mod experiment;

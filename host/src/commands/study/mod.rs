@@ -1,6 +1,7 @@
 //! `tactomo study`: studies by name; and what these and others share.
 
 mod args;
+mod built;
 mod contacts;
 
 pub use self::args::StudyArgs;
@@ -18,12 +19,14 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Study {
+    Built(built::Args),
     Contacts(contacts::Args),
 }
 
 /// Runs the study that was asked for.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.study {
+        Study::Built(args) => built::run(args),
         Study::Contacts(args) => contacts::run(args),
     }
 }

@@ -1,10 +1,10 @@
 //! What solvers are made for.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
-use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Through};
+use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Nuisance, Through};
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -13,6 +13,8 @@ pub struct Problem {
     pub model: Arc<dyn ForwardModel>,
     /// The linear theory for the detector as measured, and the mesh that solvers' images are on.
     pub jacobian: Arc<Jacobian>,
+    /// What is not known of the detector; made when it is asked for first.
+    nuisance: Arc<OnceLock<Option<Nuisance>>>,
 }
 
 impl Problem {
@@ -28,7 +30,7 @@ impl Problem {
     pub fn new(model: impl Into<Arc<dyn ForwardModel>>) -> Self {
         let model = model.into();
         let jacobian = Arc::new(Jacobian::of(&*model));
-        Self { model, jacobian }
+        Self { model, jacobian, nuisance: Arc::default() }
     }
 
     /// The same with another linear theory, on a mesh of its own.
@@ -44,6 +46,19 @@ impl Problem {
     /// The detector as measured.
     pub fn detector(&self) -> &Detector {
         &self.jacobian.detector
+    }
+
+    /// What is not known of the detector; `None` if it is taken as exact. The first call makes a model for each of some dozens of parameters,
+    /// which takes about a second.
+    pub fn nuisance(&self) -> Option<&Nuisance> {
+        let made = || {
+            let nuisance = Nuisance::new(&self.model);
+            nuisance.unwrap_or_else(|error| {
+                tracing::warn!("what is not known of the detector is left out: {error}");
+                None
+            })
+        };
+        self.nuisance.get_or_init(made).as_ref()
     }
 
     /// Mean distance of electrodes (m): the side of a square that each has for itself.
@@ -65,6 +80,6 @@ impl Problem {
             ..(*self.jacobian).clone()
         };
         let model = Through::new(Arc::clone(&self.model), kept.to_vec(), joints.to_vec());
-        Self { model: Arc::new(model), jacobian: Arc::new(jacobian) }
+        Self { model: Arc::new(model), jacobian: Arc::new(jacobian), nuisance: Arc::default() }
     }
 }

@@ -1,7 +1,7 @@
 //! The fast half: follows whichever model was chosen last, and contacts beside it.
 
 use super::words::{as_contacts, as_whole, nothing};
-use super::{ContactFollower, Evidence, Nonlinear, ShapeFollower, Solution, SolveError, Target, image_evidence};
+use super::{ContactFollower, Evidence, Found, Nonlinear, ShapeFollower, Solution, SolveError, Target, image_evidence};
 use crate::solve::FoundContact;
 use crate::solve::follow::{Followed, Follower, Lead, Whole};
 use crate::solve::nonlinear::Descent;
@@ -56,9 +56,13 @@ impl AutoFollower {
         Self { electrodes, still, contacts, shapes, image, answer: Answer::Contacts, skip: 0, patience: PATIENCE[0] }
     }
 
-    /// What the errors of averaged readings are like; `None` if the model has no contacts.
-    fn target(&self, mean: &Mean) -> Result<Option<Target>, SolveError> {
-        self.contacts.as_ref().map(|contacts| contacts.finder().target_of(mean)).transpose()
+    /// What the errors of averaged readings are like, by what `found` or else what is followed was compared by; `None` if the model has no contacts.
+    fn target(&self, mean: &Mean, found: Option<&Found>) -> Result<Option<Target>, SolveError> {
+        let of = |contacts: &ContactFollower| {
+            let covariance = found.and_then(Found::covariance).or(contacts.covariance());
+            contacts.finder().target_of(mean, covariance)
+        };
+        self.contacts.as_ref().map(of).transpose()
     }
 
     /// Derivatives of the readings by the parameters of the contacts that are followed (V).
@@ -177,7 +181,7 @@ impl AutoFollower {
 
     fn follow_mean(&mut self, mean: &Mean) -> Result<Followed, SolveError> {
         let readings = &mean.readings;
-        let target = self.target(mean)?;
+        let target = self.target(mean, None)?;
         if !matches!(self.answer, Answer::Contacts) && self.image.is_rest(readings) {
             // The contacts beside it explain nothing of that.
             self.contacts.iter_mut().for_each(ContactFollower::let_go);
@@ -217,7 +221,7 @@ impl Follower for AutoFollower {
         self.still.add_if_new(readings.volts(), Self::slopes_v(self.contacts.as_ref()));
         let mean = self.still.mean_or(readings);
         let readings = &mean.readings;
-        let Some(target) = self.target(&mean)? else { return self.adopt_alone(lead.whole, readings) };
+        let Some(target) = self.target(&mean, lead.contacts.as_deref())? else { return self.adopt_alone(lead.whole, readings) };
         // What is followed and what was found some frames ago are all brought to this frame: the lowest score is believed. Where no
         // reading stands out there may be a very light contact still.
         let Lead { contacts: found, whole, mean: searched } = lead;

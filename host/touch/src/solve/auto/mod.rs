@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use self::follower::AutoFollower;
 use self::searcher::AutoSearcher;
-use super::contacts::{ContactFinder, ContactFollower, ContactSearcher, Target};
+use super::contacts::{ContactFinder, ContactFollower, ContactSearcher, Found, Target};
 use super::evidence::Evidence;
 use super::follow::{Follower, Parts, follow_and_search};
 use super::nonlinear::Complexity;

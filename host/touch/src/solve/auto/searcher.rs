@@ -103,11 +103,11 @@ impl Searcher for AutoSearcher {
         let mut nowhere = |_| {};
         let (contacts, found) =
             if from.is_some() { (None, &mut nowhere as &mut dyn FnMut(Lead)) } else { (contacts, found) };
-        let target = finder.target_of(&mean)?;
         let searcher = ContactSearcher::new(Arc::clone(&finder));
         let Some((contacts, solution)) = searcher.contacts(contacts.map(|found| *found), &mean, found)? else {
             return Ok(Lead { mean: Some(mean), ..Lead::default() });
         };
+        let target = finder.target_of(&mean, contacts.covariance())?;
         let whole = self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?;
         let whole = whole.map(|whole| (whole, instead_of(&solution)));
         Ok(Lead { contacts: Some(Box::new(contacts)), whole, mean: Some(mean) })

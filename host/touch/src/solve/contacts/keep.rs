@@ -18,7 +18,13 @@ impl ContactFinder {
     /// An explanation of some frames ago, brought to this one.
     pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
         let fit = self.disc_fitter().go_on(&found.fit, target, CAUGHT_UP)?;
-        Some(Explanation { fit, ..found })
+        Some(Explanation { fit, covariance: target.covariance().cloned(), ..found })
+    }
+
+    /// An explanation of this frame, by what another target says of the readings' errors.
+    pub(super) fn judged(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+        let fit = self.disc_fitter().go_on(&found.fit, target, Effort { steps: 0, ..WARM })?;
+        Some(Explanation { fit, covariance: target.covariance().cloned(), ..found })
     }
 
     /// The explanation, or what is left of it without the contacts that may not be there if that is more likely; `None` if nothing is.
@@ -38,7 +44,7 @@ impl ContactFinder {
             return Some(found);
         }
         match self.disc_fitter().fit(kept, target, WARM) {
-            Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, certainty: None }),
+            Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, certainty: None, ..found }),
             _ => Some(found),
         }
     }
@@ -48,7 +54,7 @@ impl ContactFinder {
         let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
         let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
         let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
-        Some(Explanation { fit, certainty })
+        Some(Explanation { fit, certainty, covariance: last.covariance.clone() })
     }
 
     /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each

@@ -4,9 +4,11 @@
 //! more at a time from where it would explain most ([`scan`], in which contacts are spots of a small [`network`]), as long as
 //! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
 
+mod approximation;
 mod discs;
 mod evidence;
 mod exchange;
+mod informed;
 mod keep;
 #[cfg(test)]
 mod motion_tests;
@@ -24,6 +26,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+pub(super) use self::approximation::ApproximationError;
 use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
 use self::evidence::Prior;
 use self::exchange::{Logs, Usual};
@@ -102,14 +105,29 @@ struct Explanation {
     fit: DiscFit,
     /// Probability of their count, among the counts that were tried; none once it has changed without a search.
     certainty: Option<f64>,
+    /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
+    covariance: Option<Arc<ApproximationError>>,
+}
+
+impl Found {
+    /// What the readings may be off by together, by which it was compared with others.
+    pub fn covariance(&self) -> Option<&Arc<ApproximationError>> {
+        self.0.covariance.as_ref()
+    }
 }
 
 impl Explanation {
+    /// A fit whose count was not compared with others.
+    fn of(fit: DiscFit, target: &Target) -> Self {
+        Self { fit, certainty: None, covariance: target.covariance().cloned() }
+    }
+
     /// A fit, with the logarithms of the evidence for each count.
-    fn new(fit: DiscFit, by_count: &[f64]) -> Self {
+    fn new(fit: DiscFit, by_count: &[f64], target: &Target) -> Self {
         let of = by_count[fit.contacts.len()];
         let all: f64 = by_count.iter().map(|other| (other - of).exp()).sum();
-        Self { fit, certainty: Some(1.0 / all).filter(|share| share.is_finite()) }
+        let certainty = Some(1.0 / all).filter(|share| share.is_finite());
+        Self { fit, certainty, covariance: target.covariance().cloned() }
     }
 }
 
@@ -158,13 +176,13 @@ impl ContactFinder {
         super::check(readings, self.network.electrodes())
     }
 
-    /// What the mean of some frames is fitted as.
+    /// What the mean of some frames is fitted as; `covariance` is what they may be off by together, if the detector is not known exactly.
     ///
     /// # Errors
     /// [`SolveError`] if they cannot be those of the detector.
-    pub fn target_of(&self, mean: &Mean) -> Result<Target, SolveError> {
+    pub fn target_of(&self, mean: &Mean, covariance: Option<&Arc<ApproximationError>>) -> Result<Target, SolveError> {
         self.check(&mean.readings)?;
-        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors))
+        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, covariance))
     }
 
     /// What averages frames that stand still.

@@ -17,7 +17,7 @@ use tactomo_physics::space::{self, Place};
 /// A few steps from each start, and the way to the minimum from the best.
 const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
 const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
-const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
+pub(super) const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
 /// With radii free: each step of a wide disc costs as much as ten of a fingertip's.
 const RELEASED: Effort = Effort { steps: 6, gain: 0.2, share: 0.02 };
 /// Starts of one more contact, and how many of them go on.
@@ -51,8 +51,12 @@ const TOUCHING: f64 = 2.0;
 impl ContactFinder {
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
-        let target = Target::new(readings, &self.errors);
-        Some(self.one(&target)?.cost / target.count().max(1) as f64)
+        let target = Target::of_mean(readings, 1, &self.errors, None);
+        let (cost, count) = match self.alone(&target) {
+            Some(one) => (one.explanation.fit.cost, one.target.count()),
+            None => (self.one(&target)?.cost, target.count()),
+        };
+        Some(cost / count.max(1) as f64)
     }
 
     /// Whether there is any contact at all, as far as single ones tell.
@@ -61,9 +65,9 @@ impl ContactFinder {
         self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= WORTH_FIRST)
     }
 
-    /// What explains a frame, from what explains it so far if that leads there, else from nothing. Each better explanation on the way
-    /// goes to `better`.
-    pub(super) fn search(
+    /// What explains a frame of a detector that is as described, from what explains it so far if that leads there, else from nothing. Each better
+    /// explanation on the way goes to `better`.
+    pub(super) fn search_exact(
         &self,
         from: Option<&Explanation>,
         target: &Target,
@@ -75,19 +79,31 @@ impl ContactFinder {
             return Some(grown.clone());
         }
         let anew = self.one(target).map(|one| {
-            let mut starts = Vec::new();
-            if self.is_doubtful(&one, target) {
-                let looks = self.scan.at_first(&self.network, target);
-                let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
-                starts.extend(pairs.iter().map(|pair| self.discs_of(&self.scan.start(&looks, pair))));
-            }
+            let starts = self.pairs(&one, target);
             self.grow(one, starts, target, better)
         });
         [grown, anew].into_iter().flatten().max_by(|a, b| self.evidence(&a.fit).total_cmp(&self.evidence(&b.fit)))
     }
 
+    /// Starts of two contacts at once, where one leaves a little more than it should.
+    pub(super) fn pairs(&self, one: &DiscFit, target: &Target) -> Vec<Vec<Contact>> {
+        if one.contacts.len() > 1 || !self.is_doubtful(one, target) {
+            return Vec::new();
+        }
+        let looks = self.scan.at_first(&self.network, target);
+        let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
+        pairs.iter().map(|pair| self.discs_of(&self.scan.start(&looks, pair))).collect()
+    }
+
+    /// A first guess of a single contact; `None` if nothing stands out.
+    pub(super) fn begun(&self, target: &Target) -> Option<Vec<Contact>> {
+        let looks = self.scan.at_first(&self.network, target);
+        let best = self.scan.ones(&looks, 1, self.apart_m()).into_iter().next()?;
+        (best.gain >= WORTH_FIRST).then(|| self.discs_of(&self.scan.start(&looks, &best)))
+    }
+
     /// The best single contact, if anything stands out.
-    fn one(&self, target: &Target) -> Option<DiscFit> {
+    pub(super) fn one(&self, target: &Target) -> Option<DiscFit> {
         let looks = self.scan.at_first(&self.network, target);
         let ones = self.scan.ones(&looks, STARTS, self.apart_m());
         if ones.first().is_none_or(|best| best.gain < WORTH_FIRST) {
@@ -117,7 +133,7 @@ impl ContactFinder {
     }
 
     /// More contacts as long as the evidence for them grows, then fewer. `starts` are tried for the second one.
-    fn grow(
+    pub(super) fn grow(
         &self,
         first: DiscFit,
         mut starts: Vec<Vec<Contact>>,
@@ -127,7 +143,7 @@ impl ContactFinder {
         let mut by_count = vec![f64::NEG_INFINITY; self.settings.most + 1];
         let mut last = first.clone();
         let mut best = self.noted(first.clone(), &mut by_count);
-        better(&Explanation::new(first.clone(), &by_count));
+        better(&Explanation::new(first.clone(), &by_count, target));
         best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
         while last.contacts.len() < self.settings.most {
             let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
@@ -135,7 +151,7 @@ impl ContactFinder {
             last = more.0.clone();
             if more.1 > best.1 {
                 best = more;
-                better(&Explanation::new(best.0.clone(), &by_count));
+                better(&Explanation::new(best.0.clone(), &by_count, target));
             } else if !self.is_misfit(&best.0, target) || last.contacts.len() > best.0.contacts.len() + 1 {
                 break;
             }
@@ -146,7 +162,7 @@ impl ContactFinder {
             }
             let Some(other) = self.swapped(&best, target).map(|other| self.noted(other, &mut by_count)) else { break };
             best = other;
-            better(&Explanation::new(best.0.clone(), &by_count));
+            better(&Explanation::new(best.0.clone(), &by_count, target));
         }
         if self.is_misfit(&best.0, target) {
             best = self.noted(self.released(best.0, target), &mut by_count);
@@ -157,7 +173,7 @@ impl ContactFinder {
             }
             best = fewer;
         }
-        Explanation::new(best.0, &by_count)
+        Explanation::new(best.0, &by_count, target)
     }
 
     /// The more likely one.
@@ -216,7 +232,7 @@ impl ContactFinder {
     }
 
     /// Whether a fit leaves a little more than noise should, or needs a contact as wide as may be.
-    fn is_doubtful(&self, fit: &DiscFit, target: &Target) -> bool {
+    pub(super) fn is_doubtful(&self, fit: &DiscFit, target: &Target) -> bool {
         let freedom = self.freedom(fit, target);
         let widest_m = 0.95 * PLAUSIBLE * self.settings.radius_m;
         let is_wide = fit.contacts.len() > 1 && fit.contacts.iter().any(|contact| contact.radius_m > widest_m);
@@ -271,8 +287,13 @@ impl ContactFinder {
                 merged
             })
         });
-        let fewer = self.best_of(self.weak(fit).into_iter().map(without).chain(merged).collect(), target)?;
+        let fewer = self.best_of(self.dispensable(fit, target).into_iter().map(without).chain(merged).collect(), target)?;
         Some(self.released(fewer, target))
+    }
+
+    /// Contacts that a fit may do without: weak ones, and of a detector that is not known exactly any, as they may stand for what it differs by.
+    fn dispensable(&self, fit: &DiscFit, target: &Target) -> Vec<usize> {
+        if target.covariance().is_some() { (0..fit.contacts.len()).collect() } else { self.weak(fit) }
     }
 
     fn merged(&self, a: &Contact, b: &Contact) -> Contact {
@@ -321,7 +342,7 @@ impl ContactFinder {
 
     /// The same for there being no contact.
     pub(super) fn evidence_of_nothing(&self, target: &Target) -> f64 {
-        -0.5 * target.cost(&vec![0.0; target.volts.len()])
+        -0.5 * target.cost_of_nothing()
     }
 
     /// Starts nearer to each other are one (m).

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::discs::DiscFit;
-use super::{ContactFinder, ContactSettings, Explanation, Found, Target};
+use super::{ApproximationError, ContactFinder, ContactSettings, Explanation, Found, Target};
 use crate::solve::evidence::Evidence;
 use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search};
 use crate::solve::still::{Mean, Still};
@@ -97,6 +97,11 @@ impl ContactFollower {
         self.last.as_ref().map_or(&[], |last| last.fit.slopes_v())
     }
 
+    /// What the readings of what is followed may be off by together.
+    pub fn covariance(&self) -> Option<&Arc<ApproximationError>> {
+        self.last.as_ref().and_then(|last| last.covariance.as_ref())
+    }
+
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
         self.before = self.tracker.clone();
@@ -107,7 +112,9 @@ impl ContactFollower {
         };
         self.is_stale = false;
         let Some(found) = self.finder.without_weak(moved, target) else { return self.finder.stands_out(target) };
-        let search = found.fit.cost > self.enough(&found.fit, target) || target.frames >= MORE * self.searched.frames;
+        let search = found.fit.cost > self.enough(&found.fit, target)
+            || target.frames >= MORE * self.searched.frames
+            || target.is_stale(&found.fit.volts);
         self.last = Some(found);
         search
     }
@@ -118,6 +125,7 @@ impl ContactFollower {
         self.tracker = self.before.clone();
         let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
         let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
+        self.last = self.last.take().and_then(|last| self.finder.judged(last, target));
         let evidence = |found: &Option<Explanation>| {
             let of = |found: &Explanation| self.finder.evidence(&found.fit);
             found.as_ref().map_or_else(|| self.finder.evidence_of_nothing(target), of)
@@ -139,7 +147,7 @@ impl ContactFollower {
 
     /// What is left of the frames that were followed last, and what that takes; of nothing, all of it.
     pub fn evidence(&self, target: &Target) -> Evidence {
-        let nothing = || Evidence::of(target.cost(&vec![0.0; target.volts.len()]), 0);
+        let nothing = || Evidence::of(target.cost_of_nothing(), 0);
         self.last.as_ref().map_or_else(nothing, |last| self.finder.evidence_of(&last.fit))
     }
 
@@ -173,7 +181,7 @@ impl ContactFollower {
 
 impl FrameFollower {
     fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
-        self.contacts.finder.target_of(&self.still.mean_or(readings))
+        self.contacts.finder.target_of(&self.still.mean_or(readings), self.contacts.covariance())
     }
 }
 
@@ -189,7 +197,8 @@ impl Follower for FrameFollower {
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
         self.still.add_if_new(readings.volts(), self.contacts.slopes_v());
-        let target = self.target(readings)?;
+        let covariance = lead.contacts.as_ref().and_then(|found| found.covariance()).or(self.contacts.covariance());
+        let target = self.contacts.finder.target_of(&self.still.mean_or(readings), covariance)?;
         let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
         let search = self.contacts.adopt(lead.contacts.map(|found| *found), frames, &target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
@@ -223,14 +232,17 @@ impl ContactSearcher {
         mean: &Mean,
         found: &mut dyn FnMut(Lead),
     ) -> Result<Option<(Found, Solution)>, SolveError> {
-        let target = self.finder.target_of(mean)?;
+        let target = self.finder.target_of(mean, None)?;
         let mut better =
             |better: &Explanation| found(Lead::of_contacts(Some(Found(better.clone())), Some(mean.clone())));
         let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
-        Ok(found.map(|found| {
+        Ok(found
+        .map(|found| {
+            let target = self.finder.target_of(mean, found.covariance.as_ref())?;
             let solution = self.finder.solution(&found, &target);
-            (Found(found), solution)
-        }))
+            Ok((Found(found), solution))
+        })
+        .transpose()?)
     }
 }
 

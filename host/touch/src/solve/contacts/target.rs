@@ -1,11 +1,15 @@
 //! The readings that a fit is made to, and how far each may be from them.
 //!
-//! Three things part readings from a model's: noise, alike for all; an error of the model, taken as alike for all too; and
-//! the resistance between a pad and the layer, which no builder knows to a per cent and which meshes and polynomials get wrong
-//! first. It adds to `Z[g][g]` alone, so that `dV[g][e] = (Vcc - V[g][e]) d / (Z[g][g] + R)` for all `e` but `g`: one pattern for
-//! each ground. With a covariance `s^2 (I + a q q^T)` of a row, `q` of length one, `(I - k q q^T) / s` makes its errors alike
-//! and independent, with `k = 1 - (1 + a)^(-1/2)`.
+//! Three things part readings from a model's: noise, alike for all; a small error of the model's own, taken as alike for all too; and what is not
+//! known of the detector, which changes many readings together ([`ApproximationError`]). Of a detector that is as described the last is
+//! the resistance between a pad and the layer alone, which meshes and polynomials get wrong first: it adds to `Z[g][g]`, so that
+//! `dV[g][e] = (Vcc - V[g][e]) d / (Z[g][g] + R)` for all `e` but `g`, one pattern for each ground.
 
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use super::approximation::ApproximationError;
 use tactomo_physics::readings::Readings;
 
 /// What is known of the errors of readings.
@@ -31,12 +35,29 @@ impl Errors {
         let [all, fixed] = [self.noise_v, self.rounding_v].map(|deviation_v| deviation_v * deviation_v);
         (fixed + (all - fixed).max(0.0) / frames.max(1) as f64).sqrt()
     }
+
+    /// Smallest standard deviation of a mean of frames with such readings (V).
+    pub fn least_v(&self, largest_v: f64) -> f64 {
+        self.of_mean_v(usize::MAX).hypot(self.model * largest_v)
+    }
+
+    /// What an error of a pad's own impedance changes (V), row by row: one pattern for each ground. `Z[g][g] + R` is about the pad's own impedance times the drive
+    /// over the readings.
+    pub fn pad_patterns_v(&self, readings: &Readings) -> Vec<f64> {
+        let electrodes = readings.electrodes();
+        let row = |(g, row): (usize, &[f64])| {
+            let share = self.pad * row.iter().copied().fold(0.0, f64::max) / self.drive_v;
+            let drive_v = self.drive_v;
+            let pattern = |(e, volts): (usize, &f64)| if e == g { 0.0 } else { share * (drive_v - volts).max(0.0) };
+            row.iter().enumerate().map(pattern).collect::<Vec<_>>()
+        };
+        readings.volts().chunks_exact(electrodes).enumerate().flat_map(row).collect()
+    }
 }
 
 /// Readings with what their errors are like.
 #[derive(Clone, Debug)]
 pub(in crate::solve) struct Target {
-    electrodes: usize,
     /// Frames that the readings are the mean of.
     pub(super) frames: usize,
     /// Standard deviation of the readings by noise (V).
@@ -45,39 +66,75 @@ pub(in crate::solve) struct Target {
     pub(super) volts: Vec<f64>,
     /// One over the standard deviation of each (1/V); zero leaves a reading out.
     weights: Vec<f64>,
-    /// `q`, row by row, times the root of `k`.
-    loads: Vec<f64>,
+    covariance: Arc<ApproximationError>,
+    /// Whether that is of what is not known of the detector.
+    is_informed: bool,
+    /// `k` of each direction.
+    shares: Vec<f64>,
 }
 
 impl Target {
-    /// The target of some readings.
-    pub(super) fn new(readings: &Readings, errors: &Errors) -> Self {
-        Self::of_mean(readings, 1, errors)
-    }
-
-    /// The target of the mean of some frames. Their noise averages; the errors of the model and of the pads do not.
-    pub(super) fn of_mean(readings: &Readings, frames: usize, errors: &Errors) -> Self {
-        let electrodes = readings.electrodes();
+    /// The target of the mean of some frames. Their noise averages; the errors of the model and of the detector do not. Without a covariance, that
+    /// of a detector that is as described.
+    pub(super) fn of_mean(
+        readings: &Readings,
+        frames: usize,
+        errors: &Errors,
+        covariance: Option<&Arc<ApproximationError>>,
+    ) -> Self {
         let noise_v = errors.of_mean_v(frames);
         let deviation_v = noise_v.hypot(errors.model * readings.largest_v());
         let weight = |volts: &f64| if *volts < errors.full_v { 1.0 / deviation_v } else { 0.0 };
         let weights: Vec<_> = readings.volts().iter().map(weight).collect();
-        let mut loads = Vec::with_capacity(weights.len());
-        for (g, (row, weights)) in
-            readings.volts().chunks_exact(electrodes).zip(weights.chunks_exact(electrodes)).enumerate()
-        {
-            loads.extend(load_pattern(g, row, weights, errors));
-        }
-        Self { electrodes, frames, noise_v, volts: readings.volts().to_vec(), weights, loads }
+        let of_pads = || {
+            let mut patterns_v = errors.pad_patterns_v(readings);
+            let counted = patterns_v.iter_mut().zip(&weights).filter(|(_, weight)| **weight == 0.0);
+            counted.for_each(|(volts, _)| *volts = 0.0);
+            Arc::new(ApproximationError::of_rows(&patterns_v, readings.electrodes()))
+        };
+        let is_informed = covariance.is_some();
+        let covariance = covariance.map_or_else(of_pads, Arc::clone);
+        let shares = covariance.shares(deviation_v);
+        Self { frames, noise_v, volts: readings.volts().to_vec(), weights, covariance, is_informed, shares }
+    }
+
+    /// The same with what the readings may be off by together.
+    pub(super) fn with(&self, covariance: ApproximationError) -> Self {
+        let shares = covariance.shares(self.deviation_v());
+        Self { covariance: Arc::new(covariance), is_informed: true, shares, ..self.clone() }
+    }
+
+    /// What the readings may be off by together; none of a detector that is as described.
+    pub(super) fn covariance(&self) -> Option<&Arc<ApproximationError>> {
+        Some(&self.covariance).filter(|_| self.is_informed)
+    }
+
+    /// Whether what the readings may be off by together was made for others than `volts`.
+    pub(super) fn is_stale(&self, volts: &[f64]) -> bool {
+        self.is_informed && self.covariance.is_stale(volts)
+    }
+
+    /// Steps of the detector that are most likely where contacts have such readings (V).
+    pub(super) fn steps(&self, volts: &[f64]) -> Vec<f64> {
+        let mut pulls = self.residuals(volts);
+        self.whiten_transposed(&mut pulls);
+        self.covariance.steps(&pulls)
+    }
+
+    /// Leaves readings that do not count out of patterns.
+    pub(super) fn mask(&self, patterns_v: &mut DMatrix<f64>) {
+        let left_out = self.weights.iter().enumerate().filter(|(_, weight)| **weight == 0.0);
+        left_out.for_each(|(row, _)| patterns_v.row_mut(row).fill(0.0));
     }
 
     /// Makes the errors of volts alike, independent and of deviation one.
     pub fn whiten(&self, volts: &mut [f64]) {
         volts.iter_mut().zip(&self.weights).for_each(|(volts, weight)| *volts *= weight);
-        for (row, load) in volts.chunks_exact_mut(self.electrodes).zip(self.loads.chunks_exact(self.electrodes)) {
-            let share = dot(row, load);
-            row.iter_mut().zip(load).for_each(|(volts, load)| *volts -= share * load);
-        }
+        self.shrink(volts);
+    }
+
+    fn shrink(&self, volts: &mut [f64]) {
+        self.covariance.directions.iter().zip(&self.shares).for_each(|(direction, share)| direction.shrink(volts, *share));
     }
 
     /// A whitened copy of volts.
@@ -89,16 +146,14 @@ impl Target {
 
     /// The transpose of [`whiten`](Self::whiten), which takes whitened residuals to derivatives by volts.
     pub fn whiten_transposed(&self, whitened: &mut [f64]) {
-        for (row, load) in whitened.chunks_exact_mut(self.electrodes).zip(self.loads.chunks_exact(self.electrodes)) {
-            let share = dot(row, load);
-            row.iter_mut().zip(load).for_each(|(volts, load)| *volts -= share * load);
-        }
+        self.shrink(whitened);
         whitened.iter_mut().zip(&self.weights).for_each(|(volts, weight)| *volts *= weight);
     }
 
     /// Whitened differences of the readings from predicted ones.
     pub fn residuals(&self, volts: &[f64]) -> Vec<f64> {
         let mut all: Vec<_> = self.volts.iter().zip(volts).map(|(ours, theirs)| ours - theirs).collect();
+        all.iter_mut().zip(&self.covariance.mean_v).for_each(|(left, mean)| *left -= mean);
         self.whiten(&mut all);
         all
     }
@@ -107,6 +162,21 @@ impl Target {
     pub fn cost(&self, volts: &[f64]) -> f64 {
         let residuals = self.residuals(volts);
         dot(&residuals, &residuals)
+    }
+
+    /// The same for there being no contact, which reads nothing on any detector: with what is added to it where contacts, whose readings an
+    /// unknown detector changes, are judged without their determinant.
+    pub fn cost_of_nothing(&self) -> f64 {
+        if !self.is_informed {
+            return self.cost(&vec![0.0; self.volts.len()]);
+        }
+        let squares = self.volts.iter().zip(&self.weights).map(|(volts, weight)| (volts * weight).powi(2));
+        squares.sum::<f64>() - self.ln_determinant()
+    }
+
+    /// Logarithm of the determinant of the readings' covariance, in that of noise alone.
+    pub fn ln_determinant(&self) -> f64 {
+        self.shares.iter().map(|share| -2.0 * (1.0 - share).ln()).sum()
     }
 
     /// Standard deviation of a reading that counts (V).
@@ -123,22 +193,6 @@ impl Target {
     pub fn is_saturated(&self) -> bool {
         self.weights.contains(&0.0)
     }
-}
-
-/// `q` times the root of `k` for one ground. `Z[g][g] + R` is about the pad's own impedance times the drive over the readings.
-fn load_pattern(g: usize, row: &[f64], weights: &[f64], errors: &Errors) -> Vec<f64> {
-    let largest_v = row.iter().copied().fold(0.0, f64::max);
-    let share = errors.pad * largest_v / errors.drive_v;
-    let pattern = |(e, (volts, weight)): (usize, (&f64, &f64))| match e == g {
-        true => 0.0,
-        false => share * (errors.drive_v - volts).max(0.0) * weight,
-    };
-    let mut pattern: Vec<_> = row.iter().zip(weights).enumerate().map(pattern).collect();
-    let square = dot(&pattern, &pattern);
-    let k = 1.0 - 1.0 / (1.0 + square).sqrt();
-    let scale = if square > 0.0 { (k / square).sqrt() } else { 0.0 };
-    pattern.iter_mut().for_each(|value| *value *= scale);
-    pattern
 }
 
 /// Scalar product, in four sums for the processor to do at once.

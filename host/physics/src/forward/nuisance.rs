@@ -1,0 +1,280 @@
+//! What readings would be if the detector were a little different: patterns of what is not known of it.
+//!
+//! Thickness, conductivity, electrodes' places and the like are not looked for in a frame, but they are in its readings: nuisance
+//! parameters. To first order a change `s` of theirs, in standard deviations, adds `P s` to the readings, with a column of `P` for each
+//! independent direction in which the detector may differ ([`Detector::unknowns`]). With `s` normal, `P P^T` is the covariance of what a
+//! model of the described detector is wrong by: the approximation error (Kaipio and Somersalo, Statistical and computational inverse
+//! problems, 2005, section 5.8).
+//!
+//! `P` depends on what touches. Each parameter has a model of the detector with that parameter changed by one standard deviation, made
+//! once, and a column is the difference of two answers. Pads, gains and the multiplexer need no model: with `L = Z[g][g] + R`,
+//! a resistance `d` in series with ground `g` adds `(Vcc - V[g][e]) d / L`, a factor of a channel `V[g][e]` itself.
+
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{ForwardError, ForwardModel, readings_v};
+use crate::detector::{Detector, Parameter};
+use crate::readings::Readings;
+use crate::scene::Contact;
+
+/// Standard deviation of a logarithm from which its square is reckoned with as well: below, it makes less than a thirtieth of the change.
+const CURVED: f64 = 0.05;
+
+/// Models of a detector in which one thing each is different.
+pub struct Nuisance {
+    model: Arc<dyn ForwardModel>,
+    parameters: Vec<Changed>,
+    /// Steps of the parameters, in their standard deviations, in each direction: `parameters x directions`.
+    directions: DMatrix<f64>,
+    /// Contact resistance of each pad (ohm).
+    pads_ohm: Vec<f64>,
+}
+
+/// A parameter changed by one standard deviation.
+struct Changed {
+    parameter: Parameter,
+    /// In its unit.
+    deviation: f64,
+    /// The detector with that change, and with the opposite one if the square counts; none where no model is needed.
+    models: Vec<Arc<dyn ForwardModel>>,
+    /// Of the change, for the one model that there is.
+    sign: f64,
+}
+
+/// The change of the readings by one standard deviation of a parameter (V).
+struct Change {
+    /// Odd and even part; the latter only where it counts.
+    odd: Vec<f64>,
+    even: Option<Vec<f64>>,
+}
+
+/// A detector that differs from the described one in some of its parameters.
+pub struct Similar {
+    model: Arc<dyn ForwardModel>,
+    /// Steps of those that belong to the board.
+    board: Vec<(Parameter, f64)>,
+}
+
+impl Similar {
+    /// Readings of contacts (V), as the board that it is measured by has them.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if a contact is not on the detector or none conducts.
+    pub fn readings_v(&self, contacts: &[Contact], measured: &Detector) -> Result<Readings, ForwardError> {
+        let board = measured.stepped(&self.board);
+        let mut readings = readings_v(&self.model.impedance_ohm(contacts)?, &board);
+        let n = readings.electrodes();
+        // Described gains are taken out of readings before they get here.
+        let gains: Vec<_> = board.electrodes.iter().zip(&measured.electrodes).map(|(b, m)| b.gain / m.gain).collect();
+        readings.volts_mut().iter_mut().enumerate().for_each(|(index, volts)| *volts *= gains[index % n]);
+        Ok(readings)
+    }
+}
+
+impl Nuisance {
+    /// How many independent directions there are.
+    pub fn directions(&self) -> usize {
+        self.directions.ncols()
+    }
+
+    /// The detector after such steps in each direction, in standard deviations.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if it cannot be modelled.
+    pub fn similar(&self, steps: &[f64]) -> Result<Similar, ForwardError> {
+        let deviations = &self.directions * DVector::from_column_slice(steps);
+        let steps = self.parameters.iter().zip(&deviations).map(|(of, step)| (of.parameter, step * of.deviation));
+        let steps: Vec<_> = steps.collect();
+        let model = self.model.of_similar(&self.model.detector().stepped(&steps))?;
+        Ok(Similar { model, board: steps.into_iter().filter(|(parameter, _)| parameter.is_of_board()).collect() })
+    }
+
+    /// Of all that is not known of a model's detector; `None` if that is nothing. It takes a model for most parameters, made in as many
+    /// threads as there are cores.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if a detector that is a little different cannot be modelled.
+    pub fn new(model: &Arc<dyn ForwardModel>) -> Result<Option<Self>, ForwardError> {
+        let detector = model.detector();
+        let unknowns = detector.unknowns().directions;
+        let mut parameters: Vec<(Parameter, f64)> = Vec::new();
+        for (parameter, step) in unknowns.iter().flatten() {
+            match parameters.iter_mut().find(|(known, _)| known == parameter) {
+                Some((_, square)) => *square += step * step,
+                None => parameters.push((*parameter, step * step)),
+            }
+        }
+        if parameters.is_empty() {
+            return Ok(None);
+        }
+        let step_of = |steps: &[(Parameter, f64)], parameter: Parameter| {
+            steps.iter().filter(|(of, _)| *of == parameter).map(|(_, step)| step).sum::<f64>()
+        };
+        let directions = DMatrix::from_fn(parameters.len(), unknowns.len(), |row, column| {
+            let (parameter, square) = parameters[row];
+            step_of(&unknowns[column], parameter) / square.sqrt()
+        });
+        let parameters = in_parallel(&parameters, |(parameter, square)| Changed::new(model, *parameter, square.sqrt()))?;
+        let pads_ohm = pads_ohm(&**model)?;
+        Ok(Some(Self { model: Arc::clone(model), parameters, directions, pads_ohm }))
+    }
+
+    /// Changes of the readings of contacts (V), as `measured` has them, by one standard deviation of each independent error: a column each, in the readings' order.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if a contact is not on the detector or none conducts.
+    pub fn patterns_v(&self, contacts: &[Contact], measured: &Detector) -> Result<DMatrix<f64>, ForwardError> {
+        let impedance_ohm = self.model.impedance_ohm(contacts)?;
+        let at = At { contacts, measured, readings: readings_v(&impedance_ohm, measured), impedance_ohm };
+        let changes = self.parameters.iter().map(|changed| self.change_v(changed, &at));
+        let changes = changes.collect::<Result<Vec<_>, _>>()?;
+        let size = at.readings.volts().len();
+        let odd = DMatrix::from_fn(size, changes.len(), |row, column| changes[column].odd[row]);
+        let first = odd * &self.directions;
+        // Of a normal number of deviation one, the mean of the fourth power is 3.
+        let even: Vec<_> = changes.iter().filter_map(|change| change.even.as_ref()).collect();
+        let second = DMatrix::from_fn(size, even.len(), |row, column| 3f64.sqrt() * even[column][row]);
+        let (columns, offsets_v) = (first.ncols(), self.offsets_v(at.readings.electrodes(), measured));
+        let mut all = first.resize_horizontally(columns + even.len() + offsets_v.ncols(), 0.0);
+        all.columns_mut(columns, even.len()).copy_from(&second);
+        all.columns_mut(columns + even.len(), offsets_v.ncols()).copy_from(&offsets_v);
+        Ok(all)
+    }
+
+    /// What a baseline leaves of the channels' offsets (V), the same in all readings of a channel. Those below zero, half of them, are cut
+    /// off by the converter while nothing touches.
+    fn offsets_v(&self, electrodes: usize, measured: &Detector) -> DMatrix<f64> {
+        let offset_v = self.model.detector().tolerances.offset_lsb * measured.adc.lsb_v() * 0.5f64.sqrt();
+        let channels = if offset_v > 0.0 { electrodes } else { 0 };
+        DMatrix::from_fn(electrodes * electrodes, channels, |row, e| if row % electrodes == e { offset_v } else { 0.0 })
+    }
+
+    fn change_v(&self, changed: &Changed, at: &At<'_>) -> Result<Change, ForwardError> {
+        let odd = |odd| Ok(Change { odd, even: None });
+        let before = at.readings.volts();
+        match changed.parameter {
+            Parameter::Gain(e) => odd(at.each(|_, read, volts| if read == e { changed.deviation * volts } else { 0.0 })),
+            Parameter::OnResistance => {
+                let share = changed.deviation * at.measured.on_resistance_ohm;
+                odd(at.each(|g, _, volts| (at.measured.drive_v - volts) * share / at.load_ohm(g)))
+            }
+            Parameter::Pads => {
+                let ohm = |sign: f64| (sign * changed.deviation).exp_m1();
+                let half = |sign: f64| 0.5 * (ohm(1.0) + sign * ohm(-1.0));
+                let of = |factor: f64| at.under_pads(|g| factor * self.pads_ohm[g]);
+                Ok(Change { odd: of(half(-1.0)), even: Some(of(half(1.0))) })
+            }
+            Parameter::Pad(e) => {
+                odd(at.under_pads(|g| if g == e { changed.deviation * self.pads_ohm[g] } else { 0.0 }))
+            }
+            _ => {
+                let volts = |model: &Arc<dyn ForwardModel>| {
+                    Ok(readings_v(&model.impedance_ohm(at.contacts)?, at.measured).volts().to_vec())
+                };
+                let after = changed.models.iter().map(volts).collect::<Result<Vec<_>, ForwardError>>()?;
+                Ok(match &after[..] {
+                    [ahead, behind] => {
+                        let half = |sign: f64| ahead.iter().zip(behind).map(move |(a, b)| 0.5 * (a + sign * b));
+                        let even = half(1.0).zip(before).map(|(middle, volts)| middle - volts).collect();
+                        Change { odd: half(-1.0).collect(), even: Some(even) }
+                    }
+                    after => {
+                        let after = after.iter().flatten();
+                        let odd = after.zip(before).map(|(after, before)| changed.sign * (after - before)).collect();
+                        Change { odd, even: None }
+                    }
+                })
+            }
+        }
+    }
+}
+
+/// Where changes are taken.
+struct At<'a> {
+    contacts: &'a [Contact],
+    measured: &'a Detector,
+    readings: Readings,
+    impedance_ohm: DMatrix<f64>,
+}
+
+impl At<'_> {
+    fn each(&self, value: impl Fn(usize, usize, f64) -> f64) -> Vec<f64> {
+        let electrodes = self.readings.electrodes();
+        let of = |(index, volts): (usize, &f64)| value(index / electrodes, index % electrodes, *volts);
+        self.readings.volts().iter().enumerate().map(of).collect()
+    }
+
+    /// `Z[g][g] + R` (ohm).
+    fn load_ohm(&self, g: usize) -> f64 {
+        self.impedance_ohm[(g, g)] + self.measured.on_resistance_ohm
+    }
+
+    /// What a resistance under each pad (ohm) changes while it is grounded.
+    fn under_pads(&self, ohm: impl Fn(usize) -> f64) -> Vec<f64> {
+        self.each(|g, e, volts| {
+            let over = if e == g { -volts } else { self.measured.drive_v - volts };
+            over * ohm(g) / self.load_ohm(g)
+        })
+    }
+}
+
+impl Changed {
+    fn new(model: &Arc<dyn ForwardModel>, parameter: Parameter, deviation: f64) -> Result<Self, ForwardError> {
+        let with = |step: f64| model.of_similar(&model.detector().stepped(&[(parameter, step)]));
+        let (models, sign) = match parameter {
+            Parameter::Gain(_) | Parameter::OnResistance | Parameter::Pads | Parameter::Pad(_) => (Vec::new(), 1.0),
+            Parameter::Thickness | Parameter::Conductivity | Parameter::TopOverBottom if deviation > CURVED => {
+                (vec![with(deviation)?, with(-deviation)?], 1.0)
+            }
+            Parameter::ElectrodeX(_) | Parameter::ElectrodeY(_) => match with(deviation) {
+                Ok(ahead) => (vec![ahead], 1.0),
+                // Another pad, or the wall, is in the way.
+                Err(_) => (vec![with(-deviation)?], -1.0),
+            },
+            _ => (vec![with(deviation)?], 1.0),
+        };
+        Ok(Self { parameter, deviation, models, sign })
+    }
+}
+
+/// Contact resistance of the pads (ohm), with what the crowding of the current on them makes of it: a change of all contact impedances by
+/// a share of one changes `Z[g][g]` by so much.
+fn pads_ohm(model: &dyn ForwardModel) -> Result<Vec<f64>, ForwardError> {
+    const STEP: f64 = 0.1;
+    let more = model.of_similar(&model.detector().stepped(&[(Parameter::Pads, STEP)]))?;
+    let [before, after] = [model.electrode_fields_ohm(), more.electrode_fields_ohm()];
+    // Fields have a constant that is common to all; what differs between pads tells it: it is that of the mean over pairs of pads.
+    let n = before.nrows();
+    let constant = if n < 2 { 0.0 } else {
+        let off = (0..n * n).filter(|i| i / n != i % n).map(|i| after[(i / n, i % n)] - before[(i / n, i % n)]);
+        off.sum::<f64>() / (n * (n - 1)) as f64
+    };
+    Ok((0..n).map(|g| ((after[(g, g)] - before[(g, g)] - constant) / STEP.exp_m1()).max(0.0)).collect())
+}
+
+/// Results for all items, in their order, in as many threads as there are cores.
+fn in_parallel<T: Sync, R: Send, E: Send>(items: &[T], make: impl Fn(&T) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut made = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(index) else { break };
+            made.push((index, make(item)?));
+        }
+        Ok(made)
+    };
+    let threads = thread::available_parallelism().map_or(1, usize::from).min(items.len().max(1));
+    let parts: Vec<Result<Vec<(usize, R)>, E>> = thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
+    });
+    let mut all: Vec<_> = parts.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+    all.sort_unstable_by_key(|(index, _)| *index);
+    Ok(all.into_iter().map(|(_, made)| made).collect())
+}

@@ -1,0 +1,238 @@
+//! Detectors as they are built: solvers get the description, readings come from what was made of it.
+//!
+//! Detectors are [drawn](simulate::drawn) from the tolerances of a description, or come from a file that another program solved ([`file`]).
+
+mod figures;
+mod file;
+mod scenes;
+mod table;
+
+use std::panic::resume_unwind;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use super::experiment::{Experiment, StudyError};
+use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::{Contact, Touch};
+use tactomo_physics::simulate::{Noise, drawn, measured};
+use tactomo_touch::solve::{Method, Problem, Solution};
+
+pub use self::figures::{Figures, Row};
+pub use self::file::{BuiltFile, BuiltFileError};
+pub use self::table::table;
+
+/// What is tried.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The description; its tolerances are what detectors are drawn from.
+    pub detector: Detector,
+    /// Files of detectors as built, instead of drawn ones.
+    pub files: Vec<PathBuf>,
+    /// Solvers to compare.
+    pub methods: Vec<Method>,
+    /// How many detectors are drawn.
+    pub detectors: usize,
+    /// Single presses on each; a quarter as many scenes of two.
+    pub presses: usize,
+    /// Detectors tried at a time.
+    pub threads: usize,
+    /// First of the seeds that detectors, scenes and noise are drawn with.
+    pub seed: u64,
+}
+
+/// Why it cannot be tried.
+#[derive(Debug, thiserror::Error)]
+pub enum BuiltError {
+    /// A detector cannot be modelled, or a solver refuses its readings.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A file cannot be used.
+    #[error(transparent)]
+    File(#[from] BuiltFileError),
+}
+
+/// What came out.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Report {
+    /// How to run it again.
+    pub command: String,
+    /// Names of the detectors.
+    pub detectors: Vec<String>,
+    /// Figures of each solver, for each detector that comes from a file, and over all.
+    pub rows: Vec<Row>,
+    /// Every scene of every solver.
+    pub trials: Vec<Trial>,
+}
+
+/// One scene as one solver saw it.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Trial {
+    /// Which detector.
+    pub detector: usize,
+    /// Which scene of it.
+    pub scene: usize,
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// What touched.
+    pub truth: Vec<Contact>,
+    /// Contacts found, or beside an image.
+    pub found: Vec<[f64; 2]>,
+    /// What the solver chose and why, if it says so.
+    pub choice: Option<String>,
+    /// Distances of the true contacts from those found for them (m).
+    pub errors_m: Vec<f64>,
+    /// Whether as many contacts were found as touched.
+    pub is_count_right: bool,
+    /// Whether the solver says that its answer does not explain the readings.
+    pub misfit: bool,
+    /// Errors of x and y in standard errors as claimed.
+    pub sigmas: Vec<[f64; 2]>,
+    /// Claimed standard errors of places (m): the root of the mean square of both axes.
+    pub claimed_m: Vec<f64>,
+    /// Time of the frame (s).
+    pub time_s: f64,
+}
+
+/// A detector as built, with what was read of it.
+struct Built {
+    name: String,
+    /// What solvers get.
+    problem: Problem,
+    scenes: Vec<(Vec<Contact>, Readings)>,
+}
+
+/// Tries all solvers on all detectors. `progress` is called with what is done next.
+///
+/// # Errors
+/// [`BuiltError`] if a file, a detector or a solver cannot be used.
+pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Result<Report, BuiltError> {
+    let count = if plan.files.is_empty() { plan.detectors } else { plan.files.len() };
+    let nominal = match plan.files[..] {
+        [] => Some(Experiment::new(&plan.detector)?),
+        _ => None,
+    };
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut all = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= count {
+                return Ok(all);
+            }
+            let built = match &nominal {
+                Some(nominal) => from_tolerances(plan, nominal, index)?,
+                None => from_file(plan, index)?,
+            };
+            progress(&format!("{}: {} scenes", built.name, built.scenes.len()));
+            all.push((index, built.name.clone(), try_all(plan, index, &built)?));
+        }
+    };
+    let parts: Vec<Result<Vec<_>, BuiltError>> = thread::scope(|scope| {
+        let threads: Vec<_> = (0..plan.threads.max(1)).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
+    });
+    let mut parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
+    parts.sort_by_key(|(index, ..)| *index);
+    let detectors: Vec<_> = parts.iter().map(|(_, name, _)| name.clone()).collect();
+    let trials: Vec<_> = parts.into_iter().flat_map(|(.., trials)| trials).collect();
+    let rows = figures::rows(&plan.methods, &trials, if plan.files.is_empty() { &[] } else { &detectors });
+    Ok(Report { command: command.to_owned(), detectors, rows, trials })
+}
+
+fn from_tolerances(plan: &Plan, nominal: &Experiment, index: usize) -> Result<Built, StudyError> {
+    let seed = plan.seed.wrapping_add(index as u64);
+    let experiment = nominal.with_truth(&drawn(&plan.detector, seed))?;
+    let scenes = scenes::random(&plan.detector, plan.presses, seed);
+    let touches: Vec<Vec<Touch>> =
+        scenes.iter().map(|contacts| contacts.iter().copied().map(Touch::from).collect()).collect();
+    let frames = experiment.frames(&touches, seed)?;
+    let scenes = scenes.into_iter().zip(frames).map(|(contacts, frame)| (contacts, frame.readings)).collect();
+    Ok(Built { name: format!("{} as built {seed}", plan.detector.name), problem: experiment.problem, scenes })
+}
+
+fn from_file(plan: &Plan, index: usize) -> Result<Built, BuiltError> {
+    let BuiltFile { nominal, scenes } = BuiltFile::read(&plan.files[index])?;
+    let mut noise = Noise::new(plan.seed);
+    let adc = nominal.adc;
+    let read = scenes.into_iter().map(|(contacts, exact)| (contacts, measured(&exact, &adc, &mut noise))).collect();
+    let problem = Problem::of(&nominal).map_err(StudyError::from)?;
+    Ok(Built { name: nominal.name, problem, scenes: read })
+}
+
+fn try_all(plan: &Plan, detector: usize, built: &Built) -> Result<Vec<Trial>, StudyError> {
+    let mut trials = Vec::with_capacity(plan.methods.len() * built.scenes.len());
+    for method in &plan.methods {
+        let mut solver = method.build(&built.problem)?;
+        for (scene, (contacts, readings)) in built.scenes.iter().enumerate() {
+            solver.reset();
+            let (solution, time) = super::stopwatch::timed(|| solver.solve(readings));
+            let solution =
+                solution.map_err(|error| StudyError::Solve { solver: method.name().to_owned(), error })?;
+            trials.push(Trial::new([detector, scene], *method, contacts, &solution, time.as_secs_f64()));
+        }
+    }
+    Ok(trials)
+}
+
+impl Trial {
+    fn new(
+        [detector, scene]: [usize; 2],
+        method: Method,
+        truth: &[Contact],
+        solution: &Solution,
+        time_s: f64,
+    ) -> Self {
+        let found = &solution.contacts;
+        let matching = tactomo_touch::metrics::Matching::within(f64::INFINITY, truth, found);
+        let mut sigmas = Vec::new();
+        let mut claimed_m = Vec::new();
+        for pair in &matching.pairs {
+            let (truth, found) = (&truth[pair.truth], &found[pair.found]);
+            if let Some(claimed) = found.uncertainty {
+                sigmas.push([(found.x_m - truth.x_m) / claimed.x_m, (found.y_m - truth.y_m) / claimed.y_m]);
+                claimed_m.push((0.5 * (claimed.x_m.powi(2) + claimed.y_m.powi(2))).sqrt());
+            }
+        }
+        let is_whole = solution.choice.is_some() && !solution.is_contacts();
+        Self {
+            detector,
+            scene,
+            solver: method.name(),
+            truth: truth.to_vec(),
+            found: found.iter().map(|contact| [contact.x_m, contact.y_m]).collect(),
+            choice: solution.choice.as_ref().map(|choice| format!("{}: {}", choice.what, choice.why)),
+            errors_m: matching.pairs.iter().map(|pair| pair.distance_m).collect(),
+            is_count_right: found.len() == truth.len() && !is_whole,
+            misfit: solution.flags.misfit,
+            sigmas,
+            claimed_m,
+            time_s,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_physics::detector::Tolerances;
+
+    fn plan(detector: Detector) -> Plan {
+        Plan { detector, files: vec![], methods: vec![Method::Contacts], detectors: 2, presses: 4, threads: 1, seed: 7 }
+    }
+
+    #[test]
+    fn exact_detectors_are_found_to_a_tenth_of_a_millimetre_and_rough_ones_say_that_they_are_not() {
+        let run = |tolerances| {
+            let report = run(&plan(Detector { tolerances, ..Detector::default() }), "", &|_| ()).unwrap();
+            assert_eq!((report.detectors.len(), report.trials.len()), (2, 10));
+            assert!(table(&report).contains("contacts"));
+            report.rows.into_iter().find(|row| row.contacts == 1).unwrap().figures
+        };
+        let exact = run(Tolerances::EXACT);
+        assert!(exact.error_m.unwrap() < 1e-4 && exact.count_right == 1.0, "{exact:?}");
+        let rough = run(Tolerances::default());
+        assert!(rough.claimed_m.unwrap() > 3.0 * exact.claimed_m.unwrap(), "{rough:?}");
+    }
+}
