@@ -36,7 +36,7 @@ pub struct Args {
 
 /// Records until the end.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let detector = args.detector.get()?;
+    let detector = source::described(&args.board, args.detector.get()?);
     let (mut source, _) = source::board(&args.board, &args.detector, &detector)?;
     let plan = Plan {
         settings: args.board.settings.requested(),

@@ -119,7 +119,8 @@ impl Nuisance {
             let (parameter, square) = parameters[row];
             step_of(&unknowns[column], parameter) / square.sqrt()
         });
-        let parameters = in_parallel(&parameters, |(parameter, square)| Changed::new(model, *parameter, square.sqrt()))?;
+        let parameters =
+            in_parallel(&parameters, |(parameter, square)| Changed::new(model, *parameter, square.sqrt()))?;
         let pads_ohm = pads_ohm(&**model)?;
         Ok(Some(Self { model: Arc::clone(model), parameters, directions, pads_ohm }))
     }
@@ -158,7 +159,9 @@ impl Nuisance {
         let odd = |odd| Ok(Change { odd, even: None });
         let before = at.readings.volts();
         match changed.parameter {
-            Parameter::Gain(e) => odd(at.each(|_, read, volts| if read == e { changed.deviation * volts } else { 0.0 })),
+            Parameter::Gain(e) => {
+                odd(at.each(|_, read, volts| if read == e { changed.deviation * volts } else { 0.0 }))
+            }
             Parameter::OnResistance => {
                 let share = changed.deviation * at.measured.on_resistance_ohm;
                 odd(at.each(|g, _, volts| (at.measured.drive_v - volts) * share / at.load_ohm(g)))
@@ -250,7 +253,9 @@ fn pads_ohm(model: &dyn ForwardModel) -> Result<Vec<f64>, ForwardError> {
     let [before, after] = [model.electrode_fields_ohm(), more.electrode_fields_ohm()];
     // Fields have a constant that is common to all; what differs between pads tells it: it is that of the mean over pairs of pads.
     let n = before.nrows();
-    let constant = if n < 2 { 0.0 } else {
+    let constant = if n < 2 {
+        0.0
+    } else {
         let off = (0..n * n).filter(|i| i / n != i % n).map(|i| after[(i / n, i % n)] - before[(i / n, i % n)]);
         off.sum::<f64>() / (n * (n - 1)) as f64
     };

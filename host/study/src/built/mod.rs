@@ -110,7 +110,7 @@ struct Built {
 pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Result<Report, BuiltError> {
     let count = if plan.files.is_empty() { plan.detectors } else { plan.files.len() };
     let nominal = match plan.files[..] {
-        [] => Some(Experiment::new(&plan.detector)?),
+        [] => Some(Experiment::within_tolerances(&plan.detector)?),
         _ => None,
     };
     let next = AtomicUsize::new(0);
@@ -168,8 +168,7 @@ fn try_all(plan: &Plan, detector: usize, built: &Built) -> Result<Vec<Trial>, St
         for (scene, (contacts, readings)) in built.scenes.iter().enumerate() {
             solver.reset();
             let (solution, time) = super::stopwatch::timed(|| solver.solve(readings));
-            let solution =
-                solution.map_err(|error| StudyError::Solve { solver: method.name().to_owned(), error })?;
+            let solution = solution.map_err(|error| StudyError::Solve { solver: method.name().to_owned(), error })?;
             trials.push(Trial::new([detector, scene], *method, contacts, &solution, time.as_secs_f64()));
         }
     }
@@ -177,13 +176,7 @@ fn try_all(plan: &Plan, detector: usize, built: &Built) -> Result<Vec<Trial>, St
 }
 
 impl Trial {
-    fn new(
-        [detector, scene]: [usize; 2],
-        method: Method,
-        truth: &[Contact],
-        solution: &Solution,
-        time_s: f64,
-    ) -> Self {
+    fn new([detector, scene]: [usize; 2], method: Method, truth: &[Contact], solution: &Solution, time_s: f64) -> Self {
         let found = &solution.contacts;
         let matching = tactomo_touch::metrics::Matching::within(f64::INFINITY, truth, found);
         let mut sigmas = Vec::new();
