@@ -12,7 +12,10 @@ fn main() {
 }
 
 fn problem() -> Problem {
-    let Some(Ok(slab)) = Detector::preset(Detector::DEFAULT).as_ref().map(Slab::new) else { unreachable!("a preset") };
+    let Some(Ok(slab)) = Detector::preset(Detector::DEFAULT).map(|detector| Slab::new(&detector.taken_as_exact()))
+    else {
+        unreachable!("a preset")
+    };
     Problem::new(std::sync::Arc::new(slab) as std::sync::Arc<dyn ForwardModel>)
 }
 

@@ -44,7 +44,8 @@ fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);
     let method = arguments.next().map_or(Ok(Method::Contacts), |name| name.parse()).map_err(anyhow::Error::msg)?;
     let trials = arguments.next().map_or(Ok(100), |count| count.parse())?;
-    let mut detector = Detector::preset(Detector::DEFAULT).context("the default detector is a preset")?;
+    let mut detector =
+        Detector::preset(Detector::DEFAULT).context("the default detector is a preset")?.taken_as_exact();
     detector.adc.noise_lsb = 1.5;
     let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector)?);
     let problem = Problem::new(slab);

@@ -85,7 +85,8 @@ fn seconds<T>(task: impl Fn() -> T) -> f64 {
 
 /// `square-60` with `side x side` electrodes, of a thickness.
 fn square(side: usize, thickness_m: f64) -> Detector {
-    let mut detector = Detector::preset(Detector::DEFAULT).unwrap_or_else(|| unreachable!("the default is a preset"));
+    let mut detector =
+        Detector::preset(Detector::DEFAULT).unwrap_or_else(|| unreachable!("the default is a preset")).taken_as_exact();
     detector.layers = vec![Layer::uniform(thickness_m, 0.2)];
     let place = |i: usize| 0.06 * ((i as f64 + 0.5) / side as f64 - 0.5);
     detector.electrodes = (0..side * side).map(|e| Electrode::flat(place(e % side), place(e / side), 0.002)).collect();

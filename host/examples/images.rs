@@ -41,7 +41,7 @@ fn main() -> Result<()> {
         Some(at) if at + 1 < asked.len() => asked.drain(at..at + 2).next_back().map(|text| text.parse()).transpose()?,
         _ => None,
     };
-    let detector = Detector::preset(Detector::DEFAULT).context("no preset")?;
+    let detector = Detector::preset(Detector::DEFAULT).context("no preset")?.taken_as_exact();
     let problem = Problem::new(Box::new(Slab::new(&detector)?) as Box<dyn ForwardModel>);
     let mesh = &problem.jacobian.image_mesh;
     let shown: Vec<_> =

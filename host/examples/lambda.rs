@@ -50,7 +50,7 @@ struct Score {
 }
 
 fn main() -> Result<()> {
-    let detector = Detector::preset(Detector::DEFAULT).context("no preset")?;
+    let detector = Detector::preset(Detector::DEFAULT).context("no preset")?.taken_as_exact();
     let [light, firm] = FIRMNESS.map(|firmness| scenes(&detector, firmness));
     let (light, firm) = (light?, firm?);
     let models: [Box<dyn ForwardModel>; 2] = [Box::new(Shell::new(&detector)?), Box::new(Slab::new(&detector)?)];

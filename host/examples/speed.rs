@@ -21,7 +21,7 @@ const FRAMES: usize = 2000;
 fn main() -> Result<()> {
     let nodes =
         std::env::args().nth(1).map_or(Ok(2000), |nodes| nodes.parse()).context("a number of nodes is needed")?;
-    let detector = Detector::preset(Detector::DEFAULT).context("no preset")?;
+    let detector = Detector::preset(Detector::DEFAULT).context("no preset")?.taken_as_exact();
     let shell = Shell::with_nodes(&detector, nodes)?;
     let impedance_ohm = shell.impedance_ohm(&[Contact::flat(0.009, -0.006, 0.003, 2e-4)])?;
     let readings = readings_v(&impedance_ohm, &detector);

@@ -31,7 +31,7 @@ static PROBLEMS: LazyLock<[Problem; 2]> = LazyLock::new(|| {
 });
 
 fn detector() -> Detector {
-    Detector::preset(Detector::DEFAULT).unwrap()
+    Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact()
 }
 
 /// All solvers that the model serves, which on the slab are all there are.

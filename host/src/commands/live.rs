@@ -115,7 +115,7 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let detector = source::detector(&args.picture.detector, args.replay.as_deref())?;
+    let detector = source::described(&args.board, source::detector(&args.picture.detector, args.replay.as_deref())?);
     let (source, finger) = match args.replay {
         Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &args.picture.detector, &detector)?,

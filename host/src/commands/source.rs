@@ -73,6 +73,11 @@ impl SettingsArgs {
     }
 }
 
+/// What solvers are told of the detector: one that is simulated is as it is described.
+pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
+    if args.simulate { detector.taken_as_exact() } else { detector }
+}
+
 /// The board that is chosen, and what the mouse presses with on a simulated one.
 pub fn board(
     args: &BoardArgs,

@@ -96,11 +96,19 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// A sound detector, inverted on the model that it needs.
+    /// A sound detector that is as it is described, and that solvers take as exact, inverted on the model that it needs.
     ///
     /// # Errors
     /// [`StudyError`] if it is curved or cannot be modelled.
     pub fn new(detector: &Detector) -> Result<Self, StudyError> {
+        Self::within_tolerances(&detector.taken_as_exact())
+    }
+
+    /// The same of a detector that solvers know to its tolerances only.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn within_tolerances(detector: &Detector) -> Result<Self, StudyError> {
         if detector.surface.is_some() {
             return Err(StudyError::Curved { detector: detector.name.clone() });
         }

@@ -18,7 +18,7 @@ use self::score::Score;
 const SLOW: [Method; 4] = [Method::Nonlinear, Method::Tv, Method::Bsbl, Method::Nonnegative];
 
 fn detector() -> Detector {
-    let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+    let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
     detector.adc.noise_lsb = 1.5;
     detector
 }

@@ -171,7 +171,7 @@ impl Source for Links {
 
 /// A plan for the default detector that finds nothing.
 pub fn plan() -> Plan {
-    Plan::new(Detector::preset(Detector::DEFAULT).unwrap())
+    Plan::new(Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact())
 }
 
 /// The other side of a pipeline's ends.

@@ -49,7 +49,7 @@ fn width_m(detector: &Detector) -> f64 {
 
 fn report(detector: &Detector, sheets: f64, trials: usize) -> Result<(), Box<dyn std::error::Error>> {
     let fine = finer_model(detector, &[], 1)?;
-    let problem = Problem::new(Auto::new(detector, None)?.model);
+    let problem = Problem::new(Auto::new(&detector.taken_as_exact(), None)?.model);
     let settings = ContactSettings::of(&problem);
     let begin = Instant::now();
     let mut solver = Contacts::new(&problem, settings)?;

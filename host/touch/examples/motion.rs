@@ -63,7 +63,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Result<Self, Box<dyn std::error::Error>> {
-        let mut detector = Detector::default();
+        let mut detector = Detector::default().taken_as_exact();
         detector.adc.noise_lsb = 1.5;
         let problem = Problem::of(&detector)?;
         let settings = ContactSettings { most: 1, ..ContactSettings::of(&problem) };

@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seed: u64 = words.next().map_or(Ok(1), |word| word.parse())?;
     let scenes: usize = words.next().map_or(Ok(SCENES), |word| word.parse())?;
     let only = words.next().unwrap_or_default();
-    let detector = Detector::preset(Detector::DEFAULT).ok_or("no preset")?;
+    let detector = Detector::preset(Detector::DEFAULT).ok_or("no preset")?.taken_as_exact();
     let problem = Problem::of(&detector)?;
     let fine = finer_model(&detector, &[], seed)?;
     println!(

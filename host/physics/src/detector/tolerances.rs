@@ -101,7 +101,8 @@ impl Tolerances {
             Parameter::Pads => self.contact_impedance_factor.ln(),
             Parameter::Pad(_) => self.contact_impedance_spread,
             Parameter::Gain(_) => self.gain_share,
-            Parameter::Offset(_) => self.offset_lsb * detector.adc.lsb_v(),
+            // A baseline takes away those above zero: half of them.
+            Parameter::Offset(_) => 0.5f64.sqrt() * self.offset_lsb * detector.adc.lsb_v(),
             Parameter::OnResistance => self.on_resistance_share,
         }
     }

@@ -7,7 +7,7 @@
 //! problems, 2005, section 5.8).
 //!
 //! `P` depends on what touches. Each parameter has a model of the detector with that parameter changed by one standard deviation, made
-//! once, and a column is the difference of two answers. Pads, gains and the multiplexer need no model: with `L = Z[g][g] + R`,
+//! once, and a column is the difference of two answers. Pads, channels and the multiplexer need no model: with `L = Z[g][g] + R`,
 //! a resistance `d` in series with ground `g` adds `(Vcc - V[g][e]) d / L`, a factor of a channel `V[g][e]` itself.
 
 use std::panic::resume_unwind;
@@ -18,7 +18,7 @@ use std::thread;
 use nalgebra::{DMatrix, DVector};
 
 use super::{ForwardError, ForwardModel, readings_v};
-use crate::detector::{Detector, Parameter};
+use crate::detector::{Detector, Electrode, Parameter};
 use crate::readings::Readings;
 use crate::scene::Contact;
 
@@ -69,9 +69,13 @@ impl Similar {
         let board = measured.stepped(&self.board);
         let mut readings = readings_v(&self.model.impedance_ohm(contacts)?, &board);
         let n = readings.electrodes();
-        // Described gains are taken out of readings before they get here.
-        let gains: Vec<_> = board.electrodes.iter().zip(&measured.electrodes).map(|(b, m)| b.gain / m.gain).collect();
-        readings.volts_mut().iter_mut().enumerate().for_each(|(index, volts)| *volts *= gains[index % n]);
+        // Described gains and offsets are taken out of readings before they get here.
+        let of = |(b, m): (&Electrode, &Electrode)| [b.gain / m.gain, b.unseen_offset_v - m.unseen_offset_v];
+        let channels: Vec<_> = board.electrodes.iter().zip(&measured.electrodes).map(of).collect();
+        for (index, volts) in readings.volts_mut().iter_mut().enumerate() {
+            let [gain, offset_v] = channels[index % n];
+            *volts = gain * *volts + offset_v;
+        }
         Ok(readings)
     }
 }
@@ -119,7 +123,8 @@ impl Nuisance {
             let (parameter, square) = parameters[row];
             step_of(&unknowns[column], parameter) / square.sqrt()
         });
-        let parameters = in_parallel(&parameters, |(parameter, square)| Changed::new(model, *parameter, square.sqrt()))?;
+        let parameters =
+            in_parallel(&parameters, |(parameter, square)| Changed::new(model, *parameter, square.sqrt()))?;
         let pads_ohm = pads_ohm(&**model)?;
         Ok(Some(Self { model: Arc::clone(model), parameters, directions, pads_ohm }))
     }
@@ -139,26 +144,20 @@ impl Nuisance {
         // Of a normal number of deviation one, the mean of the fourth power is 3.
         let even: Vec<_> = changes.iter().filter_map(|change| change.even.as_ref()).collect();
         let second = DMatrix::from_fn(size, even.len(), |row, column| 3f64.sqrt() * even[column][row]);
-        let (columns, offsets_v) = (first.ncols(), self.offsets_v(at.readings.electrodes(), measured));
-        let mut all = first.resize_horizontally(columns + even.len() + offsets_v.ncols(), 0.0);
+        let columns = first.ncols();
+        let mut all = first.resize_horizontally(columns + even.len(), 0.0);
         all.columns_mut(columns, even.len()).copy_from(&second);
-        all.columns_mut(columns + even.len(), offsets_v.ncols()).copy_from(&offsets_v);
         Ok(all)
-    }
-
-    /// What a baseline leaves of the channels' offsets (V), the same in all readings of a channel. Those below zero, half of them, are cut
-    /// off by the converter while nothing touches.
-    fn offsets_v(&self, electrodes: usize, measured: &Detector) -> DMatrix<f64> {
-        let offset_v = self.model.detector().tolerances.offset_lsb * measured.adc.lsb_v() * 0.5f64.sqrt();
-        let channels = if offset_v > 0.0 { electrodes } else { 0 };
-        DMatrix::from_fn(electrodes * electrodes, channels, |row, e| if row % electrodes == e { offset_v } else { 0.0 })
     }
 
     fn change_v(&self, changed: &Changed, at: &At<'_>) -> Result<Change, ForwardError> {
         let odd = |odd| Ok(Change { odd, even: None });
         let before = at.readings.volts();
         match changed.parameter {
-            Parameter::Gain(e) => odd(at.each(|_, read, volts| if read == e { changed.deviation * volts } else { 0.0 })),
+            Parameter::Gain(e) => {
+                odd(at.each(|_, read, volts| if read == e { changed.deviation * volts } else { 0.0 }))
+            }
+            Parameter::Offset(e) => odd(at.each(|_, read, _| if read == e { changed.deviation } else { 0.0 })),
             Parameter::OnResistance => {
                 let share = changed.deviation * at.measured.on_resistance_ohm;
                 odd(at.each(|g, _, volts| (at.measured.drive_v - volts) * share / at.load_ohm(g)))
@@ -227,7 +226,11 @@ impl Changed {
     fn new(model: &Arc<dyn ForwardModel>, parameter: Parameter, deviation: f64) -> Result<Self, ForwardError> {
         let with = |step: f64| model.of_similar(&model.detector().stepped(&[(parameter, step)]));
         let (models, sign) = match parameter {
-            Parameter::Gain(_) | Parameter::OnResistance | Parameter::Pads | Parameter::Pad(_) => (Vec::new(), 1.0),
+            Parameter::Gain(_)
+            | Parameter::Offset(_)
+            | Parameter::OnResistance
+            | Parameter::Pads
+            | Parameter::Pad(_) => (Vec::new(), 1.0),
             Parameter::Thickness | Parameter::Conductivity | Parameter::TopOverBottom if deviation > CURVED => {
                 (vec![with(deviation)?, with(-deviation)?], 1.0)
             }
@@ -250,7 +253,9 @@ fn pads_ohm(model: &dyn ForwardModel) -> Result<Vec<f64>, ForwardError> {
     let [before, after] = [model.electrode_fields_ohm(), more.electrode_fields_ohm()];
     // Fields have a constant that is common to all; what differs between pads tells it: it is that of the mean over pairs of pads.
     let n = before.nrows();
-    let constant = if n < 2 { 0.0 } else {
+    let constant = if n < 2 {
+        0.0
+    } else {
         let off = (0..n * n).filter(|i| i / n != i % n).map(|i| after[(i / n, i % n)] - before[(i / n, i % n)]);
         off.sum::<f64>() / (n * (n - 1)) as f64
     };

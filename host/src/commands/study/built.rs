@@ -17,7 +17,8 @@ use crate::commands::output::{self, message};
 /// Examples:
 ///   tactomo study built --detectors 20 --presses 12
 ///   tactomo study built --tolerances 0.1 --solver auto --json
-///   tactomo study built reference/built/*.json
+///   tactomo study built --rub 300 --known 3
+///   tactomo study built --rub 24 reference/built/*.json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -38,6 +39,12 @@ pub struct Args {
     /// Takes this share of the description's tolerances
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
     tolerances: f64,
+    /// Calibrates each detector before, with so many single presses at unknown places; of a file with its first ones, and tries the rest
+    #[arg(long, value_name = "PRESSES", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    rub: u32,
+    /// So many of them are at known places
+    #[arg(long, value_name = "PRESSES", default_value_t = 0, requires = "rub", value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    known: u32,
     /// First of the seeds of detectors, presses and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -63,6 +70,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         methods,
         detectors: args.detectors as usize,
         presses: args.presses as usize,
+        rub: args.rub as usize,
+        known: args.known as usize,
         threads: usize::from(args.threads),
         seed: args.seed,
     };

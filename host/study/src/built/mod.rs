@@ -17,6 +17,7 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Noise, drawn, measured};
+use tactomo_touch::calibrate::{self as rub, CalibrateError, RubSettings};
 use tactomo_touch::solve::{Method, Problem, Solution};
 
 pub use self::figures::{Figures, Row};
@@ -36,6 +37,11 @@ pub struct Plan {
     pub detectors: usize,
     /// Single presses on each; a quarter as many scenes of two.
     pub presses: usize,
+    /// Presses at unknown places, each on its own, that the detector is calibrated with before; none leaves it as described. Of a file the
+    /// first ones, which are then not tried.
+    pub rub: usize,
+    /// How many of those are at known places.
+    pub known: usize,
     /// Detectors tried at a time.
     pub threads: usize,
     /// First of the seeds that detectors, scenes and noise are drawn with.
@@ -51,6 +57,14 @@ pub enum BuiltError {
     /// A file cannot be used.
     #[error(transparent)]
     File(#[from] BuiltFileError),
+    /// A detector cannot be calibrated.
+    #[error("{detector}: {error}")]
+    Calibrate {
+        /// Which.
+        detector: String,
+        /// Why.
+        error: CalibrateError,
+    },
 }
 
 /// What came out.
@@ -100,7 +114,7 @@ struct Built {
     name: String,
     /// What solvers get.
     problem: Problem,
-    scenes: Vec<(Vec<Contact>, Readings)>,
+    scenes: Vec<Scene>,
 }
 
 /// Tries all solvers on all detectors. `progress` is called with what is done next.
@@ -110,7 +124,7 @@ struct Built {
 pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Result<Report, BuiltError> {
     let count = if plan.files.is_empty() { plan.detectors } else { plan.files.len() };
     let nominal = match plan.files[..] {
-        [] => Some(Experiment::new(&plan.detector)?),
+        [] => Some(Experiment::within_tolerances(&plan.detector)?),
         _ => None,
     };
     let next = AtomicUsize::new(0);
@@ -141,24 +155,64 @@ pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Resu
     Ok(Report { command: command.to_owned(), detectors, rows, trials })
 }
 
-fn from_tolerances(plan: &Plan, nominal: &Experiment, index: usize) -> Result<Built, StudyError> {
+fn from_tolerances(plan: &Plan, nominal: &Experiment, index: usize) -> Result<Built, BuiltError> {
     let seed = plan.seed.wrapping_add(index as u64);
     let experiment = nominal.with_truth(&drawn(&plan.detector, seed))?;
-    let scenes = scenes::random(&plan.detector, plan.presses, seed);
-    let touches: Vec<Vec<Touch>> =
-        scenes.iter().map(|contacts| contacts.iter().copied().map(Touch::from).collect()).collect();
-    let frames = experiment.frames(&touches, seed)?;
-    let scenes = scenes.into_iter().zip(frames).map(|(contacts, frame)| (contacts, frame.readings)).collect();
-    Ok(Built { name: format!("{} as built {seed}", plan.detector.name), problem: experiment.problem, scenes })
+    let read = |scenes: Vec<Vec<Contact>>, seed: u64| -> Result<Vec<Scene>, StudyError> {
+        let touches: Vec<Vec<Touch>> =
+            scenes.iter().map(|contacts| contacts.iter().copied().map(Touch::from).collect()).collect();
+        let frames = experiment.frames(&touches, seed)?;
+        Ok(scenes.into_iter().zip(frames).map(|(contacts, frame)| (contacts, frame.readings)).collect())
+    };
+    let rubbed = scenes::random(&plan.detector, plan.rub, !seed).into_iter().take(plan.rub).collect();
+    let rubbed = read(rubbed, !seed)?;
+    let scenes = read(scenes::random(&plan.detector, plan.presses, seed), seed)?;
+    let name = format!("{} as built {seed}", plan.detector.name);
+    Built { name, problem: experiment.problem, scenes }.calibrated(plan, &rubbed)
 }
+
+/// What touched, and what was read.
+type Scene = (Vec<Contact>, Readings);
+
+impl Built {
+    /// The same for solvers that know the detector by a rub.
+    fn calibrated(self, plan: &Plan, rubbed: &[Scene]) -> Result<Self, BuiltError> {
+        if rubbed.is_empty() {
+            return Ok(self);
+        }
+        let frame = |(index, (contacts, readings)): (usize, &Scene)| {
+            // Spread over the presses, as these are over the detector.
+            let step = rubbed.len() / plan.known.max(1);
+            let is_known = plan.known > 0 && index % step.max(1) == 0 && index / step.max(1) < plan.known;
+            let place = contacts.first().map(|contact| [contact.x_m, contact.y_m]);
+            rub::Frame { readings: readings.clone(), known_m: place.filter(|_| is_known) }
+        };
+        let frames: Vec<_> = rubbed.iter().enumerate().map(frame).collect();
+        let settings = RubSettings { known_deviation_m: KNOWN_DEVIATION_M, ..RubSettings::default() };
+        let nominal = self.problem.detector();
+        let found = rub::rub(nominal, &frames, &settings, &mut |_| true)
+            .map_err(|error| BuiltError::Calibrate { detector: self.name.clone(), error })?;
+        let problem = Problem::of(&found.detector).map_err(StudyError::from)?;
+        let corrected = |(contacts, mut readings): Scene| {
+            readings.correct_channels(&found.detector);
+            (contacts, readings)
+        };
+        Ok(Self { problem, scenes: self.scenes.into_iter().map(corrected).collect(), name: self.name })
+    }
+}
+
+/// Known places are exact here; so much is what a jig of a robot has (m).
+const KNOWN_DEVIATION_M: f64 = 0.05e-3;
 
 fn from_file(plan: &Plan, index: usize) -> Result<Built, BuiltError> {
     let BuiltFile { nominal, scenes } = BuiltFile::read(&plan.files[index])?;
     let mut noise = Noise::new(plan.seed);
     let adc = nominal.adc;
-    let read = scenes.into_iter().map(|(contacts, exact)| (contacts, measured(&exact, &adc, &mut noise))).collect();
+    let read = scenes.into_iter().map(|(contacts, exact)| (contacts, measured(&exact, &adc, &mut noise)));
+    let mut rubbed: Vec<Scene> = read.collect();
+    let tried = rubbed.split_off(plan.rub.min(rubbed.len()));
     let problem = Problem::of(&nominal).map_err(StudyError::from)?;
-    Ok(Built { name: nominal.name, problem, scenes: read })
+    Built { name: nominal.name, problem, scenes: tried }.calibrated(plan, &rubbed)
 }
 
 fn try_all(plan: &Plan, detector: usize, built: &Built) -> Result<Vec<Trial>, StudyError> {
@@ -168,8 +222,7 @@ fn try_all(plan: &Plan, detector: usize, built: &Built) -> Result<Vec<Trial>, St
         for (scene, (contacts, readings)) in built.scenes.iter().enumerate() {
             solver.reset();
             let (solution, time) = super::stopwatch::timed(|| solver.solve(readings));
-            let solution =
-                solution.map_err(|error| StudyError::Solve { solver: method.name().to_owned(), error })?;
+            let solution = solution.map_err(|error| StudyError::Solve { solver: method.name().to_owned(), error })?;
             trials.push(Trial::new([detector, scene], *method, contacts, &solution, time.as_secs_f64()));
         }
     }
@@ -177,13 +230,7 @@ fn try_all(plan: &Plan, detector: usize, built: &Built) -> Result<Vec<Trial>, St
 }
 
 impl Trial {
-    fn new(
-        [detector, scene]: [usize; 2],
-        method: Method,
-        truth: &[Contact],
-        solution: &Solution,
-        time_s: f64,
-    ) -> Self {
+    fn new([detector, scene]: [usize; 2], method: Method, truth: &[Contact], solution: &Solution, time_s: f64) -> Self {
         let found = &solution.contacts;
         let matching = tactomo_touch::metrics::Matching::within(f64::INFINITY, truth, found);
         let mut sigmas = Vec::new();
@@ -219,7 +266,7 @@ mod tests {
     use tactomo_physics::detector::Tolerances;
 
     fn plan(detector: Detector) -> Plan {
-        Plan { detector, files: vec![], methods: vec![Method::Contacts], detectors: 2, presses: 4, threads: 1, seed: 7 }
+        Plan { detector, files: vec![], methods: vec![Method::Contacts], detectors: 2, presses: 4, rub: 0, known: 0, threads: 1, seed: 7 }
     }
 
     #[test]

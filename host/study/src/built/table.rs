@@ -6,9 +6,21 @@ use super::{Report, Row};
 pub fn table(report: &Report) -> String {
     let head = format!(
         "{:<20} {:<12} {:>8} {:>6} {:>8} {:>7} {:>6} {:>7} {:>10} {:>9} {:>8} {:>8}",
-        "detector", "solver", "contacts", "scenes", "error mm", "p95 mm", "count", "misfit", "xy 1s, 2s", "claims mm", "ms", "p95 ms"
+        "detector",
+        "solver",
+        "contacts",
+        "scenes",
+        "error mm",
+        "p95 mm",
+        "count",
+        "misfit",
+        "xy 1s, 2s",
+        "claims mm",
+        "ms",
+        "p95 ms"
     );
-    let about = "count: as many found as touch; xy: coordinates within 1 and 2 claimed standard errors; shares in per cent.";
+    let about =
+        "count: as many found as touch; xy: coordinates within 1 and 2 claimed standard errors; shares in per cent.";
     let mut lines = vec![format!("{} detectors", report.detectors.len()), head];
     lines.extend(report.rows.iter().map(line));
     lines.push(about.to_owned());
@@ -19,7 +31,8 @@ fn line(row: &Row) -> String {
     let figures = &row.figures;
     let mm = |metres: Option<f64>| metres.map_or_else(|| "-".to_owned(), |metres| format!("{:.2}", 1e3 * metres));
     let percent = |share: f64| format!("{:.0}", 100.0 * share);
-    let within = figures.within.map_or_else(|| "-".to_owned(), |[one, two]| format!("{} {}", percent(one), percent(two)));
+    let within =
+        figures.within.map_or_else(|| "-".to_owned(), |[one, two]| format!("{} {}", percent(one), percent(two)));
     format!(
         "{:<20} {:<12} {:>8} {:>6} {:>8} {:>7} {:>6} {:>7} {:>10} {:>9} {:>8.1} {:>8.1}",
         row.detector.as_deref().unwrap_or("all"),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tactomo_physics::detector::{Calibration, Detector, Parameter, SHORTEST_WAVE};
+use tactomo_physics::detector::{Calibration, Detector, Parameter, SHORTEST_WAVE, Tolerances};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
@@ -129,9 +129,12 @@ pub fn rub(
     })
 }
 
-/// A detector whose channels are taken to read what is there.
+/// A detector whose channels are taken to read what is there. One that is taken as exact is no longer, by whoever calibrates it.
 fn without_channels(detector: &Detector) -> Detector {
     let mut detector = detector.clone();
+    if detector.tolerances.is_exact() {
+        detector.tolerances = Tolerances::default();
+    }
     detector.electrodes.iter_mut().for_each(|pad| (pad.gain, pad.unseen_offset_v) = (1.0, 0.0));
     detector
 }

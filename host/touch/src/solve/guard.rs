@@ -222,7 +222,7 @@ mod tests {
 
     /// What the guard leaves out after some frames of a contact on a faulty board, and the last answer.
     fn guarded(method: Method, faults: &[&str], frames: usize) -> (Vec<(usize, ElectrodeFault)>, Solution) {
-        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         detector.adc.noise_lsb = 1.5;
         let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
         let mut guard = Guard::new(method, &Problem::new(slab)).unwrap();
@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn shorted_electrodes_are_joined_in_pairs_and_in_rows() {
-        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         let slab = Slab::new(&detector).unwrap().on_image(200);
         let faults: Vec<Fault> = ["short:2,7", "short:9,3", "short:7,12"].map(|fault| fault.parse().unwrap()).into();
         let mut board = Measurement::new(&detector, &faults, 5).unwrap();
@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn contacts_near_shorted_electrodes_stay_where_they_are() {
-        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         detector.adc.noise_lsb = 1.5;
         let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
         let mut guard = Guard::new(Method::Contacts, &Problem::new(slab)).unwrap();
@@ -312,7 +312,7 @@ mod tests {
 
     #[test]
     fn an_electrode_that_is_healthy_again_comes_back() {
-        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         detector.adc.noise_lsb = 1.5;
         let mut guard = Guard::new(Method::Tikhonov, &Problem::of(&detector).unwrap()).unwrap();
         let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
@@ -332,7 +332,7 @@ mod tests {
 
     #[test]
     fn no_healthy_electrode_is_left_out_whatever_presses() {
-        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         detector.adc.noise_lsb = 1.5;
         let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
         let mut board = Measurement::new(&detector, &[], 7).unwrap();

@@ -58,7 +58,8 @@ impl Problem {
                 None
             })
         };
-        self.nuisance.get_or_init(made).as_ref()
+        let is_exact = self.detector().calibration.is_none() && self.detector().tolerances.is_exact();
+        if is_exact { None } else { self.nuisance.get_or_init(made).as_ref() }
     }
 
     /// Mean distance of electrodes (m): the side of a square that each has for itself.

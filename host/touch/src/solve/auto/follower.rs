@@ -221,7 +221,9 @@ impl Follower for AutoFollower {
         self.still.add_if_new(readings.volts(), Self::slopes_v(self.contacts.as_ref()));
         let mean = self.still.mean_or(readings);
         let readings = &mean.readings;
-        let Some(target) = self.target(&mean, lead.contacts.as_deref())? else { return self.adopt_alone(lead.whole, readings) };
+        let Some(target) = self.target(&mean, lead.contacts.as_deref())? else {
+            return self.adopt_alone(lead.whole, readings);
+        };
         // What is followed and what was found some frames ago are all brought to this frame: the lowest score is believed. Where no
         // reading stands out there may be a very light contact still.
         let Lead { contacts: found, whole, mean: searched } = lead;

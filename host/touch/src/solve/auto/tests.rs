@@ -19,7 +19,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         detector.adc.noise_lsb = 1.5;
         let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
         let auto = Auto::new(&Problem::new(slab)).unwrap();

@@ -13,7 +13,7 @@ static PROBLEM: LazyLock<Problem> = LazyLock::new(|| Problem::of(&detector()).un
 static FINE: LazyLock<Slab> = LazyLock::new(|| Slab::with_resolution(&detector(), Resolution::FINE).unwrap());
 
 fn detector() -> Detector {
-    let mut detector = Detector::default();
+    let mut detector = Detector::default().taken_as_exact();
     detector.adc.noise_lsb = 1.5;
     detector
 }

@@ -21,7 +21,7 @@ fn example(name: &str) -> Detector {
 }
 
 fn thin() -> Detector {
-    let mut detector = Detector::preset("square-60").unwrap();
+    let mut detector = Detector::preset("square-60").unwrap().taken_as_exact();
     detector.layers = vec![Layer::uniform(0.0004, 0.2273)];
     detector
 }
@@ -94,7 +94,7 @@ fn two_contacts_on_an_outline_are_two() {
 
 #[test]
 fn contacts_at_walls_are_found_steadily_where_they_are() {
-    let mut bench = Bench::new(Detector::preset("square-60").unwrap(), 35);
+    let mut bench = Bench::new(Detector::preset("square-60").unwrap().taken_as_exact(), 35);
     for [x_m, y_m] in [[0.0, -0.0295], [0.027, 0.027], [0.03, 0.004]] {
         for sheets in [0.3, 3.0] {
             let truth = bench.contact([x_m, y_m, 0.0], sheets);
@@ -127,7 +127,7 @@ fn contacts_at_walls_are_found_steadily_where_they_are() {
 
 #[test]
 fn radii_are_found_where_the_readings_say_them() {
-    let detector = noisy(Detector::preset("square-60").unwrap());
+    let detector = noisy(Detector::preset("square-60").unwrap().taken_as_exact());
     let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
     let mut bench = Bench::new(detector, 36);
     bench.fine = Box::new(fine);

@@ -287,7 +287,8 @@ impl ContactFinder {
                 merged
             })
         });
-        let fewer = self.best_of(self.dispensable(fit, target).into_iter().map(without).chain(merged).collect(), target)?;
+        let fewer =
+            self.best_of(self.dispensable(fit, target).into_iter().map(without).chain(merged).collect(), target)?;
         Some(self.released(fewer, target))
     }
 

@@ -237,12 +237,12 @@ impl ContactSearcher {
             |better: &Explanation| found(Lead::of_contacts(Some(Found(better.clone())), Some(mean.clone())));
         let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
         Ok(found
-        .map(|found| {
-            let target = self.finder.target_of(mean, found.covariance.as_ref())?;
-            let solution = self.finder.solution(&found, &target);
-            Ok((Found(found), solution))
-        })
-        .transpose()?)
+            .map(|found| {
+                let target = self.finder.target_of(mean, found.covariance.as_ref())?;
+                let solution = self.finder.solution(&found, &target);
+                Ok((Found(found), solution))
+            })
+            .transpose()?)
     }
 }
 

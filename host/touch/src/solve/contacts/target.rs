@@ -134,7 +134,11 @@ impl Target {
     }
 
     fn shrink(&self, volts: &mut [f64]) {
-        self.covariance.directions.iter().zip(&self.shares).for_each(|(direction, share)| direction.shrink(volts, *share));
+        self.covariance
+            .directions
+            .iter()
+            .zip(&self.shares)
+            .for_each(|(direction, share)| direction.shrink(volts, *share));
     }
 
     /// A whitened copy of volts.

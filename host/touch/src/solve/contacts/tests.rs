@@ -17,7 +17,7 @@ static PROBLEM: LazyLock<Problem> = LazyLock::new(|| {
 static FINE: LazyLock<Slab> = LazyLock::new(|| Slab::with_resolution(&detector(), Resolution::FINE).unwrap());
 
 fn detector() -> Detector {
-    let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+    let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
     detector.adc.noise_lsb = 1.5;
     detector
 }
@@ -55,7 +55,7 @@ fn the_readings_follow_their_derivatives() {
     let finder = solver.finder();
     let fitter = finder.disc_fitter();
     let readings = frame(&[contact(0.01, 0.0, 1.0)], &mut Noise::new(1));
-    let target = finder.target_of(&Mean { readings, frames: 1 }).unwrap();
+    let target = finder.target_of(&Mean { readings, frames: 1 }, None).unwrap();
     let firm = Contact { radius_m: 0.0032, ..contact(-0.012, 0.004, 30.0) };
     let at = vec![contact(0.003, -0.008, 0.1), firm, contact(0.0271, 0.0262, 1.0)];
     let unmoved = Effort { steps: 0, gain: 0.0, share: 0.0 };

@@ -23,7 +23,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         let problem = Problem::new(Box::new(Slab::new(&detector).unwrap()) as Box<dyn ForwardModel>);
         Self {
             finder: Arc::new(ShapeFinder::new(&problem).unwrap().unwrap()),
@@ -42,7 +42,7 @@ impl Bench {
 
     fn target(&mut self, touch: &Touch) -> Target {
         let readings = self.readings(touch);
-        self.contacts.target_of(&Mean { readings, frames: 1 }).unwrap()
+        self.contacts.target_of(&Mean { readings, frames: 1 }, None).unwrap()
     }
 
     /// The shape found from four contacts that stand for the touch badly.
