@@ -29,6 +29,7 @@ fn every_command_has_a_help_with_an_example() {
         "tradeoff",
         "stability",
         "study",
+        "calibrate",
     ] {
         let output = tactomo(&[command, "--help"]);
         let text = String::from_utf8(output.stdout).unwrap();
@@ -55,6 +56,7 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["forward", "--press", "0,0,2.5"], "tip_radius_mm,force_n"),
         (&["forward", "--contact", "0,0,1,1e-3", "--time", "2"], "--scene"),
         (&["study", "contacts", "--scenes", "0"], "--scenes"),
+        (&["calibrate", "force", "some.csv", "--out", "cal.toml"], "--newtons <N,N,...>|--forces <FILE>"),
         (&["dance"], "dance"),
     ] {
         let (code, message) = failure(args);
