@@ -29,6 +29,7 @@ fn every_command_has_a_help_with_an_example() {
         "tradeoff",
         "stability",
         "study",
+        "calibrate",
     ] {
         let output = tactomo(&[command, "--help"]);
         let text = String::from_utf8(output.stdout).unwrap();
@@ -61,6 +62,7 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["live", "--time-factor", "10"], "--simulate"),
         (&["live", "--simulate", "--time-factor", "0"], "above 0"),
         (&["study", "contacts", "--scenes", "0"], "--scenes"),
+        (&["calibrate", "force", "some.csv", "--out", "cal.toml"], "--newtons <N,N,...>|--forces <FILE>"),
         (&["dance"], "dance"),
     ] {
         let (code, message) = failure(args);

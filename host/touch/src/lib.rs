@@ -1,7 +1,8 @@
 //! From readings back to touch, and how right that is.
 //!
-//! [`solve`] has the solvers, one file a method, one trait; [`calibrate`] what fits a detector to the one that was built; [`metrics`] the figures that they are judged by; [`schema`] the names of
-//! what leaves the program. None of them knows of boards, ports or pages.
+//! [`solve`] has the solvers, one file a method, one trait; [`calibrate`] what fits a detector's description to the one that was built;
+//! [`metrics`] the figures that solvers are judged by; [`schema`] the names of what leaves the program. None of them knows of boards, ports or
+//! pages.
 
 pub mod calibrate;
 pub mod metrics;

@@ -102,7 +102,7 @@ pub struct FittedParameter {
     pub name: &'static str,
     /// Its value; `None` where it is not determined: it may be nothing, at 95 % confidence.
     pub value: Option<f64>,
-    /// Its standard error.
+    /// Its standard error, with the allowance for few presses.
     #[serde(rename = "standard_error")]
     pub deviation: Option<f64>,
 }
@@ -229,7 +229,7 @@ fn parameters(best: &Fitted) -> Vec<FittedParameter> {
     let parameter = |name, value: [f64; 2]| FittedParameter {
         name,
         value: is_determined(value, freedom).then_some(value[0]),
-        deviation: is_determined(value, freedom).then_some(value[1]),
+        deviation: is_determined(value, freedom).then_some(widening(freedom) * value[1]),
     };
     let known = [("conductance_at_1_n_s", best.conductance_at_1_n_s()), ("exponent", best.exponent())];
     let series = best.series().map(|series| parameter("series_ohm", series));
@@ -268,11 +268,15 @@ fn forms(presses: &[ForcePress]) -> impl Iterator<Item = Form> {
         .filter(move |form| both || !form.hysteresis)
 }
 
+/// Student's allowance: so much wider are bands of 90 % by a scatter that is known with so many degrees of freedom.
+fn widening(freedom: f64) -> f64 {
+    student::quantile(BAND, freedom) / BAND
+}
+
 /// The law of a fit, and its maximum.
 fn law_of(best: &Fitted, presses: &[ForcePress], left_out: &[usize]) -> (ForceLaw, MaximumForce) {
     let freedom = best.freedom();
-    // Student's allowance: so much wider are bands of 90 % by a scatter that so few presses tell.
-    let widening = student::quantile(BAND, freedom) / BAND;
+    let widening = widening(freedom);
     let kept = presses.iter().enumerate().filter(|(index, _)| !left_out.contains(index)).map(|(_, press)| press);
     let mut law = ForceLaw {
         conductance_at_1_n_s: best.conductance_at_1_n_s()[0],

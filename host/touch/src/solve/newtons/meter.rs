@@ -15,6 +15,7 @@ use std::f64::consts::PI;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::solve::contacts::network::{LoadedSpot, Network, Solved};
+use crate::solve::evidence::misfit_limit;
 use crate::solve::{ContactSettings, FoundContact, Problem};
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::readings::Readings;
@@ -32,6 +33,9 @@ const DAMPING: f64 = 1e-3;
 const TRIES: usize = 5;
 /// Smallest and largest conductance, in sheet conductances: what is lighter is nothing, what is firmer makes no difference.
 const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
+/// Share of what is left beyond noise that a resistance may have taken up. With places 0 to 8 mm off, on the detector and on one that is 12 %
+/// thicker and graded, 68 % of 400 presses of 0.03, 0.3 and 2 N each were off by no more than 0.18, 0.40 and 0.58 times it.
+const TAKEN: f64 = 0.6;
 /// Readings above this share of the converter's range, or of the drive, say nothing.
 const FULL: f64 = 0.995;
 
@@ -177,13 +181,15 @@ impl Meter {
         (0..fit.logs.len()).map(of).collect()
     }
 
-    /// Standard errors of the logarithms. Where the spots leave more than noise, as wrong places do, errors are as much larger.
+    /// Standard errors of the logarithms: by noise, and by what the spots leave of the readings beyond it, as wrong places and a wrong
+    /// detector do: some of that lies along what a resistance changes, and is taken for it.
     fn deviations(&self, fit: &Fit, spots: &[LoadedSpot], readings: &Readings) -> Option<Vec<f64>> {
         let (normal, _) = normal(&self.slopes(fit, readings), &fit.residuals);
         let freedom = readings.volts().len().saturating_sub(readings.electrodes() + spots.len()).max(1) as f64;
-        let excess = (squares(&fit.residuals) / freedom).max(1.0);
+        let beyond_noise = (squares(&fit.residuals) - freedom * misfit_limit(freedom)).max(0.0);
         let covariance = Cholesky::new(normal)?.inverse();
-        Some((0..spots.len()).map(|k| (excess * covariance[(k, k)]).sqrt()).collect())
+        let variance = |k: usize| covariance[(k, k)] * (1.0 + TAKEN * TAKEN * beyond_noise);
+        Some((0..spots.len()).map(|k| variance(k).sqrt()).collect())
     }
 
     /// The logarithm of a resistance within what makes sense.
@@ -299,6 +305,24 @@ mod tests {
                 assert!(off_mm < 0.5 || wrong.deviation_s > right.deviation_s);
             }
         }
+    }
+
+    #[test]
+    fn standard_errors_hold_what_wrong_places_do() {
+        let mut bench = Bench::new(Detector::default());
+        let mut random = fastrand::Rng::with_seed(2);
+        let reference = [0.1, 1.0].map(|force_n| {
+            let ball = bench.ball([3.0, 4.0], force_n);
+            bench.measured(&[ball], 0.0)[0].conductance_s
+        });
+        let mut within = [0; 2];
+        for k in 0..120 {
+            let ball = bench.ball([0, 1].map(|_| 46.0 * (random.f64() - 0.5)), [0.1, 1.0][k % 2]);
+            let [found] = bench.measured(&[ball], [0.5, 1.0, 2.0, 4.0][k / 2 % 4])[..] else { panic!() };
+            let off = (found.conductance_s - reference[k % 2]).abs() / found.deviation_s;
+            within = [within[0] + usize::from(off < 1.0), within[1] + usize::from(off < 2.0)];
+        }
+        assert!(within[0] > 75 && within[1] > 100, "of 120 within one and two standard errors: {within:?}");
     }
 
     #[test]
