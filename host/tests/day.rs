@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use tactomo::board::baseline::{Baseline, BaselineState};
 use tactomo::detector::Detector;
-use tactomo::forward::{ForwardModel, Resolution, Slab, readings_v};
+use tactomo::forward::{DrivingLayer, Resolution, Slab, readings_v, touched_impedance_ohm};
 use tactomo::readings::Readings;
 use tactomo::scene::{Shape, Touch};
 use tactomo::simulate::{Noise, measured};
@@ -55,7 +55,9 @@ impl Hour {
             layer.bottom_s_per_m *= conductivity;
             layer.top_s_per_m *= conductivity;
         }
-        let slab = Slab::with_resolution(&detector, Resolution::FINE).unwrap().on_image(625);
+        let driving =
+            DrivingLayer { leak_s: LEAKAGE * self::detector().sheet_conductance_s(), ..DrivingLayer::default() };
+        let slab = Slab::under(&detector, Resolution::FINE, driving).unwrap().on_image(625);
         Self { slab, conductivity }
     }
 
@@ -67,12 +69,7 @@ impl Hour {
             .map(|(at_m, shape, sheets)| Touch::flat(*at_m, shape.clone(), sheets * self.conductivity * sheet_s))
             .into_iter()
             .collect();
-        let mesh = self.slab.image_mesh();
-        let area_m2: f64 = mesh.node_areas_m2.iter().sum();
-        let leakage_s = LEAKAGE * sheet_s;
-        let mut image_s = mesh.conductances_s(&touches).unwrap();
-        image_s.iter_mut().zip(&mesh.node_areas_m2).for_each(|(s, m2)| *s += leakage_s * m2 / area_m2);
-        readings_v(&self.slab.image_impedance_ohm(&image_s).unwrap(), &detector()).volts().to_vec()
+        readings_v(&touched_impedance_ohm(&self.slab, &touches).unwrap(), &detector()).volts().to_vec()
     }
 }
 
