@@ -8,11 +8,11 @@ use std::sync::Arc;
 
 use tactomo::board::baseline::{Baseline, BaselineState};
 use tactomo::detector::Detector;
-use tactomo::forward::{ForwardModel, Resolution, Slab, readings_v};
+use tactomo::forward::{DrivingLayer, Resolution, Slab, readings_v, touched_impedance_ohm};
 use tactomo::readings::Readings;
 use tactomo::scene::{Shape, Touch};
 use tactomo::simulate::{Noise, measured};
-use tactomo::solve::{Guard, Method, Problem, Solution, Solver};
+use tactomo::solve::{FoundContact, Guard, Method, Problem, Solution, Solver};
 
 const HOUR_S: f64 = 3600.0;
 const DAY_S: f64 = 24.0 * HOUR_S;
@@ -55,7 +55,9 @@ impl Hour {
             layer.bottom_s_per_m *= conductivity;
             layer.top_s_per_m *= conductivity;
         }
-        let slab = Slab::with_resolution(&detector, Resolution::FINE).unwrap().on_image(625);
+        let driving =
+            DrivingLayer { leak_s: LEAKAGE * self::detector().sheet_conductance_s(), ..DrivingLayer::default() };
+        let slab = Slab::under(&detector, Resolution::FINE, driving).unwrap().on_image(625);
         Self { slab, conductivity }
     }
 
@@ -67,12 +69,7 @@ impl Hour {
             .map(|(at_m, shape, sheets)| Touch::flat(*at_m, shape.clone(), sheets * self.conductivity * sheet_s))
             .into_iter()
             .collect();
-        let mesh = self.slab.image_mesh();
-        let area_m2: f64 = mesh.node_areas_m2.iter().sum();
-        let leakage_s = LEAKAGE * sheet_s;
-        let mut image_s = mesh.conductances_s(&touches).unwrap();
-        image_s.iter_mut().zip(&mesh.node_areas_m2).for_each(|(s, m2)| *s += leakage_s * m2 / area_m2);
-        readings_v(&self.slab.image_impedance_ohm(&image_s).unwrap(), &detector()).volts().to_vec()
+        readings_v(&touched_impedance_ohm(&self.slab, &touches).unwrap(), &detector()).volts().to_vec()
     }
 }
 
@@ -102,8 +99,9 @@ fn touched(hour: usize, second: f64) -> Option<([f64; 2], Shape, f64)> {
 /// What a day has come to.
 #[derive(Default)]
 struct Day {
-    /// Mean places of the finger in each hour (m).
+    /// Mean places of the finger in each hour (m), and its mean conductance (S).
     fingers_m: Vec<[f64; 2]>,
+    fingers_s: Vec<f64>,
     /// Hours and seconds with contacts that are not there.
     invented: Vec<(usize, f64)>,
     /// The same with none though something touches, but for the very beginning and end of the slow hand.
@@ -123,7 +121,7 @@ fn live_through() -> Day {
     let (mut rest_before, mut last_touched_s) = (vec![0.0; 256], 0.0);
     let mut hours = [Hour::new(0), Hour::new(1)];
     for hour in 0..24 {
-        let mut finger_m = Vec::new();
+        let mut fingers = Vec::new();
         let (mut last, mut ends) = (None, hours.each_ref().map(|of_hour| of_hour.volts(None)));
         for step in 0..(HOUR_S / STEP_S) as usize {
             let (second, time_s) = (STEP_S * step as f64, HOUR_S * hour as f64 + STEP_S * step as f64);
@@ -156,22 +154,25 @@ fn live_through() -> Day {
                     if *sheets > 0.01 && solution.contacts.is_empty() && solution.shape.is_none() {
                         day.missed.push((hour, second));
                     }
-                    finger_m.extend(place_m(&solution).filter(|_| hour != CUP_H && hour != HAND_H));
+                    fingers.extend(single(&solution).filter(|_| hour != CUP_H && hour != HAND_H));
                 }
             }
             rest_before = rest;
         }
         hours = [hours[1].clone(), Hour::new(hour + 2)];
-        if !finger_m.is_empty() {
-            let mean =
-                |axis: usize| finger_m.iter().map(|place: &[f64; 2]| place[axis]).sum::<f64>() / finger_m.len() as f64;
-            day.fingers_m.push([mean(0), mean(1)]);
+        if !fingers.is_empty() {
+            let mean = |of: fn(&FoundContact) -> f64| fingers.iter().map(of).sum::<f64>() / fingers.len() as f64;
+            let (x_m, y_m, conductance_s) =
+                (mean(|found| found.x_m), mean(|found| found.y_m), mean(|found| found.conductance_s));
+            day.fingers_m.push([x_m, y_m]);
+            day.fingers_s.push(conductance_s);
             println!(
-                "hour {hour:>2}, conductivity x {:.2}: finger at {:.3} {:.3} mm in {} frames, leakage {:.4}, {:?}",
+                "hour {hour:>2}, conductivity x {:.2}: finger at {:.3} {:.3} mm, {:.3} mS, in {} answers; leakage {:.4}, {:?}",
                 hours[0].conductivity,
-                1e3 * mean(0),
-                1e3 * mean(1),
-                finger_m.len(),
+                1e3 * x_m,
+                1e3 * y_m,
+                1e3 * conductance_s,
+                fingers.len(),
                 baseline.leakage_sheets(),
                 baseline.state()
             );
@@ -199,9 +200,9 @@ fn mean(volts: &Readings, detector: &Detector, noise: &mut Noise) -> Readings {
     mean
 }
 
-fn place_m(solution: &Solution) -> Option<[f64; 2]> {
+fn single(solution: &Solution) -> Option<FoundContact> {
     let [contact] = solution.contacts[..] else { return None };
-    Some([contact.x_m, contact.y_m])
+    Some(contact)
 }
 
 #[test]
@@ -216,9 +217,38 @@ fn a_day_of_drift_invents_nothing_learns_nothing_and_moves_nothing() {
     let off_m = day.fingers_m.iter().map(|place_m| apart_m(place_m, &FINGER_M)).fold(0.0, f64::max);
     println!("the finger's place moved by {:.3} mm, and is off by {:.3} mm at most", 1e3 * moved_m, 1e3 * off_m);
     assert!(moved_m < 1e-4 && off_m < 3e-4, "{moved_m} {off_m}");
+    // Conductances are told as if the conductivity were that of the description, of which this contact's is a share.
+    let [least_s, most_s] = [f64::min, f64::max].map(|fold| day.fingers_s.iter().copied().reduce(fold).unwrap());
+    assert!(most_s < 1.03 * least_s, "{least_s} to {most_s} S");
     assert!(day.invented.is_empty() && day.missed.is_empty() && day.taken.is_empty(), "{wrong:?}");
     assert!(day.invented.is_empty() && day.missed.is_empty() && day.taken.is_empty(), "{wrong:?}");
     // The cup and the hand have lasted for long; nothing else is worth a word.
     let is_long = |hour: &usize| [CUP_H, HAND_H].contains(hour);
     assert!(day.notices.iter().all(|(hour, state)| is_long(hour) || state.notice().is_none()), "{:?}", day.notices);
+}
+
+/// Readings are ratios: a detector of another conductivity reads the same if all other resistances have changed with it, those of contacts, pads
+/// and switch. So readings tell conductivity from the resistance of the switch, which drifts too, by nothing.
+#[test]
+fn a_drift_of_conductivity_cannot_be_told_from_one_of_the_switch() {
+    let usual = detector();
+    let mut other = usual.clone();
+    for layer in &mut other.layers {
+        layer.bottom_s_per_m *= 0.8;
+        layer.top_s_per_m *= 0.8;
+    }
+    let volts = |detector: &Detector, conductance_s: f64| {
+        let press = [Touch::flat(FINGER_M, Shape::Disc { radius_m: 0.003 }, conductance_s)];
+        readings_v(&touched_impedance_ohm(&Slab::new(detector).unwrap(), &press).unwrap(), detector)
+    };
+    let apart_v =
+        |a: &Readings, b: &Readings| a.volts().iter().zip(b.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let before = volts(&usual, 3e-3);
+    // A switch that stays as it is shows what drifts by two codes, in what the grounded electrodes read.
+    let by_conductivity_v = apart_v(&before, &volts(&other, 0.8 * 3e-3));
+    assert!((0.5e-3..2e-3).contains(&by_conductivity_v), "{by_conductivity_v}");
+    other.on_resistance_ohm /= 0.8;
+    other.contact_impedance_ohm_m2 /= 0.8;
+    let by_both_v = apart_v(&before, &volts(&other, 0.8 * 3e-3));
+    assert!(by_both_v < 1e-7, "{by_both_v}");
 }

@@ -265,7 +265,9 @@ impl FollowLoop {
         let left_out: Vec<usize> = board.watch.faulty().faults.iter().map(|(electrode, _)| *electrode).collect();
         let time_s = 1e-6 * frame.board_time_us as f64;
         if board.baseline.add(frame.mean.volts(), frame.averaged, time_s, &left_out) {
-            self.notice.change(|snapshot| snapshot.baseline = board.baseline.state().notice());
+            let notice = board.baseline.state().notice();
+            notice.iter().for_each(|notice| tracing::warn!("{notice}"));
+            self.notice.change(|snapshot| snapshot.baseline = notice);
         }
         let mut touch = frame.mean.clone();
         board.baseline.subtract(frame.mean.volts(), touch.volts_mut());

@@ -166,7 +166,7 @@ impl Baseline {
     fn refuse(&mut self, asked: bool, largest_v: f64) {
         if asked {
             self.state = BaselineState::Refused(largest_v);
-        } else if !self.held {
+        } else if self.state == BaselineState::Starting {
             self.state = BaselineState::Pressed(largest_v);
         }
         if !self.held {
@@ -187,7 +187,7 @@ impl Baseline {
             follow::Seen::Rest { mean_v, frames } => {
                 self.rest.set(mean_v, frames * f64::from(*conversions));
                 self.leakage_sheets = judge.leakage_sheets(self.rest.offset_v());
-                if matches!(self.state, BaselineState::Lasting | BaselineState::Drifted(_)) {
+                if !matches!(self.state, BaselineState::Doubtful(_)) {
                     self.state = BaselineState::Held;
                 }
             }

@@ -12,7 +12,7 @@ pub enum BaselineState {
     Pressed(f64),
     /// It is being taken anew; until then the one before holds.
     Renewing,
-    /// It was to be taken anew while something pressed, with readings up to this (V): the one before stays.
+    /// It was to be taken anew while something pressed, with readings up to this (V): the one before stays, and is followed once nothing does.
     Refused(f64),
     /// It was taken because a person asked for it, from readings that look like a light touch at x and y (m).
     Doubtful([f64; 2]),
@@ -39,11 +39,11 @@ impl BaselineState {
             Self::Starting | Self::Held | Self::Renewing => None,
             Self::Pressed(largest_v) => Some(format!(
                 "Something pressed at the start (readings up to {} mV): it is shown as touch, and zero is taken by itself once nothing \
-                 presses. If nothing does even now, re-zero.",
+                 presses. If nothing lies on the detector, re-zero.",
                 mv(largest_v)
             )),
             Self::Refused(largest_v) => Some(format!(
-                "Not re-zeroed: something presses (readings up to {} mV), and the zero of before stays. Let go, then re-zero.",
+                "Not re-zeroed: something presses (readings up to {} mV), and the zero of before stays. Let go: zero then follows by itself.",
                 mv(largest_v)
             )),
             Self::Doubtful(place_m) => Some(format!(
@@ -74,12 +74,8 @@ mod tests {
         assert!(notice(BaselineState::Pressed(1.5)).contains("1500 mV"));
         assert!(notice(BaselineState::Doubtful([0.0121, -0.0049])).contains("near (12, -5) mm"));
         assert!(notice(BaselineState::Lasting).contains("10 minutes"));
-        for state in [
-            BaselineState::Pressed(1.0),
-            BaselineState::Refused(1.0),
-            BaselineState::Drifted([0.0; 2]),
-            BaselineState::Lasting,
-        ] {
+        assert!(notice(BaselineState::Refused(0.3)).contains("Let go"));
+        for state in [BaselineState::Pressed(1.0), BaselineState::Drifted([0.0; 2]), BaselineState::Lasting] {
             assert!(notice(state).contains("re-zero"), "{state:?}");
         }
         assert_eq!([BaselineState::Held, BaselineState::Starting].map(|state| state.notice()), [None, None]);

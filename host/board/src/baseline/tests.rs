@@ -179,6 +179,11 @@ fn a_press_at_the_start_is_never_the_baseline() {
         bench.touch(&touch_v, 5 * FRAMES);
         assert!(matches!(bench.baseline.state(), BaselineState::Pressed(_)), "{sheets}: {:?}", bench.baseline.state());
         assert_eq!(bench.baseline.rest.mean_v(), [0.0; 256]);
+        if sheets > 0.1 {
+            bench.baseline.renew();
+            bench.touch(&touch_v, 2 * FRAMES);
+            assert!(matches!(bench.baseline.state(), BaselineState::Refused(_)), "the answer stays");
+        }
         // It is taken as soon as nothing presses.
         bench.rest(2 * FRAMES);
         assert!(bench.baseline.state() == BaselineState::Held && bench.error_lsb() < 0.6, "{sheets}");
@@ -277,6 +282,8 @@ fn a_person_may_take_a_light_touch_for_the_baseline_but_no_press() {
     bench.touch(&contact_v(0.3), FRAMES);
     let refused = matches!(bench.baseline.state(), BaselineState::Refused(volts) if volts > 0.1);
     assert!(refused && bench.baseline.rest.mean_v() == before_v);
+    bench.rest(2 * FRAMES);
+    assert_eq!(bench.baseline.state(), BaselineState::Held, "once nothing presses");
     bench.baseline.renew();
     bench.touch(&contact_v(0.01), FRAMES);
     let BaselineState::Doubtful(place_m) = bench.baseline.state() else { panic!("{:?}", bench.baseline.state()) };
