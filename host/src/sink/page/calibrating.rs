@@ -1,0 +1,77 @@
+//! What the page gets of a calibration by rubbing, within the status.
+
+use serde::Serialize;
+use tactomo_touch::calibrate::Rub;
+
+use crate::run::calibration::{Calibrating, Compared, Fit, Stage};
+
+/// A calibration under way.
+#[derive(Serialize)]
+pub(super) struct CalibratingMessage<'a> {
+    stage: &'static str,
+    /// Cells along x and y, and what was felt in each, row by row from the smallest y: 1 light, 2 firm, 3 both, `null` beside the detector.
+    cells: [usize; 2],
+    felt: &'a [Option<u8>],
+    /// Share of the cells that were rubbed.
+    share: f64,
+    touched: u64,
+    fitting: bool,
+    errors_m: &'a [f64],
+    fit: Option<FitMessage<'a>>,
+    trouble: Option<&'a str>,
+    saved: Option<String>,
+    used: bool,
+}
+
+/// A fit.
+#[derive(Serialize)]
+struct FitMessage<'a> {
+    /// x, y and the expected standard error there (m).
+    places_m: Vec<[f64; 3]>,
+    /// Their root mean square before and after (m).
+    expected_m: [f64; 2],
+    presses: usize,
+    /// Electrode of each channel, if wires are exchanged.
+    wires: Option<&'a [usize]>,
+    left_out: &'a [usize],
+    /// Residuals before and after, in standard deviations of the noise, and how far places have moved (m).
+    residuals: Option<[f64; 2]>,
+    moved_m: Option<f64>,
+}
+
+impl<'a> CalibratingMessage<'a> {
+    pub(super) fn of(calibrating: &'a Calibrating) -> Self {
+        Self {
+            stage: match calibrating.stage {
+                Stage::Rubbing => "rubbing",
+                Stage::Finishing => "finishing",
+                Stage::Done => "done",
+            },
+            cells: calibrating.coverage.cells,
+            felt: &calibrating.coverage.felt,
+            share: calibrating.coverage.share(),
+            touched: calibrating.touched,
+            fitting: calibrating.fitting,
+            errors_m: &calibrating.errors_m,
+            fit: calibrating.fit.as_deref().map(FitMessage::of),
+            trouble: calibrating.trouble.as_deref(),
+            saved: calibrating.saved.as_ref().map(|path| path.display().to_string()),
+            used: calibrating.used,
+        }
+    }
+}
+
+impl<'a> FitMessage<'a> {
+    fn of(Fit { rub, compared }: &'a Fit) -> Self {
+        let Rub { place_errors_m, presses, wires, left_out, .. } = rub;
+        Self {
+            places_m: place_errors_m.iter().map(|([x_m, y_m], error_m)| [*x_m, *y_m, *error_m]).collect(),
+            expected_m: [rub.place_error_before_m(), rub.place_error_m()],
+            presses: *presses,
+            wires: wires.as_deref(),
+            left_out,
+            residuals: compared.map(|Compared { residuals, .. }| residuals),
+            moved_m: compared.map(|Compared { moved_m, .. }| moved_m),
+        }
+    }
+}
