@@ -75,3 +75,32 @@ impl<'a> FitMessage<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::calibration::Coverage;
+
+    #[test]
+    fn a_page_gets_where_has_been_rubbed_and_why_there_is_no_fit() {
+        let coverage =
+            Coverage { cells: [2, 2], bounds_m: [[0.0; 2], [0.02; 2]], felt: vec![Some(0), Some(3), None, Some(1)] };
+        let calibrating = Calibrating {
+            stage: Stage::Rubbing,
+            coverage,
+            touched: 7,
+            fitting: true,
+            errors_m: vec![1e-3, 5e-4],
+            fit: None,
+            trouble: Some("rub with one fingertip alone".to_owned()),
+            saved: None,
+            used: false,
+        };
+        let value = serde_json::to_value(CalibratingMessage::of(&calibrating)).expect("plain numbers and texts");
+        assert_eq!(value["felt"], serde_json::json!([0, 3, null, 1]));
+        assert_eq!((&value["stage"], &value["errors_m"]), (&"rubbing".into(), &serde_json::json!([1e-3, 5e-4])));
+        assert_eq!(value["share"], 2.0 / 3.0);
+        assert_eq!(value["trouble"], "rub with one fingertip alone");
+        assert!(value["fit"].is_null());
+    }
+}
