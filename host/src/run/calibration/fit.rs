@@ -15,8 +15,8 @@ use super::Outcome;
 use crate::date::today;
 use crate::run::inbox::{Event, Inbox};
 
-/// Presses that fits on the way are of: they are to be quick.
-const PRESSES_ON_THE_WAY: usize = 60;
+/// Presses that the first fit is of, and most that others on the way are, each of twice as many as the one before: they are to be quick.
+const PRESSES_ON_THE_WAY: [usize; 2] = [10, 60];
 /// Presses that before and after are compared on.
 const COMPARED: usize = 24;
 
@@ -44,6 +44,8 @@ pub(super) struct Task {
     /// Identity of the board.
     pub board: Option<String>,
     pub frames: Vec<Frame>,
+    /// Fits before this one.
+    pub before: usize,
     pub is_last: bool,
     pub cancelled: Arc<AtomicBool>,
 }
@@ -70,7 +72,8 @@ pub(super) fn begin(task: Task, number: u64, inbox: &Arc<Inbox>) -> std::io::Res
 
 fn fit(task: &Task) -> Result<Fit, String> {
     let usual = RubSettings::default();
-    let presses = if task.is_last { usual.presses } else { PRESSES_ON_THE_WAY };
+    let [first, most] = PRESSES_ON_THE_WAY;
+    let presses = if task.is_last { usual.presses } else { (first << task.before.min(8)).min(most) };
     let goes_on = &mut |_| !task.cancelled.load(Ordering::Relaxed);
     let found = rub(&task.description, &task.frames, &RubSettings { presses, ..usual }, goes_on);
     let mut rub = found.map_err(|error| error.to_string())?;

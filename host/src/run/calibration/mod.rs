@@ -216,6 +216,7 @@ impl Desk {
             description: Arc::clone(&self.description),
             board: self.board.clone(),
             frames: self.collected.frames(),
+            before: self.shown.errors_m.len(),
             is_last,
             cancelled: Arc::clone(&self.cancelled),
         };

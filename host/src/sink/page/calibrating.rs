@@ -28,8 +28,6 @@ pub(super) struct CalibratingMessage<'a> {
 struct FitMessage<'a> {
     /// x, y and the expected standard error there (m).
     places_m: Vec<[f64; 3]>,
-    /// Their root mean square before and after (m).
-    expected_m: [f64; 2],
     presses: usize,
     /// Electrode of each channel, if wires are exchanged.
     wires: Option<&'a [usize]>,
@@ -66,7 +64,6 @@ impl<'a> FitMessage<'a> {
         let Rub { place_errors_m, presses, wires, left_out, .. } = rub;
         Self {
             places_m: place_errors_m.iter().map(|([x_m, y_m], error_m)| [*x_m, *y_m, *error_m]).collect(),
-            expected_m: [rub.place_error_before_m(), rub.place_error_m()],
             presses: *presses,
             wires: wires.as_deref(),
             left_out,

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
 use tactomo_physics::detector::{Calibration, Detector, Parameter, SHORTEST_WAVE};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
@@ -55,24 +54,14 @@ pub struct Rub {
     pub chi_square: [f64; 2],
     /// Places over the detector (m), with the standard error that a press of half a sheet conductance has there in one frame (m).
     pub place_errors_m: Vec<([f64; 2], f64)>,
-    /// The same before, where the detector is known to its tolerances only.
-    pub place_errors_before_m: Vec<([f64; 2], f64)>,
 }
 
 impl Rub {
     /// Root of the mean square of the standard errors of places (m).
     pub fn place_error_m(&self) -> f64 {
-        root_mean_square(&self.place_errors_m)
+        let squares = self.place_errors_m.iter().map(|(_, error_m)| error_m * error_m);
+        (squares.sum::<f64>() / self.place_errors_m.len().max(1) as f64).sqrt()
     }
-
-    /// The same before, by the tolerances alone.
-    pub fn place_error_before_m(&self) -> f64 {
-        root_mean_square(&self.place_errors_before_m)
-    }
-}
-
-fn root_mean_square(errors_m: &[([f64; 2], f64)]) -> f64 {
-    (errors_m.iter().map(|(_, error_m)| error_m * error_m).sum::<f64>() / errors_m.len().max(1) as f64).sqrt()
 }
 
 /// Places along a side that standard errors are told for, and how far they reach in shares of it.
@@ -125,14 +114,11 @@ pub fn rub(
     let (first, last, slopes) = adjusted(&mut bundle, told)?;
     let posterior = Posterior::new(&last.information, last.of_press.clone(), bundle.chi_square(&last))
         .ok_or(CalibrateError::NotSingle { touched: chosen.touched, single: 0 })?;
-    // In standard deviations before, independent of each other.
-    let prior = DMatrix::identity(bundle.parameters.len(), bundle.parameters.len());
     let mut detector = calibrated(nominal, &chosen, &bundle, &posterior);
     detector.force.clone_from(&told_channels.force);
     Ok(Rub {
         detector,
-        place_errors_m: place_errors_m(&bundle, &slopes, &posterior.covariance),
-        place_errors_before_m: place_errors_m(&bundle, &slopes, &prior),
+        place_errors_m: place_errors_m(&bundle, &slopes, &posterior),
         wires: (!order.exchanged().is_empty()).then_some(order.electrodes),
         left_out: (0..electrodes).filter(|e| !chosen.kept.contains(e)).collect(),
         touched: chosen.touched,
@@ -150,8 +136,8 @@ fn without_channels(detector: &Detector) -> Detector {
     detector
 }
 
-/// Standard errors of places over the detector, where its parameters have such a covariance.
-fn place_errors_m(bundle: &Bundle, slopes: &Slopes, covariance: &DMatrix<f64>) -> Vec<([f64; 2], f64)> {
+/// Standard errors of places over the detector.
+fn place_errors_m(bundle: &Bundle, slopes: &Slopes, posterior: &Posterior) -> Vec<([f64; 2], f64)> {
     let detector = bundle.model.detector();
     let [low, high] = detector.outline.bounds();
     let at = |axis: usize, i: usize| {
@@ -163,7 +149,7 @@ fn place_errors_m(bundle: &Bundle, slopes: &Slopes, covariance: &DMatrix<f64>) -
     let radius_m = bundle.presses.first().map_or(0.0, |press| press.usual.radius_m);
     let error_m = |at_m: &[f64; 2]| {
         let contact = Contact::flat(at_m[0], at_m[1], radius_m, 0.5 * detector.sheet_conductance_s());
-        Some((*at_m, bundle.place_error_m(&contact, slopes, covariance)?))
+        Some((*at_m, bundle.place_error_m(&contact, slopes, &posterior.covariance)?))
     };
     map(&places, error_m).into_iter().flatten().collect()
 }

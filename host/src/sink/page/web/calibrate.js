@@ -50,18 +50,17 @@ function advice(state) {
 }
 
 // Expected error after each fit, falling.
-function history(errorsM, beforeM) {
+function history(errorsM) {
   const [width, height] = [352, 62];
-  const all = [beforeM, ...errorsM].filter((errorM) => errorM > 0);
   const made = svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", "aria-label": "Expected error after each fit" });
-  if (all.length < 2) return made;
-  const [low, high] = [Math.min(...all) / 1.3, Math.max(...all) * 1.15].map(Math.log);
-  const x = (i) => 34 + ((width - 44) * i) / (all.length - 1);
+  if (errorsM.length < 2) return made;
+  const [low, high] = [Math.min(...errorsM) / 1.3, Math.max(...errorsM) * 1.15].map(Math.log);
+  const x = (i) => 34 + ((width - 44) * i) / (errorsM.length - 1);
   const y = (errorM) => height - 6 - ((height - 14) * (Math.log(errorM) - low)) / (high - low);
-  const points = all.map((errorM, i) => `${x(i).toFixed(1)},${y(errorM).toFixed(1)}`).join(" ");
+  const points = errorsM.map((errorM, i) => `${x(i).toFixed(1)},${y(errorM).toFixed(1)}`).join(" ");
   made.append(line(34, height - 5, width - 8, height - 5, "bar"), svg("polyline", { points, class: "fall" }));
-  all.forEach((errorM, i) => made.append(svg("circle", { cx: x(i), cy: y(errorM), r: 3, class: "fall-point" })));
-  made.append(label(30, y(all[0]) + 4, errorText(all[0]), "fall-text", "end"));
+  errorsM.forEach((errorM, i) => made.append(svg("circle", { cx: x(i), cy: y(errorM), r: 3, class: "fall-point" })));
+  made.append(label(30, y(errorsM[0]) + 4, errorText(errorsM[0]), "fall-text", "end"));
   return made;
 }
 
@@ -124,8 +123,8 @@ export class CalibratePanel {
     this.errors.draw(fit, theme());
     element("calibrate-legend").style.background = ErrorMap.legend(theme());
     element("calibrate-error").textContent = errorM === undefined ? "not known yet" : `± ${errorText(errorM)}\u2009mm`;
-    element("calibrate-history").replaceChildren(history(errorsM, fit?.expected_m[0]));
-    this.#compare(stage, fit);
+    element("calibrate-history").replaceChildren(history(errorsM));
+    this.#compare(stage, fit, errorM);
     this.#note(trouble, fit, saved, stage);
     const done = stage === "done";
     element("calibrate-finish").hidden = stage !== "rubbing";
@@ -138,14 +137,14 @@ export class CalibratePanel {
     element("calibrate-use").textContent = used ? "In use" : "Use it";
   }
 
-  #compare(stage, fit) {
+  #compare(stage, fit, errorM) {
     const table = element("calibrate-compared");
     table.hidden = stage !== "done" || !fit;
     if (table.hidden) return;
-    const [before, after] = fit.expected_m;
-    const rows = [row("expected error of a place", `${errorText(before)}\u2009mm`, `${errorText(after)}\u2009mm`)];
-    if (fit.residuals) rows.push(row("residual of the same presses", ...fit.residuals.map((value) => `${fixed(value, 1)} × noise`)));
-    if (fit.moved_m !== null) rows.push(row("where they are found", "", `${errorText(fit.moved_m)}\u2009mm from before`));
+    const rows = [];
+    if (fit.residuals) rows.push(row("residual", ...fit.residuals.map((value) => `${fixed(value, 1)} × noise`)));
+    const off = fit.moved_m === null ? "" : `${errorText(fit.moved_m)}\u2009mm off`;
+    rows.push(row("places", off, `± ${errorText(errorM)}\u2009mm`));
     element("calibrate-rows").replaceChildren(...rows);
   }
 
