@@ -29,5 +29,6 @@ pub use tactomo_study as study;
 pub use tactomo_table as table;
 pub use tactomo_touch::{calibrate, metrics, schema, solve};
 
+pub mod date;
 pub mod run;
 pub mod sink;

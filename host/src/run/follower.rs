@@ -1,5 +1,6 @@
 //! The thread that answers: it takes the newest frame, follows what is known, and goes on from what searches find.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -9,6 +10,7 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, FoundContact, Method, Parts, Solution};
 
+use super::calibration::{Calibrate, Desk};
 use super::inbox::{Event, Inbox, Searched, Taken};
 use super::maker::{Made, Maker, Order};
 use super::notice::NoticeBoard;
@@ -35,6 +37,7 @@ impl FollowThread {
         inbox: &Arc<Inbox>,
         notice: &Arc<NoticeBoard>,
         listeners: Vec<Box<dyn Listener>>,
+        folder: PathBuf,
     ) -> std::io::Result<Self> {
         let search = SearchThread::start(Arc::clone(inbox), Arc::clone(&solving.look_at_wires))?;
         let begin_baseline = Arc::clone(&solving.begin_baseline);
@@ -54,6 +57,10 @@ impl FollowThread {
             wants_search: false,
             found: Vec::new(),
             unshown: None,
+            calibration: None,
+            calibrations: 0,
+            calibrated: None,
+            folder,
         };
         let thread = thread::Builder::new().name("follower".to_owned());
         Ok(Self(thread.spawn(move || desk.run())?))
@@ -88,10 +95,19 @@ struct FollowLoop {
     found: Vec<FoundContact>,
     /// The newest answer, if it came too soon after the one that is shown.
     unshown: Option<FrameSnapshot>,
+    /// The calibration under way, and how many there have been.
+    calibration: Option<Desk>,
+    calibrations: u64,
+    /// The detector that was found by one and is used in place of the description.
+    calibrated: Option<Arc<Detector>>,
+    /// Where calibrated detectors are saved.
+    folder: PathBuf,
 }
 
 /// What belongs to one detector.
 struct BoardState {
+    /// As it is described, and as it is solved for: calibrated, or the same.
+    description: Arc<Detector>,
     detector: Arc<Detector>,
     baseline: Baseline,
     watch: ElectrodeWatch,
@@ -166,6 +182,13 @@ impl FollowLoop {
                     }
                 }
                 Event::Searched(searched) => self.searched(searched)?,
+                Event::Calibrate(ask, board) => self.calibrate(ask, board),
+                Event::Calibrated(number, outcome) => {
+                    if let Some(desk) = &mut self.calibration {
+                        desk.receive(number, outcome);
+                    }
+                    self.show_calibration();
+                }
                 Event::Frame(frame) => self.frame(frame)?,
             }
         }
@@ -211,15 +234,73 @@ impl FollowLoop {
     }
 
     /// Begins with a board's detector, or with another.
-    fn begin_with(&mut self, detector: Arc<Detector>) {
+    fn begin_with(&mut self, description: Arc<Detector>) {
+        let Detector { drive_v, adc, .. } = &*description;
+        let calibrated =
+            |known: &Arc<Detector>| Arc::new(Detector { drive_v: *drive_v, adc: adc.clone(), ..(**known).clone() });
+        let detector = self.calibrated.as_ref().map_or_else(|| Arc::clone(&description), calibrated);
         self.board = Some(BoardState {
             baseline: (self.begin_baseline)(&detector, self.conversions),
             watch: ElectrodeWatch::new(&detector),
+            description,
             detector,
             follower: None,
         });
         self.solved = None;
+        // Frames of another board, or of other settings of its converter, are no part of it.
+        self.calibration = None;
+        self.show_calibration();
         self.order(self.maker.method());
+    }
+
+    /// Does what a person asks of the calibration.
+    fn calibrate(&mut self, ask: Calibrate, identity: Option<String>) {
+        let Some(board) = &mut self.board else { return };
+        match (ask, &mut self.calibration) {
+            (Calibrate::Begin, None) => {
+                self.calibrations += 1;
+                let (description, inbox) = (Arc::clone(&board.description), Arc::clone(&self.inbox));
+                self.calibration =
+                    Some(Desk::new(self.calibrations, description, identity, self.folder.clone(), inbox));
+            }
+            (Calibrate::End, _) => self.calibration = None,
+            (Calibrate::Use, Some(desk)) => {
+                if let Some(found) = desk.use_found() {
+                    // Wires that it knows to be exchanged are none any more.
+                    board.watch = ElectrodeWatch::new(&found);
+                    board.detector = Arc::clone(&found);
+                    self.calibrated = Some(found);
+                    self.order(self.maker.method());
+                }
+            }
+            (ask, Some(desk)) => desk.ask(ask),
+            (_, None) => {}
+        }
+        self.show_calibration();
+    }
+
+    /// Shows how the calibration is, if that is due.
+    fn show_calibration(&mut self) {
+        match &mut self.calibration {
+            None => self.notice.change(|snapshot| snapshot.calibrating = None),
+            Some(desk) => {
+                if let Some(shown) = desk.newly_shown() {
+                    self.notice.change(|snapshot| snapshot.calibrating = Some(Arc::new(shown)));
+                }
+            }
+        }
+    }
+
+    /// Gives the newest frame to the calibration: less the baseline, as the channels read it.
+    fn rub(&mut self, frame: &Taken, found: &[FoundContact]) {
+        let (Some(board), Some(desk)) = (&self.board, &mut self.calibration) else { return };
+        if board.baseline.state().is_taking() {
+            return;
+        }
+        let mut touch = frame.newest.clone();
+        board.baseline.subtract(frame.newest.volts(), touch.volts_mut());
+        desk.take(&touch, found);
+        self.show_calibration();
     }
 
     fn change_method(&mut self, method: Method) {
@@ -275,6 +356,7 @@ impl FollowLoop {
         let changed = board.watch.note(&touch);
         let Some(follower) = &mut board.follower else { return Ok(()) };
         let followed = follower.follow(&touch)?;
+        self.rub(&frame, &followed.solution.contacts);
         self.solved = Some(Solved { frame, touch });
         self.answer(followed, begun, true);
         if changed {

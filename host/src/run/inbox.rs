@@ -11,6 +11,7 @@ use tactomo_physics::readings::Readings;
 use tactomo_protocol::Status;
 use tactomo_touch::solve::{Lead, Look, Method, Parts, Solver, Still};
 
+use super::calibration::{Calibrate, Outcome};
 use super::maker::Made;
 
 /// Longest wait before it is asked whether there is still something to wait for.
@@ -55,6 +56,10 @@ pub enum Event {
     Looked(Look, Option<[usize; 2]>),
     /// Another method is to read the touch.
     Method(Method),
+    /// Something is asked of the calibration, of a board of this identity.
+    Calibrate(Calibrate, Option<String>),
+    /// What has come of work for the calibration of this number.
+    Calibrated(u64, Outcome),
     /// A frame.
     Frame(Taken),
     /// Nothing for a while.

@@ -5,6 +5,7 @@
 //! finds thorough answers, from which the follower goes on once they explain the present better. What there is to show is published as
 //! [`Snapshot`]s through a cell that keeps the latest only, so that a slow page slows nothing. Pages answer with [`Request`]s.
 
+pub mod calibration;
 mod follower;
 mod inbox;
 mod maker;
@@ -20,12 +21,14 @@ pub use self::maker::{Order, SolverState};
 pub use self::reader::run;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tactomo_board::link::{Control, Playing};
 use tactomo_board::session::RequestedSettings;
 use tactomo_protocol::{Hello, Status};
 
+use self::calibration::{Calibrate, Calibrating};
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{Method, Solution};
 
@@ -52,6 +55,8 @@ pub struct Snapshot {
     pub baseline: Option<String>,
     /// What to know of the detector's calibration, as one sentence for a person; none if all is well or there is none.
     pub calibration: Option<String>,
+    /// The calibration by rubbing that is under way, if one is.
+    pub calibrating: Option<Arc<Calibrating>>,
 }
 
 /// How the link to the board fares.
@@ -149,4 +154,6 @@ pub enum Request {
     Record(bool),
     /// Asks something of a simulated detector or a recording.
     Control(Control),
+    /// Asks something of the calibration by rubbing.
+    Calibrate(Calibrate),
 }

@@ -1,9 +1,10 @@
 //! What a run is to do, and what comes of it.
 
 use std::io;
-use std::sync::Arc;
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use tokio::sync::watch;
@@ -16,6 +17,7 @@ use tactomo_board::measured::Mismatch;
 use tactomo_board::record::{RecordError, Recorder};
 use tactomo_board::session::{GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 use tactomo_protocol::Hello;
 use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
@@ -47,6 +49,8 @@ pub struct Plan {
     pub begin_recording: Option<BeginRecording>,
     /// Who takes each answer.
     pub listeners: Vec<Box<dyn Listener>>,
+    /// Where calibrated detectors are saved.
+    pub folder: PathBuf,
     /// Time from Hello to the end; `None` for without end.
     pub seconds: Option<Duration>,
 }
@@ -62,6 +66,7 @@ impl Plan {
             begin_recording: None,
             listeners: Vec::new(),
             board_log: BoardLog::unread(),
+            folder: PathBuf::from("."),
             seconds: None,
         }
     }
@@ -88,19 +93,45 @@ pub struct Solving {
 impl Solving {
     /// Reads the touch of a problem's detector by a method.
     pub fn new(method: Method, problem: Problem) -> Self {
-        let (looked_at, at_rest) = (problem.clone(), problem.clone());
+        let at_rest = problem.clone();
+        let problems = Arc::new(Problems { described: problem, other: Mutex::new(None) });
+        let looked_at = Arc::clone(&problems);
         Self {
             method,
             make: Arc::new(move |order| {
-                Ok(solve::without(order.method, &problem.measured_as(&order.detector), &order.faulty)?)
+                Ok(solve::without(order.method, &problems.of(&order.detector)?, &order.faulty)?)
             }),
             look_at_wires: Arc::new(move |order, look, readings| {
-                look.run(&looked_at.measured_as(&order.detector), &order.faulty, readings)
+                look.run(&looked_at.of(&order.detector).ok()?, &order.faulty, readings)
             }),
             begin_baseline: Arc::new(move |detector, conversions| {
                 Baseline::new(at_rest.measured_as(detector).jacobian, conversions)
             }),
         }
+    }
+}
+
+/// Problems of the detector that was described, and of the one that it was calibrated to.
+struct Problems {
+    described: Problem,
+    /// The last other one: models take a while.
+    other: Mutex<Option<Problem>>,
+}
+
+impl Problems {
+    fn of(&self, detector: &Detector) -> Result<Problem, ForwardError> {
+        let is_of = |problem: &Problem| {
+            let modelled = problem.model.detector();
+            *modelled == Detector { drive_v: modelled.drive_v, adc: modelled.adc.clone(), ..detector.clone() }
+        };
+        if is_of(&self.described) {
+            return Ok(self.described.measured_as(detector));
+        }
+        let mut other = self.other.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = other.take().filter(is_of);
+        let problem = known.map_or_else(|| Problem::of(detector), Ok)?;
+        *other = Some(problem.clone());
+        Ok(problem.measured_as(detector))
     }
 }
 

@@ -39,7 +39,8 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     let notice = Arc::new(NoticeBoard::new(snapshots));
     let solving = plan.solving.take();
     let listeners = std::mem::take(&mut plan.listeners);
-    let started = solving.map(|solving| FollowThread::start(solving, &inbox, &notice, listeners)).transpose();
+    let folder = plan.folder.clone();
+    let started = solving.map(|solving| FollowThread::start(solving, &inbox, &notice, listeners, folder)).transpose();
     let follower = started.map_err(LiveError::Thread)?;
     if follower.is_some() {
         // Most boards measure as the detector's description says, so their first frame finds a solver.
@@ -320,6 +321,10 @@ impl Reader {
                 }
                 Request::Record(true) => self.begin_recording(),
                 Request::Record(false) => self.end_recording(),
+                Request::Calibrate(ask) => {
+                    let board = self.board.as_ref().map(|board| identity::identity(&board.hello));
+                    self.inbox.put(Event::Calibrate(ask, board));
+                }
                 Request::Control(control) => {
                     let refused = open.as_mut().and_then(|(link, _)| link.control(&control).err());
                     self.notice.change(|snapshot| snapshot.refused = refused.map(|error| error.to_string()));

@@ -1,5 +1,6 @@
 //! The whole way in one process: simulated board, pipeline, server.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
@@ -13,7 +14,7 @@ use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, LiveError, Plan, Solving, Summary};
 use tactomo::run::{Snapshot, Statistics};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
-use tactomo::simulate::{Controls, Fault, Simulation};
+use tactomo::simulate::{Controls, Fault, Simulation, drawn};
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
 use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
@@ -35,9 +36,21 @@ pub struct Live {
 impl Live {
     /// Starts it with a scene on the default detector, with faults if asked, and the default solver.
     pub fn start(scene: SceneName, faults: &[Fault]) -> Result<Self> {
+        let described = Detector::preset(Detector::DEFAULT).context("the default preset")?;
+        Self::of(&described, scene, faults, Path::new("."))
+    }
+
+    /// Starts it at rest on the detector that was built with this seed, of which it has the description only; calibrated detectors are saved in
+    /// this folder.
+    pub fn as_built(seed: u64, folder: &Path) -> Result<Self> {
+        let described = Detector::preset(Detector::DEFAULT).context("the default preset")?;
+        Self::of(&drawn(&described, seed), SceneName::Rest, &[], folder)
+    }
+
+    fn of(built: &Detector, scene: SceneName, faults: &[Fault], folder: &Path) -> Result<Self> {
         let detector = Detector::preset(Detector::DEFAULT).context("the default preset")?;
         let hand = Hand::relative(&detector);
-        let simulation = Simulation::new(&detector, Scene::new(scene, &detector, hand, 1), faults, 1)?;
+        let simulation = Simulation::new(built, Scene::new(scene, &detector, hand, 1), faults, 1)?;
         let mouse = simulation.controls();
         let problem = Problem::of(&detector)?;
         let (snapshots, receiver) = watch::channel(Arc::default());
@@ -47,18 +60,30 @@ impl Live {
             mesh: problem.jacobian.image_mesh.clone(),
             usual_radius_m: ContactSettings::of(&problem).radius_m,
             source: "simulated board".to_owned(),
-            finger: Some(Finger::from(touch(&hand, [0.0; 2])?)),
+            finger: Some(Finger::from(touch(&hand, [0.0; 2], FIRMNESS)?)),
         };
         let server = Server::start(Listen { port: Some(0), ..Listen::default() }, page, receiver.clone(), sender)?;
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
-        let pipeline = Some(run(&detector, simulation, problem, ends)?);
+        let board = SimulatedBoard::simulate(built, simulation, Options::default())?;
+        let plan = Plan {
+            solving: Some(Solving::new(Method::Auto, problem)),
+            folder: folder.to_owned(),
+            ..Plan::new(detector.clone())
+        };
+        let mut source = Opened::new(Box::new(board));
+        let pipeline = Some(std::thread::spawn(move || tactomo::run::run(&mut source, plan, ends)));
         Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 
     /// Presses here (mm), as if by itself.
     pub fn press(&self, at_mm: [f64; 2]) -> Result<()> {
-        self.mouse.press(vec![touch(&self.hand, at_mm)?]);
+        self.press_with(at_mm, FIRMNESS)
+    }
+
+    /// Presses here (mm) so firmly.
+    pub fn press_with(&self, at_mm: [f64; 2], firmness: f64) -> Result<()> {
+        self.mouse.press(vec![touch(&self.hand, at_mm, firmness)?]);
         Ok(())
     }
 
@@ -86,19 +111,7 @@ impl Drop for Live {
     }
 }
 
-/// The mouse's touch at a place (mm).
-fn touch(hand: &Hand, at_mm: [f64; 2]) -> Result<Contact> {
-    hand.tip(at_mm.map(|mm| mm * 1e-3), FIRMNESS, 1.0).disc().context("a tip touches in a disc")
-}
-
-fn run(
-    detector: &Detector,
-    simulation: Simulation,
-    problem: Problem,
-    ends: Ends,
-) -> Result<JoinHandle<Result<Summary, LiveError>>> {
-    let board = SimulatedBoard::simulate(detector, simulation, Options::default())?;
-    let plan = Plan { solving: Some(Solving::new(Method::Auto, problem)), ..Plan::new(detector.clone()) };
-    let mut source = Opened::new(Box::new(board));
-    Ok(std::thread::spawn(move || tactomo::run::run(&mut source, plan, ends)))
+/// A touch at a place (mm).
+fn touch(hand: &Hand, at_mm: [f64; 2], firmness: f64) -> Result<Contact> {
+    hand.tip(at_mm.map(|mm| mm * 1e-3), firmness, 1.0).disc().context("a tip touches in a disc")
 }

@@ -1,6 +1,7 @@
 //! The live page: its server, spoken to byte by byte, and the page in a browser.
 
 mod browser;
+mod calibrate;
 mod chromium;
 mod controls;
 mod gallery;

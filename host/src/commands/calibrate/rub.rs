@@ -1,11 +1,12 @@
 //! `tactomo calibrate rub`: a detector as it was built, from a finger rubbed over it.
 
 use std::path::PathBuf;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::identity;
 use tactomo::calibrate::{Frame, Rub, RubSettings, rub};
+use tactomo::date::today;
 use tactomo::detector::Detector;
 use tactomo::readings::Readings;
 use tactomo::solve::Method;
@@ -88,7 +89,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut found = found.map_err(|error| anyhow!("{}: {error}", file.display()))?;
     if let Some(calibration) = &mut found.detector.calibration {
         calibration.board = board;
-        calibration.date = date(SystemTime::now());
+        calibration.date = today();
     }
     super::write(&found.detector, &args.out, out)?;
     let report = Report::of(&found, args, frames.len(), begin.elapsed());
@@ -174,19 +175,6 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
 fn most(text: &str) -> Result<usize, String> {
     let count = text.parse::<usize>().ok().filter(|count| (4..=2000).contains(count));
     count.ok_or_else(|| "a number from 4 to 2000".to_owned())
-}
-
-/// A day of the Gregorian calendar, in UTC (days from civil, after H. Hinnant's algorithm for the proleptic calendar).
-fn date(now: SystemTime) -> String {
-    let seconds = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let days = seconds / 86_400 + 719_468;
-    let (era, of_era) = (days / 146_097, days % 146_097);
-    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let month = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * month + 2) / 5 + 1;
-    let (year, month) = (year_of_era + era * 400, if month < 10 { month + 3 } else { month - 9 });
-    format!("{:04}-{month:02}-{day:02}", if month <= 2 { year + 1 } else { year })
 }
 
 /// What is told of a calibration.
@@ -286,16 +274,5 @@ impl Report {
         }
         lines.push(format!("written to {}", self.out));
         lines.join("\n")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn days_are_those_of_the_calendar() {
-        let at = |days: u64| date(SystemTime::UNIX_EPOCH + Duration::from_secs(86_400 * days + 5));
-        assert_eq!([at(0), at(59), at(11_016), at(20_778)], ["1970-01-01", "1970-03-01", "2000-02-29", "2026-11-21"]);
     }
 }

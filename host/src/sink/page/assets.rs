@@ -19,6 +19,8 @@ const ASSETS: &[Asset] = &[
     ("/app.js", SCRIPT, include_str!("web/app.js")),
     ("/bars.js", SCRIPT, include_str!("web/bars.js")),
     ("/board.js", SCRIPT, include_str!("web/board.js")),
+    ("/calibrate.js", SCRIPT, include_str!("web/calibrate.js")),
+    ("/calibrate-maps.js", SCRIPT, include_str!("web/calibrate-maps.js")),
     ("/camera.js", SCRIPT, include_str!("web/camera.js")),
     ("/colours.js", SCRIPT, include_str!("web/colours.js")),
     ("/contacts.js", SCRIPT, include_str!("web/contacts.js")),

@@ -6,6 +6,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::PageSetup;
 use crate::run::Request;
+use crate::run::calibration::Calibrate;
 use tactomo_board::link::Control;
 use tactomo_board::session::RequestedSettings;
 use tactomo_physics::scene::{Contact, SceneName};
@@ -52,6 +53,8 @@ pub(super) enum PageMessage {
     Speed(Option<f64>),
     /// Begins the recording again where it ends, or not.
     Loop(bool),
+    /// Asks something of the calibration by rubbing.
+    Calibrate(Calibrate),
 }
 
 /// A place on the detector's map (m).
@@ -98,6 +101,7 @@ impl PageMessage {
             Self::Taken => return Ok(None),
             Self::Rezero => Request::Rezero,
             Self::Solver(method) => Request::Solver(method),
+            Self::Calibrate(ask) => Request::Calibrate(ask),
             Self::Record(on) => Request::Record(on),
             Self::Settings(settings) => Request::Settings(settings.requested()?),
             Self::Press(places) => match press(&places, setup)? {
@@ -194,6 +198,7 @@ mod tests {
         assert_eq!(asks(r#""rezero""#), Ok(Some(Request::Rezero)));
         assert_eq!(asks(r#"{"solver":"noser"}"#), Ok(Some(Request::Solver(Method::Noser))));
         assert_eq!(asks(r#"{"record":true}"#), Ok(Some(Request::Record(true))));
+        assert_eq!(asks(r#"{"calibrate":"begin"}"#), Ok(Some(Request::Calibrate(Calibrate::Begin))));
         let finger = |x, y| Contact::flat(x, y, 0.003, 1e-4);
         assert_eq!(
             asks(r#"{"press":[{"x_m":0.01,"y_m":-2e-3},{"x_m":0.5,"y_m":0},{"x_m":0,"y_m":0}]}"#),
@@ -240,6 +245,8 @@ mod tests {
             r#"{"settings":{"settle_us":70000}}"#,
             r#"{"settings":{"baud":1}}"#,
             r#"{"record":1}"#,
+            r#"{"calibrate":"press"}"#,
+            r#"{"calibrate":true}"#,
             r#"{"record":true,"pause":true}"#,
             &many,
             &faults,

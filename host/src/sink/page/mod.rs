@@ -6,6 +6,7 @@
 
 mod access;
 mod assets;
+mod calibrating;
 mod messages;
 mod socket;
 mod update;

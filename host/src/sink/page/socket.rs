@@ -19,6 +19,8 @@ use crate::run::{Request, Snapshot};
 const UPDATE_INTERVAL: Duration = Duration::from_millis(15);
 
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
+/// While the detector is calibrated: whoever rubs sees at once where that was.
+const CALIBRATING_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Talks to a page until it leaves.
 pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
@@ -108,9 +110,11 @@ impl<'a> Page<'a> {
     }
 
     fn status(&mut self) -> Option<Message> {
-        self.status_due = Instant::now() + STATUS_INTERVAL;
+        let snapshot = self.snapshots.borrow().clone();
+        let interval = if snapshot.calibrating.is_some() { CALIBRATING_INTERVAL } else { STATUS_INTERVAL };
+        self.status_due = Instant::now() + interval;
         let rezeros = self.shared.rezeros.load(Ordering::Relaxed);
-        wire::status(&self.snapshots.borrow(), rezeros).ok().map(Message::text)
+        wire::status(&snapshot, rezeros).ok().map(Message::text)
     }
 
     fn update(&mut self) -> Option<Message> {

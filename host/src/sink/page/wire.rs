@@ -3,7 +3,8 @@
 //! Program to page, one message at a time, the next only after the page has answered `"taken"`:
 //!
 //! - `setup`, JSON, once: what does not change while the program runs.
-//! - `status`, JSON, four times a second: the link, the board, the counts, what is played and recorded.
+//! - `status`, JSON, four times a second, and ten times while the detector is calibrated: the link, the board, the counts, what is played and
+//!   recorded, and how the [calibration](super::calibrating) is.
 //! - an update, binary, at most about sixty times a second: the newest frame, as in [`update`](super::update).
 //!
 //! Page to program, JSON: see [`messages`](super::messages).
@@ -12,6 +13,7 @@ use serde::Serialize;
 use tactomo_protocol::Hello;
 
 use super::PageSetup;
+use super::calibrating::CalibratingMessage;
 use super::update::LAYOUT;
 use crate::run::SolverState;
 use crate::run::{Latency, LinkState, Snapshot};
@@ -128,6 +130,7 @@ struct StatusMessage<'a> {
     refused: Option<&'a str>,
     baseline: Option<&'a str>,
     calibration: Option<&'a str>,
+    calibrating: Option<CalibratingMessage<'a>>,
 }
 
 /// What the link plays.
@@ -211,6 +214,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         refused: snapshot.refused.as_deref(),
         baseline: snapshot.baseline.as_deref(),
         calibration: snapshot.calibration.as_deref(),
+        calibrating: snapshot.calibrating.as_deref().map(CalibratingMessage::of),
     })
 }
 

@@ -1,6 +1,7 @@
 // The live page: takes messages from the program and shows them.
 
 import { Board } from "./board.js";
+import { CalibratePanel } from "./calibrate.js";
 import { ContactTable } from "./contacts.js";
 import { listenForActions, RecordButton, RezeroButton } from "./controls.js";
 import { Figures } from "./figures.js";
@@ -44,6 +45,7 @@ function start(setup) {
     text, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
+    calibrate: new CalibratePanel(setup, send),
   };
   const plot = document.getElementById("plot");
   plot.classList.toggle("pressable", setup.simulated);
@@ -56,7 +58,7 @@ function start(setup) {
 function showStatus(status) {
   const { state, text } = linkOf(status);
   if (showState(state, text)) verdict.hold();
-  for (const part of [figures, transport, recordButton, rezeroButton, parts.board, parts.simulation]) part.show(status);
+  for (const part of [figures, transport, recordButton, rezeroButton, parts.board, parts.simulation, parts.calibrate]) part.show(status);
   if (parts.method.show(status.solver, status.link.state === "streaming")) parts.picture.fitNext();
   document.getElementById("pause").hidden = transport.isThere;
   showNotice(status);
@@ -142,6 +144,7 @@ listenForActions({
     parts?.readings.fit(performance.now());
   },
   rezero: () => rezeroButton.press(),
+  calibrate: () => parts?.calibrate.toggle(),
   full: fullScreen,
   view: () => look(parts?.picture.looking === "flat" ? "space" : "flat"),
   "view-flat": () => look("flat"),
@@ -151,6 +154,7 @@ listenForTheme((name) => {
   parts?.picture.recolour(name);
   parts?.readings.recolour(name);
   parts?.strip.recolour();
+  parts?.calibrate.draw();
 });
 const sizes = new ResizeObserver(() => {
   parts?.picture.layOut();

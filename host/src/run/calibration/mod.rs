@@ -1,0 +1,274 @@
+//! Calibration by rubbing, while the picture goes on: frames are collected, spread over the detector, and fitted every few seconds, so that a
+//! person sees where to rub and what it brings, until more brings nothing.
+
+mod collected;
+mod fit;
+mod save;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
+use tactomo_touch::solve::FoundContact;
+
+use self::collected::Collected;
+pub use self::collected::Coverage;
+pub use self::fit::{Compared, Fit};
+use self::fit::{Fitted, Task};
+use super::inbox::{Event, Inbox};
+
+/// Cells with frames, light and firm ones counted apart, before the first fit: fewer do not spread over a detector.
+const ENOUGH: usize = 16;
+/// Shortest time from the end of a fit to the next; at least the fit's own time is left too, for the picture needs the cores.
+const PAUSE: Duration = Duration::from_secs(2);
+/// Share of the detector that has to be rubbed before it is done: fingertips hardly reach the corners.
+const WHOLE: f64 = 0.8;
+/// Share of the expected error before by which a fit has to better it for more to be worth it.
+const WORTH: f64 = 0.05;
+/// Time between two pictures of how it is: a person sees that at once.
+const SHOWN_EVERY: Duration = Duration::from_millis(80);
+
+/// What a person asks of a calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Calibrate {
+    /// Collects frames; after the end, more of them.
+    Begin,
+    /// Ends collecting, and fits what there is.
+    Finish,
+    /// Writes what was found to a new file.
+    Save,
+    /// Goes on with the detector that was found.
+    Use,
+    /// Forgets it.
+    End,
+}
+
+/// How far a calibration is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Frames are collected.
+    Rubbing,
+    /// All of them are fitted.
+    Finishing,
+    /// There is a detector to save and to use.
+    Done,
+}
+
+/// A calibration as it is shown.
+#[derive(Clone, Debug)]
+pub struct Calibrating {
+    /// How far it is.
+    pub stage: Stage,
+    /// Where has been rubbed.
+    pub coverage: Coverage,
+    /// Frames that something touched in.
+    pub touched: u64,
+    /// Whether a fit is under way.
+    pub fitting: bool,
+    /// Expected standard error of a place (m) after each fit.
+    pub errors_m: Vec<f64>,
+    /// The newest fit.
+    pub fit: Option<Arc<Fit>>,
+    /// Why there is none, or no newer one, as a sentence for a person.
+    pub trouble: Option<String>,
+    /// The file that was written.
+    pub saved: Option<PathBuf>,
+    /// Whether the picture uses the detector that was found.
+    pub used: bool,
+}
+
+/// What comes of work in another thread.
+pub(super) enum Outcome {
+    Fitted(Box<Fitted>),
+    Saved(Result<PathBuf, String>),
+}
+
+/// A calibration under way, in the follower.
+pub(super) struct Desk {
+    /// Tells what comes of this one from what comes of others before.
+    number: u64,
+    inbox: Arc<Inbox>,
+    folder: PathBuf,
+    description: Arc<Detector>,
+    /// Identity of the board.
+    board: Option<String>,
+    collected: Collected,
+    shown: Calibrating,
+    cancelled: Arc<AtomicBool>,
+    next_fit: Instant,
+    fitted_frames: u64,
+    showed: Option<Instant>,
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Desk {
+    /// Begins to collect frames of the detector of this description, for files in this folder.
+    pub fn new(
+        number: u64,
+        description: Arc<Detector>,
+        board: Option<String>,
+        folder: PathBuf,
+        inbox: Arc<Inbox>,
+    ) -> Self {
+        let collected = Collected::new(&description);
+        let shown = Calibrating {
+            stage: Stage::Rubbing,
+            coverage: collected.coverage.clone(),
+            touched: 0,
+            fitting: false,
+            errors_m: Vec::new(),
+            fit: None,
+            trouble: None,
+            saved: None,
+            used: false,
+        };
+        Self {
+            number,
+            inbox,
+            folder,
+            description,
+            board,
+            collected,
+            shown,
+            cancelled: Arc::default(),
+            next_fit: Instant::now(),
+            fitted_frames: 0,
+            showed: None,
+        }
+    }
+
+    /// Does what a person asks, but for what is the follower's.
+    pub fn ask(&mut self, ask: Calibrate) {
+        self.showed = None;
+        match (ask, self.shown.stage) {
+            (Calibrate::Begin, Stage::Done) => self.shown.stage = Stage::Rubbing,
+            (Calibrate::Finish, Stage::Rubbing) => self.finish(),
+            (Calibrate::Save, Stage::Done) => self.save(),
+            _ => {}
+        }
+    }
+
+    /// The detector to go on with, if there is one.
+    pub fn use_found(&mut self) -> Option<Arc<Detector>> {
+        let fit = self.shown.fit.as_ref().filter(|_| self.shown.stage == Stage::Done)?;
+        (self.shown.used, self.showed) = (true, None);
+        Some(Arc::new(fit.rub.detector.clone()))
+    }
+
+    /// Takes a frame: readings (V) less the baseline, as the channels read them, and the contacts found.
+    pub fn take(&mut self, readings: &Readings, contacts: &[FoundContact]) {
+        if self.shown.stage != Stage::Rubbing {
+            return;
+        }
+        self.collected.take(readings, contacts, &self.description);
+        let is_new = self.collected.touched > self.fitted_frames;
+        if is_new && !self.shown.fitting && self.collected.filled() >= ENOUGH && Instant::now() >= self.next_fit {
+            self.fit(false);
+        }
+    }
+
+    /// Takes what has come of work in another thread.
+    pub fn receive(&mut self, number: u64, outcome: Outcome) {
+        if number != self.number {
+            return;
+        }
+        self.showed = None;
+        match outcome {
+            Outcome::Fitted(fitted) => self.fitted(*fitted),
+            Outcome::Saved(saved) => {
+                self.shown.trouble = saved.as_ref().err().cloned();
+                self.shown.saved = saved.ok();
+            }
+        }
+    }
+
+    /// How it is, if it is time to show that.
+    pub fn newly_shown(&mut self) -> Option<Calibrating> {
+        if self.showed.is_some_and(|showed| showed.elapsed() < SHOWN_EVERY) {
+            return None;
+        }
+        self.showed = Some(Instant::now());
+        self.shown.coverage.clone_from(&self.collected.coverage);
+        self.shown.touched = self.collected.touched;
+        Some(self.shown.clone())
+    }
+
+    fn finish(&mut self) {
+        self.shown.stage = Stage::Finishing;
+        // One that is under way is not of all frames: the last one follows it.
+        if !self.shown.fitting {
+            self.fit(true);
+        }
+    }
+
+    fn fit(&mut self, is_last: bool) {
+        let task = Task {
+            description: Arc::clone(&self.description),
+            board: self.board.clone(),
+            frames: self.collected.frames(),
+            before: self.shown.errors_m.len(),
+            is_last,
+            cancelled: Arc::clone(&self.cancelled),
+        };
+        self.fitted_frames = self.collected.touched;
+        match fit::begin(task, self.number, &self.inbox) {
+            Ok(()) => self.shown.fitting = true,
+            Err(error) => self.fail(format!("cannot start a thread: {error}")),
+        }
+    }
+
+    fn fail(&mut self, trouble: String) {
+        (self.shown.trouble, self.shown.stage) = (Some(trouble), Stage::Rubbing);
+    }
+
+    fn fitted(&mut self, Fitted { is_last, fit, took }: Fitted) {
+        self.shown.fitting = false;
+        self.next_fit = Instant::now() + PAUSE.max(took);
+        let is_asked = self.shown.stage == Stage::Finishing && !is_last;
+        match fit {
+            // On the way there may be too little yet; at the end that is the answer.
+            Err(trouble) => {
+                self.shown.trouble = Some(trouble);
+                self.shown.stage = if is_asked { Stage::Finishing } else { Stage::Rubbing };
+            }
+            Ok(fit) => {
+                let error_m = fit.rub.place_error_m();
+                let is_settled = self.shown.errors_m.last().is_some_and(|before_m| error_m > (1.0 - WORTH) * before_m);
+                self.shown.errors_m.push(error_m);
+                self.shown.fit = Some(Arc::new(fit));
+                (self.shown.trouble, self.shown.saved, self.shown.used) = (None, None, false);
+                if is_last {
+                    self.shown.stage = Stage::Done;
+                } else if !is_asked && is_settled && self.collected.coverage.share() >= WHOLE {
+                    self.finish();
+                }
+            }
+        }
+        if is_asked {
+            self.fit(true);
+        }
+    }
+
+    fn save(&mut self) {
+        let (Some(fit), None) = (&self.shown.fit, &self.shown.saved) else { return };
+        let (fit, folder) = (Arc::clone(fit), self.folder.clone());
+        let (number, inbox) = (self.number, Arc::clone(&self.inbox));
+        let write = move || {
+            let saved = save::save(&fit.rub.detector, &folder);
+            inbox.put(Event::Calibrated(number, Outcome::Saved(saved)));
+        };
+        if let Err(error) = thread::Builder::new().name("calibration file".to_owned()).spawn(write) {
+            self.shown.trouble = Some(format!("cannot start a thread: {error}"));
+        }
+    }
+}

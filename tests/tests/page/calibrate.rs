@@ -1,0 +1,118 @@
+//! Calibrating from the page: a simulated board that is not the one described, rubbed until the page says that it is done.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use tactomo::detector::Detector;
+
+use crate::chromium::Told;
+use crate::live::Live;
+use crate::stage::{Stage, in_front_of};
+
+/// Longest that a person would rub; on two idle cores it takes 20 s.
+const PATIENCE: Duration = Duration::from_secs(180);
+/// Time at a place, and distance to the next (mm): a finger that rubs at 10 cm/s.
+const AT_A_PLACE: Duration = Duration::from_millis(25);
+const STEP_MM: f64 = 2.5;
+/// How far the finger goes from the middle (mm): to where its disc is just on the sensor.
+const REACH_MM: f64 = 26.0;
+/// Light and firm.
+const FIRMNESSES: [f64; 2] = [0.05, 0.8];
+
+/// Places to and fro over the whole sensor (mm), along x and then along y, 5 mm apart.
+fn way_mm() -> Vec<[f64; 2]> {
+    let steps = (2.0 * REACH_MM / STEP_MM) as i32;
+    let along = |i: i32| -REACH_MM + STEP_MM * f64::from(i);
+    let rows = (0..=steps).step_by(2).enumerate().flat_map(|(turn, row)| {
+        (0..=steps).map(move |i| [along(if turn % 2 == 0 { i } else { steps - i }), along(row)])
+    });
+    let rows: Vec<_> = rows.collect();
+    rows.iter().copied().chain(rows.iter().map(|[x, y]| [*y, *x])).collect()
+}
+
+/// Rubs until the page tells what is wanted.
+async fn rub_until(stage: &Stage<Live>, wanted: impl Fn(&Told) -> bool) -> Result<Told> {
+    let begin = Instant::now();
+    let way_mm = way_mm();
+    for (step, at_mm) in way_mm.iter().cycle().enumerate() {
+        let told = stage.browser.told().await?;
+        if wanted(&told) {
+            stage.behind.mouse.press(Vec::new());
+            return Ok(told);
+        }
+        ensure!(begin.elapsed() < PATIENCE, "rubbing does not end; the page tells {told:?}");
+        stage.behind.press_with(*at_mm, FIRMNESSES[step / 30 % 2])?;
+        tokio::time::sleep(AT_A_PLACE).await;
+    }
+    unreachable!("a way without end")
+}
+
+/// Distance from a press of where the page shows its contact (mm), in the mean over a few places.
+async fn off_mm(stage: &Stage<Live>) -> Result<f64> {
+    let places = [[-15.0, -12.0], [14.0, -15.0], [2.0, 3.0], [-13.0, 16.0], [16.0, 13.0]];
+    let mut sum = 0.0;
+    for [x_mm, y_mm] in places {
+        stage.behind.press([x_mm, y_mm])?;
+        tokio::time::sleep(Duration::from_secs(1)).await;
+        let told = stage.browser.until("a contact", |told| !told.places_mm().is_empty()).await?;
+        let off = |at: &[f64; 2]| (at[0] - x_mm).hypot(at[1] - y_mm);
+        sum += told.places_mm().iter().map(off).fold(f64::INFINITY, f64::min);
+        stage.behind.mouse.press(Vec::new());
+        stage.browser.until("rest", |told| told.number("contacts") == 0.0).await?;
+    }
+    Ok(sum / places.len() as f64)
+}
+
+async fn calibrates(stage: &Stage<Live>, folder: &Path) -> Result<()> {
+    let before_mm = off_mm(stage).await?;
+    stage.browser.click("calibrate").await?;
+    stage.browser.until("rubbing", |told| told.text("calibrating") == "rubbing").await?;
+    let first_mm = rub_until(stage, |told| told.number("fits") >= 1.0).await?.number("errorMm");
+    let pictures = std::env::var_os("TACTOMO_SCREENSHOT").map(std::path::PathBuf::from);
+    pictured(stage, pictures.as_deref(), "rubbing").await?;
+    let begin = Instant::now();
+    let done = rub_until(stage, |told| told.text("calibrating") == "done").await?;
+    let last_mm = done.number("errorMm");
+    eprintln!("expected {first_mm:.2} mm, after {:.0} s more {last_mm:.2} mm", begin.elapsed().as_secs_f64());
+    ensure!(last_mm < first_mm && done.number("rubbed") > 0.8, "from {first_mm} mm: {done:?}");
+    pictured(stage, pictures.as_deref(), "done").await?;
+    stage.browser.click("calibrate-save").await?;
+    let saved = stage.browser.until("the file", |told| !told.text("calibrated").is_empty()).await?;
+    let saved = Path::new(saved.text("calibrated")).to_owned();
+    let name = saved.file_name().context("a file")?.to_owned();
+    let detector = Detector::read(&folder.join(name))?;
+    let calibration = detector.calibration.as_ref().context("what it was calibrated with")?;
+    ensure!(calibration.board.is_some() && !calibration.date.is_empty() && calibration.presses > 50, "{calibration:?}");
+    stage.browser.click("calibrate-use").await?;
+    let in_use = "return document.getElementById('calibrate-use').disabled";
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    ensure!(stage.browser.run(in_use).await? == true, "the detector is not in use");
+    let after_mm = off_mm(stage).await?;
+    eprintln!("contacts are off by {before_mm:.2} mm before, {after_mm:.2} mm after");
+    pictured(stage, pictures.as_deref(), "used").await?;
+    ensure!(after_mm < 0.6 * before_mm && after_mm < 1.0, "{before_mm} mm before, {after_mm} mm after");
+    stage.browser.click("calibrate-close").await?;
+    stage.browser.until("the end", |told| told.text("calibrating").is_empty()).await?;
+    Ok(())
+}
+
+/// Pictures of the page, if they are wanted.
+async fn pictured(stage: &Stage<Live>, folder: Option<&Path>, name: &str) -> Result<()> {
+    let Some(folder) = folder else { return Ok(()) };
+    for theme in ["light", "dark"] {
+        stage.browser.theme(theme).await?;
+        tokio::time::sleep(Duration::from_millis(400)).await;
+        std::fs::write(folder.join(format!("calibrate-{name}-{theme}.png")), stage.browser.client.screenshot().await?)?;
+    }
+    Ok(())
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_rub_finds_the_detector_that_was_built() -> Result<()> {
+    let folder = std::env::temp_dir().join(format!("tactomo-calibrate-{}", std::process::id()));
+    std::fs::create_dir_all(&folder)?;
+    let outcome = in_front_of!(Live::as_built(3, &folder), stage, { calibrates(&stage, &folder).await });
+    std::fs::remove_dir_all(&folder)?;
+    outcome
+}
