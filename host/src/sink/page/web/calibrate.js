@@ -47,7 +47,7 @@ function advice(state) {
     const light = rubbed.filter((kind) => kind === 1).length;
     return `Go over it again, ${light > rubbed.length / 2 ? "more firmly" : "more lightly"}.`;
   }
-  if (share > MOST_RUBBED && share < WHOLE) return `Now rub ${leastRubbed(state)}, where the map is pale.`;
+  if (share > MOST_RUBBED && share < WHOLE) return `Now rub ${leastRubbed(state)}, where the map is empty.`;
   return share < WHOLE || !fit ? "Go on: one fingertip, everywhere, now light and now firm." : "Nearly there: go on while the error falls.";
 }
 
