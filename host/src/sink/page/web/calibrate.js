@@ -7,6 +7,8 @@ import { count, fixed, millimetres } from "./units.js";
 
 // From this share of the detector on, a person is told which part is left.
 const MOST_RUBBED = 0.35;
+// Share from which it is done, as in `run/calibration`.
+const WHOLE = 0.8;
 // Cells felt both lightly and firmly, as a share of those felt, below which a person is told to change.
 const BOTH = 0.4;
 
@@ -45,8 +47,8 @@ function advice(state) {
     const light = rubbed.filter((kind) => kind === 1).length;
     return `Go over it again, ${light > rubbed.length / 2 ? "more firmly" : "more lightly"}.`;
   }
-  if (share > MOST_RUBBED && share < 0.8) return `Now rub ${leastRubbed(state)}, where the map is pale.`;
-  return share < 0.8 || !fit ? "Go on: one fingertip, everywhere, now light and now firm." : "Nearly there: go on while the error falls.";
+  if (share > MOST_RUBBED && share < WHOLE) return `Now rub ${leastRubbed(state)}, where the map is empty.`;
+  return share < WHOLE || !fit ? "Go on: one fingertip, everywhere, now light and now firm." : "Nearly there: go on while the error falls.";
 }
 
 // Expected error after each fit, falling.
