@@ -56,7 +56,11 @@ impl Readings {
     /// knows of either. What a channel reads with nothing on the detector is no part of it: the baseline is subtracted before.
     pub fn correct_channels(&mut self, detector: &Detector) {
         for row in self.volts.chunks_mut(self.electrodes.max(1)) {
-            let correct = |(volts, pad): (&mut f64, &Electrode)| *volts = (*volts - pad.unseen_offset_v) / pad.gain;
+            let correct = |(volts, pad): (&mut f64, &Electrode)| {
+                // An offset below zero is cut off where there is nothing: the smallest readings are lifted by what they are at most.
+                let offset_v = pad.unseen_offset_v.max(-volts.max(0.0));
+                *volts = (*volts - offset_v) / pad.gain;
+            };
             row.iter_mut().zip(&detector.electrodes).for_each(correct);
         }
     }
