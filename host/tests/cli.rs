@@ -50,10 +50,16 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["record"], "FILE"),
         (&["live", "--scene", "ring"], "--simulate"),
         (&["record", "some.file", "--fault", "open:3"], "--simulate"),
+        (&["live", "--as-built", "7"], "--simulate"),
+        (&["forward", "--as-built", "7", "--save-jacobian", "some.file"], "--save-jacobian"),
+        (&["forward", "--as-built", "seven"], "a seed, or a detector"),
         (&["forward", "--scene", "jazz"], "rolling-ball"),
         (&["forward", "--fault", "open"], "open:3, short:2,7"),
         (&["forward", "--press", "0,0,2.5"], "tip_radius_mm,force_n"),
-        (&["forward", "--contact", "0,0,1,1e-3", "--time", "2"], "--scene"),
+        (&["forward", "--contact", "0,0,1,1e-3", "--time=-2"], "0 or above"),
+        (&["forward", "--fault", "driving-sheet:100:3"], "1 or 2 points"),
+        (&["live", "--time-factor", "10"], "--simulate"),
+        (&["live", "--simulate", "--time-factor", "0"], "above 0"),
         (&["study", "contacts", "--scenes", "0"], "--scenes"),
         (&["dance"], "dance"),
     ] {
@@ -77,6 +83,11 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         (&["forward", "--scene", "rest"], "nothing to compute"),
         (&["forward", "--scene", "single", "--fault", "swap:3,16"], "swap:3,16: there is no electrode 16"),
         (&["forward", "--model", "slab", "--scene", "single", "--fault", "uneven:0.2"], "leave out --model slab"),
+        (
+            &["forward", "--model", "shell", "--scene", "single", "--fault", "driving-sheet:100"],
+            "its driving layer has a sheet resistance, which only the slab can have",
+        ),
+        (&["forward", "--fault", "leak:0.01", "--save-jacobian", "no.jacobian"], "leave out --fault leak"),
         (&["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"], "Poisson's ratio is 0.6"),
         (&["live", "--port", "/dev/null", "--elf", text, "--json"], elf),
         (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
@@ -195,6 +206,51 @@ fn scenes_faults_and_noise_repeat_with_their_seed() {
     };
     assert_eq!(measured("5"), measured("5"));
     assert_ne!(measured("5"), measured("6"));
+}
+
+#[test]
+fn foam_creeps_and_drifts_up_to_the_time_asked_for() {
+    let report = |more: &[&str]| -> serde_json::Value {
+        let output = tactomo(&[&["forward", "--contact", "0,0,3,1e-3", "--json"], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let conductance_s = |report: &serde_json::Value| report["touches"][0]["conductance_s"].as_f64().unwrap();
+    let crept = report(&["--fault", "creep:0.2:3", "--time", "3"]);
+    let expected_s = 1e-3 * (1.0 + 0.2 * (1.0 - (-1.0f64).exp()));
+    assert!((conductance_s(&crept) / expected_s - 1.0).abs() < 1e-5, "{}", conductance_s(&crept));
+    let drifted = report(&["--fault", "drift:0.2:86400", "--time", "86400"]);
+    assert_eq!(conductance_s(&drifted), 1e-3);
+    let [drifted, told] =
+        [drifted, report(&["--fault", "conductivity:1.2"])].map(|report| report["readings_v"][5][10].as_f64().unwrap());
+    assert!((drifted / told - 1.0).abs() < 2e-3, "{drifted} {told}");
+}
+
+#[test]
+fn what_was_built_is_told_and_can_be_simulated_again() {
+    let contact = ["forward", "--contact", "3,-4,2.5,0.001", "--json", "--as-built"];
+    let report = |args: &[&str]| -> serde_json::Value {
+        let output = tactomo(args);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let built = report(&[&contact[..], &["7"]].concat());
+    let shown = tactomo(&["detector", "show", "square-60", "--as-built", "7"]);
+    let toml = String::from_utf8(shown.stdout).unwrap();
+    assert_eq!(built["as_built"].as_str().unwrap().trim_end(), toml.trim_end());
+    assert_eq!(built["detector"], "square-60");
+    let path = std::env::temp_dir().join(format!("tactomo-as-built-{}.toml", std::process::id()));
+    std::fs::write(&path, toml).unwrap();
+    let again = report(&[&contact[..], &[path.to_str().unwrap()]].concat());
+    let exact =
+        tactomo(&["forward", "--contact", "0,0,1,1e-3", "--detector", path.to_str().unwrap(), "--as-built", "1"]);
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(again["readings_v"], built["readings_v"]);
+    assert_eq!(exact.status.code(), Some(1));
+    assert!(String::from_utf8(exact.stderr).unwrap().contains("nothing to draw"));
+    let described = report(&contact[..4]);
+    assert!(described.get("as_built").is_none() && described["readings_v"] != built["readings_v"]);
+    assert_ne!(report(&[&contact[..], &["8"]].concat())["readings_v"], built["readings_v"]);
 }
 
 #[test]

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use tactomo::board::identity::identity;
 use tactomo::board::record::{Header, RecordWriter};
+use tactomo::detector::{Calibration, Detector};
 use tactomo::schema::{CONTACT_COLUMNS, csv_heads};
 use tactomo::table::{NpzWriter, Table};
 use tactomo_protocol::{BoardMessage, FrameHead, Hello, MAX_WIRE, encode_board, encode_frame};
@@ -98,6 +100,37 @@ fn frames_at_rest_are_subtracted() {
     let found = lines(&[file.name(), "--rest", "2"]);
     assert_eq!((found.len(), found[0]["frame"].as_u64()), (1, Some(2)));
     assert_found(&found[0]);
+}
+
+#[test]
+fn gains_that_the_detectors_file_tells_are_taken_off_the_readings() {
+    let mut detector = Detector::default();
+    detector.electrodes.iter_mut().enumerate().for_each(|(e, pad)| pad.gain = [1.0, 1.05, 0.96][e % 3]);
+    let file = Temporary::with("gains.toml", detector.to_toml());
+    let amplified = readings().iter().enumerate().map(|(k, volts)| volts * detector.electrodes[k % 16].gain).collect();
+    let table = Temporary::with("gains.csv", csv(&[amplified]));
+    let found = |args: &[&str]| lines(&[&[table.name(), "--solver", "contacts"], args].concat()).remove(0);
+    let error_m = |line: &Value| {
+        let [x_m, y_m] = ["x_m", "y_m"].map(|name| line["contacts"][0][name].as_f64().unwrap());
+        (x_m - 1e-3 * PLACE_MM[0]).hypot(y_m - 1e-3 * PLACE_MM[1])
+    };
+    let [told, untold] = [&["--detector", file.name()][..], &[]].map(|args| error_m(&found(args)));
+    assert!(told < 2e-4 && untold > 5.0 * told, "{told} {untold}");
+}
+
+#[test]
+fn a_recording_on_another_board_than_the_calibrated_one_is_reported() {
+    let warning = |board: String| {
+        let calibration = Calibration { board: Some(board), ..Calibration::default() };
+        let detector = Detector { calibration: Some(calibration), ..Detector::default() };
+        let file = Temporary::with("calibrated.toml", detector.to_toml());
+        let recording = recording_of("calibrated.tactomo", 0..40);
+        let output = tactomo(&["reconstruct", recording.name(), "--detector", file.name(), "--json"]);
+        assert_eq!(output.status.code(), Some(0));
+        String::from_utf8(output.stderr).unwrap().contains("calibrated on another board")
+    };
+    assert!(warning("esp32".to_owned()));
+    assert!(!warning(identity(&Hello::example(16))));
 }
 
 #[test]

@@ -111,6 +111,11 @@ impl Settings {
     pub fn is_valid(&self) -> bool {
         self.average_log2 <= Self::MAX_AVERAGE_LOG2
     }
+
+    /// Conversions averaged into one reading.
+    pub fn conversions(&self) -> u32 {
+        1 << u32::from(self.average_log2.min(Self::MAX_AVERAGE_LOG2))
+    }
 }
 
 impl Default for Settings {

@@ -6,6 +6,7 @@
 pub mod baseline;
 pub mod board_log;
 pub mod frames;
+pub mod identity;
 pub mod link;
 pub mod measured;
 pub mod record;

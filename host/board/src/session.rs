@@ -93,7 +93,6 @@ pub struct Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { wanted, kept } = self;
-        let conversions = |settings: &Settings| 1u32.checked_shl(settings.average_log2.into()).unwrap_or(u32::MAX);
         let rate = |settings: &Settings| match settings.max_frames_per_s {
             0 => "as many frames a second as it can".to_owned(),
             rate => format!("at most {rate} frames a second"),
@@ -102,7 +101,7 @@ impl fmt::Display for Refusal {
             (wanted.settle_us != kept.settle_us)
                 .then(|| format!("a settle time of {} us instead of {} us", kept.settle_us, wanted.settle_us)),
             (wanted.average_log2 != kept.average_log2).then(|| {
-                format!("an average over {} instead of {} conversions", conversions(kept), conversions(wanted))
+                format!("an average over {} instead of {} conversions", kept.conversions(), wanted.conversions())
             }),
             (wanted.max_frames_per_s != kept.max_frames_per_s)
                 .then(|| format!("{} instead of {}", rate(kept), rate(wanted))),

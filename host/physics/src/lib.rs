@@ -9,6 +9,7 @@ pub mod forward;
 pub mod geometry;
 pub mod hertz;
 pub mod readings;
+pub mod rest;
 pub mod scene;
 pub mod simulate;
 pub mod space;

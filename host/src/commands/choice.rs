@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tactomo::board::record::Header;
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::shell::Shell;
-use tactomo::forward::{Auto, ForwardError, ForwardModel, Slab};
+use tactomo::forward::{Auto, DrivingLayer, ForwardError, ForwardModel, Resolution, Slab};
 use tactomo::scene::Contact;
 use tactomo::solve::Method;
 
@@ -27,17 +27,27 @@ pub enum Model {
 impl Model {
     /// Makes it for a detector; `nodes` of a shell's mesh, or the default.
     pub fn build(self, detector: &Detector, nodes: Option<usize>) -> Result<Box<dyn ForwardModel>, ForwardError> {
+        self.build_under(detector, nodes, DrivingLayer::default())
+    }
+
+    /// The same with a driving layer that need not be ideal.
+    pub fn build_under(
+        self,
+        detector: &Detector,
+        nodes: Option<usize>,
+        driving: DrivingLayer,
+    ) -> Result<Box<dyn ForwardModel>, ForwardError> {
         match self {
             Self::Auto => {
-                let Auto { model, reason } = Auto::new(detector, nodes)?;
+                let Auto { model, reason } = Auto::under(detector, nodes, driving)?;
                 message!("model of {}: {}, since {reason}", detector.name, model.name());
                 Ok(model)
             }
             Self::Shell => {
                 let nodes = nodes.unwrap_or_else(|| Shell::default_nodes(detector));
-                Ok(Box::new(Shell::with_nodes(detector, nodes)?))
+                Ok(Box::new(Shell::with_nodes(detector, nodes)?.under(driving)?))
             }
-            Self::Slab => Ok(Box::new(Slab::new(detector)?)),
+            Self::Slab => Ok(Box::new(Slab::under(detector, Resolution::STANDARD, driving)?)),
         }
     }
 }
@@ -64,7 +74,7 @@ pub enum Chosen {
 
 impl Chosen {
     /// The detector.
-    fn get(&self) -> anyhow::Result<Detector> {
+    pub fn get(&self) -> anyhow::Result<Detector> {
         match self {
             Self::Preset(detector) => Ok((**detector).clone()),
             Self::File(path) => Ok(Detector::read(path)?),

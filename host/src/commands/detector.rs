@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use tactomo::detector::{Detector, FOAMS, Foam, Stack, short};
 
+use super::as_built::AsBuiltArgs;
 use super::choice::{self, Chosen, DetectorArgs};
 use super::output::{self, NewFile, message};
 
@@ -14,6 +15,7 @@ use super::output::{self, NewFile, message};
 ///   tactomo detector list
 ///   tactomo detector show square-60 --material BC --svg square.svg
 ///   tactomo detector show square-60 --toml          a file to start from
+///   tactomo detector show square-60 --as-built 7    a file of one that may have been built by this description
 ///   tactomo detector check my.toml
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -48,6 +50,8 @@ struct ShowArgs {
     /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC
     #[arg(long, value_name = "A..D|STACK")]
     material: Option<Stack>,
+    #[command(flatten)]
+    as_built: AsBuiltArgs,
     /// Draws it into an SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
@@ -101,14 +105,17 @@ fn table(list: &List) -> String {
 }
 
 fn show(args: ShowArgs) -> anyhow::Result<()> {
-    let detector = DetectorArgs { detector: Some(args.detector), material: args.material }.get()?;
+    let described = DetectorArgs { detector: Some(args.detector), material: args.material }.get()?;
+    let detector = args.as_built.of(&described)?;
     if let Some(path) = &args.svg {
         NewFile::new(path, args.overwrite)?.write(detector.to_svg())?;
         message!("drew {} in {}", detector.name, path.display());
     }
-    let text = match (args.toml, args.json) {
+    // What was built is for a machine to use.
+    let toml = args.toml || args.as_built.is_given() && !args.json && args.svg.is_none();
+    let text = match (toml, args.json) {
         (true, _) => detector.to_toml().trim_end().to_owned(),
-        (_, true) => serde_json::to_string(&detector)?,
+        (_, true) => serde_json::to_string(&*detector)?,
         _ if args.svg.is_some() => return Ok(()),
         _ => description(&detector),
     };

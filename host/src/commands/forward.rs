@@ -11,9 +11,10 @@ use tactomo::forward::shell::Shell;
 use tactomo::forward::{ForwardModel, touched_impedance_ohm};
 use tactomo::readings::Readings;
 use tactomo::scene::{Contact, SceneName, Touch};
-use tactomo::simulate::{self, Measurement};
+use tactomo::simulate::{self, Foam, Measurement, Pressed};
 use tactomo::study::case::Case;
 
+use super::as_built::AsBuiltArgs;
 use super::choice::{self, DetectorArgs, Model};
 use super::output::{self, NewFile, message};
 use super::scene::{self, Press, SceneArgs};
@@ -24,6 +25,7 @@ use super::scene::{self, Press, SceneArgs};
 ///   tactomo forward --detector square-60 --contact 3,-4,2.5,0.001 --json
 ///   tactomo forward --model slab --press 3,-4,2.5,0.5 --fault open:3 --measured
 ///   tactomo forward --model slab --scene ring --force 5 --seed 7 --json
+///   tactomo forward --scene single --as-built 7 --measured --json
 ///   tactomo forward --save-jacobian square-60.jacobian
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -46,8 +48,8 @@ pub struct Args {
     touches: Option<PathBuf>,
     #[command(flatten)]
     scene: SceneArgs,
-    /// Time in the scene (s)
-    #[arg(long, value_name = "SECONDS", default_value = "1", requires = "scene")]
+    /// Time in the scene, and of what creeps or drifts (s); contacts, presses and touches are held from time 0
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = scene::time_s)]
     time: f64,
     /// Adds the converter's noise and rounds to its steps
     #[arg(long)]
@@ -59,12 +61,12 @@ pub struct Args {
     #[arg(long, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     nodes: Option<u32>,
     /// Saves the Jacobian to a file, for `live --jacobian`
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = AsBuiltArgs::NAME)]
     save_jacobian: Option<PathBuf>,
     /// Replaces the file if it exists
     #[arg(long, requires = "save_jacobian")]
     overwrite: bool,
-    /// Prints `{model, detector, image_nodes, touches, faults, readings_v, impedance_ohm}` as JSON
+    /// Prints `{model, detector, as_built?, image_nodes, touches, faults, readings_v, impedance_ohm}` as JSON
     #[arg(long)]
     json: bool,
 }
@@ -73,6 +75,9 @@ pub struct Args {
 struct Report<'a> {
     model: &'a str,
     detector: &'a str,
+    /// The detector that was simulated, as TOML, where that is not the one described.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    as_built: Option<String>,
     image_nodes: usize,
     touches: &'a [Touch],
     faults: Vec<String>,
@@ -84,29 +89,34 @@ struct Report<'a> {
 
 /// Computes and prints.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let (detector, touches) = touched(args)?;
+    let (detector, pressed) = pressed(args)?;
+    let leaks = simulate::driving_layer(&detector, &args.scene.fault).leak_s > 0.0;
+    let (computes, saves) = (leaks || !pressed.touches.is_empty(), args.save_jacobian.is_some());
     ensure!(
-        !touches.is_empty() || args.save_jacobian.is_some(),
+        computes || saves,
         "nothing to compute: give --contact, --press, --touches, --scene (at a time when something touches), --case or --save-jacobian"
     );
+    ensure!(!(leaks && saves), "a detector that leaks has no Jacobian at no contact: leave out --fault leak");
     let jacobian = NewFile::optional(args.save_jacobian.as_ref(), args.overwrite)?;
-    let model = model(args, &detector)?;
+    let built = args.scene.as_built.of(&detector)?;
+    let model = model(args, &built)?;
     if let (Some(file), Some(path)) = (jacobian, &args.save_jacobian) {
         Jacobian::of(&*model).save(file.unfinished_path())?;
         file.finish()?;
         message!("saved the Jacobian of {} ({}) to {}", detector.name, model.name(), path.display());
     }
-    if touches.is_empty() {
+    if !computes {
         return Ok(());
     }
-    let impedance_ohm = touched_impedance_ohm(&*model, &touches)?;
-    let readings = readings(args, &detector, &impedance_ohm)?;
+    let impedance_ohm = touched_impedance_ohm(&*model, &pressed.before_drift())? / pressed.factor;
+    let readings = readings(args, &built, &impedance_ohm)?;
     if args.json {
         let report = Report {
             model: model.name(),
             detector: &detector.name,
+            as_built: args.scene.as_built.is_given().then(|| built.to_toml()),
             image_nodes: model.image_mesh().nodes_m.len(),
-            touches: &touches,
+            touches: &pressed.touches,
             faults: args.scene.fault.iter().map(ToString::to_string).collect(),
             readings_v: rows_of_readings(&readings),
             impedance_ohm: rows(&impedance_ohm),
@@ -119,21 +129,23 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// The detector, and all that touches it.
-fn touched(args: &Args) -> anyhow::Result<(Detector, Vec<Touch>)> {
+fn pressed(args: &Args) -> anyhow::Result<(Detector, Pressed)> {
     let (detector, foams, mut contacts) = detector(args)?;
     if !args.contact.is_empty() {
         contacts.clone_from(&args.contact);
     }
-    let mut touches: Vec<Touch> = contacts.into_iter().map(Touch::from).collect();
+    let mut held: Vec<Touch> = contacts.into_iter().map(Touch::from).collect();
     if !args.press.is_empty() {
         let hertz = args.scene.hertz(foams.clone(), &detector)?;
-        touches.extend(args.press.iter().map(|press| press.touch(&hertz)));
+        held.extend(args.press.iter().map(|press| press.touch(&hertz)));
     }
     if let Some(path) = &args.touches {
-        touches.extend(scene::read_touches(path)?);
+        held.extend(scene::read_touches(path)?);
     }
-    touches.extend(args.scene.scene(SceneName::Rest, foams, &detector)?.at(args.time));
-    Ok((detector, touches))
+    let scene = args.scene.scene(SceneName::Rest, foams, &detector)?;
+    let pressed =
+        Foam::after(&args.scene.fault, args.time, |time_s| held.iter().cloned().chain(scene.at(time_s)).collect());
+    Ok((detector, pressed))
 }
 
 /// The detector, what it is made of if that is known, and the contacts of its case.
@@ -150,13 +162,14 @@ fn detector(args: &Args) -> anyhow::Result<(Detector, Option<Stack>, Vec<Contact
 fn model(args: &Args, detector: &Detector) -> anyhow::Result<Box<dyn ForwardModel>> {
     let nodes = args.nodes.map(|nodes| nodes as usize);
     let shell_nodes = nodes.unwrap_or_else(|| Shell::default_nodes(detector));
+    let driving = simulate::driving_layer(detector, &args.scene.fault);
     let detector = &simulate::as_built(detector, &args.scene.fault, args.scene.seed());
     match simulate::uneven_shell(detector, shell_nodes, &args.scene.fault, args.scene.seed())? {
         Some(shell) => {
             ensure!(args.model != Model::Slab, "only the shell can be uneven in the plane: leave out --model slab");
-            Ok(Box::new(shell))
+            Ok(Box::new(shell.under(driving)?))
         }
-        None => Ok(args.model.build(detector, nodes)?),
+        None => Ok(args.model.build_under(detector, nodes, driving)?),
     }
 }
 

@@ -33,6 +33,7 @@ const REQUESTS: usize = 64;
 ///   tactomo live                                    finds the board and serves the page
 ///   tactomo live --simulate                         without hardware
 ///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
+///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
 ///   tactomo live --replay touch.tactomo --speed 0.25
 ///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network

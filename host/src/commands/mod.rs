@@ -1,6 +1,8 @@
 //! The commands, one file each: its arguments and what it does.
 
+mod as_built;
 mod browser;
+mod calibrate;
 mod choice;
 mod detector;
 mod forward;
@@ -42,6 +44,7 @@ enum Command {
     Stability(stability::Args),
     Study(study::Args),
     Reconstruct(reconstruct::Args),
+    Calibrate(calibrate::Args),
 }
 
 /// Runs the command that was asked for.
@@ -58,5 +61,6 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Stability(args) => stability::run(&args),
         Command::Study(args) => study::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
     }
 }

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 
 /// Prints a message on stderr, as `eprintln!` does, but without a panic where stderr is closed.
 macro_rules! message {
@@ -75,6 +75,12 @@ impl NewFile {
         let file = Self { path, unfinished: unfinished.into() };
         file.create()?;
         Ok(file)
+    }
+
+    /// The same for a file of a kind that never replaces another one.
+    pub fn never_replacing(path: &Path) -> anyhow::Result<Self> {
+        ensure!(!path.exists(), "{} exists already, and is not replaced: give another name", path.display());
+        Self::new(path, false)
     }
 
     /// The same for a file that may be wanted.

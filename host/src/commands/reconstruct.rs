@@ -1,7 +1,7 @@
 //! `tactomo reconstruct`: touch from readings in a file.
 
-mod reader;
-mod units;
+pub mod reader;
+pub mod units;
 mod writer;
 
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use anyhow::Context;
 use tactomo::schema::FrameReport;
 use tactomo::solve::{Lambda, Method};
 
-use self::reader::Reader;
+use self::reader::{Input, Reader};
 use self::units::Unit;
 use self::writer::Writer;
 use super::choice::{self, DetectorArgs, Model};
@@ -73,9 +73,25 @@ pub struct Args {
     overwrite: bool,
 }
 
+impl Args {
+    fn input(&self) -> Input<'_> {
+        Input {
+            file: &self.file,
+            detector: &self.detector,
+            model: self.model,
+            solver: self.solver,
+            lambda: self.lambda,
+            presses: self.presses.as_deref(),
+            rest: self.rest,
+            unit: self.unit,
+            force: None,
+        }
+    }
+}
+
 /// Solves all frames.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let mut reader = Reader::open(args)?;
+    let mut reader = Reader::open(&args.input())?;
     let mut writer = Writer::new(args, &reader)?;
     let mut times_us = Vec::new();
     while let Some(frame) = reader.next_frame()? {

@@ -36,18 +36,28 @@ pub struct Args {
 
 /// Records until the end.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let detector = source::described(&args.board, args.detector.get()?);
-    let (mut source, _) = source::board(&args.board, &args.detector, &detector)?;
+    record(&args.file, &args.board, &args.detector, args.seconds)
+}
+
+/// Records a board in a new file, for so long or until Ctrl-C.
+pub fn record(
+    file: &PathBuf,
+    board: &BoardArgs,
+    detector_args: &DetectorArgs,
+    seconds: Option<Duration>,
+) -> anyhow::Result<()> {
+    let detector = source::described(board, detector_args.get()?);
+    let (mut source, _) = source::board(board, detector_args, &detector)?;
     let plan = Plan {
-        settings: args.board.settings.requested(),
-        recorder: recording::begin(Some(&args.file), &detector, source.name())?,
-        seconds: args.seconds,
+        settings: board.settings.requested(),
+        recorder: recording::begin(Some(file), &detector, source.name())?,
+        seconds,
         ..Plan::new(detector)
     };
     let (snapshots, _) = watch::channel(Arc::new(Snapshot::default()));
     let (_, requests) = mpsc::sync_channel(1);
     let ends = Ends { snapshots, requests, stop: interrupt::flag()? };
     let summary = tactomo::run::run(&mut *source, plan, ends)?;
-    message!("{}; kept in {}", live::sentence(&summary), args.file.display());
+    message!("{}; kept in {}", live::sentence(&summary), file.display());
     Ok(())
 }

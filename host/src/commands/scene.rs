@@ -9,6 +9,7 @@ use tactomo::hertz::{Hertz, POISSON, SURFACE_DEPTH_M, Skin};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
+use super::as_built::AsBuiltArgs;
 use super::output::message;
 
 /// Default seed.
@@ -35,10 +36,14 @@ pub struct SceneArgs {
     /// Depth of the surface layer that a contact's current crosses, for forces (mm)
     #[arg(long, value_name = "MM", default_value_t = SURFACE_DEPTH_M * 1e3, value_parser = positive)]
     surface_depth: f64,
-    /// A fault: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2 or
-    /// clip:0.14,1.8 (V); give it again for more
+    /// A fault: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2,
+    /// clip:0.14,1.8 (V); of the driving layer: driving-sheet:100 (ohm/sq), connected at one corner, driving-sheet:100:2 at two, leak:0.01 (sheet
+    /// conductances in all); of the foam in time: creep:0.2:3 (share, time constant in s), hysteresis:0.1 (share), drift:0.2:86400
+    /// (share of the conductivity in so many s), drift:0.2:86400:0.05 (with a daily wave); give it again for more
     #[arg(long, value_name = "FAULT")]
     pub fault: Vec<Fault>,
+    #[command(flatten)]
+    pub as_built: AsBuiltArgs,
     /// Seed of places, noise and faults [default: 1]
     #[arg(long)]
     seed: Option<u64>,
@@ -46,7 +51,8 @@ pub struct SceneArgs {
 
 impl SceneArgs {
     /// Names of the arguments.
-    pub const NAMES: [&str; 8] = ["scene", "force", "tip", "elasticity", "poisson", "surface_depth", "fault", "seed"];
+    pub const NAMES: [&str; 9] =
+        ["scene", "force", "tip", "elasticity", "poisson", "surface_depth", "fault", AsBuiltArgs::NAME, "seed"];
 
     /// The seed.
     pub fn seed(&self) -> u64 {
@@ -119,7 +125,14 @@ pub fn read_touches(path: &Path) -> anyhow::Result<Vec<Touch>> {
     serde_json::from_str(&text).with_context(|| format!("{} is no list of touches", path.display()))
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+/// A time from zero on (s).
+pub fn time_s(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| *number >= 0.0 && number.is_finite());
+    number.ok_or_else(|| "a number of seconds of 0 or above is needed".to_owned())
+}
+
+/// A number above zero.
+pub fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
     number.ok_or_else(|| "a number above 0 is needed".to_owned())
 }

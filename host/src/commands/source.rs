@@ -14,7 +14,7 @@ use tactomo::simulate::Simulation;
 use tactomo::sink::page::Finger;
 
 use super::choice::DetectorArgs;
-use super::scene::SceneArgs;
+use super::scene::{self, SceneArgs};
 
 /// How firmly the mouse presses on the simulated detector, from 0 to 1.
 const MOUSE_FIRMNESS: f64 = 0.3;
@@ -36,6 +36,9 @@ pub struct BoardArgs {
     pub settings: SettingsArgs,
     #[command(flatten)]
     pub scene: SceneArgs,
+    /// How many times faster than the simulated board its scene plays and its foam creeps and drifts: a day in 86 seconds with 1000
+    #[arg(long, value_name = "FACTOR", default_value = "1", requires = "simulate", value_parser = scene::positive)]
+    pub time_factor: f64,
 }
 
 /// Settings of the scan; what is not given stays as the board has it.
@@ -70,9 +73,10 @@ impl SettingsArgs {
     }
 }
 
-/// What solvers are told of the detector: one that is simulated is as it is described.
+/// What is told of the detector: one that is simulated is as it is described, unless it is one as built.
 pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
-    if args.simulate { detector.taken_as_exact() } else { detector }
+    let is_exact = args.simulate && !args.scene.as_built.is_given();
+    if is_exact { detector.taken_as_exact() } else { detector }
 }
 
 /// The board that is chosen, and what the mouse presses with on a simulated one.
@@ -87,8 +91,9 @@ pub fn board(
     let scene = args.scene.scene(SceneName::Wandering, chosen.foams(), detector)?;
     let finger = scene.hand().tip([0.0; 2], MOUSE_FIRMNESS, 1.0).disc().map(Finger::from);
     let seed = args.scene.seed();
-    let simulation = Simulation::new(detector, scene, &args.scene.fault, seed)?;
-    let link = SimulatedBoard::simulate(detector, simulation, Options { seed, ..Options::default() })?;
+    let built = args.scene.as_built.of(detector)?;
+    let simulation = Simulation::new(&built, scene, &args.scene.fault, seed)?.at_speed(args.time_factor);
+    let link = SimulatedBoard::simulate(&built, simulation, Options { seed, ..Options::default() })?;
     Ok((Box::new(Opened::new(Box::new(link))), finger))
 }
 

@@ -9,7 +9,7 @@ use super::study::StudyArgs;
 /// Finds where each solver breaks, how, and whether it reports it.
 ///
 /// Varied are noise, converter, force, the distance of two contacts and of edges, thickness and
-/// conductivity, the baseline, faulty electrodes and more; and errors are compared with the
+/// conductivity, each tolerance of the detector, the baseline, faulty electrodes and more; and errors are compared with the
 /// Cramer-Rao bound. Takes some minutes, with --quick about one.
 ///
 /// Examples:
@@ -36,6 +36,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         frames,
         seed: study.seed,
         quick: study.quick,
+        as_built: study.as_built,
+        calibrate: None,
     };
     let report = stability::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
     page.map(|page| page.write(stability::page(&report))).transpose()?;

@@ -12,7 +12,7 @@ use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, FoundContact, Met
 use super::inbox::{Event, Inbox, Searched, Taken};
 use super::maker::{Made, Maker, Order};
 use super::notice::NoticeBoard;
-use super::plan::{Listener, LiveError, Solving};
+use super::plan::{BeginBaseline, Listener, LiveError, Solving};
 use super::searcher::SearchThread;
 use super::{FrameSnapshot, SolvedFrame};
 
@@ -37,6 +37,7 @@ impl FollowThread {
         listeners: Vec<Box<dyn Listener>>,
     ) -> std::io::Result<Self> {
         let search = SearchThread::start(Arc::clone(inbox), Arc::clone(&solving.look_at_wires))?;
+        let begin_baseline = Arc::clone(&solving.begin_baseline);
         let maker = Maker::new(solving, Arc::clone(inbox));
         let (inbox, notice) = (Arc::clone(inbox), Arc::clone(notice));
         let desk = FollowLoop {
@@ -45,6 +46,8 @@ impl FollowThread {
             maker,
             search,
             listeners,
+            begin_baseline,
+            conversions: 1,
             board: None,
             pause: SearchPause::default(),
             solved: None,
@@ -72,6 +75,9 @@ struct FollowLoop {
     maker: Maker,
     search: SearchThread,
     listeners: Vec<Box<dyn Listener>>,
+    begin_baseline: BeginBaseline,
+    /// Conversions that a reading is the mean of.
+    conversions: u32,
     board: Option<BoardState>,
     pause: SearchPause,
     /// The frame that was solved last, for answers that come after it.
@@ -134,6 +140,12 @@ impl FollowLoop {
                 Event::Board(detector) => self.begin_with(detector),
                 Event::Method(method) => self.change_method(method),
                 Event::Solver(made) => self.change_solver(made)?,
+                Event::Conversions(conversions) => {
+                    self.conversions = conversions;
+                    if let Some(board) = &mut self.board {
+                        board.baseline.set_conversions(conversions);
+                    }
+                }
                 Event::Rezero => {
                     if let Some(board) = &mut self.board {
                         board.baseline.renew();
@@ -201,7 +213,7 @@ impl FollowLoop {
     /// Begins with a board's detector, or with another.
     fn begin_with(&mut self, detector: Arc<Detector>) {
         self.board = Some(BoardState {
-            baseline: Baseline::new(&detector),
+            baseline: (self.begin_baseline)(&detector, self.conversions),
             watch: ElectrodeWatch::new(&detector),
             detector,
             follower: None,
@@ -251,11 +263,13 @@ impl FollowLoop {
         let Some(board) = &mut self.board else { return Ok(()) };
         let begun = Instant::now();
         let left_out: Vec<usize> = board.watch.faulty().faults.iter().map(|(electrode, _)| *electrode).collect();
-        if board.baseline.add(frame.mean.volts(), frame.averaged, &left_out) {
+        let time_s = 1e-6 * frame.board_time_us as f64;
+        if board.baseline.add(frame.mean.volts(), frame.averaged, time_s, &left_out) {
             self.notice.change(|snapshot| snapshot.baseline = board.baseline.state().notice());
         }
         let mut touch = frame.mean.clone();
         board.baseline.subtract(frame.mean.volts(), touch.volts_mut());
+        touch.correct_channels(&board.detector);
         let changed = board.watch.note(&touch);
         let Some(follower) = &mut board.follower else { return Ok(()) };
         let followed = follower.follow(&touch)?;

@@ -41,6 +41,8 @@ pub struct Taken {
 pub enum Event {
     /// The board has said who it is: the detector, as it measures it.
     Board(Arc<Detector>),
+    /// Readings are means of so many conversions from now on.
+    Conversions(u32),
     /// The baseline is to be taken anew.
     Rezero,
     /// The frames to come do not follow those before.

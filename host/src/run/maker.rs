@@ -133,6 +133,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+    use tactomo_board::baseline::Baseline;
     use tactomo_physics::readings::Readings;
     use tactomo_touch::solve::{Solution, SolveError};
 
@@ -160,7 +161,12 @@ mod tests {
             }
         });
         let inbox = Arc::new(Inbox::new(false));
-        let solving = Solving { method: Method::Auto, make, look_at_wires: Arc::new(|_, _, _| None) };
+        let solving = Solving {
+            method: Method::Auto,
+            make,
+            look_at_wires: Arc::new(|_, _, _| None),
+            begin_baseline: Arc::new(|_, _| Baseline::over(0, 256)),
+        };
         (Maker::new(solving, Arc::clone(&inbox)), inbox, go)
     }
 

@@ -50,6 +50,8 @@ pub struct Snapshot {
     pub refused: Option<String>,
     /// What to know of the baseline, as one sentence for a person; none if all is well.
     pub baseline: Option<String>,
+    /// What to know of the detector's calibration, as one sentence for a person; none if all is well or there is none.
+    pub calibration: Option<String>,
 }
 
 /// How the link to the board fares.

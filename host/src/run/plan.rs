@@ -9,6 +9,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 use super::{Latency, Order, Request, Snapshot, SolvedFrame};
+use tactomo_board::baseline::Baseline;
 use tactomo_board::board_log::BoardLog;
 use tactomo_board::link::SourceError;
 use tactomo_board::measured::Mismatch;
@@ -23,6 +24,8 @@ use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
 pub type MakeSolver = Arc<dyn Fn(&Order) -> Result<Box<dyn Solver>, BoxError> + Send + Sync>;
 /// Looks for exchanged wires in readings (V) less the baseline, with the forward model of an order's detector; called in another thread.
 pub type LookAtWires = Arc<dyn Fn(&Order, Look, &Readings) -> Option<[usize; 2]> + Send + Sync>;
+/// Begins the baseline of a detector as measured, whose readings are means of so many conversions each.
+pub type BeginBaseline = Arc<dyn Fn(&Detector, u32) -> Baseline + Send + Sync>;
 /// Begins a recording in a new file, of a board that has said Hello.
 pub type BeginRecording = Box<dyn FnMut(&Hello) -> Result<Recorder, RecordError> + Send>;
 /// Any error.
@@ -78,12 +81,14 @@ pub struct Solving {
     pub make: MakeSolver,
     /// Looks for exchanged wires.
     pub look_at_wires: LookAtWires,
+    /// Begins the baseline once the board has said Hello.
+    pub begin_baseline: BeginBaseline,
 }
 
 impl Solving {
     /// Reads the touch of a problem's detector by a method.
     pub fn new(method: Method, problem: Problem) -> Self {
-        let looked_at = problem.clone();
+        let (looked_at, at_rest) = (problem.clone(), problem.clone());
         Self {
             method,
             make: Arc::new(move |order| {
@@ -91,6 +96,9 @@ impl Solving {
             }),
             look_at_wires: Arc::new(move |order, look, readings| {
                 look.run(&looked_at.measured_as(&order.detector), &order.faulty, readings)
+            }),
+            begin_baseline: Arc::new(move |detector, conversions| {
+                Baseline::new(at_rest.measured_as(detector).jacobian, conversions)
             }),
         }
     }

@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use tactomo_board::identity;
 use tactomo_board::link::{Link, Source};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::{Closing, RecordError, Recorder};
@@ -256,8 +257,17 @@ impl Reader {
             if *solved != *measured {
                 self.inbox.put(Event::Board(Arc::clone(&measured)));
             }
+            self.inbox.put(Event::Conversions(hello.settings.conversions()));
             let noise_v = measured.adc.deviation_v();
-            self.notice.change(|snapshot| snapshot.hello = Some(hello.clone()));
+            let other_board = identity::other_board(&measured, &hello);
+            // Settings change its Hello, and not what it is.
+            let is_new = known.is_none_or(|board| identity::identity(&board.hello) != identity::identity(&hello));
+            if let Some(notice) = other_board.as_ref().filter(|_| is_new) {
+                tracing::warn!("{notice}");
+            }
+            self.notice.change(|snapshot| {
+                (snapshot.hello, snapshot.calibration) = (Some(hello.clone()), other_board);
+            });
             self.board = Some(Board { volts: Volts::of(&hello), hello, detector: measured, noise_v });
         }
         Ok(())

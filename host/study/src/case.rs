@@ -183,6 +183,7 @@ impl File {
                 // What was solved is what the case describes.
                 tolerances: Tolerances::EXACT,
                 calibration: None,
+                force: None,
             },
             contacts: self.contacts,
             impedance_ohm: DMatrix::from_fn(count, count, |i, j| self.impedance_ohm[i][j]),

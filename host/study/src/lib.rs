@@ -18,7 +18,7 @@ pub mod validate;
 mod variant;
 
 pub use self::bound::{Bound, RADIUS_DEVIATION, cramer_rao};
-pub use self::experiment::{Experiment, Frame, StudyError};
+pub use self::experiment::{Calibrate, Experiment, Frame, StudyError};
 pub use self::machine::Machine;
 pub use self::scenes::{Group, SceneKind};
 pub use self::score::{Score, Scorer, Summary};

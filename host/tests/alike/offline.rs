@@ -1,6 +1,7 @@
 //! The answers of the same solver to the recorded bytes, frame by frame and as long as they take.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use tactomo::board::baseline::Baseline;
 use tactomo::board::frames::FrameFile;
@@ -14,8 +15,9 @@ use crate::live::{Answer, Live};
 pub fn answers(problem: &Problem, method: Method, live: &Live) -> Vec<Answer> {
     let detector = problem.detector();
     let mut solver = Guard::new(method, problem).unwrap();
-    let mut baseline = Baseline::new(detector);
     let mut file = FrameFile::open(&live.recording, None).unwrap();
+    let conversions = file.board().unwrap().settings.conversions();
+    let mut baseline = Baseline::new(Arc::clone(&problem.jacobian), conversions);
     let answered: HashSet<u64> = live.answers.iter().map(|answer| answer.sequence).collect();
     let last = answered.iter().max().copied().unwrap_or(0);
     let mut found = std::collections::HashMap::new();
@@ -24,12 +26,13 @@ pub fn answers(problem: &Problem, method: Method, live: &Live) -> Vec<Answer> {
         if sequence > last {
             break;
         }
-        baseline.add(&frame.volts, 1, &[]);
+        baseline.add(&frame.volts, 1, frame.time_s.unwrap(), &[]);
         let is_answered = answered.contains(&sequence);
         if is_answered || !SLOW.contains(&method) {
             let mut touch = frame.volts.clone();
             baseline.subtract(&frame.volts, &mut touch);
-            let readings = Readings::new(detector.electrodes.len(), touch).unwrap();
+            let mut readings = Readings::new(detector.electrodes.len(), touch).unwrap();
+            readings.correct_channels(detector);
             let solution = solver.solve(&readings).unwrap();
             if is_answered {
                 found.insert(sequence, solution);

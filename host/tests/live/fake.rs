@@ -5,6 +5,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 
+use tactomo::board::baseline::{Baseline, FRAMES};
 use tactomo::board::link::{Control, ControlError, Link, Source, SourceError};
 use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, MakeSolver, Plan, Solving};
@@ -197,5 +198,10 @@ pub fn ends() -> (Ends, Other) {
 
 /// Solves by what a test makes.
 pub fn solving(make: MakeSolver) -> Solving {
-    Solving { method: Method::Tikhonov, make, look_at_wires: Arc::new(|_, _, _| None) }
+    Solving {
+        method: Method::Tikhonov,
+        make,
+        look_at_wires: Arc::new(|_, _, _| None),
+        begin_baseline: Arc::new(|detector, _| Baseline::over(FRAMES, detector.electrodes.len().pow(2))),
+    }
 }

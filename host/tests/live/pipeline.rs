@@ -3,9 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use tactomo::board::identity::identity;
 use tactomo::board::link::{Control, Link, Opened, Recording};
 use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::{GreetError, RequestedSettings, greet};
+use tactomo::detector::{Calibration, Detector};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
 use tactomo::run::plan::{LiveError, MakeSolver, Plan};
@@ -49,6 +51,22 @@ fn a_board_with_other_electrodes_than_the_detector_is_refused() {
     let board = FakeBoard { electrodes: 8, ..FakeBoard::new(10) };
     let error = tactomo::run::run(&mut opened(board), plan(), ends().0).unwrap_err();
     assert!(matches!(error, LiveError::Mismatch(_)), "{error:?}");
+}
+
+#[test]
+fn a_detector_that_was_calibrated_on_another_board_is_shown_as_such() {
+    let calibration = |board: &str| Calibration { board: Some(board.to_owned()), ..Calibration::default() };
+    let notice = |board: &str| {
+        let plan = plan();
+        let detector = Detector { calibration: Some(calibration(board)), ..plan.detector };
+        let (ends, other) = ends();
+        tactomo::run::run(&mut opened(FakeBoard::new(5)), Plan { detector, ..plan }, ends).unwrap();
+        let snapshot = other.snapshots.borrow().clone();
+        (snapshot.calibration.clone(), identity(snapshot.hello.as_ref().unwrap()))
+    };
+    let (other, this) = notice("esp32");
+    assert!(other.unwrap().contains(&format!("on another board (esp32) than this one ({this})")));
+    assert_eq!(notice(&this).0, None);
 }
 
 #[test]

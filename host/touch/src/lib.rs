@@ -1,8 +1,10 @@
 //! From readings back to touch, and how right that is.
 //!
-//! [`solve`] has the solvers, one file a method, one trait; [`metrics`] the figures that they are judged by; [`schema`] the names of
+//! [`solve`] has the solvers, one file a method, one trait; [`calibrate`] what fits a detector to the one that was built; [`metrics`] the figures that they are judged by; [`schema`] the names of
 //! what leaves the program. None of them knows of boards, ports or pages.
 
+pub mod calibrate;
 pub mod metrics;
 pub mod schema;
 pub mod solve;
+mod threads;

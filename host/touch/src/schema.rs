@@ -2,7 +2,7 @@
 //!
 //! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of its contacts [`CONTACT_COLUMNS`], those of its shape
 //! [`SHAPE_COLUMNS`]; a column that is added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
-//! newtons, `_us` microseconds. `sigma_` is a standard error. What is not known is absent in JSON, empty in CSV and NaN elsewhere.
+//! newtons, `_us` microseconds. `sigma_` is a standard error, and `force_deviation_n` that of the force. What is not known is absent in JSON, empty in CSV and NaN elsewhere.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
@@ -17,7 +17,7 @@ pub struct ContactColumn {
 }
 
 /// The numbers of a contact, in the order of every format.
-pub const CONTACT_COLUMNS: [ContactColumn; 11] = [
+pub const CONTACT_COLUMNS: [ContactColumn; 13] = [
     ContactColumn { name: "id", of: |contact| contact.id.map(f64::from) },
     ContactColumn { name: "x_m", of: |contact| Some(contact.x_m) },
     ContactColumn { name: "y_m", of: |contact| Some(contact.y_m) },
@@ -25,6 +25,8 @@ pub const CONTACT_COLUMNS: [ContactColumn; 11] = [
     ContactColumn { name: "conductance_s", of: |contact| Some(contact.conductance_s) },
     ContactColumn { name: "radius_m", of: |contact| contact.radius_m },
     ContactColumn { name: "force_n", of: |contact| contact.force_n },
+    ContactColumn { name: "force_deviation_n", of: |contact| contact.force_deviation_n },
+    ContactColumn { name: "force_beyond_maximum", of: |contact| contact.force_beyond_maximum.map(f64::from) },
     ContactColumn { name: "sigma_x_m", of: |contact| error(contact, |errors| errors.x_m) },
     ContactColumn { name: "sigma_y_m", of: |contact| error(contact, |errors| errors.y_m) },
     ContactColumn { name: "correlation", of: |contact| error(contact, |errors| errors.correlation) },
@@ -48,13 +50,14 @@ pub fn contact_values(contact: &FoundContact) -> [f32; CONTACT_COLUMNS.len() - 1
     std::array::from_fn(|index| CONTACT_COLUMNS[index + 1].value(contact).map_or(f32::NAN, |value| value as f32))
 }
 
-/// `{id?, x_m, y_m, z_m?, conductance_s, radius_m?, force_n?, sigma_x_m?, ...}`; z is left out on a flat detector.
+/// `{id?, x_m, y_m, z_m?, conductance_s, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ...}`; z is left out on a flat detector.
 impl Serialize for FoundContact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for column in &CONTACT_COLUMNS {
             match (column.name, column.value(self)) {
                 ("id", Some(_)) => map.serialize_entry("id", &self.id)?,
+                (name @ "force_beyond_maximum", Some(_)) => map.serialize_entry(name, &self.force_beyond_maximum)?,
                 ("z_m", Some(0.0)) | (_, None) => {}
                 (name, Some(value)) => map.serialize_entry(name, &value)?,
             }
@@ -282,6 +285,8 @@ mod tests {
             z_m: 0.5,
             radius_m: Some(0.25),
             force_n: Some(3.0),
+            force_deviation_n: Some(0.375),
+            force_beyond_maximum: Some(true),
             uncertainty: Some(Uncertainty { x_m: 0.125, y_m: 0.75, correlation: -0.5, conductance_s: 4.0 }),
             ..FoundContact::flat(1.0, 2.0, 8.0)
         }
@@ -311,14 +316,15 @@ mod tests {
         let heads = csv_heads();
         for (index, column) in CONTACT_COLUMNS.iter().enumerate() {
             let value = column.value(&contact()).unwrap();
-            assert_eq!(json[column.name].as_f64(), Some(value), "{}", column.name);
+            let flag = json[column.name].as_bool().map(f64::from);
+            assert_eq!(json[column.name].as_f64().or(flag), Some(value), "{}", column.name);
             let cell = heads.iter().position(|head| *head == column.name).unwrap();
             assert_eq!(rows[0][cell].parse(), Ok(value), "{}", column.name);
             if index > 0 {
                 assert_eq!(f64::from(contact_values(&contact())[index - 1]), value, "{}", column.name);
             }
         }
-        assert!(json["id"].is_u64(), "{json}");
+        assert!(json["id"].is_u64() && json["force_beyond_maximum"].is_boolean(), "{json}");
         assert_eq!(json.as_object().map(serde_json::Map::len), Some(CONTACT_COLUMNS.len()));
     }
 

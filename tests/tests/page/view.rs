@@ -154,6 +154,42 @@ async fn the_strip_chart_has_each_contacts_value() -> Result<()> {
     })
 }
 
+/// A contact with a force.
+fn pressed(contact: FoundContact, force_n: f64, deviation_n: f64, is_beyond: bool) -> FoundContact {
+    FoundContact {
+        force_n: Some(force_n),
+        force_deviation_n: Some(deviation_n),
+        force_beyond_maximum: Some(is_beyond),
+        ..contact
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn newtons_are_shown_with_their_error_where_the_detector_has_a_law() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let script = "const cells = [...document.querySelectorAll('#contacts td.value')];
+            return [document.getElementById('strength').textContent, ...cells.map((cell) => cell.textContent),
+              ...cells.map((cell) => cell.title), JSON.parse(document.getElementById('strip').dataset.values)[4]]";
+        stage.behind.contacts(vec![contact(4, [10.0, 0.0], 3e-4)]);
+        settled(&stage).await;
+        let shown = stage.browser.run(script).await?;
+        ensure!(shown[0] == "conductance" && shown[1] == "300\u{2009}µS", "{shown}");
+        let light = pressed(contact(4, [10.0, 0.0], 3e-4), 0.734, 0.0612, false);
+        stage.behind.contacts(vec![light, pressed(contact(5, [-10.0, 0.0], 5e-3), 7.5, 3.0, true)]);
+        settled(&stage).await;
+        let shown = stage.browser.run(script).await?;
+        ensure!(
+            shown[0] == "force" && shown[1] == "734 ± 61\u{2009}mN" && shown[2] == "\u{2273}\u{2009}7.50\u{2009}N",
+            "{shown}"
+        );
+        ensure!(shown[3] == "734 ± 61\u{2009}mN; 300\u{2009}µS", "{shown}");
+        let told = "7.50 ± 3.00\u{2009}N, beyond the largest force that can be told; 5.00\u{2009}mS";
+        ensure!(shown[4] == told, "{shown}");
+        ensure!(shown[5].as_f64().is_some_and(|force_n| (force_n - 0.734).abs() < 1e-6), "{shown}");
+        Ok(())
+    })
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_view_in_space_rises_where_it_is_pressed() -> Result<()> {
     in_front_of!(Script::start(), stage, {
@@ -190,7 +226,8 @@ const OVERFLOW: &str = "const box = document.getElementById('tools').getBounding
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn nothing_is_cut_off_on_a_phone_or_a_low_window() -> Result<()> {
     in_front_of!(Script::start(), stage, {
-        let five = (0..5).map(|i| contact(i + 100, [10.0 * f64::from(i) - 20.0, 5.0], 1e-4)).collect();
+        let at = |i: u32| contact(i + 100, [10.0 * f64::from(i) - 20.0, 5.0], 1e-4);
+        let five = (0..5).map(|i| pressed(at(i), 0.123 * f64::from(i + 1), 0.0456, i == 4)).collect();
         stage.behind.contacts(five);
         stage.behind.set(|snapshot| snapshot.baseline = Some("Something pressed at the start.".to_owned()));
         stage.browser.resize(1280, 760).await?;
@@ -270,6 +307,12 @@ async fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
         ensure!(shown[0] == "2 contacts", "{shown}");
         ensure!(shown[1].as_str().is_some_and(|text| text.starts_with("residual 1.0 × noise · answer ")), "{shown}");
         ensure!(shown[2] == "electrode 3 left out" && shown[3] == sentence, "{shown}");
+        let another = "my-skin was calibrated on another board.";
+        stage.behind.set(|snapshot| (snapshot.baseline, snapshot.calibration) = (None, Some(another.to_owned())));
+        settled(&stage).await;
+        let script = "const notice = document.getElementById('notice'); return [notice.textContent, notice.className]";
+        let shown = stage.browser.run(script).await?;
+        ensure!(shown[0] == another && shown[1] == "warning", "{shown}");
         Ok(())
     })
 }

@@ -61,13 +61,18 @@ impl Header {
         detector.map(Some).map_err(|source| RecordError::Detector { path: path.to_owned(), source })
     }
 
-    /// Whether `detector` is the one of the recording; where the header holds only a name, whether that is the same.
+    /// Whether `detector` is the one of the recording, whatever is known of its forces; where the header holds only a name, whether
+    /// that is the same.
     pub fn is_of(&self, detector: &Detector) -> bool {
-        let other = Self::of(detector, String::new(), 0);
-        match &self.detector_toml {
-            Some(toml) => Some(toml) == other.detector_toml.as_ref() && self.surface_obj == other.surface_obj,
-            None => self.detector == other.detector,
+        if self.detector_toml.is_none() {
+            return self.detector == detector.name;
         }
+        let without_force = |detector: &Detector| {
+            let header = Self::of(&Detector { force: None, ..detector.clone() }, String::new(), 0);
+            (header.detector_toml, header.surface_obj)
+        };
+        let recorded = self.detector(Path::new("")).ok().flatten();
+        recorded.is_some_and(|recorded| without_force(&recorded) == without_force(detector))
     }
 }
 

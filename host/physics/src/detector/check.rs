@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Adc, Detector, Layer, Outline, Tolerances};
+use super::{Adc, CalibratedParameter, Detector, Electrode, ForceLaw, Layer, Outline, Parameter, Tolerances};
 use crate::geometry::{Point, area, cross, distance, edges, is_inside, segment_distance};
 use crate::space::{self, Place};
 
@@ -18,6 +18,8 @@ const UNEVEN_LOG: RangeInclusive<f64> = -1.0..=1.0;
 const MAX_UNEVEN_MODES: usize = 9;
 /// What a channel may read, over what is there.
 const GAIN: RangeInclusive<f64> = 0.5..=2.0;
+/// What a channel may read where nothing is (V).
+const OFFSET_V: RangeInclusive<f64> = -1e3..=1e3;
 const DRIVE_V: RangeInclusive<f64> = 1e-3..=1e3;
 const BITS: RangeInclusive<u8> = 1..=24;
 const MAX_LAYERS: usize = 16;
@@ -62,7 +64,8 @@ impl Detector {
         within("on_resistance_ohm", self.on_resistance_ohm, 0.0..=1e9)?;
         self.tolerances.check()?;
         self.check_calibration()?;
-        self.adc.check()
+        self.adc.check()?;
+        self.force.as_ref().map_or(Ok(()), ForceLaw::check)
     }
 
     fn check_layers(&self) -> Result<(), Problem> {
@@ -76,12 +79,27 @@ impl Detector {
     fn check_calibration(&self) -> Result<(), Problem> {
         let known = self.calibration.iter().flat_map(|calibration| &calibration.parameters);
         let electrodes = self.electrodes.len();
-        match known.map(|known| known.parameter).find(|it| it.electrode().is_some_and(|e| e >= electrodes)) {
-            Some(other) => {
-                let what = format!("names `{other}`, but the detector has {electrodes} electrodes, counted from 0");
-                Err(Problem::new("calibration.parameters", what))
+        let wrong = |other: Parameter| match other {
+            Parameter::Uneven(mode) if mode.iter().any(|half_waves| *half_waves >= MAX_UNEVEN_MODES) => {
+                Some(format!("but unevenness has up to {} half waves along a side", MAX_UNEVEN_MODES - 1))
             }
-            None => Ok(()),
+            _ if other.electrode().is_some_and(|e| e >= electrodes) => {
+                Some(format!("but the detector has {electrodes} electrodes, counted from 0"))
+            }
+            _ => None,
+        };
+        let names = |known: &CalibratedParameter| {
+            wrong(known.parameter).map(|what| format!("names `{}`, {what}", known.parameter))
+        };
+        let wrong_name = known.clone().find_map(names);
+        let error = known.map(|known| known.standard_error).find(|error| *error < 0.0);
+        match (wrong_name, error) {
+            (Some(what), _) => Err(Problem::new("calibration.parameters", what)),
+            (_, Some(error)) => {
+                let what = format!("holds {error:?}, but a standard error is not below zero");
+                Err(Problem::new("calibration.standard_errors", what))
+            }
+            _ => Ok(()),
         }
     }
 
@@ -112,6 +130,8 @@ impl Detector {
         let impedance = format!("electrodes.contact_impedances_ohm_m2[{index}]");
         within(&impedance, self.pad_impedance_ohm_m2(&pad), IMPEDANCE_OHM_M2)?;
         within(&format!("electrodes.gains[{index}]"), pad.gain, GAIN)?;
+        within(&format!("electrodes.unseen_offsets_v[{index}]"), pad.unseen_offset_v, -1.0..=1.0)?;
+        within(&format!("electrodes.offsets_v[{index}]"), pad.offset_v, OFFSET_V)?;
         let at = pad.place_m();
         let position = format!("electrodes.positions_m[{index}]");
         at.iter().try_for_each(|&at_m| within(&position, at_m, -LENGTH_M.end()..=*LENGTH_M.end()))?;
@@ -119,20 +139,30 @@ impl Detector {
             let place = format!("puts electrode {index} at {} mm", self.millimetres(at));
             Err(Problem::new(&position, place + &what))
         };
-        let clearance_m = match &self.surface {
-            Some(surface) => surface.clearance_m(at),
-            None => self.outline.clearance_m([pad.x_m, pad.y_m]),
-        };
-        if clearance_m <= pad.radius_m {
+        if !self.is_within(&pad) {
             let diameter_mm = 2e3 * pad.radius_m;
             return wrong(format!(", but with its diameter of {diameter_mm:.3} mm it has to lie within the outline"));
         }
-        let overlaps =
-            |other: &super::Electrode| space::distance(at, other.place_m()) <= pad.radius_m + other.radius_m + APART_M;
-        match self.electrodes[..index].iter().position(overlaps) {
+        match self.electrodes[..index].iter().position(|other| overlap(&pad, other)) {
             Some(other) => wrong(format!(", where it overlaps with electrode {other}; there has to be a gap")),
             None => Ok(()),
         }
+    }
+
+    /// Whether a pad lies on the layer with all of its area.
+    fn is_within(&self, pad: &Electrode) -> bool {
+        let clearance_m = match &self.surface {
+            Some(surface) => surface.clearance_m(pad.place_m()),
+            None => self.outline.clearance_m([pad.x_m, pad.y_m]),
+        };
+        clearance_m > pad.radius_m
+    }
+
+    /// Whether a pad could be where it is: on the layer, and apart from all others.
+    pub(crate) fn has_room_for(&self, index: usize) -> bool {
+        let pad = &self.electrodes[index];
+        let mut others = self.electrodes.iter().enumerate().filter(|(other, _)| *other != index);
+        self.is_within(pad) && !others.any(|(_, other)| overlap(pad, other))
     }
 
     /// A place for people: two numbers, or three on a surface.
@@ -142,6 +172,10 @@ impl Detector {
             None => millimetres([at[0], at[1]]),
         }
     }
+}
+
+fn overlap(pad: &Electrode, other: &Electrode) -> bool {
+    space::distance(pad.place_m(), other.place_m()) <= pad.radius_m + other.radius_m + APART_M
 }
 
 impl Tolerances {

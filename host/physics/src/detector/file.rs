@@ -16,7 +16,7 @@ use self::electrodes::ElectrodeTable;
 use super::check::{LENGTH_M, Problem, within};
 use super::material::Foam;
 use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
-use super::{Adc, Detector, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
+use super::{Adc, Detector, ForceLaw, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
 use crate::geometry::area;
 
 /// No detector's file is longer (bytes).
@@ -80,6 +80,7 @@ struct Document {
     #[serde(default)]
     tolerances: Tolerances,
     calibration: Option<CalibrationTable>,
+    force: Option<ForceLaw>,
 }
 
 #[derive(Deserialize)]
@@ -143,7 +144,11 @@ impl Detector {
         })
     }
 
-    fn from_toml_in(folder: &Path, text: &str, name: &str) -> Result<Self, TomlError> {
+    /// Reads a detector from TOML, as from a file in `folder`: a surface's file is sought there.
+    ///
+    /// # Errors
+    /// [`TomlError`] with field, line and what is allowed.
+    pub fn from_toml_in(folder: &Path, text: &str, name: &str) -> Result<Self, TomlError> {
         Self::from_toml_with(text, name, &|file, unit| {
             let path = folder.join(file);
             Surface::read(&path, file, unit).map_err(|error| surface_problem(&path.display().to_string(), error))
@@ -183,6 +188,9 @@ impl Detector {
         writeln!(text, "noise_lsb = {:?}", self.adc.noise_lsb)?;
         if self.tolerances != Tolerances::default() {
             self.tolerances.write_toml(text)?;
+        }
+        if let Some(law) = &self.force {
+            law.write_toml(text)?;
         }
         match &self.calibration {
             Some(calibration) => calibration.write_toml(text),
@@ -287,6 +295,7 @@ impl Document {
             adc: self.adc.into_adc(),
             tolerances: self.tolerances,
             calibration: self.calibration.map(CalibrationTable::into_calibration).transpose()?,
+            force: self.force,
         })
     }
 }
@@ -402,5 +411,7 @@ fn line_of(text: &str, field: &str) -> Option<usize> {
     start.map(|start| 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count())
 }
 
+#[cfg(test)]
+mod as_built_tests;
 #[cfg(test)]
 mod tests;

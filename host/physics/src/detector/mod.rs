@@ -3,6 +3,7 @@
 mod calibration;
 mod check;
 mod file;
+mod force;
 mod material;
 mod parameters;
 mod preset;
@@ -14,6 +15,7 @@ mod uneven;
 pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
 pub use self::check::{ELECTRODES, Problem};
 pub use self::file::{FileError, TomlError};
+pub use self::force::{FARTHEST, ForceLaw, Newtons};
 pub use self::material::{FOAMS, Foam, Stack};
 pub use self::parameters::Parameter;
 pub use self::surface::edges_of;
@@ -21,6 +23,7 @@ pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
 pub use self::svg::short;
 pub use self::tolerances::Tolerances;
 pub use self::uneven::Unevenness;
+pub(crate) use self::uneven::cosines;
 use crate::geometry;
 
 /// A detection layer with its electrodes and the circuit that measures it.
@@ -55,6 +58,8 @@ pub struct Detector {
     /// Where its quantities come from, if they were not told but calibrated.
     #[serde(skip)]
     pub calibration: Option<Calibration>,
+    /// Newtons from conductances, once that is calibrated.
+    pub force: Option<ForceLaw>,
 }
 
 /// Closed polygons, without repeating the first corner (m).
@@ -95,8 +100,11 @@ pub struct Electrode {
     /// What its channel reads, over what is there.
     #[serde(default = "one")]
     pub gain: f64,
+    /// What its channel reads too much, though at rest it does not show (V): a converter reads nothing below zero.
+    #[serde(default)]
+    pub unseen_offset_v: f64,
     /// What its channel reads where nothing is (V): in simulated detectors only, since a baseline takes it away.
-    #[serde(skip)]
+    #[serde(default)]
     pub offset_v: f64,
 }
 
@@ -190,7 +198,16 @@ impl Electrode {
 
     /// A pad of a flat detector.
     pub const fn flat(x_m: f64, y_m: f64, radius_m: f64) -> Self {
-        Self { x_m, y_m, z_m: 0.0, radius_m, contact_impedance_ohm_m2: None, gain: 1.0, offset_v: 0.0 }
+        Self {
+            x_m,
+            y_m,
+            z_m: 0.0,
+            radius_m,
+            contact_impedance_ohm_m2: None,
+            gain: 1.0,
+            unseen_offset_v: 0.0,
+            offset_v: 0.0,
+        }
     }
 }
 
@@ -215,6 +232,11 @@ impl Outline {
     pub fn rectangle(width_m: f64, height_m: f64) -> Self {
         let (x, y) = (width_m / 2.0, height_m / 2.0);
         Self { outer: vec![[-x, -y], [x, -y], [x, y], [-x, y]], holes: Vec::new() }
+    }
+
+    /// Whether a point is inside, and in no hole (m).
+    pub fn holds(&self, at_m: [f64; 2]) -> bool {
+        geometry::is_inside(at_m, &self.outer) && !self.holes.iter().any(|hole| geometry::is_inside(at_m, hole))
     }
 
     /// Width and height (m) if this is a rectangle about the origin, else `None`.

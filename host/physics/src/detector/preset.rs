@@ -51,6 +51,7 @@ impl Detector {
             adc: Adc::default(),
             tolerances: Tolerances::default(),
             calibration: None,
+            force: None,
         }
     }
 }

@@ -260,14 +260,16 @@ impl Detector {
 
     /// What else there is to know, each with its name.
     pub fn facts(&self) -> Vec<(&'static str, String)> {
-        vec![
+        let mut facts = vec![
             ("sheet conductance", format!("{} mS", short(self.sheet_conductance_s() * 1e3))),
             ("contact impedance", format!("{} ohm cm\u{b2}", short(self.contact_impedance_ohm_m2 * 1e4))),
             ("drive", format!("{} V", short(self.drive_v))),
             ("on-resistance", format!("{} ohm", short(self.on_resistance_ohm))),
             ("ADC", format!("{} bits to {} V", self.adc.bits, short(self.adc.full_scale_v))),
             ("noise", format!("{} LSB", short(self.adc.noise_lsb))),
-        ]
+        ];
+        facts.extend(self.force.as_ref().map(|law| ("forces", format!("up to {} N", short(law.limit_n())))));
+        facts
     }
 }
 

@@ -27,7 +27,8 @@ pub struct Tolerances {
     pub contact_impedance_spread: f64,
     /// Of what a channel reads, as a share of what is there.
     pub gain_share: f64,
-    /// Of what a channel reads where nothing is, in codes of the converter (LSB). A baseline takes it away.
+    /// Of what a channel reads where nothing is, in codes of the converter (LSB). A baseline takes it away, where the converter does not
+    /// cut it off at zero.
     pub offset_lsb: f64,
     /// Of the multiplexer's on-resistance, as a share of it.
     pub on_resistance_share: f64,
@@ -56,20 +57,20 @@ impl Tolerances {
         *self == Self::EXACT
     }
 
-    /// A share of all of them.
+    /// All of them so many times: factors to that power. At 0 there are none.
     #[must_use]
-    pub fn scaled(&self, share: f64) -> Self {
+    pub fn times(&self, factor: f64) -> Self {
         Self {
-            thickness_share: share * self.thickness_share,
-            conductivity_share: share * self.conductivity_share,
-            top_over_bottom_factor: self.top_over_bottom_factor.powf(share),
-            uneven_share: share * self.uneven_share,
-            electrodes_m: share * self.electrodes_m,
-            contact_impedance_factor: self.contact_impedance_factor.powf(share),
-            contact_impedance_spread: share * self.contact_impedance_spread,
-            gain_share: share * self.gain_share,
-            offset_lsb: share * self.offset_lsb,
-            on_resistance_share: share * self.on_resistance_share,
+            thickness_share: factor * self.thickness_share,
+            conductivity_share: factor * self.conductivity_share,
+            top_over_bottom_factor: self.top_over_bottom_factor.powf(factor),
+            uneven_share: factor * self.uneven_share,
+            electrodes_m: factor * self.electrodes_m,
+            contact_impedance_factor: self.contact_impedance_factor.powf(factor),
+            contact_impedance_spread: factor * self.contact_impedance_spread,
+            gain_share: factor * self.gain_share,
+            offset_lsb: factor * self.offset_lsb,
+            on_resistance_share: factor * self.on_resistance_share,
         }
     }
 
@@ -100,6 +101,7 @@ impl Tolerances {
             Parameter::Pads => self.contact_impedance_factor.ln(),
             Parameter::Pad(_) => self.contact_impedance_spread,
             Parameter::Gain(_) => self.gain_share,
+            Parameter::Offset(_) => self.offset_lsb * detector.adc.lsb_v(),
             Parameter::OnResistance => self.on_resistance_share,
         }
     }
@@ -134,4 +136,64 @@ fn uneven_share_of(detector: &Detector, mode: [usize; 2]) -> f64 {
     let all: f64 = Parameter::uneven_modes(detector, f64::INFINITY).map(power).sum();
     let mean_square: f64 = mode.iter().map(|m| if *m == 0 { 1.0 } else { 0.5 }).product();
     (power(mode) / all / mean_square).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detector::Outline;
+
+    #[test]
+    fn each_parameter_has_the_deviation_of_its_kind() {
+        let detector = Detector::default();
+        let of = |parameter| detector.tolerances.deviation(&detector, parameter);
+        assert_eq!([of(Parameter::Thickness), of(Parameter::Conductivity)], [0.1, 0.2]);
+        assert_eq!([of(Parameter::TopOverBottom), of(Parameter::Pads)], [2f64.ln(), 3f64.ln()]);
+        assert_eq!([of(Parameter::ElectrodeX(3)), of(Parameter::ElectrodeY(3))], [3e-4; 2]);
+        assert_eq!([of(Parameter::Pad(3)), of(Parameter::Gain(3)), of(Parameter::OnResistance)], [0.3, 0.003, 0.25]);
+        let exact = |parameter| Tolerances::EXACT.deviation(&detector, parameter);
+        assert!(Parameter::all(&detector, 0.0).into_iter().all(|parameter| exact(parameter) == 0.0));
+        assert!(Tolerances::EXACT.is_exact() && !Tolerances::default().is_exact());
+    }
+
+    #[test]
+    fn tolerances_scale_in_their_units() {
+        let (detector, twice) = (Detector::default(), Tolerances::default().times(2.0));
+        for parameter in Parameter::all(&detector, 0.5) {
+            let of = |tolerances: &Tolerances| tolerances.deviation(&detector, parameter);
+            assert!((of(&twice) / of(&detector.tolerances) - 2.0).abs() < 1e-12, "{parameter}");
+        }
+        assert_eq!((twice.offset_lsb, Tolerances::default().times(0.0)), (4.0, Tolerances::EXACT));
+    }
+
+    /// Mean square of the unevenness over the plane and over all detectors, and its correlation a quarter of the width apart: `exp(-1/2)`.
+    #[test]
+    fn unevenness_is_as_large_and_as_long_as_told() {
+        for size_m in [[0.06, 0.06], [0.14, 0.07]] {
+            let detector = Detector { outline: Outline::rectangle(size_m[0], size_m[1]), ..Detector::default() };
+            let variance = |mode: [usize; 2]| detector.tolerances.deviation(&detector, Parameter::Uneven(mode)).powi(2);
+            let covariance = |a: [f64; 2], b: [f64; 2]| {
+                let mode = |mode: [usize; 2]| {
+                    let wave = |at: [f64; 2]| {
+                        (0..2)
+                            .map(|axis| (mode[axis] as f64 * PI * (at[axis] / size_m[axis] + 0.5)).cos())
+                            .product::<f64>()
+                    };
+                    variance(mode) * wave(a) * wave(b)
+                };
+                Parameter::uneven_modes(&detector, f64::INFINITY).map(mode).sum::<f64>()
+            };
+            let points =
+                || (0..24).flat_map(|i| (0..24).map(move |j| [i, j].map(|k| (f64::from(k) + 0.5) / 24.0 - 0.5)));
+            let at = |share: [f64; 2]| [share[0] * size_m[0], share[1] * size_m[1]];
+            let mean = points().map(|point| covariance(at(point), at(point))).sum::<f64>() / 576.0;
+            assert!((mean.sqrt() / 0.06 - 1.0).abs() < 1e-6, "{}", mean.sqrt());
+            let length_m = 0.25 * size_m[0].min(size_m[1]);
+            // The mean over the plane is left out, as that is the conductivity: what is far apart shows by how much.
+            let far = covariance(at([-0.5, -0.5]), at([0.5, 0.5]));
+            let beyond = |b: [f64; 2]| covariance([0.0, 0.0], b) - far;
+            let there = beyond([length_m, 0.0]) / beyond([0.0, 0.0]);
+            assert!((there - (-0.5f64).exp()).abs() < 0.02, "{there}");
+        }
+    }
 }

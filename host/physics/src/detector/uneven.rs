@@ -32,7 +32,9 @@ impl Unevenness {
 
     /// Logarithm of the factor at a place, in shares of the sides.
     pub fn log_at(&self, [u, v]: [f64; 2]) -> f64 {
-        self.modes().map(|([i, j], a)| a * (PI * i as f64 * u).cos() * (PI * j as f64 * v).cos()).sum()
+        let most = self.log_amplitudes.iter().map(Vec::len).chain([self.log_amplitudes.len()]).max().unwrap_or(0);
+        let (x, y) = (cosines(most, u), cosines(most, v));
+        self.log_amplitudes.iter().zip(&x).map(|(row, x)| x * row.iter().zip(&y).map(|(a, y)| a * y).sum::<f64>()).sum()
     }
 
     /// Adds to one amplitude.
@@ -46,4 +48,15 @@ impl Unevenness {
         }
         row[j] += amplitude;
     }
+}
+
+/// `cos(m pi u)` for all `m` up to `most`, by its recurrence.
+pub(crate) fn cosines(most: usize, u: f64) -> Vec<f64> {
+    let first = (PI * u).cos();
+    let mut all = Vec::with_capacity(most + 2);
+    all.extend([1.0, first]);
+    for m in 2..=most {
+        all.push(2.0 * first * all[m - 1] - all[m - 2]);
+    }
+    all
 }

@@ -1,7 +1,7 @@
 //! Which model a detector needs.
 
 use super::shell::Shell;
-use super::{ForwardError, ForwardModel, Slab};
+use super::{DrivingLayer, ForwardError, ForwardModel, Resolution, Slab};
 use crate::detector::Detector;
 
 /// Thickness, in radii of the smallest pad, up to which the shell's readings are within 3 % of the slab's. Measured by
@@ -25,11 +25,25 @@ impl Auto {
     /// # Errors
     /// [`ForwardError::Detector`] if the model cannot be made.
     pub fn new(detector: &Detector, shell_nodes: Option<usize>) -> Result<Self, ForwardError> {
-        let (needs_slab, reason) = needs_slab(detector);
+        Self::under(detector, shell_nodes, DrivingLayer::default())
+    }
+
+    /// The same with a driving layer that need not be ideal.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn under(detector: &Detector, shell_nodes: Option<usize>, driving: DrivingLayer) -> Result<Self, ForwardError> {
+        let (needs_slab, reason) = match needs_slab(detector) {
+            (false, _) if driving.sheet_ohm > 0.0 && detector.outline.as_rectangle().is_some() => {
+                (true, "its driving layer has a sheet resistance, which only the slab can have".to_owned())
+            }
+            needs => needs,
+        };
         let model: Box<dyn ForwardModel> = if needs_slab {
-            Box::new(Slab::new(detector)?)
+            Box::new(Slab::under(detector, Resolution::STANDARD, driving)?)
         } else {
-            Box::new(Shell::with_nodes(detector, shell_nodes.unwrap_or_else(|| Shell::default_nodes(detector)))?)
+            let nodes = shell_nodes.unwrap_or_else(|| Shell::default_nodes(detector));
+            Box::new(Shell::with_nodes(detector, nodes)?.under(driving)?)
         };
         Ok(Self { model, reason })
     }
@@ -70,6 +84,8 @@ mod tests {
         assert_eq!(Auto::new(&detector, None).unwrap().model.name(), "slab");
         detector.layers = vec![Layer::uniform(0.0004, 0.2)];
         assert_eq!(Auto::new(&detector, None).unwrap().model.name(), "shell");
+        let driving = DrivingLayer { sheet_ohm: 100.0, ..DrivingLayer::default() };
+        assert_eq!(Auto::under(&detector, None, driving).unwrap().model.name(), "slab");
         detector.layers[0].top_s_per_m = 2.0;
         assert!(needs_slab(&detector).0 && needs_slab(&detector).1.contains("10.0 times"));
     }

@@ -9,6 +9,10 @@
 //! ```
 //!
 //! with `c0` the constant. Nothing here knows where the fields come from: triangles, modes or a measurement.
+//!
+//! Where the layers touch lightly everywhere, the fields are those of a detector that leaks, and only the mean potential is still open. In
+//! the gauge in which the fields' mean under the driving layer is zero, `c0` is that mean, and `-G` with the total conductance `G` of the leak
+//! takes the place of the zero.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
@@ -29,6 +33,8 @@ pub struct ContactSystem<'a> {
     /// Fields of the unknowns at the electrodes, and the current to the driving layer that one unit of each carries:
     /// `K x (n + 1)`.
     pub cross_and_current: DMatrix<f64>,
+    /// Conductance that is spread evenly over the whole surface (S), and of which the fields know already; zero if there is none.
+    pub leak_s: f64,
 }
 
 /// What a [`ContactSystem`] gives.
@@ -43,8 +49,8 @@ pub struct Contacted {
 }
 
 impl ContactSystem<'_> {
-    /// The impedance matrix (ohm) by the Cholesky factor `L` of the large block; `None` if that is not positive definite or no
-    /// unknown carries current.
+    /// The impedance matrix (ohm) by the Cholesky factor `L` of the large block; `None` if that is not positive definite or nothing
+    /// leads to the driving layer.
     pub fn impedance_ohm(mut self) -> Option<DMatrix<f64>> {
         Some(self.eliminate()?.0)
     }
@@ -55,9 +61,11 @@ impl ContactSystem<'_> {
         let electrodes = self.electrodes.nrows();
         let mut unknowns = self.cross_and_current;
         let size = unknowns.nrows();
-        let factor = MatRef::from_column_major_slice(self.contacts.as_slice(), size, size);
-        let solved = MatMut::from_column_major_slice_mut(unknowns.as_mut_slice(), size, electrodes + 1);
-        solve_upper_triangular_in_place(factor.transpose(), solved, Par::Seq);
+        if size > 0 {
+            let factor = MatRef::from_column_major_slice(self.contacts.as_slice(), size, size);
+            let solved = MatMut::from_column_major_slice_mut(unknowns.as_mut_slice(), size, electrodes + 1);
+            solve_upper_triangular_in_place(factor.transpose(), solved, Par::Seq);
+        }
         let unit = unknowns.column(electrodes).into_owned();
         let unknowns = -unknowns.columns(0, electrodes) - unit * constant_ohm.transpose();
         Some(Contacted { impedance_ohm, unknowns, constant_ohm })
@@ -71,20 +79,12 @@ impl ContactSystem<'_> {
         Some(ContactFields { impedance_ohm, nodes_ohm })
     }
 
-    /// Leaves `L` in place of the contacts' block and `L^-1` times the right sides in their place; gives impedances and constants.
+    /// Factorises; gives impedances and constants.
     fn eliminate(&mut self) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let (size, electrodes) = (self.contacts.nrows(), self.electrodes.nrows());
-        let block = MatMut::from_column_major_slice_mut(self.contacts.as_mut_slice(), size, size);
-        let mut memory =
-            MemBuffer::try_new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Default::default())).ok()?;
-        let stack = MemStack::new(&mut memory);
-        cholesky_in_place(block, Default::default(), Par::Seq, stack, Default::default()).ok()?;
-        let factor = MatRef::from_column_major_slice(self.contacts.as_slice(), size, size);
-        let right = MatMut::from_column_major_slice_mut(self.cross_and_current.as_mut_slice(), size, electrodes + 1);
-        solve_lower_triangular_in_place(factor, right, Par::Seq);
-
+        self.factorise()?;
+        let electrodes = self.electrodes.nrows();
         let products = self.cross_and_current.transpose() * &self.cross_and_current;
-        let conductance = products[(electrodes, electrodes)];
+        let conductance = products[(electrodes, electrodes)] + self.leak_s;
         if !(conductance.is_finite() && conductance > 0.0) {
             return None;
         }
@@ -95,6 +95,23 @@ impl ContactSystem<'_> {
             self.electrodes[(i, j)] - products[(i, j)] + missing[i] * constant_ohm[j]
         });
         Some((impedance_ohm, constant_ohm))
+    }
+
+    /// Leaves `L` in place of the contacts' block and `L^-1` times the right sides in their place.
+    fn factorise(&mut self) -> Option<()> {
+        let (size, electrodes) = (self.contacts.nrows(), self.electrodes.nrows());
+        if size == 0 {
+            return Some(());
+        }
+        let block = MatMut::from_column_major_slice_mut(self.contacts.as_mut_slice(), size, size);
+        let mut memory =
+            MemBuffer::try_new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Default::default())).ok()?;
+        let stack = MemStack::new(&mut memory);
+        cholesky_in_place(block, Default::default(), Par::Seq, stack, Default::default()).ok()?;
+        let factor = MatRef::from_column_major_slice(self.contacts.as_slice(), size, size);
+        let right = MatMut::from_column_major_slice_mut(self.cross_and_current.as_mut_slice(), size, electrodes + 1);
+        solve_lower_triangular_in_place(factor, right, Par::Seq);
+        Some(())
     }
 }
 
@@ -119,7 +136,7 @@ pub fn conducting_patches<'a>(
     let current = cross.ncols();
     let cross_and_current =
         DMatrix::from_fn(scale.len(), current + 1, |k, e| scale[k] * if e == current { 1.0 } else { cross[(k, e)] });
-    ContactSystem { electrodes, contacts: patches, cross_and_current }
+    ContactSystem { electrodes, contacts: patches, cross_and_current, leak_s: 0.0 }
 }
 
 /// Potentials for 1 A into each electrode while contacts lead it off to the driving layer.

@@ -16,7 +16,7 @@ use super::jacobian::Jacobian;
 use crate::detector::{Detector, Surface};
 
 const MAGIC: &[u8; 8] = b"TACTOJAC";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a Jacobian cannot be saved or loaded.
@@ -245,7 +245,7 @@ mod tests {
         assert!(message(&whole[..9]).contains("cut short"));
         assert!(message(&changed(whole.len() / 2)).contains("checksum"));
         assert!(message(&changed(0)).contains("TACTOJAC"));
-        assert!(message(&changed(9)).contains("format 258"));
+        assert!(message(&changed(9)).contains("format 259"));
         Ok(())
     }
 }

@@ -5,6 +5,7 @@
 
 mod auto;
 mod contact;
+mod driving;
 pub mod jacobian;
 mod jacobian_file;
 mod joined;
@@ -22,6 +23,7 @@ use nalgebra::DMatrix;
 
 pub use self::auto::Auto;
 pub use self::contact::ContactFields;
+pub use self::driving::{ConnectingPoints, DrivingLayer};
 pub use self::jacobian_file::JacobianFileError;
 pub use self::joined::{Exchanges, Joint};
 pub use self::nuisance::{Nuisance, Similar};
@@ -220,6 +222,12 @@ fn check_image(image_s: &[f64], nodes: usize) -> Result<(), ForwardError> {
         None if image_s.iter().all(|value_s| *value_s == 0.0) => Err(ForwardError::NoContact),
         None => Ok(()),
     }
+}
+
+/// A detector that leaks to the driving layer everywhere has no fields without contact.
+fn leaks(detector: &Detector) -> ForwardError {
+    let what = "it leaks to the driving layer everywhere, so it has no fields without contact".to_owned();
+    ForwardError::Detector { detector: detector.name.clone(), what }
 }
 
 /// Readings of a frame from the impedance matrix (V): `V[g][e] = Vcc (1 - Z[e][g] / (Z[g][g] + R_on))`.

@@ -94,14 +94,13 @@ impl Nuisance {
         Ok(Similar { model, board: steps.into_iter().filter(|(parameter, _)| parameter.is_of_board()).collect() })
     }
 
-    /// Of all that is not known of a model's detector; `None` if that is nothing. It takes a model for most parameters, made in as many
+    /// Of all that is not known of the detector that a model is of, as it is described; `None` if that is nothing. It takes a model for most parameters, made in as many
     /// threads as there are cores.
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if a detector that is a little different cannot be modelled.
-    pub fn new(model: &Arc<dyn ForwardModel>) -> Result<Option<Self>, ForwardError> {
-        let detector = model.detector();
-        let unknowns = detector.unknowns().directions;
+    pub fn new(model: &Arc<dyn ForwardModel>, described: &Detector) -> Result<Option<Self>, ForwardError> {
+        let unknowns = described.unknowns().directions;
         let mut parameters: Vec<(Parameter, f64)> = Vec::new();
         for (parameter, step) in unknowns.iter().flatten() {
             match parameters.iter_mut().find(|(known, _)| known == parameter) {
@@ -140,7 +139,7 @@ impl Nuisance {
         // Of a normal number of deviation one, the mean of the fourth power is 3.
         let even: Vec<_> = changes.iter().filter_map(|change| change.even.as_ref()).collect();
         let second = DMatrix::from_fn(size, even.len(), |row, column| 3f64.sqrt() * even[column][row]);
-        let (columns, offsets_v) = (first.ncols(), self.offsets_v(at.readings.electrodes(), measured));
+        let (columns, offsets_v) = (first.ncols(), Self::offsets_v(at.readings.electrodes(), measured));
         let mut all = first.resize_horizontally(columns + even.len() + offsets_v.ncols(), 0.0);
         all.columns_mut(columns, even.len()).copy_from(&second);
         all.columns_mut(columns + even.len(), offsets_v.ncols()).copy_from(&offsets_v);
@@ -149,8 +148,8 @@ impl Nuisance {
 
     /// What a baseline leaves of the channels' offsets (V), the same in all readings of a channel. Those below zero, half of them, are cut
     /// off by the converter while nothing touches.
-    fn offsets_v(&self, electrodes: usize, measured: &Detector) -> DMatrix<f64> {
-        let offset_v = self.model.detector().tolerances.offset_lsb * measured.adc.lsb_v() * 0.5f64.sqrt();
+    fn offsets_v(electrodes: usize, measured: &Detector) -> DMatrix<f64> {
+        let offset_v = measured.tolerances.offset_lsb * measured.adc.lsb_v() * 0.5f64.sqrt();
         let channels = if offset_v > 0.0 { electrodes } else { 0 };
         DMatrix::from_fn(electrodes * electrodes, channels, |row, e| if row % electrodes == e { offset_v } else { 0.0 })
     }

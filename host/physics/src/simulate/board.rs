@@ -6,7 +6,7 @@ use super::controls::{Built, Changes, Controls};
 use super::{Fault, FaultError, Physics, as_built, uneven_shell};
 use crate::detector::Detector;
 use crate::forward::shell::Shell;
-use crate::forward::{ForwardError, ForwardModel, Resolution, Slab, touched_impedance_ohm};
+use crate::forward::{DrivingLayer, ForwardError, ForwardModel, Resolution, Slab, touched_impedance_ohm};
 use crate::readings::Readings;
 use crate::scene::{Contact, Scene, SceneName, Touch};
 
@@ -36,8 +36,10 @@ pub enum SimulationError {
 pub struct Simulation {
     built: Built,
     scene: Scene,
-    /// When the scene began (s).
+    /// When the scene began, and when the detector as it is built was taken (s).
     scene_from_s: f64,
+    built_from_s: f64,
+    time_factor: f64,
     controls: Controls,
     pressed: Vec<Contact>,
     /// What touched last, and the impedances it made.
@@ -45,20 +47,34 @@ pub struct Simulation {
 }
 
 /// The best model of a detector with such faults, finer than those that are inverted: the slab for rectangles, else the shell. Uneven
-/// conductivity only the shell can have.
+/// conductivity only the shell can have, sheet resistance of the driving layer only the slab.
 ///
 /// # Errors
 /// [`ForwardError::Detector`] if there is no model of the detector.
 pub fn finer_model(detector: &Detector, faults: &[Fault], seed: u64) -> Result<Box<dyn ForwardModel>, ForwardError> {
+    let driving = driving_layer(detector, faults);
     let detector = &as_built(detector, faults, seed);
     let nodes = FINER * Shell::default_nodes(detector);
     if let Some(uneven) = uneven_shell(detector, nodes, faults, seed)? {
-        return Ok(Box::new(uneven));
+        return Ok(Box::new(uneven.under(driving)?));
     }
     if detector.surface.is_none() && detector.outline.as_rectangle().is_some() {
-        return Ok(Box::new(Slab::with_resolution(detector, Resolution::FINE)?.on_image(SLAB_IMAGE_NODES)));
+        return Ok(Box::new(Slab::under(detector, Resolution::FINE, driving)?.on_image(SLAB_IMAGE_NODES)));
     }
-    Ok(Box::new(Shell::with_nodes(detector, nodes)?))
+    Ok(Box::new(Shell::with_nodes(detector, nodes)?.under(driving)?))
+}
+
+/// The driving layer of `detector` with such faults: of several of a kind, the last one.
+pub fn driving_layer(detector: &Detector, faults: &[Fault]) -> DrivingLayer {
+    let mut driving = DrivingLayer::default();
+    for fault in faults {
+        match *fault {
+            Fault::DrivingSheet { ohm, points } => (driving.sheet_ohm, driving.points) = (ohm, points),
+            Fault::Leak { sheets } => driving.leak_s = sheets * detector.sheet_conductance_s(),
+            _ => {}
+        }
+    }
+    driving
 }
 
 impl Simulation {
@@ -69,7 +85,21 @@ impl Simulation {
     pub fn new(detector: &Detector, scene: Scene, faults: &[Fault], seed: u64) -> Result<Self, SimulationError> {
         let built = Built::new(detector, faults, seed)?;
         let controls = Controls::new(detector, &scene, faults, seed);
-        Ok(Self { built, scene, scene_from_s: 0.0, controls, pressed: Vec::new(), last: None })
+        Ok(Self {
+            built,
+            scene,
+            scene_from_s: 0.0,
+            built_from_s: 0.0,
+            time_factor: 1.0,
+            controls,
+            pressed: Vec::new(),
+            last: None,
+        })
+    }
+
+    /// The same, with scene and foam so many times faster than the board that measures them.
+    pub fn at_speed(self, time_factor: f64) -> Self {
+        Self { time_factor, ..self }
     }
 
     /// What a person may change of it while it runs.
@@ -85,21 +115,25 @@ impl Simulation {
             (self.scene, self.scene_from_s) = (scene, time_s);
         }
         if let Some(built) = built {
-            (self.built, self.last) = (built, None);
+            (self.built, self.built_from_s, self.last) = (built, time_s, None);
         }
     }
 }
 
 impl Physics for Simulation {
     fn readings_v(&mut self, time_s: f64) -> Readings {
+        let time_s = self.time_factor * time_s;
         self.take_changes(time_s);
         let mut touches = self.scene.at(time_s - self.scene_from_s);
         touches.extend(self.pressed.iter().copied().map(Touch::from));
+        let pressed = self.built.foam.press(touches, time_s - self.built_from_s);
+        let touches = pressed.before_drift();
         let impedance_ohm = match self.last.take() {
             Some((last, impedance_ohm)) if last == touches => impedance_ohm,
             _ => impedance_ohm(&*self.built.model, touches.clone()),
         };
-        let readings = self.built.measurement.pad_voltages(impedance_ohm.as_ref());
+        let drifted_ohm = impedance_ohm.as_ref().map(|impedance_ohm| impedance_ohm / pressed.factor);
+        let readings = self.built.measurement.pad_voltages(drifted_ohm.as_ref());
         self.last = Some((touches, impedance_ohm));
         readings
     }
@@ -215,5 +249,53 @@ mod tests {
         assert_eq!(faulty.at(0, 4), 0.5 * whole.at(0, 4));
         assert_eq!(faulty.at(0, 3), whole.at(0, 3));
         assert!(matches!(controls.set_faults(fault("open:16"), failed), Err(SimulationError::Fault(_))));
+    }
+
+    #[test]
+    fn a_leak_is_read_with_nothing_on_it_and_comes_and_goes_with_its_fault() {
+        let mut leaking = simulation(SceneName::Rest, &["leak:0.01"]);
+        let rest = leaking.readings_v(0.0);
+        // A hundredth of a sheet conductance is 88 kohm before about 1 kohm.
+        assert!(rest.largest_v() > 0.005 && rest.largest_v() < 0.05, "{}", rest.largest_v());
+        leaking.controls().press(vec![Contact::flat(0.004, -0.011, 0.003, 1e-3)]);
+        assert!(leaking.readings_v(1.0).largest_v() > 0.1);
+        leaking.controls().press(Vec::new());
+        assert_eq!(leaking.readings_v(2.0), rest);
+    }
+
+    #[test]
+    fn the_driving_layers_resistance_takes_of_what_is_firm() {
+        let light = |faults: &[&str]| simulation(SceneName::Single, faults).readings_v(0.0).largest_v();
+        let [ideal, one, two] = [&[][..], &["driving-sheet:200"], &["driving-sheet:200:2"]].map(light);
+        assert!(one < two && two < ideal, "{one} {two} {ideal}");
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let both = ["uneven:0.1", "driving-sheet:200"].map(|fault| fault.parse().unwrap());
+        let error = finer_model(&detector, &both, 1).err().unwrap().to_string();
+        assert!(error.contains("which only the slab can have"), "{error}");
+    }
+
+    #[test]
+    fn a_press_that_creeps_is_read_higher_and_a_day_passes_at_any_speed() {
+        let at = |simulation: &mut Simulation, time_s: f64| simulation.readings_v(time_s).largest_v();
+        let mut creeping = simulation(SceneName::Single, &["creep:0.2:3"]);
+        let [begin, later, end] = [0.0, 3.0, 60.0].map(|time_s| at(&mut creeping, time_s));
+        assert!(begin < later && later < end && end < 1.2 * begin, "{begin} {later} {end}");
+        let mut sound = simulation(SceneName::Single, &[]);
+        assert_eq!(at(&mut sound, 0.0), begin);
+        let mut fast = simulation(SceneName::Single, &["creep:0.2:3"]).at_speed(1000.0);
+        assert_eq!([0.0, 0.003, 0.06].map(|time_s| at(&mut fast, time_s)), [begin, later, end]);
+    }
+
+    #[test]
+    fn a_detector_that_has_drifted_is_one_of_that_conductivity() {
+        let drifted = simulation(SceneName::Several, &["drift:0.2:100"]).readings_v(100.0);
+        let told = simulation(SceneName::Several, &["conductivity:1.2"]).readings_v(100.0);
+        let before = simulation(SceneName::Several, &[]).readings_v(100.0);
+        let apart = |a: &Readings, b: &Readings| {
+            a.volts().iter().zip(b.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        // All that differs is the pads' contact impedance, of which 0.8 ohm drift too.
+        assert!(apart(&drifted, &told) < 4e-4, "{}", apart(&drifted, &told));
+        assert!(apart(&drifted, &before) > 0.02, "{}", apart(&drifted, &before));
     }
 }

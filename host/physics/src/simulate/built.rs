@@ -14,6 +14,9 @@ const WAVES: usize = 32;
 /// Length over which it changes, as a share of the detector's shorter side.
 const LENGTH_SHARE: f64 = 0.25;
 
+/// Halvings of the way from a pad's place as drawn to the one described, after which they are one.
+const HALVINGS: usize = 60;
+
 /// `detector` as its faults make it: of another conductivity, with contact impedances that differ from pad to pad. `seed` chooses which
 /// are large and which small.
 pub fn as_built(detector: &Detector, faults: &[Fault], seed: u64) -> Detector {
@@ -34,13 +37,31 @@ pub fn drawn(detector: &Detector, seed: u64) -> Detector {
     let mut noise = Noise::of(seed, Stream::AsBuilt);
     let all = Parameter::all(detector, 0.0);
     let step = |parameter: Parameter| (parameter, detector.tolerances.deviation(detector, parameter) * noise.normal());
-    let steps: Vec<_> = all.into_iter().map(step).collect();
+    // Offsets are the board's, and are drawn below.
+    let all = all.into_iter().filter(|parameter| !matches!(parameter, Parameter::Offset(_)));
+    // What is exact stays as it is described, to the digit.
+    let steps: Vec<_> = all.map(step).filter(|(_, step)| *step != 0.0).collect();
     let mut built = detector.stepped(&steps);
+    settle(&mut built, detector);
     let code_v = detector.adc.lsb_v();
     for pad in &mut built.electrodes {
-        pad.offset_v = detector.tolerances.offset_lsb * code_v * noise.normal();
+        pad.offset_v += detector.tolerances.offset_lsb * code_v * noise.normal();
     }
     Detector { calibration: None, tolerances: Tolerances::EXACT, ..built }
+}
+
+/// Moves pads that have no room half way back to where they are described, until all have.
+fn settle(built: &mut Detector, described: &Detector) {
+    for _ in 0..HALVINGS {
+        let moved: Vec<usize> = (0..built.electrodes.len()).filter(|e| !built.has_room_for(*e)).collect();
+        if moved.is_empty() {
+            return;
+        }
+        for e in moved {
+            let [at_m, told_m] = [&*built, described].map(|detector| detector.electrodes[e].place_m());
+            built.put_electrode(e, [0, 1, 2].map(|axis| 0.5 * (at_m[axis] + told_m[axis])));
+        }
+    }
 }
 
 fn scale(detector: &mut Detector, factor: f64) {
@@ -205,6 +226,72 @@ mod tests {
         assert_eq!(uneven(0.2, 1), uneven(0.2, 1));
         assert_ne!(uneven(0.2, 1), uneven(0.2, 2));
         assert!(uneven_shell(&detector, 1000, &[], 1).unwrap().is_none());
+    }
+
+    /// Standard deviation of what a function gives of the detectors drawn at 400 seeds, and the mean.
+    fn over_seeds(described: &Detector, of: impl Fn(&Detector) -> f64) -> [f64; 2] {
+        let all: Vec<f64> = (0..400).map(|seed| of(&drawn(described, seed))).collect();
+        let mean = all.iter().sum::<f64>() / 400.0;
+        [(all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 400.0).sqrt(), mean]
+    }
+
+    #[test]
+    fn detectors_are_drawn_with_the_deviations_of_their_tolerances() {
+        let told = Detector::default();
+        let is = |of: &dyn Fn(&Detector) -> f64, deviation: f64| {
+            let [found, mean] = over_seeds(&told, of);
+            // Four standard errors of the deviation and of the mean, of 400 normal numbers.
+            assert!((found / deviation - 1.0).abs() < 4.0 / 800f64.sqrt(), "{found} {deviation}");
+            assert!(mean.abs() < 4.0 * deviation / 20.0, "{mean} {deviation}");
+        };
+        is(&|built| (built.thickness_m() / told.thickness_m()).ln(), 0.1);
+        is(&|built| (built.layers[0].top_s_per_m / built.layers[0].bottom_s_per_m).ln(), 2f64.ln());
+        let per_m = |detector: &Detector| detector.sheet_conductance_s() / detector.thickness_m();
+        is(&|built| (per_m(built) / per_m(&told)).ln(), 0.2);
+        is(&|built| built.electrodes[5].x_m - told.electrodes[5].x_m, 3e-4);
+        is(&|built| built.electrodes[9].y_m - told.electrodes[9].y_m, 3e-4);
+        is(&|built| (built.contact_impedance_ohm_m2 / told.contact_impedance_ohm_m2).ln(), 3f64.ln());
+        is(&|built| (built.pad_impedance_ohm_m2(&built.electrodes[2]) / built.contact_impedance_ohm_m2).ln(), 0.3);
+        is(&|built| built.electrodes[2].gain.ln(), 0.003);
+        is(&|built| built.electrodes[2].offset_v, 2.0 * told.adc.lsb_v());
+        is(&|built| (built.on_resistance_ohm / told.on_resistance_ohm).ln(), 0.25);
+        let mode = Parameter::Uneven([1, 1]);
+        is(&|built| built.unevenness.log_amplitudes[1][1], told.tolerances.deviation(&told, mode));
+    }
+
+    #[test]
+    fn a_seed_is_one_detector_and_what_is_drawn_is_exact() {
+        let told = Detector::default();
+        assert_eq!(drawn(&told, 7), drawn(&told, 7));
+        assert_ne!(drawn(&told, 7), drawn(&told, 8));
+        assert!(drawn(&told, 7).tolerances.is_exact());
+        let exact = told.taken_as_exact();
+        assert_eq!(drawn(&exact, 7), exact);
+    }
+
+    #[test]
+    fn pads_stay_apart_and_on_the_detector_however_far_they_may_be() {
+        let examples = |name| format!("{}/../examples/detectors/{name}", env!("CARGO_MANIFEST_DIR"));
+        let files = ["fingertip.toml", "l-shape.toml"].map(|name| Detector::read(examples(name).as_ref()).unwrap());
+        let presets = Detector::preset_names().filter_map(Detector::preset);
+        for mut told in files.into_iter().chain(presets) {
+            told.tolerances.electrodes_m = 0.01;
+            for seed in 0..10 {
+                let built = drawn(&told, seed);
+                assert_eq!(built.check(), Ok(()), "{} {seed}", told.name);
+                assert_ne!(built.electrodes[0].place_m(), told.electrodes[0].place_m(), "{} {seed}", told.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_detector_as_built_reads_otherwise_than_the_one_on_paper() {
+        let told = Detector::default();
+        let press = Contact::flat(0.004, -0.011, 0.003, 1e-3);
+        let slab = |detector: &Detector| Slab::new(detector).unwrap().impedance_ohm(&[press]).unwrap();
+        let (paper, bench) = (slab(&told), slab(&drawn(&told, 1)));
+        assert!((&paper - &bench).amax() > 0.02 * paper.amax());
+        assert!((&bench - bench.transpose()).amax() < 1e-9 * bench.amax());
     }
 
     fn logs_at(place: Place) -> Vec<f64> {

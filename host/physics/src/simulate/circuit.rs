@@ -62,8 +62,15 @@ impl Circuit {
             Fault::Clip { range_v: [low_v, high_v] } => {
                 self.clip_v = [self.clip_v[0].max(low_v), self.clip_v[1].min(high_v)];
             }
-            // The model of the detector has these.
-            Fault::ContactSpread { .. } | Fault::Conductivity { .. } | Fault::Uneven { .. } => {}
+            // The model of the detector has these, or what presses on it.
+            Fault::ContactSpread { .. }
+            | Fault::Conductivity { .. }
+            | Fault::Uneven { .. }
+            | Fault::DrivingSheet { .. }
+            | Fault::Leak { .. }
+            | Fault::Creep { .. }
+            | Fault::Hysteresis { .. }
+            | Fault::Drift { .. } => {}
         }
     }
 

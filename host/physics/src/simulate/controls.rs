@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use super::board::{SimulationError, finer_model};
-use super::{Fault, Measurement};
+use super::{Fault, Foam, Measurement};
 use crate::detector::Detector;
 use crate::forward::ForwardModel;
 use crate::scene::{Contact, Hand, Scene, SceneName};
@@ -34,6 +34,7 @@ struct State {
 /// A detector with its faults, and the board that measures it.
 pub(super) struct Built {
     pub(super) model: Box<dyn ForwardModel>,
+    pub(super) foam: Foam,
     pub(super) measurement: Measurement,
 }
 
@@ -41,7 +42,7 @@ impl Built {
     /// Takes up to a second.
     pub(super) fn new(detector: &Detector, faults: &[Fault], seed: u64) -> Result<Self, SimulationError> {
         let measurement = Measurement::new(detector, faults, seed)?;
-        Ok(Self { model: finer_model(detector, faults, seed)?, measurement })
+        Ok(Self { model: finer_model(detector, faults, seed)?, foam: Foam::new(faults), measurement })
     }
 }
 

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::forward::ConnectingPoints;
+
 /// Something wrong. Electrodes count from 0. Breaks and shorts are told by electrode; what stands behind them, the exchange of
 /// two wires first, then gain and sign, by channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,10 +58,45 @@ pub enum Fault {
         /// The range (V).
         range_v: [f64; 2],
     },
+    /// The driving layer has a sheet resistance, and is connected at a corner: `driving-sheet:100`; or at two opposite ones:
+    /// `driving-sheet:100:2`
+    DrivingSheet {
+        /// Sheet resistance (ohm per square).
+        ohm: f64,
+        /// Where it is connected.
+        points: ConnectingPoints,
+    },
+    /// The layers touch lightly everywhere, as under a preload or through a worn mesh. `leak:0.01`
+    Leak {
+        /// Conductance of it all, in sheet conductances of the detector as it is described.
+        sheets: f64,
+    },
+    /// Contacts grow while they are pressed. `creep:0.2:3`
+    Creep {
+        /// By how much in the end, as a share.
+        share: f64,
+        /// Time constant (s).
+        time_s: f64,
+    },
+    /// Contacts conduct more while force is taken from them than while it grew. `hysteresis:0.1`
+    Hysteresis {
+        /// How much more, as a share.
+        share: f64,
+    },
+    /// The conductivity drifts, with humidity and temperature. `drift:0.2:86400`, or with a daily wave `drift:0.2:86400:0.05`
+    Drift {
+        /// Share by which it grows, or falls if below zero, in each such time.
+        share: f64,
+        /// The time (s).
+        time_s: f64,
+        /// Half of the wave's height, as a share.
+        daily: f64,
+    },
 }
 
 /// Forms of faults, for messages.
-const FORMS: &str = "open:3, short:2,7, short:2,7:50, swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2 or clip:0.14,1.8";
+const FORMS: &str = "open:3, short:2,7, short:2,7:50, swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2, \
+    clip:0.14,1.8, driving-sheet:100, driving-sheet:100:2, leak:0.01, creep:0.2:3, hysteresis:0.1, drift:0.2:86400 or drift:0.2:86400:0.05";
 
 /// Why a fault cannot be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -103,10 +140,27 @@ impl Fault {
                 [Some(one), None]
             }
             Self::Short { electrodes: [a, b], .. } | Self::Swap { channels: [a, b] } => [Some(a), Some(b)],
-            Self::ContactSpread { .. } | Self::Conductivity { .. } | Self::Uneven { .. } | Self::Clip { .. } => {
-                [None; 2]
-            }
+            Self::ContactSpread { .. }
+            | Self::Conductivity { .. }
+            | Self::Uneven { .. }
+            | Self::Clip { .. }
+            | Self::DrivingSheet { .. }
+            | Self::Leak { .. }
+            | Self::Creep { .. }
+            | Self::Hysteresis { .. }
+            | Self::Drift { .. } => [None; 2],
         }
+    }
+
+    /// Whether it acts through time, on what presses: [`Foam`](super::Foam) has it.
+    pub fn is_of_time(&self) -> bool {
+        matches!(self, Self::Creep { .. } | Self::Hysteresis { .. } | Self::Drift { .. })
+    }
+
+    /// Whether it makes another model of the detector, and not only of its wires and channels.
+    pub fn is_of_model(&self) -> bool {
+        let layers = matches!(self, Self::ContactSpread { .. } | Self::Conductivity { .. } | Self::Uneven { .. });
+        layers || matches!(self, Self::DrivingSheet { .. } | Self::Leak { .. })
     }
 
     fn parse(text: &str) -> Result<Self, &'static str> {
@@ -124,6 +178,17 @@ impl Fault {
             ("conductivity", [factor]) => Ok(Self::Conductivity { factor: positive(factor)? }),
             ("uneven", [deviation]) => Ok(Self::Uneven { deviation: not_negative(deviation)? }),
             ("clip", [range]) => Ok(Self::Clip { range_v: self::range(range)? }),
+            ("driving-sheet", [ohm]) => {
+                Ok(Self::DrivingSheet { ohm: not_negative(ohm)?, points: ConnectingPoints::One })
+            }
+            ("driving-sheet", [ohm, count]) => {
+                Ok(Self::DrivingSheet { ohm: not_negative(ohm)?, points: points(count)? })
+            }
+            ("leak", [sheets]) => Ok(Self::Leak { sheets: not_negative(sheets)? }),
+            ("creep", [share, time]) => Ok(Self::Creep { share: not_negative(share)?, time_s: positive(time)? }),
+            ("hysteresis", [share]) => Ok(Self::Hysteresis { share: not_negative(share)? }),
+            ("drift", [share, time]) => drift(share, time, "0"),
+            ("drift", [share, time, daily]) => drift(share, time, daily),
             _ => Err("no such fault, or too few or too many numbers"),
         }
     }
@@ -146,6 +211,21 @@ fn not_negative(text: &str) -> Result<f64, &'static str> {
 
 fn positive(text: &str) -> Result<f64, &'static str> {
     not_negative(text).ok().filter(|number| *number > 0.0).ok_or("a number above zero is needed")
+}
+
+fn points(text: &str) -> Result<ConnectingPoints, &'static str> {
+    match text.trim() {
+        "1" => Ok(ConnectingPoints::One),
+        "2" => Ok(ConnectingPoints::Two),
+        _ => Err("a driving layer is connected at 1 or 2 points"),
+    }
+}
+
+fn drift(share: &str, time: &str, daily: &str) -> Result<Fault, &'static str> {
+    let number = share.trim().parse::<f64>().ok().filter(|share| *share > -1.0 && share.is_finite());
+    let share = number.ok_or("a share above -1 is needed")?;
+    let daily = not_negative(daily).ok().filter(|daily| *daily < 1.0).ok_or("a daily wave below 1 is needed")?;
+    Ok(Fault::Drift { share, time_s: positive(time)?, daily })
 }
 
 fn range(text: &str) -> Result<[f64; 2], &'static str> {
@@ -175,6 +255,13 @@ impl fmt::Display for Fault {
             Self::Conductivity { factor } => write!(formatter, "conductivity:{factor}"),
             Self::Uneven { deviation } => write!(formatter, "uneven:{deviation}"),
             Self::Clip { range_v: [low_v, high_v] } => write!(formatter, "clip:{low_v},{high_v}"),
+            Self::DrivingSheet { ohm, points: ConnectingPoints::One } => write!(formatter, "driving-sheet:{ohm}"),
+            Self::DrivingSheet { ohm, points: ConnectingPoints::Two } => write!(formatter, "driving-sheet:{ohm}:2"),
+            Self::Leak { sheets } => write!(formatter, "leak:{sheets}"),
+            Self::Creep { share, time_s } => write!(formatter, "creep:{share}:{time_s}"),
+            Self::Hysteresis { share } => write!(formatter, "hysteresis:{share}"),
+            Self::Drift { share, time_s, daily: 0.0 } => write!(formatter, "drift:{share}:{time_s}"),
+            Self::Drift { share, time_s, daily } => write!(formatter, "drift:{share}:{time_s}:{daily}"),
         }
     }
 }
@@ -196,6 +283,13 @@ mod tests {
             "conductivity:2",
             "uneven:0.2",
             "clip:0.14,1.8",
+            "driving-sheet:100",
+            "driving-sheet:100:2",
+            "leak:0.01",
+            "creep:0.2:3",
+            "hysteresis:0.1",
+            "drift:0.2:86400",
+            "drift:0.2:86400:0.05",
         ];
         for form in forms {
             assert_eq!(form.parse::<Fault>().unwrap().to_string(), form);
@@ -216,6 +310,14 @@ mod tests {
             ("gain:1:NaN", "zero or above"),
             ("conductivity:0", "above zero"),
             ("clip:2,1", "below the second"),
+            ("driving-sheet:-1", "zero or above"),
+            ("driving-sheet:100:3", "1 or 2 points"),
+            ("leak:inf", "zero or above"),
+            ("creep:0.2", "too few"),
+            ("creep:0.2:0", "above zero"),
+            ("hysteresis:-0.1", "zero or above"),
+            ("drift:-1:60", "above -1"),
+            ("drift:0.1:60:1", "wave below 1"),
         ] {
             let error = text.parse::<Fault>().unwrap_err().to_string();
             assert!(error.contains(what) && error.contains("contact-spread:0.2"), "{error}");

@@ -8,16 +8,18 @@ mod built;
 mod circuit;
 mod controls;
 mod fault;
+mod foam;
 mod measure;
 mod measurement;
 mod noise;
 
 use crate::readings::Readings;
 
-pub use board::{Simulation, SimulationError, finer_model};
+pub use board::{Simulation, SimulationError, driving_layer, finer_model};
 pub use built::{as_built, drawn, uneven_shell};
 pub use controls::Controls;
 pub use fault::{Fault, FaultError};
+pub use foam::{Foam, Pressed};
 pub use measure::{code, measured};
 pub use measurement::Measurement;
 pub use noise::Noise;

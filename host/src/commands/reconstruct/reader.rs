@@ -1,19 +1,45 @@
 //! Frames of a file, less the baseline, and what solves them.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail, ensure};
 use tactomo::board::baseline::Baseline;
 use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
-use tactomo::board::measured;
-use tactomo::detector::Detector;
+use tactomo::board::{identity, measured};
+use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
+use tactomo::forward::jacobian::Jacobian;
 use tactomo::readings::Readings;
 use tactomo::solve::{Guard, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver};
 
-use super::Args;
+use tactomo_protocol::Hello;
+
 use super::units::{self, Unit};
+use crate::commands::choice::{DetectorArgs, Model};
 use crate::commands::output::message;
+
+/// What is read, and what solves it.
+pub struct Input<'a> {
+    /// A recording, or a table of readings.
+    pub file: &'a Path,
+    /// On which detector.
+    pub detector: &'a DetectorArgs,
+    /// Forward model.
+    pub model: Model,
+    /// Solver.
+    pub solver: Method,
+    /// Its lambda, if that is not the default.
+    pub lambda: Option<Lambda>,
+    /// Presses that it learns from, instead of a detector.
+    pub presses: Option<&'a Path>,
+    /// Frames at the start that are the baseline, if that is said.
+    pub rest: Option<u32>,
+    /// Unit of a table, if that is said.
+    pub unit: Option<Unit>,
+    /// Law of force in place of the detector's own.
+    pub force: Option<ForceLaw>,
+}
 
 /// Frames and what solves them.
 pub struct Reader {
@@ -25,6 +51,8 @@ pub struct Reader {
     /// Frames still to come that are the baseline and nothing else, because the user said so.
     given: u32,
     touch: Touch,
+    /// The detector as it was chosen, of a solver for a detector.
+    detector: Option<Detector>,
 }
 
 /// Frames, one after the other.
@@ -38,25 +66,59 @@ enum Frames {
 /// What solves frames.
 enum Touch {
     /// A solver for a detector, as the file's board measures it, and the places of its images.
-    Solver { solver: Box<dyn Solver>, electrodes: usize, mesh: ImageMesh },
+    Solver { solver: Box<dyn Solver>, detector: Box<Detector>, mesh: ImageMesh },
     /// A kernel that has learned from presses in a file, on whatever they were made.
     Kernel(Box<Kernel>),
 }
 
 impl Reader {
     /// Opens the file and makes what solves it.
-    pub fn open(args: &Args) -> anyhow::Result<Self> {
-        let (file, touch, detector) = match &args.presses {
-            Some(presses) => learned(args, Presses::read(presses)?)?,
-            None => solved(args)?,
+    pub fn open(input: &Input) -> anyhow::Result<Self> {
+        let Opened { file, touch, jacobian, chosen } = match input.presses {
+            Some(presses) => learned(input, Presses::read(presses)?)?,
+            None => solved(input)?,
         };
         // That of a recording is taken as live takes it, while its frames are solved.
-        let baseline = match (&detector, args.rest) {
-            (Some(detector), None) if file.board().is_some() => Baseline::new(detector),
-            (_, frames) => Baseline::over(frames.unwrap_or(0), file.channels()),
+        let baseline = match (&jacobian, input.rest, file.board()) {
+            (Some(jacobian), None, Some(board)) => Baseline::new(Arc::clone(jacobian), board.settings.conversions()),
+            (_, frames, _) => Baseline::over(frames.unwrap_or(0), file.channels()),
         };
-        let frames = Frames::of(file, args, detector.as_ref())?;
-        Ok(Self { path: args.file.clone(), frames, baseline, count: 0, given: args.rest.unwrap_or(0), touch })
+        let frames = Frames::of(file, input, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
+        let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));
+        Ok(Self { path, frames, baseline, count: 0, given, touch, detector: chosen })
+    }
+
+    /// The detector as it was chosen, before its board was asked; `None` where presses were learned from.
+    pub fn detector(&self) -> Option<&Detector> {
+        self.detector.as_ref()
+    }
+
+    /// The detector as the file's board measures it; `None` where presses were learned from.
+    pub fn measured(&self) -> Option<&Detector> {
+        match &self.touch {
+            Touch::Solver { detector, .. } => Some(detector),
+            Touch::Kernel(_) => None,
+        }
+    }
+
+    /// The board that a recording was taken from.
+    pub fn board(&self) -> Option<&Hello> {
+        match &self.frames {
+            Frames::Recording(file) => file.board(),
+            Frames::Table(_) => None,
+        }
+    }
+
+    /// Whether the file is a recording, whose frames follow each other in time.
+    pub fn is_recording(&self) -> bool {
+        matches!(self.frames, Frames::Recording(_))
+    }
+
+    /// Forgets the frames before: the next one need not follow them.
+    pub fn reset(&mut self) {
+        if let Touch::Solver { solver, .. } = &mut self.touch {
+            solver.reset();
+        }
     }
 
     /// The next frame after those of the baseline, with readings (V) less the baseline.
@@ -64,7 +126,7 @@ impl Reader {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
             if self.given == 0 {
-                self.baseline.add(&frame.volts, 1, &[]);
+                self.baseline.add(&frame.volts, 1, frame.time_s.unwrap_or_default(), &[]);
                 let volts = frame.volts.clone();
                 self.baseline.subtract(&volts, &mut frame.volts);
                 return Ok(Some(frame));
@@ -72,7 +134,7 @@ impl Reader {
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
                 bail!("{}: the baseline needs finite readings, but some of these are not", self.place());
             }
-            self.baseline.add(&frame.volts, 1, &[]);
+            self.baseline.add(&frame.volts, 1, frame.time_s.unwrap_or_default(), &[]);
             self.given -= 1;
         }
         Ok(None)
@@ -92,8 +154,10 @@ impl Reader {
     /// What a frame's readings (V, less the baseline) say.
     pub fn solve(&mut self, readings_v: Vec<f64>) -> anyhow::Result<Solution> {
         match &mut self.touch {
-            Touch::Solver { solver, electrodes, .. } => {
-                let readings = Readings::new(*electrodes, readings_v).context("a frame of another length")?;
+            Touch::Solver { solver, detector, .. } => {
+                let readings = Readings::new(detector.electrodes.len(), readings_v);
+                let mut readings = readings.context("a frame of another length")?;
+                readings.correct_channels(detector);
                 Ok(solver.solve(&readings)?)
             }
             Touch::Kernel(kernel) => match kernel.press(&readings_v) {
@@ -143,16 +207,13 @@ impl Reader {
 
 impl Frames {
     /// Of a file, in volts.
-    fn of(mut file: FrameFile, args: &Args, detector: Option<&Detector>) -> anyhow::Result<Self> {
+    fn of(mut file: FrameFile, input: &Input, detector: Option<&Detector>) -> anyhow::Result<Self> {
+        let path = input.file.display();
         if file.board().is_some() {
-            ensure!(
-                args.unit.is_none(),
-                "leave out --unit: {} is a recording, which knows its unit",
-                args.file.display()
-            );
+            ensure!(input.unit.is_none(), "leave out --unit: {path} is a recording, which knows its unit");
             return Ok(Self::Recording(file));
         }
-        let unit = args.unit.unwrap_or(Unit::Volt);
+        let unit = input.unit.unwrap_or(Unit::Volt);
         let mut frames = Vec::new();
         while let Some(mut frame) = file.next_frame()? {
             frame.volts.iter_mut().for_each(|value| *value *= unit.volts());
@@ -161,7 +222,7 @@ impl Frames {
         let volts = || frames.iter().flat_map(|frame| &frame.volts);
         let largest_v = volts().map(|volts| volts.abs()).filter(|volts| volts.is_finite()).fold(0.0, f64::max);
         if let Some(detector) = detector {
-            units::check(largest_v, unit, detector).map_err(|what| anyhow!("{}: {what}", args.file.display()))?;
+            units::check(largest_v, unit, detector).map_err(|what| anyhow!("{path}: {what}"))?;
         }
         Ok(Self::Table(frames.into_iter()))
     }
@@ -182,13 +243,20 @@ impl Frames {
     }
 }
 
-/// A file, what solves it, and the detector that it must be of, if that is known.
-type Opened = (FrameFile, Touch, Option<Detector>);
+/// A file and what solves it.
+struct Opened {
+    file: FrameFile,
+    touch: Touch,
+    /// The linear theory of the detector that it must be of, as its board measures it, if that is known.
+    jacobian: Option<Arc<Jacobian>>,
+    /// The same as it was chosen.
+    chosen: Option<Detector>,
+}
 
 /// A kernel that has learned from presses.
-fn learned(args: &Args, presses: Presses) -> anyhow::Result<Opened> {
-    if args.solver != Method::Kernel {
-        bail!("only the solver kernel learns from presses, not {}: give --solver kernel", args.solver.name());
+fn learned(input: &Input, presses: Presses) -> anyhow::Result<Opened> {
+    if input.solver != Method::Kernel {
+        bail!("only the solver kernel learns from presses, not {}: give --solver kernel", input.solver.name());
     }
     let kernel = Kernel::train(&presses)?;
     message!(
@@ -198,46 +266,53 @@ fn learned(args: &Args, presses: Presses) -> anyhow::Result<Opened> {
         kernel.left_out_m() * 1e3,
         kernel.left_out_strength() * 100.0
     );
-    let file = FrameFile::open(&args.file, Some(kernel.channels()))?;
+    let file = FrameFile::open(input.file, Some(kernel.channels()))?;
     if file.channels() != kernel.channels() {
         bail!(
             "{} has {} readings a frame, but the presses have {} channels",
-            args.file.display(),
+            input.file.display(),
             file.channels(),
             kernel.channels()
         );
     }
-    Ok((file, Touch::Kernel(Box::new(kernel)), None))
+    Ok(Opened { file, touch: Touch::Kernel(Box::new(kernel)), jacobian: None, chosen: None })
 }
 
 /// A solver for the detector.
-fn solved(args: &Args) -> anyhow::Result<Opened> {
+fn solved(input: &Input) -> anyhow::Result<Opened> {
     // That of a recording is in its header, unless another one is given.
-    let given = args.detector.get()?.electrodes.len();
-    let file = FrameFile::open(&args.file, Some(given * given))?;
+    let given = input.detector.get()?.electrodes.len();
+    let file = FrameFile::open(input.file, Some(given * given))?;
     let chosen = match file.header() {
-        Some(header) => args.detector.of_recording(&args.file, header)?,
-        None => args.detector.get()?,
+        Some(header) => input.detector.of_recording(input.file, header)?,
+        None => input.detector.get()?,
     };
     let electrodes = chosen.electrodes.len();
     let detector = match file.board() {
-        Some(board) => measured::as_measured(&chosen, board)?,
-        None => chosen,
+        Some(board) => {
+            if let Some(notice) = identity::other_board(&chosen, board) {
+                message!("warning: {notice}");
+            }
+            measured::as_measured(&chosen, board)?
+        }
+        None => chosen.clone(),
     };
+    let detector = Detector { force: input.force.clone().or(detector.force), ..detector };
     if file.channels() != electrodes * electrodes {
         bail!(
             "{} has {} readings a frame, but the detector {} with its {electrodes} electrodes needs {}: give the right one with \
              --detector",
-            args.file.display(),
+            input.file.display(),
             file.channels(),
             detector.name,
             electrodes * electrodes
         );
     }
-    let problem = Problem::new(args.model.build(&detector, None)?);
-    let solver = solver(args.solver, args.lambda, &problem)?;
+    let problem = Problem::new(input.model.build(&detector, None)?);
+    let solver = solver(input.solver, input.lambda, &problem)?;
     let mesh = problem.jacobian.image_mesh.clone();
-    Ok((file, Touch::Solver { solver, electrodes, mesh }, Some(detector)))
+    let touch = Touch::Solver { solver, detector: Box::new(detector), mesh };
+    Ok(Opened { file, touch, jacobian: Some(problem.jacobian), chosen: Some(chosen) })
 }
 
 /// The solver, which leaves out faulty electrodes; or, with a given lambda, of all electrodes.

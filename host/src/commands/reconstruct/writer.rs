@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use anyhow::{Context, bail, ensure};
+use tactomo::detector::short;
 use tactomo::forward::ImageMesh;
 use tactomo::schema::{self, CONTACT_COLUMNS, FRAME_COLUMNS, FrameReport, SHAPE_COLUMNS};
 use tactomo::solve::{FoundContact, FoundShape};
@@ -100,7 +101,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
 fn sentence(frame: &FrameReport) -> String {
     let contact = |found: &FoundContact| {
         let strength = match found.force_n {
-            Some(force_n) => format!("{force_n:.2} N"),
+            Some(force_n) => force_sentence(force_n, found),
             None => format!("{:.2e} S", found.conductance_s),
         };
         format!("({:.2}, {:.2}) mm {strength}", found.x_m * 1e3, found.y_m * 1e3)
@@ -119,6 +120,13 @@ fn sentence(frame: &FrameReport) -> String {
         Some(count) => format!(" ({count} lost before it)"),
     };
     format!("frame{number}{time}{lost}: {found}{misfit}")
+}
+
+/// A force for people, with its standard error if that is known.
+fn force_sentence(force_n: f64, found: &FoundContact) -> String {
+    let error = found.force_deviation_n.map_or_else(String::new, |error_n| format!(" \u{b1} {}", short(error_n)));
+    let beyond = if found.force_beyond_maximum == Some(true) { " (beyond the largest that can be told)" } else { "" };
+    format!("{}{error} N{beyond}", short(force_n))
 }
 
 /// A shape for people.

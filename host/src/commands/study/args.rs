@@ -24,6 +24,10 @@ pub struct StudyArgs {
     /// Seed of places and noise: the same seed gives the same figures, but for times
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Simulates detectors as they were built: drawn with this seed from the tolerances around their descriptions, which is all that
+    /// solvers know
+    #[arg(long, value_name = "SEED")]
+    pub as_built: Option<u64>,
     /// Writes a page with charts, which needs nothing else
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

@@ -52,7 +52,7 @@ pub struct Args {
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut detector = args.detector.get()?;
-    detector.tolerances = detector.tolerances.scaled(args.tolerances);
+    detector.tolerances = detector.tolerances.times(args.tolerances);
     let methods = match args.solver[..] {
         [] => vec![Method::Auto, Method::Contacts, Method::Tikhonov],
         _ => args.solver.clone(),

@@ -34,6 +34,10 @@ pub struct Args {
     /// Seed of scenes and noise: the same seed gives the same figures, but for times
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Simulates detectors as they were built: drawn with this seed from the tolerances around their descriptions, which is all that
+    /// the solver knows
+    #[arg(long, value_name = "SEED")]
+    as_built: Option<u64>,
     /// Scenes tried at a time; times are right with one only
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     threads: u8,
@@ -59,6 +63,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         threads: usize::from(args.threads),
         worst: usize::from(args.worst),
         seed: args.seed,
+        as_built: args.as_built,
     };
     let report = contacts::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
     Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { contacts::table(&report) })?)

@@ -9,7 +9,7 @@
 //! | f32 | age of the answer when this was sent: since the last byte of its frame came (s) |
 //! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
 //! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
-//! | k x (u32, 12 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
+//! | k x (u32, 14 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
 //! | 18 x f32 | with a shape: its [columns](tactomo_touch::schema::SHAPE_COLUMNS); then the contacts are beside it |
 //! | the rest | UTF-8: what was chosen, a line feed, why; nothing if the solver does not choose |
 
@@ -19,7 +19,7 @@ use tactomo_touch::schema::{CONTACT_COLUMNS, contact_values, shape_values};
 use tactomo_touch::solve::{Flags, FoundContact, FoundShape};
 
 /// Version of the layout; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 5;
+pub(super) const LAYOUT: u32 = 6;
 
 /// Numbers of a contact: the columns after its id, and its place on the map.
 const CONTACT_FLOATS: usize = CONTACT_COLUMNS.len() - 1 + 2;
@@ -111,6 +111,8 @@ mod tests {
             id: Some(6),
             radius_m: Some(1.5),
             force_n: Some(3.0),
+            force_deviation_n: Some(0.75),
+            force_beyond_maximum: Some(true),
             uncertainty: Some(errors),
             ..FoundContact::flat(0.25, -0.5, 2.0)
         };
@@ -129,12 +131,13 @@ mod tests {
         assert!((0.0..5.0).contains(&head[1]), "{} s old", head[1]);
         assert_eq!(head[2..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0]);
         assert_eq!(words(&bytes[72..76]), [6]);
-        assert_eq!(floats(&bytes[76..124]), [0.25, -0.5, 0.0, 2.0, 1.5, 3.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5]);
-        assert_eq!(words(&bytes[124..128]), [0]);
-        assert_eq!(floats(&bytes[128..144]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[144..168]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[168..176]), [1.0, 2.0]);
-        assert_eq!(&bytes[176..], "2 contacts\nµ".as_bytes());
+        let known = [0.25, -0.5, 0.0, 2.0, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5];
+        assert_eq!(floats(&bytes[76..132]), known);
+        assert_eq!(words(&bytes[132..136]), [0]);
+        assert_eq!(floats(&bytes[136..152]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[152..184]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[184..192]), [1.0, 2.0]);
+        assert_eq!(&bytes[192..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -147,7 +150,7 @@ mod tests {
             ..Solution::default()
         });
         assert_eq!(words(&bytes[20..28]), [1, 2]);
-        let shape = floats(&bytes[44 + 4 * 4 + 52..]);
+        let shape = floats(&bytes[44 + 4 * 4 + 60..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }

@@ -127,6 +127,7 @@ struct StatusMessage<'a> {
     recording: Option<String>,
     refused: Option<&'a str>,
     baseline: Option<&'a str>,
+    calibration: Option<&'a str>,
 }
 
 /// What the link plays.
@@ -209,6 +210,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         recording: snapshot.recording.as_ref().map(|path| path.display().to_string()),
         refused: snapshot.refused.as_deref(),
         baseline: snapshot.baseline.as_deref(),
+        calibration: snapshot.calibration.as_deref(),
     })
 }
 
@@ -331,6 +333,7 @@ mod tests {
             playing,
             recording: Some("touch.tactomo".into()),
             baseline: Some("Something pressed at the start.".to_owned()),
+            calibration: Some("It was calibrated on another board.".to_owned()),
             ..Snapshot::default()
         };
         let value = json(status(&snapshot, 3));
@@ -344,6 +347,7 @@ mod tests {
         );
         assert_eq!(value["recording"], "touch.tactomo");
         assert_eq!(value["baseline"], "Something pressed at the start.");
+        assert_eq!(value["calibration"], "It was calibrated on another board.");
         assert_eq!(value["rezeros"], 3);
     }
 }

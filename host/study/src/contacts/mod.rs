@@ -45,6 +45,8 @@ pub struct Plan {
     pub worst: usize,
     /// Where scenes and noise start.
     pub seed: u64,
+    /// If given, readings are those of detectors as they were built with this seed; bounds are of the detectors on paper.
+    pub as_built: Option<u64>,
 }
 
 /// What came out.
@@ -66,6 +68,8 @@ pub struct Report {
     pub threads: usize,
     /// Seed.
     pub seed: u64,
+    /// The seed of the detectors as they were built, if readings are of such.
+    pub as_built: Option<u64>,
     /// A row for each class of scenes or contacts.
     pub rows: Vec<Row>,
     /// The worst scenes, the worst first.
@@ -106,7 +110,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
     let mut experiments = Vec::with_capacity(plan.detectors.len());
     for detector in &plan.detectors {
         progress(&format!("{}: model", detector.name));
-        experiments.push(Experiment::new(detector)?);
+        experiments.push(Experiment::of(detector, plan.as_built)?);
     }
     progress(&format!("{} scenes", plan.scenes));
     let trials = try_all(plan, &experiments, &scenes::random(&plan.detectors, plan.scenes, plan.seed))?;
@@ -119,6 +123,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         frames: plan.frames,
         threads: plan.threads,
         seed: plan.seed,
+        as_built: plan.as_built,
         rows: rows::rows(&trials),
         worst: worst(trials, plan.worst),
     })
@@ -202,6 +207,7 @@ mod tests {
             threads,
             worst: 2,
             seed: 3,
+            as_built: None,
         }
     }
 
@@ -227,6 +233,7 @@ mod tests {
         let one = run(&plan(1));
         assert_eq!(one, run(&plan(3)));
         assert_ne!(one, run(&Plan { seed: 4, ..plan(1) }));
+        assert_ne!(one, run(&Plan { as_built: Some(4), ..plan(1) }));
     }
 
     #[test]

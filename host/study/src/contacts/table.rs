@@ -11,11 +11,12 @@ use tactomo_touch::solve::FoundContact;
 pub fn table(report: &Report) -> String {
     let mut lines = vec![
         format!(
-            "{} on {}; {} scenes, seed {}, judged at frame {}",
+            "{} on {}; {} scenes, seed {}{}, judged at frame {}",
             report.solver,
             report.detectors.join(", "),
             report.scenes,
             report.seed,
+            report.as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}")),
             report.frames
         ),
         format!(

@@ -1,7 +1,8 @@
 //! What noise allows, and what solvers reach.
 
 use super::scenes::{APART, pair};
-use super::sweep::{Bench, Trials};
+use super::sweep::Bench;
+use super::trials::Trials;
 use crate::bound::cramer_rao;
 use crate::experiment::StudyError;
 use crate::scenes::SceneKind;

@@ -105,6 +105,8 @@ mod tests {
             frames: 2,
             seed: 1,
             quick: true,
+            as_built: None,
+            calibrate: None,
         };
         let bench = Bench { plan: &plan, sound: Experiment::new(&plan.detector).unwrap() };
         let Sweep { points, .. } = left_out(sweep(&bench, KINDS[0]).unwrap(), GUARDED[0]).unwrap();

@@ -8,6 +8,8 @@ mod page;
 mod scenes;
 mod sweep;
 mod table;
+mod tolerances;
+mod trials;
 mod wrong;
 
 pub use self::bounds::{BoundChart, BoundCurve, BoundReport};

@@ -1,20 +1,16 @@
 //! Sweeps and how they are run.
 
-use std::sync::Arc;
-
 use super::bounds::{self, BoundReport};
 use super::breakdown::{Break, CellReport, breaks};
 use super::errors::{self, ErrorCurve, ErrorRange};
-use super::{faults, scenes, wrong};
-use crate::experiment::{Experiment, Frame, StudyError};
+use super::trials::Trials;
+use super::{faults, scenes, tolerances, wrong};
+use crate::experiment::{Calibrate, Experiment, Frame, StudyError};
 use crate::machine::Machine;
 use crate::scenes::SceneKind;
-use crate::score::{Scorer, Summary};
-use crate::variant::Variation;
 use tactomo_physics::detector::Detector;
-use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::scene::{Contact, Hand, Touch};
-use tactomo_touch::solve::{Method, ParameterKind, Problem, Solver};
+use tactomo_touch::solve::{Method, ParameterKind};
 
 /// Lambda's sweep, in shares of the largest singular value.
 const LAMBDAS: [f64; 7] = [1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
@@ -36,6 +32,10 @@ pub struct Plan {
     pub seed: u64,
     /// Whether only some of the points are tried.
     pub quick: bool,
+    /// If given, everything but the sweeps of tolerances is simulated on the detector as it was built with this seed.
+    pub as_built: Option<u64>,
+    /// If given, sweeps of tolerances are tried after a calibration too.
+    pub calibrate: Option<Calibrate>,
 }
 
 /// What came out.
@@ -51,6 +51,8 @@ pub struct Report {
     pub reach_m: f64,
     /// Seed.
     pub seed: u64,
+    /// The seed of the detector as it was built, if everything is simulated on one.
+    pub as_built: Option<u64>,
     /// Places of the contacts at each point.
     pub places: usize,
     /// Frames at each place.
@@ -112,6 +114,8 @@ pub(super) struct Point {
     pub experiment: Experiment,
     /// Frames of each place.
     pub places: Vec<Vec<Frame>>,
+    /// What solvers know at each place, where that is another detector each time; none if they know the experiment's everywhere.
+    pub known: Vec<Experiment>,
     /// What solvers' lambda is set to.
     pub lambda: Option<f64>,
 }
@@ -119,11 +123,16 @@ pub(super) struct Point {
 /// What sweeps are made from.
 pub(super) struct Bench<'a> {
     pub plan: &'a Plan,
-    /// The sound detector.
+    /// The sound detector: as it is described, or as it was built where that is asked for.
     pub sound: Experiment,
 }
 
 impl Bench<'_> {
+    /// Another detector, as it is described or as it was built where that is asked for.
+    pub fn experiment(&self, detector: &Detector) -> Result<Experiment, StudyError> {
+        Experiment::of(detector, self.plan.as_built)
+    }
+
     /// Seeds of the places.
     pub fn seeds(&self) -> Vec<u64> {
         (0..self.plan.places as u64).map(|place| self.plan.seed.wrapping_mul(1_000_003).wrapping_add(place)).collect()
@@ -162,7 +171,7 @@ impl Bench<'_> {
             .into_iter()
             .map(|seed| experiment.frames(&vec![touches(seed); self.plan.frames], seed))
             .collect::<Result<_, _>>()?;
-        Ok(Point { label, severity, experiment, places, lambda: None })
+        Ok(Point { label, severity, experiment, places, known: Vec::new(), lambda: None })
     }
 
     /// The one contact of a kind of scene at a seed.
@@ -182,8 +191,8 @@ type Maker = fn(&Bench) -> Result<Vec<Sweep>, StudyError>;
 /// # Errors
 /// [`StudyError`] if the detector cannot be modelled or is curved.
 pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result<Report, StudyError> {
-    let bench = Bench { plan, sound: Experiment::new(&plan.detector)? };
-    let makers: [Maker; 4] = [scenes::sweeps, wrong::sweeps, lambda, faults::sweeps];
+    let bench = Bench { plan, sound: Experiment::of(&plan.detector, plan.as_built)? };
+    let makers: [Maker; 5] = [scenes::sweeps, wrong::sweeps, tolerances::sweeps, lambda, faults::sweeps];
     let mut trials = Trials::default();
     let mut sweeps = Vec::new();
     for make in makers {
@@ -200,6 +209,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         detector: plan.detector.name.clone(),
         reach_m: bench.sound.reach_m(),
         seed: plan.seed,
+        as_built: plan.as_built,
         places: plan.places,
         frames: plan.frames,
         errors: errors::curves(&sweeps),
@@ -250,61 +260,6 @@ fn try_sweep(plan: &Plan, sweep: Sweep, trials: &mut Trials) -> Result<SweepRepo
     })
 }
 
-/// Solvers and judges of the last problems, as long as they stay the same.
-#[derive(Default)]
-pub(super) struct Trials {
-    scorer: Option<(Arc<Jacobian>, Scorer)>,
-    solvers: Vec<Kept>,
-}
-
-/// A solver that is kept for the next point.
-struct Kept {
-    variation: Variation,
-    jacobian: Arc<Jacobian>,
-    /// None if it cannot be made for the model.
-    solver: Option<Box<dyn Solver>>,
-}
-
-/// Solvers that are kept at most.
-const MOST_KEPT: usize = 24;
-
-impl Trials {
-    /// What a solver makes of a point; `None` if it cannot be made for the model.
-    pub fn summary(&mut self, method: Method, point: &Point) -> Result<Option<Summary>, StudyError> {
-        let variation = match point.lambda {
-            Some(lambda) => Variation::with_lambda(method, lambda),
-            None => Variation::default_of(method),
-        };
-        let jacobian = &point.experiment.problem.jacobian;
-        if !self.scorer.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, jacobian)) {
-            self.scorer = Some((Arc::clone(jacobian), Scorer::new(&point.experiment)));
-        }
-        let index = self.kept(variation, &point.experiment.problem);
-        let (Some((_, scorer)), Some(solver)) = (&mut self.scorer, &mut self.solvers[index].solver) else {
-            return Ok(None);
-        };
-        let mut scores = Vec::new();
-        for frames in &point.places {
-            scores.extend(scorer.run(&mut **solver, frames)?);
-        }
-        Ok(Some(Summary::of(&scores)))
-    }
-
-    /// Where a solver is kept; makes it if there is none.
-    fn kept(&mut self, variation: Variation, problem: &Problem) -> usize {
-        let same = |kept: &Kept| kept.variation == variation && Arc::ptr_eq(&kept.jacobian, &problem.jacobian);
-        if let Some(index) = self.solvers.iter().position(same) {
-            return index;
-        }
-        if self.solvers.len() >= MOST_KEPT {
-            self.solvers.remove(0);
-        }
-        let solver = variation.build(problem).ok();
-        self.solvers.push(Kept { variation, jacobian: Arc::clone(&problem.jacobian), solver });
-        self.solvers.len() - 1
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::LazyLock;
@@ -321,6 +276,8 @@ mod tests {
             frames: 1,
             seed: 2,
             quick: true,
+            as_built: None,
+            calibrate: Some(|experiment, _| Ok(experiment.truth().clone())),
         };
         run(&plan, "tactomo <stability>", &mut |_| {}).unwrap()
     });
@@ -348,6 +305,19 @@ mod tests {
         };
         assert!(breaks("Noise").is_some(), "nothing is found at 0 dB");
         assert!(breaks("Contact impedances that differ").is_none(), "a linear image does not feel them");
+    }
+
+    #[test]
+    fn tolerances_of_nothing_are_the_description_and_a_calibration_shows_beyond() {
+        let errors_m = |title: &str| {
+            let sweep = REPORT.sweeps.iter().find(|sweep| sweep.title == title).unwrap();
+            let cells = sweep.solvers[0].cells.iter().map(|cell| cell.as_ref().unwrap().error_m.unwrap());
+            cells.collect::<Vec<_>>()
+        };
+        let (before, after) = (errors_m("All tolerances"), errors_m("All tolerances, calibrated"));
+        assert_eq!(before[0], after[0]);
+        assert_ne!(before.last(), after.last());
+        assert_eq!(before[0], errors_m("Unevenness")[0]);
     }
 
     #[test]

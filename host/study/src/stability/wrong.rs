@@ -12,8 +12,7 @@ use tactomo_physics::simulate::Fault;
 const THICKNESSES: [f64; 9] = [0.5, 0.7, 0.85, 0.95, 1.0, 1.05, 1.15, 1.4, 2.0];
 /// True conductivity over the one in the model.
 const CONDUCTIVITIES: [f64; 7] = [0.5, 0.7, 0.9, 1.0, 1.1, 1.4, 2.0];
-/// Standard deviation of the logarithm of the conductivity, and of contact impedances.
-const UNEVEN: [f64; 5] = [0.0, 0.05, 0.1, 0.2, 0.4];
+/// Standard deviation of the logarithm of contact impedances.
 const SPREADS: [f64; 5] = [0.0, 0.05, 0.2, 0.5, 1.0];
 /// Contact impedance for its spread (ohm m2): enough to be felt, a tenth of a sheet's resistance on a pad of 4 mm.
 const FELT_OHM_M2: f64 = 1e-3;
@@ -21,8 +20,6 @@ const FELT_OHM_M2: f64 = 1e-3;
 const BASELINES: [f64; 6] = [0.0, 0.003, 0.01, 0.03, 0.1, 0.3];
 /// Thickness of a detector that is read with the shell model, in radii of a pad.
 const SHELL_THICKNESSES: [f64; 7] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
-/// Thickness at which the shell is right, in radii of a pad.
-const THIN: f64 = 0.1;
 /// Nodes of the image.
 const NODES: [usize; 6] = [2000, 5000, 900, 400, 200, 100];
 /// True noise over the one that solvers expect.
@@ -32,10 +29,7 @@ const CLIPS: [f64; 6] = [1.0, 0.5, 0.3, 0.2, 0.1, 0.05];
 
 /// All of them.
 pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
-    [thickness, conductivity, uneven, spread, baseline, noise, clip, shell, nodes]
-        .into_iter()
-        .map(|make| make(bench))
-        .collect()
+    [thickness, conductivity, spread, baseline, noise, clip, shell, nodes].into_iter().map(|make| make(bench)).collect()
 }
 
 /// A sweep on a firm contact: how bad a value is, and the experiment for it.
@@ -71,7 +65,7 @@ fn pad_radius_m(detector: &Detector) -> f64 {
 
 fn thickness(bench: &Bench) -> Result<Sweep, StudyError> {
     let what = ("Wrong thickness", "True thickness over the one in the model, at the same conductivity.");
-    let of = |factor| bench.sound.with_truth(&thicker(&bench.sound.detector, factor));
+    let of = |factor| bench.sound.with_truth(&thicker(bench.sound.truth(), factor));
     firm(bench, what, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
 }
 
@@ -79,23 +73,6 @@ fn conductivity(bench: &Bench) -> Result<Sweep, StudyError> {
     let what = ("Wrong conductivity", "True conductivity over the one in the model.");
     let of = |factor| bench.sound.with_faults(&[Fault::Conductivity { factor }], 1);
     firm(bench, what, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
-}
-
-/// A experiment of a detector so thin that the shell is right: the only model of uneven conductivity.
-fn thin(bench: &Bench) -> Result<Experiment, StudyError> {
-    let detector = &bench.sound.detector;
-    Experiment::new(&as_thick(detector, THIN * pad_radius_m(detector)))
-}
-
-fn uneven(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = (
-        "Uneven conductivity",
-        "Standard deviation of its logarithm, over a quarter of the shorter side; on a detector so thin that the shell is right, \
-         the only model of it.",
-    );
-    let thin = thin(bench)?;
-    let of = |deviation| thin.with_faults(&[Fault::Uneven { deviation }], bench.plan.seed);
-    firm(bench, what, &UNEVEN, percent, |deviation| deviation, of)
 }
 
 fn percent(share: f64) -> String {
@@ -108,7 +85,7 @@ fn spread(bench: &Bench) -> Result<Sweep, StudyError> {
         "Standard deviation of their logarithm, where pads have 1e-3 ohm m2, which the model has for all.",
     );
     let felt = Detector { contact_impedance_ohm_m2: FELT_OHM_M2, ..bench.sound.detector.clone() };
-    let felt = Experiment::new(&felt)?;
+    let felt = bench.experiment(&felt)?;
     let of = |deviation| felt.with_faults(&[Fault::ContactSpread { deviation }], bench.plan.seed);
     firm(bench, what, &SPREADS, percent, |deviation| deviation, of)
 }
@@ -132,7 +109,7 @@ fn noise(bench: &Bench) -> Result<Sweep, StudyError> {
     let adc = bench.sound.detector.adc;
     let of = |factor: f64| {
         let noisy = Adc { noise_lsb: factor * adc.noise_lsb, ..adc };
-        bench.sound.with_truth(&Detector { adc: noisy, ..bench.sound.detector.clone() })
+        bench.sound.with_truth(&Detector { adc: noisy, ..bench.sound.truth().clone() })
     };
     firm(bench, what, &NOISES, |factor| format!("x {factor}"), |factor| factor, of)
 }
@@ -149,7 +126,7 @@ fn shell(bench: &Bench) -> Result<Sweep, StudyError> {
     let detector = &bench.sound.detector;
     let of = |radii| {
         let detector = as_thick(detector, radii * pad_radius_m(detector));
-        let experiment = Experiment::new(&detector)?;
+        let experiment = bench.experiment(&detector)?;
         Ok(experiment.inverted_on(Box::new(Shell::new(&detector)?)))
     };
     firm(bench, what, &SHELL_THICKNESSES, |radii| format!("{radii}"), |radii| radii, of)

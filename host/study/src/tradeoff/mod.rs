@@ -5,16 +5,19 @@
 
 mod page;
 mod table;
+mod trial;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use super::experiment::{Experiment, Frame, StudyError};
+use super::experiment::{Calibrate, Experiment, StudyError};
 use super::machine::Machine;
 use super::scenes::{Group, SceneKind};
-use super::score::{Score, Scorer, Summary};
+use super::score::Summary;
 use super::variant::Variation;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{Family, Method};
+
+use self::trial::{Trial, try_variation};
 
 pub use self::page::{page, picture};
 pub use self::table::table;
@@ -36,6 +39,12 @@ pub struct Plan {
     pub seed: u64,
     /// How memory is counted, if it is.
     pub heap: Option<Heap>,
+    /// If given, all is simulated on detectors as they were built with this seed.
+    pub as_built: Option<u64>,
+    /// Else solvers are tried once more, with their defaults, on so many detectors drawn from the tolerances.
+    pub drawn: usize,
+    /// If given, and on those once more after a calibration.
+    pub calibrate: Option<Calibrate>,
 }
 
 /// An allocator that can count.
@@ -56,6 +65,8 @@ pub struct Report {
     pub command: String,
     /// Seed.
     pub seed: u64,
+    /// The seed of the detectors as they were built, if all is simulated on such.
+    pub as_built: Option<u64>,
     /// Places of each kind of scene.
     pub places: usize,
     /// Frames at each place.
@@ -81,6 +92,29 @@ pub struct DetectorReport {
     pub unavailable: Vec<String>,
     /// One for each solver and parameter.
     pub solvers: Vec<SolverReport>,
+    /// The same solvers with their defaults on detectors drawn from the tolerances: as solvers know them, one after the other.
+    pub as_built: Vec<AsBuiltReport>,
+}
+
+/// What came out on detectors drawn from the tolerances of one.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct AsBuiltReport {
+    /// What solvers know of them.
+    pub known: Known,
+    /// How many detectors, each with a place of each kind of scene.
+    pub detectors: usize,
+    /// One for each solver.
+    pub solvers: Vec<SolverReport>,
+}
+
+/// What solvers know of a detector as it was built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Known {
+    /// Its description.
+    Described,
+    /// What a calibration found.
+    Calibrated,
 }
 
 /// What came out for one solver.
@@ -154,6 +188,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         machine: Machine::this(),
         command: command.to_owned(),
         seed: plan.seed,
+        as_built: plan.as_built,
         places: plan.places,
         frames: plan.frames,
         detectors,
@@ -162,21 +197,25 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
 
 fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str)) -> Result<DetectorReport, StudyError> {
     progress(&format!("{}: data", detector.name));
-    let experiment = Experiment::new(detector)?;
-    let scenes = scenes(plan, &experiment)?;
+    let described = Experiment::new(detector)?;
+    let experiment = match plan.as_built {
+        Some(seed) => described.as_built(seed)?,
+        None => described,
+    };
+    let mut trials = [Trial::new(plan, experiment, 0..plan.places as u64)?];
     let sweep = |method: &Method| match plan.sweep {
         true => Variation::sweep(*method),
         false => vec![Variation::default_of(*method)],
     };
-    let mut scorer = Scorer::new(&experiment);
     let (mut solvers, mut unavailable) = (Vec::new(), Vec::new());
     for variation in plan.methods.iter().flat_map(sweep) {
         progress(&format!("{}: {}", detector.name, variation.label()));
-        match try_variation(plan, &experiment, &scenes, &mut scorer, variation) {
+        match try_variation(plan.heap, &mut trials, variation) {
             Ok(report) => solvers.push(report),
             Err(error) => unavailable.push(format!("{}: {error}", variation.label())),
         }
     }
+    let [Trial { experiment, .. }] = trials;
     Ok(DetectorReport {
         detector: detector.name.clone(),
         size_m: detector.outline.size_m(),
@@ -185,77 +224,47 @@ fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str))
         reach_m: experiment.reach_m(),
         unavailable,
         solvers,
+        as_built: if plan.as_built.is_some() { Vec::new() } else { as_built(plan, &experiment, progress)? },
     })
 }
 
-/// Frames of a place.
-struct Place {
-    kind: SceneKind,
-    frames: Vec<Frame>,
-}
-
-fn scenes(plan: &Plan, experiment: &Experiment) -> Result<Vec<Place>, StudyError> {
-    let places = (0..plan.places as u64).flat_map(|place| SceneKind::ALL.map(|kind| (place, kind)));
-    places
-        .map(|(place, kind)| {
-            let seed = plan.seed.wrapping_mul(1_000_003).wrapping_add(place * 101 + kind as u64);
-            let touches = kind.frames(&experiment.detector, seed, plan.frames);
-            Ok(Place { kind, frames: experiment.frames(&touches, seed)? })
-        })
-        .collect()
-}
-
-fn try_variation(
-    plan: &Plan,
-    experiment: &Experiment,
-    scenes: &[Place],
-    scorer: &mut Scorer,
-    variation: Variation,
-) -> Result<SolverReport, StudyError> {
-    let start = Instant::now();
-    let mut solver = variation.build(&experiment.problem)?;
-    let set_up = start.elapsed();
-    let mut scores: Vec<(SceneKind, Vec<Score>)> = Vec::with_capacity(scenes.len());
-    for place in scenes {
-        scores.push((place.kind, scorer.run(&mut *solver, &place.frames)?));
+/// Solvers on detectors drawn from the tolerances of a sound one: knowing the description, and calibrated if there is a way.
+fn as_built(plan: &Plan, sound: &Experiment, progress: &mut dyn FnMut(&str)) -> Result<Vec<AsBuiltReport>, StudyError> {
+    if plan.drawn == 0 || sound.detector.tolerances.is_exact() {
+        return Ok(Vec::new());
     }
-    drop(solver);
-    let memory = plan.heap.map(|heap| memory(heap, experiment, scenes, variation)).transpose()?;
-    let over = |is: &dyn Fn(SceneKind) -> bool| {
-        Summary::of(scores.iter().filter(|(kind, _)| is(*kind)).flat_map(|(_, scores)| scores))
-    };
-    Ok(SolverReport {
-        solver: variation.method.name().to_owned(),
-        family: variation.method.family(),
-        parameter: variation.parameter.map(|parameter| parameter.to_string()),
-        set_up_ms: milliseconds(set_up),
-        memory,
-        all: over(&|_| true),
-        groups: Group::ALL
-            .into_iter()
-            .map(|group| GroupReport { group, summary: over(&|kind| kind.group() == group) })
-            .collect(),
-        scenes: SceneKind::ALL
-            .into_iter()
-            .map(|scene| SceneReport { scene, summary: over(&|kind| kind == scene) })
-            .collect(),
-    })
+    let seeds = || (0..plan.drawn as u64).map(|index| (index, plan.seed.wrapping_add(index)));
+    let built = seeds().map(|(_, seed)| sound.as_built(seed)).collect::<Result<Vec<_>, _>>()?;
+    let mut reports = Vec::new();
+    for (known, calibrate) in [(Known::Described, None), (Known::Calibrated, plan.calibrate)] {
+        if known == Known::Calibrated && calibrate.is_none() {
+            continue;
+        }
+        progress(&format!("{}: {} detectors as built, {}", sound.detector.name, plan.drawn, known.name()));
+        let trial = |((index, seed), built): ((u64, u64), &Experiment)| {
+            let known = match calibrate {
+                Some(calibrate) => built.known_as(&calibrate(built, seed)?)?,
+                None => built.with_faults(&[], 0)?,
+            };
+            Trial::new(plan, known, index..index + 1)
+        };
+        let mut trials = seeds().zip(&built).map(trial).collect::<Result<Vec<_>, _>>()?;
+        let variations = plan.methods.iter().map(|method| Variation::default_of(*method));
+        // What cannot be made for the model was told before.
+        let solvers = variations.filter_map(|variation| try_variation(None, &mut trials, variation).ok()).collect();
+        reports.push(AsBuiltReport { known, detectors: plan.drawn, solvers });
+    }
+    Ok(reports)
 }
 
-/// Makes the solver again and lets it solve the first place of each kind, with nothing else allocated meanwhile.
-fn memory(heap: Heap, experiment: &Experiment, scenes: &[Place], variation: Variation) -> Result<Memory, StudyError> {
-    (heap.start)();
-    let built = variation.build(&experiment.problem).map(|mut solver| {
-        for frame in scenes.iter().take(SceneKind::ALL.len()).flat_map(|place| &place.frames) {
-            // Readings that it refuses need no memory.
-            drop(solver.solve(&frame.readings));
+impl Known {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Described => "by their description",
+            Self::Calibrated => "calibrated",
         }
-        solver
-    });
-    // The solver is still there, so what it keeps is counted.
-    let memory = (heap.stop)();
-    built?;
-    Ok(memory)
+    }
 }
 
 fn milliseconds(time: Duration) -> f64 {
@@ -275,6 +284,9 @@ mod tests {
             frames: 2,
             seed: 3,
             heap: None,
+            as_built: None,
+            drawn: 2,
+            calibrate: Some(|experiment, _| Ok(experiment.truth().clone())),
         };
         run(&plan, "tactomo <tradeoff>", &mut |_| {}).unwrap()
     }
@@ -300,9 +312,41 @@ mod tests {
     }
 
     #[test]
+    fn detectors_as_built_are_tried_with_what_solvers_know_of_them() {
+        // The converter cuts off offsets below zero, which no calibration brings back.
+        let mut detector = Detector::default();
+        detector.tolerances.offset_lsb = 0.0;
+        let plan = |as_built| Plan {
+            detectors: vec![detector.clone()],
+            methods: vec![Method::Contacts],
+            sweep: false,
+            places: 1,
+            frames: 1,
+            seed: 3,
+            heap: None,
+            as_built,
+            drawn: 2,
+            calibrate: Some(|experiment, _| Ok(experiment.truth().clone())),
+        };
+        let run = |as_built| run(&plan(as_built), "", &mut |_| {}).unwrap().detectors.remove(0);
+        let one_m = |solvers: &[SolverReport]| solvers[0].group(Group::One).unwrap().error_m.unwrap();
+        let paper = run(None);
+        let [described, calibrated] = &paper.as_built[..] else { panic!("{:?}", paper.as_built) };
+        assert_eq!((described.known, calibrated.known), (Known::Described, Known::Calibrated));
+        assert_eq!(described.solvers[0].all.frames, 2 * SceneKind::ALL.len());
+        let errors_m = [&paper.solvers, &described.solvers, &calibrated.solvers].map(|solvers| one_m(solvers));
+        assert!(errors_m[1] > 3.0 * errors_m[0] && errors_m[1] > 3.0 * errors_m[2], "{errors_m:?}");
+        let bench = run(Some(3));
+        assert!(bench.as_built.is_empty() && one_m(&bench.solvers) > 3.0 * errors_m[0]);
+    }
+
+    #[test]
     fn page_and_table_show_every_solver_and_how_to_run_it_again() {
         let report = report();
         let (page, table) = (page(&report), table(&report));
+        for part in ["as built, by their description", "as built, calibrated"] {
+            assert!(page.contains(part) && table.contains(part), "{part}");
+        }
         for solver in ["tikhonov", "tikhonov-paper", "tikhonov lambda 0.1"] {
             assert!(page.contains(solver) && table.contains(solver), "{solver}");
         }

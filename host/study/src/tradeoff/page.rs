@@ -1,7 +1,7 @@
 //! The report as a page.
 
 use super::table::{label, names, number};
-use super::{DetectorReport, Group, Report, SceneKind, SolverReport};
+use super::{AsBuiltReport, DetectorReport, Group, Known, Report, SceneKind, SolverReport};
 use crate::page::{Axis, Chart, Mark, Series, Unit, escaped, folded, html, machine, table};
 use crate::score::Summary;
 use tactomo_touch::solve::Family;
@@ -23,15 +23,15 @@ pub fn page(report: &Report) -> String {
             .to_owned(),
         legend(report),
     ];
-    parts.extend(report.detectors.iter().map(of_detector));
+    parts.extend(report.detectors.iter().map(|detector| of_detector(detector, report.as_built)));
     parts.push(footer(report));
     html("Tactomo: time against error", &parts)
 }
 
 /// The charts of the first detector alone, for a document.
 pub fn picture(report: &Report) -> String {
-    let charts = report.detectors.first().map(group_charts).unwrap_or_default();
-    html("Tactomo: time against error", &[legend(report), charts])
+    let charts = report.detectors.first().and_then(|detector| group_charts(detector).into_iter().next());
+    html("Tactomo: time against error", &[legend(report), charts.unwrap_or_default()])
 }
 
 fn legend(report: &Report) -> String {
@@ -45,39 +45,59 @@ fn legend(report: &Report) -> String {
     format!("<ul class=\"legend\">{items}</ul>")
 }
 
-fn of_detector(report: &DetectorReport) -> String {
+fn of_detector(report: &DetectorReport, as_built: Option<u64>) -> String {
+    let truth = as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}"));
+    let mut charts = group_charts(report).into_iter();
+    let on_paper = charts.next().unwrap_or_default();
     let [width_mm, height_mm] = report.size_m.map(|side_m| side_m * 1e3);
     [
         format!(
-            "<h2>{}, {width_mm:.0} x {height_mm:.0} mm</h2>\n<p class=\"quiet\">Inverted on the {} model, made in {:.0} ms. \
+            "<h2>{}, {width_mm:.0} x {height_mm:.0} mm{truth}</h2>\n<p class=\"quiet\">Inverted on the {} model, made in {:.0} ms. \
              A contact missed or invented counts {:.1} mm.</p>",
             escaped(&report.detector),
             report.model,
             report.model_ms,
             report.reach_m * 1e3
         ),
-        group_charts(report),
+        on_paper,
         nothing(report),
+        report.as_built.iter().zip(charts).map(|(built, charts)| as_built_row(built, &charts)).collect(),
         format!("<h3>Scene by scene</h3>\n{}", scene_charts(report)),
         folded("All figures", &(costs(report) + &figures(report))),
     ]
     .join("\n")
 }
 
-fn group_charts(report: &DetectorReport) -> String {
+/// A row of charts of the detector on paper, and one for each way in which it was known as built, on the same axes.
+fn group_charts(report: &DetectorReport) -> Vec<String> {
     let groups =
         [(Group::One, "One contact"), (Group::Several, "Two or three contacts"), (Group::Shapes, "Hands and shapes")];
-    let of = groups.map(|(group, title)| {
-        let subtitle = format!("{} · {}", of_what(group), names(group));
-        Panel {
+    let all = std::iter::once(&report.solvers).chain(report.as_built.iter().map(|built| &built.solvers));
+    let row = |solvers: &Vec<SolverReport>| {
+        groups.map(|(group, title)| Panel {
             title,
-            subtitle,
+            subtitle: format!("{} · {}", of_what(group), names(group)),
             group,
             size: [430.0, 380.0],
-            series: series(report, group, |solver| solver.group(group)),
-        }
-    });
-    format!("<div class=\"charts\">{}</div>", drawn(&of))
+            series: series(solvers, group, |solver| solver.group(group)),
+        })
+    };
+    let panels: Vec<Panel> = all.flat_map(row).collect();
+    let row = |charts: &[String]| format!("<div class=\"charts\">{}</div>", charts.concat());
+    drawn(&panels).chunks(groups.len()).map(row).collect()
+}
+
+fn as_built_row(report: &AsBuiltReport, charts: &str) -> String {
+    let what = match report.known {
+        Known::Described => "the description, which is all that solvers know of them",
+        Known::Calibrated => "the description; solvers know what a calibration has found of each",
+    };
+    format!(
+        "<h3>{} detectors as built, {}</h3>\n<p class=\"quiet\">Drawn from the tolerances around {what}. One place of each kind of scene on \
+         each; solvers with their defaults. Axes are those of the charts above.</p>\n{charts}",
+        report.detectors,
+        report.known.name()
+    )
 }
 
 fn scene_charts(report: &DetectorReport) -> String {
@@ -87,9 +107,9 @@ fn scene_charts(report: &DetectorReport) -> String {
         subtitle: of_what(kind.group()).to_owned(),
         group: kind.group(),
         size: [330.0, 270.0],
-        series: series(report, kind.group(), |solver| solver.scene(kind)),
+        series: series(&report.solvers, kind.group(), |solver| solver.scene(kind)),
     });
-    format!("<div class=\"charts small\">{}</div>", drawn(&of.collect::<Vec<_>>()))
+    format!("<div class=\"charts small\">{}</div>", drawn(&of.collect::<Vec<_>>()).concat())
 }
 
 /// A chart whose axes are still to be found.
@@ -102,7 +122,7 @@ struct Panel {
 }
 
 /// All panels, with one axis of time for all and one of error for those of a group: so they can be compared.
-fn drawn(panels: &[Panel]) -> String {
+fn drawn(panels: &[Panel]) -> Vec<String> {
     let marks = |group: Option<Group>| {
         let wanted = move |panel: &&Panel| group.is_none_or(|group| panel.group == group);
         panels.iter().filter(wanted).flat_map(|panel| &panel.series).flat_map(|series| &series.marks)
@@ -137,12 +157,12 @@ fn error(group: Group, summary: &Summary) -> Option<f64> {
 
 /// A series for each solver, from its means over some scenes; the first mark is that of its defaults.
 fn series<'a>(
-    report: &'a DetectorReport,
+    solvers: &'a [SolverReport],
     group: Group,
     of: impl Fn(&'a SolverReport) -> Option<&'a Summary>,
 ) -> Vec<Series> {
     let mut all: Vec<Series> = Vec::new();
-    for solver in &report.solvers {
+    for solver in solvers {
         let Some(summary) = of(solver) else { continue };
         let Some(error) = error(group, summary) else { continue };
         let mark = Mark { x: summary.time_us.median * 1e-6, y: error, tooltip: tooltip(solver, summary) };

@@ -6,8 +6,9 @@ use super::{Group, Report, SceneKind, SolverReport};
 pub fn table(report: &Report) -> String {
     let mut lines = Vec::new();
     for detector in &report.detectors {
+        let truth = report.as_built.map_or_else(String::new, |seed| format!(" as built with seed {seed}"));
         lines.push(format!(
-            "{}: {} model, {:.0} ms; a contact missed or invented counts {:.0} mm",
+            "{}{truth}: {} model, {:.0} ms; a contact missed or invented counts {:.0} mm",
             detector.detector,
             detector.model,
             detector.model_ms,
@@ -31,6 +32,10 @@ pub fn table(report: &Report) -> String {
         ));
         lines.extend(detector.solvers.iter().map(line));
         lines.extend(detector.unavailable.iter().map(|why| format!("not tried: {why}")));
+        for built in &detector.as_built {
+            lines.push(format!("{} detectors as built, {}:", built.detectors, built.known.name()));
+            lines.extend(built.solvers.iter().map(line));
+        }
         lines.push(String::new());
     }
     lines.push("one, several: mean error with contacts missed and invented; count: frames of several with none of either; conduct.: relative error of one contact's; correl., Dice: images of".to_owned());

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::{
     Auto, Bsbl, ContactSettings, Contacts, KernelSolver, Lambda, Nonlinear, NonlinearSettings, Nonnegative, Problem,
-    Solver, Tikhonov, Tsvd, Tv, Variant,
+    Solver, Tikhonov, Tsvd, Tv, Variant, newtons,
 };
 use tactomo_physics::forward::ForwardError;
 
@@ -325,12 +325,13 @@ impl Method {
         self.build_with(problem, None)
     }
 
-    /// Makes the solver with a value of its main parameter; one that it does not have changes nothing.
+    /// Makes the solver with a value of its main parameter; one that it does not have changes nothing. On a detector with a law of force, its
+    /// contacts carry newtons.
     ///
     /// # Errors
     /// [`ForwardError`] if the model cannot give what the solver needs.
     pub fn build_with(self, problem: &Problem, parameter: Option<Parameter>) -> Result<Box<dyn Solver>, ForwardError> {
-        (self.row().build)(problem, parameter)
+        Ok(newtons::with_newtons(problem, (self.row().build)(problem, parameter)?))
     }
 }
 

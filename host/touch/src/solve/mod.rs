@@ -15,6 +15,7 @@ mod laplace;
 mod linear;
 mod locate;
 mod method;
+mod newtons;
 mod nonlinear;
 mod nonnegative;
 mod noser;
@@ -45,6 +46,7 @@ pub use self::nonnegative::Nonnegative;
 pub use self::problem::Problem;
 pub use self::shapes::{FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty};
 pub use self::still::Still;
+pub(crate) use self::still::rounding_v;
 pub use self::tikhonov::{Tikhonov, Variant};
 pub use self::tsvd::Tsvd;
 pub use self::tv::Tv;
@@ -135,8 +137,12 @@ pub struct FoundContact {
     pub conductance_s: f64,
     /// Radius (m), where the readings tell it.
     pub radius_m: Option<f64>,
-    /// Force (N), on a calibrated detector.
+    /// Force (N): on a detector with a law of force, or of a solver that was taught forces.
     pub force_n: Option<f64>,
+    /// Standard error of the force (N), of a law of force.
+    pub force_deviation_n: Option<f64>,
+    /// Whether the force is beyond the largest that the law of force can tell: then it may be more.
+    pub force_beyond_maximum: Option<bool>,
     /// Standard errors, of a method that knows them.
     pub uncertainty: Option<Uncertainty>,
     /// The same number from frame to frame for the same contact, of a method that follows contacts.

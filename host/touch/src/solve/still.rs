@@ -255,7 +255,7 @@ impl<'a> Moves<'a> {
 /// Standard deviation of what rounding to codes leaves in the mean of any number of readings (V): noise of half a code takes nearly all
 /// of it away, none leaves the root of 1/12 (Widrow and Kollar, Quantization noise, 2008: a Fourier series of the mean error, damped by the
 /// characteristic function of the noise).
-pub(super) fn rounding_v(adc: &Adc) -> f64 {
+pub(crate) fn rounding_v(adc: &Adc) -> f64 {
     let term = |k: u32| {
         let k = f64::from(k) * PI;
         (-(2.0 * k * adc.noise_lsb).powi(2)).exp() / (2.0 * k * k)

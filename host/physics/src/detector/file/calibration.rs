@@ -44,6 +44,10 @@ impl CalibrationTable {
         }
         each("calibration.standard_errors", &self.standard_errors)?;
         self.directions.iter().try_for_each(|direction| each("calibration.directions", direction))?;
+        if let Some(other) = self.left_at_prior.iter().find(|name| !self.parameters.contains(name)) {
+            let what = format!("names {}, which is none of calibration.parameters", quoted(other));
+            return Err(Problem::new("calibration.left_at_prior", what));
+        }
         let parameter = |(name, standard_error): (&String, &f64)| {
             let parameter = name.parse().map_err(|what: String| Problem::new("calibration.parameters", what))?;
             let is_prior = self.left_at_prior.contains(name);

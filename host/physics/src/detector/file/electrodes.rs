@@ -18,6 +18,8 @@ pub(super) struct ElectrodeTable {
     diameters_m: Option<Vec<f64>>,
     contact_impedances_ohm_m2: Option<Vec<f64>>,
     gains: Option<Vec<f64>>,
+    unseen_offsets_v: Option<Vec<f64>>,
+    offsets_v: Option<Vec<f64>>,
 }
 
 impl Detector {
@@ -52,6 +54,14 @@ impl Detector {
         if self.electrodes.iter().any(|pad| pad.gain != 1.0) {
             let gains: Vec<f64> = self.electrodes.iter().map(|pad| pad.gain).collect();
             writeln!(text, "gains = {gains:?}")?;
+        }
+        if self.electrodes.iter().any(|pad| pad.unseen_offset_v != 0.0) {
+            let offsets_v: Vec<f64> = self.electrodes.iter().map(|pad| pad.unseen_offset_v).collect();
+            writeln!(text, "unseen_offsets_v = {offsets_v:?}")?;
+        }
+        if self.electrodes.iter().any(|pad| pad.offset_v != 0.0) {
+            let offsets_v: Vec<f64> = self.electrodes.iter().map(|pad| pad.offset_v).collect();
+            writeln!(text, "offsets_v = {offsets_v:?}")?;
         }
         Ok(())
     }
@@ -97,6 +107,14 @@ impl ElectrodeTable {
         if let Some(each) = self.gains {
             let each = one_for_each("electrodes.gains", each, electrodes.len())?;
             electrodes.iter_mut().zip(each).for_each(|(pad, gain)| pad.gain = gain);
+        }
+        if let Some(each) = self.unseen_offsets_v {
+            let each = one_for_each("electrodes.unseen_offsets_v", each, electrodes.len())?;
+            electrodes.iter_mut().zip(each).for_each(|(pad, offset_v)| pad.unseen_offset_v = offset_v);
+        }
+        if let Some(each) = self.offsets_v {
+            let each = one_for_each("electrodes.offsets_v", each, electrodes.len())?;
+            electrodes.iter_mut().zip(each).for_each(|(pad, offset_v)| pad.offset_v = offset_v);
         }
         if let Some(surface) = surface {
             electrodes.iter_mut().enumerate().try_for_each(|(index, pad)| pad.lay_on(surface, index))?;

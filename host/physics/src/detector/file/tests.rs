@@ -122,44 +122,72 @@ fn a_file_that_is_missing_or_no_text_says_so() {
     assert!(Detector::read(Path::new(".")).is_err());
 }
 
+/// Laws of force of odd numbers, their parameters independent.
+fn laws() -> impl Strategy<Value = ForceLaw> {
+    let numbers = (1e-9..1.0f64, 0.1..3.0f64, prop::option::of(1e-3..1e6f64), prop::option::of(1e-3..1e3f64));
+    (numbers, prop::array::uniform3(0.0..1.0f64), prop::array::uniform2(0.0..0.5f64), 1e-3..1.0f64, 0..100usize)
+        .prop_map(|(numbers, variances, [scatter, hysteresis], least_n, presses)| {
+            let (conductance_at_1_n_s, exponent, series_ohm, maximum_n) = numbers;
+            let size = if series_ohm.is_some() { 3 } else { 2 };
+            let row = |i: usize| (0..size).map(|j| if i == j { variances[i] } else { 0.0 }).collect();
+            let covariance = (0..size).map(row).collect();
+            let range_n = [least_n, 50.0 * least_n];
+            ForceLaw {
+                conductance_at_1_n_s,
+                exponent,
+                series_ohm,
+                covariance,
+                scatter,
+                hysteresis,
+                range_n,
+                maximum_n,
+                presses,
+            }
+        })
+}
+
 /// Detectors of odd numbers: a star about the origin, with a hole or without, and electrodes on a ring.
 fn detectors() -> impl Strategy<Value = Detector> {
     let star = prop::collection::vec(0.04..0.08f64, 3..40);
     let layers = prop::collection::vec((1e-4..0.01f64, 1e-3..100.0f64, 1e-3..100.0f64), 1..5);
     let rest = (1e-6..1e-3f64, 0.1..10.0f64, 0.0..100.0f64, 1..=24u8, any::<bool>());
-    (star, layers, 4..=32usize, "[^\\p{Cc}]{1,30}", rest).prop_filter_map("not buildable", |parts| {
-        let (star, layers, count, name, (impedance, drive_v, on_resistance_ohm, bits, hole)) = parts;
-        let ring = |count: usize, index: usize| (std::f64::consts::TAU * index as f64 / count as f64).sin_cos();
-        let outer = star.iter().enumerate().map(|(i, radius)| {
-            let (sin, cos) = ring(star.len(), i);
-            [radius * cos, radius * sin]
-        });
-        let pad = |index: usize| {
-            let (sin, cos) = ring(count, index);
-            Electrode::flat(0.018 * cos, 0.018 * sin, 1e-3 + 1e-5 * index as f64)
-        };
-        let holes = if hole { vec![vec![[0.0, 0.0], [0.0, 1e-3], [1e-3, 0.0]]] } else { vec![] };
-        let mut outline = Outline { outer: outer.collect(), holes };
-        let shift_m = outline.centre();
-        let mut electrodes: Vec<_> = (0..count).map(pad).collect();
-        electrodes.iter_mut().for_each(|pad| (pad.x_m, pad.y_m) = (pad.x_m + shift_m[0], pad.y_m + shift_m[1]));
-        let layer = |(thickness_m, bottom_s_per_m, top_s_per_m)| Layer { thickness_m, bottom_s_per_m, top_s_per_m };
-        let detector = Detector {
-            name,
-            outline,
-            surface: None,
-            unevenness: crate::detector::Unevenness::default(),
-            tolerances: crate::detector::Tolerances::default(),
-            calibration: None,
-            layers: layers.into_iter().map(layer).collect(),
-            electrodes,
-            contact_impedance_ohm_m2: impedance,
-            drive_v,
-            on_resistance_ohm,
-            adc: Adc { bits, ..Adc::default() },
-        };
-        detector.check().is_ok().then_some(detector)
-    })
+    (star, layers, 4..=32usize, "[^\\p{Cc}]{1,30}", rest, prop::option::of(laws())).prop_filter_map(
+        "not buildable",
+        |parts| {
+            let (star, layers, count, name, (impedance, drive_v, on_resistance_ohm, bits, hole), force) = parts;
+            let ring = |count: usize, index: usize| (std::f64::consts::TAU * index as f64 / count as f64).sin_cos();
+            let outer = star.iter().enumerate().map(|(i, radius)| {
+                let (sin, cos) = ring(star.len(), i);
+                [radius * cos, radius * sin]
+            });
+            let pad = |index: usize| {
+                let (sin, cos) = ring(count, index);
+                Electrode::flat(0.018 * cos, 0.018 * sin, 1e-3 + 1e-5 * index as f64)
+            };
+            let holes = if hole { vec![vec![[0.0, 0.0], [0.0, 1e-3], [1e-3, 0.0]]] } else { vec![] };
+            let mut outline = Outline { outer: outer.collect(), holes };
+            let shift_m = outline.centre();
+            let mut electrodes: Vec<_> = (0..count).map(pad).collect();
+            electrodes.iter_mut().for_each(|pad| (pad.x_m, pad.y_m) = (pad.x_m + shift_m[0], pad.y_m + shift_m[1]));
+            let layer = |(thickness_m, bottom_s_per_m, top_s_per_m)| Layer { thickness_m, bottom_s_per_m, top_s_per_m };
+            let detector = Detector {
+                name,
+                outline,
+                surface: None,
+                unevenness: crate::detector::Unevenness::default(),
+                tolerances: crate::detector::Tolerances::default(),
+                calibration: None,
+                layers: layers.into_iter().map(layer).collect(),
+                electrodes,
+                contact_impedance_ohm_m2: impedance,
+                drive_v,
+                on_resistance_ohm,
+                adc: Adc { bits, ..Adc::default() },
+                force,
+            };
+            detector.check().is_ok().then_some(detector)
+        },
+    )
 }
 
 proptest! {
@@ -183,6 +211,29 @@ proptest! {
             prop_assert_eq!(Detector::from_toml(&detector.to_toml(), "").unwrap(), detector);
         }
     }
+}
+
+#[test]
+fn a_law_of_force_is_checked_with_its_line() {
+    let law = "\n[force]\nconductance_at_1_n_s = 2e-3\nexponent = 0.66\ncovariance = [[4e-4, 1e-4], [1e-4, 9e-4]]\nscatter = 0.05\n\
+               hysteresis = 0.03\nrange_n = [0.5, 5]\npresses = 10\n";
+    let with = |law: &str| Detector::from_toml(&format!("{SQUARE}{law}"), "square");
+    let detector = with(law).unwrap();
+    let force = detector.force.as_ref().unwrap();
+    assert_eq!((force.exponent, force.series_ohm, force.limit_n()), (0.66, None, 5.0));
+    assert!(detector.to_toml().contains("exponent = 0.66 # standard error 0.03"), "{}", detector.to_toml());
+    assert_eq!(Detector::from_toml(&detector.to_toml(), "").unwrap(), detector);
+    assert_eq!(detector.in_material(&"B".parse().unwrap()).unwrap().force, None, "it was that of another material");
+    let error = |from: &str, to: &str| with(&law.replace(from, to)).unwrap_err().to_string();
+    assert_eq!(error("0.66", "-1"), "line 14: force.exponent is -1.0, but has to be from 0.01 to 10.0");
+    assert!(
+        error("[0.5, 5]", "[5, 0.5]").starts_with("line 18: force.range_n[1] is 0.5"),
+        "{}",
+        error("[0.5, 5]", "[5, 0.5]")
+    );
+    assert!(error("exponent", "power").contains("unknown field `power`"));
+    assert!(error("presses = 10\n", "").contains("missing field `presses`"));
+    assert!(error("[[4e-4, 1e-4], [1e-4, 9e-4]]", "[[4e-4]]").contains("force.covariance has to have a row"));
 }
 
 fn example(name: &str) -> std::path::PathBuf {

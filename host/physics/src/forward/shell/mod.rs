@@ -29,8 +29,9 @@ pub use self::mesh::Mesh;
 use self::spots::{ShellSpots, SpotTable};
 use self::system::{Factor, Singular, System};
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
+use super::driving::DrivingLayer;
 use super::spots::SpotFields;
-use super::{ForwardError, ForwardModel, ImageMesh, check_image};
+use super::{ForwardError, ForwardModel, ImageMesh, check_image, leaks};
 use crate::detector::{Detector, Electrode};
 use crate::scene::Contact;
 use crate::space::Place;
@@ -51,6 +52,8 @@ pub struct Shell {
     system: System,
     fields_ohm: DMatrix<f64>,
     electrode_fields_ohm: DMatrix<f64>,
+    /// Conductance to the driving layer where nothing presses (S/m2).
+    leak_s_per_m2: f64,
     /// Fields between single nodes; made when first contacts are small enough to ask for them.
     between_nodes: OnceLock<Option<BetweenNodes>>,
     /// Tables of spots, by radius (m).
@@ -128,16 +131,42 @@ impl Shell {
             system,
             fields_ohm,
             electrode_fields_ohm,
+            leak_s_per_m2: 0.0,
             between_nodes: OnceLock::new(),
             spots: Mutex::new(Vec::new()),
         })
     }
 
+    /// The same model with a driving layer that need not be ideal: one that leaks.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the layer has a sheet resistance, which only the slab can have.
+    pub fn under(self, driving: DrivingLayer) -> Result<Self, ForwardError> {
+        if driving.sheet_ohm > 0.0 {
+            let what = "its driving layer has a sheet resistance, which only the slab can have: a flat rectangle whose conductivity is \
+                        even in the plane";
+            return Err(ForwardError::Detector { detector: self.detector.name.clone(), what: what.to_owned() });
+        }
+        Ok(Self { leak_s_per_m2: driving.leak_s / self.area_m2(), ..self })
+    }
+
+    fn area_m2(&self) -> f64 {
+        self.image_mesh.node_areas_m2.iter().sum()
+    }
+
+    /// Whether `image_s` can be an image on this model; one of nothing if it leaks.
+    fn check_image(&self, image_s: &[f64]) -> Result<(), ForwardError> {
+        match check_image(image_s, self.mesh.nodes_m.len()) {
+            Err(ForwardError::NoContact) if self.leak_s_per_m2 > 0.0 => Ok(()),
+            checked => checked,
+        }
+    }
+
     /// What the few nodes that conduct make of the fields between them (Woodbury's identity), which costs less than factorising anew:
-    /// their system, and their conductances (S). `None` if they are many.
+    /// their system, and their conductances (S). `None` if they are many, or if the detector leaks everywhere.
     fn touched(&self, image_s: &[f64]) -> Option<(ContactSystem<'_>, Vec<f64>)> {
         let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
-        if touched.len() > MOST_TOUCHED {
+        if touched.len() > MOST_TOUCHED || self.leak_s_per_m2 > 0.0 {
             return None;
         }
         let fields = self.between_nodes.get_or_init(|| self.between_nodes().ok()).as_ref()?;
@@ -207,7 +236,7 @@ impl ForwardModel for Shell {
     }
 
     fn image_impedance_ohm(&self, image_s: &[f64]) -> Result<DMatrix<f64>, ForwardError> {
-        check_image(image_s, self.mesh.nodes_m.len())?;
+        self.check_image(image_s)?;
         match self.touched(image_s).and_then(|(system, _)| system.impedance_ohm()) {
             Some(impedance_ohm) => Ok(impedance_ohm),
             None => Ok(self.image_fields(image_s)?.impedance_ohm),
@@ -215,8 +244,10 @@ impl ForwardModel for Shell {
     }
 
     fn image_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
-        check_image(image_s, self.mesh.nodes_m.len())?;
-        let factor = self.system.factorise(image_s.iter().copied().enumerate()).map_err(|_| ForwardError::NoContact)?;
+        self.check_image(image_s)?;
+        let leaks_s = self.image_mesh.node_areas_m2.iter().map(|area_m2| self.leak_s_per_m2 * area_m2);
+        let conductances_s = image_s.iter().zip(leaks_s).map(|(image_s, leak_s)| image_s + leak_s);
+        let factor = self.system.factorise(conductances_s.enumerate()).map_err(|_| ForwardError::NoContact)?;
         let pads = self.system.pads();
         let currents_a = Mat::from_fn(self.system.pad(pads), pads, |i, j| f64::from(u8::from(i == self.system.pad(j))));
         let (nodes_ohm, impedance_ohm) = factor.solve(currents_a);
@@ -224,7 +255,7 @@ impl ForwardModel for Shell {
     }
 
     fn touched_fields(&self, image_s: &[f64]) -> Result<ContactFields, ForwardError> {
-        check_image(image_s, self.mesh.nodes_m.len())?;
+        self.check_image(image_s)?;
         match self.touched(image_s).and_then(|(system, conductances_s)| system.fields(&conductances_s)) {
             Some(fields) => Ok(fields),
             None => Ok(self.image_fields(image_s)?.of_touched(image_s)),
@@ -232,7 +263,9 @@ impl ForwardModel for Shell {
     }
 
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError> {
-        Ok(Box::new(Self::with_nodes(&self.detector, nodes)?))
+        let leak_s = self.leak_s_per_m2 * self.area_m2();
+        let driving = DrivingLayer { leak_s, ..DrivingLayer::default() };
+        Ok(Box::new(Self::with_nodes(&self.detector, nodes)?.under(driving)?))
     }
 
     fn of_similar(&self, detector: &Detector) -> Result<Arc<dyn ForwardModel>, ForwardError> {
@@ -240,6 +273,9 @@ impl ForwardModel for Shell {
     }
 
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
+        if self.leak_s_per_m2 > 0.0 {
+            return None;
+        }
         Some(Box::new(ShellSpots(self.spot_table(radius_m)?)))
     }
 
@@ -252,6 +288,9 @@ impl ForwardModel for Shell {
     }
 
     fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
+        if self.leak_s_per_m2 > 0.0 {
+            return Err(leaks(&self.detector));
+        }
         self.floating_fields_ohm(self.mesh.nodes_m.len(), |node| vec![(node as u32, 1.0)])
     }
 

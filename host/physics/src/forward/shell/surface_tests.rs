@@ -36,6 +36,7 @@ fn flat(outline: Outline, electrodes: Vec<Electrode>) -> Detector {
         drive_v: 2.0,
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
+        force: None,
     }
 }
 

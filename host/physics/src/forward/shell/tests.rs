@@ -6,6 +6,7 @@ use nalgebra::Cholesky;
 
 use super::*;
 use crate::detector::{Adc, Layer, Outline};
+use crate::forward::{Resolution, Slab};
 use crate::geometry;
 
 /// Sheet conductance of the detectors made here (S).
@@ -34,6 +35,7 @@ fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
         drive_v: 2.0,
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
+        force: None,
     }
 }
 
@@ -328,5 +330,24 @@ fn impedance_derivatives_are_products_of_fields() -> Result<(), ForwardError> {
         let product = fields.ohm_per_s(e, g, node);
         assert!((difference / product - 1.0).abs() < 1e-3, "{difference} {product}");
     }
+    Ok(())
+}
+
+#[test]
+fn a_leaking_shell_is_the_leaking_slab_of_a_thin_detector() -> Result<(), ForwardError> {
+    let mut detector = preset("square-60");
+    detector.layers = vec![Layer::uniform(0.00025, 1.2)];
+    let leak_s = 0.05 * detector.sheet_conductance_s();
+    let driving = DrivingLayer { leak_s, ..DrivingLayer::default() };
+    let leaking = shell(&detector, 8000).under(driving)?;
+    let slab = Slab::under(&detector, Resolution::STANDARD, driving)?;
+    for contacts in [vec![], vec![contact(0.004, -0.011, 0.003, 1e-4)]] {
+        let [found, expected] = [leaking.impedance_ohm(&contacts)?, slab.impedance_ohm(&contacts)?];
+        let off = (&found - &expected).amax() / expected.amax();
+        assert!(off < 0.01, "{off}: {contacts:?}");
+    }
+    assert!(leaking.spots(0.003).is_none() && leaking.node_fields_ohm().is_err());
+    let error = leaking.under(DrivingLayer { sheet_ohm: 100.0, ..driving }).err().unwrap_or(ForwardError::NoContact);
+    assert!(error.to_string().contains("which only the slab can have"), "{error}");
     Ok(())
 }

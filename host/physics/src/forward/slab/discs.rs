@@ -239,7 +239,8 @@ impl Discs<'_> {
             own += &self.own[k];
             row += disc.basis.len();
         }
-        ContactSystem { electrodes: &self.slab.pads.electrodes_ohm, contacts, cross_and_current }
+        let electrodes = &self.slab.pads.electrodes_ohm;
+        ContactSystem { electrodes, contacts, cross_and_current, leak_s: self.slab.driving.leak_s }
     }
 }
 

@@ -54,7 +54,7 @@ impl ImageGrid {
     }
 
     /// Where a node is, from the corner (m).
-    fn from_corner(&self, node: usize) -> [f64; 2] {
+    fn node_from_corner_m(&self, node: usize) -> [f64; 2] {
         let indices = self.indices(node);
         [0, 1].map(|axis| self.step_m(axis) * indices[axis] as f64)
     }
@@ -111,7 +111,8 @@ impl CellFields {
     ) -> Self {
         let all = grid.means(pads, pads.columns());
         let corrections = all.rows(pads.electrodes(), pads.columns() - pads.electrodes()).into_owned();
-        let uneven = uneven.map(|uneven| (0..grid.nodes()).map(|node| uneven.place(grid.from_corner(node))).collect());
+        let uneven =
+            uneven.map(|uneven| (0..grid.nodes()).map(|node| uneven.place(grid.node_from_corner_m(node))).collect());
         Self { grid, table: table(&grid, response, floating), corrections, uneven }
     }
 

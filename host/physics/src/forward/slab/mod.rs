@@ -8,6 +8,7 @@
 mod cut;
 mod disc;
 mod discs;
+mod driving;
 mod green;
 mod image;
 mod layers;
@@ -27,15 +28,17 @@ use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 
 use self::disc::{DiscBasis, MAX_DEGREE};
+use self::driving::Covered;
 use self::green::{Surface, SurfaceGreen};
 use self::image::{CellFields, ImageGrid};
-use self::pads::{Across, Pad, PadFields, pad_impedances};
+use self::pads::{Pad, PadFields, pad_impedances};
 use self::spots::SlabSpots;
 use self::uneven::Uneven;
 pub(super) use self::uneven::UnevenPlace;
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
+use super::driving::DrivingLayer;
 use super::spots::SpotFields;
-use super::{ForwardError, ForwardModel, ImageMesh, check_image};
+use super::{ForwardError, ForwardModel, ImageMesh, check_image, leaks};
 use crate::detector::{Detector, Layer};
 use crate::scene::Contact;
 
@@ -68,6 +71,7 @@ impl Resolution {
 pub struct Slab {
     detector: Detector,
     size_m: [f64; 2],
+    driving: DrivingLayer,
     resolution: Resolution,
     /// Highest degree on contacts, however wide.
     most_degree: usize,
@@ -105,14 +109,28 @@ impl Slab {
     /// # Errors
     /// As for [`new`](Self::new).
     pub fn with_resolution(detector: &Detector, resolution: Resolution) -> Result<Self, ForwardError> {
-        Self::like(None, detector, resolution)
+        Self::under(detector, resolution, DrivingLayer::default())
+    }
+
+    /// Makes the model with a driving layer that need not be ideal.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn under(detector: &Detector, resolution: Resolution, driving: DrivingLayer) -> Result<Self, ForwardError> {
+        Self::like(None, detector, resolution, driving)
     }
 
     /// Makes the model, with what a slab of a detector that is nearly the same has in common with it.
-    fn like(like: Option<&Self>, detector: &Detector, resolution: Resolution) -> Result<Self, ForwardError> {
+    fn like(
+        like: Option<&Self>,
+        detector: &Detector,
+        resolution: Resolution,
+        driving: DrivingLayer,
+    ) -> Result<Self, ForwardError> {
         let wrong = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
         let size_m = check(detector).map_err(wrong)?;
         let mut planner = RealFftPlanner::new();
+        let covered = Covered::new(detector, size_m, driving);
         let split_m = split_m(detector, size_m);
         let as_even = like.filter(|like| {
             let other = &like.detector;
@@ -121,19 +139,20 @@ impl Slab {
         let [bottom, top] = match as_even {
             Some(like) => [Arc::clone(&like.bottom), Arc::clone(&like.top)],
             None => [
-                SurfaceGreen::new(size_m, split_m, &mut planner, &bottom_surface(detector)).into(),
-                SurfaceGreen::new(size_m, split_m, &mut planner, &top_surface(detector)).into(),
+                SurfaceGreen::new(size_m, split_m, &mut planner, &bottom_surface(detector, covered)).into(),
+                SurfaceGreen::new(size_m, split_m, &mut planner, &top_surface(detector, covered)).into(),
             ],
         };
         let uneven = match as_even.filter(|like| like.detector.unevenness == detector.unevenness) {
             Some(like) => like.uneven.clone(),
             None => Uneven::new(size_m, &detector.unevenness, &detector.layers, resolution.uneven_modes).map(Arc::new),
         };
-        let pads = bare(detector, resolution, &bottom, uneven.as_deref(), &mut planner)
+        let pads = bare(detector, &covered, resolution, &bottom, uneven.as_deref(), &mut planner)
             .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
         Ok(Self {
             detector: detector.clone(),
             size_m,
+            driving,
             resolution,
             most_degree: MAX_DEGREE,
             bottom,
@@ -156,7 +175,7 @@ impl Slab {
 
     fn cells(&self) -> &CellFields {
         self.image.cells.get_or_init(|| {
-            let top = top_surface(&self.detector);
+            let top = top_surface(&self.detector, Covered::new(&self.detector, self.size_m, self.driving));
             CellFields::new(self.image.grid, &self.pads, self.uneven.as_deref(), top.response, top.floating)
         })
     }
@@ -181,12 +200,16 @@ impl Slab {
 
     /// The nodes of an image that conduct, and their system.
     fn touched(&self, image_s: &[f64]) -> Result<(Vec<usize>, ContactSystem<'_>), ForwardError> {
-        check_image(image_s, self.image.grid.nodes())?;
+        match check_image(image_s, self.image.grid.nodes()) {
+            Err(ForwardError::NoContact) if self.driving.leak_s > 0.0 => {}
+            checked => checked?,
+        }
         let touched: Vec<_> = (0..image_s.len()).filter(|node| image_s[*node] > 0.0).collect();
         let conductance_s: Vec<_> = touched.iter().map(|node| image_s[*node]).collect();
         let cross = self.image_fields_ohm().select_rows(&touched);
         let patches = self.cells().within(&touched);
-        Ok((touched, conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s)))
+        let system = conducting_patches(&self.pads.electrodes_ohm, &cross, patches, &conductance_s);
+        Ok((touched, ContactSystem { leak_s: self.driving.leak_s, ..system }))
     }
 }
 
@@ -248,7 +271,8 @@ impl ForwardModel for Slab {
     }
 
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
-        Some(Box::new(SlabSpots::new(self.clone(), radius_m)))
+        let leaks = self.driving.leak_s > 0.0;
+        (!leaks).then(|| Box::new(SlabSpots::new(self.clone(), radius_m)) as Box<dyn SpotFields>)
     }
 
     fn image_mesh(&self) -> &ImageMesh {
@@ -256,7 +280,10 @@ impl ForwardModel for Slab {
     }
 
     fn of_similar(&self, detector: &Detector) -> Result<Arc<dyn ForwardModel>, ForwardError> {
-        Ok(Arc::new(Self { most_degree: self.most_degree, ..Self::like(Some(self), detector, self.resolution)? }))
+        Ok(Arc::new(Self {
+            most_degree: self.most_degree,
+            ..Self::like(Some(self), detector, self.resolution, self.driving)?
+        }))
     }
 
     fn fields_ohm(&self) -> &DMatrix<f64> {
@@ -264,6 +291,9 @@ impl ForwardModel for Slab {
     }
 
     fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
+        if self.driving.leak_s > 0.0 {
+            return Err(leaks(&self.detector));
+        }
         let nodes: Vec<_> = (0..self.image.grid.nodes()).collect();
         Ok(self.cells().between(&nodes, &nodes))
     }
@@ -317,19 +347,19 @@ fn split_m(detector: &Detector, size_m: [f64; 2]) -> f64 {
     (0.6 * detector.thickness_m()).min(0.05 * size_m[0].max(size_m[1])).max(SPLIT_IN_PAD * pad_m)
 }
 
-fn top_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {
+fn top_surface<'a>(detector: &Detector, covered: Covered<'a>) -> Surface<impl Fn(f64) -> f64 + use<'a>> {
     Surface {
-        response: |k| layers::response(&detector.layers, k).tt,
-        floating: layers::floating_response(&detector.layers).tt,
-        sheet_s: detector.sheet_conductance_s(),
+        response: move |k| covered.response(k).tt,
+        floating: covered.floating().tt,
+        sheet_s: covered.gap_sheet_s(),
         sigma: detector.layers.last().map_or(0.0, |layer| layer.top_s_per_m),
     }
 }
 
-fn bottom_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {
+fn bottom_surface<'a>(detector: &Detector, covered: Covered<'a>) -> Surface<impl Fn(f64) -> f64 + use<'a>> {
     Surface {
-        response: |k| layers::response(&detector.layers, k).bb,
-        floating: layers::floating_response(&detector.layers).bb,
+        response: move |k| covered.response(k).bb,
+        floating: covered.floating().bb,
         sheet_s: detector.sheet_conductance_s(),
         sigma: detector.layers.first().map_or(0.0, |layer| layer.bottom_s_per_m),
     }
@@ -338,12 +368,13 @@ fn bottom_surface(detector: &Detector) -> Surface<impl Fn(f64) -> f64 + '_> {
 /// The bare slab with its pads eliminated.
 fn bare(
     detector: &Detector,
+    covered: &Covered<'_>,
     resolution: Resolution,
     bottom: &SurfaceGreen,
     uneven: Option<&Uneven>,
     planner: &mut RealFftPlanner<f64>,
 ) -> Option<PadFields> {
-    let size_m = detector.outline.size_m();
+    let size_m = covered.size_m();
     let pads: Vec<_> = detector
         .electrodes
         .iter()
@@ -355,14 +386,7 @@ fn bare(
         .collect();
     let basis = DiscBasis::of_degree(resolution.pad_degree);
     let impedances = pad_impedances(&pads, basis, bottom, uneven);
-    let across = Across {
-        size_m,
-        thickness_m: detector.thickness_m(),
-        response: |k| layers::response(&detector.layers, k).tb,
-        floating: layers::floating_response(&detector.layers).tb,
-        uneven,
-    };
-    PadFields::new(&pads, basis, &impedances, &across, planner)
+    PadFields::new(&pads, basis, impedances, covered, uneven, planner)
 }
 
 impl Image {

@@ -12,6 +12,7 @@ use nalgebra::{Cholesky, DMatrix};
 use realfft::RealFftPlanner;
 
 use super::disc::DiscBasis;
+use super::driving::Covered;
 use super::green::SurfaceGreen;
 use super::spline::Grid;
 use super::uneven::Uneven;
@@ -135,24 +136,11 @@ pub(super) struct PadFields {
     pub electrodes_ohm: DMatrix<f64>,
 }
 
-/// One mode of the fields across the slab.
-struct Mode {
-    m: usize,
-    n: usize,
+/// One mode of the fields across the slab: half waves along both sides.
+pub(super) struct Mode {
+    pub m: usize,
+    pub n: usize,
     amplitude: f64,
-}
-
-/// The way from the pads to the top.
-pub(super) struct Across<'a, F: Fn(f64) -> f64> {
-    /// Length and width (m).
-    pub size_m: [f64; 2],
-    /// Thickness (m).
-    pub thickness_m: f64,
-    /// Potential at one surface per normal current density at the other (ohm m2) for a wave number (1/m).
-    pub response: F,
-    /// What is left of it at 0 (ohm m2).
-    pub floating: f64,
-    pub uneven: Option<&'a Uneven>,
 }
 
 impl PadFields {
@@ -160,30 +148,32 @@ impl PadFields {
     pub fn new(
         pads: &[Pad],
         basis: &DiscBasis,
-        impedances: &DMatrix<f64>,
-        across: &Across<'_, impl Fn(f64) -> f64>,
+        impedances: DMatrix<f64>,
+        covered: &Covered<'_>,
+        uneven: Option<&Uneven>,
         planner: &mut RealFftPlanner<f64>,
     ) -> Option<Self> {
         let smallest_m = pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min);
-        let step_m = (across.thickness_m / STEPS_IN_THICKNESS).max(smallest_m / STEPS_IN_PAD);
-        let grid = Grid::new(across.size_m, step_m);
-        let modes = across.modes(&grid);
+        let step_m = (covered.thickness_m() / STEPS_IN_THICKNESS).max(smallest_m / STEPS_IN_PAD);
+        let grid = Grid::new(covered.size_m(), step_m.min(std::f64::consts::PI / covered.finest()));
+        let modes = modes(covered, &grid);
         let size = basis.len();
         let uniform: Vec<_> = (0..pads.len()).map(|pad| pad * size).collect();
-        let others: Vec<_> = (0..pads.len() * size).filter(|i| i % size != 0).collect();
+        let fields = pad_modes(pads, basis, &grid, &modes, uneven);
+        let [impedances, fields] = covered.connect([impedances, fields], &uniform, &grid, &modes);
+        let others: Vec<_> = (0..fields.ncols()).filter(|i| !uniform.contains(i)).collect();
         let inner = impedances.select_rows(&others).select_columns(&others);
         let lower = Cholesky::new(inner)?.unpack();
         let inverse = lower.solve_lower_triangular(&DMatrix::identity(others.len(), others.len()))?;
         let coupling = &inverse * impedances.select_rows(&others).select_columns(&uniform);
         let electrodes_ohm = impedances.select_rows(&uniform).select_columns(&uniform) - coupling.tr_mul(&coupling);
 
-        let fields = pad_modes(pads, basis, &grid, &modes, across.uneven);
         let correction = fields.select_columns(&others) * inverse.transpose();
         let electrode_fields = fields.select_columns(&uniform) - &correction * coupling;
         let columns = pads.len() + others.len();
         let mut table = vec![0.0; grid.nodes(0) * grid.nodes(1) * columns];
         let all = electrode_fields.column_iter().chain(correction.column_iter());
-        let roots = across.uneven.map(|uneven| grid.values(|at_m| uneven.inverse_root(at_m)));
+        let roots = uneven.map(|uneven| grid.values(|at_m| uneven.inverse_root(at_m)));
         for (column, amplitudes) in all.enumerate() {
             let mut amplitude = vec![0.0; (grid.modes(0) + 1) * (grid.modes(1) + 1)];
             for (mode, value) in modes.iter().zip(amplitudes.iter()) {
@@ -241,19 +231,16 @@ impl PadFields {
     }
 }
 
-impl<F: Fn(f64) -> f64> Across<'_, F> {
-    fn modes(&self, grid: &Grid) -> Vec<Mode> {
-        let area_m2 = self.size_m[0] * self.size_m[1];
-        let response = |m: usize, n: usize| {
-            let k = grid.wave_number(0, m).hypot(grid.wave_number(1, n));
-            let count = if m == 0 { 1.0 } else { 2.0 } * if n == 0 { 1.0 } else { 2.0 };
-            let value = if m + n == 0 { self.floating } else { (self.response)(k) };
-            (k * self.thickness_m < ACROSS_END).then(|| Mode { m, n, amplitude: count * value / area_m2 })
-        };
-        (0..=grid.modes(0))
-            .flat_map(|m| (0..=grid.modes(1)).filter_map(move |n| response(m, n)).collect::<Vec<_>>())
-            .collect()
-    }
+fn modes(covered: &Covered<'_>, grid: &Grid) -> Vec<Mode> {
+    let area_m2 = covered.size_m()[0] * covered.size_m()[1];
+    let end = (ACROSS_END / covered.thickness_m()).max(covered.finest());
+    let mode = |m: usize, n: usize| {
+        let k = grid.wave_number(0, m).hypot(grid.wave_number(1, n));
+        let count = if m == 0 { 1.0 } else { 2.0 } * if n == 0 { 1.0 } else { 2.0 };
+        let value = || if m + n == 0 { covered.floating().tb } else { covered.response(k).tb };
+        (k < end).then(|| Mode { m, n, amplitude: count * value() / area_m2 })
+    };
+    (0..=grid.modes(0)).flat_map(|m| (0..=grid.modes(1)).filter_map(move |n| mode(m, n)).collect::<Vec<_>>()).collect()
 }
 
 /// Amplitudes of the field on the top of each density of each pad: `modes x densities`; with unevenness but for the root of its factor at

@@ -15,13 +15,14 @@
 //! between the two surfaces, whatever the layers (Green's identity in depth). The sheet's matrix is scaled by that quotient.
 //!
 //! Left out: how depth changes the second order in `q`; slopes of `s` and of `D` over a contact; and those over a pad in its own singular field.
+//! The resistance of a driving layer and a leak are scaled with the foam, though they are even.
 
 use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::layers::{Response, response};
-use crate::detector::{Layer, Unevenness};
+use crate::detector::{Layer, Unevenness, cosines};
 
 /// Points along a side, for each half wave of the highest mode, where `q` is integrated.
 const POINTS_PER_MODE: usize = 4;
@@ -159,16 +160,6 @@ impl Uneven {
     }
 }
 
-/// `cos(m pi u)` for all `m` up to `most`, by its recurrence.
-fn cosines(most: usize, u: f64) -> Vec<f64> {
-    let first = (PI * u).cos();
-    let mut all = vec![1.0, first];
-    for m in 2..=most {
-        all.push(2.0 * first * all[m - 1] - all[m - 2]);
-    }
-    all
-}
-
 /// `q` by its means under products of two cosines (1/m2).
 struct Potential {
     means: DMatrix<f64>,
@@ -178,8 +169,12 @@ impl Potential {
     fn new(size_m: [f64; 2], unevenness: &Unevenness, most: usize) -> Self {
         let points = POINTS_PER_MODE * most.max(unevenness.most());
         let at = |i: usize| (i as f64 + 0.5) / points as f64;
-        let q = DMatrix::from_fn(points, points, |i, j| potential(size_m, unevenness, [at(i), at(j)]));
-        let cosines = DMatrix::from_fn(2 * most + 1, points, |m, i| (PI * m as f64 * at(i)).cos() / points as f64);
+        let waves =
+            |i: usize| (0..=unevenness.most()).map(move |m| (PI * m as f64 * at(i)).sin_cos()).map(|(s, c)| [c, s]);
+        let waves: Vec<Vec<[f64; 2]>> = (0..points).map(|i| waves(i).collect()).collect();
+        let q = DMatrix::from_fn(points, points, |i, j| potential(size_m, unevenness, [&waves[i], &waves[j]]));
+        let all: Vec<_> = (0..points).map(|i| cosines(2 * most, at(i))).collect();
+        let cosines = DMatrix::from_fn(2 * most + 1, points, |m, i| all[i][m] / points as f64);
         Self { means: &cosines * q * cosines.transpose() }
     }
 
@@ -191,15 +186,14 @@ impl Potential {
     }
 }
 
-/// `q` at a place, in shares of the sides (1/m2).
-fn potential(size_m: [f64; 2], unevenness: &Unevenness, [u, v]: [f64; 2]) -> f64 {
+/// `q` at a place, by `cos` and `sin` of all half waves along both sides there (1/m2).
+fn potential(size_m: [f64; 2], unevenness: &Unevenness, [x, y]: [&[[f64; 2]]; 2]) -> f64 {
     let (mut laplace, mut slope) = (0.0, [0.0; 2]);
     for ([i, j], amplitude) in unevenness.modes() {
         let k = [i as f64 * PI / size_m[0], j as f64 * PI / size_m[1]];
-        let (x, y) = (i as f64 * PI * u, j as f64 * PI * v);
-        laplace -= amplitude * (k[0] * k[0] + k[1] * k[1]) * x.cos() * y.cos();
-        slope[0] -= amplitude * k[0] * x.sin() * y.cos();
-        slope[1] -= amplitude * k[1] * x.cos() * y.sin();
+        laplace -= amplitude * (k[0] * k[0] + k[1] * k[1]) * x[i][0] * y[j][0];
+        slope[0] -= amplitude * k[0] * x[i][1] * y[j][0];
+        slope[1] -= amplitude * k[1] * x[i][0] * y[j][1];
     }
     0.5 * laplace + 0.25 * (slope[0] * slope[0] + slope[1] * slope[1])
 }

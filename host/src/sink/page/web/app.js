@@ -62,12 +62,12 @@ function showStatus(status) {
   showNotice(status);
 }
 
-// One line for what the program has to say: what was refused, what to know of the baseline, where the recording is.
-function showNotice({ refused, baseline, recording, solver }) {
+// One line for what the program has to say: what was refused, what to know of the baseline and the calibration, where the recording is.
+function showNotice({ refused, baseline, calibration, recording, solver }) {
   const notice = document.getElementById("notice");
   const method = solver?.refused ? `This solver cannot be used: ${solver.refused}` : null;
-  notice.textContent = refused ?? method ?? baseline ?? (recording ? `Recording to ${recording}` : "");
-  notice.className = refused || method ? "bad" : baseline ? "warning" : "";
+  notice.textContent = refused ?? method ?? baseline ?? calibration ?? (recording ? `Recording to ${recording}` : "");
+  notice.className = refused || method ? "bad" : baseline || calibration ? "warning" : "";
   notice.hidden = !notice.textContent;
 }
 

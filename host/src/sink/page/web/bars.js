@@ -21,7 +21,7 @@ export function placesOf(shape) {
 export const errorOf = ({ errorsM }) => (errorsM.includes(null) ? null : Math.max(...errorsM));
 
 /** What a label says of it, as of a contact. */
-export const labelled = ({ kind, conductanceS }) => ({ kind, id: null, forceN: null, conductanceS });
+export const labelled = ({ kind, conductanceS }) => ({ kind, id: null, forceN: null, beyondMaximum: false, conductanceS });
 
 /** A place (m) in the middle of the strip, for its label. */
 export const middleOf = (shape) => (shape.kind === "line"

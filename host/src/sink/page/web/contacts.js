@@ -1,9 +1,9 @@
 // The contacts found, as a table.
 
 import { errorOf, placesOf } from "./bars.js";
-import { ellipseOf } from "./marks.js";
+import { ellipseOf, strengthOf } from "./marks.js";
 import { hueOf } from "./palette.js";
-import { count, millimetres, withPrefix } from "./units.js";
+import { count, millimetres, withError, withPrefix } from "./units.js";
 
 // Numbers that change faster cannot be read.
 const SHOWN_EVERY_MS = 120;
@@ -37,15 +37,22 @@ function bar(share) {
   return element("td", "wide", element("span", "level", made, element("span", "word", wordOf(share))));
 }
 
+// What it presses with, in newtons with their standard error where they are known; as a title the conductance too.
+function strengthCell(contact) {
+  const { forceN, forceErrorN, beyondMaximum, conductanceS, errorS } = contact;
+  const value = element("td", "value", forceN === null || beyondMaximum ? strengthOf(contact) : withError(forceN, forceErrorN, "N"));
+  const conductance = errorS === null ? withPrefix(conductanceS, "S") : `${withPrefix(conductanceS, "S")} ± ${withPrefix(errorS, "S", 2)}`;
+  const force = forceN === null ? "" : `${withError(forceN, forceErrorN, "N")}${beyondMaximum ? ", beyond the largest force that can be told" : ""}; `;
+  value.title = `${force}${conductance}`;
+  return value;
+}
+
 function row(contact, sheetS) {
-  const { id, xM, yM, forceN, conductanceS, errorS } = contact;
-  const error = forceN === null && errorS !== null ? ` ± ${withPrefix(errorS, "S", 2)}` : "";
-  const value = element("td", "value", forceN === null ? withPrefix(conductanceS, "S") : withPrefix(forceN, "N"));
-  value.title = `${value.textContent}${error}`;
+  const { id, xM, yM, conductanceS } = contact;
   return element("tr", hueOf(id),
     element("td", "id", element("span", "badge-id", id ? String(id) : "\u2013")),
     element("td", "", `${millimetres(xM, 1)}, ${millimetres(yM, 1)}`),
-    element("td", "error", placeError(ellipseOf(contact))), value, bar(Math.max(1e-9, conductanceS / sheetS)));
+    element("td", "error", placeError(ellipseOf(contact))), strengthCell(contact), bar(Math.max(1e-9, conductanceS / sheetS)));
 }
 
 function shapeRow(shape, sheetS) {

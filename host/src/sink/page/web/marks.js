@@ -11,8 +11,9 @@ const LARGEST_ELLIPSE = 2000;
 const TRAIL_WIDTH = 5;
 const PILL = { height: 22, badge: 9, font: "600 12.5px system-ui, sans-serif" };
 
-/** What a contact presses with, for people: newtons where they are known. */
-export const strengthOf = ({ forceN, conductanceS }) => (forceN === null ? withPrefix(conductanceS, "S") : withPrefix(forceN, "N"));
+/** What a contact presses with, for people: newtons where they are known, "or more" where they are beyond what the detector can tell. */
+export const strengthOf = ({ forceN, beyondMaximum, conductanceS }) => (
+  forceN === null ? withPrefix(conductanceS, "S") : `${beyondMaximum ? "\u2273\u2009" : ""}${withPrefix(forceN, "N")}`);
 
 /** The half axes (m) of one standard error and the direction of the longer (radians, anticlockwise), or null. */
 export function ellipseOf({ xErrorM, yErrorM, correlation }) {

@@ -2,7 +2,7 @@
 // the same.
 
 /** Version of the layout below; the setup carries the program's. */
-export const LAYOUT = 5;
+export const LAYOUT = 6;
 
 const HEAD_WORDS = 9;
 // From the lowest bit on.
@@ -36,10 +36,13 @@ class Taker {
 
 function contact(taker) {
   const id = taker.word() || null;
-  const [x, y, z, conductanceS, ...others] = taker.floats(12);
-  const [radiusM, forceN, xErrorM, yErrorM, correlation, errorS] = others.slice(0, 6).map(known);
-  const [xM, yM] = others.slice(6);
-  return { id, xM, yM, conductanceS, radiusM, forceN, xErrorM, yErrorM, correlation, errorS, place: [x, y, z] };
+  const [x, y, z, conductanceS, ...others] = taker.floats(14);
+  const [radiusM, forceN, forceErrorN, beyond, xErrorM, yErrorM, correlation, errorS] = others.slice(0, 8).map(known);
+  const [xM, yM] = others.slice(8);
+  return {
+    id, xM, yM, conductanceS, radiusM, forceN, forceErrorN, beyondMaximum: beyond === 1, xErrorM, yErrorM, correlation, errorS,
+    place: [x, y, z],
+  };
 }
 
 const SHAPES = [null, "line", "ring"];

@@ -3,7 +3,11 @@
 const FAULTS = [
   ["", "none"], ["open:3", "wire 3 broken"], ["short:2,7", "wires 2 and 7 touch"], ["swap:1,5", "wires 1 and 5 exchanged"],
   ["gain:4:0.8", "channel 4 reads 20 % low"], ["invert:4", "channel 4 inverted"], ["uneven:0.2", "uneven foam"],
+  ["driving-sheet:100", "driving layer of 100 ohm/sq"], ["leak:0.01", "layers touch lightly everywhere"],
+  ["creep:0.2:3", "foam creeps"], ["hysteresis:0.1", "foam with hysteresis"], ["drift:0.2:600", "conductivity drifts"],
 ];
+/** Whether a fault names no electrode. */
+const namesNone = ([text]) => !/^(open|short|swap|gain|invert)/.test(text);
 const WISH_STAYS_MS = 500;
 
 /** The choice of scene and fault; asks through `send`. */
@@ -15,7 +19,7 @@ export class Simulation {
     this.asked = -Infinity;
     this.scene.replaceChildren(...scenes.map((name) => new Option(name.replaceAll("-", " "), name)));
     // The faults of the list name electrodes up to 7.
-    const faults = electrodes.length > 7 ? FAULTS : [FAULTS[0], FAULTS.at(-1)];
+    const faults = electrodes.length > 7 ? FAULTS : FAULTS.filter(namesNone);
     this.fault.replaceChildren(...faults.map(([text, words]) => new Option(words, text)));
     const ask = (request) => {
       this.asked = performance.now();

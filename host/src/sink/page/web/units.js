@@ -26,6 +26,15 @@ export function withPrefix(value, unit, digits = 3) {
   return `${fixed(value / factor, Math.max(0, digits - whole))}\u2009${symbol}${unit}`;
 }
 
+/** `value ± error` with the prefix and the decimals of the value. */
+export function withError(value, error, unit) {
+  const text = withPrefix(value, unit);
+  if (error === null) return text;
+  const decimals = /[.](\d+)/.exec(text)?.[1].length ?? 0;
+  const { factor } = prefixOf(value);
+  return text.replace("\u2009", ` ± ${fixed(error / factor, decimals)}\u2009`);
+}
+
 /** A count with thin spaces between thousands. */
 export const count = (value) => String(Math.round(value)).replace(/\B(?=(\d{3})+$)/g, "\u2009");
 

@@ -12,7 +12,7 @@ mod informed;
 mod keep;
 #[cfg(test)]
 mod motion_tests;
-mod network;
+pub(super) mod network;
 #[cfg(test)]
 mod places_tests;
 mod scan;

@@ -17,7 +17,7 @@ use tactomo_physics::forward::spots::{Spot, SpotFields};
 
 /// A contact as a spot.
 #[derive(Clone, Debug, Default)]
-pub(super) struct LoadedSpot {
+pub(in crate::solve) struct LoadedSpot {
     /// Where, and the fields there.
     pub spot: Spot,
     /// Resistance of the contact with the crowded current under it (ohm).
@@ -26,7 +26,7 @@ pub(super) struct LoadedSpot {
 
 /// What does not depend on the contacts.
 #[derive(Clone, Debug)]
-pub(super) struct Network {
+pub(in crate::solve) struct Network {
     /// Fields between the electrodes (ohm).
     pub electrodes_ohm: DMatrix<f64>,
     pub drive_v: f64,
@@ -35,7 +35,7 @@ pub(super) struct Network {
 
 /// Currents and impedances of some spots.
 #[derive(Clone, Debug)]
-pub(super) struct Solved {
+pub(in crate::solve) struct Solved {
     /// Currents at the spots for 1 A into each electrode, last the constant (ohm): row by row, `(K + 1) x n`.
     pub currents: Vec<f64>,
     /// `Z` (ohm), row by row.

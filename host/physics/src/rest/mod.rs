@@ -1,0 +1,226 @@
+//! What a detector reads while nothing touches it: offsets of its converter and leakage, and how they are taken off.
+//!
+//! At rest a converter cuts off what noise and offset are below zero, under load it does not. [`Rest`] therefore knows two numbers of each
+//! reading, its mean at rest and the offset behind it. Leakage is a conductance in parallel to every contact, of which [`Leakage`] takes off
+//! what is left when its voltages at rest are. [`RestPatterns`] tells offsets, leakage and contacts apart.
+
+mod clipping;
+mod leakage;
+mod patterns;
+
+pub use self::clipping::Clipping;
+pub use self::leakage::Leakage;
+pub use self::patterns::{RestChange, RestPatterns};
+use crate::detector::Adc;
+use crate::forward::jacobian::Jacobian;
+
+/// Readings at which noise is no longer cut off (standard deviations of a conversion's noise): at two, 0.4 % of one is.
+const KNEE: f64 = 2.0;
+/// Mean readings from here on are the offset itself.
+const CLEAR: f64 = 1.75;
+
+/// Sum of frames that nothing touches in.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RestSum {
+    sum_v: Vec<f64>,
+    /// Squares of all readings (V2), each as often as its frames.
+    squares_v2: f64,
+    frames: u32,
+    /// How many means were added.
+    means: u32,
+}
+
+/// What a detector reads at rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rest {
+    lsb_v: f64,
+    clipping: Clipping,
+    mean_v: Vec<f64>,
+    offset_v: Vec<f64>,
+}
+
+impl RestSum {
+    /// Means that are needed to see how much noise there is.
+    const FEWEST: u32 = 8;
+
+    /// Adds the mean readings of some frames (V).
+    pub fn add(&mut self, readings_v: &[f64], frames: u32) {
+        self.sum_v.resize(readings_v.len(), 0.0);
+        let weight = f64::from(frames);
+        for (sum, volts) in self.sum_v.iter_mut().zip(readings_v) {
+            *sum += weight * volts;
+            self.squares_v2 += weight * volts * volts;
+        }
+        self.frames += frames;
+        self.means += 1;
+    }
+
+    /// Frames in it.
+    pub fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// Their mean (V); nothing of none.
+    pub fn mean_v(&self) -> Vec<f64> {
+        self.sum_v.iter().map(|sum| sum / f64::from(self.frames.max(1))).collect()
+    }
+
+    /// What a converter reads at rest, whose readings are means of so many conversions each. How much noise there is, the frames tell; of
+    /// few means it is what the converter's description says.
+    pub fn rest(&self, adc: &Adc, conversions: u32) -> Rest {
+        let (mean_v, lsb_v) = (self.mean_v(), adc.lsb_v());
+        let clipping = match self.variance_v2(&mean_v) {
+            None => Clipping::new(adc.noise_lsb),
+            Some(variance_v2) => {
+                let means: Vec<f64> = mean_v.iter().map(|volts| volts / lsb_v).collect();
+                Clipping::of_variance(&means, variance_v2 * f64::from(conversions) / (lsb_v * lsb_v))
+            }
+        };
+        let mut rest = Rest { lsb_v, clipping, mean_v: Vec::new(), offset_v: Vec::new() };
+        rest.set(mean_v, f64::from(self.frames) * f64::from(conversions));
+        rest
+    }
+
+    /// Mean variance of a frame's reading (V2), if there are enough to tell.
+    fn variance_v2(&self, mean_v: &[f64]) -> Option<f64> {
+        let of_means_v2 = f64::from(self.frames) * mean_v.iter().map(|volts| volts * volts).sum::<f64>();
+        let freedom = f64::from(self.means.saturating_sub(1)) * mean_v.len() as f64;
+        (self.means >= Self::FEWEST && freedom > 0.0).then(|| ((self.squares_v2 - of_means_v2) / freedom).max(0.0))
+    }
+}
+
+impl Rest {
+    /// Readings that are all zero at rest, of a converter whose noise nothing is known of.
+    pub fn zero(readings: usize) -> Self {
+        Self { lsb_v: 1.0, clipping: Clipping::new(0.0), mean_v: vec![0.0; readings], offset_v: vec![0.0; readings] }
+    }
+
+    /// The same noise with other mean readings (V), of so many conversions each.
+    pub fn set(&mut self, mean_v: Vec<f64>, conversions: f64) {
+        let clear_v = CLEAR * self.clipping.deviation() * self.lsb_v;
+        let offset_v = |mean_v: &f64| match *mean_v < clear_v {
+            true => self.lsb_v * self.clipping.level(mean_v / self.lsb_v, conversions),
+            false => *mean_v,
+        };
+        self.offset_v = mean_v.iter().map(offset_v).collect();
+        self.mean_v = mean_v;
+    }
+
+    /// Mean readings at rest (V).
+    pub fn mean_v(&self) -> &[f64] {
+        &self.mean_v
+    }
+
+    /// What is in readings that are too large for their noise to be cut off (V).
+    pub fn offset_v(&self) -> &[f64] {
+        &self.offset_v
+    }
+
+    /// Puts `readings_v` less what they are at rest into `touch_v` (V).
+    ///
+    /// At rest that is the mean, and from two standard deviations on the offset. Between them it goes from one to the other on a straight
+    /// line, so that the mean of frames has the same taken off as the frames have in the mean.
+    pub fn subtract(&self, readings_v: &[f64], touch_v: &mut [f64]) {
+        let knee_v = KNEE * self.clipping.deviation() * self.lsb_v;
+        let rest = self.mean_v.iter().zip(&self.offset_v);
+        for ((touch, volts), (mean, offset)) in touch_v.iter_mut().zip(readings_v).zip(rest) {
+            let cut_v = mean - offset;
+            let share = if cut_v > 0.0 { ((knee_v - volts) / (knee_v - mean)).max(0.0) } else { 0.0 };
+            *touch = volts - offset - share * cut_v;
+        }
+    }
+}
+
+/// Means of the bare detector's fields over its surface (ohm), an electrode each: those of a current that is spread over it.
+fn mean_fields_ohm(jacobian: &Jacobian) -> Vec<f64> {
+    let areas_m2 = &jacobian.image_mesh.node_areas_m2;
+    let area_m2: f64 = areas_m2.iter().sum();
+    let columns = jacobian.fields_ohm.column_iter();
+    columns.map(|fields| fields.iter().zip(areas_m2).map(|(ohm, m2)| ohm * m2).sum::<f64>() / area_m2).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::readings::Readings;
+    use crate::simulate::{Noise, measured};
+
+    /// Means that are off by so many codes at rest, after `frames` frames, with what is then taken off under a load (V).
+    fn errors_lsb(offset_lsb: f64, load_lsb: f64, frames: u32, average: bool) -> f64 {
+        let adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 };
+        let mut noise = Noise::new(5);
+        let at = |level_lsb: f64| Readings::from_fn(16, |_, _| level_lsb * 1e-3);
+        let mut sum = RestSum::default();
+        (0..frames).for_each(|_| sum.add(measured(&at(offset_lsb), &adc, &mut noise).volts(), 1));
+        // What the description says of the noise is not needed.
+        let rest = sum.rest(&Adc { noise_lsb: 9.0, ..adc }, 1);
+        let (mut touch_v, mut all, loaded) = (vec![0.0; 256], vec![0.0; 256], at(offset_lsb + load_lsb));
+        for _ in 0..400 {
+            let frame = measured(&loaded, &adc, &mut noise);
+            if average {
+                all.iter_mut().zip(frame.volts()).for_each(|(sum, volts)| *sum += volts / 400.0);
+            } else {
+                rest.subtract(frame.volts(), &mut touch_v);
+                all.iter_mut().zip(&touch_v).for_each(|(sum, volts)| *sum += volts / 400.0);
+            }
+        }
+        if average {
+            rest.subtract(&all.clone(), &mut all);
+        }
+        all.iter().sum::<f64>() / 256.0 / 1e-3 - load_lsb
+    }
+
+    #[test]
+    fn what_is_taken_off_is_right_at_rest_and_under_load_although_noise_is_cut_off() {
+        for offset_lsb in [-2.0, -1.0, 0.0, 1.0, 3.0, 30.0] {
+            for average in [false, true] {
+                let rest = errors_lsb(offset_lsb, 0.0, 256, average);
+                assert!(rest.abs() < 0.05, "offset {offset_lsb}, at rest: {rest}");
+                let load = errors_lsb(offset_lsb, 50.0, 256, average);
+                assert!(load.abs() < 0.1, "offset {offset_lsb}, under load: {load}");
+            }
+        }
+    }
+
+    #[test]
+    fn between_rest_and_load_no_less_of_a_touch_is_seen_than_with_the_mean_taken_off() {
+        for offset_lsb in [-2.0, 0.0, 1.0] {
+            for load_lsb in [1.0, 2.0, 4.0] {
+                let error = errors_lsb(offset_lsb, load_lsb, 256, false);
+                let [rest, loaded] = [offset_lsb, offset_lsb + load_lsb].map(|level| Clipping::new(1.5).mean_of(level));
+                let plain = loaded - rest - load_lsb;
+                assert!(
+                    (plain - 0.05..0.25).contains(&error),
+                    "{offset_lsb} {load_lsb}: {error}, with the mean {plain}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_mean_alone_is_read_with_the_noise_of_the_description() {
+        let mut sum = RestSum::default();
+        sum.add(&[0.6e-3; 4], 64);
+        let rest = sum.rest(&Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 }, 1);
+        assert!(rest.offset_v()[2].abs() < 0.03e-3 && rest.mean_v()[2] == 0.6e-3, "{:?}", rest.offset_v());
+        assert_eq!(Rest::zero(2).offset_v(), [0.0; 2]);
+    }
+
+    #[test]
+    fn means_of_several_conversions_are_cut_off_as_each_is() {
+        // 16 conversions about -1 code.
+        let adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 };
+        let (mut noise, mut sum) = (Noise::new(8), RestSum::default());
+        let low = Readings::from_fn(16, |_, _| -1e-3);
+        for _ in 0..64 {
+            let mut mean_v = vec![0.0; 256];
+            for _ in 0..16 {
+                let codes = measured(&low, &adc, &mut noise);
+                mean_v.iter_mut().zip(codes.volts()).for_each(|(sum, volts)| *sum += volts / 16.0);
+            }
+            sum.add(&mean_v, 1);
+        }
+        let offsets = sum.rest(&adc, 16).offset_v().iter().sum::<f64>() / 256.0;
+        assert!((offsets + 1e-3).abs() < 0.1e-3, "{offsets}");
+    }
+}

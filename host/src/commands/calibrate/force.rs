@@ -1,0 +1,92 @@
+//! `tactomo calibrate force`: newtons from presses of known force.
+
+mod gather;
+mod known;
+mod report;
+
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use tactomo::calibrate::force::{Law, fit_force};
+use tactomo::detector::Detector;
+
+use self::gather::gather;
+use self::known::Known;
+use self::report::Report;
+use crate::commands::choice::DetectorArgs;
+use crate::commands::output::{self, NewFile, message};
+use crate::commands::reconstruct::units::Unit;
+
+/// Finds which force is behind a contact's conductance, from presses of known force.
+///
+/// FILE is a recording of presses on a kitchen scale, each held for a second and lifted before
+/// the next, or a table of readings with a press a row. Ten presses from light to firm are good,
+/// all of them with the tip that will be used. The result is the detector with a law of force:
+/// with it, contacts of every solver carry newtons and their standard error.
+///
+/// Examples:
+///   tactomo calibrate force scale.tactomo --newtons 0.5,1,2,3,5,4,2.5,1.5,0.7,0.3 --out my-newtons.toml
+///   tactomo calibrate force presses.csv --detector my.toml --newtons 1,2,3,5,8 --out my-newtons.toml --json
+///   tactomo calibrate force ramp.tactomo --forces sensor.csv --out my-newtons.toml
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+#[command(group(clap::ArgGroup::new("known").args(["newtons", "forces"]).required(true)))]
+pub struct Args {
+    /// A recording, or a table of readings with a press a row (see `reconstruct`)
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    detector: DetectorArgs,
+    /// Force of each press (N): of each row of a table, of each press of a recording
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = newtons)]
+    newtons: Vec<f64>,
+    /// The same from a table with a column `force_n`, and `unloading` if that is known: 1 where the force was falling, else 0; or a force
+    /// sensor's: columns `time_s`, since the recording's first frame, and `force_n`
+    #[arg(long, value_name = "FILE")]
+    forces: Option<PathBuf>,
+    /// Law of force: `power`, or `saturating`, the paper's eq. (6) [default: the one that the presses need]
+    #[arg(long, value_name = "power|saturating", value_parser = law)]
+    law: Option<Law>,
+    /// Frames at the start whose mean is the baseline, and which are no presses [default: as `reconstruct`]
+    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    rest: Option<u32>,
+    /// Unit of the readings in a table [default: V]
+    #[arg(long, value_name = "V|mV")]
+    unit: Option<Unit>,
+    /// The detector file to write; a file that exists is not replaced
+    #[arg(long, value_name = "CAL.toml")]
+    out: PathBuf,
+    /// Prints `{detector, out, law, parameters, maximum_force, maximum_force_n, scatter, hysteresis, presses, ...}` as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Fits a law and writes the detector with it.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let out = NewFile::never_replacing(&args.out)?;
+    let known = Known::of(&args.newtons, args.forces.as_deref())?;
+    let gathered = gather(args, &known)?;
+    let presses: Vec<_> = gathered.presses.iter().map(|press| press.press).collect();
+    let fit = fit_force(&presses, args.law).map_err(|error| anyhow!("{}: {error}", args.file.display()))?;
+    let calibrated = Detector { force: Some(fit.law.clone()), ..gathered.detector };
+    super::write(&calibrated, &args.out, out)?;
+    let report = Report::of(&calibrated.name, &args.out, &gathered.presses, &fit);
+    message!("{}", report.table());
+    if args.json {
+        output::print(&serde_json::to_string(&report)?)?;
+    }
+    Ok(())
+}
+
+fn newtons(text: &str) -> Result<f64, String> {
+    let force_n = text.trim().parse::<f64>().ok().filter(|force_n| *force_n > 0.0 && force_n.is_finite());
+    force_n.ok_or_else(|| "a force in newtons above 0 is needed for each press".to_owned())
+}
+
+fn law(text: &str) -> Result<Law, String> {
+    match text {
+        "power" => Ok(Law::Power),
+        "saturating" => Ok(Law::Saturating),
+        _ => Err("power or saturating is needed".to_owned()),
+    }
+}

@@ -1,0 +1,301 @@
+//! `tactomo calibrate rub`: a detector as it was built, from a finger rubbed over it.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant, SystemTime};
+
+use anyhow::{Context, anyhow, bail, ensure};
+use tactomo::board::identity;
+use tactomo::calibrate::{Frame, Rub, RubSettings, rub};
+use tactomo::detector::Detector;
+use tactomo::readings::Readings;
+use tactomo::solve::Method;
+
+use super::known::{KnownPlace, places};
+use crate::commands::choice::{DetectorArgs, Model};
+use crate::commands::output::{self, NewFile, message};
+use crate::commands::reconstruct::reader::{Input, Reader};
+use crate::commands::reconstruct::units::Unit;
+use crate::commands::record;
+use crate::commands::source::{self, BoardArgs};
+
+/// Finds the detector that was built, from one finger rubbed over it: half a minute, everywhere, now light and now firm.
+///
+/// Nobody needs to know where the finger was: each press shows the detector, wherever it is. FILE
+/// is a recording, or a table of readings with a press a row (see `reconstruct`); without it, the
+/// board on --port or the simulated one is recorded first, and the recording is kept beside the
+/// result. Frames of several fingers, and electrodes that are broken, are left out. Presses at
+/// known places fix what rubbing cannot tell: which way round the sensor lies.
+///
+/// Examples:
+///   tactomo calibrate rub --port /dev/ttyUSB0 --detector my.toml --out my-cal.toml
+///   tactomo calibrate rub --simulate --as-built 3 --seconds 30 --out cal.toml
+///   tactomo calibrate rub rub.tactomo --out my-cal.toml --json
+///   tactomo calibrate rub presses.csv --known 1:-20,-20 --known 2:20,-20 --known 3:20,20 --out my-cal.toml
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// A recording, or a table of readings with a press a row
+    #[arg(value_name = "FILE", conflicts_with_all = ["port", "simulate"])]
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    board: BoardArgs,
+    #[command(flatten)]
+    detector: DetectorArgs,
+    /// How long a board is recorded (s)
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = source::seconds)]
+    seconds: Duration,
+    /// A press at a known place: the row of a table, from 1, or the time in a recording (s); x and y from the sensor's middle (mm)
+    #[arg(long, value_name = "ROW:X,Y", allow_hyphen_values = true)]
+    known: Vec<KnownPlace>,
+    /// Presses at known places from a table: columns `row`, from 1, or `time_s`, and `x_m` and `y_m`
+    #[arg(long, value_name = "FILE")]
+    places: Option<PathBuf>,
+    /// Most presses that are fitted
+    #[arg(long, value_name = "PRESSES", default_value_t = RubSettings::default().presses, value_parser = most)]
+    presses: usize,
+    /// Frames at the start whose mean is the baseline, and which are no presses [default: as `reconstruct`]
+    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    rest: Option<u32>,
+    /// Unit of the readings in a table [default: V]
+    #[arg(long, value_name = "V|mV")]
+    unit: Option<Unit>,
+    /// The detector file to write; a file that exists is not replaced
+    #[arg(long, value_name = "CAL.toml")]
+    out: PathBuf,
+    /// Prints `{detector, out, presses, place_error_m, parameters, wires, left_out, ...}` as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Fits the detector and writes it.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let out = NewFile::never_replacing(&args.out)?;
+    let file = match &args.file {
+        Some(file) => file.clone(),
+        None => recorded(args)?,
+    };
+    let (nominal, board, frames) = frames(args, &file)?;
+    let begin = Instant::now();
+    let settings = RubSettings { presses: args.presses, ..RubSettings::default() };
+    let found = rub(&nominal, &frames, &settings, &mut |step| {
+        message!(
+            "fitting detector and presses: step {}, residual {:.2} x noise",
+            step.iteration,
+            step.chi_square.sqrt()
+        );
+        true
+    });
+    let mut found = found.map_err(|error| anyhow!("{}: {error}", file.display()))?;
+    if let Some(calibration) = &mut found.detector.calibration {
+        calibration.board = board;
+        calibration.date = date(SystemTime::now());
+    }
+    super::write(&found.detector, &args.out, out)?;
+    let report = Report::of(&found, args, frames.len(), begin.elapsed());
+    message!("{}", report.table(&found));
+    if args.json {
+        output::print(&serde_json::to_string(&report)?)?;
+    }
+    Ok(())
+}
+
+/// Records a board beside the result.
+fn recorded(args: &Args) -> anyhow::Result<PathBuf> {
+    ensure!(
+        args.board.port.is_some() || args.board.simulate,
+        "give a FILE, or --port PORT for a board, or --simulate: which readings shall the detector be fitted to?"
+    );
+    let file = args.out.with_extension("tactomo");
+    message!(
+        "rub one fingertip over the whole sensor, now light and now firm, for {:.0} s; the recording is kept in {}",
+        args.seconds.as_secs_f64(),
+        file.display()
+    );
+    record::record(&file, &args.board, &args.detector, Some(args.seconds))?;
+    Ok(file)
+}
+
+/// The description, the board's identity, and the frames of a file.
+fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Option<String>, Vec<Frame>)> {
+    let mut reader = Reader::open(&Input {
+        file,
+        detector: &args.detector,
+        model: Model::Auto,
+        solver: Method::Tikhonov,
+        lambda: None,
+        presses: None,
+        rest: args.rest,
+        unit: args.unit,
+        force: None,
+    })?;
+    let nominal = reader.measured().cloned().context("a rub needs a detector")?;
+    let board = reader.board().map(identity::identity);
+    let (electrodes, is_recording) = (nominal.electrodes.len(), reader.is_recording());
+    let mut known = args.known.clone();
+    if let Some(path) = &args.places {
+        known.extend(places(path, is_recording)?);
+    }
+    let mut frames = Vec::new();
+    let mut used = vec![false; known.len()];
+    while let Some(frame) = reader.next_frame()? {
+        let at = if is_recording { frame.time_s.unwrap_or(0.0) } else { (frames.len() + 1) as f64 };
+        let is_at = |known: &&(usize, &KnownPlace)| known.1.is_at(at, is_recording);
+        let place = known.iter().enumerate().collect::<Vec<_>>().iter().find(is_at).map(|(index, place)| {
+            used[*index] = true;
+            place.at_m
+        });
+        let readings = Readings::new(electrodes, frame.volts).with_context(|| reader.place())?;
+        if readings.volts().iter().any(|volts| !volts.is_finite()) {
+            bail!("{}: a reading is not a finite number", reader.place());
+        }
+        frames.push(Frame { readings, known_m: place });
+    }
+    if let Some(losses) = reader.losses() {
+        message!("warning: {losses}");
+    }
+    if let Some(missing) = known.iter().zip(&used).find(|(_, used)| !**used) {
+        let (what, last) = if is_recording { ("second", "time") } else { ("row", "row") };
+        bail!(
+            "{}: there is no {what} {} for a known place: see that each {last} is in the file",
+            file.display(),
+            missing.0.at
+        );
+    }
+    if let Some(wrong) = known.iter().find(|known| !nominal.outline.holds(known.at_m)) {
+        bail!(
+            "the known place {:.1}, {:.1} mm is not on the sensor: x and y count from its middle, in millimetres",
+            1e3 * wrong.at_m[0],
+            1e3 * wrong.at_m[1]
+        );
+    }
+    Ok((nominal, board, frames))
+}
+
+fn most(text: &str) -> Result<usize, String> {
+    let count = text.parse::<usize>().ok().filter(|count| (4..=2000).contains(count));
+    count.ok_or_else(|| "a number from 4 to 2000".to_owned())
+}
+
+/// A day of the Gregorian calendar, in UTC (days from civil, after H. Hinnant's algorithm for the proleptic calendar).
+fn date(now: SystemTime) -> String {
+    let seconds = now.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let days = seconds / 86_400 + 719_468;
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month + 2) / 5 + 1;
+    let (year, month) = (year_of_era + era * 400, if month < 10 { month + 3 } else { month - 9 });
+    format!("{:04}-{month:02}-{day:02}", if month <= 2 { year + 1 } else { year })
+}
+
+/// What is told of a calibration.
+#[derive(serde::Serialize)]
+struct Report {
+    detector: String,
+    out: String,
+    frames: usize,
+    touched: usize,
+    single: usize,
+    presses: usize,
+    known: usize,
+    /// Residual over noise and model error, root mean square.
+    residual: f64,
+    /// Expected standard error of places (m).
+    place_error_m: f64,
+    /// Places and their standard errors (m).
+    place_errors_m: Vec<[f64; 3]>,
+    wires: Option<Vec<usize>>,
+    left_out: Vec<usize>,
+    parameters: Vec<ReportedParameter>,
+    seconds: f64,
+}
+
+#[derive(serde::Serialize)]
+struct ReportedParameter {
+    parameter: String,
+    standard_error: f64,
+    left_at_prior: bool,
+}
+
+impl Report {
+    fn of(found: &Rub, args: &Args, frames: usize, took: Duration) -> Self {
+        let known = found.detector.calibration.iter().flat_map(|calibration| &calibration.parameters);
+        Self {
+            detector: found.detector.name.clone(),
+            out: args.out.display().to_string(),
+            frames,
+            touched: found.touched,
+            single: found.single,
+            presses: found.presses,
+            known: found.known,
+            residual: found.chi_square[1].sqrt(),
+            place_error_m: found.place_error_m(),
+            place_errors_m: found.place_errors_m.iter().map(|([x, y], error_m)| [*x, *y, *error_m]).collect(),
+            wires: found.wires.clone(),
+            left_out: found.left_out.clone(),
+            parameters: known
+                .map(|known| ReportedParameter {
+                    parameter: known.parameter.to_string(),
+                    standard_error: known.standard_error,
+                    left_at_prior: known.is_prior,
+                })
+                .collect(),
+            seconds: took.as_secs_f64(),
+        }
+    }
+
+    /// For a person.
+    fn table(&self, found: &Rub) -> String {
+        let detector = &found.detector;
+        let error = |name: &str| self.parameters.iter().find(|known| known.parameter == name);
+        let share = |name: &str| match error(name) {
+            Some(known) if known.left_at_prior => "as described: the readings do not tell".to_owned(),
+            Some(known) => format!("+- {:.0} %", 100.0 * known.standard_error),
+            None => "taken as exact".to_owned(),
+        };
+        let [first, last] = [detector.layers.first(), detector.layers.last()];
+        let ratio = first.zip(last).map_or(1.0, |(bottom, top)| top.top_s_per_m / bottom.bottom_s_per_m);
+        let mut lines = vec![
+            format!(
+                "{} of {} touched frames have a single contact; {} presses were fitted in {:.1} s, residual {:.2} x noise",
+                self.single, self.touched, self.presses, self.seconds, self.residual
+            ),
+            format!("thickness {:.2} mm {}", 1e3 * detector.thickness_m(), share("thickness")),
+            format!("top over bottom {ratio:.2} {}", share("top-over-bottom")),
+            format!(
+                "places of a press are expected within {:.2} mm (one standard error, mean over the sensor)",
+                1e3 * self.place_error_m
+            ),
+        ];
+        if let Some(wires) = &self.wires {
+            let moved = wires.iter().enumerate().filter(|(channel, electrode)| channel != *electrode);
+            let told: Vec<_> =
+                moved.map(|(channel, electrode)| format!("{channel} is at electrode {electrode}")).collect();
+            lines.push(format!("wires are exchanged, and taken as they are: channel {}", told.join(", ")));
+        }
+        if !self.left_out.is_empty() {
+            lines
+                .push(format!("electrodes {:?} are broken or contradict the others, and were left out", self.left_out));
+        }
+        if self.known == 0 {
+            lines.push(
+                "no press at a known place: the sensor may be taken for turned or mirrored; --known fixes that"
+                    .to_owned(),
+            );
+        }
+        lines.push(format!("written to {}", self.out));
+        lines.join("\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        let at = |days: u64| date(SystemTime::UNIX_EPOCH + Duration::from_secs(86_400 * days + 5));
+        assert_eq!([at(0), at(59), at(11_016), at(20_778)], ["1970-01-01", "1970-03-01", "2000-02-29", "2026-11-21"]);
+    }
+}

@@ -1,0 +1,388 @@
+//! `tactomo calibrate force` as a user calls it: presses of known force in, a detector with newtons out.
+
+#![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tactomo::board::record::{Header, RecordWriter};
+use tactomo::detector::{Detector, Foam};
+use tactomo::forward::{ForwardModel, readings_v};
+use tactomo::hertz::Hertz;
+use tactomo::readings::Readings;
+use tactomo::scene::Contact;
+use tactomo::simulate::{Noise, finer_model, measured};
+use tactomo_protocol::{BoardMessage, FrameHead, Hello, MAX_WIRE, encode_board, encode_frame};
+
+/// Ten presses on a kitchen scale (N).
+const TEN_N: [f64; 10] = [0.1, 0.15, 0.25, 0.4, 0.6, 0.8, 1.1, 1.5, 2.0, 2.6];
+/// Quantile of the normal distribution below which 95 % are.
+const BAND: f64 = 1.645;
+
+fn tactomo(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).output().unwrap()
+}
+
+/// A folder that goes when the test ends.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("tactomo-{}-force-{name}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+
+    fn with(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
+        std::fs::write(self.0.join(name), bytes).unwrap();
+        self.path(name)
+    }
+
+    fn names(&self) -> Vec<String> {
+        let files = std::fs::read_dir(&self.0).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<_> = files.collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _gone = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A ball of 8 mm that presses on `square-60`, by a finer model than the one that is inverted.
+struct Bench {
+    detector: Detector,
+    finer: Box<dyn ForwardModel>,
+    hertz: Hertz,
+    noise: Noise,
+    random: fastrand::Rng,
+}
+
+impl Bench {
+    fn new(seed: u64) -> Self {
+        let detector = Detector::default();
+        Self {
+            finer: finer_model(&detector, &[], 0).unwrap(),
+            hertz: Hertz::new(&detector, Foam::of('A').unwrap().into()).unwrap(),
+            noise: Noise::new(seed),
+            random: fastrand::Rng::with_seed(seed),
+            detector,
+        }
+    }
+
+    /// A press anywhere but next to the wall.
+    fn ball(&mut self, force_n: f64) -> Contact {
+        let [x_m, y_m] = [0, 1].map(|_| 0.05 * (self.random.f64() - 0.5));
+        self.ball_at([x_m, y_m], force_n)
+    }
+
+    fn ball_at(&self, [x_m, y_m]: [f64; 2], force_n: f64) -> Contact {
+        let imprint = self.hertz.ball(0.008, force_n);
+        Contact::flat(x_m, y_m, imprint.half_width_m, imprint.conductance_s)
+    }
+
+    fn exact(&self, contacts: &[Contact]) -> Readings {
+        match contacts {
+            [] => Readings::from_fn(16, |_, _| 0.0),
+            _ => readings_v(&self.finer.impedance_ohm(contacts).unwrap(), &self.detector),
+        }
+    }
+
+    fn row(&mut self, contacts: &[Contact]) -> Vec<f64> {
+        measured(&self.exact(contacts), &self.detector.adc, &mut self.noise).volts().to_vec()
+    }
+
+    /// Rows of presses with these forces. The foam presses back with so much more or less, as a logarithm, while it is let go or loaded.
+    fn rows(&mut self, forces_n: &[f64], hysteresis: f64) -> Vec<Vec<f64>> {
+        let of = |force_n: &f64| {
+            let side = if self.random.bool() { hysteresis } else { -hysteresis };
+            let ball = self.ball(force_n * side.exp());
+            self.row(&[ball])
+        };
+        forces_n.iter().map(of).collect()
+    }
+}
+
+fn csv(rows: &[Vec<f64>]) -> String {
+    let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    rows.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+fn list(forces_n: &[f64]) -> String {
+    forces_n.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+}
+
+fn calibrated(args: &[&str]) -> Value {
+    let output = tactomo(&[&["calibrate", "force"], args, &["--json"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// What stands on stderr of a calibration that fails and writes nothing.
+fn refused(folder: &Folder, args: &[&str]) -> String {
+    let before = folder.names();
+    let out = folder.path("never.toml");
+    let output = tactomo(&[&["calibrate", "force"], args, &["--out", &out]].concat());
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0));
+    assert_eq!(folder.names(), before, "nothing is written");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// Force, its standard error and the flag of the only contact of each frame.
+fn forces(file: &str, detector: &str, solver: &str) -> Vec<(f64, f64, bool)> {
+    let output = tactomo(&["reconstruct", file, "--detector", detector, "--solver", solver, "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let of = |line: &str| {
+        let frame: Value = serde_json::from_str(line).unwrap();
+        let contact = &frame["contacts"][0];
+        let number = |name: &str| contact[name].as_f64().unwrap_or_else(|| panic!("{solver} has no {name}: {frame}"));
+        (number("force_n"), number("force_deviation_n"), contact["force_beyond_maximum"].as_bool().unwrap())
+    };
+    String::from_utf8(output.stdout).unwrap().lines().map(of).collect()
+}
+
+#[test]
+fn ten_presses_give_newtons_within_their_hysteresis() {
+    const HYSTERESIS: f64 = 0.1;
+    let folder = Folder::new("round");
+    let (mut middle, mut off, mut within, mut count) = (Vec::new(), Vec::new(), 0, 0);
+    for seed in 0..10 {
+        let mut bench = Bench::new(seed);
+        let presses = folder.with("presses.csv", csv(&bench.rows(&TEN_N, HYSTERESIS)));
+        let out = folder.path(&format!("cal-{seed}.toml"));
+        let report = calibrated(&[&presses, "--newtons", &list(&TEN_N), "--out", &out]);
+        assert_eq!(report["presses"].as_array().map(Vec::len), Some(10));
+        assert_eq!(report["left_out"], serde_json::json!([]), "{report}");
+        let truth: Vec<f64> = (0..16).map(|k| 0.1 * 26f64.powf(f64::from(k) / 15.0)).collect();
+        let others = folder.with("others.csv", csv(&bench.rows(&truth, HYSTERESIS)));
+        for (force_n, (found_n, deviation_n, _)) in truth.iter().zip(forces(&others, &out, "auto")) {
+            off.push((found_n / force_n).ln().abs());
+            count += 1;
+            within += usize::from((found_n - force_n).abs() < BAND * deviation_n);
+        }
+        let still = folder.with("still.csv", csv(&bench.rows(&truth, 0.0)));
+        let errors = truth.iter().zip(forces(&still, &out, "auto")).map(|(truth, found)| (found.0 / truth).ln().abs());
+        middle.push(errors.sum::<f64>() / 16.0);
+    }
+    middle.sort_by(f64::total_cmp);
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    assert!(middle[8] < HYSTERESIS, "the middle of both curves is missed by {middle:?}");
+    // A press is off by the hysteresis to either side, whoever tells it, and by what the middle is off.
+    assert!(mean < 1.1 * HYSTERESIS, "{mean}");
+    assert!(within * 10 >= 9 * count, "{within} of {count} in bands of 90 %");
+}
+
+#[test]
+fn every_solver_tells_the_force_that_was_calibrated_and_the_flag_beyond() {
+    let folder = Folder::new("solvers");
+    let mut bench = Bench::new(7);
+    let presses = folder.with("presses.csv", csv(&bench.rows(&TEN_N, 0.0)));
+    let out = folder.path("cal.toml");
+    let report = calibrated(&[&presses, "--newtons", &list(&TEN_N), "--out", &out]);
+    // A fit of eq. (6) to presses up to 2.6 N has some maximum, at thousands of newtons: it is not told.
+    assert_eq!(
+        (&report["law"], &report["maximum_force"]),
+        (&"saturating".into(), &"not determined".into()),
+        "{report}"
+    );
+    assert!(report["maximum_force_n"].is_null() && report["range_n"] == serde_json::json!([0.1, 2.6]), "{report}");
+    let detector = Detector::read(Path::new(&out)).unwrap();
+    assert_eq!(Detector { force: None, ..detector.clone() }, Detector::default());
+    assert_eq!(detector.force.as_ref().map(|law| (law.presses, law.maximum_n)), Some((10, None)));
+    let truth = [0.2, 0.7, 1.9, 3.5];
+    let places = [[0.004, 0.009], [-0.012, 0.003], [0.0, -0.008], [0.011, 0.012]];
+    let contacts: Vec<_> = places.iter().zip(truth).map(|(at, force_n)| bench.ball_at(*at, force_n)).collect();
+    let rows: Vec<_> = contacts.into_iter().map(|contact| bench.row(&[contact])).collect();
+    let file = folder.with("others.csv", csv(&rows));
+    for (solver, factor) in
+        [("auto", 1.05), ("contacts", 1.05), ("kernel", 1.05), ("nonlinear", 1.1), ("bsbl", 1.1), ("tikhonov", 1.6)]
+    {
+        let found = forces(&file, &out, solver);
+        for (truth_n, (found_n, deviation_n, beyond)) in truth.iter().zip(&found) {
+            assert!((found_n / truth_n).ln().abs() < f64::ln(factor), "{solver}: {found_n} N, {truth_n} N");
+            assert!(*deviation_n > 0.0 && *deviation_n < *found_n, "{solver}: {deviation_n} N");
+            assert!(factor > 1.5 || *beyond == (*truth_n > 2.6), "{solver}: {truth_n} N");
+        }
+    }
+    let told = tactomo(&["reconstruct", &file, "--detector", &out, "--solver", "contacts"]);
+    let told = String::from_utf8(told.stdout).unwrap();
+    assert!(
+        told.lines().all(|line| line.contains(" N")) && told.contains("N (beyond the largest that can be told)"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_file_is_never_replaced_and_bad_presses_write_none() {
+    let folder = Folder::new("bad");
+    let mut bench = Bench::new(3);
+    let rows = bench.rows(&TEN_N, 0.0);
+    let good = folder.with("good.csv", csv(&rows));
+    let precious = folder.with("precious.toml", "precious");
+    let output = tactomo(&["calibrate", "force", &good, "--newtons", &list(&TEN_N), "--out", &precious]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("exists already, and is not replaced"));
+    assert_eq!(std::fs::read_to_string(&precious).unwrap(), "precious");
+
+    let backwards: Vec<f64> = TEN_N.iter().rev().copied().collect();
+    let mut exchanged = TEN_N;
+    exchanged.swap(1, 6);
+    let mut two = rows.clone();
+    let pair = [bench.ball_at([-0.015, 0.0], 0.3), bench.ball_at([0.015, 0.0], 0.3)];
+    two[3] = bench.row(&pair);
+    let mut light = rows.clone();
+    light[0] = bench.row(&[]);
+    let two = folder.with("two.csv", csv(&two));
+    let light = folder.with("light.csv", csv(&light));
+    let nothing = folder.with("nothing.csv", csv(&(0..10).map(|_| bench.row(&[])).collect::<Vec<_>>()));
+    let few = folder.with("few.csv", csv(&rows[..4]));
+    let sensor = folder.with("sensor.csv", "time_s,force_n\n0,1\n1,2\n");
+    let no_force = folder.with("no-force.csv", "newtons\n1\n2\n");
+    for (file, known, told) in [
+        (&good, ["--newtons", &list(&backwards)], "They would fit in the reverse order"),
+        (
+            &good,
+            ["--newtons", &list(&exchanged)],
+            "presses 2 and 7 do not agree with the others, but would if their forces",
+        ),
+        (&good, ["--newtons", "1,2,3"], "10 rows of readings, but 3 forces are given"),
+        (&two, ["--newtons", &list(&TEN_N)], "row 4 has 2 contacts: press with one tip"),
+        (&light, ["--newtons", &list(&TEN_N)], "press 1 (0.1 N) is too light to be found"),
+        (&nothing, ["--newtons", &list(&TEN_N)], "no press in any of its 10 rows"),
+        (&few, ["--newtons", &list(&TEN_N[..4])], "4 presses, but 5 at least are needed"),
+        (&good, ["--newtons", "1,1.1,1.2,1.3,1.4,1.5,1.6,1.7,1.8,1.9"], "the forces go from 1 N to 1.9 N only"),
+        (&good, ["--forces", &sensor], "a table of readings has no times"),
+        (&good, ["--forces", &no_force], "a column named force_n is needed"),
+    ] {
+        let message = refused(&folder, &[file, known[0], known[1]]);
+        assert!(message.contains(told), "{known:?}: {message}");
+    }
+    let seven = Detector::preset("strip-13x60").unwrap().to_toml().replace("grid = [2, 8]", "grid = [2, 7]");
+    let other = folder.with("other.toml", seven);
+    let message = refused(&folder, &[&good, "--detector", &other, "--newtons", &list(&TEN_N)]);
+    assert!(
+        message.contains("has 256 readings a frame, but the detector strip-13x60 with its 14 electrodes"),
+        "{message}"
+    );
+    for wrong in [
+        &[&good, "--out", "x.toml"][..],
+        &[&good, "--newtons", "1,-2", "--out", "x.toml"],
+        &[&good, "--newtons", "1", "--law", "5"],
+    ] {
+        assert_eq!(tactomo(&[&["calibrate", "force"], wrong].concat()).status.code(), Some(2), "{wrong:?}");
+    }
+}
+
+/// A recording at 100 frames a second of what touches at each time (s).
+fn recording(path: &str, bench: &mut Bench, seconds: f64, touches: impl Fn(&Bench, f64) -> Option<Contact>) {
+    let header = Header::of(&bench.detector, "a test".to_owned(), 0);
+    let mut writer = RecordWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
+    let mut wire = [0; MAX_WIRE];
+    let hello = Hello { adc_bits: 12, adc_full_scale_mv: 3300, drive_mv: 2000, ..Hello::example(16) };
+    let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
+    writer.write(0, &wire[..length]).unwrap();
+    for sequence in 0..(100.0 * seconds) as u16 {
+        let contact = touches(bench, 0.01 * f64::from(sequence));
+        let lsb_v = bench.detector.adc.lsb_v();
+        let row = bench.row(contact.as_slice());
+        let codes: Vec<u16> = row.iter().map(|volts| (volts / lsb_v).round() as u16).collect();
+        let head = FrameHead { sequence, time_us: 10_000 * u32::from(sequence), ..FrameHead::default() };
+        let length = encode_frame(head, &codes, &mut wire).unwrap();
+        writer.write(10_000 * u64::from(sequence), &wire[..length]).unwrap();
+    }
+    writer.flush().unwrap();
+}
+
+#[test]
+fn presses_of_a_recording_are_found_and_counted() {
+    const FORCES_N: [f64; 6] = [0.2, 1.5, 0.5, 2.2, 0.9, 0.3];
+    let folder = Folder::new("recording");
+    let mut bench = Bench::new(5);
+    let file = folder.path("scale.tactomo");
+    // A press a second from 0.5 s on, each 0.6 s long with 0.1 s to come and to go.
+    recording(&file, &mut bench, 6.8, |bench, time_s| {
+        let (k, at_s) = ((time_s - 0.5).div_euclid(1.0), (time_s - 0.5).rem_euclid(1.0));
+        let full_n = FORCES_N.get(k as usize).filter(|_| k >= 0.0)?;
+        let force_n = full_n * (at_s / 0.1).min((0.6 - at_s) / 0.1).min(1.0);
+        let place_m = [0.004 * k - 0.01, 0.012 - 0.005 * k];
+        (force_n > 0.0).then(|| bench.ball_at(place_m, force_n))
+    });
+    let out = folder.path("cal.toml");
+    let report = calibrated(&[&file, "--newtons", &list(&FORCES_N), "--out", &out]);
+    for (press, force_n) in report["presses"].as_array().unwrap().iter().zip(FORCES_N) {
+        let found_n = press["fitted_force_n"].as_f64().unwrap();
+        assert!((found_n / force_n).ln().abs() < 0.04, "{press}");
+    }
+    let message = refused(&folder, &[&file, "--newtons", "1,2,3,4,5"]);
+    assert!(message.contains("6 presses are found, but 5 forces are given"), "{message}");
+    assert!(message.contains("presses begin at 0.5, 1.5, 2.5, 3.5, 4.5, 5.5 s"), "{message}");
+    // The recording is still one of this detector, whatever is known of its forces.
+    let again = tactomo(&["reconstruct", &file, "--detector", &out, "--solver", "contacts", "--json"]);
+    assert!(
+        !String::from_utf8_lossy(&again.stderr).contains("was recorded on"),
+        "{}",
+        String::from_utf8_lossy(&again.stderr)
+    );
+}
+
+#[test]
+fn a_force_sensor_tells_loading_from_unloading() {
+    const HALF: f64 = 0.08;
+    let folder = Folder::new("sensor");
+    let mut bench = Bench::new(6);
+    let force_n = |time_s: f64| (2.5 * (1.0 - ((time_s - 0.3).rem_euclid(2.0) - 0.9).abs() / 0.9)).max(0.0);
+    let file = folder.path("ramp.tactomo");
+    recording(&file, &mut bench, 6.3, |bench, time_s| {
+        if time_s < 0.3 {
+            return None;
+        }
+        let (k, at_s) = ((time_s - 0.3).div_euclid(2.0), (time_s - 0.3).rem_euclid(2.0));
+        // Let go, the foam touches as if it were pressed harder.
+        let side = if at_s < 0.9 { -HALF } else { HALF };
+        (force_n(time_s) > 0.01).then(|| bench.ball_at([0.006 * k - 0.006, 0.003], force_n(time_s) * side.exp()))
+    });
+    let sensor: String = (0..640)
+        .map(|k| 0.01 * f64::from(k))
+        .map(|s| format!("{s},{}\n", if s < 0.3 { 0.0 } else { force_n(s) }))
+        .collect();
+    let sensor = folder.with("sensor.csv", format!("time_s,force_n\n{sensor}"));
+    let out = folder.path("cal.toml");
+    let report = calibrated(&[&file, "--forces", &sensor, "--out", &out]);
+    let count = |direction: &str| {
+        report["presses"].as_array().unwrap().iter().filter(|press| press["direction"] == direction).count()
+    };
+    assert!(count("loading") > 15 && count("unloading") > 15, "{report}");
+    let law = Detector::read(Path::new(&out)).unwrap().force.unwrap();
+    // Half the width is 0.08 of the force, and some 0.4 of that of the conductance: its power of the force.
+    let of_force = (law.force_n(law.conductance_s(1.0) * (1.0 + law.hysteresis), 0.0).force_n).ln();
+    assert!((of_force / HALF - 1.0).abs() < 0.25, "{of_force}: {law:?}");
+    assert!(law.scatter < 0.03, "{law:?}");
+    // The uppermost press is a mean over a quarter.
+    assert!((2.0..2.5).contains(&law.range_n[1]), "{law:?}");
+    let late = folder.with("late.csv", "time_s,force_n\n100,1\n101,2\n");
+    let message = refused(&folder, &[&file, "--forces", &late]);
+    assert!(message.contains("the sensor is from 100.0 to 101.0 s"), "{message}");
+}
+
+#[test]
+fn a_wanted_law_that_is_open_is_not_determined() {
+    let folder = Folder::new("open");
+    let mut bench = Bench::new(9);
+    // So light that the constriction hardly counts.
+    let forces_n = [0.0002, 0.0003, 0.0005, 0.0008, 0.0012, 0.002];
+    let file = folder.with("light.csv", csv(&bench.rows(&forces_n, 0.05)));
+    let report =
+        calibrated(&[&file, "--newtons", &list(&forces_n), "--law", "saturating", "--out", &folder.path("cal.toml")]);
+    assert_eq!((&report["law"], &report["maximum_force"]), (&"saturating".into(), &"not determined".into()));
+    assert_eq!(report["parameters"][2]["name"], "series_ohm");
+    assert!(report["parameters"][2]["value"].is_null() && report["maximum_force_n"].is_null(), "{report}");
+    assert!(report["maximum_force_as_printed_n"].is_null());
+}

@@ -1,0 +1,449 @@
+//! Detector and contacts of a rub, fitted together: a bundle adjustment.
+//!
+//! Unknown are the detector's [`Parameter`]s, with its tolerances as their prior, and of each press place, conductance and radius of a single
+//! contact. What is minimised is the sum over all readings of `((V - V(detector, contact)) / s)^2`, with `s` noise and the model's own error
+//! together, and of the parameters' squares in standard deviations: the maximum a posteriori. It is done by Gauss and Newton, with the contacts
+//! eliminated press by press (Schur's complement, as in Triggs et al., "Bundle adjustment - a modern synthesis", 2000). Presses that fit much
+//! worse than most count less (Geman and McClure).
+
+use std::sync::Arc;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use tactomo_physics::detector::{Detector, Parameter};
+use tactomo_physics::forward::{ForwardError, ForwardModel};
+use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
+
+use super::slopes::{Slopes, as_read};
+use super::{CalibrateError, Step};
+use crate::threads::map;
+
+/// Error of the slab as a share of `Vcc - V`: against readings of an independent program, but for what pads' own impedances take up, 0.07 %.
+const MODEL_ERROR: f64 = 0.0007;
+/// Standard deviation of the logarithm of a contact's radius about the usual one, and of its conductance about where it was found.
+const RADIUS_DEVIATION: f64 = 0.5;
+const CONDUCTANCE_DEVIATION: f64 = 3.0;
+/// Unknowns of a press.
+const OF_PRESS: usize = 4;
+/// Most iterations.
+const MOST_ITERATIONS: usize = 9;
+/// Share of the sum of squares by which an iteration has to better it for there to be another one.
+const WORTH: f64 = 5e-3;
+/// Dampings that are tried, as shares of the information.
+const DAMPINGS: [f64; 4] = [0.0, 0.01, 0.1, 1.0];
+/// Steps of a contact on a new detector, and share of its sum of squares that one has to better.
+const REFITS: usize = 6;
+const REFIT_WORTH: f64 = 1e-3;
+/// Share of its sum of squares below which another contact is taken for a press.
+const WORTH_MOVING: f64 = 0.9;
+/// Largest step of a parameter in an iteration, in its unit for logarithms and in standard deviations for others.
+const LARGEST_LOG: f64 = 1.0;
+const LARGEST_DEVIATIONS: f64 = 3.0;
+
+/// A press: one contact for as long as it stands.
+#[derive(Clone, Debug)]
+pub(super) struct Press {
+    /// Mean readings (V), less the baseline.
+    pub readings: Readings,
+    /// Standard deviation of each by noise (V).
+    pub noise_v: f64,
+    /// Where it is known to be (m), and to what standard deviation (m).
+    pub known_m: Option<([f64; 2], f64)>,
+    /// The contact as it is fitted.
+    pub contact: Contact,
+    /// Radius and conductance that it is held near to.
+    pub usual: Contact,
+}
+
+/// A detector under adjustment, with its presses.
+pub(super) struct Bundle {
+    /// The description.
+    nominal: Detector,
+    /// What is unknown, and the standard deviation of each before.
+    pub parameters: Vec<(Parameter, f64)>,
+    /// Where each is, in standard deviations.
+    pub steps: DVector<f64>,
+    pub model: Arc<dyn ForwardModel>,
+    pub presses: Vec<Press>,
+    full_v: f64,
+}
+
+/// What the bundle says at one point.
+pub(super) struct Normal {
+    /// Of the detector's parameters alone, contacts eliminated, in standard deviations before: information without the prior, and slope.
+    pub information: DMatrix<f64>,
+    slope: DVector<f64>,
+    /// Information of an average press by itself, at a contact that is known.
+    pub of_press: DMatrix<f64>,
+    /// What takes steps of the detector to those of each press.
+    of_presses: Vec<(DVector<f64>, DMatrix<f64>)>,
+    /// Sum of squares of each press, and the weight that it has.
+    pub costs: Vec<f64>,
+    pub weights: Vec<f64>,
+}
+
+impl Bundle {
+    pub fn new(
+        model: Arc<dyn ForwardModel>,
+        parameters: Vec<(Parameter, f64)>,
+        presses: Vec<Press>,
+        full_v: f64,
+    ) -> Self {
+        let steps = DVector::zeros(parameters.len());
+        Self { nominal: model.detector().clone(), parameters, steps, model, presses, full_v }
+    }
+
+    /// The description with the steps taken.
+    fn detector_at(&self, steps: &DVector<f64>) -> Detector {
+        let step = |((parameter, deviation), step): (&(Parameter, f64), &f64)| (*parameter, deviation * step);
+        let all: Vec<_> = self.parameters.iter().zip(steps.iter()).map(step).collect();
+        self.nominal.stepped(&all)
+    }
+
+    /// The detector as it stands.
+    pub fn detector(&self) -> Detector {
+        self.detector_at(&self.steps)
+    }
+
+    /// Readings that count.
+    pub fn count(&self, press: &Press) -> usize {
+        let n = press.readings.electrodes();
+        let counts = |index: usize| index / n != index % n && press.readings.volts()[index] < self.full_v;
+        (0..n * n).filter(|index| counts(*index)).count()
+    }
+
+    /// One over the standard deviation of each reading (1/V), zero of those that do not count.
+    fn weights(&self, press: &Press) -> Vec<f64> {
+        let (n, drive_v) = (press.readings.electrodes(), self.nominal.drive_v);
+        let weight = |(index, volts): (usize, &f64)| match index / n == index % n || *volts >= self.full_v {
+            true => 0.0,
+            false => 1.0 / press.noise_v.hypot(MODEL_ERROR * (drive_v - volts).max(0.0)),
+        };
+        press.readings.volts().iter().enumerate().map(weight).collect()
+    }
+
+    /// Sum of squares of a press and of what is known of it before.
+    fn cost(&self, model: &dyn ForwardModel, press: &Press, contact: &Contact) -> f64 {
+        let Ok(impedance_ohm) = model.impedance_ohm(&[*contact]) else { return f64::INFINITY };
+        let predicted = as_read(&impedance_ohm, model.detector());
+        let pairs = press.readings.volts().iter().zip(&predicted).zip(self.weights(press));
+        pairs.map(|((ours, theirs), weight)| (weight * (ours - theirs)).powi(2)).sum::<f64>()
+            + press.prior(contact).iter().map(|(off, _)| off * off).sum::<f64>()
+    }
+
+    /// The normal equations at the model as it is.
+    pub fn normal(&self, slopes: &Slopes) -> Normal {
+        let count = self.parameters.len();
+        let all = map(&self.presses, |press| self.of_press(press, slopes).unwrap_or_else(|| OfPress::nothing(count)));
+        let costs: Vec<f64> = all.iter().map(|of| of.cost).collect();
+        let weights = self.robust(&costs);
+        let (mut information, mut slope) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut of_press = DMatrix::zeros(count, count);
+        let mut of_presses = Vec::with_capacity(all.len());
+        let share = 1.0 / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        for (of, weight) in all.into_iter().zip(&weights) {
+            information += of.information * *weight;
+            of_press += of.known * (*weight * share);
+            slope += of.slope * *weight;
+            of_presses.push((of.step, of.coupling));
+        }
+        Normal { information, slope, of_press, of_presses, costs, weights }
+    }
+
+    /// Weights of presses by their sums of squares: half where one is four times as bad as most.
+    fn robust(&self, costs: &[f64]) -> Vec<f64> {
+        let shares: Vec<f64> =
+            costs.iter().zip(&self.presses).map(|(cost, press)| cost / self.count(press).max(1) as f64).collect();
+        let mut sorted = shares.clone();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(1.0);
+        shares.iter().map(|share| 1.0 / (1.0 + (share / (4.0 * usual)).powi(2)).powi(2)).collect()
+    }
+
+    /// Derivatives by the contact of a press; `None` if it cannot be on the detector.
+    fn of_contact(&self, model: &dyn ForwardModel, press: &Press, contact: &Contact) -> Option<OfContact> {
+        let detector = model.detector();
+        let near = contact.neighbours(detector);
+        let replaced: Vec<_> = near.iter().map(|(contact, _)| (0, *contact)).collect();
+        let (impedance_ohm, changes) = model.impedance_with_changes_ohm(&[*contact], &replaced).ok()?;
+        let weights = DVector::from_vec(self.weights(press));
+        let predicted = DVector::from_vec(as_read(&impedance_ohm, detector));
+        let volts = DVector::from_column_slice(press.readings.volts());
+        let residual = weights.component_mul(&(volts - &predicted));
+        let column = |(change, (_, step)): (&DMatrix<f64>, &(Contact, f64))| {
+            let moved = DVector::from_vec(as_read(&(&impedance_ohm + change), detector));
+            weights.component_mul(&((moved - &predicted) / *step))
+        };
+        let columns: Vec<_> = changes.iter().zip(&near).map(column).collect();
+        let slopes = DMatrix::from_columns(&columns);
+        let mut own = slopes.tr_mul(&slopes);
+        let mut slope = slopes.tr_mul(&residual);
+        let mut cost = residual.norm_squared();
+        for (k, (off, per)) in press.prior(contact).into_iter().enumerate() {
+            own[(k, k)] += per * per;
+            slope[k] -= off * per;
+            cost += off * off;
+        }
+        Some(OfContact { impedance_ohm, weights, predicted, residual, slopes, own, slope, cost })
+    }
+
+    fn of_press(&self, press: &Press, slopes: &Slopes) -> Option<OfPress> {
+        let contact = self.of_contact(&*self.model, press, &press.contact)?;
+        let weights = &contact.weights;
+        let mut of_detector = DMatrix::zeros(weights.len(), self.parameters.len());
+        slopes.readings_v(&press.contact, &contact.impedance_ohm, contact.predicted.as_slice(), |column, change_v| {
+            of_detector.column_mut(column).iter_mut().zip(change_v).zip(weights).for_each(|((to, v), w)| *to = w * v);
+        });
+        let factor = Cholesky::new(contact.own)?;
+        let coupling = factor.solve(&contact.slopes.tr_mul(&of_detector));
+        let step = factor.solve(&contact.slope);
+        let known = of_detector.tr_mul(&of_detector);
+        let information = &known - of_detector.tr_mul(&contact.slopes) * &coupling;
+        let slope = of_detector.tr_mul(&(contact.residual - &contact.slopes * &step));
+        Some(OfPress { cost: contact.cost, information, known, slope, step, coupling })
+    }
+
+    /// Adjusts everything, with derivatives that are made anew in the first iterations; tells after each how far it is.
+    pub fn adjust(
+        &mut self,
+        slopes: &mut Slopes,
+        renewed: usize,
+        told: &mut dyn FnMut(Step) -> bool,
+    ) -> Result<Normal, CalibrateError> {
+        let mut normal = self.normal(slopes);
+        for iteration in 1..=MOST_ITERATIONS {
+            let before = self.objective(&normal, &self.steps);
+            let bettered = self.step(&normal)?;
+            if iteration <= renewed && bettered {
+                *slopes = Slopes::new(&*self.model, &self.parameters)?;
+            }
+            normal = self.normal(slopes);
+            let after = self.objective(&normal, &self.steps);
+            if !told(Step { iteration, most: MOST_ITERATIONS, chi_square: self.chi_square(&normal) }) {
+                return Err(CalibrateError::Stopped);
+            }
+            if !bettered || before - after < WORTH * before {
+                break;
+            }
+        }
+        Ok(normal)
+    }
+
+    /// Sum of squares for each reading, of those presses that count.
+    pub fn chi_square(&self, normal: &Normal) -> f64 {
+        let counts = self.presses.iter().map(|press| self.count(press) as f64);
+        let (mut sum, mut all) = (0.0, 0.0);
+        for ((cost, weight), count) in normal.costs.iter().zip(&normal.weights).zip(counts) {
+            sum += weight * cost;
+            all += weight * count;
+        }
+        sum / all.max(1.0)
+    }
+
+    fn objective(&self, normal: &Normal, steps: &DVector<f64>) -> f64 {
+        steps.norm_squared() + normal.costs.iter().zip(&normal.weights).map(|(cost, weight)| cost * weight).sum::<f64>()
+    }
+
+    /// One step, damped until it betters the sum of squares (Levenberg and Marquardt); whether it did.
+    fn step(&mut self, normal: &Normal) -> Result<bool, ForwardError> {
+        let before = self.objective(normal, &self.steps);
+        for damping in DAMPINGS {
+            let Some(step) = self.damped(normal, damping) else { continue };
+            let steps = &self.steps + &step;
+            let Ok(model) = self.model.of_similar(&self.detector_at(&steps)) else { continue };
+            let moved: Vec<_> = self.presses.iter().zip(&normal.of_presses).collect();
+            let fitted = map(&moved, |(press, (own, coupling))| {
+                let moved = press.contact.moved(&(own - coupling * &step), model.detector());
+                self.refit(&*model, press, [moved, press.contact])
+            });
+            let costs = fitted.iter().zip(&normal.weights).map(|((_, cost), weight)| cost * weight).sum::<f64>();
+            if steps.norm_squared() + costs < before {
+                self.steps = steps;
+                self.model = model;
+                self.presses.iter_mut().zip(&fitted).for_each(|(press, (contact, _))| press.contact = *contact);
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The step of the detector with a damping, within what a step may be.
+    fn damped(&self, normal: &Normal, damping: f64) -> Option<DVector<f64>> {
+        let count = self.parameters.len();
+        let mut system = &normal.information + DMatrix::identity(count, count);
+        (0..count).for_each(|k| system[(k, k)] *= 1.0 + damping);
+        let step = Cholesky::new(system)?.solve(&(&normal.slope - &self.steps));
+        let excess = |((parameter, deviation), step): (&(Parameter, f64), &f64)| {
+            let most = if parameter.is_log() { LARGEST_LOG / deviation } else { LARGEST_DEVIATIONS };
+            step.abs() / most
+        };
+        let excess = self.parameters.iter().zip(step.iter()).map(excess).fold(1.0, f64::max);
+        Some(step / excess)
+    }
+
+    /// The contact that fits a press best on a model, from the better of two starts, and its cost.
+    fn refit(&self, model: &dyn ForwardModel, press: &Press, starts: [Contact; 2]) -> (Contact, f64) {
+        let [a, b] = starts.map(|contact| (contact, self.cost(model, press, &contact)));
+        let mut best = if a.1 <= b.1 { a } else { b };
+        let mut damping = 1e-3;
+        for _ in 0..REFITS {
+            let Some(of) = self.of_contact(model, press, &best.0) else { break };
+            let mut system = of.own.clone();
+            (0..OF_PRESS).for_each(|k| system[(k, k)] *= 1.0 + damping);
+            let Some(factor) = Cholesky::new(system) else { break };
+            let moved = best.0.moved(&factor.solve(&of.slope), model.detector());
+            let cost = self.cost(model, press, &moved);
+            let bettered_by = best.1 - cost;
+            if bettered_by > 0.0 {
+                best = (moved, cost);
+                damping *= 0.1;
+            } else {
+                damping = 10.0 * f64::max(damping, 0.1);
+            }
+            if bettered_by.abs() < REFIT_WORTH * best.1 {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Standard error of the place (m) at which a contact would be found in one frame, by noise and by what is unknown of the detector with such a
+    /// covariance; `None` where the contact cannot be.
+    pub fn place_error_m(&self, contact: &Contact, slopes: &Slopes, covariance: &DMatrix<f64>) -> Option<f64> {
+        let predicted = as_read(&self.model.impedance_ohm(&[*contact]).ok()?, self.model.detector());
+        let press = Press {
+            readings: Readings::new(self.nominal.electrodes.len(), predicted)?,
+            noise_v: self.nominal.adc.deviation_v(),
+            known_m: None,
+            contact: *contact,
+            usual: *contact,
+        };
+        let own = Cholesky::new(self.of_contact(&*self.model, &press, contact)?.own)?.inverse();
+        let coupling = self.of_press(&press, slopes)?.coupling;
+        let by_detector = &coupling * covariance * coupling.transpose();
+        Some((0..2).map(|axis| own[(axis, axis)] + by_detector[(axis, axis)]).sum::<f64>().sqrt())
+    }
+
+    /// Presses that fit so many times worse than most.
+    pub fn lost(&self, normal: &Normal, times: f64) -> Vec<usize> {
+        let mut sorted = normal.costs.clone();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+        (0..normal.costs.len()).filter(|index| normal.costs[*index] > times * usual).collect()
+    }
+
+    /// Takes other contacts for some presses where they fit better; whether any does.
+    pub fn offer(&mut self, presses: &[usize], contacts: &[Option<Contact>]) -> bool {
+        let mut any = false;
+        for (index, contact) in presses.iter().zip(contacts) {
+            let Some(contact) = contact else { continue };
+            let press = &self.presses[*index];
+            let cost = |contact: &Contact| self.cost(&*self.model, press, contact);
+            if cost(contact) < WORTH_MOVING * cost(&press.contact) {
+                self.presses[*index].contact = *contact;
+                any = true;
+            }
+        }
+        any
+    }
+}
+
+/// A contact of a press, with derivatives by its unknowns; readings over their deviations.
+struct OfContact {
+    impedance_ohm: DMatrix<f64>,
+    weights: DVector<f64>,
+    /// Readings that it gives (V).
+    predicted: DVector<f64>,
+    residual: DVector<f64>,
+    slopes: DMatrix<f64>,
+    /// Normal equations with what is known before.
+    own: DMatrix<f64>,
+    slope: DVector<f64>,
+    cost: f64,
+}
+
+/// What a press adds to the normal equations.
+struct OfPress {
+    cost: f64,
+    information: DMatrix<f64>,
+    /// The same where the contact is known.
+    known: DMatrix<f64>,
+    slope: DVector<f64>,
+    /// Step of the contact, and what a step of the detector takes off it.
+    step: DVector<f64>,
+    coupling: DMatrix<f64>,
+}
+
+impl OfPress {
+    /// Of a press that cannot be computed: it says nothing.
+    fn nothing(count: usize) -> Self {
+        Self {
+            cost: f64::MAX.sqrt(),
+            information: DMatrix::zeros(count, count),
+            known: DMatrix::zeros(count, count),
+            slope: DVector::zeros(count),
+            step: DVector::zeros(OF_PRESS),
+            coupling: DMatrix::zeros(OF_PRESS, count),
+        }
+    }
+}
+
+impl Press {
+    /// Of each unknown of a contact, how far it is from what is known of it before, in standard deviations, and standard deviations in its unit.
+    fn prior(&self, contact: &Contact) -> [(f64, f64); OF_PRESS] {
+        let log = |value: f64, usual: f64, deviation: f64| ((value / usual).ln() / deviation, 1.0 / deviation);
+        let place = |at_m: f64, axis: usize| match self.known_m {
+            Some((known_m, deviation_m)) => ((at_m - known_m[axis]) / deviation_m, 1.0 / deviation_m),
+            None => (0.0, 0.0),
+        };
+        [
+            place(contact.x_m, 0),
+            place(contact.y_m, 1),
+            log(contact.conductance_s, self.usual.conductance_s, CONDUCTANCE_DEVIATION),
+            log(contact.radius_m, self.usual.radius_m, RADIUS_DEVIATION),
+        ]
+    }
+}
+
+/// Steps for derivatives: of a place (m) and of logarithms.
+const STEP_M: f64 = 1e-5;
+const STEP_LOG: f64 = 1e-3;
+
+/// A contact by its unknowns: x, y (m), and the logarithms of conductance and radius.
+trait Moves: Sized {
+    fn moved(&self, step: &DVector<f64>, detector: &Detector) -> Self;
+    fn neighbours(&self, detector: &Detector) -> [(Self, f64); OF_PRESS];
+}
+
+impl Moves for Contact {
+    /// Moved by a step, at most a tenth of the detector and a factor of three, and within the detector.
+    fn moved(&self, step: &DVector<f64>, detector: &Detector) -> Self {
+        let [low, high] = detector.outline.bounds();
+        let place = |at_m: f64, axis: usize| {
+            let most_m = 0.1 * (high[axis] - low[axis]);
+            (at_m + step[axis].clamp(-most_m, most_m)).clamp(low[axis], high[axis])
+        };
+        Self {
+            x_m: place(self.x_m, 0),
+            y_m: place(self.y_m, 1),
+            conductance_s: self.conductance_s * step[2].clamp(-1.1, 1.1).exp(),
+            radius_m: self.radius_m * step[3].clamp(-0.5, 0.5).exp(),
+            ..*self
+        }
+    }
+
+    fn neighbours(&self, detector: &Detector) -> [(Self, f64); OF_PRESS] {
+        // Towards the middle, so that they stay on the detector.
+        let inward = |at_m: f64, axis: usize| {
+            let [low, high] = detector.outline.bounds();
+            if at_m > 0.5 * (low[axis] + high[axis]) { -STEP_M } else { STEP_M }
+        };
+        let (x, y) = (inward(self.x_m, 0), inward(self.y_m, 1));
+        [
+            (Self { x_m: self.x_m + x, ..*self }, x),
+            (Self { y_m: self.y_m + y, ..*self }, y),
+            (Self { conductance_s: self.conductance_s * STEP_LOG.exp(), ..*self }, STEP_LOG),
+            (Self { radius_m: self.radius_m * STEP_LOG.exp(), ..*self }, STEP_LOG),
+        ]
+    }
+}

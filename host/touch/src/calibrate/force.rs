@@ -1,0 +1,304 @@
+//! From presses of known force to a law from conductance to force.
+//!
+//! Two laws are fitted, the power law of the paper's eq. (5) and its eq. (6), which saturates: see
+//! [`ForceLaw`](tactomo_physics::detector::ForceLaw) for what they say of a conductance. Each is fitted with and without a difference between
+//! loading and unloading where presses tell it, by Levenberg's and Marquardt's steps with a share of outliers ([`fit`]). The law with the
+//! lowest Bayesian information criterion is taken: no more law than the presses need. Presses that contradict each other are refused with what to
+//! look at ([`order`]).
+
+mod fit;
+mod order;
+mod stands;
+mod student;
+#[cfg(test)]
+mod tests;
+
+use tactomo_physics::detector::{FARTHEST, ForceLaw};
+
+use self::fit::{Fitted, Form, Point};
+pub use self::order::Mistyped;
+pub use self::stands::{Moment, Stand, pairs, stands};
+
+/// Fewest presses: two or three parameters and a scatter, of which something is left.
+pub const FEWEST: usize = 5;
+/// Largest force over the smallest, at least: with a scatter of 10 %, ten presses then tell the exponent to a tenth or two.
+const SPREAD: f64 = 2.0;
+/// Largest share of presses that may be left out as outliers.
+const LEFT_OUT: f64 = 0.25;
+/// Two-sided confidence at which a parameter has to differ from nothing to be determined: 95 %, as a quantile of the normal distribution.
+const DETERMINED: f64 = 1.959_964;
+/// Quantile of the normal distribution below which 95 % are: bands of 90 %.
+const BAND: f64 = 1.644_854;
+
+/// A press of known force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForcePress {
+    /// Force (N).
+    pub force_n: f64,
+    /// Conductance with its constriction (S): what a solver's contacts have as newtons on a detector with
+    /// [`ForceLaw::siemens`].
+    pub conductance_s: f64,
+    /// Its standard error (S); zero where it is not known.
+    pub deviation_s: f64,
+    /// Whether the force was rising or falling, where that is known.
+    pub direction: Option<Direction>,
+}
+
+/// Which way the force was going.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Direction {
+    /// It was rising.
+    Loading,
+    /// It was falling.
+    Unloading,
+}
+
+/// A law of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Law {
+    /// Eq. (5) without its divider: a power of the force.
+    Power,
+    /// Eq. (6): it saturates.
+    Saturating,
+}
+
+/// The largest force that can be told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MaximumForce {
+    /// Nine tenths of the saturation are reached at this force.
+    Saturation {
+        /// Force (N).
+        force_n: f64,
+        /// Standard error (N).
+        deviation_n: f64,
+    },
+    /// The law does not saturate as far as the presses go: the largest of them.
+    Calibrated {
+        /// Force (N).
+        force_n: f64,
+    },
+    /// The law saturates somewhere, and the presses do not tell where: a parameter of it may be nothing, at 95 % confidence, or the
+    /// maximum is beyond twice the largest press. The paper's sample D has 34975 N from presses of up to 5 N.
+    NotDetermined,
+}
+
+/// A law that was tried.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Candidate {
+    /// Which law.
+    pub law: Law,
+    /// Whether loading and unloading have curves of their own.
+    pub hysteresis: bool,
+    /// Bayesian information criterion: -2 ln likelihood + parameters x ln presses; the lowest is the best.
+    pub bic: f64,
+}
+
+/// A parameter of a law.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct FittedParameter {
+    /// Its name in a detector's file, with its unit.
+    pub name: &'static str,
+    /// Its value; `None` where it is not determined: it may be nothing, at 95 % confidence.
+    pub value: Option<f64>,
+    /// Its standard error.
+    #[serde(rename = "standard_error")]
+    pub deviation: Option<f64>,
+}
+
+/// A fitted law.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForceFit {
+    /// The law, for the detector's file. Its covariance and scatter have Student's allowance for few presses: 1.645 standard errors are bands of 90 %.
+    pub law: ForceLaw,
+    /// Its parameters.
+    pub parameters: Vec<FittedParameter>,
+    /// The largest force that can be told.
+    pub maximum: MaximumForce,
+    /// Presses that do not agree with the others, by their index: they count for little.
+    pub left_out: Vec<usize>,
+    /// All that was tried.
+    pub candidates: Vec<Candidate>,
+}
+
+/// Why presses give no law.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ForceError {
+    /// Too few.
+    #[error("{found} presses, but {FEWEST} at least are needed; ten with forces from light to firm are good")]
+    TooFew {
+        /// How many there are.
+        found: usize,
+    },
+    /// Not a press.
+    #[error("press {}: {what}", press + 1)]
+    Value {
+        /// Its index.
+        press: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// All alike.
+    #[error("the forces go from {} N to {} N only: press with forces that differ {SPREAD} times at least, better ten times", range_n[0], range_n[1])]
+    Narrow {
+        /// Smallest and largest force (N).
+        range_n: [f64; 2],
+    },
+    /// Conductances that contradict the forces.
+    #[error("{0}")]
+    Mistyped(#[from] Mistyped),
+    /// Too many outliers.
+    #[error(
+        "presses {} do not agree with the others, which is too many of {count}: press again, one tip, upright, until the scale stands still",
+        numbers(presses)
+    )]
+    Disagree {
+        /// Their indices.
+        presses: Vec<usize>,
+        /// Number of presses.
+        count: usize,
+    },
+    /// No rise.
+    #[error(
+        "the conductance hardly rises with the force (exponent {exponent:.2} \u{b1} {deviation:.2}): press with forces that differ more, or more often"
+    )]
+    Flat {
+        /// Exponent found.
+        exponent: f64,
+        /// Its standard error.
+        deviation: f64,
+    },
+    /// The law that is wanted, or any, is open.
+    #[error("the presses do not determine a law: press more often, with forces that differ more")]
+    Open,
+}
+
+/// Numbers of presses for people, from 1.
+fn numbers(presses: &[usize]) -> String {
+    presses.iter().map(|press| (press + 1).to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// Fits a law to presses: that which they need, or the one that is `wanted`.
+///
+/// # Errors
+/// [`ForceError`] if they tell none; nothing is guessed.
+pub fn fit_force(presses: &[ForcePress], wanted: Option<Law>) -> Result<ForceFit, ForceError> {
+    check(presses)?;
+    order::check(presses)?;
+    let points: Vec<Point> = presses.iter().map(Point::of).collect();
+    let mut tried: Vec<Fitted> = forms(presses).filter_map(|form| fit::fit(&points, form)).collect();
+    tried.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+    let candidates = tried.iter().map(Fitted::candidate).collect();
+    check_rise(&tried)?;
+    // Of itself no law is taken whose exponent is open: it has more parameters than the presses tell.
+    let is_taken = |fit: &&Fitted| match wanted {
+        Some(law) => fit.form().law == law,
+        None => is_determined(fit.exponent(), fit.freedom()),
+    };
+    let best = tried.iter().find(is_taken).ok_or(ForceError::Open)?;
+    let left_out = best.outliers();
+    if left_out.len() > 1 {
+        order::check_exchange(presses, &left_out, best)?;
+    }
+    if left_out.len() as f64 > LEFT_OUT * presses.len() as f64 {
+        return Err(ForceError::Disagree { presses: left_out, count: presses.len() });
+    }
+    let (law, maximum) = law_of(best, presses, &left_out);
+    Ok(ForceFit { law, parameters: parameters(best), maximum, left_out, candidates })
+}
+
+/// Whether a value differs from nothing, with its standard error and so many degrees of freedom.
+fn is_determined([value, deviation]: [f64; 2], freedom: f64) -> bool {
+    value > student::quantile(DETERMINED, freedom) * deviation
+}
+
+/// Checks that the conductance rises with the force: as the best power law says, whatever else may be.
+fn check_rise(tried: &[Fitted]) -> Result<(), ForceError> {
+    let power = tried.iter().find(|fit| fit.form().law == Law::Power).ok_or(ForceError::Open)?;
+    let [exponent, deviation] = power.exponent();
+    match is_determined([exponent, deviation], power.freedom()) {
+        true => Ok(()),
+        false => Err(ForceError::Flat { exponent, deviation }),
+    }
+}
+
+/// The parameters with their standard errors, and no number where a parameter is open.
+fn parameters(best: &Fitted) -> Vec<FittedParameter> {
+    let freedom = best.freedom();
+    let parameter = |name, value: [f64; 2]| FittedParameter {
+        name,
+        value: is_determined(value, freedom).then_some(value[0]),
+        deviation: is_determined(value, freedom).then_some(value[1]),
+    };
+    let known = [("conductance_at_1_n_s", best.conductance_at_1_n_s()), ("exponent", best.exponent())];
+    let series = best.series().map(|series| parameter("series_ohm", series));
+    known.map(|(name, value)| parameter(name, value)).into_iter().chain(series).collect()
+}
+
+fn check(presses: &[ForcePress]) -> Result<(), ForceError> {
+    let is_good = |value: f64| value > 0.0 && value.is_finite();
+    for (index, press) in presses.iter().enumerate() {
+        let wrong = |what: String| Err(ForceError::Value { press: index, what });
+        if !is_good(press.force_n) {
+            return wrong(format!("its force is {} N, but has to be above zero", press.force_n));
+        }
+        if !(is_good(press.conductance_s) && press.deviation_s >= 0.0) {
+            return wrong(format!("its conductance is {} S, but has to be above zero", press.conductance_s));
+        }
+    }
+    if presses.len() < FEWEST {
+        return Err(ForceError::TooFew { found: presses.len() });
+    }
+    let range_n = range_n(presses.iter());
+    if range_n[1] < SPREAD * range_n[0] { Err(ForceError::Narrow { range_n }) } else { Ok(()) }
+}
+
+/// Smallest and largest force (N).
+fn range_n<'a>(presses: impl Iterator<Item = &'a ForcePress>) -> [f64; 2] {
+    presses.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], press| [low.min(press.force_n), high.max(press.force_n)])
+}
+
+/// What to try: two curves only where both were pressed twice.
+fn forms(presses: &[ForcePress]) -> impl Iterator<Item = Form> {
+    let count = |of: Direction| presses.iter().filter(|press| press.direction == Some(of)).count();
+    let both = count(Direction::Loading).min(count(Direction::Unloading)) > 1;
+    let laws = [Law::Power, Law::Saturating].into_iter();
+    laws.flat_map(|law| [false, true].map(|hysteresis| Form { law, hysteresis }))
+        .filter(move |form| both || !form.hysteresis)
+}
+
+/// The law of a fit, and its maximum.
+fn law_of(best: &Fitted, presses: &[ForcePress], left_out: &[usize]) -> (ForceLaw, MaximumForce) {
+    let freedom = best.freedom();
+    // Student's allowance: so much wider are bands of 90 % by a scatter that so few presses tell.
+    let widening = student::quantile(BAND, freedom) / BAND;
+    let kept = presses.iter().enumerate().filter(|(index, _)| !left_out.contains(index)).map(|(_, press)| press);
+    let mut law = ForceLaw {
+        conductance_at_1_n_s: best.conductance_at_1_n_s()[0],
+        exponent: best.exponent()[0],
+        series_ohm: best.series().map(|[ohm, _]| ohm),
+        covariance: best.covariance(widening * widening),
+        scatter: widening * best.scatter(),
+        hysteresis: best.hysteresis(),
+        range_n: range_n(kept),
+        maximum_n: None,
+        presses: presses.len() - left_out.len(),
+    };
+    let maximum = match best.series() {
+        None => MaximumForce::Calibrated { force_n: law.range_n[1] },
+        Some(series) if !(is_determined(series, freedom) && is_determined(best.exponent(), freedom)) => {
+            MaximumForce::NotDetermined
+        }
+        Some(_) => match law.fmax_n().zip(law.fmax_deviation_n()) {
+            Some((force_n, deviation_n)) if force_n < FARTHEST * law.range_n[1] => {
+                MaximumForce::Saturation { force_n, deviation_n }
+            }
+            _ => MaximumForce::NotDetermined,
+        },
+    };
+    if let MaximumForce::Saturation { force_n, .. } = maximum {
+        law.maximum_n = Some(force_n);
+    }
+    (law, maximum)
+}

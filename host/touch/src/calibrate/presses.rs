@@ -1,0 +1,175 @@
+//! From the frames of a rub to a few hundred presses of one contact each, spread over the detector.
+
+use nalgebra::DMatrix;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
+
+use super::centred::{Agreement, Centred};
+use super::{CalibrateError, Frame};
+use crate::solve::{faulty_electrodes, rounding_v};
+
+/// Deviations of the noise that the largest reading of a touch has at least.
+const TOUCHED: f64 = 20.0;
+/// Deviations of the noise, in the root of the mean square, within which frames are the same press.
+const STILL: f64 = 1.3;
+/// Most frames that are averaged.
+const MOST_AVERAGED: usize = 64;
+/// Most means that are looked at.
+const MOST_MEANS: usize = 6000;
+/// Share of the touched frames in which an electrode has to be wrong to be left out.
+const FAULTY: f64 = 0.3;
+/// Fewest presses that a detector is fitted to.
+pub(super) const FEWEST: usize = 4;
+/// Share of the touched frames that has to be of one contact: below, agreement may be chance.
+const SINGLE: f64 = 0.05;
+
+/// Mean readings of frames that stood still.
+#[derive(Clone, Debug)]
+pub(super) struct Mean {
+    pub readings: Readings,
+    pub frames: usize,
+    /// Standard deviation of a reading (V).
+    pub noise_v: f64,
+    pub known_m: Option<[f64; 2]>,
+}
+
+/// What a rub has.
+pub(super) struct Chosen {
+    /// Electrodes that can be used.
+    pub kept: Vec<usize>,
+    /// Means of single contacts, through the electrodes that are kept.
+    pub singles: Vec<Mean>,
+    /// Frames that something touched in.
+    pub touched: usize,
+    /// Their common centred matrix, of norm one.
+    pub centred: DMatrix<f64>,
+}
+
+impl Chosen {
+    /// Finds them.
+    pub fn among(frames: &[Frame], detector: &Detector) -> Result<Self, CalibrateError> {
+        let noise_v = detector.adc.deviation_v();
+        let touches = |frame: &&Frame| frame.readings.largest_v() > TOUCHED * noise_v;
+        let touched: Vec<_> = frames.iter().filter(touches).collect();
+        if touched.is_empty() {
+            return Err(CalibrateError::NoPress { frames: frames.len() });
+        }
+        let kept = kept(&touched, detector, noise_v);
+        if 2 * kept.len() <= detector.electrodes.len() {
+            let all = 0..detector.electrodes.len();
+            return Err(CalibrateError::Electrodes { faulty: all.filter(|e| !kept.contains(e)).collect() });
+        }
+        let means = means(&touched, &kept, detector);
+        let on_share = on_share(&means, detector);
+        let centred: Vec<_> = means
+            .iter()
+            .enumerate()
+            .filter_map(|(index, mean)| {
+                Some((index, Centred::of(&mean.readings, detector.drive_v, on_share, mean.noise_v)?))
+            })
+            .collect();
+        let frames_of = |indices: &[usize]| indices.iter().map(|index| means[*index].frames).sum::<usize>();
+        let all: Vec<usize> = (0..means.len()).collect();
+        let counted = frames_of(&all);
+        let none = || CalibrateError::NotSingle { touched: counted, single: 0 };
+        let agreement = Agreement::among(&centred).ok_or_else(none)?;
+        let single = frames_of(&agreement.agree);
+        if agreement.agree.len() < FEWEST || (single as f64) < SINGLE * counted as f64 {
+            return Err(CalibrateError::NotSingle { touched: counted, single });
+        }
+        let singles = agreement.agree.iter().map(|index| means[*index].clone()).collect();
+        Ok(Self { kept, singles, touched: counted, centred: agreement.mean.matrix })
+    }
+
+    /// At most so many of the single contacts, spread over places and firmness; those at known places are all among them.
+    pub fn spread(&self, most: usize, detector: &Detector) -> Vec<Mean> {
+        let features: Vec<_> = self.singles.iter().map(|mean| feature(&mean.readings, detector)).collect();
+        let mut chosen: Vec<usize> =
+            (0..self.singles.len()).filter(|index| self.singles[*index].known_m.is_some()).collect();
+        if chosen.is_empty() {
+            chosen.push(0);
+        }
+        let apart = |a: usize, b: usize| (0..3).map(|k| (features[a][k] - features[b][k]).powi(2)).sum::<f64>();
+        let mut nearest: Vec<f64> = (0..features.len())
+            .map(|index| chosen.iter().map(|other| apart(index, *other)).fold(f64::INFINITY, f64::min))
+            .collect();
+        while chosen.len() < most.min(features.len()) {
+            let farthest = (0..nearest.len()).max_by(|a, b| nearest[*a].total_cmp(&nearest[*b])).unwrap_or(0);
+            if nearest[farthest] <= 0.0 {
+                break;
+            }
+            chosen.push(farthest);
+            nearest.iter_mut().enumerate().for_each(|(index, least)| *least = least.min(apart(index, farthest)));
+        }
+        chosen.iter().map(|index| self.singles[*index].clone()).collect()
+    }
+}
+
+/// About where and how firm a press is: place in shares of the detector, and the logarithm of the largest reading, in which a factor of ten is as
+/// much as half of the detector.
+fn feature(readings: &Readings, detector: &Detector) -> [f64; 3] {
+    let n = readings.electrodes();
+    let (mut sum, mut at) = (f64::MIN_POSITIVE, [0.0; 2]);
+    for e in 0..n {
+        let column = (0..n).map(|g| readings.at(g, e).max(0.0)).sum::<f64>().powi(3);
+        sum += column;
+        at[0] += column * detector.electrodes[e].x_m;
+        at[1] += column * detector.electrodes[e].y_m;
+    }
+    let size_m = detector.outline.size_m();
+    [at[0] / sum / size_m[0], at[1] / sum / size_m[1], 0.2 * readings.largest_v().max(f64::MIN_POSITIVE).ln()]
+}
+
+/// Electrodes that are not wrong in many of the frames.
+fn kept(touched: &[&Frame], detector: &Detector, noise_v: f64) -> Vec<usize> {
+    let n = detector.electrodes.len();
+    let step = touched.len().div_ceil(200);
+    let looked: Vec<_> = touched
+        .iter()
+        .step_by(step)
+        .filter_map(|frame| faulty_electrodes(&frame.readings, detector.drive_v, noise_v))
+        .collect();
+    let wrong = |e: &usize| looked.iter().filter(|faulty| faulty.iter().any(|(other, _)| other == e)).count();
+    (0..n).filter(|e| (wrong(e) as f64) <= FAULTY * looked.len().max(1) as f64).collect()
+}
+
+/// Means of frames that follow each other and stand still, through the electrodes that are kept.
+fn means(touched: &[&Frame], kept: &[usize], detector: &Detector) -> Vec<Mean> {
+    let [noise_v, rounding_v] = [detector.adc.deviation_v(), rounding_v(&detector.adc)];
+    let of_group = |group: &[&Frame]| {
+        let count = group.len() as f64;
+        let readings = Readings::from_fn(kept.len(), |g, e| {
+            group.iter().map(|frame| frame.readings.at(kept[g], kept[e])).sum::<f64>() / count
+        });
+        let random_v2 = (noise_v * noise_v - rounding_v * rounding_v).max(0.0);
+        let noise_v = (rounding_v * rounding_v + random_v2 / count).sqrt();
+        Mean { readings, frames: group.len(), noise_v, known_m: group[0].known_m }
+    };
+    let is_same = |a: &Frame, b: &Frame| {
+        let square = a.readings.volts().iter().zip(b.readings.volts()).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let root = (square / a.readings.volts().len() as f64).sqrt();
+        a.known_m == b.known_m && root < STILL * std::f64::consts::SQRT_2 * noise_v
+    };
+    let mut groups: Vec<&[&Frame]> = Vec::new();
+    let mut from = 0;
+    for index in 1..=touched.len() {
+        let ends = index == touched.len() || index - from == MOST_AVERAGED || !is_same(touched[from], touched[index]);
+        if ends {
+            groups.push(&touched[from..index]);
+            from = index;
+        }
+    }
+    let step = groups.len().div_ceil(MOST_MEANS);
+    let is_taken = |(index, group): &(usize, &&[&Frame])| index % step == 0 || group[0].known_m.is_some();
+    groups.iter().enumerate().filter(is_taken).map(|(_, group)| of_group(group)).collect()
+}
+
+/// Share of a load that is the on-resistance, from what a grounded pad reads, or where that is lost in the noise from the description.
+fn on_share(means: &[Mean], detector: &Detector) -> f64 {
+    let firm = means.iter().max_by(|a, b| a.readings.largest_v().total_cmp(&b.readings.largest_v()));
+    let of = |readings: &Readings| {
+        let n = readings.electrodes();
+        (0..n).map(|g| readings.at(g, g)).sum::<f64>() / n as f64 / detector.drive_v
+    };
+    firm.map_or(0.0, |mean| of(&mean.readings).clamp(0.0, 0.1))
+}
