@@ -73,9 +73,10 @@ impl SettingsArgs {
     }
 }
 
-/// What solvers are told of the detector: one that is simulated is as it is described.
+/// What is told of the detector: one that is simulated is as it is described, unless it is one as built.
 pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
-    if args.simulate { detector.taken_as_exact() } else { detector }
+    let is_exact = args.simulate && !args.scene.as_built.is_given();
+    if is_exact { detector.taken_as_exact() } else { detector }
 }
 
 /// The board that is chosen, and what the mouse presses with on a simulated one.

@@ -101,21 +101,13 @@ impl Experiment {
     /// # Errors
     /// [`StudyError`] if it is curved or cannot be modelled.
     pub fn new(detector: &Detector) -> Result<Self, StudyError> {
-        Self::within_tolerances(&detector.taken_as_exact())
-    }
-
-    /// The same of a detector that solvers know to its tolerances only.
-    ///
-    /// # Errors
-    /// As for [`new`](Self::new).
-    pub fn within_tolerances(detector: &Detector) -> Result<Self, StudyError> {
         if detector.surface.is_some() {
             return Err(StudyError::Curved { detector: detector.name.clone() });
         }
         let start = Instant::now();
         let model = Auto::new(detector, None)?.model;
         let name = model.name().to_owned();
-        let problem = Problem::new(model);
+        let problem = Problem::new(model).measured_as(&detector.taken_as_exact());
         let model_time = start.elapsed();
         let truth = finer_model(detector, &[], 0)?.into();
         Ok(Self {
@@ -166,7 +158,7 @@ impl Experiment {
         self.as_built_within(self.detector.tolerances, seed)
     }
 
-    /// The same with other tolerances, of which solvers do not know.
+    /// The same with other tolerances than those that the detector is described with, which are what solvers know.
     ///
     /// # Errors
     /// As for [`as_built`](Self::as_built).
@@ -174,7 +166,7 @@ impl Experiment {
         let built = drawn(&Detector { tolerances, ..self.detector.clone() }, seed);
         let name = || self.detector.name.clone();
         built.check().map_err(|wrong| StudyError::AsBuilt { detector: name(), seed, wrong })?;
-        self.with_truth(&built)
+        Ok(Self { problem: self.problem.measured_as(&self.detector), ..self.with_truth(&built)? })
     }
 
     /// The same, in truth another detector than the one described: thicker, or noisier.
@@ -214,16 +206,22 @@ impl Experiment {
 
     /// The same readings, measured by another converter or drive, which solvers know of.
     pub fn measured_as(&self, detector: &Detector) -> Self {
-        let problem = self.problem.measured_as(detector);
+        let problem = self.problem.measured_as(&self.as_known(detector));
         let built = Detector { drive_v: detector.drive_v, adc: detector.adc, ..self.built.clone() };
         let whole = Jacobian { detector: detector.clone(), ..(*self.whole).clone() }.into();
         Self { detector: detector.clone(), built, problem, whole, ..self.again() }
     }
 
+    /// A detector with what is known of this one: to tolerances, or exactly.
+    fn as_known(&self, detector: &Detector) -> Detector {
+        let Detector { tolerances, calibration, .. } = self.problem.detector().clone();
+        Detector { tolerances, calibration, ..detector.clone() }
+    }
+
     /// The same, inverted on another model.
     pub fn inverted_on(&self, model: Box<dyn ForwardModel>) -> Self {
         let name = model.name().to_owned();
-        let problem = Problem::new(model).measured_as(&self.detector);
+        let problem = Problem::new(model).measured_as(&self.as_known(&self.detector));
         Self { problem, model: name, ..self.again() }
     }
 
@@ -404,7 +402,7 @@ mod tests {
         assert_eq!(experiment.measured_as(&other).problem.detector().adc.bits, 10);
         other.layers[0].thickness_m *= 2.0;
         let wrong = experiment.with_truth(&other).unwrap();
-        assert_eq!(wrong.problem.detector(), &experiment.detector);
+        assert_eq!(wrong.problem.detector(), &experiment.detector.taken_as_exact());
         assert_ne!(readings(&wrong, 1), readings(&experiment, 1));
     }
 

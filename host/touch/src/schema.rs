@@ -218,7 +218,7 @@ pub struct FrameColumn {
 }
 
 /// The numbers of a frame but for its contacts and image, in the order of every format.
-pub const FRAME_COLUMNS: [FrameColumn; 11] = [
+pub const FRAME_COLUMNS: [FrameColumn; 12] = [
     FrameColumn { name: "frame", of: |frame| frame.frame.map(|frame| frame as f64) },
     FrameColumn { name: "sequence", of: |frame| frame.sequence.map(|sequence| sequence as f64) },
     FrameColumn { name: "time_s", of: |frame| frame.time_s },
@@ -229,6 +229,7 @@ pub const FRAME_COLUMNS: [FrameColumn; 11] = [
     FrameColumn { name: "saturated", of: |frame| frame.flag(|flags| flags.saturated) },
     FrameColumn { name: "misfit", of: |frame| frame.flag(|flags| flags.misfit) },
     FrameColumn { name: "unfinished", of: |frame| frame.flag(|flags| flags.unfinished) },
+    FrameColumn { name: "calibrate", of: |frame| frame.flag(|flags| flags.calibrate) },
     FrameColumn { name: "excluded_count", of: |frame| frame.flags.map(|flags| flags.excluded.len() as f64) },
 ];
 

@@ -98,14 +98,13 @@ impl Nuisance {
         Ok(Similar { model, board: steps.into_iter().filter(|(parameter, _)| parameter.is_of_board()).collect() })
     }
 
-    /// Of all that is not known of a model's detector; `None` if that is nothing. It takes a model for most parameters, made in as many
+    /// Of all that is not known of the detector that a model is of, as it is described; `None` if that is nothing. It takes a model for most parameters, made in as many
     /// threads as there are cores.
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if a detector that is a little different cannot be modelled.
-    pub fn new(model: &Arc<dyn ForwardModel>) -> Result<Option<Self>, ForwardError> {
-        let detector = model.detector();
-        let unknowns = detector.unknowns().directions;
+    pub fn new(model: &Arc<dyn ForwardModel>, described: &Detector) -> Result<Option<Self>, ForwardError> {
+        let unknowns = described.unknowns().directions;
         let mut parameters: Vec<(Parameter, f64)> = Vec::new();
         for (parameter, step) in unknowns.iter().flatten() {
             match parameters.iter_mut().find(|(known, _)| known == parameter) {

@@ -4,7 +4,7 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 9 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; shape: 0 none, 1 a line, 2 a ring; flags: 1 saturated, 2 the readings do not fit, 4 unfinished; electrodes left out: bit `e` is electrode `e` |
+//! | 9 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; shape: 0 none, 1 a line, 2 a ring; flags: 1 saturated, 2 the readings do not fit, 4 unfinished, 8 the detector differs from its description; electrodes left out: bit `e` is electrode `e` |
 //! | f32 | residual of the readings: root mean square, in standard deviations of the noise |
 //! | f32 | age of the answer when this was sent: since the last byte of its frame came (s) |
 //! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
@@ -58,7 +58,7 @@ fn kind(shape: Option<&FoundShape>) -> u32 {
 }
 
 fn flags(flags: &Flags) -> [u32; 2] {
-    let bits = [flags.saturated, flags.misfit, flags.unfinished];
+    let bits = [flags.saturated, flags.misfit, flags.unfinished, flags.calibrate];
     let told = bits.iter().enumerate().map(|(bit, set)| u32::from(*set) << bit).sum();
     [told, flags.excluded.iter().filter_map(|e| 1_u32.checked_shl(*e as u32)).fold(0, |all, bit| all | bit)]
 }

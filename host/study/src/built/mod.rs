@@ -1,6 +1,6 @@
 //! Detectors as they are built: solvers get the description, readings come from what was made of it.
 //!
-//! Detectors are [drawn](simulate::drawn) from the tolerances of a description, or come from a file that another program solved ([`file`]).
+//! Detectors are [drawn](tactomo_physics::simulate::drawn) from the tolerances of a description, or come from a file that another program solved ([`file`]).
 
 mod figures;
 mod file;
@@ -16,7 +16,7 @@ use super::experiment::{Experiment, StudyError};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Contact, Touch};
-use tactomo_physics::simulate::{Noise, drawn, measured};
+use tactomo_physics::simulate::{Noise, measured};
 use tactomo_touch::calibrate::{self as rub, CalibrateError, RubSettings};
 use tactomo_touch::solve::{Method, Problem, Solution};
 
@@ -124,7 +124,7 @@ struct Built {
 pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Result<Report, BuiltError> {
     let count = if plan.files.is_empty() { plan.detectors } else { plan.files.len() };
     let nominal = match plan.files[..] {
-        [] => Some(Experiment::within_tolerances(&plan.detector)?),
+        [] => Some(Experiment::new(&plan.detector)?),
         _ => None,
     };
     let next = AtomicUsize::new(0);
@@ -157,7 +157,7 @@ pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Resu
 
 fn from_tolerances(plan: &Plan, nominal: &Experiment, index: usize) -> Result<Built, BuiltError> {
     let seed = plan.seed.wrapping_add(index as u64);
-    let experiment = nominal.with_truth(&drawn(&plan.detector, seed))?;
+    let experiment = nominal.as_built(seed)?;
     let read = |scenes: Vec<Vec<Contact>>, seed: u64| -> Result<Vec<Scene>, StudyError> {
         let touches: Vec<Vec<Touch>> =
             scenes.iter().map(|contacts| contacts.iter().copied().map(Touch::from).collect()).collect();
@@ -266,7 +266,17 @@ mod tests {
     use tactomo_physics::detector::Tolerances;
 
     fn plan(detector: Detector) -> Plan {
-        Plan { detector, files: vec![], methods: vec![Method::Contacts], detectors: 2, presses: 4, rub: 0, known: 0, threads: 1, seed: 7 }
+        Plan {
+            detector,
+            files: vec![],
+            methods: vec![Method::Contacts],
+            detectors: 2,
+            presses: 4,
+            rub: 0,
+            known: 0,
+            threads: 1,
+            seed: 7,
+        }
     }
 
     #[test]

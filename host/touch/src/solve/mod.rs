@@ -89,6 +89,8 @@ pub struct Solution {
     pub residual: Option<f64>,
     /// What to know before this is believed.
     pub flags: Flags,
+    /// What a calibration would bring, where [`Flags::calibrate`] asks for one.
+    pub calibrated: Option<Calibrated>,
     /// Probability that as many contacts touch as were found, against other numbers of contacts; of a method that weighs them.
     pub certainty: Option<f64>,
     /// What was chosen and why, by a solver that chooses.
@@ -111,8 +113,19 @@ pub struct Flags {
     pub misfit: bool,
     /// The method stopped before its end, to keep a limit of time or steps.
     pub unfinished: bool,
+    /// The readings are those of a detector that differs from the one described, within its tolerances: a calibration would tell more.
+    pub calibrate: bool,
     /// Electrodes that were left out.
     pub excluded: Vec<usize>,
+}
+
+/// Standard error of a place, of the least known contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibrated {
+    /// As it is now (m).
+    pub now_m: f64,
+    /// On a detector that is known exactly (m).
+    pub calibrated_m: f64,
 }
 
 /// What a solver chose.

@@ -38,9 +38,15 @@ impl Problem {
         Self { jacobian: Arc::new(jacobian), ..self }
     }
 
-    /// The same with drive voltage, multiplexer and converter of `detector`.
+    /// The same with drive voltage, multiplexer and converter of `detector`, and with what is not known of it.
     pub fn measured_as(&self, detector: &Detector) -> Self {
-        self.clone().with_jacobian(Jacobian { detector: detector.clone(), ..(*self.jacobian).clone() })
+        let known = |detector: &Detector| (detector.tolerances, detector.calibration.clone());
+        let nuisance = match known(detector) == known(self.detector()) {
+            true => Arc::clone(&self.nuisance),
+            false => Arc::default(),
+        };
+        let problem = self.clone().with_jacobian(Jacobian { detector: detector.clone(), ..(*self.jacobian).clone() });
+        Self { nuisance, ..problem }
     }
 
     /// The detector as measured.
@@ -52,14 +58,13 @@ impl Problem {
     /// which takes about a second.
     pub fn nuisance(&self) -> Option<&Nuisance> {
         let made = || {
-            let nuisance = Nuisance::new(&self.model);
+            let nuisance = Nuisance::new(&self.model, self.detector());
             nuisance.unwrap_or_else(|error| {
                 tracing::warn!("what is not known of the detector is left out: {error}");
                 None
             })
         };
-        let is_exact = self.detector().calibration.is_none() && self.detector().tolerances.is_exact();
-        if is_exact { None } else { self.nuisance.get_or_init(made).as_ref() }
+        self.nuisance.get_or_init(made).as_ref()
     }
 
     /// Mean distance of electrodes (m): the side of a square that each has for itself.

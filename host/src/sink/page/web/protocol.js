@@ -6,7 +6,7 @@ export const LAYOUT = 6;
 
 const HEAD_WORDS = 9;
 // From the lowest bit on.
-const FLAGS = ["saturated", "misfit", "unfinished"];
+const FLAGS = ["saturated", "misfit", "unfinished", "calibrate"];
 
 const known = (value) => (Number.isNaN(value) ? null : value);
 const bitsOf = (word) => Array.from({ length: 32 }, (_, bit) => bit).filter((bit) => (word >>> bit) & 1);

@@ -10,6 +10,7 @@ const WORDS_STAY_MS = 250;
 const WARNINGS = {
   saturated: ["saturated", "Readings at the end of the converter's range, or contacts that conduct so well that more would change nothing"],
   misfit: ["readings do not fit", "The readings are not what the model gives for what was found"],
+  calibrate: ["calibrate", "The detector differs from its description: a calibration would tell places better"],
   unfinished: ["searching", "A better answer is being searched, or a search stopped at its limit of steps"],
 };
 

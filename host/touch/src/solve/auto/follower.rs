@@ -59,8 +59,8 @@ impl AutoFollower {
     /// What the errors of averaged readings are like, by what `found` or else what is followed was compared by; `None` if the model has no contacts.
     fn target(&self, mean: &Mean, found: Option<&Found>) -> Result<Option<Target>, SolveError> {
         let of = |contacts: &ContactFollower| {
-            let covariance = found.and_then(Found::covariance).or(contacts.covariance());
-            contacts.finder().target_of(mean, covariance)
+            let error = found.and_then(Found::error).or(contacts.error());
+            contacts.finder().target_of(mean, error)
         };
         self.contacts.as_ref().map(of).transpose()
     }

@@ -79,6 +79,16 @@ impl AutoSearcher {
             return Ok(None);
         }
         let shape = self.shape((solution, contacts), from.as_ref(), target);
+        if std::env::var("DBG").is_ok() {
+            eprintln!(
+                "contacts {} {:?} score {:.0}; shape {:?} score {:?}",
+                solution.contacts.len(),
+                contacts,
+                contacts.score(),
+                shape.as_ref().map(StripFit::evidence),
+                shape.as_ref().map(|s| s.evidence().score())
+            );
+        }
         let best = shape.as_ref().map_or(contacts, StripFit::evidence);
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
         let noise_share = (target.noise_v / target.deviation_v()).powi(2);
@@ -107,7 +117,7 @@ impl Searcher for AutoSearcher {
         let Some((contacts, solution)) = searcher.contacts(contacts.map(|found| *found), &mean, found)? else {
             return Ok(Lead { mean: Some(mean), ..Lead::default() });
         };
-        let target = finder.target_of(&mean, contacts.covariance())?;
+        let target = finder.target_of(&mean, contacts.error())?;
         let whole = self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?;
         let whole = whole.map(|whole| (whole, instead_of(&solution)));
         Ok(Lead { contacts: Some(Box::new(contacts)), whole, mean: Some(mean) })

@@ -1,6 +1,6 @@
 //! What was chosen, in words.
 
-use crate::solve::{Choice, FoundShape, Solution};
+use crate::solve::{Calibrated, Choice, FoundShape, Solution};
 
 /// The solution of contacts, and what it is.
 pub(super) fn as_contacts(solution: Solution, search: bool) -> Solution {
@@ -9,7 +9,7 @@ pub(super) fn as_contacts(solution: Solution, search: bool) -> Solution {
     }
     let what = counted(solution.contacts.len());
     let sure = solution.certainty.map(|certainty| format!("; count {:.0} % sure", 100.0 * certainty));
-    let left = left(&solution) + &sure.unwrap_or_default();
+    let left = left(&solution) + &sure.unwrap_or_default() + &calibrate(&solution);
     let why = if search { format!("{left}; searching for a better answer") } else { left };
     chosen(solution, what, why)
 }
@@ -36,6 +36,15 @@ pub(super) fn as_whole(solution: Solution, why: &str) -> Solution {
 pub(super) fn instead_of(contacts: &Solution) -> String {
     let left = contacts.residual.unwrap_or_default();
     format!("{} would leave {left:.1}", counted(contacts.contacts.len()))
+}
+
+/// What a calibration would bring, if one is asked for.
+fn calibrate(solution: &Solution) -> String {
+    let Some(Calibrated { now_m, calibrated_m }) = solution.calibrated else { return String::new() };
+    let [now_mm, calibrated_mm] = [now_m, calibrated_m].map(|metres| 1e3 * metres);
+    format!(
+        "; the detector differs from its description: calibrate, and places are known to {calibrated_mm:.2} mm instead of {now_mm:.2} mm"
+    )
 }
 
 fn left(solution: &Solution) -> String {

@@ -284,6 +284,11 @@ impl DiscFitter<'_> {
         cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, settled: false })
     }
 
+    /// Covariance of a fit's parameters if its errors were those of another target; `None` where they are not determined.
+    pub fn covariance(&self, fit: &DiscFit, target: &Target) -> Option<DMatrix<f64>> {
+        Some(Cholesky::new(self.normal(&fit.slopes, target))?.inverse())
+    }
+
     fn normal(&self, slopes: &Slopes, target: &Target) -> DMatrix<f64> {
         let whitened: Vec<_> = slopes.by.iter().map(|slope| target.whitened(slope)).collect();
         let size = whitened.len();

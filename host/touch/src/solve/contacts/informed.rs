@@ -3,7 +3,7 @@
 //! What readings may be off by together depends on the scene, and a little on the detector that it makes likely
 //! ([`ApproximationError`]). So a fit and its target are brought to agree, for a single contact first: a second one would stand for
 //! what the detector differs by. Explanations with targets of their own are compared by the evidence with the determinant of
-//! their readings' covariance.
+//! their readings' error.
 
 use std::sync::Arc;
 
@@ -66,7 +66,7 @@ impl ContactFinder {
     }
 
     fn caught_up(&self, from: &Explanation, target: &Target) -> Option<Informed> {
-        let near = from.covariance.as_ref().and_then(|error| error.linearised.clone());
+        let near = from.error.as_ref().and_then(|error| error.linearised.clone());
         let target = self.informed(target, &from.fit.contacts, near.as_ref())?;
         let fit = self.disc_fitter().go_on(&from.fit, &target, COLD)?;
         Some(self.settled(Informed { explanation: Explanation::of(fit, &target), target }))
@@ -79,16 +79,16 @@ impl ContactFinder {
             // What contacts are missing for says nothing of the detector.
             let is_hopeless = explanation.fit.cost > HOPELESS * target.count() as f64;
             let nearer = if is_hopeless { None } else { self.nearer_detector(&explanation.fit, target) };
-            let is_settled = target.covariance().is_none_or(|error| error.is_settled(&explanation.fit.volts));
+            let is_settled = target.error().is_none_or(|error| error.is_settled(&explanation.fit.volts));
             if nearer.is_none() && is_settled {
                 break;
             }
-            let near = nearer.or_else(|| explanation.covariance.as_ref()?.linearised.clone());
+            let near = nearer.or_else(|| explanation.error.as_ref()?.linearised.clone());
             let contacts = &explanation.fit.contacts;
             let renewed = self.informed(target, contacts, near.as_ref());
             let fitted = renewed.and_then(|target| {
                 let fit = self.disc_fitter().fit(contacts.clone(), &target, COLD)?;
-                let explanation = Explanation { fit, covariance: target.covariance().cloned(), ..explanation.clone() };
+                let explanation = Explanation { fit, error: target.error().cloned(), ..explanation.clone() };
                 Some(Informed { explanation, target })
             });
             let Some(fitted) = fitted else { break };
@@ -152,7 +152,7 @@ impl ContactFinder {
 
     /// The detector that a fit makes most likely, if it is far from where the target is linear.
     fn nearer_detector(&self, fit: &DiscFit, target: &Target) -> Option<Arc<Linearised>> {
-        let (nuisance, error) = (self.problem.nuisance()?, target.covariance()?);
+        let (nuisance, error) = (self.problem.nuisance()?, target.error()?);
         let steps = target.steps(&fit.volts);
         if !error.is_far(&steps, target.deviation_v()) {
             return None;

@@ -18,13 +18,13 @@ impl ContactFinder {
     /// An explanation of some frames ago, brought to this one.
     pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
         let fit = self.disc_fitter().go_on(&found.fit, target, CAUGHT_UP)?;
-        Some(Explanation { fit, covariance: target.covariance().cloned(), ..found })
+        Some(Explanation { fit, error: target.error().cloned(), ..found })
     }
 
     /// An explanation of this frame, by what another target says of the readings' errors.
     pub(super) fn judged(&self, found: Explanation, target: &Target) -> Option<Explanation> {
         let fit = self.disc_fitter().go_on(&found.fit, target, Effort { steps: 0, ..WARM })?;
-        Some(Explanation { fit, covariance: target.covariance().cloned(), ..found })
+        Some(Explanation { fit, error: target.error().cloned(), ..found })
     }
 
     /// The explanation, or what is left of it without the contacts that may not be there if that is more likely; `None` if nothing is.
@@ -54,7 +54,7 @@ impl ContactFinder {
         let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
         let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
         let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
-        Some(Explanation { fit, certainty, covariance: last.covariance.clone() })
+        Some(Explanation { fit, certainty, error: last.error.clone() })
     }
 
     /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each

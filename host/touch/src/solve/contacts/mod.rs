@@ -39,7 +39,7 @@ pub(super) use self::target::Target;
 pub(super) use self::target::dot;
 use super::evidence::{Evidence, misfit_limit};
 use super::still::{self, Mean, Still};
-use super::{Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
+use super::{Calibrated, Flags, FoundContact, Problem, Solution, SolveError, Uncertainty};
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
@@ -52,6 +52,9 @@ const SATURATED: f64 = 270.0;
 const FULL: f64 = 0.995;
 /// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
 const KNOWN: f64 = 0.2;
+
+/// Factor on the standard errors of places from which a calibration is worth to be asked for.
+const WORTH: f64 = 2.0;
 
 /// How contacts are fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,20 +109,20 @@ struct Explanation {
     /// Probability of their count, among the counts that were tried; none once it has changed without a search.
     certainty: Option<f64>,
     /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
-    covariance: Option<Arc<ApproximationError>>,
+    error: Option<Arc<ApproximationError>>,
 }
 
 impl Found {
     /// What the readings may be off by together, by which it was compared with others.
-    pub fn covariance(&self) -> Option<&Arc<ApproximationError>> {
-        self.0.covariance.as_ref()
+    pub fn error(&self) -> Option<&Arc<ApproximationError>> {
+        self.0.error.as_ref()
     }
 }
 
 impl Explanation {
     /// A fit whose count was not compared with others.
     fn of(fit: DiscFit, target: &Target) -> Self {
-        Self { fit, certainty: None, covariance: target.covariance().cloned() }
+        Self { fit, certainty: None, error: target.error().cloned() }
     }
 
     /// A fit, with the logarithms of the evidence for each count.
@@ -127,7 +130,7 @@ impl Explanation {
         let of = by_count[fit.contacts.len()];
         let all: f64 = by_count.iter().map(|other| (other - of).exp()).sum();
         let certainty = Some(1.0 / all).filter(|share| share.is_finite());
-        Self { fit, certainty, covariance: target.covariance().cloned() }
+        Self { fit, certainty, error: target.error().cloned() }
     }
 }
 
@@ -176,13 +179,13 @@ impl ContactFinder {
         super::check(readings, self.network.electrodes())
     }
 
-    /// What the mean of some frames is fitted as; `covariance` is what they may be off by together, if the detector is not known exactly.
+    /// What the mean of some frames is fitted as; `error` is what they may be off by together, if the detector is not known exactly.
     ///
     /// # Errors
     /// [`SolveError`] if they cannot be those of the detector.
-    pub fn target_of(&self, mean: &Mean, covariance: Option<&Arc<ApproximationError>>) -> Result<Target, SolveError> {
+    pub fn target_of(&self, mean: &Mean, error: Option<&Arc<ApproximationError>>) -> Result<Target, SolveError> {
         self.check(&mean.readings)?;
-        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, covariance))
+        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, error))
     }
 
     /// What averages frames that stand still.
@@ -231,20 +234,56 @@ impl ContactFinder {
         let covariance = fit.covariance();
         let logs: Vec<_> = (0..fit.contacts.len()).map(|k| self.logs(fit, k, covariance.as_ref())).collect();
         let contacts: Vec<_> =
-            logs.iter().enumerate().map(|(k, logs)| found_contact(fit, k, covariance.as_ref().zip(*logs))).collect();
+            logs.iter().enumerate().map(|(k, logs)| self.contact(fit, k, covariance.as_ref().zip(*logs))).collect();
         // A standard error more and it is as good as perfect.
         let perfect = (SATURATED * self.sheet_s).ln();
         let is_perfect = |logs: &Option<Logs>| {
             logs.is_some_and(|Logs { conductance: [mean, deviation], .. }| mean + deviation > perfect)
         };
+        let calibrated = self.calibrated(fit, target);
         let flags = Flags {
             saturated: target.is_saturated() || logs.iter().any(is_perfect),
             misfit: self.is_misfit(fit, target),
             unfinished: !fit.settled,
+            calibrate: calibrated.is_some(),
             excluded: Vec::new(),
         };
         let residual = Some(self.residual(fit, fit.cost, target));
-        Solution { contacts, residual, flags, certainty: found.certainty, ..Solution::default() }
+        Solution { contacts, residual, flags, calibrated, certainty: found.certainty, ..Solution::default() }
+    }
+
+    /// A contact of a fit with its standard errors: of a place no more than that of one anywhere on the detector.
+    fn contact(&self, fit: &DiscFit, k: usize, known: Option<(&DMatrix<f64>, Logs)>) -> FoundContact {
+        let contact = fit.contacts[k];
+        let conductance_s = known.map_or(contact.conductance_s, |(_, logs)| logs.conductance[0].exp());
+        let most_m = self.problem.detector().outline.size_m().map(|side_m| side_m / 12f64.sqrt());
+        let uncertainty = known.map(|(covariance, logs)| {
+            let place = place_uncertainty(fit, k, covariance);
+            let conductance_s = conductance_s * logs.conductance[1];
+            Uncertainty { conductance_s, x_m: place.x_m.min(most_m[0]), y_m: place.y_m.min(most_m[1]), ..place }
+        });
+        let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
+        FoundContact {
+            z_m: contact.z_m,
+            uncertainty,
+            radius_m: radius.map(|[mean, _]| mean.exp()),
+            ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)
+        }
+    }
+
+    /// What a calibration would bring, if the detector as described leaves more of the readings than noise and the model's own error do, and
+    /// that is what places are not known better for.
+    fn calibrated(&self, fit: &DiscFit, target: &Target) -> Option<Calibrated> {
+        let exact = target.as_exact(&self.errors)?;
+        let freedom = self.freedom(fit, &exact);
+        let is_off = exact.cost(&fit.volts) > freedom * misfit_limit(freedom);
+        let known = self.disc_fitter().covariance(fit, &exact)?;
+        let largest_m = |covariance: &DMatrix<f64>| {
+            let of = |k: usize| place_uncertainty(fit, k, covariance);
+            (0..fit.contacts.len()).map(of).map(|place| place.x_m.max(place.y_m)).fold(0.0, f64::max)
+        };
+        let [now_m, calibrated_m] = [&fit.covariance()?, &known].map(largest_m);
+        (is_off && now_m > WORTH * calibrated_m).then_some(Calibrated { now_m, calibrated_m })
     }
 
     /// What the readings say of a contact's conductance and radius.
@@ -256,23 +295,6 @@ impl ContactFinder {
             radius_deviation: self.settings.radius_deviation,
         };
         usual.logs(fit, k, covariance?)
-    }
-}
-
-/// A contact of a fit with its standard errors.
-fn found_contact(fit: &DiscFit, k: usize, known: Option<(&DMatrix<f64>, Logs)>) -> FoundContact {
-    let contact = fit.contacts[k];
-    let conductance_s = known.map_or(contact.conductance_s, |(_, logs)| logs.conductance[0].exp());
-    let uncertainty = known.map(|(covariance, logs)| Uncertainty {
-        conductance_s: conductance_s * logs.conductance[1],
-        ..place_uncertainty(fit, k, covariance)
-    });
-    let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
-    FoundContact {
-        z_m: contact.z_m,
-        uncertainty,
-        radius_m: radius.map(|[mean, _]| mean.exp()),
-        ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)
     }
 }
 

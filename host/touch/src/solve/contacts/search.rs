@@ -294,7 +294,7 @@ impl ContactFinder {
 
     /// Contacts that a fit may do without: weak ones, and of a detector that is not known exactly any, as they may stand for what it differs by.
     fn dispensable(&self, fit: &DiscFit, target: &Target) -> Vec<usize> {
-        if target.covariance().is_some() { (0..fit.contacts.len()).collect() } else { self.weak(fit) }
+        if target.error().is_some() { (0..fit.contacts.len()).collect() } else { self.weak(fit) }
     }
 
     fn merged(&self, a: &Contact, b: &Contact) -> Contact {

@@ -98,8 +98,8 @@ impl ContactFollower {
     }
 
     /// What the readings of what is followed may be off by together.
-    pub fn covariance(&self) -> Option<&Arc<ApproximationError>> {
-        self.last.as_ref().and_then(|last| last.covariance.as_ref())
+    pub fn error(&self) -> Option<&Arc<ApproximationError>> {
+        self.last.as_ref().and_then(|last| last.error.as_ref())
     }
 
     /// Brings the contacts to the next frame; whether they have to be searched.
@@ -181,7 +181,7 @@ impl ContactFollower {
 
 impl FrameFollower {
     fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
-        self.contacts.finder.target_of(&self.still.mean_or(readings), self.contacts.covariance())
+        self.contacts.finder.target_of(&self.still.mean_or(readings), self.contacts.error())
     }
 }
 
@@ -197,8 +197,8 @@ impl Follower for FrameFollower {
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
         self.still.add_if_new(readings.volts(), self.contacts.slopes_v());
-        let covariance = lead.contacts.as_ref().and_then(|found| found.covariance()).or(self.contacts.covariance());
-        let target = self.contacts.finder.target_of(&self.still.mean_or(readings), covariance)?;
+        let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
+        let target = self.contacts.finder.target_of(&self.still.mean_or(readings), error)?;
         let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
         let search = self.contacts.adopt(lead.contacts.map(|found| *found), frames, &target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
@@ -238,7 +238,7 @@ impl ContactSearcher {
         let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
         Ok(found
             .map(|found| {
-                let target = self.finder.target_of(mean, found.covariance.as_ref())?;
+                let target = self.finder.target_of(mean, found.error.as_ref())?;
                 let solution = self.finder.solution(&found, &target);
                 Ok((Found(found), solution))
             })

@@ -66,7 +66,7 @@ pub(in crate::solve) struct Target {
     pub(super) volts: Vec<f64>,
     /// One over the standard deviation of each (1/V); zero leaves a reading out.
     weights: Vec<f64>,
-    covariance: Arc<ApproximationError>,
+    error: Arc<ApproximationError>,
     /// Whether that is of what is not known of the detector.
     is_informed: bool,
     /// `k` of each direction.
@@ -74,13 +74,13 @@ pub(in crate::solve) struct Target {
 }
 
 impl Target {
-    /// The target of the mean of some frames. Their noise averages; the errors of the model and of the detector do not. Without a covariance, that
+    /// The target of the mean of some frames. Their noise averages; the errors of the model and of the detector do not. Without what is known of the latter, that
     /// of a detector that is as described.
     pub(super) fn of_mean(
         readings: &Readings,
         frames: usize,
         errors: &Errors,
-        covariance: Option<&Arc<ApproximationError>>,
+        error: Option<&Arc<ApproximationError>>,
     ) -> Self {
         let noise_v = errors.of_mean_v(frames);
         let deviation_v = noise_v.hypot(errors.model * readings.largest_v());
@@ -92,33 +92,40 @@ impl Target {
             counted.for_each(|(volts, _)| *volts = 0.0);
             Arc::new(ApproximationError::of_rows(&patterns_v, readings.electrodes()))
         };
-        let is_informed = covariance.is_some();
-        let covariance = covariance.map_or_else(of_pads, Arc::clone);
-        let shares = covariance.shares(deviation_v);
-        Self { frames, noise_v, volts: readings.volts().to_vec(), weights, covariance, is_informed, shares }
+        let is_informed = error.is_some();
+        let error = error.map_or_else(of_pads, Arc::clone);
+        let shares = error.shares(deviation_v);
+        Self { frames, noise_v, volts: readings.volts().to_vec(), weights, error, is_informed, shares }
     }
 
     /// The same with what the readings may be off by together.
-    pub(super) fn with(&self, covariance: ApproximationError) -> Self {
-        let shares = covariance.shares(self.deviation_v());
-        Self { covariance: Arc::new(covariance), is_informed: true, shares, ..self.clone() }
+    pub(super) fn with(&self, error: ApproximationError) -> Self {
+        let shares = error.shares(self.deviation_v());
+        Self { error: Arc::new(error), is_informed: true, shares, ..self.clone() }
+    }
+
+    /// The same as if the detector were as described; `None` if it is taken as that already.
+    pub(super) fn as_exact(&self, errors: &Errors) -> Option<Self> {
+        let n = self.volts.len().isqrt();
+        let readings = Readings::from_fn(n, |g, e| self.volts[g * n + e]);
+        self.is_informed.then(|| Self::of_mean(&readings, self.frames, errors, None))
     }
 
     /// What the readings may be off by together; none of a detector that is as described.
-    pub(super) fn covariance(&self) -> Option<&Arc<ApproximationError>> {
-        Some(&self.covariance).filter(|_| self.is_informed)
+    pub(super) fn error(&self) -> Option<&Arc<ApproximationError>> {
+        Some(&self.error).filter(|_| self.is_informed)
     }
 
     /// Whether what the readings may be off by together was made for others than `volts`.
     pub(super) fn is_stale(&self, volts: &[f64]) -> bool {
-        self.is_informed && self.covariance.is_stale(volts)
+        self.is_informed && self.error.is_stale(volts)
     }
 
     /// Steps of the detector that are most likely where contacts have such readings (V).
     pub(super) fn steps(&self, volts: &[f64]) -> Vec<f64> {
         let mut pulls = self.residuals(volts);
         self.whiten_transposed(&mut pulls);
-        self.covariance.steps(&pulls)
+        self.error.steps(&pulls)
     }
 
     /// Leaves readings that do not count out of patterns.
@@ -134,11 +141,7 @@ impl Target {
     }
 
     fn shrink(&self, volts: &mut [f64]) {
-        self.covariance
-            .directions
-            .iter()
-            .zip(&self.shares)
-            .for_each(|(direction, share)| direction.shrink(volts, *share));
+        self.error.directions.iter().zip(&self.shares).for_each(|(direction, share)| direction.shrink(volts, *share));
     }
 
     /// A whitened copy of volts.
@@ -157,7 +160,7 @@ impl Target {
     /// Whitened differences of the readings from predicted ones.
     pub fn residuals(&self, volts: &[f64]) -> Vec<f64> {
         let mut all: Vec<_> = self.volts.iter().zip(volts).map(|(ours, theirs)| ours - theirs).collect();
-        all.iter_mut().zip(&self.covariance.mean_v).for_each(|(left, mean)| *left -= mean);
+        all.iter_mut().zip(&self.error.mean_v).for_each(|(left, mean)| *left -= mean);
         self.whiten(&mut all);
         all
     }

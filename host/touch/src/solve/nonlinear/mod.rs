@@ -145,7 +145,7 @@ impl Shared {
             saturated: counted < target.volts.len(),
             misfit: left > self.misfit_limit(target),
             unfinished: !descent.settled,
-            excluded: Vec::new(),
+            ..Flags::default()
         };
         Solution {
             contacts: self.locator.peaks(&image),

@@ -209,7 +209,7 @@ impl ShapeFinder {
             saturated: target.is_saturated(),
             misfit: evidence.is_misfit(target.count()),
             unfinished: !fit.settled,
-            excluded: Vec::new(),
+            ..Flags::default()
         };
         Solution {
             image_s_per_m2: Some(self.image_ground.image_s_per_m2(fit.strip())),
