@@ -1,6 +1,6 @@
 //! `tactomo record`: keeps what a board sends, without a picture.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
@@ -41,7 +41,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 /// Records a board in a new file, for so long or until Ctrl-C.
 pub fn record(
-    file: &PathBuf,
+    file: &Path,
     board: &BoardArgs,
     detector_args: &DetectorArgs,
     seconds: Option<Duration>,

@@ -237,7 +237,7 @@ impl FollowLoop {
     fn begin_with(&mut self, description: Arc<Detector>) {
         let Detector { drive_v, adc, .. } = &*description;
         let calibrated =
-            |known: &Arc<Detector>| Arc::new(Detector { drive_v: *drive_v, adc: adc.clone(), ..(**known).clone() });
+            |known: &Arc<Detector>| Arc::new(Detector { drive_v: *drive_v, adc: *adc, ..(**known).clone() });
         let detector = self.calibrated.as_ref().map_or_else(|| Arc::clone(&description), calibrated);
         self.board = Some(BoardState {
             baseline: (self.begin_baseline)(&detector, self.conversions),

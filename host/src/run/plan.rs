@@ -122,7 +122,7 @@ impl Problems {
     fn of(&self, detector: &Detector) -> Result<Problem, ForwardError> {
         let is_of = |problem: &Problem| {
             let modelled = problem.model.detector();
-            *modelled == Detector { drive_v: modelled.drive_v, adc: modelled.adc.clone(), ..detector.clone() }
+            *modelled == Detector { drive_v: modelled.drive_v, adc: modelled.adc, ..detector.clone() }
         };
         if is_of(&self.described) {
             return Ok(self.described.measured_as(detector));

@@ -99,8 +99,11 @@ fn compare(before: &Detector, after: &Detector, frames: &[Frame]) -> Result<Opti
     Ok(moved_m.map(|moved_m| Compared { residuals: [residual_before, residual_after], moved_m }))
 }
 
-/// Place (m) of the one contact that explains each frame best on a detector that is taken as exact, and the residual.
-fn singles(detector: &Detector, frames: &[&Frame]) -> Result<Vec<Option<([f64; 2], f64)>>, ForwardError> {
+/// Place of a contact (m), and what it leaves of the readings, in standard deviations of the noise.
+type Single = ([f64; 2], f64);
+
+/// The one contact that explains each frame best on a detector that is taken as exact.
+fn singles(detector: &Detector, frames: &[&Frame]) -> Result<Vec<Option<Single>>, ForwardError> {
     let problem = Problem::of(&detector.taken_as_exact())?;
     let Ok(mut solver) = Contacts::new(&problem, ContactSettings { most: 1, ..ContactSettings::of(&problem) }) else {
         return Ok(vec![None; frames.len()]);

@@ -22,7 +22,7 @@ enum Slope {
     /// A model with the parameter a step further.
     Model(Arc<dyn ForwardModel>),
     /// The same detector, whose board measures otherwise.
-    Board(Detector),
+    Board(Box<Detector>),
     /// A channel's gain, by this logarithm.
     Gain(usize, f64),
     /// A channel's offset (V).
@@ -40,7 +40,7 @@ impl Slopes {
             Ok(match *parameter {
                 Parameter::Gain(channel) => Slope::Gain(channel, *deviation),
                 Parameter::Offset(channel) => Slope::Offset(channel, *deviation),
-                Parameter::OnResistance => Slope::Board(model.detector().stepped(&[(*parameter, step)])),
+                Parameter::OnResistance => Slope::Board(model.detector().stepped(&[(*parameter, step)]).into()),
                 _ => Slope::Model(model.of_similar(&model.detector().stepped(&[(*parameter, step)]))?),
             })
         };

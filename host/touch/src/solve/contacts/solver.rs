@@ -236,13 +236,13 @@ impl ContactSearcher {
         let mut better =
             |better: &Explanation| found(Lead::of_contacts(Some(Found(better.clone())), Some(mean.clone())));
         let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
-        Ok(found
+        found
             .map(|found| {
                 let target = self.finder.target_of(mean, found.error.as_ref())?;
                 let solution = self.finder.solution(&found, &target);
                 Ok((Found(found), solution))
             })
-            .transpose()?)
+            .transpose()
     }
 }
 
