@@ -1,10 +1,10 @@
 //! From presses of known force to a law from conductance to force.
 //!
 //! Two laws are fitted, the power law of the paper's eq. (5) and its eq. (6), which saturates: see
-//! [`ForceLaw`](tactomo_physics::detector::ForceLaw) for what they say of a conductance. Each is fitted with and without a difference between
-//! loading and unloading where presses tell it, by Levenberg's and Marquardt's steps with a share of outliers ([`fit`]). The law with the
+//! [`ForceLaw`] for what they say of a conductance. Each is fitted with and without a difference between
+//! loading and unloading where presses tell it, by Levenberg's and Marquardt's steps with a share of outliers (`fit`). The law with the
 //! lowest Bayesian information criterion is taken: no more law than the presses need. Presses that contradict each other are refused with what to
-//! look at ([`order`]).
+//! look at (`order`).
 
 mod fit;
 mod order;

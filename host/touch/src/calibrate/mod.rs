@@ -1,9 +1,9 @@
 //! From the detector on paper to the one that was built.
 //!
 //! A finger rubbed over the foam is enough: the impedance matrix of a single contact, centred, is that of the bare detector wherever
-//! the contact is ([`centred`]), which tells single contacts from others and finds the order of the wires ([`wires`]); then detector and all
-//! contacts are fitted together ([`bundle`]), with the builder's tolerances as prior. What is left unknown is kept with the detector
-//! ([`posterior`]).
+//! the contact is (`centred`), which tells single contacts from others and finds the order of the wires (`wires`); then detector and all
+//! contacts are fitted together (`bundle`), with the builder's tolerances as prior. What is left unknown is kept with the detector
+//! (`posterior`).
 
 mod bundle;
 mod centred;
@@ -12,6 +12,8 @@ mod posterior;
 mod presses;
 mod rub;
 mod slopes;
+#[cfg(test)]
+mod tests;
 mod wires;
 
 use tactomo_physics::forward::ForwardError;

@@ -1,0 +1,110 @@
+//! A rub on simulated detectors as built.
+
+use super::*;
+use crate::solve::{ContactSettings, Contacts, Problem, Solver};
+use tactomo_physics::detector::Detector;
+use tactomo_physics::scene::Contact;
+use tactomo_physics::simulate::{Measurement, drawn, finer_model};
+
+/// A detector as built with what its board reads of contacts, less what it reads at rest.
+struct Bench {
+    model: Box<dyn tactomo_physics::forward::ForwardModel>,
+    board: Measurement,
+    rest_v: Vec<f64>,
+    random: fastrand::Rng,
+}
+
+impl Bench {
+    fn new(seed: u64) -> Self {
+        let built = drawn(&Detector::default(), seed);
+        let mut board = Measurement::new(&built, &[], seed).unwrap();
+        let mut rest_v = vec![0.0; 256];
+        for _ in 0..32 {
+            let readings = board.readings_v(None);
+            rest_v.iter_mut().zip(readings.volts()).for_each(|(sum, volts)| *sum += volts / 32.0);
+        }
+        Self { model: finer_model(&built, &[], seed).unwrap(), board, rest_v, random: fastrand::Rng::with_seed(seed) }
+    }
+
+    fn contacts(&mut self, count: usize) -> Vec<Contact> {
+        let mut place_m = || 0.046 * (self.random.f64() - 0.5);
+        let places: Vec<_> = (0..count).map(|_| [place_m(), place_m()]).collect();
+        places.into_iter().map(|[x_m, y_m]| Contact::flat(x_m, y_m, 0.0025, 1e-3)).collect()
+    }
+
+    fn frame(&mut self, contacts: &[Contact]) -> Frame {
+        let read = self.board.readings_v(Some(&self.model.impedance_ohm(contacts).unwrap()));
+        let readings = Readings::from_fn(16, |g, e| read.at(g, e) - self.rest_v[16 * g + e]);
+        Frame { readings, known_m: None }
+    }
+}
+
+fn rubbed(frames: &[Frame]) -> Result<Rub, CalibrateError> {
+    rub(&Detector::default(), frames, &RubSettings { presses: 40, ..RubSettings::default() }, &mut |_| true)
+}
+
+/// Mean distance of single contacts from where they are found with a detector (m).
+fn off_m(detector: &Detector, tried: &[(Contact, Frame)]) -> f64 {
+    let problem = Problem::of(&detector.taken_as_exact()).unwrap();
+    let mut solver = Contacts::new(&problem, ContactSettings { most: 1, ..ContactSettings::of(&problem) }).unwrap();
+    let off_m = |(contact, frame): &(Contact, Frame)| {
+        solver.reset();
+        let mut readings = frame.readings.clone();
+        readings.correct_channels(detector);
+        let found = solver.solve(&readings).unwrap().contacts[0];
+        (found.x_m - contact.x_m).hypot(found.y_m - contact.y_m)
+    };
+    tried.iter().map(off_m).sum::<f64>() / tried.len() as f64
+}
+
+#[test]
+fn presses_at_unknown_places_make_places_right() {
+    let mut bench = Bench::new(5);
+    let mut frames = Vec::new();
+    for index in 0..60 {
+        // Every tenth is of two fingers.
+        let contacts = bench.contacts(1 + usize::from(index % 10 == 9));
+        frames.push(bench.frame(&contacts));
+    }
+    let tried: Vec<_> = (0..12)
+        .map(|_| {
+            let contacts = bench.contacts(1);
+            (contacts[0], bench.frame(&contacts))
+        })
+        .collect();
+    let found = rubbed(&frames).unwrap();
+    let [before_m, after_m] = [&Detector::default(), &found.detector].map(|detector| off_m(detector, &tried));
+    assert!(after_m < 0.4e-3 && after_m < 0.3 * before_m, "{before_m} {after_m}");
+    assert!(found.single <= 56 && found.wires.is_none(), "{}", found.single);
+    let again = Detector::from_toml(&found.detector.to_toml(), "").unwrap();
+    assert_eq!(again.calibration.unwrap().parameters.len(), found.detector.calibration.unwrap().parameters.len());
+}
+
+#[test]
+fn exchanged_wires_are_found_and_known_places_tell_a_turned_sensor() {
+    let mut bench = Bench::new(6);
+    let turned: Vec<usize> = (0..16).rev().collect();
+    let mut frames = Vec::new();
+    for index in 0..24 {
+        let contacts = bench.contacts(1);
+        let frame = bench.frame(&contacts);
+        let known_m = (index < 3).then_some([contacts[0].x_m, contacts[0].y_m]);
+        frames.push(Frame { readings: frame.readings.of(&turned), known_m });
+    }
+    assert_eq!(rubbed(&frames).unwrap().wires, Some(turned));
+}
+
+#[test]
+fn what_is_no_rub_says_so() {
+    let mut bench = Bench::new(7);
+    assert_eq!(rubbed(&[]).unwrap_err(), CalibrateError::NoPress { frames: 0 });
+    let several: Vec<_> = (0..40)
+        .map(|_| {
+            let contacts = bench.contacts(3);
+            bench.frame(&contacts)
+        })
+        .collect();
+    assert!(matches!(rubbed(&several), Err(CalibrateError::NotSingle { .. })), "{:?}", rubbed(&several).err());
+    let few = Frame { readings: Readings::from_fn(8, |_, _| 1.0), known_m: None };
+    assert!(matches!(rubbed(&[few]), Err(CalibrateError::Count { readings: 8, .. })));
+}
