@@ -21,7 +21,7 @@ const FAULTY: f64 = 0.3;
 /// Fewest presses that a detector is fitted to.
 pub(super) const FEWEST: usize = 4;
 /// Share of the touched frames that has to be of one contact: below, agreement may be chance.
-const SINGLE: f64 = 0.05;
+const SINGLE: f64 = 0.3;
 
 /// Mean readings of frames that stood still.
 #[derive(Clone, Debug)]
