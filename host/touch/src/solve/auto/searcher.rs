@@ -79,16 +79,6 @@ impl AutoSearcher {
             return Ok(None);
         }
         let shape = self.shape((solution, contacts), from.as_ref(), target);
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "contacts {} {:?} score {:.0}; shape {:?} score {:?}",
-                solution.contacts.len(),
-                contacts,
-                contacts.score(),
-                shape.as_ref().map(StripFit::evidence),
-                shape.as_ref().map(|s| s.evidence().score())
-            );
-        }
         let best = shape.as_ref().map_or(contacts, StripFit::evidence);
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
         let noise_share = (target.noise_v / target.deviation_v()).powi(2);
