@@ -100,7 +100,7 @@ async fn a_shape_is_named_outlined_and_listed_without_the_contacts_beside_it() -
 }
 
 /// The end of the colours' scale (S/m2), once it no longer moves: on a busy machine that takes longer.
-async fn still_scale(stage: &Stage) -> Result<f64> {
+async fn still_scale(stage: &Stage<Script>) -> Result<f64> {
     let mut last = f64::INFINITY;
     for _ in 0..40 {
         tokio::time::sleep(Duration::from_millis(500)).await;
