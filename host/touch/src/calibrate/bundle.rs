@@ -19,7 +19,7 @@ use super::{CalibrateError, Step};
 use crate::threads::map;
 
 /// Error of the slab as a share of `Vcc - V`: against readings of an independent program, but for what pads' own impedances take up, 0.07 %.
-const MODEL_ERROR: f64 = 0.0007;
+pub(super) const MODEL_ERROR: f64 = 0.0007;
 /// Standard deviation of the logarithm of a contact's radius about the usual one, and of its conductance about where it was found.
 const RADIUS_DEVIATION: f64 = 0.5;
 const CONDUCTANCE_DEVIATION: f64 = 3.0;
@@ -65,6 +65,8 @@ pub(super) struct Bundle {
     pub steps: DVector<f64>,
     pub model: Arc<dyn ForwardModel>,
     pub presses: Vec<Press>,
+    /// Error of the model, in shares of `Vcc - V`.
+    pub model_error: f64,
     full_v: f64,
 }
 
@@ -90,7 +92,7 @@ impl Bundle {
         full_v: f64,
     ) -> Self {
         let steps = DVector::zeros(parameters.len());
-        Self { nominal: model.detector().clone(), parameters, steps, model, presses, full_v }
+        Self { nominal: model.detector().clone(), parameters, steps, model, presses, model_error: MODEL_ERROR, full_v }
     }
 
     /// The description with the steps taken.
@@ -117,7 +119,7 @@ impl Bundle {
         let (n, drive_v) = (press.readings.electrodes(), self.nominal.drive_v);
         let weight = |(index, volts): (usize, &f64)| match index / n == index % n || *volts >= self.full_v {
             true => 0.0,
-            false => 1.0 / press.noise_v.hypot(MODEL_ERROR * (drive_v - volts).max(0.0)),
+            false => 1.0 / press.noise_v.hypot(self.model_error * (drive_v - volts).max(0.0)),
         };
         press.readings.volts().iter().enumerate().map(weight).collect()
     }

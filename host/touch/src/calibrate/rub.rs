@@ -6,7 +6,7 @@ use tactomo_physics::detector::{Calibration, Detector, Parameter, SHORTEST_WAVE,
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-use super::bundle::{Bundle, Normal, Press};
+use super::bundle::{Bundle, MODEL_ERROR, Normal, Press};
 use super::centred::between_others;
 use super::posterior::Posterior;
 use super::presses::{Chosen, Mean};
@@ -80,6 +80,10 @@ const FULL: f64 = 0.995;
 const UNFIT: f64 = 5.0;
 /// Iterations in which derivatives by the detector are made anew.
 const RENEWED: usize = 2;
+const ROUGH: [f64; 2] = [30.0, 6.0];
+/// Presses that the detector is fitted to first. They are found by what tolerances let readings be off by, which takes longer than on
+/// the detector as fitted, and does not go astray.
+const FIRST: usize = 24;
 /// Sum of squares, in those of most presses, above which a press is sought anew.
 const LOST: f64 = 2.0;
 
@@ -106,15 +110,18 @@ pub fn rub(
     let found = wired(&chosen, nominal, &problem)?;
     let means = chosen.spread(settings.presses, nominal);
     let (order, problem) = ordered(&found, &chosen, &problem, &means)?;
-    let presses = started(&problem, &means, settings)?;
+    let described = through(&order, &chosen, &Problem::of(nominal)?);
     let parameters: Vec<_> = Parameter::all(problem.detector(), SHORTEST_WAVE)
         .into_iter()
         .map(|parameter| (parameter, nominal.tolerances.deviation(nominal, parameter)))
         .filter(|(_, deviation)| *deviation > 0.0)
         .collect();
     let full_v = FULL * nominal.adc.full_scale_v.min(nominal.drive_v);
-    let mut bundle = Bundle::new(Arc::clone(&problem.model), parameters, presses, full_v);
-    let (first, last, slopes) = adjusted(&mut bundle, told)?;
+    let presses = Presses { means: &means, settings };
+    let (first, rest) = presses.divided();
+    let first = presses.started(&described, &first)?;
+    let mut bundle = Bundle::new(Arc::clone(&problem.model), parameters, first, full_v);
+    let (first, last, slopes) = adjusted(&mut bundle, &presses, &rest, told)?;
     let single = chosen.singles.iter().map(|mean| mean.frames).sum();
     if bundle.chi_square(&last) > UNFIT {
         return Err(CalibrateError::NotSingle { touched: chosen.touched, single });
@@ -193,20 +200,15 @@ fn ordered(
     problem: &Problem,
     means: &[Mean],
 ) -> Result<(Order, Problem), CalibrateError> {
-    let through = |order: &Order| {
-        let kept: Vec<usize> = order.electrodes.iter().map(|e| chosen.kept[*e]).collect();
-        let whole = kept.len() == problem.detector().electrodes.len();
-        if whole && order.exchanged().is_empty() { problem.clone() } else { problem.through(&kept, &[]) }
-    };
     let known: Vec<_> = means.iter().filter(|mean| mean.known_m.is_some()).cloned().collect();
     if known.is_empty() {
         let order = found[0].clone();
-        let problem = through(&order);
+        let problem = through(&order, chosen, problem);
         return Ok((order, problem));
     }
     let mut best: Option<(f64, Order, Problem)> = None;
     for order in found {
-        let problem = through(order);
+        let problem = through(order, chosen, problem);
         let off_m = off_m(&problem, &known)?;
         if best.as_ref().is_none_or(|(least_m, ..)| off_m < *least_m) {
             best = Some((off_m, order.clone(), problem));
@@ -216,6 +218,13 @@ fn ordered(
         Some((off_m, order, through)) if off_m < OFF_SPACINGS * problem.spacing_m() => Ok((order, through)),
         other => Err(CalibrateError::Places { off_mm: 1e3 * other.map_or(f64::INFINITY, |(off_m, ..)| off_m) }),
     }
+}
+
+/// A problem with the electrodes that are kept, in such an order.
+fn through(order: &Order, chosen: &Chosen, problem: &Problem) -> Problem {
+    let kept: Vec<usize> = order.electrodes.iter().map(|e| chosen.kept[*e]).collect();
+    let is_whole = kept.len() == problem.detector().electrodes.len();
+    if is_whole && order.exchanged().is_empty() { problem.clone() } else { problem.through(&kept, &[]) }
 }
 
 /// How far contacts found with the description are from where they are known to be, in the root of the mean square (m).
@@ -243,30 +252,60 @@ fn searched<'a>(
     Ok(all.map(of).collect())
 }
 
-/// The presses with contacts to start from.
-fn started(problem: &Problem, means: &[Mean], settings: &RubSettings) -> Result<Vec<Press>, CalibrateError> {
-    let found = searched(problem, means.iter().map(|mean| &mean.readings))?;
-    let press = |(mean, contact): (&Mean, Option<Contact>)| {
-        contact.map(|contact| Press {
-            readings: mean.readings.clone(),
-            noise_v: mean.noise_v,
-            known_m: mean.known_m.map(|at_m| (at_m, settings.known_deviation_m)),
-            contact,
-            usual: contact,
-        })
-    };
-    Ok(means.iter().zip(found).filter_map(press).collect())
+/// Means of frames that are fitted.
+struct Presses<'a> {
+    means: &'a [Mean],
+    settings: &'a RubSettings,
 }
 
-/// Adjusts detector and presses, seeks presses anew that were lost in a wrong minimum, and adjusts again. Gives the sum of squares for each reading
-/// at the start.
-fn adjusted(bundle: &mut Bundle, told: &mut dyn FnMut(Step) -> bool) -> Result<(f64, Normal, Slopes), CalibrateError> {
+impl Presses<'_> {
+    /// Those that the detector is fitted to first, with all at known places, and the others.
+    fn divided(&self) -> (Vec<usize>, Vec<usize>) {
+        let step = self.means.len().div_ceil(FIRST).max(1);
+        (0..self.means.len()).partition(|index| index % step == 0 || self.means[*index].known_m.is_some())
+    }
+
+    /// Some of them with contacts to start from, as they are found by what is known of a detector.
+    fn started(&self, problem: &Problem, which: &[usize]) -> Result<Vec<Press>, CalibrateError> {
+        let found = searched(problem, which.iter().map(|index| &self.means[*index].readings))?;
+        let press = |(index, contact): (&usize, Option<Contact>)| {
+            let mean = &self.means[*index];
+            contact.map(|contact| Press {
+                readings: mean.readings.clone(),
+                noise_v: mean.noise_v,
+                known_m: mean.known_m.map(|at_m| (at_m, self.settings.known_deviation_m)),
+                contact,
+                usual: contact,
+            })
+        };
+        Ok(which.iter().zip(found).filter_map(press).collect())
+    }
+}
+
+/// Adjusts the detector to the first presses and then to the rest too, seeks presses anew that were lost in a wrong minimum, and adjusts again.
+/// Gives the sum of squares for each reading at the start.
+fn adjusted(
+    bundle: &mut Bundle,
+    presses: &Presses<'_>,
+    rest: &[usize],
+    told: &mut dyn FnMut(Step) -> bool,
+) -> Result<(f64, Normal, Slopes), CalibrateError> {
     let mut first = None;
     let mut slopes = Slopes::new(&*bundle.model, &bundle.parameters)?;
-    let mut normal = bundle.adjust(&mut slopes, RENEWED, &mut |step| {
-        first.get_or_insert(step.chi_square);
-        told(step)
-    })?;
+    for rough in ROUGH {
+        bundle.model_error = rough * MODEL_ERROR;
+        bundle.adjust(&mut slopes, RENEWED, &mut |step| {
+            first.get_or_insert(step.chi_square);
+            told(step)
+        })?;
+    }
+    bundle.model_error = MODEL_ERROR;
+    let mut normal = bundle.adjust(&mut slopes, RENEWED, told)?;
+    if !rest.is_empty() {
+        let others = presses.started(&Problem::new(Arc::clone(&bundle.model)), rest)?;
+        bundle.presses.extend(others);
+        normal = bundle.adjust(&mut slopes, 1, told)?;
+    }
     for _ in 0..2 {
         let lost = bundle.lost(&normal, LOST);
         if lost.is_empty() {
