@@ -31,7 +31,7 @@ use self::disc::{DiscBasis, MAX_DEGREE};
 use self::driving::Covered;
 use self::green::{Surface, SurfaceGreen};
 use self::image::{CellFields, ImageGrid};
-use self::pads::{Pad, PadFields, pad_impedances};
+use self::pads::{PadFields, PadPoints};
 use self::spots::SlabSpots;
 use self::uneven::Uneven;
 pub(super) use self::uneven::UnevenPlace;
@@ -77,6 +77,7 @@ pub struct Slab {
     most_degree: usize,
     bottom: Arc<SurfaceGreen>,
     top: Arc<SurfaceGreen>,
+    points: Arc<PadPoints>,
     pads: Arc<PadFields>,
     /// `None` where the conductivity is even across the plane.
     uneven: Option<Arc<Uneven>>,
@@ -147,7 +148,10 @@ impl Slab {
             Some(like) => like.uneven.clone(),
             None => Uneven::new(size_m, &detector.unevenness, &detector.layers, resolution.uneven_modes).map(Arc::new),
         };
-        let pads = bare(detector, &covered, resolution, &bottom, uneven.as_deref(), &mut planner)
+        let basis = DiscBasis::of_degree(resolution.pad_degree);
+        let points = PadPoints::new(detector, size_m, basis, &bottom, as_even.map(|like| &*like.points));
+        let impedances = points.impedances(basis, &bottom, uneven.as_deref());
+        let pads = PadFields::new(points.pads(), basis, impedances, &covered, uneven.as_deref(), &mut planner)
             .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
         Ok(Self {
             detector: detector.clone(),
@@ -157,6 +161,7 @@ impl Slab {
             most_degree: MAX_DEGREE,
             bottom,
             top,
+            points: points.into(),
             pads: pads.into(),
             uneven,
             image: Image::new(ImageGrid::new(size_m, IMAGE_NODES)).into(),
@@ -363,30 +368,6 @@ fn bottom_surface<'a>(detector: &Detector, covered: Covered<'a>) -> Surface<impl
         sheet_s: detector.sheet_conductance_s(),
         sigma: detector.layers.first().map_or(0.0, |layer| layer.bottom_s_per_m),
     }
-}
-
-/// The bare slab with its pads eliminated.
-fn bare(
-    detector: &Detector,
-    covered: &Covered<'_>,
-    resolution: Resolution,
-    bottom: &SurfaceGreen,
-    uneven: Option<&Uneven>,
-    planner: &mut RealFftPlanner<f64>,
-) -> Option<PadFields> {
-    let size_m = covered.size_m();
-    let pads: Vec<_> = detector
-        .electrodes
-        .iter()
-        .map(|pad| Pad {
-            centre_m: from_corner(size_m, [pad.x_m, pad.y_m]),
-            radius_m: pad.radius_m,
-            contact_impedance_ohm_m2: detector.pad_impedance_ohm_m2(pad),
-        })
-        .collect();
-    let basis = DiscBasis::of_degree(resolution.pad_degree);
-    let impedances = pad_impedances(&pads, basis, bottom, uneven);
-    PadFields::new(&pads, basis, impedances, covered, uneven, planner)
 }
 
 impl Image {

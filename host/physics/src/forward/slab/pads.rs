@@ -7,15 +7,18 @@
 //! `N(x, x') -> N(x, x') - w(x) . w(x')`.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix};
 use realfft::RealFftPlanner;
 
-use super::disc::DiscBasis;
+use super::disc::{DiscBasis, DiscSelf};
 use super::driving::Covered;
+use super::from_corner;
 use super::green::SurfaceGreen;
 use super::spline::Grid;
 use super::uneven::Uneven;
+use crate::detector::Detector;
 
 /// `k T` at which the field across the slab has fallen to 3e-5.
 const ACROSS_END: f64 = 11.0;
@@ -35,48 +38,89 @@ pub(super) struct Pad {
 }
 
 impl Pad {
-    fn is_made_as(&self, other: &Self) -> bool {
-        self.radius_m == other.radius_m && self.contact_impedance_ohm_m2 == other.contact_impedance_ohm_m2
+    fn is_placed_as(&self, other: &Self) -> bool {
+        self.centre_m == other.centre_m && self.radius_m == other.radius_m
     }
 }
 
-/// Impedances between all densities of all pads (ohm): pad by pad.
-pub(super) fn pad_impedances(
-    pads: &[Pad],
-    basis: &DiscBasis,
-    kernel: &SurfaceGreen,
-    uneven: Option<&Uneven>,
-) -> DMatrix<f64> {
-    let size = basis.len();
-    let nodes: Vec<_> = pads.iter().map(|pad| basis.nodes_m(pad.centre_m, pad.radius_m)).collect();
-    let places: Vec<_> = nodes.iter().map(|nodes| uneven.map(|uneven| uneven.under_pad(nodes))).collect();
-    let mut all = DMatrix::zeros(pads.len() * size, pads.len() * size);
-    let mut own: Option<(Pad, DMatrix<f64>)> = None;
-    for (e, pad) in pads.iter().enumerate() {
-        for (f, other) in pads.iter().enumerate().take(e + 1) {
-            let gap_m = pad.radius_m + other.radius_m;
-            let images = kernel.images(pad.centre_m, other.centre_m, gap_m);
-            let mut points = between_points(&nodes[e], &nodes[f], kernel, &images, e == f);
-            if let (Some(here), Some(there)) = (&places[e], &places[f]) {
-                here.apply(there, &mut points);
+/// Impedances between the points of all pads (ohm), of an even slab: what is most of the work, and mostly the same for a slab that is nearly
+/// the same.
+#[derive(Clone, Debug)]
+pub(super) struct PadPoints {
+    pads: Vec<Pad>,
+    /// Of each pad with those before it and itself.
+    blocks: Vec<Arc<DMatrix<f64>>>,
+}
+
+impl PadPoints {
+    /// Those of a detector, with what there is of pads in the same places on a slab with the same kernel.
+    pub fn new(
+        detector: &Detector,
+        size_m: [f64; 2],
+        basis: &DiscBasis,
+        kernel: &SurfaceGreen,
+        like: Option<&Self>,
+    ) -> Self {
+        let pads = detector.electrodes.iter().map(|pad| Pad {
+            centre_m: from_corner(size_m, [pad.x_m, pad.y_m]),
+            radius_m: pad.radius_m,
+            contact_impedance_ohm_m2: detector.pad_impedance_ohm_m2(pad),
+        });
+        let pads: Vec<_> = pads.collect();
+        let nodes: Vec<_> = pads.iter().map(|pad| basis.nodes_m(pad.centre_m, pad.radius_m)).collect();
+        let like = like.filter(|like| like.pads.len() == pads.len());
+        let is_like = |e: usize| like.is_some_and(|like| pads[e].is_placed_as(&like.pads[e]));
+        let block = |(e, f): (usize, usize)| match like {
+            Some(like) if is_like(e) && is_like(f) => Arc::clone(&like.blocks[pair(e, f)]),
+            _ => {
+                let gap_m = pads[e].radius_m + pads[f].radius_m;
+                let images = kernel.images(pads[e].centre_m, pads[f].centre_m, gap_m);
+                between_points(&nodes[e], &nodes[f], kernel, &images, e == f).into()
             }
-            let mut block = basis.weights() * points * basis.weights().transpose();
-            if e == f {
-                let even = uneven.map_or(1.0, |uneven| uneven.inverse_root(pad.centre_m).powi(2));
-                let like = |(like, _): &mut (Pad, DMatrix<f64>)| uneven.is_none() && pad.is_made_as(like);
-                let local = own.take_if(like).unwrap_or_else(|| {
-                    let area_m2 = std::f64::consts::PI * pad.radius_m * pad.radius_m;
-                    let local = kernel.disc_self(pad.radius_m);
-                    (*pad, local.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, even))
-                });
-                block += &local.1;
-                own = Some(local);
-            }
-            all.view_mut((e * size, f * size), (size, size)).copy_from(&block);
-            all.view_mut((f * size, e * size), (size, size)).tr_copy_from(&block);
-        }
+        };
+        let pairs = (0..pads.len()).flat_map(|e| (0..=e).map(move |f| (e, f)));
+        let blocks = pairs.map(block).collect();
+        Self { pads, blocks }
     }
-    all
+
+    /// The pads.
+    pub fn pads(&self) -> &[Pad] {
+        &self.pads
+    }
+
+    /// Impedances between all densities of all pads (ohm), pad by pad.
+    pub fn impedances(&self, basis: &DiscBasis, kernel: &SurfaceGreen, uneven: Option<&Uneven>) -> DMatrix<f64> {
+        let size = basis.len();
+        let under = |pad: &Pad| Some(uneven?.under_pad(&basis.nodes_m(pad.centre_m, pad.radius_m)));
+        let places: Vec<_> = self.pads.iter().map(under).collect();
+        let mut all = DMatrix::zeros(self.pads.len() * size, self.pads.len() * size);
+        let mut own: Option<(f64, DiscSelf)> = None;
+        for (e, pad) in self.pads.iter().enumerate() {
+            for f in 0..=e {
+                let mut points = (*self.blocks[pair(e, f)]).clone();
+                if let (Some(here), Some(there)) = (&places[e], &places[f]) {
+                    here.apply(there, &mut points);
+                }
+                let mut block = basis.weights() * points * basis.weights().transpose();
+                if e == f {
+                    let even = uneven.map_or(1.0, |uneven| uneven.inverse_root(pad.centre_m).powi(2));
+                    let area_m2 = std::f64::consts::PI * pad.radius_m * pad.radius_m;
+                    let alike = own.take_if(|(radius_m, _)| *radius_m == pad.radius_m);
+                    let local = alike.unwrap_or_else(|| (pad.radius_m, kernel.disc_self(pad.radius_m)));
+                    block += local.1.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, even);
+                    own = Some(local);
+                }
+                all.view_mut((e * size, f * size), (size, size)).copy_from(&block);
+                all.view_mut((f * size, e * size), (size, size)).tr_copy_from(&block);
+            }
+        }
+        all
+    }
+}
+
+/// Where the block of two pads is, the second no later than the first.
+fn pair(e: usize, f: usize) -> usize {
+    e * (e + 1) / 2 + f
 }
 
 /// Impedances between the densities of two discs (ohm), by their points; a disc's own singular part is left out.
