@@ -271,6 +271,8 @@ fn bad_presses_say_what_to_do_and_write_nothing() {
         let message = refused(&folder, &[&[&good[..]], known].concat());
         assert!(message.contains(told), "{known:?}: {message}");
     }
+    let message = refused(&folder, &["--simulate", "--places", &places]);
+    assert!(message.contains("press no known places"), "{message}");
     let seven = Detector::preset("strip-13x60").unwrap().to_toml().replace("grid = [2, 8]", "grid = [2, 7]");
     let other = folder.with("other.toml", seven);
     let message = refused(&folder, &[&good, "--detector", &other, "--places", &places]);

@@ -68,6 +68,10 @@ pub struct Args {
 /// Finds the correction and writes the detector with it.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let out = NewFile::never_replacing(&args.out)?;
+    ensure!(
+        !args.board.simulate,
+        "the scenes of the simulated board press no known places: give a FILE of presses (`tactomo forward --measured` simulates rows), or --port"
+    );
     let what = "press the known places one after the other, each for a second, and lift the tip between them";
     let file =
         super::given_or_recorded(args.file.as_ref(), (&args.board, &args.detector), args.seconds, &args.out, what)?;
