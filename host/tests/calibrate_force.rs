@@ -2,60 +2,24 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod samples;
+
+use std::path::Path;
 
 use serde_json::Value;
-use tactomo::board::record::{Header, RecordWriter};
 use tactomo::detector::{Detector, Foam};
 use tactomo::forward::{ForwardModel, readings_v};
 use tactomo::hertz::Hertz;
 use tactomo::readings::Readings;
 use tactomo::scene::Contact;
 use tactomo::simulate::{Noise, finer_model, measured};
-use tactomo_protocol::{BoardMessage, FrameHead, Hello, MAX_WIRE, encode_board, encode_frame};
+
+use self::samples::{Folder, csv, recording, tactomo};
 
 /// Ten presses on a kitchen scale (N).
 const TEN_N: [f64; 10] = [0.1, 0.15, 0.25, 0.4, 0.6, 0.8, 1.1, 1.5, 2.0, 2.6];
 /// Quantile of the normal distribution below which 95 % are.
 const BAND: f64 = 1.645;
-
-fn tactomo(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).output().unwrap()
-}
-
-/// A folder that goes when the test ends.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("tactomo-{}-force-{name}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
-    }
-
-    fn with(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
-        std::fs::write(self.0.join(name), bytes).unwrap();
-        self.path(name)
-    }
-
-    fn names(&self) -> Vec<String> {
-        let files = std::fs::read_dir(&self.0).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap());
-        let mut names: Vec<_> = files.collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _gone = std::fs::remove_dir_all(&self.0);
-    }
-}
 
 /// A ball of 8 mm that presses on `square-60`, by a finer model than the one that is inverted.
 struct Bench {
@@ -111,11 +75,6 @@ impl Bench {
     }
 }
 
-fn csv(rows: &[Vec<f64>]) -> String {
-    let line = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-    rows.iter().map(line).collect::<Vec<_>>().join("\n")
-}
-
 fn list(forces_n: &[f64]) -> String {
     forces_n.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
 }
@@ -152,7 +111,7 @@ fn forces(file: &str, detector: &str, solver: &str) -> Vec<(f64, f64, bool)> {
 #[test]
 fn ten_presses_give_newtons_within_their_hysteresis() {
     const HYSTERESIS: f64 = 0.1;
-    let folder = Folder::new("round");
+    let folder = Folder::new("force-round");
     let (mut middle, mut off, mut within, mut count) = (Vec::new(), Vec::new(), 0, 0);
     for seed in 0..10 {
         let mut bench = Bench::new(seed);
@@ -182,7 +141,7 @@ fn ten_presses_give_newtons_within_their_hysteresis() {
 
 #[test]
 fn every_solver_tells_the_force_that_was_calibrated_and_the_flag_beyond() {
-    let folder = Folder::new("solvers");
+    let folder = Folder::new("force-solvers");
     let mut bench = Bench::new(7);
     let presses = folder.with("presses.csv", csv(&bench.rows(&TEN_N, 0.0)));
     let out = folder.path("cal.toml");
@@ -222,7 +181,7 @@ fn every_solver_tells_the_force_that_was_calibrated_and_the_flag_beyond() {
 
 #[test]
 fn a_file_is_never_replaced_and_bad_presses_write_none() {
-    let folder = Folder::new("bad");
+    let folder = Folder::new("force-bad");
     let mut bench = Bench::new(3);
     let rows = bench.rows(&TEN_N, 0.0);
     let good = folder.with("good.csv", csv(&rows));
@@ -281,39 +240,24 @@ fn a_file_is_never_replaced_and_bad_presses_write_none() {
     }
 }
 
-/// A recording at 100 frames a second of what touches at each time (s).
-fn recording(path: &str, bench: &mut Bench, seconds: f64, touches: impl Fn(&Bench, f64) -> Option<Contact>) {
-    let header = Header::of(&bench.detector, "a test".to_owned(), 0);
-    let mut writer = RecordWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
-    let mut wire = [0; MAX_WIRE];
-    let hello = Hello { adc_bits: 12, adc_full_scale_mv: 3300, drive_mv: 2000, ..Hello::example(16) };
-    let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
-    writer.write(0, &wire[..length]).unwrap();
-    for sequence in 0..(100.0 * seconds) as u16 {
-        let contact = touches(bench, 0.01 * f64::from(sequence));
-        let lsb_v = bench.detector.adc.lsb_v();
-        let row = bench.row(contact.as_slice());
-        let codes: Vec<u16> = row.iter().map(|volts| (volts / lsb_v).round() as u16).collect();
-        let head = FrameHead { sequence, time_us: 10_000 * u32::from(sequence), ..FrameHead::default() };
-        let length = encode_frame(head, &codes, &mut wire).unwrap();
-        writer.write(10_000 * u64::from(sequence), &wire[..length]).unwrap();
-    }
-    writer.flush().unwrap();
-}
-
 #[test]
 fn presses_of_a_recording_are_found_and_counted() {
     const FORCES_N: [f64; 6] = [0.2, 1.5, 0.5, 2.2, 0.9, 0.3];
-    let folder = Folder::new("recording");
+    let folder = Folder::new("force-recording");
     let mut bench = Bench::new(5);
     let file = folder.path("scale.tactomo");
     // A press a second from 0.5 s on, each 0.6 s long with 0.1 s to come and to go.
-    recording(&file, &mut bench, 6.8, |bench, time_s| {
-        let (k, at_s) = ((time_s - 0.5).div_euclid(1.0), (time_s - 0.5).rem_euclid(1.0));
-        let full_n = FORCES_N.get(k as usize).filter(|_| k >= 0.0)?;
-        let force_n = full_n * (at_s / 0.1).min((0.6 - at_s) / 0.1).min(1.0);
-        let place_m = [0.004 * k - 0.01, 0.012 - 0.005 * k];
-        (force_n > 0.0).then(|| bench.ball_at(place_m, force_n))
+    let detector = bench.detector.clone();
+    recording(&file, &detector, 6.8, |time_s| {
+        let press = |bench: &Bench| {
+            let (k, at_s) = ((time_s - 0.5).div_euclid(1.0), (time_s - 0.5).rem_euclid(1.0));
+            let full_n = FORCES_N.get(k as usize).filter(|_| k >= 0.0)?;
+            let force_n = full_n * (at_s / 0.1).min((0.6 - at_s) / 0.1).min(1.0);
+            let place_m = [0.004 * k - 0.01, 0.012 - 0.005 * k];
+            (force_n > 0.0).then(|| bench.ball_at(place_m, force_n))
+        };
+        let contact = press(&bench);
+        bench.row(contact.as_slice())
     });
     let out = folder.path("cal.toml");
     let report = calibrated(&[&file, "--newtons", &list(&FORCES_N), "--out", &out]);
@@ -336,18 +280,23 @@ fn presses_of_a_recording_are_found_and_counted() {
 #[test]
 fn a_force_sensor_tells_loading_from_unloading() {
     const HALF: f64 = 0.08;
-    let folder = Folder::new("sensor");
+    let folder = Folder::new("force-sensor");
     let mut bench = Bench::new(6);
     let force_n = |time_s: f64| (2.5 * (1.0 - ((time_s - 0.3).rem_euclid(2.0) - 0.9).abs() / 0.9)).max(0.0);
     let file = folder.path("ramp.tactomo");
-    recording(&file, &mut bench, 6.3, |bench, time_s| {
-        if time_s < 0.3 {
-            return None;
-        }
-        let (k, at_s) = ((time_s - 0.3).div_euclid(2.0), (time_s - 0.3).rem_euclid(2.0));
-        // Let go, the foam touches as if it were pressed harder.
-        let side = if at_s < 0.9 { -HALF } else { HALF };
-        (force_n(time_s) > 0.01).then(|| bench.ball_at([0.006 * k - 0.006, 0.003], force_n(time_s) * side.exp()))
+    let detector = bench.detector.clone();
+    recording(&file, &detector, 6.3, |time_s| {
+        let press = |bench: &Bench| {
+            if time_s < 0.3 {
+                return None;
+            }
+            let (k, at_s) = ((time_s - 0.3).div_euclid(2.0), (time_s - 0.3).rem_euclid(2.0));
+            // Let go, the foam touches as if it were pressed harder.
+            let side = if at_s < 0.9 { -HALF } else { HALF };
+            (force_n(time_s) > 0.01).then(|| bench.ball_at([0.006 * k - 0.006, 0.003], force_n(time_s) * side.exp()))
+        };
+        let contact = press(&bench);
+        bench.row(contact.as_slice())
     });
     let sensor: String = (0..640)
         .map(|k| 0.01 * f64::from(k))
@@ -374,7 +323,7 @@ fn a_force_sensor_tells_loading_from_unloading() {
 
 #[test]
 fn a_wanted_law_that_is_open_is_not_determined() {
-    let folder = Folder::new("open");
+    let folder = Folder::new("force-open");
     let mut bench = Bench::new(9);
     // So light that the constriction hardly counts.
     let forces_n = [0.0002, 0.0003, 0.0005, 0.0008, 0.0012, 0.002];

@@ -85,6 +85,7 @@ impl Args {
             rest: self.rest,
             unit: self.unit,
             force: None,
+            uncorrected: false,
         }
     }
 }

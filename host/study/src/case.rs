@@ -184,6 +184,7 @@ impl File {
                 tolerances: Tolerances::EXACT,
                 calibration: None,
                 force: None,
+                correction: None,
             },
             contacts: self.contacts,
             impedance_ohm: DMatrix::from_fn(count, count, |i, j| self.impedance_ohm[i][j]),

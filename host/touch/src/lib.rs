@@ -5,6 +5,7 @@
 //! pages.
 
 pub mod calibrate;
+mod gaussian;
 pub mod metrics;
 pub mod schema;
 pub mod solve;

@@ -61,18 +61,18 @@ impl Header {
         detector.map(Some).map_err(|source| RecordError::Detector { path: path.to_owned(), source })
     }
 
-    /// Whether `detector` is the one of the recording, whatever is known of its forces; where the header holds only a name, whether
+    /// Whether `detector` is the one of the recording, whatever is known of its forces and corrected in its answers; where the header holds only a name, whether
     /// that is the same.
     pub fn is_of(&self, detector: &Detector) -> bool {
         if self.detector_toml.is_none() {
             return self.detector == detector.name;
         }
-        let without_force = |detector: &Detector| {
-            let header = Self::of(&Detector { force: None, ..detector.clone() }, String::new(), 0);
+        let bare = |detector: &Detector| {
+            let header = Self::of(&Detector { force: None, correction: None, ..detector.clone() }, String::new(), 0);
             (header.detector_toml, header.surface_obj)
         };
         let recorded = self.detector(Path::new("")).ok().flatten();
-        recorded.is_some_and(|recorded| without_force(&recorded) == without_force(detector))
+        recorded.is_some_and(|recorded| bare(&recorded) == bare(detector))
     }
 }
 

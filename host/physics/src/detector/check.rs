@@ -2,7 +2,9 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Adc, CalibratedParameter, Detector, Electrode, ForceLaw, Layer, Outline, Parameter, Tolerances};
+use super::{
+    Adc, CalibratedParameter, Correction, Detector, Electrode, ForceLaw, Layer, Outline, Parameter, Tolerances,
+};
 use crate::geometry::{Point, area, cross, distance, edges, is_inside, segment_distance};
 use crate::space::{self, Place};
 
@@ -65,7 +67,15 @@ impl Detector {
         self.tolerances.check()?;
         self.check_calibration()?;
         self.adc.check()?;
-        self.force.as_ref().map_or(Ok(()), ForceLaw::check)
+        self.force.as_ref().map_or(Ok(()), ForceLaw::check)?;
+        self.check_correction()
+    }
+
+    fn check_correction(&self) -> Result<(), Problem> {
+        if self.correction.is_some() && self.surface.is_some() {
+            return Err(Problem::new("correction", "is known of flat detectors only: leave it out of a curved one"));
+        }
+        self.correction.as_ref().map_or(Ok(()), Correction::check)
     }
 
     fn check_layers(&self) -> Result<(), Problem> {

@@ -16,7 +16,7 @@ use self::electrodes::ElectrodeTable;
 use super::check::{LENGTH_M, Problem, within};
 use super::material::Foam;
 use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
-use super::{Adc, Detector, ForceLaw, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
+use super::{Adc, Correction, Detector, ForceLaw, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
 use crate::geometry::area;
 
 /// No detector's file is longer (bytes).
@@ -81,6 +81,7 @@ struct Document {
     tolerances: Tolerances,
     calibration: Option<CalibrationTable>,
     force: Option<ForceLaw>,
+    correction: Option<Correction>,
 }
 
 #[derive(Deserialize)]
@@ -192,6 +193,9 @@ impl Detector {
         if let Some(law) = &self.force {
             law.write_toml(text)?;
         }
+        if let Some(correction) = &self.correction {
+            correction.write_toml(text)?;
+        }
         match &self.calibration {
             Some(calibration) => calibration.write_toml(text),
             None => Ok(()),
@@ -296,6 +300,7 @@ impl Document {
             tolerances: self.tolerances,
             calibration: self.calibration.map(CalibrationTable::into_calibration).transpose()?,
             force: self.force,
+            correction: self.correction,
         })
     }
 }

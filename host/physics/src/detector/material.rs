@@ -65,7 +65,7 @@ impl FromStr for Stack {
 }
 
 impl Detector {
-    /// This detector in another material, with no law of force: that was another material's. A stack of as many foams as there are layers keeps each layer's thickness; on a
+    /// This detector in another material, with no law of force and no correction: those were another material's. A stack of as many foams as there are layers keeps each layer's thickness; on a
     /// single layer, each foam has that layer's thickness, as the paper's stacks do.
     ///
     /// # Errors
@@ -82,7 +82,7 @@ impl Detector {
         let layer = |(index, foam): (usize, &Foam)| Layer::uniform(thickness_m(index), foam.conductivity_s_per_m);
         self.layers = stack.foams.iter().enumerate().map(layer).collect();
         self.name = format!("{} in {}", self.name, stack.name);
-        self.force = None;
+        (self.force, self.correction) = (None, None);
         Ok(self)
     }
 }

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod check;
+mod correction;
 mod file;
 mod force;
 mod material;
@@ -14,6 +15,7 @@ mod uneven;
 
 pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
 pub use self::check::{ELECTRODES, Problem};
+pub use self::correction::{ConductanceErrors, Correction, PlaceErrors};
 pub use self::file::{FileError, TomlError};
 pub use self::force::{FARTHEST, ForceLaw, Newtons};
 pub use self::material::{FOAMS, Foam, Stack};
@@ -60,6 +62,9 @@ pub struct Detector {
     pub calibration: Option<Calibration>,
     /// Newtons from conductances, once that is calibrated.
     pub force: Option<ForceLaw>,
+    /// What is taken off contacts that are found with this description, where known presses have shown errors.
+    #[serde(skip)]
+    pub correction: Option<Correction>,
 }
 
 /// Closed polygons, without repeating the first corner (m).
@@ -167,10 +172,10 @@ impl Detector {
         }
     }
 
-    /// This detector with its description taken as exact.
+    /// This detector with its description taken as exact: there is nothing to correct then.
     #[must_use]
     pub fn taken_as_exact(&self) -> Self {
-        Self { tolerances: Tolerances::EXACT, calibration: None, ..self.clone() }
+        Self { tolerances: Tolerances::EXACT, calibration: None, correction: None, ..self.clone() }
     }
 
     /// Logarithm of the factor by which unevenness changes the conductivity at a place of the map (m).

@@ -52,6 +52,7 @@ impl Detector {
             tolerances: Tolerances::default(),
             calibration: None,
             force: None,
+            correction: None,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write as _};
 
-use super::{Detector, Layer};
+use super::{Correction, Detector, Layer};
 
 /// Largest size of the view from above (px).
 const PLAN_PX: [f64; 2] = [460.0, 420.0];
@@ -269,6 +269,8 @@ impl Detector {
             ("noise", format!("{} LSB", short(self.adc.noise_lsb))),
         ];
         facts.extend(self.force.as_ref().map(|law| ("forces", format!("up to {} N", short(law.limit_n())))));
+        let presses = |correction: &Correction| ("corrected", format!("by {} known presses", correction.presses()));
+        facts.extend(self.correction.as_ref().map(presses));
         facts
     }
 }

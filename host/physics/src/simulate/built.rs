@@ -47,7 +47,7 @@ pub fn drawn(detector: &Detector, seed: u64) -> Detector {
     for pad in &mut built.electrodes {
         pad.offset_v += detector.tolerances.offset_lsb * code_v * noise.normal();
     }
-    Detector { calibration: None, tolerances: Tolerances::EXACT, ..built }
+    Detector { calibration: None, correction: None, tolerances: Tolerances::EXACT, ..built }
 }
 
 /// Moves pads that have no room half way back to where they are described, until all have.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, anyhow, bail, ensure};
+use anyhow::{Context, anyhow, bail};
 use tactomo::board::identity;
 use tactomo::calibrate::{Frame, Rub, RubSettings, rub};
 use tactomo::date::today;
@@ -11,12 +11,11 @@ use tactomo::detector::Detector;
 use tactomo::readings::Readings;
 use tactomo::solve::Method;
 
-use super::known::{KnownPlace, places};
+use super::known::{KnownPlace, check_places, check_used, places};
 use crate::commands::choice::{DetectorArgs, Model};
 use crate::commands::output::{self, NewFile, message};
 use crate::commands::reconstruct::reader::{Input, Reader};
 use crate::commands::reconstruct::units::Unit;
-use crate::commands::record;
 use crate::commands::source::{self, BoardArgs};
 
 /// Finds the detector that was built, from one finger rubbed over it: half a minute, everywhere, now light and now firm.
@@ -71,10 +70,9 @@ pub struct Args {
 /// Fits the detector and writes it.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let out = NewFile::never_replacing(&args.out)?;
-    let file = match &args.file {
-        Some(file) => file.clone(),
-        None => recorded(args)?,
-    };
+    let what = "rub one fingertip over the whole sensor, now light and now firm";
+    let file =
+        super::given_or_recorded(args.file.as_ref(), (&args.board, &args.detector), args.seconds, &args.out, what)?;
     let (nominal, board, frames) = frames(args, &file)?;
     let begin = Instant::now();
     let settings = RubSettings { presses: args.presses, ..RubSettings::default() };
@@ -100,22 +98,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Records a board beside the result.
-fn recorded(args: &Args) -> anyhow::Result<PathBuf> {
-    ensure!(
-        args.board.port.is_some() || args.board.simulate,
-        "give a FILE, or --port PORT for a board, or --simulate: which readings shall the detector be fitted to?"
-    );
-    let file = args.out.with_extension("tactomo");
-    message!(
-        "rub one fingertip over the whole sensor, now light and now firm, for {:.0} s; the recording is kept in {}",
-        args.seconds.as_secs_f64(),
-        file.display()
-    );
-    record::record(&file, &args.board, &args.detector, Some(args.seconds))?;
-    Ok(file)
-}
-
 /// The description, the board's identity, and the frames of a file.
 fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Option<String>, Vec<Frame>)> {
     let mut reader = Reader::open(&Input {
@@ -128,6 +110,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
         rest: args.rest,
         unit: args.unit,
         force: None,
+        uncorrected: true,
     })?;
     let nominal = reader.measured().cloned().context("a rub needs a detector")?;
     let board = reader.board().map(identity::identity);
@@ -154,21 +137,9 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
     if let Some(losses) = reader.losses() {
         message!("warning: {losses}");
     }
-    if let Some(missing) = known.iter().zip(&used).find(|(_, used)| !**used) {
-        let (what, last) = if is_recording { ("second", "time") } else { ("row", "row") };
-        bail!(
-            "{}: there is no {what} {} for a known place: see that each {last} is in the file",
-            file.display(),
-            missing.0.at
-        );
-    }
-    if let Some(wrong) = known.iter().find(|known| !nominal.outline.holds(known.at_m)) {
-        bail!(
-            "the known place {:.1}, {:.1} mm is not on the sensor: x and y count from its middle, in millimetres",
-            1e3 * wrong.at_m[0],
-            1e3 * wrong.at_m[1]
-        );
-    }
+    let unused = known.iter().zip(&used).find(|(_, used)| !**used).map(|(known, _)| known);
+    check_used(file, unused, is_recording)?;
+    check_places(&known, &nominal)?;
     Ok((nominal, board, frames))
 }
 

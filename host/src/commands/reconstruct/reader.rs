@@ -39,6 +39,8 @@ pub struct Input<'a> {
     pub unit: Option<Unit>,
     /// Law of force in place of the detector's own.
     pub force: Option<ForceLaw>,
+    /// Leaves out what the detector's known presses correct.
+    pub uncorrected: bool,
 }
 
 /// Frames and what solves them.
@@ -297,7 +299,8 @@ fn solved(input: &Input) -> anyhow::Result<Opened> {
         }
         None => chosen.clone(),
     };
-    let detector = Detector { force: input.force.clone().or(detector.force), ..detector };
+    let correction = detector.correction.filter(|_| !input.uncorrected);
+    let detector = Detector { force: input.force.clone().or(detector.force), correction, ..detector };
     if file.channels() != electrodes * electrodes {
         bail!(
             "{} has {} readings a frame, but the detector {} with its {electrodes} electrodes needs {}: give the right one with \

@@ -3,11 +3,12 @@
 //! A finger rubbed over the foam is enough: the impedance matrix of a single contact, centred, is that of the bare detector wherever
 //! the contact is (`centred`), which tells single contacts from others and finds the order of the wires (`wires`); then detector and all
 //! contacts are fitted together (`bundle`), with the builder's tolerances as prior. What is left unknown is kept with the detector
-//! (`posterior`).
+//! (`posterior`). What no parameter explains is corrected by presses at known places (`known`).
 
 mod bundle;
 mod centred;
 pub mod force;
+pub mod known;
 mod posterior;
 mod presses;
 mod rub;

@@ -143,9 +143,10 @@ pub fn rub(
     })
 }
 
-/// A detector whose channels are taken to read what is there. One that is taken as exact is no longer, by whoever calibrates it.
+/// A detector whose channels are taken to read what is there, and whose answers are not corrected. One that is taken as exact is no longer, by
+/// whoever calibrates it.
 fn without_channels(detector: &Detector) -> Detector {
-    let mut detector = detector.clone();
+    let mut detector = Detector { correction: None, ..detector.clone() };
     if detector.tolerances.is_exact() {
         detector.tolerances = Tolerances::default();
     }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::{
     Auto, Bsbl, ContactSettings, Contacts, KernelSolver, Lambda, Nonlinear, NonlinearSettings, Nonnegative, Problem,
-    Solver, Tikhonov, Tsvd, Tv, Variant, newtons,
+    Solver, Tikhonov, Tsvd, Tv, Variant, correct, newtons,
 };
 use tactomo_physics::forward::ForwardError;
 
@@ -326,12 +326,14 @@ impl Method {
     }
 
     /// Makes the solver with a value of its main parameter; one that it does not have changes nothing. On a detector with a law of force, its
-    /// contacts carry newtons.
+    /// contacts carry newtons; on one that known presses have corrected, they are where these say.
     ///
     /// # Errors
     /// [`ForwardError`] if the model cannot give what the solver needs.
     pub fn build_with(self, problem: &Problem, parameter: Option<Parameter>) -> Result<Box<dyn Solver>, ForwardError> {
-        Ok(newtons::with_newtons(problem, (self.row().build)(problem, parameter)?))
+        let solver = (self.row().build)(problem, parameter)?;
+        // Newtons are measured where the model explains the readings, so before places are corrected.
+        Ok(correct::with_correction(problem.detector(), newtons::with_newtons(problem, solver)))
     }
 }
 

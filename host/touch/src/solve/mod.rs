@@ -4,6 +4,7 @@ mod auto;
 mod balance;
 mod bsbl;
 mod contacts;
+mod correct;
 mod evidence;
 mod follow;
 mod guard;
@@ -33,6 +34,8 @@ mod watch;
 pub use self::auto::Auto;
 pub use self::bsbl::Bsbl;
 pub use self::contacts::{ContactSettings, Contacts};
+#[cfg(test)]
+pub(crate) use self::correct::Corrector;
 use self::follow::Direct;
 pub use self::follow::{Followed, Follower, Lead, Parts, Searcher};
 pub use self::guard::{Guard, without};

@@ -4,7 +4,8 @@ mod meter;
 
 use std::sync::Arc;
 
-use self::meter::Meter;
+use self::meter::{Measured, Meter};
+use super::correct::Corrector;
 use super::follow::{Followed, Follower, Lead, Parts};
 use super::{FoundContact, Problem, Solution, SolveError, Solver};
 use tactomo_physics::detector::ForceLaw;
@@ -13,16 +14,17 @@ use tactomo_physics::readings::Readings;
 /// The solver, whose contacts then carry newtons if the detector of the problem has a law of force.
 pub(super) fn with_newtons(problem: &Problem, solver: Box<dyn Solver>) -> Box<dyn Solver> {
     let scale = problem.detector().force.clone().zip(Meter::new(problem));
-    match scale {
-        Some((law, meter)) => Box::new(InNewtons { scale: Arc::new(Scale { law, meter }), half: solver }),
-        None => solver,
-    }
+    let Some((law, meter)) = scale else { return solver };
+    let corrector = Corrector::of(problem.detector());
+    Box::new(InNewtons { scale: Arc::new(Scale { law, meter, corrector }), half: solver })
 }
 
 /// What makes forces of readings at the places of contacts.
 struct Scale {
     law: ForceLaw,
     meter: Meter,
+    /// What known presses say of conductances.
+    corrector: Option<Corrector>,
 }
 
 /// A solver, or its half that answers, with a scale.
@@ -37,7 +39,13 @@ impl Scale {
         let is_told = solution.contacts.iter().any(|contact| contact.force_n.is_some());
         let measured = if is_told { None } else { self.meter.measure(readings, &solution.contacts) };
         for (contact, measured) in solution.contacts.iter_mut().zip(measured.into_iter().flatten()) {
-            let newtons = self.law.force_n(measured.conductance_s, measured.deviation_s);
+            let Measured { conductance_s, deviation_s } = measured;
+            let found = [conductance_s, deviation_s];
+            let [conductance_s, deviation_s] = match &self.corrector {
+                Some(corrector) => corrector.conductance_s([contact.x_m, contact.y_m], found),
+                None => found,
+            };
+            let newtons = self.law.force_n(conductance_s, deviation_s);
             contact.force_n = Some(newtons.force_n);
             contact.force_deviation_n = Some(newtons.deviation_n);
             contact.force_beyond_maximum = Some(newtons.beyond_maximum);
@@ -162,7 +170,7 @@ mod tests {
     #[test]
     fn a_force_that_was_taught_stays_and_nothing_is_made_of_no_number() {
         let problem = problem(Some(law()));
-        let scale = Scale { law: law(), meter: Meter::new(&problem).unwrap() };
+        let scale = Scale { law: law(), meter: Meter::new(&problem).unwrap(), corrector: None };
         let told =
             |contact| scale.told(&readings(CONTACT), Solution { contacts: vec![contact], ..Solution::default() });
         let taught = FoundContact { force_n: Some(7.0), ..FoundContact::flat(0.0, 0.0, 1e-4) };

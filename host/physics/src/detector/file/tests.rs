@@ -184,6 +184,7 @@ fn detectors() -> impl Strategy<Value = Detector> {
                 on_resistance_ohm,
                 adc: Adc { bits, ..Adc::default() },
                 force,
+                correction: None,
             };
             detector.check().is_ok().then_some(detector)
         },
@@ -234,6 +235,31 @@ fn a_law_of_force_is_checked_with_its_line() {
     assert!(error("exponent", "power").contains("unknown field `power`"));
     assert!(error("presses = 10\n", "").contains("missing field `presses`"));
     assert!(error("[[4e-4, 1e-4], [1e-4, 9e-4]]", "[[4e-4]]").contains("force.covariance has to have a row"));
+}
+
+#[test]
+fn a_correction_is_checked_with_its_line_and_belongs_to_its_material() {
+    let table = "\n[correction.place]\nlength_m = 0.03\ndeviation_m = 1e-3\nnoise_m = 1e-4\nclaimed_share = 0.5\n\
+                 found_m = [[0.01, 0.02], [0.0, -0.01]]\nerrors_m = [[1e-3, 0.0], [0.0, 2e-3]]\n\
+                 standard_errors_m = [[1e-4, 1e-4], [1e-4, 1e-4]]\n";
+    let with = |table: &str| Detector::from_toml(&format!("{SQUARE}{table}"), "square");
+    let detector = with(table).unwrap();
+    assert_eq!(detector.correction.as_ref().map(Correction::presses), Some(2));
+    assert_eq!(Detector::from_toml(&detector.to_toml(), "").unwrap(), detector);
+    assert!(detector.facts().contains(&("corrected", "by 2 known presses".to_owned())));
+    assert_eq!(detector.taken_as_exact().correction, None, "there is nothing to correct");
+    let error = |from: &str, to: &str| with(&table.replace(from, to)).unwrap_err().to_string();
+    assert_eq!(
+        error("length_m = 0.03", "length_m = 0"),
+        "line 13: correction.place.length_m is 0.0, but has to be from 1e-5 to 100.0"
+    );
+    assert!(error("[1e-3, 0.0], ", "").ends_with("correction.place.errors_m has 1 presses, but found_m has 2"));
+    assert!(error("noise_m", "noise").contains("unknown field `noise`"));
+    assert_eq!(
+        detector.in_material(&"B".parse().unwrap()).unwrap().correction,
+        None,
+        "it was that of another material"
+    );
 }
 
 fn example(name: &str) -> std::path::PathBuf {

@@ -37,6 +37,7 @@ fn flat(outline: Outline, electrodes: Vec<Electrode>) -> Detector {
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
         force: None,
+        correction: None,
     }
 }
 

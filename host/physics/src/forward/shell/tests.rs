@@ -36,6 +36,7 @@ fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
         force: None,
+        correction: None,
     }
 }
 

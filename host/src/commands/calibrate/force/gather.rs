@@ -36,6 +36,7 @@ pub fn gather(args: &Args, known: &Known) -> anyhow::Result<Gathered> {
         rest: args.rest,
         unit: args.unit,
         force: Some(ForceLaw::siemens()),
+        uncorrected: false,
     })?;
     let presses = match (reader.is_recording(), known) {
         (true, Known::Presses(forces)) => of_stands(&mut reader, forces)?,
