@@ -25,8 +25,6 @@ const RADIUS_DEVIATION: f64 = 0.5;
 const CONDUCTANCE_DEVIATION: f64 = 3.0;
 /// Unknowns of a press.
 const OF_PRESS: usize = 4;
-/// Most iterations.
-const MOST_ITERATIONS: usize = 9;
 /// Share of the sum of squares by which an iteration has to better it for there to be another one.
 const WORTH: f64 = 5e-3;
 /// Dampings that are tried, as shares of the information.
@@ -68,6 +66,21 @@ pub(super) struct Bundle {
     /// Error of the model, in shares of `Vcc - V`.
     pub model_error: f64,
     full_v: f64,
+}
+
+/// How often a bundle is bettered.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Iterations {
+    /// At most.
+    pub most: usize,
+    /// In how many of them derivatives by the detector are made anew.
+    pub renewed: usize,
+}
+
+impl Default for Iterations {
+    fn default() -> Self {
+        Self { most: 9, renewed: 0 }
+    }
 }
 
 /// What the bundle says at one point.
@@ -209,19 +222,19 @@ impl Bundle {
     pub fn adjust(
         &mut self,
         slopes: &mut Slopes,
-        renewed: usize,
+        iterations: Iterations,
         told: &mut dyn FnMut(Step) -> bool,
     ) -> Result<Normal, CalibrateError> {
         let mut normal = self.normal(slopes);
-        for iteration in 1..=MOST_ITERATIONS {
+        for iteration in 1..=iterations.most {
             let before = self.objective(&normal, &self.steps);
             let bettered = self.step(&normal)?;
-            if iteration <= renewed && bettered {
+            if iteration <= iterations.renewed && bettered {
                 *slopes = Slopes::new(&*self.model, &self.parameters)?;
             }
             normal = self.normal(slopes);
             let after = self.objective(&normal, &self.steps);
-            if !told(Step { iteration, most: MOST_ITERATIONS, chi_square: self.chi_square(&normal) }) {
+            if !told(Step { iteration, most: iterations.most, chi_square: self.chi_square(&normal) }) {
                 return Err(CalibrateError::Stopped);
             }
             if !bettered || before - after < WORTH * before {
