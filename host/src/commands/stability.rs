@@ -37,7 +37,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         seed: study.seed,
         quick: study.quick,
         as_built: study.as_built,
-        calibrate: None,
+        calibrate: study.calibrate(),
     };
     let report = stability::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
     page.map(|page| page.write(stability::page(&report))).transpose()?;
