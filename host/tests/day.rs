@@ -33,8 +33,9 @@ const CUP_H: usize = 9;
 const HAND_H: usize = 15;
 const HAND_M: [f64; 2] = [0.016, -0.013];
 
+/// A calibrated detector: of one on paper, whose tolerances leave conductances open by a third, a drift by a fifth shows nothing.
 fn detector() -> Detector {
-    let mut detector = Detector::preset(Detector::DEFAULT).unwrap();
+    let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
     detector.adc.noise_lsb = 1.5;
     detector
 }
@@ -220,7 +221,6 @@ fn a_day_of_drift_invents_nothing_learns_nothing_and_moves_nothing() {
     // Conductances are told as if the conductivity were that of the description, of which this contact's is a share.
     let [least_s, most_s] = [f64::min, f64::max].map(|fold| day.fingers_s.iter().copied().reduce(fold).unwrap());
     assert!(most_s < 1.03 * least_s, "{least_s} to {most_s} S");
-    assert!(day.invented.is_empty() && day.missed.is_empty() && day.taken.is_empty(), "{wrong:?}");
     assert!(day.invented.is_empty() && day.missed.is_empty() && day.taken.is_empty(), "{wrong:?}");
     // The cup and the hand have lasted for long; nothing else is worth a word.
     let is_long = |hour: &usize| [CUP_H, HAND_H].contains(hour);

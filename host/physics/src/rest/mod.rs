@@ -19,12 +19,16 @@ const KNEE: f64 = 2.0;
 /// Mean readings from here on are the offset itself.
 const CLEAR: f64 = 1.75;
 
+/// Variance of a channel, in that of one of the noisier quarter, from which it floats. The same noise is a tenth as large where half of it
+/// and more is cut off; a broken wire's is ten thousand times larger.
+const FLOATING: f64 = 30.0;
+
 /// Sum of frames that nothing touches in.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RestSum {
     sum_v: Vec<f64>,
-    /// Squares of all readings (V2), each as often as its frames.
-    squares_v2: f64,
+    /// Squares of readings (V2), each as often as its frames.
+    squares_v2: Vec<f64>,
     frames: u32,
     /// How many means were added.
     means: u32,
@@ -46,10 +50,11 @@ impl RestSum {
     /// Adds the mean readings of some frames (V).
     pub fn add(&mut self, readings_v: &[f64], frames: u32) {
         self.sum_v.resize(readings_v.len(), 0.0);
+        self.squares_v2.resize(readings_v.len(), 0.0);
         let weight = f64::from(frames);
-        for (sum, volts) in self.sum_v.iter_mut().zip(readings_v) {
+        for ((sum, square), volts) in self.sum_v.iter_mut().zip(&mut self.squares_v2).zip(readings_v) {
             *sum += weight * volts;
-            self.squares_v2 += weight * volts * volts;
+            *square += weight * volts * volts;
         }
         self.frames += frames;
         self.means += 1;
@@ -69,10 +74,10 @@ impl RestSum {
     /// few means it is what the converter's description says.
     pub fn rest(&self, adc: &Adc, conversions: u32) -> Rest {
         let (mean_v, lsb_v) = (self.mean_v(), adc.lsb_v());
-        let clipping = match self.variance_v2(&mean_v) {
+        let clipping = match self.noise_of(&mean_v) {
             None => Clipping::new(adc.noise_lsb),
-            Some(variance_v2) => {
-                let means: Vec<f64> = mean_v.iter().map(|volts| volts / lsb_v).collect();
+            Some((means_v, variance_v2)) => {
+                let means: Vec<f64> = means_v.iter().map(|volts| volts / lsb_v).collect();
                 Clipping::of_variance(&means, variance_v2 * f64::from(conversions) / (lsb_v * lsb_v))
             }
         };
@@ -81,11 +86,23 @@ impl RestSum {
         rest
     }
 
-    /// Mean variance of a frame's reading (V2), if there are enough to tell.
-    fn variance_v2(&self, mean_v: &[f64]) -> Option<f64> {
-        let of_means_v2 = f64::from(self.frames) * mean_v.iter().map(|volts| volts * volts).sum::<f64>();
-        let freedom = f64::from(self.means.saturating_sub(1)) * mean_v.len() as f64;
-        (self.means >= Self::FEWEST && freedom > 0.0).then(|| ((self.squares_v2 - of_means_v2) / freedom).max(0.0))
+    /// Means of the readings that show the converter's noise (V) and the mean variance of one of a frame (V2), if there are enough to tell.
+    /// A channel that floats, since its wire is broken, shows other noise.
+    fn noise_of(&self, mean_v: &[f64]) -> Option<(Vec<f64>, f64)> {
+        if self.means < Self::FEWEST || mean_v.is_empty() {
+            return None;
+        }
+        let frames = f64::from(self.frames);
+        let of = |(square, mean): (&f64, &f64)| (square - frames * mean * mean).max(0.0) / f64::from(self.means - 1);
+        let variances_v2: Vec<f64> = self.squares_v2.iter().zip(mean_v).map(of).collect();
+        let channels = mean_v.len().isqrt().max(1);
+        let of_channel = |e: usize| variances_v2.iter().skip(e).step_by(channels).sum::<f64>();
+        let mut sorted: Vec<f64> = (0..channels).map(of_channel).collect();
+        sorted.sort_by(f64::total_cmp);
+        let most_v2 = FLOATING * sorted[channels * 3 / 4];
+        let kept: Vec<usize> = (0..mean_v.len()).filter(|index| of_channel(index % channels) <= most_v2).collect();
+        let variance_v2 = kept.iter().map(|index| variances_v2[*index]).sum::<f64>() / kept.len().max(1) as f64;
+        Some((kept.iter().map(|index| mean_v[*index]).collect(), variance_v2))
     }
 }
 
@@ -195,6 +212,28 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_wire_that_floats_does_not_make_the_others_noisy() {
+        let adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 };
+        let (mut noise, mut floating) = (Noise::new(5), Noise::new(6));
+        let rest = |floats: bool, noise: &mut Noise, floating: &mut Noise| {
+            let mut sum = RestSum::default();
+            for _ in 0..64 {
+                let mut frame = measured(&Readings::from_fn(16, |_, _| 0.0), &adc, noise);
+                let of_channel = frame.volts_mut().iter_mut().skip(3).step_by(16);
+                of_channel.filter(|_| floats).for_each(|volts| *volts = 2.0 + 0.3 * floating.normal());
+                sum.add(frame.volts(), 1);
+            }
+            sum.rest(&adc, 1)
+        };
+        let [sound, broken] = [false, true].map(|floats| rest(floats, &mut noise, &mut floating));
+        let others = |rest: &Rest| {
+            rest.offset_v().iter().enumerate().filter(|(i, _)| i % 16 != 3).map(|(_, v)| *v).sum::<f64>() / 240.0
+        };
+        let [sound_v, broken_v] = [sound, broken].map(|rest| others(&rest));
+        assert!((sound_v - broken_v).abs() < 0.1e-3, "{sound_v} {broken_v}");
     }
 
     #[test]

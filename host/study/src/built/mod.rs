@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn exact_detectors_are_found_to_a_tenth_of_a_millimetre_and_rough_ones_say_that_they_are_not() {
+    fn presses_on_exact_detectors_are_found_to_two_tenths_of_a_millimetre_and_rough_ones_say_that_they_are_not() {
         let run = |tolerances| {
             let report = run(&plan(Detector { tolerances, ..Detector::default() }), "", &|_| ()).unwrap();
             assert_eq!((report.detectors.len(), report.trials.len()), (2, 10));
@@ -277,7 +277,7 @@ mod tests {
             report.rows.into_iter().find(|row| row.contacts == 1).unwrap().figures
         };
         let exact = run(Tolerances::EXACT);
-        assert!(exact.error_m.unwrap() < 1e-4 && exact.count_right == 1.0, "{exact:?}");
+        assert!(exact.error_m.unwrap() < 2e-4 && exact.count_right == 1.0, "{exact:?}");
         let rough = run(Tolerances::default());
         assert!(rough.claimed_m.unwrap() > 3.0 * exact.claimed_m.unwrap(), "{rough:?}");
     }

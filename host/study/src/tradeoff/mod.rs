@@ -337,7 +337,8 @@ mod tests {
         detector.tolerances.offset_lsb = 0.0;
         let plan = |as_built| Plan {
             detectors: vec![detector.clone()],
-            methods: vec![Method::Contacts],
+            // Trained on readings of the detector that it knows, and knows no tolerances.
+            methods: vec![Method::Kernel],
             sweep: false,
             places: 1,
             frames: 1,
@@ -356,7 +357,7 @@ mod tests {
         let errors_m = [&paper.solvers, &described.solvers, &calibrated.solvers].map(|solvers| one_m(solvers));
         assert!(errors_m[1] > 3.0 * errors_m[0] && errors_m[1] > 3.0 * errors_m[2], "{errors_m:?}");
         let bench = run(Some(3));
-        assert!(bench.as_built.is_empty() && one_m(&bench.solvers) > 3.0 * errors_m[0]);
+        assert!(bench.as_built.is_empty() && one_m(&bench.solvers) > 1.5 * errors_m[0]);
     }
 
     #[test]

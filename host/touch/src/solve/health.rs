@@ -94,8 +94,11 @@ fn shorted(readings: &Readings, sound: &[usize], noise_v: f64) -> Vec<usize> {
         for f in &sound[..i] {
             // With one of them grounded the other is too, which no two pads apart ever are.
             let grounded_v = readings.at(*e, *f).max(readings.at(*f, *e));
+            // Both rise while others are grounded: where nothing touches all read the same, but for a wire that floats.
+            let risen_v = sound.iter().map(|g| readings.at(*g, *e)).fold(0.0, f64::max);
             let row_v = sound.iter().map(|other| readings.at(*e, *other)).fold(0.0, f64::max);
-            if grounded_v < SAME * noise_v && row_v > TOUCHED * noise_v && spread_v(*e, *f) < SAME * noise_v {
+            let is_touched = row_v.min(risen_v) > TOUCHED * noise_v;
+            if is_touched && grounded_v < SAME * noise_v && spread_v(*e, *f) < SAME * noise_v {
                 found.extend([*e, *f]);
             }
         }
@@ -190,4 +193,27 @@ fn loads(pairs: &[Pair], n: usize) -> Vec<f64> {
         }
     }
     loads
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_nothing_touches_a_wire_that_floats_makes_no_shorts_of_the_others() {
+        let noise_v = 1e-3;
+        let rest = |g: usize, e: usize| noise_v * ((7 * g + 3 * e) % 5) as f64;
+        let floating = Readings::from_fn(16, |g, e| if e == 3 { 0.4 + 0.02 * g as f64 } else { rest(g, e) });
+        let found = faulty_electrodes(&floating, 1.2, noise_v).unwrap();
+        assert!(found.iter().all(|(e, _)| *e == 3), "{found:?}");
+    }
+
+    #[test]
+    fn two_wires_that_touch_are_told() {
+        let rises = |g: usize, e: usize| if g == e { 0.0 } else { 0.3 + 0.02 * e as f64 };
+        let joined = |e: usize| if e == 6 { 5 } else { e };
+        let shorted = Readings::from_fn(16, |g, e| rises(joined(g), joined(e)));
+        let found = faulty_electrodes(&shorted, 1.2, 1e-3).unwrap();
+        assert_eq!(found, [(5, ElectrodeFault::Shorted), (6, ElectrodeFault::Shorted)]);
+    }
 }
