@@ -10,7 +10,7 @@ use super::study::StudyArgs;
 ///
 /// Varied are noise, converter, force, the distance of two contacts and of edges, thickness and
 /// conductivity, each tolerance of the detector, the baseline, faulty electrodes and more; and errors are compared with the
-/// Cramer-Rao bound. Takes some minutes, with --quick about one.
+/// Cramer-Rao bound. Takes some minutes, with --quick about two; --calibrate 0 takes half of that.
 ///
 /// Examples:
 ///   tactomo stability --quick --out stability.html

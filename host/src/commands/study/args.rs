@@ -43,8 +43,8 @@ pub struct StudyArgs {
     pub json: bool,
 }
 
-/// Rubbed presses unless said otherwise: more of them better places by less than a tenth of a millimetre
-/// (`study built --chart-frames`), and take longer.
+/// Rubbed presses unless said otherwise: more of them did not better places (`study built --chart-frames`, the table in docs/calibrate.md), and
+/// take longer.
 const RUBBED: u16 = 24;
 
 impl StudyArgs {

@@ -24,7 +24,7 @@ pub fn page(report: &OverFrames) -> String {
         format!("<div class=\"charts\">{charts}</div>"),
         format!(
             "<h2>How it was measured</h2>\n<p class=\"note\">Detectors are drawn from the tolerances of {}; {} single presses on each, each a cold start, \
-             the same for all points; noise of the converter as told, 12 bits but for other descriptions. Rubbed presses are others than those tried. \
+             the same for all points. Rubbed presses are others than those tried. \
              Where a calibration is refused, solvers know the description.</p>\n{}",
             crate::page::escaped(&report.detector),
             report.presses,
@@ -38,7 +38,8 @@ fn chart(report: &OverFrames, solver: &str) -> Chart {
     let curves = || report.curves.iter().filter(|curve| curve.solver == solver);
     let described = |curve: &Curve| {
         let error_m = curve.points.iter().find(|point| point.frames == 0).and_then(|point| point.figures.error_m);
-        error_m.map_or_else(|| "–".to_owned(), |error_m| Unit::Metres.text(error_m))
+        let error = error_m.map_or_else(|| "–".to_owned(), |error_m| Unit::Metres.text(error_m));
+        format!("{error} at {} LSB", curve.noise_lsb)
     };
     let before: Vec<String> = curves().map(described).collect();
     // All charts have the same axes.
@@ -69,6 +70,6 @@ fn series(curve: &Curve, class: &'static str) -> Series {
         Some(Mark { x: point.frames as f64, y: figures.error_m?, tooltip })
     };
     let marks: Vec<Mark> = curve.points.iter().filter(|point| point.frames > 0).filter_map(mark).collect();
-    let main = marks.len().saturating_sub(1);
+    let main = marks.len() / 2;
     Series { name: format!("{} LSB", curve.noise_lsb), class, marks, main, is_joined: true }
 }
