@@ -84,7 +84,6 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         (&["forward", "--detector", text, "--contact", "0,0,1,1e-3"], "unknown field `"),
         (&["forward", "--scene", "rest"], "nothing to compute"),
         (&["forward", "--scene", "single", "--fault", "swap:3,16"], "swap:3,16: there is no electrode 16"),
-        (&["forward", "--model", "slab", "--scene", "single", "--fault", "uneven:0.2"], "leave out --model slab"),
         (
             &["forward", "--model", "shell", "--scene", "single", "--fault", "driving-sheet:100"],
             "its driving layer has a sheet resistance, which only the slab can have",
@@ -200,7 +199,7 @@ fn the_study_of_contacts_has_a_row_for_each_class_and_shows_the_worst_scene() {
 #[test]
 fn scenes_faults_and_noise_repeat_with_their_seed() {
     let measured = |seed| {
-        let faults = ["--fault", "open:3", "--fault", "contact-spread:0.3", "--fault", "uneven:0.2", "--nodes", "500"];
+        let faults = ["--fault", "open:3", "--fault", "contact-spread:0.3", "--fault", "uneven:0.2"];
         let scene = ["forward", "--scene", "several", "--force", "2", "--measured", "--json", "--seed", seed];
         let output = tactomo(&[&scene[..], &faults].concat());
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));

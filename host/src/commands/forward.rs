@@ -7,7 +7,6 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::jacobian::Jacobian;
-use tactomo::forward::shell::Shell;
 use tactomo::forward::{ForwardModel, touched_impedance_ohm};
 use tactomo::readings::Readings;
 use tactomo::scene::{Contact, SceneName, Touch};
@@ -161,16 +160,9 @@ fn detector(args: &Args) -> anyhow::Result<(Detector, Option<Stack>, Vec<Contact
 
 fn model(args: &Args, detector: &Detector) -> anyhow::Result<Box<dyn ForwardModel>> {
     let nodes = args.nodes.map(|nodes| nodes as usize);
-    let shell_nodes = nodes.unwrap_or_else(|| Shell::default_nodes(detector));
     let driving = simulate::driving_layer(detector, &args.scene.fault);
-    let detector = &simulate::as_built(detector, &args.scene.fault, args.scene.seed());
-    match simulate::uneven_shell(detector, shell_nodes, &args.scene.fault, args.scene.seed())? {
-        Some(shell) => {
-            ensure!(args.model != Model::Slab, "only the shell can be uneven in the plane: leave out --model slab");
-            Ok(Box::new(shell.under(driving)?))
-        }
-        None => Ok(args.model.build_under(detector, nodes, driving)?),
-    }
+    let detector = simulate::as_built(detector, &args.scene.fault, args.scene.seed());
+    Ok(args.model.build_under(&detector, nodes, driving)?)
 }
 
 fn readings(args: &Args, detector: &Detector, impedance_ohm: &DMatrix<f64>) -> anyhow::Result<Readings> {

@@ -18,7 +18,8 @@ const DRAWN: [usize; 2] = [2, 4];
 /// Charts time per frame against error for every solver, on scenes from no touch to a hand.
 ///
 /// Readings are simulated on a finer model than the ones inverted, with the converter's noise
-/// and steps; then once more on detectors that are not quite the ones described. Takes some minutes, with --quick about 20 seconds. Let nothing else run meanwhile.
+/// and steps; then once more on detectors that are not quite the ones described, before and after a calibration. Takes some minutes, with
+/// --quick about half a minute. Let nothing else run meanwhile.
 ///
 /// Examples:
 ///   tactomo tradeoff --quick --out tradeoff.html
@@ -52,7 +53,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         heap: Some(HEAP),
         as_built: study.as_built,
         drawn: if study.quick { DRAWN[0] } else { DRAWN[1] },
-        calibrate: None,
+        calibrate: study.calibrate(),
     };
     let report = tradeoff::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
     page.map(|page| page.write(tradeoff::page(&report))).transpose()?;

@@ -71,10 +71,6 @@ pub struct Frame {
     pub readings: Readings,
 }
 
-/// Finds what a detector is like from its readings: given one as it was built, of which it knows what a builder does ([`Experiment::detector`]
-/// and [`Experiment::frames`] of touches at a seed, which is the second argument), it gives the detector as calibrated.
-pub type Calibrate = fn(&Experiment, u64) -> Result<Detector, StudyError>;
-
 /// A detector, what it is simulated with and what is inverted.
 pub struct Experiment {
     /// The detector as it is described to solvers.

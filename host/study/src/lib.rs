@@ -4,11 +4,13 @@
 
 mod bound;
 pub mod built;
+mod calibrate;
 pub mod case;
 pub mod contacts;
 mod experiment;
 mod machine;
 pub mod page;
+mod presses;
 mod scenes;
 mod score;
 pub mod stability;
@@ -18,7 +20,8 @@ pub mod validate;
 mod variant;
 
 pub use self::bound::{Bound, RADIUS_DEVIATION, cramer_rao};
-pub use self::experiment::{Calibrate, Experiment, Frame, StudyError};
+pub use self::calibrate::{Calibrate, Calibrated};
+pub use self::experiment::{Experiment, Frame, StudyError};
 pub use self::machine::Machine;
 pub use self::scenes::{Group, SceneKind};
 pub use self::score::{Score, Scorer, Summary};

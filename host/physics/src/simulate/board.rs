@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::controls::{Built, Changes, Controls};
-use super::{Fault, FaultError, Physics, as_built, uneven_shell};
+use super::{Fault, FaultError, Physics, as_built};
 use crate::detector::Detector;
 use crate::forward::shell::Shell;
 use crate::forward::{DrivingLayer, ForwardError, ForwardModel, Resolution, Slab, touched_impedance_ohm};
@@ -46,22 +46,18 @@ pub struct Simulation {
     last: Option<(Vec<Touch>, Option<DMatrix<f64>>)>,
 }
 
-/// The best model of a detector with such faults, finer than those that are inverted: the slab for rectangles, else the shell. Uneven
-/// conductivity only the shell can have, sheet resistance of the driving layer only the slab.
+/// The best model of a detector with such faults, finer than those that are inverted: the slab for rectangles, else the shell, which has no
+/// sheet resistance of the driving layer.
 ///
 /// # Errors
 /// [`ForwardError::Detector`] if there is no model of the detector.
 pub fn finer_model(detector: &Detector, faults: &[Fault], seed: u64) -> Result<Box<dyn ForwardModel>, ForwardError> {
     let driving = driving_layer(detector, faults);
     let detector = &as_built(detector, faults, seed);
-    let nodes = FINER * Shell::default_nodes(detector);
-    if let Some(uneven) = uneven_shell(detector, nodes, faults, seed)? {
-        return Ok(Box::new(uneven.under(driving)?));
-    }
     if detector.surface.is_none() && detector.outline.as_rectangle().is_some() {
         return Ok(Box::new(Slab::under(detector, Resolution::FINE, driving)?.on_image(SLAB_IMAGE_NODES)));
     }
-    Ok(Box::new(Shell::with_nodes(detector, nodes)?.under(driving)?))
+    Ok(Box::new(Shell::with_nodes(detector, FINER * Shell::default_nodes(detector))?.under(driving)?))
 }
 
 /// The driving layer of `detector` with such faults: of several of a kind, the last one.
@@ -268,10 +264,30 @@ mod tests {
         let light = |faults: &[&str]| simulation(SceneName::Single, faults).readings_v(0.0).largest_v();
         let [ideal, one, two] = [&[][..], &["driving-sheet:200"], &["driving-sheet:200:2"]].map(light);
         assert!(one < two && two < ideal, "{one} {two} {ideal}");
-        let detector = Detector::preset(Detector::DEFAULT).unwrap();
-        let both = ["uneven:0.1", "driving-sheet:200"].map(|fault| fault.parse().unwrap());
-        let error = finer_model(&detector, &both, 1).err().unwrap().to_string();
+        let mut triangle = Detector::preset(Detector::DEFAULT).unwrap();
+        triangle.outline.outer.truncate(3);
+        triangle.electrodes.retain(|pad| triangle.outline.holds([pad.x_m - 0.003, pad.y_m + 0.003]));
+        let error = finer_model(&triangle, &["driving-sheet:200".parse().unwrap()], 1).err().unwrap().to_string();
         assert!(error.contains("which only the slab can have"), "{error}");
+    }
+
+    #[test]
+    fn an_uneven_detector_is_a_slab_like_others_and_reads_otherwise_than_an_even_one() {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let press = [Contact::flat(0.004, -0.011, 0.003, 1e-3)];
+        let of = |faults: &[&str], seed| {
+            let faults: Vec<Fault> = faults.iter().map(|fault| fault.parse().unwrap()).collect();
+            let model = finer_model(&detector, &faults, seed).unwrap();
+            assert_eq!(model.name(), "slab");
+            model.impedance_ohm(&press).unwrap()
+        };
+        let even = of(&[], 1);
+        let [one, other] = [1, 2].map(|seed| of(&["uneven:0.1"], seed));
+        let apart = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() / even.amax();
+        // A tenth from place to place: some per cent of the readings, and not those of the other seed.
+        assert!(apart(&one, &even) > 0.01 && apart(&one, &even) < 0.3, "{}", apart(&one, &even));
+        assert!(apart(&one, &other) > 0.01);
+        assert!(apart(&of(&["uneven:0.1", "driving-sheet:200"], 1), &one) > 0.01);
     }
 
     #[test]

@@ -1,30 +1,21 @@
 //! Detectors that are not as they are described: pads and places that differ.
 
-use std::f64::consts::TAU;
-
 use super::Fault;
 use super::noise::{Noise, Stream};
 use crate::detector::{Detector, Parameter, Tolerances};
-use crate::forward::ForwardError;
-use crate::forward::shell::Shell;
-use crate::space::Place;
-
-/// Waves that make up the pattern: enough that its values are nearly normally distributed.
-const WAVES: usize = 32;
-/// Length over which it changes, as a share of the detector's shorter side.
-const LENGTH_SHARE: f64 = 0.25;
 
 /// Halvings of the way from a pad's place as drawn to the one described, after which they are one.
 const HALVINGS: usize = 60;
 
-/// `detector` as its faults make it: of another conductivity, with contact impedances that differ from pad to pad. `seed` chooses which
-/// are large and which small.
+/// `detector` as its faults make it: of another conductivity, or one that differs from place to place, with contact impedances that differ
+/// from pad to pad. `seed` chooses what is large and what small.
 pub fn as_built(detector: &Detector, faults: &[Fault], seed: u64) -> Detector {
     let mut detector = detector.clone();
     for fault in faults {
         match *fault {
             Fault::Conductivity { factor } => scale(&mut detector, factor),
             Fault::ContactSpread { deviation } => spread_contacts(&mut detector, deviation, seed),
+            Fault::Uneven { deviation } => detector = uneven(&detector, deviation, seed),
             _ => {}
         }
     }
@@ -35,19 +26,27 @@ pub fn as_built(detector: &Detector, faults: &[Fault], seed: u64) -> Detector {
 /// is returned is exact: it is what was built, which solvers do not know. Pads stay apart and within the outline.
 pub fn drawn(detector: &Detector, seed: u64) -> Detector {
     let mut noise = Noise::of(seed, Stream::AsBuilt);
-    let all = Parameter::all(detector, 0.0);
-    let step = |parameter: Parameter| (parameter, detector.tolerances.deviation(detector, parameter) * noise.normal());
-    // Offsets are the board's, and are drawn below.
-    let all = all.into_iter().filter(|parameter| !matches!(parameter, Parameter::Offset(_)));
-    // What is exact stays as it is described, to the digit.
-    let steps: Vec<_> = all.map(step).filter(|(_, step)| *step != 0.0).collect();
-    let mut built = detector.stepped(&steps);
+    let mut built = detector.stepped(&steps(detector, &detector.tolerances, &mut noise));
     settle(&mut built, detector);
     let code_v = detector.adc.lsb_v();
     for pad in &mut built.electrodes {
         pad.offset_v += detector.tolerances.offset_lsb * code_v * noise.normal();
     }
     Detector { calibration: None, correction: None, tolerances: Tolerances::EXACT, ..built }
+}
+
+/// A step of every parameter but the offsets, which are the board's.
+fn steps(detector: &Detector, tolerances: &Tolerances, noise: &mut Noise) -> Vec<(Parameter, f64)> {
+    let step = |parameter: Parameter| (parameter, tolerances.deviation(detector, parameter) * noise.normal());
+    let all = Parameter::all(detector, 0.0).into_iter().filter(|parameter| !matches!(parameter, Parameter::Offset(_)));
+    // What is exact stays as it is described, to the digit.
+    all.map(step).filter(|(_, step)| *step != 0.0).collect()
+}
+
+/// `detector` with a conductivity whose logarithm differs by that standard deviation over the plane, as tolerances draw it.
+fn uneven(detector: &Detector, deviation: f64, seed: u64) -> Detector {
+    let tolerances = Tolerances { uneven_share: deviation, ..Tolerances::EXACT };
+    detector.stepped(&steps(detector, &tolerances, &mut Noise::of(seed, Stream::Uneven)))
 }
 
 /// Moves pads that have no room half way back to where they are described, until all have.
@@ -79,61 +78,10 @@ fn spread_contacts(detector: &mut Detector, deviation: f64, seed: u64) {
     }
 }
 
-/// A shell of `nodes` nodes with uneven conductivity, if that is one of the faults. `seed` chooses where it is high and low.
-///
-/// # Errors
-/// [`ForwardError::Detector`] if the detector cannot be meshed.
-pub fn uneven_shell(
-    detector: &Detector,
-    nodes: usize,
-    faults: &[Fault],
-    seed: u64,
-) -> Result<Option<Shell>, ForwardError> {
-    let deviation = |fault: &Fault| match fault {
-        Fault::Uneven { deviation } => Some(*deviation),
-        _ => None,
-    };
-    let Some(deviation) = faults.iter().find_map(deviation) else { return Ok(None) };
-    let uneven = Unevenness::new(detector, deviation, seed);
-    Shell::with_sheet(detector, nodes, |at_m| uneven.factor(at_m)).map(Some)
-}
-
-/// A smooth random pattern of factors about 1, whose logarithm has the covariance `d^2 exp(-|x - y|^2 / 2 l^2)` over all seeds (a sum of
-/// random waves: Rahimi and Recht, 2007).
-#[derive(Clone, Debug, PartialEq)]
-struct Unevenness {
-    deviation: f64,
-    waves: Vec<Wave>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Wave {
-    per_m: [f64; 3],
-    phase: f64,
-}
-
-impl Unevenness {
-    /// A pattern on `detector` whose logarithm has that standard deviation.
-    fn new(detector: &Detector, deviation: f64, seed: u64) -> Self {
-        let [width_m, height_m] = detector.outline.size_m();
-        let length_m = LENGTH_SHARE * width_m.min(height_m);
-        let mut noise = Noise::of(seed, Stream::Uneven);
-        let mut wave = || Wave { per_m: [(); 3].map(|()| noise.normal() / length_m), phase: TAU * noise.uniform() };
-        Self { deviation, waves: (0..WAVES).map(|_| wave()).collect() }
-    }
-
-    /// The factor at a place.
-    fn factor(&self, [x, y, z]: Place) -> f64 {
-        let at = |wave: &Wave| (wave.per_m[0] * x + wave.per_m[1] * y + wave.per_m[2] * z + wave.phase).cos();
-        let sum: f64 = self.waves.iter().map(at).sum();
-        (self.deviation * sum * (2.0 / WAVES as f64).sqrt()).exp()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detector::{Electrode, Outline};
+    use crate::forward::shell::Shell;
     use crate::forward::{ForwardModel, Slab};
     use crate::scene::Contact;
 
@@ -188,44 +136,6 @@ mod tests {
         assert!(own > 1.0 && own < 1.5, "{own}");
         let others = (0..256).filter(|k| *k != 5 * 17).map(|k| change[k].abs()).fold(0.0, f64::max);
         assert!(others < 0.05 * even_ohm, "{others} {even_ohm}");
-    }
-
-    #[test]
-    fn along_a_bar_of_changing_conductivity_the_potential_is_ohms() {
-        let (length_m, width_m, per_m) = (0.12, 0.01, 30.0);
-        let bar = Detector {
-            outline: Outline::rectangle(length_m, width_m),
-            electrodes: [-0.055, 0.055].map(|x_m| Electrode::flat(x_m, 0.0, 0.002)).to_vec(),
-            ..Detector::preset(Detector::DEFAULT).unwrap()
-        };
-        let shell = Shell::with_sheet(&bar, 3000, |[x, ..]| (per_m * x).exp()).unwrap();
-        // 1 A from one end to the other; the integral of dx over conductance is -exp(-k x) / (k s w).
-        let ohm = |x: f64| (-per_m * x).exp() / (per_m * bar.sheet_conductance_s() * width_m);
-        let off: Vec<f64> = (0..shell.image_mesh().nodes_m.len())
-            .filter(|node| shell.image_mesh().nodes_m[*node][0].abs() < 0.03)
-            .map(|node| {
-                let fields_ohm = shell.fields_ohm();
-                fields_ohm[(node, 0)] - fields_ohm[(node, 1)] - ohm(shell.image_mesh().nodes_m[node][0])
-            })
-            .collect();
-        let mean = off.iter().sum::<f64>() / off.len() as f64;
-        let largest = off.iter().map(|ohm| (ohm - mean).abs()).fold(0.0, f64::max);
-        assert!(off.len() > 100 && largest < 3e-3 * (ohm(-0.03) - ohm(0.03)), "{} {largest}", off.len());
-    }
-
-    #[test]
-    fn an_uneven_shell_of_no_deviation_is_the_even_one() {
-        let detector = Detector::preset(Detector::DEFAULT).unwrap();
-        let press = Contact::flat(0.004, -0.011, 0.003, 1e-3);
-        let uneven = |deviation, seed| {
-            let shell = uneven_shell(&detector, 1000, &[Fault::Uneven { deviation }], seed).unwrap().unwrap();
-            shell.impedance_ohm(&[press]).unwrap()
-        };
-        let even = Shell::with_nodes(&detector, 1000).unwrap().impedance_ohm(&[press]).unwrap();
-        assert_eq!(uneven(0.0, 1), even);
-        assert_eq!(uneven(0.2, 1), uneven(0.2, 1));
-        assert_ne!(uneven(0.2, 1), uneven(0.2, 2));
-        assert!(uneven_shell(&detector, 1000, &[], 1).unwrap().is_none());
     }
 
     /// Standard deviation of what a function gives of the detectors drawn at 400 seeds, and the mean.
@@ -294,20 +204,38 @@ mod tests {
         assert!((&bench - bench.transpose()).amax() < 1e-9 * bench.amax());
     }
 
-    fn logs_at(place: Place) -> Vec<f64> {
-        let detector = Detector::preset(Detector::DEFAULT).unwrap();
-        (0..4000).map(|seed| Unevenness::new(&detector, 0.2, seed).factor(place).ln()).collect()
+    #[test]
+    fn unevenness_over_seeds_is_that_asked_for_and_smooth_over_a_quarter_of_the_side() {
+        const SEEDS: u64 = 2000;
+        let told = Detector::preset(Detector::DEFAULT).unwrap();
+        let fault = [Fault::Uneven { deviation: 0.2 }];
+        let built: Vec<Detector> = (0..SEEDS).map(|seed| as_built(&told, &fault, seed)).collect();
+        let covariance = |a: [f64; 2], b: [f64; 2]| {
+            let product = |built: &Detector| built.log_unevenness(a) * built.log_unevenness(b);
+            built.iter().map(product).sum::<f64>() / SEEDS as f64
+        };
+        // It is larger at the walls, where all cosines are: that over the plane is the one asked for.
+        let points =
+            (0..9).flat_map(|i| (0..9).map(move |j| [i, j].map(|k| 0.06 * ((f64::from(k) + 0.5) / 9.0 - 0.5))));
+        let deviation = (points.map(|at_m| covariance(at_m, at_m)).sum::<f64>() / 81.0).sqrt();
+        // Four standard errors of the root of a mean square at one place, which are more than those of 81.
+        let error = (2.0 / SEEDS as f64).sqrt();
+        assert!((deviation / 0.2 - 1.0).abs() < 2.0 * error, "{deviation}");
+        // The mean over the plane is left out, as that is the conductivity: what is far apart shows by how much.
+        let (here, far) = ([0.0, 0.0], covariance([0.0, 0.0], [-0.03, 0.03]));
+        let correlation = (covariance(here, [0.015, 0.0]) - far) / (covariance(here, here) - far);
+        // 15 mm is the length itself: exp(-1/2). Four standard errors of a mean of products.
+        assert!((correlation - (-0.5f64).exp()).abs() < 4.0 * error, "{correlation}");
     }
 
     #[test]
-    fn deviation_and_covariance_over_seeds_are_those_asked_for() {
-        let covariance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64;
-        let (here, near, far) =
-            (logs_at([0.01, -0.02, 0.0]), logs_at([0.025, -0.02, 0.0]), logs_at([-0.03, 0.03, 0.0]));
-        // 15 mm is the length itself: exp(-1/2). Four standard errors of 4000 products of variance about 0.04^2 (1 + r^2).
-        for (other, expected) in [(&here, 0.04), (&near, 0.04 * (-0.5f64).exp()), (&far, 0.0)] {
-            let found = covariance(&here, other);
-            assert!((found - expected).abs() < 4.0 * 0.04 * (2.0f64 / 4000.0).sqrt(), "{found} {expected}");
-        }
+    fn unevenness_of_nothing_is_none_and_of_a_seed_one() {
+        let told = Detector::default();
+        let of = |deviation, seed| as_built(&told, &[Fault::Uneven { deviation }], seed);
+        assert_eq!(of(0.0, 1), told);
+        assert_eq!(of(0.2, 1), of(0.2, 1));
+        assert_ne!(of(0.2, 1), of(0.2, 2));
+        let even = Detector { unevenness: told.unevenness.clone(), ..of(0.2, 1) };
+        assert_eq!(even, told, "nothing else differs");
     }
 }

@@ -25,11 +25,6 @@ impl Noise {
         Self::new(std::iter::repeat_with(|| seeds.u64(..)).nth(stream as usize).unwrap_or(seed))
     }
 
-    /// The next number, evenly distributed from 0 to 1.
-    pub(super) fn uniform(&mut self) -> f64 {
-        self.uniform.f64()
-    }
-
     /// Noise that is the same for the same `seed`.
     pub fn new(seed: u64) -> Self {
         Self { uniform: fastrand::Rng::with_seed(seed), spare: None }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use tactomo::solve::Method;
+use tactomo::study::Calibrate;
 
 use crate::commands::choice;
 
@@ -28,6 +29,9 @@ pub struct StudyArgs {
     /// solvers know
     #[arg(long, value_name = "SEED")]
     pub as_built: Option<u64>,
+    /// Detectors as built are tried once more after a rub of so many presses at unknown places; 0 for none. Some seconds for each detector
+    #[arg(long, value_name = "PRESSES", default_value_t = RUBBED, value_parser = clap::value_parser!(u16).range(0..=10_000))]
+    calibrate: u16,
     /// Writes a page with charts, which needs nothing else
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -39,7 +43,16 @@ pub struct StudyArgs {
     pub json: bool,
 }
 
+/// Rubbed presses unless said otherwise: more of them did not better places (`study built --chart-frames`, the table in docs/calibrate.md), and
+/// take longer.
+const RUBBED: u16 = 24;
+
 impl StudyArgs {
+    /// The calibration that is tried, if one is.
+    pub fn calibrate(&self) -> Option<Calibrate> {
+        (self.calibrate > 0).then_some(Calibrate::Rub(usize::from(self.calibrate)))
+    }
+
     /// The solvers that are tried.
     pub fn methods(&self) -> Vec<Method> {
         if self.solver.is_empty() { Method::ALL.to_vec() } else { self.solver.clone() }

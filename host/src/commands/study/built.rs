@@ -6,7 +6,7 @@ use tactomo::solve::Method;
 use tactomo::study::built::{self, Plan};
 
 use crate::commands::choice::{self, DetectorArgs};
-use crate::commands::output::{self, message};
+use crate::commands::output::{self, NewFile, message};
 
 /// Tries solvers on detectors as built, of which they know the description only.
 ///
@@ -18,6 +18,7 @@ use crate::commands::output::{self, message};
 ///   tactomo study built --detectors 20 --presses 12
 ///   tactomo study built --tolerances 0.1 --solver auto --json
 ///   tactomo study built --rub 300 --known 3
+///   tactomo study built --chart-frames --detectors 4 --solver contacts --out frames.html
 ///   tactomo study built --rub 24 reference/built/*.json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -45,6 +46,15 @@ pub struct Args {
     /// So many of them are at known places
     #[arg(long, value_name = "PRESSES", default_value_t = 0, requires = "rub", value_parser = clap::value_parser!(u32).range(0..=10_000))]
     known: u32,
+    /// Calibrates with 5, 20, 100 and 1000 presses in turn, at three noises of the converter, and compares
+    #[arg(long, conflicts_with_all = ["files", "rub", "known"])]
+    chart_frames: bool,
+    /// Writes a page with the charts of --chart-frames, which needs nothing else
+    #[arg(long, value_name = "FILE", requires = "chart_frames")]
+    out: Option<PathBuf>,
+    /// Replaces the file if it exists
+    #[arg(long, visible_alias = "force", requires = "out")]
+    overwrite: bool,
     /// First of the seeds of detectors, presses and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -75,8 +85,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         threads: usize::from(args.threads),
         seed: args.seed,
     };
+    if args.chart_frames {
+        return over_frames(args, &plan);
+    }
     let report = built::run(&plan, &output::command_line(), &|step| message!("{step}"))?;
     Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { built::table(&report) })?)
+}
+
+fn over_frames(args: &Args, plan: &Plan) -> anyhow::Result<()> {
+    let page = NewFile::optional(args.out.as_ref(), args.overwrite)?;
+    let report = built::over_frames(plan, &output::command_line(), &|step| message!("{step}"))?;
+    page.map(|page| page.write(built::page(&report))).transpose()?;
+    Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { built::frames_table(&report) })?)
 }
 
 fn share(text: &str) -> Result<f64, String> {

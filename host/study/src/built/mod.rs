@@ -4,7 +4,8 @@
 
 mod figures;
 mod file;
-mod scenes;
+mod frames;
+mod page;
 mod table;
 
 use std::panic::resume_unwind;
@@ -12,17 +13,19 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
+use super::calibrate::{Calibrated, Scene, read, rubbed};
 use super::experiment::{Experiment, StudyError};
+use super::presses;
 use tactomo_physics::detector::Detector;
-use tactomo_physics::readings::Readings;
-use tactomo_physics::scene::{Contact, Touch};
+use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, measured};
-use tactomo_touch::calibrate::{self as rub, CalibrateError, RubSettings};
 use tactomo_touch::solve::{Method, Problem, Solution};
 
 pub use self::figures::{Figures, Row};
 pub use self::file::{BuiltFile, BuiltFileError};
-pub use self::table::table;
+pub use self::frames::{Curve, OverFrames, Point, over_frames};
+pub use self::page::page;
+pub use self::table::{frames_table, table};
 
 /// What is tried.
 #[derive(Clone, Debug)]
@@ -57,14 +60,6 @@ pub enum BuiltError {
     /// A file cannot be used.
     #[error(transparent)]
     File(#[from] BuiltFileError),
-    /// A detector cannot be calibrated.
-    #[error("{detector}: {error}")]
-    Calibrate {
-        /// Which.
-        detector: String,
-        /// Why.
-        error: CalibrateError,
-    },
 }
 
 /// What came out.
@@ -74,6 +69,8 @@ pub struct Report {
     pub command: String,
     /// Names of the detectors.
     pub detectors: Vec<String>,
+    /// Detectors whose calibration was refused, and why: solvers know their description.
+    pub refused: Vec<String>,
     /// Figures of each solver, for each detector that comes from a file, and over all.
     pub rows: Vec<Row>,
     /// Every scene of every solver.
@@ -115,6 +112,8 @@ struct Built {
     /// What solvers get.
     problem: Problem,
     scenes: Vec<Scene>,
+    /// Why its calibration was refused, if it was.
+    refused: Option<String>,
 }
 
 /// Tries all solvers on all detectors. `progress` is called with what is done next.
@@ -139,40 +138,41 @@ pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Resu
                 Some(nominal) => from_tolerances(plan, nominal, index)?,
                 None => from_file(plan, index)?,
             };
+            built.refused.iter().for_each(|why| progress(why));
             progress(&format!("{}: {} scenes", built.name, built.scenes.len()));
-            all.push((index, built.name.clone(), try_all(plan, index, &built)?));
+            let trials = try_all(plan, index, &built)?;
+            all.push(Tried { index, name: built.name, refused: built.refused, trials });
         }
     };
-    let parts: Vec<Result<Vec<_>, BuiltError>> = thread::scope(|scope| {
+    let parts: Vec<Result<Vec<Tried>, BuiltError>> = thread::scope(|scope| {
         let threads: Vec<_> = (0..plan.threads.max(1)).map(|_| scope.spawn(work)).collect();
         threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
     });
-    let mut parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
-    parts.sort_by_key(|(index, ..)| *index);
-    let detectors: Vec<_> = parts.iter().map(|(_, name, _)| name.clone()).collect();
-    let trials: Vec<_> = parts.into_iter().flat_map(|(.., trials)| trials).collect();
+    let mut parts: Vec<_> = parts.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+    parts.sort_by_key(|tried| tried.index);
+    let detectors: Vec<_> = parts.iter().map(|tried| tried.name.clone()).collect();
+    let refused = parts.iter().filter_map(|tried| tried.refused.clone()).collect();
+    let trials: Vec<_> = parts.into_iter().flat_map(|tried| tried.trials).collect();
     let rows = figures::rows(&plan.methods, &trials, if plan.files.is_empty() { &[] } else { &detectors });
-    Ok(Report { command: command.to_owned(), detectors, rows, trials })
+    Ok(Report { command: command.to_owned(), detectors, refused, rows, trials })
+}
+
+/// A detector that was tried.
+struct Tried {
+    index: usize,
+    name: String,
+    refused: Option<String>,
+    trials: Vec<Trial>,
 }
 
 fn from_tolerances(plan: &Plan, nominal: &Experiment, index: usize) -> Result<Built, BuiltError> {
     let seed = plan.seed.wrapping_add(index as u64);
     let experiment = nominal.as_built(seed)?;
-    let read = |scenes: Vec<Vec<Contact>>, seed: u64| -> Result<Vec<Scene>, StudyError> {
-        let touches: Vec<Vec<Touch>> =
-            scenes.iter().map(|contacts| contacts.iter().copied().map(Touch::from).collect()).collect();
-        let frames = experiment.frames(&touches, seed)?;
-        Ok(scenes.into_iter().zip(frames).map(|(contacts, frame)| (contacts, frame.readings)).collect())
-    };
-    let rubbed = scenes::random(&plan.detector, plan.rub, !seed).into_iter().take(plan.rub).collect();
-    let rubbed = read(rubbed, !seed)?;
-    let scenes = read(scenes::random(&plan.detector, plan.presses, seed), seed)?;
+    let rubbed = rubbed(&experiment, plan.rub, seed)?;
+    let scenes = read(&experiment, presses::random(&plan.detector, plan.presses, seed), seed)?;
     let name = format!("{} as built {seed}", plan.detector.name);
-    Built { name, problem: experiment.problem, scenes }.calibrated(plan, &rubbed)
+    Built { name, problem: experiment.problem, scenes, refused: None }.calibrated(plan, &rubbed)
 }
-
-/// What touched, and what was read.
-type Scene = (Vec<Contact>, Readings);
 
 impl Built {
     /// The same for solvers that know the detector by a rub.
@@ -180,29 +180,18 @@ impl Built {
         if rubbed.is_empty() {
             return Ok(self);
         }
-        let frame = |(index, (contacts, readings)): (usize, &Scene)| {
-            // Spread over the presses, as these are over the detector.
-            let step = rubbed.len() / plan.known.max(1);
-            let is_known = plan.known > 0 && index % step.max(1) == 0 && index / step.max(1) < plan.known;
-            let place = contacts.first().map(|contact| [contact.x_m, contact.y_m]);
-            rub::Frame { readings: readings.clone(), known_m: place.filter(|_| is_known) }
-        };
-        let frames: Vec<_> = rubbed.iter().enumerate().map(frame).collect();
-        let settings = RubSettings { known_deviation_m: KNOWN_DEVIATION_M, ..RubSettings::default() };
-        let nominal = self.problem.detector();
-        let found = rub::rub(nominal, &frames, &settings, &mut |_| true)
-            .map_err(|error| BuiltError::Calibrate { detector: self.name.clone(), error })?;
-        let problem = Problem::of(&found.detector).map_err(StudyError::from)?;
+        let Calibrated { detector, refused } = Calibrated::of(self.problem.detector(), rubbed, plan.known);
+        if let Some(error) = refused {
+            return Ok(Self { refused: Some(format!("{}: {error}", self.name)), ..self });
+        }
+        let problem = Problem::of(&detector).map_err(StudyError::from)?;
         let corrected = |(contacts, mut readings): Scene| {
-            readings.correct_channels(&found.detector);
+            readings.correct_channels(&detector);
             (contacts, readings)
         };
-        Ok(Self { problem, scenes: self.scenes.into_iter().map(corrected).collect(), name: self.name })
+        Ok(Self { problem, scenes: self.scenes.into_iter().map(corrected).collect(), ..self })
     }
 }
-
-/// Known places are exact here; so much is what a jig of a robot has (m).
-const KNOWN_DEVIATION_M: f64 = 0.05e-3;
 
 fn from_file(plan: &Plan, index: usize) -> Result<Built, BuiltError> {
     let BuiltFile { nominal, scenes } = BuiltFile::read(&plan.files[index])?;
@@ -212,7 +201,7 @@ fn from_file(plan: &Plan, index: usize) -> Result<Built, BuiltError> {
     let mut rubbed: Vec<Scene> = read.collect();
     let tried = rubbed.split_off(plan.rub.min(rubbed.len()));
     let problem = Problem::of(&nominal).map_err(StudyError::from)?;
-    Built { name: nominal.name, problem, scenes: tried }.calibrated(plan, &rubbed)
+    Built { name: nominal.name, problem, scenes: tried, refused: None }.calibrated(plan, &rubbed)
 }
 
 fn try_all(plan: &Plan, detector: usize, built: &Built) -> Result<Vec<Trial>, StudyError> {

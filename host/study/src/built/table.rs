@@ -1,6 +1,6 @@
 //! The report as a table.
 
-use super::{Report, Row};
+use super::{Curve, OverFrames, Point, Report, Row};
 
 /// Lines for a terminal: a row for each solver and number of contacts.
 pub fn table(report: &Report) -> String {
@@ -24,6 +24,39 @@ pub fn table(report: &Report) -> String {
     let mut lines = vec![format!("{} detectors", report.detectors.len()), head];
     lines.extend(report.rows.iter().map(line));
     lines.push(about.to_owned());
+    if !report.refused.is_empty() {
+        let (refused, all) = (report.refused.len(), report.detectors.len());
+        lines.push(format!(
+            "{refused} of {all} calibrations were refused; there solvers know the description:\n{}",
+            report.refused.join("\n")
+        ));
+    }
+    lines.join("\n")
+}
+
+/// Lines for a terminal: a row for each solver and noise, a column for each number of presses.
+pub fn frames_table(report: &OverFrames) -> String {
+    let counts: String = report.frames.iter().map(|frames| format!(" {frames:>15}")).collect();
+    let mut lines = vec![
+        format!("{} detectors as built, {} single presses on each", report.detectors, report.presses),
+        format!("{:<12} {:>9} {counts}", "solver", "noise LSB"),
+    ];
+    let cell = |point: &Point| {
+        let figures = &point.figures;
+        let mm = figures.error_m.map_or_else(|| "-".to_owned(), |metres| format!("{:.2}", 1e3 * metres));
+        let refused = if point.refused > 0 { format!("({})", point.refused) } else { String::new() };
+        format!(" {refused:>4}{mm:>7}{:>4.0}", 100.0 * figures.count_right)
+    };
+    let row = |curve: &Curve| {
+        let cells: String = curve.points.iter().map(cell).collect();
+        format!("{:<12} {:>9} {cells}", curve.solver, curve.noise_lsb)
+    };
+    lines.extend(report.curves.iter().map(row));
+    lines.push(
+        "Columns: rubbed presses, 0 for none; in each the mean error of single presses, mm, and the share of right counts, per cent.\n\
+         In brackets: calibrations that were refused; there solvers know the description."
+            .to_owned(),
+    );
     lines.join("\n")
 }
 

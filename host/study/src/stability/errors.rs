@@ -104,6 +104,7 @@ mod tests {
             note: String::new(),
             points: vec![PointReport { label: String::new(), severity: 0.0 }],
             solvers: vec![SolverRow { solver: "tv".to_owned(), cells, errors: ErrorRange::default(), breaks: None }],
+            calibrated: Vec::new(),
         };
         let curves = curves(&[sweep(vec![cell(0.4), cell(3.0), None]), sweep(vec![refused, shape, cell(1.0)])]);
         assert_eq!(curves.len(), 1);

@@ -108,7 +108,8 @@ mod tests {
             as_built: None,
             calibrate: None,
         };
-        let bench = Bench { plan: &plan, sound: Experiment::new(&plan.detector).unwrap() };
+        let mut silent = |_: &str| ();
+        let bench = Bench::new(&plan, Experiment::new(&plan.detector).unwrap(), &mut silent);
         let Sweep { points, .. } = left_out(sweep(&bench, KINDS[0]).unwrap(), GUARDED[0]).unwrap();
         assert_eq!((points[0].label.as_str(), points[2].label.as_str()), ("none", "no. 5 → 5"));
         assert_eq!(points[2].places[0][0].readings.electrodes(), 15);

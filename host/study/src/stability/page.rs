@@ -49,14 +49,19 @@ fn overview(report: &Report) -> String {
 /// A map of the width of the page: a row for each sweep, a column for each solver.
 fn sweeps_by_solvers(report: &Report, title: String, note: &str, cell: fn(&SolverRow) -> Cell) -> String {
     let Some(all) = report.sweeps.iter().max_by_key(|sweep| sweep.solvers.len()) else { return String::new() };
-    let cell_of = |sweep: &SweepReport, solver: &str| {
-        sweep.solvers.iter().find(|row| row.solver == solver).map_or_else(Cell::default, |row| {
+    let cell_of = |rows: &[SolverRow], solver: &str| {
+        rows.iter().find(|row| row.solver == solver).map_or_else(Cell::default, |row| {
             if row.cells.iter().any(Option::is_some) { cell(row) } else { self::cell(&None) }
         })
     };
-    let rows = report.sweeps.iter().map(|sweep| Row {
-        name: sweep.title.clone(),
-        cells: all.solvers.iter().map(|solver| cell_of(sweep, &solver.solver)).collect(),
+    let row = |name: String, solvers: &[SolverRow]| Row {
+        name,
+        cells: all.solvers.iter().map(|solver| cell_of(solvers, &solver.solver)).collect(),
+    };
+    let rows = report.sweeps.iter().flat_map(|sweep| {
+        let after =
+            (!sweep.calibrated.is_empty()).then(|| row(format!("{}, calibrated", sweep.title), &sweep.calibrated));
+        std::iter::once(row(sweep.title.clone(), &sweep.solvers)).chain(after)
     });
     Heat {
         title,
@@ -154,12 +159,16 @@ fn class(solver: &str) -> &'static str {
 }
 
 fn heat(sweep: &SweepReport) -> Heat {
-    let row = |row: &SolverRow| Row { name: row.solver.clone(), cells: row.cells.iter().map(cell).collect() };
+    let row = |name: String, row: &SolverRow| Row { name, cells: row.cells.iter().map(cell).collect() };
+    let rows = sweep.solvers.iter().enumerate().flat_map(|(index, solver)| {
+        let after = sweep.calibrated.get(index).map(|after| row(format!("{}, calibrated", solver.solver), after));
+        std::iter::once(row(solver.solver.clone(), solver)).chain(after)
+    });
     Heat {
         title: sweep.title.clone(),
         note: sweep.note.clone(),
         columns: sweep.points.iter().map(|point| point.label.clone()).collect(),
-        rows: sweep.solvers.iter().map(row).collect(),
+        rows: rows.collect(),
         is_whole: false,
     }
 }

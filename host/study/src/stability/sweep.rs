@@ -1,11 +1,14 @@
 //! Sweeps and how they are run.
 
+use std::cell::RefCell;
+
 use super::bounds::{self, BoundReport};
 use super::breakdown::{Break, CellReport, breaks};
 use super::errors::{self, ErrorCurve, ErrorRange};
 use super::trials::Trials;
 use super::{faults, scenes, tolerances, wrong};
-use crate::experiment::{Calibrate, Experiment, Frame, StudyError};
+use crate::calibrate::Calibrate;
+use crate::experiment::{Experiment, Frame, StudyError};
 use crate::machine::Machine;
 use crate::scenes::SceneKind;
 use tactomo_physics::detector::Detector;
@@ -76,6 +79,9 @@ pub struct SweepReport {
     pub points: Vec<PointReport>,
     /// A row for each solver.
     pub solvers: Vec<SolverRow>,
+    /// The same of detectors that were calibrated before, where that was tried.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub calibrated: Vec<SolverRow>,
 }
 
 /// A point of a sweep.
@@ -118,6 +124,8 @@ pub(super) struct Point {
     pub known: Vec<Experiment>,
     /// What solvers' lambda is set to.
     pub lambda: Option<f64>,
+    /// The same after a calibration, where that is tried.
+    pub calibrated: Option<Box<Point>>,
 }
 
 /// What sweeps are made from.
@@ -125,9 +133,20 @@ pub(super) struct Bench<'a> {
     pub plan: &'a Plan,
     /// The sound detector: as it is described, or as it was built where that is asked for.
     pub sound: Experiment,
+    progress: RefCell<&'a mut dyn FnMut(&str)>,
 }
 
-impl Bench<'_> {
+impl<'a> Bench<'a> {
+    /// Of a plan and its sound detector.
+    pub fn new(plan: &'a Plan, sound: Experiment, progress: &'a mut dyn FnMut(&str)) -> Self {
+        Self { plan, sound, progress: RefCell::new(progress) }
+    }
+
+    /// Tells what is tried next.
+    pub fn tell(&self, step: &str) {
+        (self.progress.borrow_mut())(step);
+    }
+
     /// Another detector, as it is described or as it was built where that is asked for.
     pub fn experiment(&self, detector: &Detector) -> Result<Experiment, StudyError> {
         Experiment::of(detector, self.plan.as_built)
@@ -171,7 +190,7 @@ impl Bench<'_> {
             .into_iter()
             .map(|seed| experiment.frames(&vec![touches(seed); self.plan.frames], seed))
             .collect::<Result<_, _>>()?;
-        Ok(Point { label, severity, experiment, places, known: Vec::new(), lambda: None })
+        Ok(Point { label, severity, experiment, places, known: Vec::new(), lambda: None, calibrated: None })
     }
 
     /// The one contact of a kind of scene at a seed.
@@ -191,17 +210,17 @@ type Maker = fn(&Bench) -> Result<Vec<Sweep>, StudyError>;
 /// # Errors
 /// [`StudyError`] if the detector cannot be modelled or is curved.
 pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result<Report, StudyError> {
-    let bench = Bench { plan, sound: Experiment::of(&plan.detector, plan.as_built)? };
+    let bench = Bench::new(plan, Experiment::of(&plan.detector, plan.as_built)?, progress);
     let makers: [Maker; 5] = [scenes::sweeps, wrong::sweeps, tolerances::sweeps, lambda, faults::sweeps];
     let mut trials = Trials::default();
     let mut sweeps = Vec::new();
     for make in makers {
         for sweep in make(&bench)? {
-            progress(sweep.title);
+            bench.tell(sweep.title);
             sweeps.push(try_sweep(plan, sweep, &mut trials)?);
         }
     }
-    progress("bounds");
+    bench.tell("bounds");
     let bounds = bounds::report(&bench, &mut trials)?;
     Ok(Report {
         machine: Machine::this(),
@@ -237,27 +256,36 @@ fn try_sweep(plan: &Plan, sweep: Sweep, trials: &mut Trials) -> Result<SweepRepo
     let sweeps_lambda = sweep.points.iter().any(|point| point.lambda.is_some());
     let methods =
         plan.methods.iter().filter(|method| !sweeps_lambda || method.parameter() == Some(ParameterKind::Lambda));
-    let solvers = methods
-        .map(|method| {
-            let cell = |point: &Point| {
-                let summary = trials.summary(*method, point)?;
-                Ok(summary.map(|summary| CellReport::of(&summary, point.experiment.reach_m())))
-            };
-            let mut cells = sweep.points.iter().map(cell).collect::<Result<Vec<_>, StudyError>>()?;
-            let severities: Vec<f64> = sweep.points.iter().map(|point| point.severity).collect();
-            let labels: Vec<&str> = sweep.points.iter().map(|point| point.label.as_str()).collect();
-            let breaks = breaks(&labels, &severities, &mut cells);
-            let errors = ErrorRange::of(&severities, &cells);
-            Ok(SolverRow { solver: method.name().to_owned(), cells, errors, breaks })
-        })
-        .collect::<Result<_, StudyError>>()?;
+    let before: Vec<&Point> = sweep.points.iter().collect();
+    let after: Vec<&Point> = sweep.points.iter().filter_map(|point| point.calibrated.as_deref()).collect();
+    let (mut solvers, mut calibrated) = (Vec::new(), Vec::new());
+    for method in methods {
+        solvers.push(row(*method, &before, trials)?);
+        if !after.is_empty() {
+            calibrated.push(row(*method, &after, trials)?);
+        }
+    }
     let point = |point: Point| PointReport { label: point.label, severity: point.severity };
     Ok(SweepReport {
         title: sweep.title.to_owned(),
         note: sweep.note,
         points: sweep.points.into_iter().map(point).collect(),
         solvers,
+        calibrated,
     })
+}
+
+fn row(method: Method, points: &[&Point], trials: &mut Trials) -> Result<SolverRow, StudyError> {
+    let cell = |point: &&Point| {
+        let summary = trials.summary(method, point)?;
+        Ok(summary.map(|summary| CellReport::of(&summary, point.experiment.reach_m())))
+    };
+    let mut cells = points.iter().map(cell).collect::<Result<Vec<_>, StudyError>>()?;
+    let severities: Vec<f64> = points.iter().map(|point| point.severity).collect();
+    let labels: Vec<&str> = points.iter().map(|point| point.label.as_str()).collect();
+    let breaks = breaks(&labels, &severities, &mut cells);
+    let errors = ErrorRange::of(&severities, &cells);
+    Ok(SolverRow { solver: method.name().to_owned(), cells, errors, breaks })
 }
 
 #[cfg(test)]
@@ -277,7 +305,7 @@ mod tests {
             seed: 2,
             quick: true,
             as_built: None,
-            calibrate: Some(|experiment, _| Ok(experiment.truth().clone())),
+            calibrate: Some(Calibrate::Perfect),
         };
         run(&plan, "tactomo <stability>", &mut |_| {}).unwrap()
     });
@@ -309,15 +337,20 @@ mod tests {
 
     #[test]
     fn tolerances_of_nothing_are_the_description_and_a_calibration_shows_beyond() {
-        let errors_m = |title: &str| {
-            let sweep = REPORT.sweeps.iter().find(|sweep| sweep.title == title).unwrap();
-            let cells = sweep.solvers[0].cells.iter().map(|cell| cell.as_ref().unwrap().error_m.unwrap());
+        let sweep = |title: &str| REPORT.sweeps.iter().find(|sweep| sweep.title == title).unwrap();
+        let errors_m = |rows: &[SolverRow]| {
+            let cells = rows[0].cells.iter().map(|cell| cell.as_ref().unwrap().error_m.unwrap());
             cells.collect::<Vec<_>>()
         };
-        let (before, after) = (errors_m("All tolerances"), errors_m("All tolerances, calibrated"));
+        let all = sweep("All tolerances");
+        let (before, after) = (errors_m(&all.solvers), errors_m(&all.calibrated));
         assert_eq!(before[0], after[0]);
         assert_ne!(before.last(), after.last());
-        assert_eq!(before[0], errors_m("Unevenness")[0]);
+        assert_eq!(before[0], errors_m(&sweep("Unevenness").solvers)[0]);
+        assert!(sweep("Noise").calibrated.is_empty());
+        let (page, table) = (page(&REPORT), table(&REPORT));
+        assert!(page.contains("All tolerances, calibrated") && page.contains("tikhonov, calibrated"));
+        assert_eq!(table.matches("    calibrated ").count(), 2 * 11, "{table}");
     }
 
     #[test]

@@ -15,7 +15,10 @@ pub fn table(report: &Report) -> String {
     ];
     for sweep in &report.sweeps {
         lines.push(format!("\n{}", sweep.title));
-        lines.extend(sweep.solvers.iter().map(row));
+        for (index, solver) in sweep.solvers.iter().enumerate() {
+            lines.push(row(&solver.solver, solver));
+            lines.extend(sweep.calibrated.get(index).map(|calibrated| row("  calibrated", calibrated)));
+        }
     }
     let limits = WITHIN_M.map(|limit_m| format!("{:>6}", 1e3 * limit_m)).concat();
     lines.push(format!("\n{:<16} {limits}", "Error up to, mm"));
@@ -32,7 +35,7 @@ pub fn table(report: &Report) -> String {
     lines.join("\n")
 }
 
-fn row(row: &SolverRow) -> String {
+fn row(name: &str, row: &SolverRow) -> String {
     let verdict = match &row.breaks {
         None => "holds".to_owned(),
         Some(found) => format!(
@@ -48,7 +51,7 @@ fn row(row: &SolverRow) -> String {
         Some(error_m) => format!("{:>7}", millimetres(error_m)),
         None => format!("{:>7}", "-"),
     });
-    format!("  {:<16} {}   {verdict}", row.solver, errors.concat())
+    format!("  {name:<16} {}   {verdict}", errors.concat())
 }
 
 fn within(curve: &ErrorCurve) -> String {

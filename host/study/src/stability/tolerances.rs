@@ -1,14 +1,14 @@
 //! Sweeps of the tolerances: how far the detector that was built may be from the one described.
 
 use super::sweep::{Bench, Point, Sweep};
-use crate::experiment::{Calibrate, Experiment, StudyError};
+use crate::calibrate::{Calibrate, Calibrated};
+use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
-use tactomo_physics::detector::Tolerances;
+use tactomo_physics::detector::{Detector, Tolerances};
 
 /// A tolerance, from nothing to hopeless. Of the tolerances at hand all others are nothing.
 struct Kind {
     title: &'static str,
-    calibrated: &'static str,
     note: &'static str,
     values: &'static [f64],
     label: fn(f64) -> String,
@@ -20,7 +20,6 @@ const EXACT: Tolerances = Tolerances::EXACT;
 const KINDS: [Kind; 11] = [
     Kind {
         title: "All tolerances",
-        calibrated: "All tolerances, calibrated",
         note: "Every tolerance at so many times that of a hobbyist's bench.",
         values: &[0.0, 0.03, 0.1, 0.3, 1.0, 2.0],
         label: times,
@@ -28,7 +27,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Tolerance of thickness",
-        calibrated: "Tolerance of thickness, calibrated",
         note: "Standard deviation of its logarithm, at the same conductivity.",
         values: &[0.0, 0.02, 0.05, 0.1, 0.2, 0.4],
         label: percent,
@@ -36,7 +34,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Tolerance of conductivity",
-        calibrated: "Tolerance of conductivity, calibrated",
         note: "Standard deviation of its logarithm.",
         values: &[0.0, 0.05, 0.1, 0.2, 0.5, 1.0],
         label: percent,
@@ -44,7 +41,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Tolerance of top over bottom",
-        calibrated: "Tolerance of top over bottom, calibrated",
         note: "Of the conductivities of both: a factor, by its standard deviation.",
         values: &[1.0, 1.1, 1.3, 2.0, 4.0, 10.0],
         label: times,
@@ -52,7 +48,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Unevenness",
-        calibrated: "Unevenness, calibrated",
         note: "Standard deviation of the logarithm of the conductivity from place to place, over a quarter of the shorter side.",
         values: &[0.0, 0.01, 0.03, 0.06, 0.12, 0.25],
         label: percent,
@@ -60,7 +55,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Tolerance of electrodes' places",
-        calibrated: "Tolerance of electrodes' places, calibrated",
         note: "Standard deviation of their x and y.",
         values: &[0.0, 5e-5, 1e-4, 3e-4, 1e-3, 3e-3],
         label: |metres| format!("{} mm", metres * 1e3),
@@ -68,7 +62,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Tolerance of pads' contact impedance",
-        calibrated: "Tolerance of pads' contact impedance, calibrated",
         note: "Of all pads alike: a factor, by its standard deviation.",
         values: &[1.0, 1.5, 3.0, 10.0, 30.0, 100.0],
         label: times,
@@ -76,7 +69,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Spread of pads' contact impedance",
-        calibrated: "Spread of pads' contact impedance, calibrated",
         note: "Standard deviation of its logarithm from pad to pad.",
         values: &[0.0, 0.1, 0.2, 0.3, 0.6, 1.0],
         label: percent,
@@ -84,7 +76,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Tolerance of channel gains",
-        calibrated: "Tolerance of channel gains, calibrated",
         note: "Standard deviation of their logarithm.",
         values: &[0.0, 0.001, 0.003, 0.01, 0.03, 0.1],
         label: |share| format!("{} %", (1e3 * share).round() / 10.0),
@@ -92,7 +83,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Offsets of channels",
-        calibrated: "Offsets of channels, calibrated",
         note: "Standard deviation, in codes. The baseline takes them away, but for those below zero, which no converter reads.",
         values: &[0.0, 1.0, 2.0, 5.0, 20.0, 100.0],
         label: |codes| format!("{codes} LSB"),
@@ -100,7 +90,6 @@ const KINDS: [Kind; 11] = [
     },
     Kind {
         title: "Tolerance of the on-resistance",
-        calibrated: "Tolerance of the on-resistance, calibrated",
         note: "Standard deviation of its logarithm.",
         values: &[0.0, 0.1, 0.25, 0.5, 0.7, 1.0],
         label: percent,
@@ -118,24 +107,34 @@ fn times(factor: f64) -> String {
 
 /// All of them: with what solvers know from the description, and after a calibration if there is one.
 pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
-    let mut sweeps = Vec::new();
-    for kind in &KINDS {
-        let values: Vec<f64> = bench.some(kind.values).copied().collect();
-        let built = values.iter().map(|value| as_built(bench, (kind.of)(*value))).collect::<Result<Vec<_>, _>>()?;
-        let sweep = |title, all: &[Vec<Experiment>]| -> Result<Sweep, StudyError> {
-            let labelled = values.iter().map(|value| (kind.label)(*value)).zip(all).enumerate();
-            let points = labelled.map(|(index, (label, places))| point(bench, label, index as f64, places));
-            let note = format!("{} A firm contact, each place on another detector as built.", kind.note);
-            Ok(Sweep { title, note, points: points.collect::<Result<_, _>>()? })
-        };
-        sweeps.push(sweep(kind.title, &built)?);
+    let mut calibrated = CalibratedBench { bench, done: Vec::new() };
+    KINDS.iter().map(|kind| sweep(&mut calibrated, kind)).collect()
+}
+
+fn sweep(calibrated: &mut CalibratedBench, kind: &Kind) -> Result<Sweep, StudyError> {
+    let bench = calibrated.bench;
+    let mut note = format!("{} A firm contact, each place on another detector as built.", kind.note);
+    let (mut points, mut refused) = (Vec::new(), 0);
+    for (index, value) in bench.some(kind.values).copied().enumerate() {
+        let (label, severity) = ((kind.label)(value), index as f64);
+        let tolerances = (kind.of)(value);
+        let built = as_built(bench, tolerances)?;
+        let mut point = point(bench, label.clone(), severity, &built)?;
         if let Some(calibrate) = bench.plan.calibrate {
-            let known =
-                built.iter().map(|places| calibrated(bench, places, calibrate)).collect::<Result<Vec<_>, _>>()?;
-            sweeps.push(sweep(kind.calibrated, &known)?);
+            bench.tell(&format!("{}, {label}: calibrating {} detectors", kind.title, built.len()));
+            let (known, more) = calibrated.known(calibrate, tolerances, &built)?;
+            refused += more;
+            point.calibrated = Some(Box::new(self::point(bench, label, severity, &known)?));
         }
+        points.push(point);
     }
-    Ok(sweeps)
+    if let Some(calibrate) = bench.plan.calibrate {
+        note += &format!(" Below each solver: {}.", calibrate.name());
+    }
+    if refused > 0 {
+        note += &format!(" {refused} calibrations were refused; solvers know the description there.");
+    }
+    Ok(Sweep { title: kind.title, note, points })
 }
 
 /// The detector as it was built at each place, within tolerances of which solvers know nothing.
@@ -143,9 +142,35 @@ fn as_built(bench: &Bench, tolerances: Tolerances) -> Result<Vec<Experiment>, St
     bench.seeds().into_iter().map(|seed| bench.sound.as_built_within(tolerances, seed)).collect()
 }
 
-fn calibrated(bench: &Bench, places: &[Experiment], calibrate: Calibrate) -> Result<Vec<Experiment>, StudyError> {
-    let known = |(place, seed): (&Experiment, u64)| place.known_as(&calibrate(place, seed)?);
-    places.iter().zip(bench.seeds()).map(known).collect()
+/// Calibrations of the detectors as built within some tolerances, each done once: no tolerances are the same ones in every sweep.
+struct CalibratedBench<'a, 'plan> {
+    bench: &'a Bench<'plan>,
+    done: Vec<(Tolerances, Vec<Detector>, usize)>,
+}
+
+impl CalibratedBench<'_, '_> {
+    /// The same detectors as solvers know them after a calibration, and how many of those were refused.
+    fn known(
+        &mut self,
+        calibrate: Calibrate,
+        tolerances: Tolerances,
+        built: &[Experiment],
+    ) -> Result<(Vec<Experiment>, usize), StudyError> {
+        let index = match self.done.iter().position(|(done, ..)| *done == tolerances) {
+            Some(index) => index,
+            None => {
+                let places = built.iter().zip(self.bench.seeds());
+                let found = places.map(|(place, seed)| calibrate.find(place, seed)).collect::<Result<Vec<_>, _>>()?;
+                let refused = found.iter().filter(|found| found.refused.is_some()).count();
+                let detectors = found.into_iter().map(|Calibrated { detector, .. }| detector).collect();
+                self.done.push((tolerances, detectors, refused));
+                self.done.len() - 1
+            }
+        };
+        let (_, detectors, refused) = &self.done[index];
+        let known = built.iter().zip(detectors).map(|(place, detector)| place.known_as(detector));
+        Ok((known.collect::<Result<_, _>>()?, *refused))
+    }
 }
 
 /// A point at which each place has a detector of its own.
@@ -161,5 +186,6 @@ fn point(bench: &Bench, label: String, severity: f64, places: &[Experiment]) -> 
         places: places.iter().zip(bench.seeds()).map(frames).collect::<Result<_, _>>()?,
         known: places.iter().map(|place| place.with_faults(&[], 0)).collect::<Result<_, _>>()?,
         lambda: None,
+        calibrated: None,
     })
 }

@@ -9,7 +9,8 @@ mod trial;
 
 use std::time::Duration;
 
-use super::experiment::{Calibrate, Experiment, StudyError};
+use super::calibrate::Calibrate;
+use super::experiment::{Experiment, StudyError};
 use super::machine::Machine;
 use super::scenes::{Group, SceneKind};
 use super::score::Summary;
@@ -101,6 +102,10 @@ pub struct DetectorReport {
 pub struct AsBuiltReport {
     /// What solvers know of them.
     pub known: Known,
+    /// The calibration, if they are calibrated.
+    pub calibration: Option<String>,
+    /// How many calibrations were refused, which left solvers the description.
+    pub refused: usize,
     /// How many detectors, each with a place of each kind of scene.
     pub detectors: usize,
     /// One for each solver.
@@ -163,6 +168,13 @@ pub struct SceneReport {
     pub scene: SceneKind,
     /// Its means.
     pub summary: Summary,
+}
+
+impl AsBuiltReport {
+    /// Figures of a solver.
+    pub fn of(&self, solver: &str) -> Option<&SolverReport> {
+        self.solvers.iter().find(|report| report.solver == solver)
+    }
 }
 
 impl SolverReport {
@@ -241,9 +253,15 @@ fn as_built(plan: &Plan, sound: &Experiment, progress: &mut dyn FnMut(&str)) -> 
             continue;
         }
         progress(&format!("{}: {} detectors as built, {}", sound.detector.name, plan.drawn, known.name()));
+        let mut refused = 0;
         let trial = |((index, seed), built): ((u64, u64), &Experiment)| {
             let known = match calibrate {
-                Some(calibrate) => built.known_as(&calibrate(built, seed)?)?,
+                Some(calibrate) => {
+                    let found = calibrate.find(built, seed)?;
+                    refused += usize::from(found.refused.is_some());
+                    found.refused.iter().for_each(|why| progress(&format!("{}: {why}", built.detector.name)));
+                    built.known_as(&found.detector)?
+                }
                 None => built.with_faults(&[], 0)?,
             };
             Trial::new(plan, known, index..index + 1)
@@ -252,7 +270,8 @@ fn as_built(plan: &Plan, sound: &Experiment, progress: &mut dyn FnMut(&str)) -> 
         let variations = plan.methods.iter().map(|method| Variation::default_of(*method));
         // What cannot be made for the model was told before.
         let solvers = variations.filter_map(|variation| try_variation(None, &mut trials, variation).ok()).collect();
-        reports.push(AsBuiltReport { known, detectors: plan.drawn, solvers });
+        let calibration = calibrate.map(Calibrate::name);
+        reports.push(AsBuiltReport { known, calibration, refused, detectors: plan.drawn, solvers });
     }
     Ok(reports)
 }
@@ -286,7 +305,7 @@ mod tests {
             heap: None,
             as_built: None,
             drawn: 2,
-            calibrate: Some(|experiment, _| Ok(experiment.truth().clone())),
+            calibrate: Some(Calibrate::Perfect),
         };
         run(&plan, "tactomo <tradeoff>", &mut |_| {}).unwrap()
     }
@@ -327,7 +346,7 @@ mod tests {
             heap: None,
             as_built,
             drawn: 2,
-            calibrate: Some(|experiment, _| Ok(experiment.truth().clone())),
+            calibrate: Some(Calibrate::Perfect),
         };
         let run = |as_built| run(&plan(as_built), "", &mut |_| {}).unwrap().detectors.remove(0);
         let one_m = |solvers: &[SolverReport]| solvers[0].group(Group::One).unwrap().error_m.unwrap();
@@ -345,9 +364,11 @@ mod tests {
     fn page_and_table_show_every_solver_and_how_to_run_it_again() {
         let report = report();
         let (page, table) = (page(&report), table(&report));
-        for part in ["as built, by their description", "as built, calibrated"] {
+        for part in ["2 detectors as built", "calibrated without an error"] {
             assert!(page.contains(part) && table.contains(part), "{part}");
         }
+        assert_eq!(table.matches("  calibrated ").count(), 2, "{table}");
+        assert!(page.contains("by their description: tikhonov:") && page.contains("calibrated: tikhonov:"));
         for solver in ["tikhonov", "tikhonov-paper", "tikhonov lambda 0.1"] {
             assert!(page.contains(solver) && table.contains(solver), "{solver}");
         }

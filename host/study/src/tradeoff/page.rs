@@ -1,7 +1,7 @@
 //! The report as a page.
 
-use super::table::{label, names, number};
-use super::{AsBuiltReport, DetectorReport, Group, Known, Report, SceneKind, SolverReport};
+use super::table::{as_built_title, label, names, number};
+use super::{AsBuiltReport, DetectorReport, Group, Report, SceneKind, SolverReport};
 use crate::page::{Axis, Chart, Mark, Series, Unit, escaped, folded, html, machine, table};
 use crate::score::Summary;
 use tactomo_touch::solve::Family;
@@ -61,42 +61,62 @@ fn of_detector(report: &DetectorReport, as_built: Option<u64>) -> String {
         ),
         on_paper,
         nothing(report),
-        report.as_built.iter().zip(charts).map(|(built, charts)| as_built_row(built, &charts)).collect(),
+        charts.map(|charts| as_built_row(&report.as_built, &charts)).collect(),
         format!("<h3>Scene by scene</h3>\n{}", scene_charts(report)),
         folded("All figures", &(costs(report) + &figures(report))),
     ]
     .join("\n")
 }
 
-/// A row of charts of the detector on paper, and one for each way in which it was known as built, on the same axes.
+/// A row of charts of the detector on paper, and one of detectors as built, on the same axes.
 fn group_charts(report: &DetectorReport) -> Vec<String> {
     let groups =
         [(Group::One, "One contact"), (Group::Several, "Two or three contacts"), (Group::Shapes, "Hands and shapes")];
-    let all = std::iter::once(&report.solvers).chain(report.as_built.iter().map(|built| &built.solvers));
-    let row = |solvers: &Vec<SolverReport>| {
-        groups.map(|(group, title)| Panel {
-            title,
-            subtitle: format!("{} · {}", of_what(group), names(group)),
-            group,
-            size: [430.0, 380.0],
-            series: series(solvers, group, |solver| solver.group(group)),
-        })
+    let panel = |(group, title): (Group, &'static str), series: Vec<Series>| Panel {
+        title,
+        subtitle: format!("{} · {}", of_what(group), names(group)),
+        group,
+        size: [430.0, 380.0],
+        series,
     };
-    let panels: Vec<Panel> = all.flat_map(row).collect();
+    let of = |solvers, group| series(solvers, group, |solver: &SolverReport| solver.group(group));
+    let mut panels: Vec<_> = groups.map(|group| panel(group, of(&report.solvers, group.0))).into();
+    if !report.as_built.is_empty() {
+        panels.extend(groups.map(|group| panel(group, as_built_series(&report.as_built, group.0))));
+    }
     let row = |charts: &[String]| format!("<div class=\"charts\">{}</div>", charts.concat());
     drawn(&panels).chunks(groups.len()).map(row).collect()
 }
 
-fn as_built_row(report: &AsBuiltReport, charts: &str) -> String {
-    let what = match report.known {
-        Known::Described => "the description, which is all that solvers know of them",
-        Known::Calibrated => "the description; solvers know what a calibration has found of each",
+/// A series for each solver: from what it reaches with the description to what it reaches calibrated, which has the label.
+fn as_built_series(reports: &[AsBuiltReport], group: Group) -> Vec<Series> {
+    let mut all: Vec<Series> = Vec::new();
+    for report in reports {
+        for mut more in series(&report.solvers, group, |solver: &SolverReport| solver.group(group)) {
+            for mark in &mut more.marks {
+                mark.tooltip = format!("{}: {}", report.known.name(), mark.tooltip);
+            }
+            match all.iter_mut().find(|series| series.name == more.name) {
+                Some(series) => {
+                    series.marks.extend(more.marks);
+                    (series.main, series.is_joined) = (series.marks.len() - 1, true);
+                }
+                None => all.push(more),
+            }
+        }
+    }
+    all
+}
+
+fn as_built_row(reports: &[AsBuiltReport], charts: &str) -> String {
+    let dots = match reports.len() {
+        1 => "Solvers know the description only",
+        _ => "Small dots: solvers know the description only; large ones: what the calibration has found of each",
     };
     format!(
-        "<h3>{} detectors as built, {}</h3>\n<p class=\"quiet\">Drawn from the tolerances around {what}. One place of each kind of scene on \
-         each; solvers with their defaults. Axes are those of the charts above.</p>\n{charts}",
-        report.detectors,
-        report.known.name()
+        "<h3>{}</h3>\n<p class=\"quiet\">Drawn from the tolerances around the description. {dots}. One place of each kind of scene on each; \
+         solvers with their defaults. Axes are those of the charts above.</p>\n{charts}",
+        as_built_title(reports)
     )
 }
 

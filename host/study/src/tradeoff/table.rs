@@ -1,6 +1,6 @@
 //! The report as a table.
 
-use super::{Group, Report, SceneKind, SolverReport};
+use super::{AsBuiltReport, Group, Report, SceneKind, SolverReport};
 
 /// Lines for a terminal: a solver each.
 pub fn table(report: &Report) -> String {
@@ -30,12 +30,9 @@ pub fn table(report: &Report) -> String {
             "correl.",
             "Dice"
         ));
-        lines.extend(detector.solvers.iter().map(line));
+        lines.extend(detector.solvers.iter().map(|solver| line(&label(solver), solver)));
         lines.extend(detector.unavailable.iter().map(|why| format!("not tried: {why}")));
-        for built in &detector.as_built {
-            lines.push(format!("{} detectors as built, {}:", built.detectors, built.known.name()));
-            lines.extend(built.solvers.iter().map(line));
-        }
+        lines.extend(as_built(&detector.as_built));
         lines.push(String::new());
     }
     lines.push("one, several: mean error with contacts missed and invented; count: frames of several with none of either; conduct.: relative error of one contact's; correl., Dice: images of".to_owned());
@@ -61,14 +58,39 @@ pub(super) fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
 }
 
-fn line(solver: &SolverReport) -> String {
+/// Each solver on detectors as built, and below it the same after a calibration.
+fn as_built(reports: &[AsBuiltReport]) -> Vec<String> {
+    let Some((described, calibrated)) = reports.split_first() else { return Vec::new() };
+    let mut lines = vec![as_built_title(reports) + ":"];
+    for solver in &described.solvers {
+        lines.push(line(&label(solver), solver));
+        let same = calibrated.iter().filter_map(|report| report.of(&solver.solver));
+        lines.extend(same.map(|solver| line("  calibrated", solver)));
+    }
+    lines
+}
+
+/// What is known of detectors as built, for people.
+pub(super) fn as_built_title(reports: &[AsBuiltReport]) -> String {
+    let Some(first) = reports.first() else { return String::new() };
+    let mut title = format!("{} detectors as built, {}", first.detectors, first.known.name());
+    for report in &reports[1..] {
+        title += &format!(", and {}", report.calibration.as_deref().unwrap_or(report.known.name()));
+        if report.refused > 0 {
+            title += &format!(" ({} of {} were refused)", report.refused, report.detectors);
+        }
+    }
+    title
+}
+
+fn line(name: &str, solver: &SolverReport) -> String {
     let of = |group| solver.group(group);
     let error_mm = |group| number(of(group).and_then(|summary| Some(summary.error_m? * 1e3)), 2);
     let (one, shapes) = (of(Group::One), of(Group::Shapes));
     let memory = solver.memory.map(|memory| memory.peak_bytes as f64 / 1e6);
     format!(
         "{:<32} {:>9.1} {:>9.1} {:>9.2} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9} {:>6}",
-        label(solver),
+        name,
         solver.all.time_us.median,
         solver.all.time_us.p99,
         solver.set_up_ms,

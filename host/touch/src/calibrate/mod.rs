@@ -85,7 +85,7 @@ pub enum CalibrateError {
     /// What was found is too far from the description.
     #[error(
         "the readings are not those of {detector} within its tolerances: the bare detector differs by {distance:.0} %, where {usual:.0} % is usual: \
-         choose the detector that was rubbed, or widen [tolerances]"
+         choose the detector that was rubbed, see that no wires touch, or widen [tolerances]"
     )]
     OtherDetector {
         /// Name of the detector.

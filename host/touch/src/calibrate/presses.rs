@@ -18,6 +18,10 @@ const MOST_AVERAGED: usize = 64;
 const MOST_MEANS: usize = 6000;
 /// Share of the touched frames in which an electrode has to be wrong to be left out.
 const FAULTY: f64 = 0.3;
+/// Share of the drive above which a reading has risen to it, and of the other electrodes that do so where nothing is grounded: those of them
+/// that are not broken too, down to four of sixteen. Where 5 sheet conductances press, a quarter of the sound ones read 0.75 of the drive at most.
+const RISEN: f64 = 0.97;
+const RISE_TOGETHER: f64 = 0.25;
 /// Fewest presses that a detector is fitted to.
 pub(super) const FEWEST: usize = 4;
 /// Share of the touched frames that has to be of one contact: below, agreement may be chance.
@@ -71,11 +75,14 @@ impl Chosen {
         let frames_of = |indices: &[usize]| indices.iter().map(|index| means[*index].frames).sum::<usize>();
         let all: Vec<usize> = (0..means.len()).collect();
         let counted = frames_of(&all);
-        let none = || CalibrateError::NotSingle { touched: counted, single: 0 };
-        let agreement = Agreement::among(&centred).ok_or_else(none)?;
+        let not_single = |single: usize| match ungrounded(&touched, detector) {
+            broken if broken.is_empty() => CalibrateError::NotSingle { touched: counted, single },
+            faulty => CalibrateError::Electrodes { faulty },
+        };
+        let agreement = Agreement::among(&centred).ok_or_else(|| not_single(0))?;
         let single = frames_of(&agreement.agree);
         if agreement.agree.len() < FEWEST || (single as f64) < SINGLE * counted as f64 {
-            return Err(CalibrateError::NotSingle { touched: counted, single });
+            return Err(not_single(single));
         }
         let singles = agreement.agree.iter().map(|index| means[*index].clone()).collect();
         Ok(Self { kept, singles, touched: counted, centred: agreement.mean.matrix })
@@ -131,6 +138,16 @@ fn kept(touched: &[&Frame], detector: &Detector, noise_v: f64) -> Vec<usize> {
         .collect();
     let wrong = |e: &usize| looked.iter().filter(|faulty| faulty.iter().any(|(other, _)| other == e)).count();
     (0..n).filter(|e| (wrong(e) as f64) <= FAULTY * looked.len().max(1) as f64).collect()
+}
+
+/// Electrodes that ground nothing in most of the frames, however many they are: [`faulty_electrodes`] knows a few among many that are sound.
+fn ungrounded(touched: &[&Frame], detector: &Detector) -> Vec<usize> {
+    let n = detector.electrodes.len();
+    let rises = |frame: &Frame, g: usize| {
+        let risen = (0..n).filter(|e| *e != g && frame.readings.at(g, *e) > RISEN * detector.drive_v).count();
+        risen as f64 >= RISE_TOGETHER * (n - 1) as f64
+    };
+    (0..n).filter(|g| 2 * touched.iter().filter(|frame| rises(frame, *g)).count() > touched.len()).collect()
 }
 
 /// Means of frames that follow each other and stand still, through the electrodes that are kept.

@@ -34,7 +34,6 @@ use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image, leaks};
 use crate::detector::{Detector, Electrode};
 use crate::scene::Contact;
-use crate::space::Place;
 
 /// A pad's contact impedance is at least this share of `radius^2 / sheet conductance`: below, it makes no difference to a
 /// reading (current enters within 1/1000 of the radius) and the equations only lose digits.
@@ -93,23 +92,13 @@ impl Shell {
     /// # Errors
     /// [`ForwardError::Detector`] if the detector cannot be meshed.
     pub fn with_nodes(detector: &Detector, nodes: usize) -> Result<Self, ForwardError> {
-        Self::with_sheet(detector, nodes, |_| 1.0)
-    }
-
-    /// A model whose sheet conductance is not everywhere that of the detector, but `factor` times it at a place (m).
-    ///
-    /// # Errors
-    /// [`ForwardError::Detector`] if the detector cannot be meshed.
-    pub fn with_sheet(detector: &Detector, nodes: usize, factor: impl Fn(Place) -> f64) -> Result<Self, ForwardError> {
         let singular = |_: Singular| singular(detector);
         let pad_impedance_ohm_m2: Vec<_> =
             detector.electrodes.iter().map(|pad| pad_impedance_ohm_m2(detector, pad)).collect();
         let sheet_conductance_s = detector.sheet_conductance_s();
         let mesh = Mesh::new(detector, nodes)?;
-        let sheet_s = |triangle| {
-            let at_m = mesh.centroid_m(triangle);
-            factor(at_m) * detector.log_unevenness(detector.map_m(at_m)).exp() * sheet_conductance_s
-        };
+        let sheet_s =
+            |triangle| detector.log_unevenness(detector.map_m(mesh.centroid_m(triangle))).exp() * sheet_conductance_s;
         let system = System::new(&mesh, sheet_s, &pad_impedance_ohm_m2).map_err(singular)?;
         let node_areas_m2 = mesh.node_areas_m2();
         // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.
@@ -143,8 +132,7 @@ impl Shell {
     /// [`ForwardError::Detector`] if the layer has a sheet resistance, which only the slab can have.
     pub fn under(self, driving: DrivingLayer) -> Result<Self, ForwardError> {
         if driving.sheet_ohm > 0.0 {
-            let what = "its driving layer has a sheet resistance, which only the slab can have: a flat rectangle whose conductivity is \
-                        even in the plane";
+            let what = "its driving layer has a sheet resistance, which only the slab can have: a flat rectangle";
             return Err(ForwardError::Detector { detector: self.detector.name.clone(), what: what.to_owned() });
         }
         Ok(Self { leak_s_per_m2: driving.leak_s / self.area_m2(), ..self })

@@ -352,3 +352,27 @@ fn a_leaking_shell_is_the_leaking_slab_of_a_thin_detector() -> Result<(), Forwar
     assert!(error.to_string().contains("which only the slab can have"), "{error}");
     Ok(())
 }
+
+#[test]
+fn along_a_bar_of_uneven_conductivity_the_potential_is_ohms() {
+    let (length_m, width_m) = (0.12, 0.01);
+    let mut bar = detector(Outline::rectangle(length_m, width_m), &[[-0.055, 0.0, 0.002], [0.055, 0.0, 0.002]]);
+    bar.unevenness.add([1, 0], 1.0);
+    bar.unevenness.add([3, 0], -0.4);
+    let shell = shell(&bar, 3000);
+    // 1 A from one end to the other: the integral of dx over conductance, from the middle, by the midpoint rule.
+    let ohm = |x_m: f64| {
+        let step_m = x_m / 200.0;
+        let at = |i: u8| step_m / (SHEET_S * width_m) / bar.log_unevenness([(f64::from(i) + 0.5) * step_m, 0.0]).exp();
+        -(0..200).map(at).sum::<f64>()
+    };
+    let fields_ohm = shell.fields_ohm();
+    let off: Vec<f64> = (0..shell.image_mesh().nodes_m.len())
+        .map(|node| (node, shell.image_mesh().nodes_m[node][0]))
+        .filter(|(_, x_m)| x_m.abs() < 0.03)
+        .map(|(node, x_m)| fields_ohm[(node, 0)] - fields_ohm[(node, 1)] - ohm(x_m))
+        .collect();
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    let largest = off.iter().map(|ohm| (ohm - mean).abs()).fold(0.0, f64::max);
+    assert!(off.len() > 100 && largest < 3e-3 * (ohm(-0.03) - ohm(0.03)), "{} {largest}", off.len());
+}

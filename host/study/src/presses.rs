@@ -15,7 +15,7 @@ const MARGIN_M: f64 = 4e-3;
 const SINGLES: usize = 4;
 
 /// So many single presses, and then pairs.
-pub(super) fn random(detector: &Detector, presses: usize, seed: u64) -> Vec<Vec<Contact>> {
+pub(crate) fn random(detector: &Detector, presses: usize, seed: u64) -> Vec<Vec<Contact>> {
     let mut random = fastrand::Rng::with_seed(seed);
     let sheet_s = detector.sheet_conductance_s();
     let mut press = |sheets: Option<f64>| {
