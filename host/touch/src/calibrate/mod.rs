@@ -36,8 +36,6 @@ pub struct Frame {
 pub struct Step {
     /// Iterations done.
     pub iteration: usize,
-    /// Most that there will be.
-    pub most: usize,
     /// Sum of squares for each reading, in standard deviations of noise and model error: about 1 or less where all fits.
     pub chi_square: f64,
 }
@@ -94,6 +92,17 @@ pub enum CalibrateError {
         distance: f64,
         /// What tolerances make of it (%).
         usual: f64,
+    },
+    /// No detector near the description, with one contact for each press, has such readings.
+    #[error(
+        "no detector within the tolerances of {detector} explains the presses: they are off by {residual:.1} x noise: rub with one fingertip \
+         alone, see that no wire is loose, choose the detector that was rubbed, or widen [tolerances]"
+    )]
+    Unfit {
+        /// Name of the detector.
+        detector: String,
+        /// Root of the mean square of what is left, in deviations of noise and the model's own error.
+        residual: f64,
     },
     /// Known places contradict the readings.
     #[error(

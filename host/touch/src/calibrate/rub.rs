@@ -6,7 +6,7 @@ use tactomo_physics::detector::{Calibration, Detector, Parameter, SHORTEST_WAVE,
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-use super::bundle::{Bundle, Iterations, MODEL_ERROR, Normal, Press};
+use super::bundle::{Bundle, Iterations, Normal, Press};
 use super::centred::between_others;
 use super::posterior::Posterior;
 use super::presses::{Chosen, Mean};
@@ -122,10 +122,11 @@ pub fn rub(
     let (first, last, slopes) = adjusted(&mut bundle, &presses, &rest, told)?;
     let single = chosen.singles.iter().map(|mean| mean.frames).sum();
     if bundle.chi_square(&last) > UNFIT {
-        return Err(CalibrateError::NotSingle { touched: chosen.touched, single });
+        let residual = bundle.chi_square(&last).sqrt();
+        return Err(CalibrateError::Unfit { detector: nominal.name.clone(), residual });
     }
     let posterior = Posterior::new(&last.information, last.of_press.clone(), bundle.chi_square(&last))
-        .ok_or(CalibrateError::NotSingle { touched: chosen.touched, single: 0 })?;
+        .ok_or_else(|| CalibrateError::Unfit { detector: nominal.name.clone(), residual: f64::INFINITY })?;
     let mut detector = calibrated(nominal, &chosen, &bundle, &posterior);
     detector.force.clone_from(&told_channels.force);
     Ok(Rub {
@@ -292,10 +293,10 @@ fn adjusted(
     let mut slopes = Slopes::new(&*bundle.model, &bundle.parameters)?;
     let first = bundle.chi_square(&bundle.normal(&slopes));
     for rough in ROUGH {
-        bundle.model_error = rough * MODEL_ERROR;
+        bundle.rough = rough;
         bundle.adjust(&mut slopes, Iterations { most: 1, renewed: 1 }, told)?;
     }
-    bundle.model_error = MODEL_ERROR;
+    bundle.rough = 1.0;
     let mut normal = bundle.adjust(&mut slopes, Iterations { most: 2, renewed: 1 }, told)?;
     if !rest.is_empty() {
         let others = presses.started(&Problem::new(Arc::clone(&bundle.model)), rest)?;
