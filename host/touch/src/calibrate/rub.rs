@@ -80,7 +80,7 @@ const FULL: f64 = 0.995;
 const UNFIT: f64 = 5.0;
 /// Errors of the model, in its own, with which the first iterations are done: far from the truth readings are not linear in the detector, and
 /// with the model's own error alone two of five detectors drawn from the default tolerances end in a wrong minimum.
-const ROUGH: [f64; 2] = [30.0, 6.0];
+const ROUGH: [f64; 2] = [30.0, 4.0];
 /// Presses that the detector is fitted to first: what they leave is within a tenth of what all leave, in a sixth of the time.
 const FIRST: usize = 24;
 /// Sum of squares, in those of most presses, above which a press is sought anew.
@@ -297,12 +297,9 @@ fn adjusted(
         bundle.adjust(&mut slopes, Iterations { most: 1, renewed: 1 }, told)?;
     }
     bundle.rough = 1.0;
-    let mut normal = bundle.adjust(&mut slopes, Iterations { most: 2, renewed: 1 }, told)?;
-    if !rest.is_empty() {
-        let others = presses.started(&Problem::new(Arc::clone(&bundle.model)), rest)?;
-        bundle.presses.extend(others);
-        normal = bundle.adjust(&mut slopes, Iterations { renewed: 1, ..Iterations::default() }, told)?;
-    }
+    let others = presses.started(&Problem::new(Arc::clone(&bundle.model)), rest)?;
+    bundle.presses.extend(others);
+    let mut normal = bundle.adjust(&mut slopes, Iterations { renewed: 1, ..Iterations::default() }, told)?;
     for _ in 0..2 {
         let lost = bundle.lost(&normal, LOST);
         if lost.is_empty() {
