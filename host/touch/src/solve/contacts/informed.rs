@@ -74,10 +74,13 @@ impl ContactFinder {
 
     /// Brings a fit and what its readings may be off by to agree.
     fn settled(&self, mut found: Informed) -> Informed {
-        for _ in 0..RENEWALS {
+        for renewal in 0..RENEWALS {
             let Informed { explanation, target } = &found;
             // What contacts are missing for says nothing of the detector.
             let is_hopeless = explanation.fit.cost > HOPELESS * target.count() as f64;
+            if is_hopeless && renewal > 0 {
+                break;
+            }
             let nearer = if is_hopeless { None } else { self.nearer_detector(&explanation.fit, target) };
             let is_settled = target.error().is_none_or(|error| error.is_settled(&explanation.fit.volts));
             if nearer.is_none() && is_settled {
@@ -97,8 +100,9 @@ impl ContactFinder {
         found
     }
 
-    /// More contacts as long as the evidence for them grows.
-    fn grown(&self, mut best: Informed, better: &mut dyn FnMut(&Explanation)) -> Informed {
+    /// More contacts as long as the evidence for them grows, then whatever other set of them is more likely.
+    fn grown(&self, first: Informed, better: &mut dyn FnMut(&Explanation)) -> Informed {
+        let mut best = self.one_by_one(first, better);
         for _ in 0..GROWTHS {
             let fit = &best.explanation.fit;
             let starts = self.pairs(fit, &best.target);
@@ -114,6 +118,27 @@ impl ContactFinder {
                 best.explanation.certainty = grown.explanation.certainty;
             }
             if !(is_better && is_other) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// One contact more at a time, each with what its readings may be off by, while there are too few.
+    fn one_by_one(&self, first: Informed, better: &mut dyn FnMut(&Explanation)) -> Informed {
+        let (mut best, mut last) = (first.clone(), first);
+        while self.is_misfit(&best.explanation.fit, &best.target) {
+            let Informed { explanation: Explanation { fit, .. }, target } = last;
+            if fit.contacts.len() >= self.settings.most {
+                break;
+            }
+            let starts = self.pairs(&fit, &target);
+            let Some(more) = self.one_more(&fit, starts, &target) else { break };
+            last = self.settled(Informed { explanation: Explanation::of(more, &target), target });
+            if self.whole_evidence(&last) > self.whole_evidence(&best) {
+                best = last.clone();
+                better(&best.explanation);
+            } else if last.explanation.fit.contacts.len() > best.explanation.fit.contacts.len() + 1 {
                 break;
             }
         }

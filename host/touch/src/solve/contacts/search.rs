@@ -191,7 +191,7 @@ impl ContactFinder {
     }
 
     /// The best fit with one more contact, from some starts or from where it would explain most; `None` if the readings ask for none.
-    fn one_more(&self, fit: &DiscFit, mut starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
+    pub(super) fn one_more(&self, fit: &DiscFit, mut starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
         let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
         let looks = self.scan.beside(&self.network, &*self.fields, &spots, fit, target);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));

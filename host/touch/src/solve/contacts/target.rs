@@ -112,7 +112,7 @@ impl Target {
     }
 
     /// What the readings may be off by together; none of a detector that is as described.
-    pub(super) fn error(&self) -> Option<&Arc<ApproximationError>> {
+    pub fn error(&self) -> Option<&Arc<ApproximationError>> {
         Some(&self.error).filter(|_| self.is_informed)
     }
 
