@@ -14,6 +14,7 @@ use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
+use super::contact::{Moves, OF_PRESS, Press};
 use super::slopes::{Slopes, as_read};
 use super::{CalibrateError, Step};
 use crate::threads::map;
@@ -21,14 +22,9 @@ use crate::threads::map;
 /// Error of the slab as a share of `Vcc - V`: against readings of an independent program, but for what pads' own impedances take up, 0.07 %.
 const MODEL_ERROR: f64 = 0.0007;
 /// Presses whose errors by the model are independent: it errs alike where readings are alike, so more presses average noise only. On six
-/// detectors drawn from the default tolerances (seeds 401 to 406, 160 presses at 1.5 LSB) this has 64 and 94 % of places within one and two
-/// standard errors; 12 has 54 and 85 %.
+/// detectors drawn from the default tolerances (seeds 401 to 406, 160 presses at 1.5 LSB) this has 66 and 95 % of places within one and two
+/// standard errors; 6 has 58 and 85 %.
 const APART: f64 = 2.0;
-/// Standard deviation of the logarithm of a contact's radius about the usual one, and of its conductance about where it was found.
-const RADIUS_DEVIATION: f64 = 0.5;
-const CONDUCTANCE_DEVIATION: f64 = 3.0;
-/// Unknowns of a press.
-const OF_PRESS: usize = 4;
 /// Share of the sum of squares by which an iteration has to better it for there to be another one.
 const WORTH: f64 = 5e-3;
 /// Dampings that are tried, as shares of the information.
@@ -38,24 +34,11 @@ const REFITS: usize = 6;
 const REFIT_WORTH: f64 = 1e-3;
 /// Share of its sum of squares below which another contact is taken for a press.
 const WORTH_MOVING: f64 = 0.9;
+/// Presses that the mean of one is taken of.
+const MEAN_OF: usize = 40;
 /// Largest step of a parameter in an iteration, in its unit for logarithms and in standard deviations for others.
 const LARGEST_LOG: f64 = 1.0;
 const LARGEST_DEVIATIONS: f64 = 3.0;
-
-/// A press: one contact for as long as it stands.
-#[derive(Clone, Debug)]
-pub(super) struct Press {
-    /// Mean readings (V), less the baseline.
-    pub readings: Readings,
-    /// Standard deviation of each by noise (V).
-    pub noise_v: f64,
-    /// Where it is known to be (m), and to what standard deviation (m).
-    pub known_m: Option<([f64; 2], f64)>,
-    /// The contact as it is fitted.
-    pub contact: Contact,
-    /// Radius and conductance that it is held near to.
-    pub usual: Contact,
-}
 
 /// A detector under adjustment, with its presses.
 pub(super) struct Bundle {
@@ -94,8 +77,6 @@ pub(super) struct Normal {
     /// Of the detector's parameters alone, contacts eliminated, in standard deviations before: information without the prior, and slope.
     pub information: DMatrix<f64>,
     slope: DVector<f64>,
-    /// Information of an average press by itself, at a contact that is known.
-    pub of_press: DMatrix<f64>,
     /// What takes steps of the detector to those of each press.
     of_presses: Vec<(DVector<f64>, DMatrix<f64>)>,
     /// Sum of squares of each press, and the weight that it has.
@@ -160,20 +141,19 @@ impl Bundle {
     /// The normal equations at the model as it is.
     pub fn normal(&self, slopes: &Slopes) -> Normal {
         let count = self.parameters.len();
-        let all = map(&self.presses, |press| self.of_press(press, slopes).unwrap_or_else(|| OfPress::nothing(count)));
+        let all = map(&self.presses, |press| {
+            self.of_press(press, slopes, self.model_error()).unwrap_or_else(|| OfPress::nothing(count))
+        });
         let costs: Vec<f64> = all.iter().map(|of| of.cost).collect();
         let weights = self.robust(&costs);
         let (mut information, mut slope) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let mut of_press = DMatrix::zeros(count, count);
         let mut of_presses = Vec::with_capacity(all.len());
-        let share = 1.0 / weights.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         for (of, weight) in all.into_iter().zip(&weights) {
             information += of.information * *weight;
-            of_press += of.known * (*weight * share);
             slope += of.slope * *weight;
             of_presses.push((of.step, of.coupling));
         }
-        Normal { information, slope, of_press, of_presses, costs, weights }
+        Normal { information, slope, of_presses, costs, weights }
     }
 
     /// Weights of presses by their sums of squares: half where one is four times as bad as most.
@@ -187,12 +167,18 @@ impl Bundle {
     }
 
     /// Derivatives by the contact of a press; `None` if it cannot be on the detector.
-    fn of_contact(&self, model: &dyn ForwardModel, press: &Press, contact: &Contact) -> Option<OfContact> {
+    fn of_contact(
+        &self,
+        model: &dyn ForwardModel,
+        press: &Press,
+        contact: &Contact,
+        model_error: f64,
+    ) -> Option<OfContact> {
         let detector = model.detector();
         let near = contact.neighbours(detector);
         let replaced: Vec<_> = near.iter().map(|(contact, _)| (0, *contact)).collect();
         let (impedance_ohm, changes) = model.impedance_with_changes_ohm(&[*contact], &replaced).ok()?;
-        let weights = DVector::from_vec(self.weights(press, self.model_error()));
+        let weights = DVector::from_vec(self.weights(press, model_error));
         let predicted = DVector::from_vec(as_read(&impedance_ohm, detector));
         let volts = DVector::from_column_slice(press.readings.volts());
         let residual = weights.component_mul(&(volts - &predicted));
@@ -213,20 +199,37 @@ impl Bundle {
         Some(OfContact { impedance_ohm, weights, predicted, residual, slopes, own, slope, cost })
     }
 
-    fn of_press(&self, press: &Press, slopes: &Slopes) -> Option<OfPress> {
-        let contact = self.of_contact(&*self.model, press, &press.contact)?;
-        let weights = &contact.weights;
-        let mut of_detector = DMatrix::zeros(weights.len(), self.parameters.len());
-        slopes.readings_v(&press.contact, &contact.impedance_ohm, contact.predicted.as_slice(), |column, change_v| {
-            of_detector.column_mut(column).iter_mut().zip(change_v).zip(weights).for_each(|((to, v), w)| *to = w * v);
+    /// Changes of readings by each of the detector's parameters, in deviations of both.
+    fn by_detector(&self, contact: &Contact, of: &OfContact, slopes: &Slopes) -> DMatrix<f64> {
+        let mut all = DMatrix::zeros(of.weights.len(), self.parameters.len());
+        slopes.readings_v(contact, &of.impedance_ohm, of.predicted.as_slice(), |column, change_v| {
+            all.column_mut(column).iter_mut().zip(change_v).zip(&of.weights).for_each(|((to, v), w)| *to = w * v);
         });
+        all
+    }
+
+    fn of_press(&self, press: &Press, slopes: &Slopes, model_error: f64) -> Option<OfPress> {
+        let contact = self.of_contact(&*self.model, press, &press.contact, model_error)?;
+        let of_detector = self.by_detector(&press.contact, &contact, slopes);
         let factor = Cholesky::new(contact.own)?;
         let coupling = factor.solve(&contact.slopes.tr_mul(&of_detector));
         let step = factor.solve(&contact.slope);
-        let known = of_detector.tr_mul(&of_detector);
-        let information = &known - of_detector.tr_mul(&contact.slopes) * &coupling;
+        let information = of_detector.tr_mul(&(&of_detector - &contact.slopes * &coupling));
         let slope = of_detector.tr_mul(&(contact.residual - &contact.slopes * &step));
-        Some(OfPress { cost: contact.cost, information, known, slope, step, coupling })
+        Some(OfPress { cost: contact.cost, information, slope, step, coupling })
+    }
+
+    /// Information of the readings of a press in the mean about the detector, in standard deviations before, if its contact is known.
+    pub fn information_of_press(&self, slopes: &Slopes) -> DMatrix<f64> {
+        let count = self.parameters.len();
+        let some: Vec<_> = self.presses.iter().step_by(self.presses.len().div_ceil(MEAN_OF).max(1)).collect();
+        let of = |press: &&Press| {
+            let contact = self.of_contact(&*self.model, press, &press.contact, MODEL_ERROR)?;
+            let of_detector = self.by_detector(&press.contact, &contact, slopes);
+            Some(of_detector.tr_mul(&of_detector))
+        };
+        let all: Vec<_> = map(&some, of).into_iter().flatten().collect();
+        all.iter().fold(DMatrix::zeros(count, count), |sum, of| sum + of) / all.len().max(1) as f64
     }
 
     /// Adjusts everything, with derivatives that are made anew in the first iterations; tells after each how far it is.
@@ -317,7 +320,7 @@ impl Bundle {
         let mut best = if a.1 <= b.1 { a } else { b };
         let mut damping = 1e-3;
         for _ in 0..REFITS {
-            let Some(of) = self.of_contact(model, press, &best.0) else { break };
+            let Some(of) = self.of_contact(model, press, &best.0, self.model_error()) else { break };
             let mut system = of.own.clone();
             (0..OF_PRESS).for_each(|k| system[(k, k)] *= 1.0 + damping);
             let Some(factor) = Cholesky::new(system) else { break };
@@ -348,8 +351,8 @@ impl Bundle {
             contact: *contact,
             usual: *contact,
         };
-        let own = Cholesky::new(self.of_contact(&*self.model, &press, contact)?.own)?.inverse();
-        let coupling = self.of_press(&press, slopes)?.coupling;
+        let own = Cholesky::new(self.of_contact(&*self.model, &press, contact, MODEL_ERROR)?.own)?.inverse();
+        let coupling = self.of_press(&press, slopes, MODEL_ERROR)?.coupling;
         let by_detector = &coupling * covariance * coupling.transpose();
         Some((0..2).map(|axis| own[(axis, axis)] + by_detector[(axis, axis)]).sum::<f64>().sqrt())
     }
@@ -396,8 +399,6 @@ struct OfContact {
 struct OfPress {
     cost: f64,
     information: DMatrix<f64>,
-    /// The same where the contact is known.
-    known: DMatrix<f64>,
     slope: DVector<f64>,
     /// Step of the contact, and what a step of the detector takes off it.
     step: DVector<f64>,
@@ -410,70 +411,9 @@ impl OfPress {
         Self {
             cost: f64::MAX.sqrt(),
             information: DMatrix::zeros(count, count),
-            known: DMatrix::zeros(count, count),
             slope: DVector::zeros(count),
             step: DVector::zeros(OF_PRESS),
             coupling: DMatrix::zeros(OF_PRESS, count),
         }
-    }
-}
-
-impl Press {
-    /// Of each unknown of a contact, how far it is from what is known of it before, in standard deviations, and standard deviations in its unit.
-    fn prior(&self, contact: &Contact) -> [(f64, f64); OF_PRESS] {
-        let log = |value: f64, usual: f64, deviation: f64| ((value / usual).ln() / deviation, 1.0 / deviation);
-        let place = |at_m: f64, axis: usize| match self.known_m {
-            Some((known_m, deviation_m)) => ((at_m - known_m[axis]) / deviation_m, 1.0 / deviation_m),
-            None => (0.0, 0.0),
-        };
-        [
-            place(contact.x_m, 0),
-            place(contact.y_m, 1),
-            log(contact.conductance_s, self.usual.conductance_s, CONDUCTANCE_DEVIATION),
-            log(contact.radius_m, self.usual.radius_m, RADIUS_DEVIATION),
-        ]
-    }
-}
-
-/// Steps for derivatives: of a place (m) and of logarithms.
-const STEP_M: f64 = 1e-5;
-const STEP_LOG: f64 = 1e-3;
-
-/// A contact by its unknowns: x, y (m), and the logarithms of conductance and radius.
-trait Moves: Sized {
-    fn moved(&self, step: &DVector<f64>, detector: &Detector) -> Self;
-    fn neighbours(&self, detector: &Detector) -> [(Self, f64); OF_PRESS];
-}
-
-impl Moves for Contact {
-    /// Moved by a step, at most a tenth of the detector and a factor of three, and within the detector.
-    fn moved(&self, step: &DVector<f64>, detector: &Detector) -> Self {
-        let [low, high] = detector.outline.bounds();
-        let place = |at_m: f64, axis: usize| {
-            let most_m = 0.1 * (high[axis] - low[axis]);
-            (at_m + step[axis].clamp(-most_m, most_m)).clamp(low[axis], high[axis])
-        };
-        Self {
-            x_m: place(self.x_m, 0),
-            y_m: place(self.y_m, 1),
-            conductance_s: self.conductance_s * step[2].clamp(-1.1, 1.1).exp(),
-            radius_m: self.radius_m * step[3].clamp(-0.5, 0.5).exp(),
-            ..*self
-        }
-    }
-
-    fn neighbours(&self, detector: &Detector) -> [(Self, f64); OF_PRESS] {
-        // Towards the middle, so that they stay on the detector.
-        let inward = |at_m: f64, axis: usize| {
-            let [low, high] = detector.outline.bounds();
-            if at_m > 0.5 * (low[axis] + high[axis]) { -STEP_M } else { STEP_M }
-        };
-        let (x, y) = (inward(self.x_m, 0), inward(self.y_m, 1));
-        [
-            (Self { x_m: self.x_m + x, ..*self }, x),
-            (Self { y_m: self.y_m + y, ..*self }, y),
-            (Self { conductance_s: self.conductance_s * STEP_LOG.exp(), ..*self }, STEP_LOG),
-            (Self { radius_m: self.radius_m * STEP_LOG.exp(), ..*self }, STEP_LOG),
-        ]
     }
 }

@@ -7,6 +7,7 @@
 
 mod bundle;
 mod centred;
+mod contact;
 pub mod force;
 pub mod known;
 mod posterior;

