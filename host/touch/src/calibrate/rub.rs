@@ -97,19 +97,9 @@ pub fn rub(
     settings: &RubSettings,
     told: &mut dyn FnMut(Step) -> bool,
 ) -> Result<Rub, CalibrateError> {
-    let electrodes = nominal.electrodes.len();
-    if let Some(other) = frames.iter().find(|frame| frame.readings.electrodes() != electrodes) {
-        let readings = other.readings.electrodes();
-        return Err(CalibrateError::Count { readings, detector: nominal.name.clone(), electrodes });
-    }
-    let chosen = Chosen::among(frames, nominal)?;
-    let told_channels = nominal;
     // Readings are those of the channels: gains and offsets are fitted from none.
-    let nominal = &without_channels(nominal);
-    let problem = Problem::of(&nominal.taken_as_exact())?;
-    let found = wired(&chosen, nominal, &problem)?;
-    let means = chosen.spread(settings.presses, nominal);
-    let (order, problem) = ordered(&found, &chosen, &problem, &means)?;
+    let (told_channels, nominal) = (nominal, &without_channels(nominal));
+    let Sorted { chosen, means, order, problem } = Sorted::new(nominal, frames, settings.presses)?;
     let parameters: Vec<_> = Parameter::all(problem.detector(), SHORTEST_WAVE)
         .into_iter()
         .map(|parameter| (parameter, nominal.tolerances.deviation(nominal, parameter)))
@@ -134,13 +124,40 @@ pub fn rub(
         detector,
         place_errors_m: place_errors_m(&bundle, &slopes, &posterior),
         wires: (!order.exchanged().is_empty()).then_some(order.electrodes),
-        left_out: (0..electrodes).filter(|e| !chosen.kept.contains(e)).collect(),
+        left_out: (0..nominal.electrodes.len()).filter(|e| !chosen.kept.contains(e)).collect(),
         touched: chosen.touched,
         single,
         presses: bundle.presses.len(),
         known: bundle.presses.iter().filter(|press| press.known_m.is_some()).count(),
         chi_square: [first, bundle.chi_square(&last)],
     })
+}
+
+/// Frames of a rub, with the electrodes that they are of.
+pub(super) struct Sorted {
+    chosen: Chosen,
+    /// Means of frames that are fitted.
+    means: Vec<Mean>,
+    pub order: Order,
+    /// The detector as described, through electrodes that are sound, in the order of the channels.
+    problem: Problem,
+}
+
+impl Sorted {
+    /// Takes so many presses of single contacts, and finds which wire is which.
+    pub fn new(nominal: &Detector, frames: &[Frame], presses: usize) -> Result<Self, CalibrateError> {
+        let electrodes = nominal.electrodes.len();
+        if let Some(other) = frames.iter().find(|frame| frame.readings.electrodes() != electrodes) {
+            let readings = other.readings.electrodes();
+            return Err(CalibrateError::Count { readings, detector: nominal.name.clone(), electrodes });
+        }
+        let chosen = Chosen::among(frames, nominal)?;
+        let problem = Problem::of(&nominal.taken_as_exact())?;
+        let found = wired(&chosen, nominal, &problem)?;
+        let means = chosen.spread(presses, nominal);
+        let (order, problem) = ordered(&found, &chosen, &problem, &means)?;
+        Ok(Self { chosen, means, order, problem })
+    }
 }
 
 /// A detector whose channels are taken to read what is there, and whose answers are not corrected. One that is taken as exact is no longer, by

@@ -95,6 +95,32 @@ fn exchanged_wires_are_found_and_known_places_tell_a_turned_sensor() {
 }
 
 #[test]
+fn three_known_places_tell_all_eight_ways_that_a_square_can_lie() {
+    let mut bench = Bench::new(8);
+    let contacts: Vec<_> = (0..24).map(|_| bench.contacts(1)[0]).collect();
+    let frames: Vec<_> = contacts.iter().map(|contact| bench.frame(&[*contact])).collect();
+    let detector = Detector::default();
+    for (mirrored, turns) in (0..8).map(|way| (way >= 4, way % 4)) {
+        let lying = |[x_m, y_m]: [f64; 2]| {
+            let start_m = if mirrored { [-x_m, y_m] } else { [x_m, y_m] };
+            (0..turns).fold(start_m, |[x_m, y_m], _| [-y_m, x_m])
+        };
+        let known = |(index, frame): (usize, &Frame)| {
+            let at_m = lying([contacts[index].x_m, contacts[index].y_m]);
+            Frame { known_m: (index < 3).then_some(at_m), ..frame.clone() }
+        };
+        let frames: Vec<_> = frames.iter().enumerate().map(known).collect();
+        let order = rub::Sorted::new(&detector, &frames, 24).unwrap().order;
+        let lies_there = |(channel, electrode): (usize, &usize)| {
+            let [x_m, y_m] = lying([detector.electrodes[channel].x_m, detector.electrodes[channel].y_m]);
+            let described = &detector.electrodes[*electrode];
+            (described.x_m - x_m).hypot(described.y_m - y_m) < 1e-6
+        };
+        assert!(order.electrodes.iter().enumerate().all(lies_there), "{mirrored} {turns}: {order:?}");
+    }
+}
+
+#[test]
 fn what_is_no_rub_says_so() {
     let mut bench = Bench::new(7);
     assert_eq!(rubbed(&[]).unwrap_err(), CalibrateError::NoPress { frames: 0 });
