@@ -107,7 +107,7 @@ fn where_nobody_or_a_whole_hand_presses_one_fingertip_is_asked_for() {
     let rest = folder.refused(&bench.frames(30, 0), &[]);
     assert!(rest.contains("rub.csv: nothing presses in any of 30 frames: rub one fingertip"), "{rest}");
     let hand = folder.refused(&bench.frames(24, 3), &[]);
-    assert!(hand.contains("24 touched frames agree") && hand.contains("rub with one fingertip alone"), "{hand}");
+    assert!(hand.contains("rub with one fingertip alone"), "{hand}");
 }
 
 #[test]

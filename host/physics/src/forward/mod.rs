@@ -82,6 +82,15 @@ pub trait ForwardModel: Send + Sync {
         None
     }
 
+    /// The same detector at a resolution at which detectors that are [similar](Self::of_similar) are a few times cheaper to make: readings are
+    /// off by up to a per cent or so, and their changes from one to the other by a few per cent, those with pads' own impedances by a sixth. `None` if there is no such thing.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if it cannot be modelled so.
+    fn coarse(&self) -> Result<Option<Arc<dyn ForwardModel>>, ForwardError> {
+        Ok(None)
+    }
+
     /// The impedance matrix and the fields under the image's nodes with a conductance at each of them (S): an image of contact,
     /// or a mask of any shape. A node stands for its cell of the surface, over which its conductance is spread.
     ///

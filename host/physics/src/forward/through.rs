@@ -75,6 +75,12 @@ impl ForwardModel for Through {
         Ok((before, changes))
     }
 
+    fn coarse(&self) -> Result<Option<Arc<dyn ForwardModel>>, ForwardError> {
+        let through =
+            |model| Arc::new(Self::new(model, self.kept.clone(), self.joints.clone())) as Arc<dyn ForwardModel>;
+        Ok(self.model.coarse()?.map(through))
+    }
+
     fn rough(&self) -> Option<Arc<dyn ForwardModel>> {
         Some(Arc::new(Self::new(self.model.rough()?, self.kept.clone(), self.joints.clone())))
     }

@@ -244,7 +244,7 @@ impl Bundle {
             let before = self.objective(&normal, &self.steps);
             let bettered = self.step(&normal)?;
             if iteration <= iterations.renewed && bettered {
-                *slopes = Slopes::new(&*self.model, &self.parameters)?;
+                *slopes = Slopes::new(&self.model, &self.parameters)?;
             }
             normal = self.normal(slopes);
             let after = self.objective(&normal, &self.steps);

@@ -308,7 +308,7 @@ fn adjusted(
     rest: &[usize],
     told: &mut dyn FnMut(Step) -> bool,
 ) -> Result<(f64, Normal, Slopes), CalibrateError> {
-    let mut slopes = Slopes::new(&*bundle.model, &bundle.parameters)?;
+    let mut slopes = Slopes::new(&bundle.model, &bundle.parameters)?;
     let first = bundle.chi_square(&bundle.normal(&slopes));
     for rough in ROUGH {
         bundle.rough = rough;

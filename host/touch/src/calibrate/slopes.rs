@@ -14,6 +14,8 @@ const STEP: f64 = 0.1;
 
 /// Derivatives of the readings by parameters of the detector.
 pub(super) struct Slopes {
+    /// What the models are a step from, as coarse as they are.
+    coarse: Arc<dyn ForwardModel>,
     all: Vec<Slope>,
 }
 
@@ -34,17 +36,19 @@ impl Slopes {
     ///
     /// # Errors
     /// [`ForwardError`] if one of the detectors cannot be.
-    pub fn new(model: &dyn ForwardModel, parameters: &[(Parameter, f64)]) -> Result<Self, ForwardError> {
+    pub fn new(model: &Arc<dyn ForwardModel>, parameters: &[(Parameter, f64)]) -> Result<Self, ForwardError> {
+        let coarse = model.coarse()?.unwrap_or_else(|| Arc::clone(model));
         let slope = |(parameter, deviation): &(Parameter, f64)| {
             let step = STEP * deviation;
             Ok(match *parameter {
                 Parameter::Gain(channel) => Slope::Gain(channel, *deviation),
                 Parameter::Offset(channel) => Slope::Offset(channel, *deviation),
                 Parameter::OnResistance => Slope::Board(model.detector().stepped(&[(*parameter, step)]).into()),
-                _ => Slope::Model(model.of_similar(&model.detector().stepped(&[(*parameter, step)]))?),
+                _ => Slope::Model(coarse.of_similar(&model.detector().stepped(&[(*parameter, step)]))?),
             })
         };
-        Ok(Self { all: map(parameters, slope).into_iter().collect::<Result<_, _>>()? })
+        let all = map(parameters, slope).into_iter().collect::<Result<_, _>>()?;
+        Ok(Self { coarse, all })
     }
 
     /// Gives for each parameter by how much the readings of a contact change (V) with one of its standard deviations.
@@ -57,8 +61,10 @@ impl Slopes {
     ) {
         let n = impedance_ohm.nrows();
         let mut change_v = vec![0.0; n * n];
+        let Ok(coarse_ohm) = self.coarse.impedance_ohm(&[*contact]) else { return };
+        let coarse = as_read(&coarse_ohm, self.coarse.detector());
         for (column, slope) in self.all.iter().enumerate() {
-            let stepped = match slope {
+            let (stepped, before) = match slope {
                 Slope::Gain(channel, deviation) => {
                     change_v.fill(0.0);
                     let own = (*channel..n * n).step_by(n);
@@ -72,13 +78,13 @@ impl Slopes {
                     give(column, &change_v);
                     continue;
                 }
-                Slope::Board(detector) => as_read(impedance_ohm, detector),
+                Slope::Board(detector) => (as_read(impedance_ohm, detector), predicted),
                 Slope::Model(model) => match model.impedance_ohm(&[*contact]) {
-                    Ok(other_ohm) => as_read(&other_ohm, model.detector()),
+                    Ok(other_ohm) => (as_read(&other_ohm, model.detector()), &coarse[..]),
                     Err(_) => continue,
                 },
             };
-            let pairs = stepped.iter().zip(predicted);
+            let pairs = stepped.iter().zip(before);
             change_v.iter_mut().zip(pairs).for_each(|(change, (to, from))| *change = (to - from) / STEP);
             give(column, &change_v);
         }

@@ -1,7 +1,7 @@
 //! The slab against answers known otherwise.
 
 use super::*;
-use crate::detector::{Electrode, Outline};
+use crate::detector::{Electrode, Outline, Parameter};
 use crate::forward::contact::conducting_patches;
 use crate::forward::readings_v;
 use crate::forward::shell::Shell;
@@ -295,4 +295,34 @@ fn impedances_change_as_differences_do() {
         let off = (change - &expected).norm() / expected.norm();
         assert!(off < 0.06, "contact {k} to {contact:?}: {off}");
     }
+}
+
+/// What a coarse slab is for: how readings change with what a calibration finds.
+#[test]
+fn readings_change_alike_on_a_coarse_slab() {
+    let detector = Detector::default();
+    let contact = Contact::flat(0.009, -0.006, 0.0025, 1e-3);
+    let fine = Slab::new(&detector).unwrap();
+    let coarse = fine.coarse().unwrap().unwrap();
+    let change = |model: &dyn ForwardModel, parameter: Parameter, step: f64| {
+        let similar = model.of_similar(&detector.stepped(&[(parameter, step)])).unwrap();
+        similar.impedance_ohm(&[contact]).unwrap() - model.impedance_ohm(&[contact]).unwrap()
+    };
+    let off = |parameter, step| {
+        let changes = [change(&fine, parameter, step), change(&*coarse, parameter, step)];
+        (&changes[0] - &changes[1]).norm() / changes[0].norm()
+    };
+    for (parameter, step) in [
+        (Parameter::Thickness, 0.01),
+        (Parameter::TopOverBottom, 0.05),
+        (Parameter::Uneven([1, 0]), 0.01),
+        (Parameter::Uneven([2, 3]), 0.01),
+        (Parameter::ElectrodeX(5), 3e-5),
+        (Parameter::ElectrodeY(15), 3e-5),
+    ] {
+        assert!(off(parameter, step) < 0.03, "{parameter:?}: {}", off(parameter, step));
+    }
+    // What crowds at a pad's rim is what is coarse.
+    let pad = off(Parameter::Pad(9), 0.05);
+    assert!(pad < 0.2, "{pad}");
 }
