@@ -13,3 +13,4 @@ pub mod rest;
 pub mod scene;
 pub mod simulate;
 pub mod space;
+pub mod threads;

@@ -9,4 +9,3 @@ mod gaussian;
 pub mod metrics;
 pub mod schema;
 pub mod solve;
-mod threads;

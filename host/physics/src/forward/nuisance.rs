@@ -10,10 +10,7 @@
 //! once, and a column is the difference of two answers. Pads, channels and the multiplexer need no model: with `L = Z[g][g] + R`,
 //! a resistance `d` in series with ground `g` adds `(Vcc - V[g][e]) d / L`, a factor of a channel `V[g][e]` itself.
 
-use std::panic::resume_unwind;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,6 +18,7 @@ use super::{ForwardError, ForwardModel, readings_v};
 use crate::detector::{Detector, Electrode, Parameter};
 use crate::readings::Readings;
 use crate::scene::Contact;
+use crate::threads;
 
 /// Standard deviation of a logarithm from which its square is reckoned with as well: below, it makes less than a thirtieth of the change.
 const CURVED: f64 = 0.05;
@@ -123,7 +121,8 @@ impl Nuisance {
             step_of(&unknowns[column], parameter) / square.sqrt()
         });
         let parameters =
-            in_parallel(&parameters, |(parameter, square)| Changed::new(model, *parameter, square.sqrt()))?;
+            threads::map(&parameters, |(parameter, square)| Changed::new(model, *parameter, square.sqrt()));
+        let parameters = parameters.into_iter().collect::<Result<_, _>>()?;
         let pads_ohm = pads_ohm(&**model)?;
         Ok(Some(Self { model: Arc::clone(model), parameters, directions, pads_ohm }))
     }
@@ -259,26 +258,4 @@ fn pads_ohm(model: &dyn ForwardModel) -> Result<Vec<f64>, ForwardError> {
         off.sum::<f64>() / (n * (n - 1)) as f64
     };
     Ok((0..n).map(|g| ((after[(g, g)] - before[(g, g)] - constant) / STEP.exp_m1()).max(0.0)).collect())
-}
-
-/// Results for all items, in their order, in as many threads as there are cores.
-fn in_parallel<T: Sync, R: Send, E: Send>(items: &[T], make: impl Fn(&T) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut made = Vec::new();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(item) = items.get(index) else { break };
-            made.push((index, make(item)?));
-        }
-        Ok(made)
-    };
-    let threads = thread::available_parallelism().map_or(1, usize::from).min(items.len().max(1));
-    let parts: Vec<Result<Vec<(usize, R)>, E>> = thread::scope(|scope| {
-        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
-    });
-    let mut all: Vec<_> = parts.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-    all.sort_unstable_by_key(|(index, _)| *index);
-    Ok(all.into_iter().map(|(_, made)| made).collect())
 }

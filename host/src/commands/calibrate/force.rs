@@ -13,9 +13,9 @@ use tactomo::detector::Detector;
 use self::gather::gather;
 use self::known::Known;
 use self::report::Report;
+use super::Reading;
 use crate::commands::choice::DetectorArgs;
 use crate::commands::output::{self, NewFile, message};
-use crate::commands::reconstruct::units::Unit;
 
 /// Finds which force is behind a contact's conductance, from presses of known force.
 ///
@@ -47,12 +47,8 @@ pub struct Args {
     /// Law of force: `power`, or `saturating`, the paper's eq. (6) [default: the one that the presses need]
     #[arg(long, value_name = "power|saturating", value_parser = law)]
     law: Option<Law>,
-    /// Frames at the start whose mean is the baseline, and which are no presses [default: as `reconstruct`]
-    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
-    rest: Option<u32>,
-    /// Unit of the readings in a table [default: V]
-    #[arg(long, value_name = "V|mV")]
-    unit: Option<Unit>,
+    #[command(flatten)]
+    reading: Reading,
     /// The detector file to write; a file that exists is not replaced
     #[arg(long, value_name = "CAL.toml")]
     out: PathBuf,

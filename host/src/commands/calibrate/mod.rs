@@ -13,8 +13,9 @@ use tactomo::detector::Detector;
 
 use super::choice::DetectorArgs;
 use super::output::{NewFile, message};
+use super::reconstruct::units::Unit;
 use super::record;
-use super::source::BoardArgs;
+use super::source::{self, BoardArgs};
 
 /// Fits a detector's description to the detector that was built.
 ///
@@ -48,25 +49,47 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-/// The file that is given, or a new recording of a board beside the result; `what` to do meanwhile.
-fn given_or_recorded(
-    file: Option<&PathBuf>,
-    (board, detector): (&BoardArgs, &DetectorArgs),
+/// Where readings come from: a file, or a board that is recorded first.
+#[derive(Debug, clap::Args)]
+struct Source {
+    /// A recording, or a table of readings with a press a row
+    #[arg(value_name = "FILE", conflicts_with_all = ["port", "simulate"])]
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    board: BoardArgs,
+    #[command(flatten)]
+    detector: DetectorArgs,
+    /// How long a board is recorded (s)
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = source::seconds)]
     seconds: Duration,
-    out: &Path,
-    what: &str,
-) -> anyhow::Result<PathBuf> {
-    if let Some(file) = file {
-        return Ok(file.clone());
+}
+
+impl Source {
+    /// The file that is given, or a new recording of a board beside the result; `what` to do meanwhile.
+    fn file(&self, out: &Path, what: &str) -> anyhow::Result<PathBuf> {
+        if let Some(file) = &self.file {
+            return Ok(file.clone());
+        }
+        ensure!(
+            self.board.port.is_some() || self.board.simulate,
+            "give a FILE, or --port PORT for a board, or --simulate: which readings shall the detector be fitted to?"
+        );
+        let file = out.with_extension("tactomo");
+        message!("{what}, for {:.0} s; the recording is kept in {}", self.seconds.as_secs_f64(), file.display());
+        record::record(&file, &self.board, &self.detector, Some(self.seconds))?;
+        Ok(file)
     }
-    ensure!(
-        board.port.is_some() || board.simulate,
-        "give a FILE, or --port PORT for a board, or --simulate: which readings shall the detector be fitted to?"
-    );
-    let file = out.with_extension("tactomo");
-    message!("{what}, for {:.0} s; the recording is kept in {}", seconds.as_secs_f64(), file.display());
-    record::record(&file, board, detector, Some(seconds))?;
-    Ok(file)
+}
+
+/// How the readings of a file are to be read.
+#[derive(Debug, clap::Args)]
+struct Reading {
+    /// Frames at the start whose mean is the baseline, and which are no presses [default: as `reconstruct`]
+    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    rest: Option<u32>,
+    /// Unit of the readings in a table [default: V]
+    #[arg(long, value_name = "V|mV")]
+    unit: Option<Unit>,
 }
 
 /// Writes a detector that can be read back from where it will be: a curved one names the file of its surface.

@@ -4,7 +4,6 @@ mod gather;
 mod report;
 
 use std::path::PathBuf;
-use std::time::Duration;
 
 use anyhow::{anyhow, ensure};
 use tactomo::calibrate::known::correction;
@@ -13,10 +12,8 @@ use tactomo::detector::Detector;
 use self::gather::{Known, gather};
 use self::report::Report;
 use super::known::{KnownPlace, check_places, places_or_order};
-use crate::commands::choice::DetectorArgs;
+use super::{Reading, Source};
 use crate::commands::output::{self, NewFile, message};
-use crate::commands::reconstruct::units::Unit;
-use crate::commands::source::{self, BoardArgs};
 
 /// Corrects places by presses at known ones, as far as these show errors that run smoothly over the sensor: 16 to 25 are good.
 ///
@@ -35,28 +32,16 @@ use crate::commands::source::{self, BoardArgs};
 #[command(verbatim_doc_comment)]
 #[command(group(clap::ArgGroup::new("wanted").args(["known", "places"]).required(true).multiple(true)))]
 pub struct Args {
-    /// A recording, or a table of readings with a press a row
-    #[arg(value_name = "FILE", conflicts_with_all = ["port", "simulate"])]
-    file: Option<PathBuf>,
     #[command(flatten)]
-    board: BoardArgs,
-    #[command(flatten)]
-    detector: DetectorArgs,
-    /// How long a board is recorded (s)
-    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = source::seconds)]
-    seconds: Duration,
+    source: Source,
     /// Where a press is: the row of a table, from 1, or the time in a recording (s); x and y from the sensor's middle (mm)
     #[arg(long, value_name = "ROW:X,Y", allow_hyphen_values = true)]
     known: Vec<KnownPlace>,
     /// The same from a table: columns `x_m` and `y_m`, `row`, from 1, or `time_s`, or else in the order of the presses; and `force_n` if that is known
     #[arg(long, value_name = "FILE")]
     places: Option<PathBuf>,
-    /// Frames at the start whose mean is the baseline, and which are no presses [default: as `reconstruct`]
-    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
-    rest: Option<u32>,
-    /// Unit of the readings in a table [default: V]
-    #[arg(long, value_name = "V|mV")]
-    unit: Option<Unit>,
+    #[command(flatten)]
+    reading: Reading,
     /// The detector file to write; a file that exists is not replaced
     #[arg(long, value_name = "CAL.toml")]
     out: PathBuf,
@@ -69,12 +54,11 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let out = NewFile::never_replacing(&args.out)?;
     ensure!(
-        !args.board.simulate,
+        !args.source.board.simulate,
         "the scenes of the simulated board press no known places: give a FILE of presses (`tactomo forward --measured` simulates rows), or --port"
     );
     let what = "press the known places one after the other, each for a second, and lift the tip between them";
-    let file =
-        super::given_or_recorded(args.file.as_ref(), (&args.board, &args.detector), args.seconds, &args.out, what)?;
+    let file = args.source.file(&args.out, what)?;
     let gathered = gather(args, &file)?;
     for skipped in &gathered.skipped {
         message!("{} is left out: {}", skipped.place, skipped.why());

@@ -12,11 +12,10 @@ use tactomo::readings::Readings;
 use tactomo::solve::Method;
 
 use super::known::{KnownPlace, check_places, check_used, places};
-use crate::commands::choice::{DetectorArgs, Model};
+use super::{Reading, Source};
+use crate::commands::choice::Model;
 use crate::commands::output::{self, NewFile, message};
 use crate::commands::reconstruct::reader::{Input, Reader};
-use crate::commands::reconstruct::units::Unit;
-use crate::commands::source::{self, BoardArgs};
 
 /// Finds the detector that was built, from one finger rubbed over it: half a minute, everywhere, now light and now firm.
 ///
@@ -34,16 +33,8 @@ use crate::commands::source::{self, BoardArgs};
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
-    /// A recording, or a table of readings with a press a row
-    #[arg(value_name = "FILE", conflicts_with_all = ["port", "simulate"])]
-    file: Option<PathBuf>,
     #[command(flatten)]
-    board: BoardArgs,
-    #[command(flatten)]
-    detector: DetectorArgs,
-    /// How long a board is recorded (s)
-    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = source::seconds)]
-    seconds: Duration,
+    source: Source,
     /// A press at a known place: the row of a table, from 1, or the time in a recording (s); x and y from the sensor's middle (mm)
     #[arg(long, value_name = "ROW:X,Y", allow_hyphen_values = true)]
     known: Vec<KnownPlace>,
@@ -53,12 +44,8 @@ pub struct Args {
     /// Most presses that are fitted
     #[arg(long, value_name = "PRESSES", default_value_t = RubSettings::default().presses, value_parser = most)]
     presses: usize,
-    /// Frames at the start whose mean is the baseline, and which are no presses [default: as `reconstruct`]
-    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
-    rest: Option<u32>,
-    /// Unit of the readings in a table [default: V]
-    #[arg(long, value_name = "V|mV")]
-    unit: Option<Unit>,
+    #[command(flatten)]
+    reading: Reading,
     /// The detector file to write; a file that exists is not replaced
     #[arg(long, value_name = "CAL.toml")]
     out: PathBuf,
@@ -71,8 +58,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let out = NewFile::never_replacing(&args.out)?;
     let what = "rub one fingertip over the whole sensor, now light and now firm";
-    let file =
-        super::given_or_recorded(args.file.as_ref(), (&args.board, &args.detector), args.seconds, &args.out, what)?;
+    let file = args.source.file(&args.out, what)?;
     let (nominal, board, frames) = frames(args, &file)?;
     let begin = Instant::now();
     let settings = RubSettings { presses: args.presses, ..RubSettings::default() };
@@ -102,13 +88,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Option<String>, Vec<Frame>)> {
     let mut reader = Reader::open(&Input {
         file,
-        detector: &args.detector,
+        detector: &args.source.detector,
         model: Model::Auto,
         solver: Method::Tikhonov,
         lambda: None,
         presses: None,
-        rest: args.rest,
-        unit: args.unit,
+        rest: args.reading.rest,
+        unit: args.reading.unit,
         force: None,
         uncorrected: true,
     })?;

@@ -17,7 +17,7 @@ use tactomo_physics::scene::Contact;
 use super::contact::{Moves, OF_PRESS, Press};
 use super::slopes::{Slopes, as_read};
 use super::{CalibrateError, Step};
-use crate::threads::map;
+use tactomo_physics::threads::map;
 
 /// Error of the slab as a share of `Vcc - V`: against readings of an independent program, but for what pads' own impedances take up, 0.07 %.
 const MODEL_ERROR: f64 = 0.0007;

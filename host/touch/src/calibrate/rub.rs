@@ -15,7 +15,7 @@ use super::slopes::Slopes;
 use super::wires::{Order, orders};
 use super::{CalibrateError, Frame, Step};
 use crate::solve::{ContactSettings, Contacts, Problem, Solver};
-use crate::threads::map;
+use tactomo_physics::threads::map;
 
 /// How a rub is used.
 #[derive(Clone, Copy, Debug, PartialEq)]

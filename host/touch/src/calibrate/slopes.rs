@@ -7,7 +7,7 @@ use tactomo_physics::detector::{Detector, Parameter};
 use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
 use tactomo_physics::scene::Contact;
 
-use crate::threads::map;
+use tactomo_physics::threads::map;
 
 /// Step of a parameter, in its standard deviations: small enough for a slope, large against the rounding of tables.
 const STEP: f64 = 0.1;

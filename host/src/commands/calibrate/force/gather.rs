@@ -33,8 +33,8 @@ pub fn gather(args: &Args, known: &Known) -> anyhow::Result<Gathered> {
         solver: Method::Contacts,
         lambda: None,
         presses: None,
-        rest: args.rest,
-        unit: args.unit,
+        rest: args.reading.rest,
+        unit: args.reading.unit,
         force: Some(ForceLaw::siemens()),
         uncorrected: false,
     })?;

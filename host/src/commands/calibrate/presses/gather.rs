@@ -72,13 +72,13 @@ type Found = Result<FoundContact, usize>;
 pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
     let mut reader = Reader::open(&Input {
         file,
-        detector: &args.detector,
+        detector: &args.source.detector,
         model: Model::Auto,
         solver: Method::Contacts,
         lambda: None,
         presses: None,
-        rest: args.rest,
-        unit: args.unit,
+        rest: args.reading.rest,
+        unit: args.reading.unit,
         // Conductances with their constriction, as laws of force have them.
         force: Some(ForceLaw::siemens()),
         uncorrected: true,

@@ -3,7 +3,7 @@
 use std::thread;
 
 /// A function of each of some things, in their order, on as many threads as there are cores.
-pub(crate) fn map<T: Sync, R: Send>(all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub fn map<T: Sync, R: Send>(all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let cores = thread::available_parallelism().map_or(1, usize::from).min(all.len());
     if cores < 2 {
         return all.iter().map(function).collect();
