@@ -21,12 +21,13 @@ use tactomo_physics::threads::map;
 
 /// Error of the slab as a share of `Vcc - V`: against readings of an independent program, but for what pads' own impedances take up, 0.07 %.
 const MODEL_ERROR: f64 = 0.0007;
-/// Presses whose errors by the model are independent: it errs alike where readings are alike, so more presses average noise only. On six
-/// detectors drawn from the default tolerances (seeds 401 to 406, 160 presses at 1.5 LSB) this has 66 and 95 % of places within one and two
-/// standard errors; 6 has 58 and 85 %.
-const APART: f64 = 2.0;
-/// Share of the sum of squares by which an iteration has to better it for there to be another one.
-const WORTH: f64 = 5e-3;
+/// Presses whose errors by the model are independent: it errs alike where readings are alike, so more presses average noise only. On five
+/// detectors drawn from the default tolerances (seeds 411 to 415, 160 presses at 1.5 LSB) this has 67 and 98 % of places within one and two
+/// standard errors; 2 has 81 and 98 %.
+const APART: f64 = 12.0;
+/// Sum of squares, in standard deviations, by which an iteration has to better it for there to be another one: what is left to go is then less
+/// than a standard error.
+const WORTH: f64 = 0.3;
 /// Dampings that are tried, as shares of the information.
 const DAMPINGS: [f64; 4] = [0.0, 0.01, 0.1, 1.0];
 /// Steps of a contact on a new detector, and share of its sum of squares that one has to better.
@@ -34,6 +35,8 @@ const REFITS: usize = 6;
 const REFIT_WORTH: f64 = 1e-3;
 /// Share of its sum of squares below which another contact is taken for a press.
 const WORTH_MOVING: f64 = 0.9;
+/// Sum of squares for each reading from which a press is worse than most: a hundredth of what noise and model should leave.
+const LEAST: f64 = 0.01;
 /// Presses that the mean of one is taken of.
 const MEAN_OF: usize = 40;
 /// Largest step of a parameter in an iteration, in its unit for logarithms and in standard deviations for others.
@@ -156,14 +159,14 @@ impl Bundle {
         Normal { information, slope, of_presses, costs, weights }
     }
 
-    /// Weights of presses by their sums of squares: half where one is four times as bad as most.
+    /// Weights of presses by their sums of squares: a quarter where one is twice as bad as most.
     fn robust(&self, costs: &[f64]) -> Vec<f64> {
         let shares: Vec<f64> =
             costs.iter().zip(&self.presses).map(|(cost, press)| cost / self.count(press).max(1) as f64).collect();
         let mut sorted = shares.clone();
         sorted.sort_by(f64::total_cmp);
-        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(1.0);
-        shares.iter().map(|share| 1.0 / (1.0 + (share / (4.0 * usual)).powi(2)).powi(2)).collect()
+        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(LEAST);
+        shares.iter().map(|share| 1.0 / (1.0 + (share / (2.0 * usual)).powi(2)).powi(2)).collect()
     }
 
     /// Derivatives by the contact of a press; `None` if it cannot be on the detector.
@@ -252,7 +255,7 @@ impl Bundle {
             if !told(Step { iteration: self.done, chi_square: self.chi_square(&normal) }) {
                 return Err(CalibrateError::Stopped);
             }
-            if !bettered || before - after < WORTH * before {
+            if !bettered || before - after < WORTH {
                 break;
             }
         }
