@@ -1,25 +1,71 @@
 //! Work on all cores.
 
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
 /// A function of each of some things, in their order, on as many threads as there are cores.
 pub fn map<T: Sync, R: Send>(all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let cores = thread::available_parallelism().map_or(1, usize::from).min(all.len());
-    if cores < 2 {
-        return all.iter().map(function).collect();
-    }
-    // Every so-manieth to each, for neighbours cost alike.
-    let of_core = &|core: usize| all.iter().skip(core).step_by(cores).map(&function).collect::<Vec<_>>();
-    let mut parts: Vec<_> = thread::scope(|scope| {
-        let workers: Vec<_> = (1..cores).map(|core| scope.spawn(move || of_core(core))).collect();
-        let mut parts = vec![of_core(0)];
-        for worker in workers {
-            match worker.join() {
-                Ok(part) => parts.push(part),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
+    map_until(all, &AtomicBool::new(false), &|_| {}, function).into_iter().flatten().collect()
+}
+
+/// The same until `stop` is set: `None` of what was not begun by then. `done` is told, on any of the threads, how many are done.
+pub fn map_until<T: Sync, R: Send>(
+    all: &[T],
+    stop: &AtomicBool,
+    done: &(dyn Fn(usize) + Sync),
+    function: impl Fn(&T) -> R + Sync,
+) -> Vec<Option<R>> {
+    let (next, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    // Each takes the next one that nobody has taken, for some take longer than others.
+    let work = || {
+        let mut results = Vec::new();
+        while !stop.load(Ordering::Relaxed) {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(thing) = all.get(index) else { break };
+            results.push((index, function(thing)));
+            done(finished.fetch_add(1, Ordering::Relaxed) + 1);
         }
-        parts.into_iter().map(Vec::into_iter).collect()
+        results
+    };
+    let cores = thread::available_parallelism().map_or(1, usize::from).min(all.len());
+    let mut results: Vec<Option<R>> = all.iter().map(|_| None).collect();
+    thread::scope(|scope| {
+        let workers: Vec<_> = (1..cores).map(|_| scope.spawn(work)).collect();
+        let mut found = work();
+        for worker in workers {
+            found.extend(worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        }
+        found.into_iter().for_each(|(index, result)| results[index] = Some(result));
     });
-    (0..all.len()).filter_map(|index| parts[index % cores].next()).collect()
+    results
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_are_in_order_however_long_each_takes() {
+        let all: Vec<u64> = (0..100).collect();
+        let slow_first = |value: &u64| {
+            thread::sleep(std::time::Duration::from_micros(200 - 2 * value));
+            value * value
+        };
+        assert_eq!(map(&all, slow_first), all.iter().map(|value| value * value).collect::<Vec<_>>());
+        assert!(map(&[], |_: &u8| 0).is_empty());
+    }
+
+    #[test]
+    fn what_was_not_begun_when_it_stops_is_missing_and_the_rest_is_there() {
+        let (stop, most) = (AtomicBool::new(false), AtomicUsize::new(0));
+        let all: Vec<usize> = (0..1000).collect();
+        let done = |count: usize| {
+            most.fetch_max(count, Ordering::Relaxed);
+            stop.store(count >= 10, Ordering::Relaxed);
+        };
+        let found = map_until(&all, &stop, &done, |value| *value);
+        let there: Vec<_> = found.iter().flatten().copied().collect();
+        assert_eq!(there, (0..there.len()).collect::<Vec<_>>());
+        assert!((10..900).contains(&there.len()) && most.load(Ordering::Relaxed) == there.len(), "{}", there.len());
+    }
 }

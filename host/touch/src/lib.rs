@@ -9,3 +9,4 @@ mod gaussian;
 pub mod metrics;
 pub mod schema;
 pub mod solve;
+pub mod student;

@@ -20,6 +20,7 @@ pub use self::file::{FileError, TomlError};
 pub use self::force::{FARTHEST, ForceLaw, Newtons};
 pub use self::material::{FOAMS, Foam, Stack};
 pub use self::parameters::Parameter;
+pub use self::preset::electrode_grid;
 pub use self::surface::edges_of;
 pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
 pub use self::svg::short;

@@ -3,12 +3,15 @@
 mod args;
 mod built;
 mod contacts;
+mod design;
+mod materials;
 
 pub use self::args::StudyArgs;
 
-/// Studies of how well touch is found.
+/// Studies of detectors, and of how well touch is found.
 ///
-/// Example:
+/// Examples:
+///   tactomo study materials --out materials.html
 ///   tactomo study contacts --scenes 60
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -21,6 +24,7 @@ pub struct Args {
 enum Study {
     Built(built::Args),
     Contacts(contacts::Args),
+    Materials(materials::Args),
 }
 
 /// Runs the study that was asked for.
@@ -28,5 +32,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.study {
         Study::Built(args) => built::run(args),
         Study::Contacts(args) => contacts::run(args),
+        Study::Materials(args) => materials::run(args),
     }
 }

@@ -11,15 +11,17 @@ pub enum Unit {
     Plain,
 }
 
-/// A logarithmic axis.
+/// An axis, logarithmic unless it is linear.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// What it shows.
     pub title: String,
     /// In what.
     pub unit: Unit,
-    /// Smallest and largest value; both above zero.
+    /// Smallest and largest value; of a logarithmic axis both above zero.
     pub range: [f64; 2],
+    /// Whether it is even in the values, not in their logarithms.
+    pub is_linear: bool,
 }
 
 impl Axis {
@@ -32,11 +34,29 @@ impl Axis {
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
         let [low, high] = if low > high { [floor.log10(), floor.log10()] } else { [low, high] };
         let missing = (decades - (high - low)).max(0.0) / 2.0 + 0.04 * (high - low).max(decades);
-        Self { title: title.to_owned(), unit, range: [low - missing, high + missing].map(|log| 10f64.powf(log)) }
+        Self {
+            title: title.to_owned(),
+            unit,
+            range: [low - missing, high + missing].map(|log| 10f64.powf(log)),
+            is_linear: false,
+        }
+    }
+
+    /// A linear axis over all of some values, with a little room.
+    pub fn linear(title: &str, unit: Unit, values: impl IntoIterator<Item = f64>) -> Self {
+        let finite = values.into_iter().filter(|value| value.is_finite());
+        let [low, high] = finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], value| [a.min(value), b.max(value)]);
+        let [low, high] = if low > high { [0.0, 1.0] } else { [low, high] };
+        let room = if high > low { 0.04 * (high - low) } else { 0.5 * high.abs().max(1.0) };
+        Self { title: title.to_owned(), unit, range: [low - room, high + room], is_linear: true }
     }
 
     /// Where a value lies, 0 to 1; beyond an end, at it.
     pub fn share(&self, value: f64) -> f64 {
+        if self.is_linear {
+            let [low, high] = self.range;
+            return ((value - low) / (high - low)).clamp(0.0, 1.0);
+        }
         let [low, high] = self.range.map(f64::log10);
         ((value.max(f64::MIN_POSITIVE).log10() - low) / (high - low)).clamp(0.0, 1.0)
     }
@@ -44,6 +64,9 @@ impl Axis {
     /// Values of ticks, with their text: decades, and twos and fives where there are few of those.
     pub fn ticks(&self) -> Vec<(f64, String)> {
         let [low, high] = self.range;
+        if self.is_linear {
+            return self.even_ticks();
+        }
         let decades = (high / low).log10();
         let steps: &[f64] = match decades {
             ..1.3 => &[1.0, 2.0, 3.0, 5.0, 7.0],
@@ -55,6 +78,21 @@ impl Axis {
         (first..=high.log10().ceil() as i32)
             .flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)))
             .filter(|value| (low..=high).contains(value))
+            .map(|value| (value, self.unit.text(value)))
+            .collect()
+    }
+}
+
+impl Axis {
+    /// Four to eight values, a one, two or five of a decade apart.
+    fn even_ticks(&self) -> Vec<(f64, String)> {
+        let [low, high] = self.range;
+        let decade = 10f64.powf(((high - low) / 4.0).log10().floor());
+        let step = [5.0, 2.0, 1.0].map(|times| times * decade).into_iter().find(|step| 4.0 * step <= high - low);
+        let step = step.unwrap_or(decade);
+        let first = (low / step).ceil() as i64;
+        (first..=(high / step).floor() as i64)
+            .map(|index| index as f64 * step)
             .map(|value| (value, self.unit.text(value)))
             .collect()
     }
@@ -121,6 +159,14 @@ mod tests {
         let texts: Vec<_> = axis.ticks().into_iter().map(|(_, text)| text).collect();
         assert_eq!(texts.first().map(String::as_str), Some("10 µs"));
         assert!(texts.contains(&"100 µs".to_owned()));
+    }
+
+    #[test]
+    fn a_linear_axis_is_even_and_may_go_below_zero() {
+        let axis = Axis::linear("share", Unit::Plain, [-1.0, 1.0]);
+        assert!((axis.share(0.0) - 0.5).abs() < 1e-12);
+        let ticks: Vec<_> = axis.ticks().into_iter().map(|(_, text)| text).collect();
+        assert_eq!(ticks, ["-1", "-0.5", "0", "0.5", "1"]);
     }
 
     #[test]

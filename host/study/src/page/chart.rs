@@ -1,4 +1,4 @@
-//! Charts of marks between two logarithmic axes.
+//! Charts of marks between two axes.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ const ROOMY: f64 = 350.0;
 /// Marks nearer than this have one label (px).
 const ONE_SPOT: f64 = 14.0;
 
-/// Marks between two logarithmic axes; further left and further down is better.
+/// Marks between two axes; with a front, further left and further down is better.
 #[derive(Clone, Debug)]
 pub struct Chart {
     /// What it shows, in a few words.
@@ -261,7 +261,7 @@ mod tests {
     use super::*;
 
     fn chart(points: &[[f64; 2]]) -> Chart {
-        let axis = || Axis { title: "x".to_owned(), unit: Unit::Plain, range: [1.0, 100.0] };
+        let axis = || Axis { title: "x".to_owned(), unit: Unit::Plain, range: [1.0, 100.0], is_linear: false };
         let series = points.iter().map(|&[x, y]| Series {
             name: format!("s{x}"),
             class: "linear",

@@ -2,12 +2,15 @@
 
 mod axis;
 mod chart;
+mod colour;
 mod heat;
 mod label;
+mod map;
 
 pub use self::axis::{Axis, Unit};
 pub use self::chart::{Chart, Mark, Series};
 pub use self::heat::{Cell, Heat, Row};
+pub use self::map::Map;
 
 use super::machine::Machine;
 

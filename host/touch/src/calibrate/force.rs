@@ -9,7 +9,6 @@
 mod fit;
 mod order;
 mod stands;
-mod student;
 #[cfg(test)]
 mod tests;
 
@@ -210,7 +209,7 @@ pub fn fit_force(presses: &[ForcePress], wanted: Option<Law>) -> Result<ForceFit
 
 /// Whether a value differs from nothing, with its standard error and so many degrees of freedom.
 fn is_determined([value, deviation]: [f64; 2], freedom: f64) -> bool {
-    value > student::quantile(DETERMINED, freedom) * deviation
+    value > crate::student::quantile(DETERMINED, freedom) * deviation
 }
 
 /// Checks that the conductance rises with the force: as the best power law says, whatever else may be.
@@ -270,7 +269,7 @@ fn forms(presses: &[ForcePress]) -> impl Iterator<Item = Form> {
 
 /// Student's allowance: so much wider are bands of 90 % by a scatter that is known with so many degrees of freedom.
 fn widening(freedom: f64) -> f64 {
-    student::quantile(BAND, freedom) / BAND
+    crate::student::quantile(BAND, freedom) / BAND
 }
 
 /// The law of a fit, and its maximum.

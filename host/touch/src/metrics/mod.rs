@@ -10,7 +10,7 @@ mod paper;
 pub use self::contacts::{Matching, Pair, position_error_m};
 pub use self::greit::Greit;
 pub use self::image::{Comparison, ImageMetrics, found_s_per_m2, truth_s_per_m2};
-pub use self::paper::PaperFigures;
+pub use self::paper::{PaperFigures, centroid_m};
 
 #[cfg(test)]
 mod tests {

@@ -31,8 +31,8 @@ impl PaperFigures {
     }
 }
 
-/// Centroid of an image above zero (m).
-fn centroid_m(mesh: &ImageMesh, image: &[f32]) -> Option<Point> {
+/// Centroid of an image above zero (m); `None` if it is nowhere so.
+pub fn centroid_m(mesh: &ImageMesh, image: &[f32]) -> Option<Point> {
     let (mut sum, mut moment) = (0.0, [0.0; 2]);
     for ((value, area_m2), [x, y]) in image.iter().zip(&mesh.node_areas_m2).zip(&mesh.nodes_m) {
         let weight = f64::from(value.max(0.0)) * area_m2;

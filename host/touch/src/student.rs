@@ -4,7 +4,7 @@
 ///
 /// Cornish and Fisher's expansion (Abramowitz and Stegun, 26.7.5), within 0.5 % of the truth from 3 degrees of freedom on, and 1.5 % at 2. Below 1 that of
 /// 1 is given.
-pub(super) fn quantile(z: f64, freedom: f64) -> f64 {
+pub fn quantile(z: f64, freedom: f64) -> f64 {
     let v = freedom.max(1.0);
     let terms = [
         (z.powi(3) + z) / 4.0,

@@ -1,0 +1,29 @@
+//! Which detector: what a sensor of some foam, thickness and electrodes can tell, and what of that its solver makes.
+//!
+//! The paper's studies ([`materials`] and others) put its four metrics, which are those of a thin shell and Tikhonov's image, beside the
+//! [limit](Limit) of the sensor itself. Nothing here knows of commands or files.
+
+pub mod claim;
+pub mod curve;
+mod error;
+mod limit;
+pub mod materials;
+mod metrics;
+mod paper;
+mod press;
+mod progress;
+mod rank;
+mod reached;
+mod report;
+mod text;
+
+pub use self::claim::{Claim, Verdict};
+pub use self::error::DesignError;
+pub use self::limit::{Limit, range, two_points_m};
+pub use self::metrics::Metrics;
+pub use self::paper::{Imaged, PaperSolver};
+pub use self::press::Press;
+pub use self::progress::{Progress, Step};
+pub use self::rank::spearman;
+pub use self::reached::Reached;
+pub use self::report::{Report, page};

@@ -1,0 +1,212 @@
+//! What a detector itself can tell, whatever the solver: how well any method can do with its readings.
+//!
+//! Standard errors are Cramer and Rao's bounds of one frame under the converter's noise, [`cramer_rao`]; the range of strengths runs from
+//! where noise hides a contact to where the contact is at nine tenths of the drive, eq. (4). The radius of a contact is known to a factor of two only.
+
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
+use tactomo_physics::geometry::Point;
+use tactomo_physics::scene::Contact;
+use tactomo_study::cramer_rao;
+
+use super::press::{MIDDLE, Press, nine_places};
+
+/// A contact is seen if its conductance is so many standard errors from nothing.
+const SEEN_DEVIATIONS: f64 = 3.0;
+/// Two contacts are told apart if they are so many standard errors of each place apart: then the places' intervals of two standard
+/// errors on either side do not meet.
+const APART_DEVIATIONS: f64 = 4.0;
+/// Radius of two contacts that are pressed side by side, as a share of their distance, at most.
+const RADIUS_OF_DISTANCE: f64 = 0.4;
+/// Distances that are tried for two contacts, as shares of the detector's shorter side.
+const DISTANCES: [f64; 2] = [1e-3, 0.5];
+/// Halvings of a range in its logarithm: of five decades to 0.2 %.
+const DISTANCE_HALVINGS: usize = 8;
+const STRENGTH_HALVINGS: usize = 15;
+/// A contact saturates where it is at this share of the drive, eq. (8).
+const SATURATED: f64 = 0.9;
+/// Strengths below the smallest that is asked about are looked at, as far as this share of it.
+const LIGHTEST: f64 = 1e-9;
+/// And above the largest, up to so many times it.
+const HARDEST: f64 = 1e3;
+
+/// Limits of a detector for presses of one strength at the paper's nine places, and the strengths between which it can tell anything.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Limit {
+    /// Largest reading over the standard deviation of one, in the middle (dB).
+    pub signal_to_noise_db: f64,
+    /// Root mean square over the places of the standard error of a place (m); `None` if the readings do not tell it at one of them.
+    pub place_m: Option<f64>,
+    /// The largest of them (m).
+    pub worst_place_m: Option<f64>,
+    /// Standard error of the conductance, as a share of it, in the middle.
+    pub conductance: Option<f64>,
+    /// Least distance of two such contacts about the middle that can be told apart (m); `None` if they cannot at half the shorter side.
+    pub two_points_m: Option<f64>,
+    /// Strengths from which on a contact in the middle is seen, and at which it saturates: unit of the press. `None` where
+    /// that is beyond all that was looked at.
+    pub range: [Option<f64>; 2],
+}
+
+impl Limit {
+    /// Of a model, for presses of a strength, out of a range of strengths that matter.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if a contact is off the detector.
+    pub fn of(
+        model: &dyn ForwardModel,
+        press: &Press,
+        strength: f64,
+        strengths: [f64; 2],
+    ) -> Result<Self, ForwardError> {
+        let detector = model.detector();
+        let noise_v = detector.adc.deviation_v();
+        let bounds = nine_places(detector).map(|place| {
+            let bound = cramer_rao(model, &[press.at(place, strength)], noise_v)?;
+            Ok(bound.and_then(|bounds| bounds.first().copied()).filter(|bound| bound.position_m.is_finite()))
+        });
+        let bounds = bounds.into_iter().collect::<Result<Option<Vec<_>>, ForwardError>>()?;
+        let largest_v =
+            readings_v(&model.impedance_ohm(&[press.at(MIDDLE, strength)])?, detector).largest_v();
+        let mean_square = |bounds: &Vec<tactomo_study::Bound>| {
+            bounds.iter().map(|bound| bound.position_any_radius_m.powi(2)).sum::<f64>() / bounds.len() as f64
+        };
+        Ok(Self {
+            signal_to_noise_db: 20.0 * (largest_v / noise_v).log10(),
+            place_m: bounds.as_ref().map(|bounds| mean_square(bounds).sqrt()),
+            worst_place_m: bounds.as_ref().map(|bounds| bounds.iter().map(|bound| bound.position_any_radius_m).fold(0.0, f64::max)),
+            conductance: bounds.as_ref().map(|bounds| bounds[4].conductance),
+            two_points_m: two_points_m(model, press, strength)?,
+            range: range(model, press, strengths)?,
+        })
+    }
+}
+
+/// Least distance of two contacts of a strength, side by side about the middle, that can be told apart (m).
+///
+/// # Errors
+/// [`ForwardError`] if the contacts are off the detector.
+pub fn two_points_m(model: &dyn ForwardModel, press: &Press, strength: f64) -> Result<Option<f64>, ForwardError> {
+    let detector = model.detector();
+    let noise_v = detector.adc.deviation_v();
+    let [width_m, height_m] = detector.outline.size_m();
+    let side_m = width_m.min(height_m);
+    // Along the longer side, where there is room.
+    let along: Point = if width_m >= height_m { [1.0, 0.0] } else { [0.0, 1.0] };
+    let apart = |distance_m: f64| {
+        let pair = [-0.5, 0.5].map(|share| {
+            let contact = press.at(along.map(|part| part * share * distance_m), strength);
+            Contact { radius_m: contact.radius_m.min(RADIUS_OF_DISTANCE * distance_m), ..contact }
+        });
+        let bounds = cramer_rao(model, &pair, noise_v)?.unwrap_or_default();
+        // Both coordinates of a place; along the line between them it is at most that.
+        let error_m = bounds.iter().map(|bound| bound.position_any_radius_m).fold(f64::NAN, f64::max);
+        Ok::<_, ForwardError>(distance_m >= APART_DEVIATIONS * error_m)
+    };
+    let [low_m, high_m] = DISTANCES.map(|share| share * side_m);
+    least([low_m, high_m], DISTANCE_HALVINGS, apart)
+}
+
+/// Strengths from which on a contact in the middle is seen, and at which it saturates: [`Limit::range`].
+///
+/// # Errors
+/// [`ForwardError`] if the model cannot have the contact.
+pub fn range(
+    model: &dyn ForwardModel,
+    press: &Press,
+    strengths: [f64; 2],
+) -> Result<[Option<f64>; 2], ForwardError> {
+    let hardest = hardest(model, press, strengths)?;
+    // Of a contact that is saturated, the conductance is not told.
+    let [low, high] = strengths;
+    Ok([lightest(model, press, [low, hardest.map_or(high, |hardest| hardest.min(high))])?, hardest])
+}
+
+/// The strength from which on a contact in the middle is seen.
+fn lightest(model: &dyn ForwardModel, press: &Press, [low, high]: [f64; 2]) -> Result<Option<f64>, ForwardError> {
+    let noise_v = model.detector().adc.deviation_v();
+    let seen = |strength: f64| {
+        let bound = cramer_rao(model, &[press.at(MIDDLE, strength)], noise_v)?;
+        Ok(bound.is_some_and(|bounds| bounds[0].conductance * SEEN_DEVIATIONS <= 1.0))
+    };
+    least([LIGHTEST * low, high], STRENGTH_HALVINGS, seen)
+}
+
+/// The strength at which a contact in the middle saturates.
+fn hardest(model: &dyn ForwardModel, press: &Press, [low, high]: [f64; 2]) -> Result<Option<f64>, ForwardError> {
+    let saturated = |strength: f64| Ok(of_drive(model, &press.at(MIDDLE, strength))? >= SATURATED);
+    least([low * LIGHTEST, high * HARDEST], STRENGTH_HALVINGS, saturated)
+}
+
+/// Potential of a contact that is alone as a share of the drive, mean over the grounds: eq. (4). All current passes the contact.
+pub(crate) fn of_drive(model: &dyn ForwardModel, contact: &Contact) -> Result<f64, ForwardError> {
+    let Detector { on_resistance_ohm, electrodes, .. } = model.detector();
+    let impedance_ohm = model.impedance_ohm(std::slice::from_ref(contact))?;
+    let lost = |g: usize| 1.0 / (contact.conductance_s * (impedance_ohm[(g, g)] + on_resistance_ohm));
+    Ok(1.0 - (0..electrodes.len()).map(lost).sum::<f64>() / electrodes.len() as f64)
+}
+
+/// Least value of a range, by halves of its logarithm, from which on something holds; `None` if it does not at the end.
+fn least(
+    [mut low, mut high]: [f64; 2],
+    halvings: usize,
+    mut holds: impl FnMut(f64) -> Result<bool, ForwardError>,
+) -> Result<Option<f64>, ForwardError> {
+    if !holds(high)? {
+        return Ok(None);
+    }
+    for _ in 0..halvings {
+        let middle = (low * high).sqrt();
+        if holds(middle)? { high = middle } else { low = middle }
+    }
+    Ok(Some(high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_physics::detector::{Adc, Foam};
+    use tactomo_physics::forward::Slab;
+
+    fn limit(detector: &Detector, strength: f64) -> Limit {
+        Limit::of(&Slab::new(detector).unwrap(), &Press::PAPER, strength, [1e-3, 10.0]).unwrap()
+    }
+
+    #[test]
+    fn four_times_less_noise_is_nearly_four_times_better() {
+        let detector = Detector::default();
+        // So noisy that rounding is nothing beside it.
+        let noisy = |noise_lsb: f64| Detector { adc: Adc { noise_lsb, ..detector.adc }, ..detector.clone() };
+        let [loud, quiet] = [12.0, 3.0].map(|noise_lsb| limit(&noisy(noise_lsb), 0.1));
+        let ratio = loud.place_m.unwrap() / quiet.place_m.unwrap();
+        // A little less than four times, for the radius is known alike to both.
+        assert!((2.5..4.05).contains(&ratio), "{ratio}");
+        assert!((quiet.signal_to_noise_db - loud.signal_to_noise_db - 12.04).abs() < 0.1);
+        let seen = loud.range[0].unwrap() / quiet.range[0].unwrap();
+        assert!((seen - 4.0).abs() < 0.1, "{seen}");
+        assert!(quiet.two_points_m < loud.two_points_m);
+        assert_eq!(quiet.range[1], loud.range[1]);
+    }
+
+    #[test]
+    fn at_the_ends_of_the_range_a_contact_is_just_seen_and_nearly_at_the_drive() {
+        let (detector, press) = (Detector::default(), Press::PAPER);
+        let slab = Slab::new(&detector).unwrap();
+        let [seen, saturated] = limit(&detector, 1.0).range.map(Option::unwrap);
+        let bound = cramer_rao(&slab, &[press.at(MIDDLE, seen)], detector.adc.deviation_v()).unwrap().unwrap()[0];
+        assert!((3.0 * bound.conductance - 1.0).abs() < 0.01, "{bound:?}");
+        assert!((of_drive(&slab, &press.at(MIDDLE, saturated)).unwrap() - 0.9).abs() < 0.001);
+        // The indenter on sample A saturates where `tactomo_physics::hertz` says that it does.
+        let ball = Press::indenter(&detector, Foam::of('A').unwrap().into()).unwrap();
+        let newtons = Limit::of(&slab, &ball, 1.0, [0.01, 5.0]).unwrap().range[1].unwrap();
+        assert!((newtons - 2.1).abs() < 0.05, "{newtons}");
+    }
+
+    #[test]
+    fn what_no_reading_tells_is_left_open() {
+        // A millionth of the voltage: nothing is seen.
+        let detector = Detector { drive_v: 2e-6, ..Detector::default() };
+        let found = limit(&detector, 1.0);
+        assert_eq!((found.range[0], found.two_points_m), (None, None));
+    }
+}

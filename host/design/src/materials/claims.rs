@@ -1,0 +1,266 @@
+//! What the paper concludes from its maps, on ours.
+
+use super::super::claim::{Trend, Verdict};
+use super::super::rank::spearman;
+use super::{Claim, Condition, short};
+
+/// A conductivity is "about" another within this factor: half a decade, the step of the paper's map.
+const ABOUT: f64 = 3.2;
+/// Conductivity that the paper finds suited to touch of several newtons, and where it sees the best accuracy at the bottom (S/m).
+const SUITED_S_PER_M: f64 = 0.2;
+const PEAK_S_PER_M: f64 = 1.0;
+/// A condition is among the best in a figure if it is in the best tenth.
+const BEST_SHARE: f64 = 0.1;
+/// Touch of several newtons (N): a light press, and a firm one below what the paper measured as the maximum of its sample A, 2.8 N.
+const TOUCH_N: [f64; 2] = [0.05, 2.5];
+
+/// A figure of a condition: larger is better.
+type Figure = fn(&Condition) -> Option<f64>;
+
+/// With the paper's solver, and the sensor's own of the same meaning.
+const SENSITIVITY: [Figure; 2] = [|c| c.exact.sensitivity(), |c| Some(c.limit.signal_to_noise_db)];
+const MAXIMUM: [Figure; 2] = [|c| c.exact.maximum(), |c| c.limit.range[1]];
+const RESOLUTION: [Figure; 2] = [|c| c.exact.spatial_resolution, |c| c.limit.two_points_m.map(|m| -m)];
+const ACCURACY: [Figure; 2] = [|c| c.exact.position_accuracy, |c| c.limit.place_m.map(|m| -m)];
+
+/// All claims of section III.B.
+pub(super) fn of(conditions: &[Condition], conductivities_s_per_m: &[f64]) -> Vec<Claim> {
+    let map = Map { conditions, conductivities_s_per_m };
+    vec![
+        map.suited(),
+        Claim::of_trends(
+            "sensitivity rises with the conductivity of the top",
+            map.trend("SENS with top", SENSITIVITY[0], |c| c.top_s_per_m, 1.0),
+            map.trend("signal to noise with top", SENSITIVITY[1], |c| c.top_s_per_m, 1.0),
+        ),
+        map.most_sensitive(),
+        Claim::of_trends(
+            "a low conductivity of the bottom sharpens the image",
+            map.trend("SR with bottom, reversed", RESOLUTION[0], |c| c.bottom_s_per_m, -1.0),
+            map.trend("two points told apart with bottom, reversed", RESOLUTION[1], |c| c.bottom_s_per_m, -1.0),
+        ),
+        map.high_and_even(),
+        map.bottom_above_top(),
+        map.peak(),
+        map.best_in_all(),
+    ]
+}
+
+struct Map<'a> {
+    conditions: &'a [Condition],
+    conductivities_s_per_m: &'a [f64],
+}
+
+impl<'a> Map<'a> {
+    fn trend(&self, of: &'static str, figure: Figure, by: fn(&Condition) -> f64, sign: f64) -> Trend {
+        let pairs: Vec<_> = self.conditions.iter().filter_map(|c| Some([sign * by(c), figure(c)?])).collect();
+        Trend { of, correlation: spearman(&pairs) }
+    }
+
+    /// Conditions of the same conductivity at top and bottom.
+    fn uniform(&self) -> impl Iterator<Item = &'a Condition> {
+        self.conditions.iter().filter(|c| c.bottom_s_per_m == c.top_s_per_m)
+    }
+
+    /// About 0.2 S/m for several newtons: with the solver, the uniform material whose least normalised metric is the largest; of the sensor, those that
+    /// see a light press and do not saturate under a firm one.
+    fn suited(&self) -> Claim {
+        let normalised = [(SENSITIVITY[0], true), (MAXIMUM[0], true), (RESOLUTION[0], false), (ACCURACY[0], false)]
+            .map(|(figure, is_log)| self.normalised(figure, is_log));
+        let balance = |c: &Condition| {
+            normalised.iter().map(|share| share(c)).try_fold(f64::INFINITY, |least, share| Some(least.min(share?)))
+        };
+        let balanced = best(self.uniform(), balance);
+        let covers = |c: &&Condition| {
+            matches!(c.force_range_n, [Some(low), high] if low <= TOUCH_N[0] && high.is_none_or(|high| high >= TOUCH_N[1]))
+        };
+        let suited: Vec<f64> = self.uniform().filter(covers).map(|c| c.bottom_s_per_m).collect();
+        let is_about = |found: f64| (1.0 / ABOUT..=ABOUT).contains(&(found / SUITED_S_PER_M));
+        let is_only = suited.iter().any(|found| is_about(*found)) && suited.iter().all(|found| is_about(*found));
+        Claim {
+            claim: "about 0.2 S/m suits touch of several newtons",
+            verdict: Verdict::of(balanced.map(|c| is_about(c.bottom_s_per_m)), self.uniform().next().map(|_| is_only)),
+            solver: said(balanced, |c| {
+                format!("the least of the four normalised metrics is best at {} S/m, uniform", short(c.bottom_s_per_m))
+            }),
+            sensor: match (suited.first(), suited.last()) {
+                (Some(low), Some(high)) => format!(
+                    "{} to {} N is within the range of every uniform foam from {} to {} S/m that is as soft as sample A",
+                    TOUCH_N[0],
+                    TOUCH_N[1],
+                    short(*low),
+                    short(*high)
+                ),
+                _ => format!("no uniform foam has {} to {} N within its range", TOUCH_N[0], TOUCH_N[1]),
+            },
+        }
+    }
+
+    /// Highest sensitivity for 0.5 S/m above 0.001 S/m: where it is highest, by both readings of eq. (7) and of the sensor.
+    fn most_sensitive(&self) -> Claim {
+        let at_half = best(self.conditions.iter(), |c| c.exact.sensitivity_at_half_maximum());
+        let [solver, sensor] = SENSITIVITY.map(|figure| best(self.conditions.iter(), figure));
+        let is_there = |c: &Condition| c.top_s_per_m > 100.0 * c.bottom_s_per_m;
+        let place = |c: &Condition| c.title();
+        Claim {
+            claim: "the most sensitive is a conductive top (0.5 S/m) on a poor bottom (0.001 S/m)",
+            verdict: Verdict::of(solver.or(at_half).map(|c| is_there(c) || at_half.is_some_and(is_there)), sensor.map(is_there)),
+            solver: format!(
+                "SENS is highest at {}; at half of FMAX instead of half of what is applied, at {}",
+                said(solver, place),
+                said(at_half, place)
+            ),
+            sensor: format!("signal to noise is highest at {}", said(sensor, place)),
+        }
+    }
+
+    /// High and even: the maximum rises along the diagonal, and no gradient of the same mean has more.
+    fn high_and_even(&self) -> Claim {
+        let text = |[rises, even]: [Option<f64>; 2]| match (rises, even) {
+            (Some(rises), Some(even)) => format!(
+                "rank correlation with uniform conductivity {rises:+.2}; even has more than a gradient of the same mean in {:.0} % of pairs",
+                100.0 * even
+            ),
+            _ => NOT_COMPUTED.to_owned(),
+        };
+        let found = MAXIMUM.map(|figure| {
+            let pairs: Vec<_> = self.uniform().filter_map(|c| Some([c.bottom_s_per_m, figure(c)?])).collect();
+            [spearman(&pairs), self.share_of_pairs(figure, |c, other| is_even_of(c, other))]
+        });
+        let holds = found.map(|[rises, even]| Some(rises? > 0.5 && even? > 0.5));
+        Claim {
+            claim: "the maximum force is largest for high and even conductivity",
+            verdict: Verdict::of(holds[0], holds[1]),
+            solver: text(found[0]),
+            sensor: text(found[1]),
+        }
+    }
+
+    fn bottom_above_top(&self) -> Claim {
+        let shares = ACCURACY.map(|figure| self.share_of_pairs(figure, is_mirrored_with_better_bottom));
+        let text = |what: &str, share: Option<f64>| match share {
+            Some(share) => format!("{what} is better so than the other way round in {:.0} % of pairs", 100.0 * share),
+            None => NOT_COMPUTED.to_owned(),
+        };
+        let holds = shares.map(|share| share.map(|share| share > 0.5));
+        Claim {
+            claim: "accuracy wants the bottom more conductive than the top",
+            verdict: Verdict::of(holds[0], holds[1]),
+            solver: text("PA", shares[0]),
+            sensor: text("the standard error of places", shares[1]),
+        }
+    }
+
+    /// The conductivity of the bottom with the best accuracy, mean over tops.
+    fn peak(&self) -> Claim {
+        let [solver, sensor] = ACCURACY.map(|figure| {
+            let mean = |bottom: &f64| {
+                let row = self.conditions.iter().filter(|c| c.bottom_s_per_m == *bottom);
+                // Errors of places spread over decades: their logarithms are averaged.
+                let values: Vec<f64> =
+                    row.filter_map(figure).map(|value| if value < 0.0 { -(-value).ln() } else { value }).collect();
+                super::super::metrics::mean(&values).map(|mean| (*bottom, mean))
+            };
+            let means = self.conductivities_s_per_m.iter().filter_map(mean);
+            means.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(bottom, _)| bottom)
+        });
+        let is_there = |found: Option<f64>| found.map(|found| (1.0 / ABOUT..=ABOUT).contains(&(found / PEAK_S_PER_M)));
+        let text = |what: &str, found: Option<f64>| {
+            found.map_or(NOT_COMPUTED.to_owned(), |found| format!("{what} is best at {} S/m", short(found)))
+        };
+        Claim {
+            claim: "accuracy peaks near 1 S/m at the bottom",
+            verdict: Verdict::of(is_there(solver), is_there(sensor)),
+            solver: text("mean PA", solver),
+            sensor: text("the mean standard error of places", sensor),
+        }
+    }
+
+    /// No condition is among the best tenth of all four.
+    fn best_in_all(&self) -> Claim {
+        let found = [0, 1].map(|side| {
+            let figures = [SENSITIVITY, MAXIMUM, RESOLUTION, ACCURACY].map(|figures| figures[side]);
+            let levels: Option<Vec<f64>> = figures.iter().map(|figure| self.level(*figure)).collect();
+            let levels = levels?;
+            let among = |c: &&Condition| {
+                figures.iter().zip(&levels).all(|(figure, level)| figure(c).is_some_and(|value| value >= *level))
+            };
+            Some(self.conditions.iter().filter(among).collect::<Vec<_>>())
+        });
+        let text = |best: &Option<Vec<&Condition>>| match best.as_deref() {
+            None => NOT_COMPUTED.to_owned(),
+            Some([]) => "no condition is in the best tenth of all four figures".to_owned(),
+            Some([first, ..]) => format!("{} is in the best tenth of all four figures", first.title()),
+        };
+        Claim {
+            claim: "no condition is best in all four",
+            verdict: Verdict::of(
+                found[0].as_ref().map(Vec::is_empty),
+                found[1].as_ref().map(Vec::is_empty),
+            ),
+            solver: text(&found[0]),
+            sensor: text(&found[1]),
+        }
+    }
+
+    /// Of pairs of conditions that belong together, the share of those of which the first has more of a figure.
+    fn share_of_pairs(&self, figure: Figure, together: fn(&Condition, &Condition) -> bool) -> Option<f64> {
+        let mut counts = [0u32; 2];
+        for first in self.conditions {
+            for second in self.conditions.iter().filter(|second| together(first, second)) {
+                if let (Some(a), Some(b)) = (figure(first), figure(second)) {
+                    counts[usize::from(a > b)] += 1;
+                }
+            }
+        }
+        let all = counts[0] + counts[1];
+        (all > 0).then(|| f64::from(counts[1]) / f64::from(all))
+    }
+
+    /// From 0 for the worst condition to 1 for the best, even in the logarithm for what spans decades.
+    fn normalised(&self, figure: Figure, is_log: bool) -> impl Fn(&Condition) -> Option<f64> {
+        let scaled = move |value: f64| if is_log { value.ln() } else { value };
+        let [low, high] = extent(self.conditions.iter().filter_map(figure).map(scaled));
+        move |c| figure(c).filter(|_| high > low).map(|value| (scaled(value) - low) / (high - low))
+    }
+
+    /// The value from which on a condition is among the best tenth.
+    fn level(&self, figure: Figure) -> Option<f64> {
+        let mut values: Vec<f64> = self.conditions.iter().filter_map(figure).collect();
+        values.sort_by(|a, b| b.total_cmp(a));
+        values.get(((self.conditions.len() as f64 * BEST_SHARE).ceil() as usize).saturating_sub(1)).copied()
+    }
+}
+
+const NOT_COMPUTED: &str = "not computed";
+
+/// Smallest and largest.
+pub(super) fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+}
+
+fn best<'a>(
+    conditions: impl Iterator<Item = &'a Condition>,
+    figure: impl Fn(&Condition) -> Option<f64>,
+) -> Option<&'a Condition> {
+    let rated = conditions.filter_map(|c| Some((figure(c)?, c)));
+    rated.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, c)| c)
+}
+
+fn said(found: Option<&Condition>, text: impl Fn(&Condition) -> String) -> String {
+    found.map_or(NOT_COMPUTED.to_owned(), text)
+}
+
+/// Whether the first is even and the second a gradient with the same geometric mean.
+fn is_even_of(first: &Condition, second: &Condition) -> bool {
+    let mean = |c: &Condition| c.bottom_s_per_m.ln() + c.top_s_per_m.ln();
+    first.bottom_s_per_m == first.top_s_per_m
+        && second.bottom_s_per_m != second.top_s_per_m
+        && (mean(first) - mean(second)).abs() < 1e-6
+}
+
+/// Whether the second is the first upside down, which has the better conductor at the bottom.
+fn is_mirrored_with_better_bottom(first: &Condition, second: &Condition) -> bool {
+    first.bottom_s_per_m > first.top_s_per_m
+        && (first.bottom_s_per_m, first.top_s_per_m) == (second.top_s_per_m, second.bottom_s_per_m)
+}
