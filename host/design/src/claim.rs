@@ -76,11 +76,11 @@ pub(crate) struct Trend {
 }
 
 impl Trend {
-    fn confirms(&self) -> Option<bool> {
+    pub fn confirms(&self) -> Option<bool> {
         self.correlation.map(|correlation| correlation > TREND)
     }
 
-    fn text(&self) -> String {
+    pub fn text(&self) -> String {
         self.correlation.map_or_else(
             || format!("{}: too few conditions", self.of),
             |correlation| format!("{}: rank correlation {correlation:+.2}", self.of),

@@ -16,6 +16,7 @@ mod rank;
 mod reached;
 mod report;
 mod text;
+pub mod thickness;
 
 pub use self::claim::{Claim, Verdict};
 pub use self::error::DesignError;

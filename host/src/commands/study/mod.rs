@@ -5,6 +5,7 @@ mod built;
 mod contacts;
 mod design;
 mod materials;
+mod thickness;
 
 pub use self::args::StudyArgs;
 
@@ -25,6 +26,7 @@ enum Study {
     Built(built::Args),
     Contacts(contacts::Args),
     Materials(materials::Args),
+    Thickness(thickness::Args),
 }
 
 /// Runs the study that was asked for.
@@ -33,5 +35,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Study::Built(args) => built::run(args),
         Study::Contacts(args) => contacts::run(args),
         Study::Materials(args) => materials::run(args),
+        Study::Thickness(args) => thickness::run(args),
     }
 }
