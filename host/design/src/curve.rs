@@ -5,7 +5,8 @@
 //! sense, by Levenberg and Marquardt's method.
 //!
 //! What the data leave open is not given as a number. Where the curve is still a power law at the largest force, any saturation above some
-//! value fits: it is open unless the power law (`H` to infinity) fits worse by more than [`OPEN_DEVIATIONS`].
+//! value fits: it is open unless the power law (`H` to infinity) fits worse by more than [`OPEN_DEVIATIONS`]. Forces far beyond those that were applied
+//! are open as well.
 
 use nalgebra::{Matrix3, Vector3};
 use tactomo_touch::student::quantile as student_quantile;
@@ -18,6 +19,9 @@ const BAND_DEVIATIONS: f64 = 1.959_964;
 const OPEN_DEVIATIONS: f64 = 3.3;
 /// A band wider than this factor tells nothing.
 const OPEN_FACTOR: f64 = 100.0;
+/// A force beyond so many times the largest that was applied is an extrapolation, not a figure: the paper's table II has such ones, 34 975 N from
+/// presses of up to 5 N.
+const OPEN_TIMES: f64 = 4.0;
 /// Steps of the fit at most; it takes 5 to 20.
 const STEPS: usize = 100;
 /// Exponents and shares of the saturation at the largest output that fits start from.
@@ -186,18 +190,22 @@ fn figures(points: &[[f64; 2]], logs: Vector3<f64>, squares: f64, largest_force:
     let at_half = 1.0 / (1.0 + (-(nine - 2f64.ln()) * exponent).exp());
     let half_changes = Vector3::new(1.0, -1.0, 1.0 - (1.0 - 2.0 * at_half) * exponent * 2f64.ln() + nine);
     let saturates = bends(points, squares, variance);
+    let within = |figure: Figure| match figure {
+        Figure::Determined { value, .. } if value > OPEN_TIMES * largest_force => Figure::Above(largest_force),
+        figure => figure,
+    };
     let if_it_saturates = |figure: Figure, above: f64| if saturates { figure } else { Figure::Above(above) };
     Fit {
         curve,
         saturation: if_it_saturates(of(logs[0], Vector3::x()), curve.output(largest_force)),
-        half_force: if_it_saturates(of(logs[1], Vector3::y()), largest_force),
+        half_force: if_it_saturates(within(of(logs[1], Vector3::y())), largest_force),
         exponent: of(logs[2], Vector3::z()),
         sensitivity: of(curve.slope(half_force_n).ln(), slope_changes),
         sensitivity_at_half_maximum: if_it_saturates(
             of(curve.slope(curve.maximum_force() / 2.0).ln(), half_changes),
             0.0,
         ),
-        maximum_force: if_it_saturates(of(logs[1] + nine, Vector3::new(0.0, 1.0, -nine)), largest_force),
+        maximum_force: if_it_saturates(within(of(logs[1] + nine, Vector3::new(0.0, 1.0, -nine))), largest_force),
         residual: (squares / points.len() as f64).sqrt(),
     }
 }
@@ -326,7 +334,7 @@ mod tests {
             let share = f64::from(held) / f64::from(held + missed);
             println!("{name}: {held} of {} within", held + missed);
             // Four standard errors of a share of 1000 are 2.8 points.
-            assert!(held + missed > 900 && (share - 0.95).abs() < 0.028, "{name}: {share} of {}", held + missed);
+            assert!(held + missed > 850 && (share - 0.95).abs() < 0.028, "{name}: {share} of {}", held + missed);
         }
     }
 

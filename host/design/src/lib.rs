@@ -5,7 +5,9 @@
 
 pub mod claim;
 pub mod curve;
+pub mod electrodes;
 mod error;
+mod layout;
 mod limit;
 pub mod materials;
 mod metrics;
@@ -15,11 +17,13 @@ mod progress;
 mod rank;
 mod reached;
 mod report;
+pub mod samples;
 mod text;
 pub mod thickness;
 
 pub use self::claim::{Claim, Verdict};
 pub use self::error::DesignError;
+pub use self::layout::Layout;
 pub use self::limit::{Limit, range, two_points_m};
 pub use self::metrics::Metrics;
 pub use self::paper::{Imaged, PaperSolver};

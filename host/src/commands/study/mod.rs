@@ -4,7 +4,9 @@ mod args;
 mod built;
 mod contacts;
 mod design;
+mod electrodes;
 mod materials;
+mod samples;
 mod thickness;
 
 pub use self::args::StudyArgs;
@@ -27,6 +29,8 @@ enum Study {
     Contacts(contacts::Args),
     Materials(materials::Args),
     Thickness(thickness::Args),
+    Samples(samples::Args),
+    Electrodes(electrodes::Args),
 }
 
 /// Runs the study that was asked for.
@@ -36,5 +40,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Study::Contacts(args) => contacts::run(args),
         Study::Materials(args) => materials::run(args),
         Study::Thickness(args) => thickness::run(args),
+        Study::Samples(args) => samples::run(args),
+        Study::Electrodes(args) => electrodes::run(args),
     }
 }

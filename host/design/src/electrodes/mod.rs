@@ -1,0 +1,251 @@
+//! Which electrodes: their number, pattern, diameter and pitch, which the paper does not study.
+//!
+//! On its sample A, 60 x 60 x 5 mm, with its contact of 4 mm and 1 S/m. A frame has a conversion for each ground and electrode, so that more
+//! electrodes take longer: places are compared for one frame, and for the time of a frame of 16.
+
+mod page;
+mod table;
+
+use std::time::Instant;
+
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::{ForwardError, ForwardModel, Slab};
+use tactomo_physics::geometry::Point;
+use tactomo_study::cramer_rao;
+
+use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, nine_places};
+use super::reached::by_auto;
+use super::{Claim, DesignError, Layout, Limit, Press, Progress, Reached};
+
+/// Places over the whole surface. Right above an electrode a place is told worse, so that a few places in rows would meet or miss just those.
+const PLACES: usize = 100;
+/// Steps from one place to the next as shares of the sides, which fill a square evenly: powers of the plastic number (Roberts, "The unreasonable
+/// effectiveness of quasirandom sequences", 2018).
+const STEPS: [f64; 2] = [0.754_877_666, 0.569_840_291];
+/// Share of each side that is left free at each edge.
+const MARGIN: f64 = 0.05;
+/// Diameter of the paper's electrodes (m).
+const DIAMETER_M: f64 = 0.004;
+/// Conversions of a frame that others are compared with: 16 grounds, 16 electrodes.
+const USUAL_CONVERSIONS: f64 = 256.0;
+
+/// What to compute.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Of noise.
+    pub seed: u64,
+}
+
+/// Electrodes and what they give.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Row {
+    /// What is varied.
+    pub group: Group,
+    /// What the electrodes are.
+    pub name: String,
+    /// The pattern.
+    pub layout: Layout,
+    /// Diameter of an electrode (m).
+    pub diameter_m: f64,
+    /// Conversions of a frame.
+    pub conversions: usize,
+    /// What the sensor itself can tell.
+    pub limit: Limit,
+    /// Root mean square of the standard error of a place over the whole surface (m); `None` if somewhere it is not told.
+    pub place_everywhere_m: Option<f64>,
+    /// The same if as many frames are averaged as are read in the time of one of 16 electrodes (m).
+    pub place_in_same_time_m: Option<f64>,
+    /// What `auto` makes of contacts at the nine places.
+    pub reached: Reached,
+}
+
+/// What is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Group {
+    /// How many.
+    Number,
+    /// How 16 of them lie.
+    Pattern,
+    /// How wide they are.
+    Diameter,
+    /// How far apart.
+    Pitch,
+}
+
+/// All of the study.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Report {
+    /// Group by group.
+    pub rows: Vec<Row>,
+    /// Whether it was ended before all was done.
+    pub is_stopped: bool,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// What it took (s).
+    pub seconds: f64,
+}
+
+impl Group {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Number, Self::Pattern, Self::Diameter, Self::Pitch];
+
+    /// What is varied, for people.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Number => "Number",
+            Self::Pattern => "Pattern of 16",
+            Self::Diameter => "Diameter, 4 x 4",
+            Self::Pitch => "Pitch, 4 x 4",
+        }
+    }
+
+    fn layouts(self) -> Vec<(Layout, f64)> {
+        let usual = |layout| (layout, DIAMETER_M);
+        match self {
+            Self::Number => [[2, 2], [4, 2], [3, 3], [4, 3], [4, 4], [5, 4], [5, 5], [6, 5], [8, 4]]
+                .map(|[columns, rows]| usual(Layout::grid(columns, rows)))
+                .to_vec(),
+            Self::Pattern => {
+                [Layout::grid(4, 4), Layout::Staggered { columns: 4, rows: 4 }, Layout::grid(8, 2), Layout::Ring { count: 16 }]
+                    .map(usual)
+                    .to_vec()
+            }
+            Self::Diameter => [1e-3, 2e-3, 4e-3, 6e-3, 8e-3, 12e-3].map(|diameter_m| (Layout::grid(4, 4), diameter_m)).to_vec(),
+            Self::Pitch => [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]
+                .map(|spread| usual(Layout::Grid { columns: 4, rows: 4, spread }))
+                .to_vec(),
+        }
+    }
+}
+
+/// Runs the study.
+///
+/// # Errors
+/// [`DesignError`] if there is no model of a detector.
+pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
+    let start = Instant::now();
+    let tasks: Vec<_> = Group::ALL
+        .into_iter()
+        .flat_map(|group| group.layouts().into_iter().map(move |(layout, diameter_m)| (group, layout, diameter_m)))
+        .collect();
+    let computed = progress
+        .map("electrodes", &tasks, |(group, layout, diameter_m)| row(*group, *layout, *diameter_m, plan.seed));
+    Ok(Report {
+        is_stopped: computed.iter().any(Option::is_none),
+        rows: computed.into_iter().flatten().collect::<Result<_, _>>()?,
+        seed: plan.seed,
+        seconds: start.elapsed().as_secs_f64(),
+    })
+}
+
+fn row(group: Group, layout: Layout, diameter_m: f64, seed: u64) -> Result<Row, DesignError> {
+    let base = Detector::default().taken_as_exact();
+    let electrodes = layout.electrodes(base.outline.size_m(), diameter_m / 2.0);
+    let detector = Detector { electrodes, ..base };
+    let slab = Slab::new(&detector)?;
+    let conversions = layout.count().pow(2);
+    let place_everywhere_m = place_everywhere_m(&slab)?;
+    let contacts = nine_places(&detector).map(|place| Press::PAPER.at(place, COMPARED_S_PER_M));
+    let name = match group {
+        Group::Diameter => format!("{:.0} mm", diameter_m * 1e3),
+        Group::Pitch => match layout {
+            Layout::Grid { columns, spread, .. } => {
+                format!("{:.1} mm", spread * base_width_m(&detector) / columns as f64 * 1e3)
+            }
+            _ => layout.name(),
+        },
+        Group::Number => format!("{}: {}", layout.count(), layout.name()),
+        Group::Pattern => layout.name(),
+    };
+    Ok(Row {
+        group,
+        name,
+        layout,
+        diameter_m,
+        conversions,
+        limit: Limit::of(&slab, &Press::PAPER, COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M)?,
+        place_everywhere_m,
+        place_in_same_time_m: place_everywhere_m.map(|place_m| place_m * (conversions as f64 / USUAL_CONVERSIONS).sqrt()),
+        reached: by_auto(&detector, &contacts, seed)?,
+    })
+}
+
+fn base_width_m(detector: &Detector) -> f64 {
+    detector.outline.size_m()[0]
+}
+
+/// Root mean square over places across the whole surface of the standard error of a place (m).
+fn place_everywhere_m(model: &dyn ForwardModel) -> Result<Option<f64>, ForwardError> {
+    let detector = model.detector();
+    let [width_m, height_m] = detector.outline.size_m();
+    let share = |index: usize, axis: usize| {
+        (0.5 + STEPS[axis] * index as f64).fract() * (1.0 - 2.0 * MARGIN) + MARGIN - 0.5
+    };
+    let mut squares_m2 = Vec::new();
+    for index in 0..PLACES {
+        let place: Point = [share(index, 0) * width_m, share(index, 1) * height_m];
+        let bounds = cramer_rao(model, &[Press::PAPER.at(place, COMPARED_S_PER_M)], detector.adc.deviation_v())?;
+        let Some(bound) = bounds.and_then(|bounds| bounds.first().copied()) else { return Ok(None) };
+        squares_m2.push(bound.position_any_radius_m.powi(2));
+    }
+    Ok(super::metrics::mean(&squares_m2).map(f64::sqrt).filter(|place_m| place_m.is_finite()))
+}
+
+impl super::Report for Report {
+    fn name(&self) -> &'static str {
+        "electrodes"
+    }
+
+    fn title(&self) -> &'static str {
+        "Which electrodes"
+    }
+
+    fn lead_in(&self) -> &'static str {
+        "How many electrodes, in which pattern, how wide and how far apart: what the sensor itself can tell with them, on sample A of 60 x 60 x 5 mm. The paper does \
+         not study this."
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.is_stopped
+    }
+
+    fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    fn claims(&self) -> &[Claim] {
+        &[]
+    }
+
+    fn table(&self) -> String {
+        table::table(self)
+    }
+
+    fn csv(&self) -> String {
+        table::csv(self)
+    }
+
+    fn parts(&self) -> Vec<String> {
+        page::parts(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_electrodes_tell_more_and_all_layouts_are_detectors() {
+        let of = |layout| row(Group::Number, layout, DIAMETER_M, 1).unwrap();
+        let [few, many] = [Layout::grid(3, 3), Layout::grid(5, 5)].map(of);
+        assert!(many.place_everywhere_m.unwrap() < few.place_everywhere_m.unwrap());
+        assert_eq!((few.conversions, many.conversions), (81, 625));
+        for (layout, diameter_m) in Group::ALL.into_iter().flat_map(Group::layouts) {
+            let base = Detector::default();
+            let electrodes = layout.electrodes(base.outline.size_m(), diameter_m / 2.0);
+            let detector = Detector { electrodes, ..base };
+            assert!(detector.check().is_ok(), "{} {diameter_m}: {:?}", layout.name(), detector.check());
+        }
+    }
+}
