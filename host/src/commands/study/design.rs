@@ -52,6 +52,17 @@ pub fn one<R: Report + Serialize>(
     put_out(&args.output, page, &[&report], &report)
 }
 
+/// The same of several studies, on one page.
+pub fn several<R: Serialize>(
+    args: &Output,
+    run: impl FnOnce(Progress) -> Result<R, design::DesignError>,
+    reports: impl FnOnce(&R) -> Vec<&dyn Report>,
+) -> anyhow::Result<()> {
+    let page = NewFile::optional(args.out.as_ref(), args.overwrite)?;
+    let all = watched(run)?;
+    put_out(args, page, &reports(&all), &all)
+}
+
 /// Runs something that tells how far it is, until Ctrl-C.
 fn watched<R>(run: impl FnOnce(Progress) -> Result<R, design::DesignError>) -> anyhow::Result<R> {
     let stop = interrupt::flag()?;

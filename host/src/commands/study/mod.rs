@@ -1,5 +1,6 @@
 //! `tactomo study`: studies by name; and what these and others share.
 
+mod all;
 mod args;
 mod built;
 mod contacts;
@@ -31,6 +32,7 @@ enum Study {
     Thickness(thickness::Args),
     Samples(samples::Args),
     Electrodes(electrodes::Args),
+    All(all::Args),
 }
 
 /// Runs the study that was asked for.
@@ -42,5 +44,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Study::Thickness(args) => thickness::run(args),
         Study::Samples(args) => samples::run(args),
         Study::Electrodes(args) => electrodes::run(args),
+        Study::All(args) => all::run(args),
     }
 }
