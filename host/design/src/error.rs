@@ -16,4 +16,12 @@ pub enum DesignError {
     /// A foam is no elastic layer.
     #[error(transparent)]
     Skin(#[from] SkinError),
+    /// No detector can be built of what there is.
+    #[error(
+        "no detector of this size can be built with {electrodes} electrodes or fewer: electrodes touch or leave the outline; allow more electrodes, or another size"
+    )]
+    NothingFits {
+        /// Electrodes that are allowed.
+        electrodes: usize,
+    },
 }

@@ -18,13 +18,14 @@ mod rank;
 mod reached;
 mod report;
 pub mod samples;
+pub mod search;
 mod text;
 pub mod thickness;
 
 pub use self::claim::{Claim, Verdict};
 pub use self::error::DesignError;
 pub use self::layout::Layout;
-pub use self::limit::{Limit, range, two_points_m};
+pub use self::limit::{Limit, place_everywhere_m, range, two_points_m};
 pub use self::metrics::Metrics;
 pub use self::paper::{Imaged, PaperSolver};
 pub use self::press::Press;

@@ -20,6 +20,11 @@ const APART_DEVIATIONS: f64 = 4.0;
 const RADIUS_OF_DISTANCE: f64 = 0.4;
 /// Distances that are tried for two contacts, as shares of the detector's shorter side.
 const DISTANCES: [f64; 2] = [1e-3, 0.5];
+/// Steps from one place to the next as shares of the sides, which fill a square evenly: powers of the plastic number (Roberts, "The unreasonable
+/// effectiveness of quasirandom sequences", 2018). Right above an electrode a place is told worse, and places in rows would meet or miss just those.
+const STEPS: [f64; 2] = [0.754_877_666, 0.569_840_291];
+/// Share of each side that is left free at each edge.
+const MARGIN: f64 = 0.05;
 /// Halvings of a range in its logarithm: of five decades to 0.2 %.
 const DISTANCE_HALVINGS: usize = 8;
 const STRENGTH_HALVINGS: usize = 15;
@@ -66,29 +71,58 @@ impl Limit {
             Ok(bound.and_then(|bounds| bounds.first().copied()).filter(|bound| bound.position_m.is_finite()))
         });
         let bounds = bounds.into_iter().collect::<Result<Option<Vec<_>>, ForwardError>>()?;
-        let largest_v =
-            readings_v(&model.impedance_ohm(&[press.at(MIDDLE, strength)])?, detector).largest_v();
+        let largest_v = readings_v(&model.impedance_ohm(&[press.at(MIDDLE, strength)])?, detector).largest_v();
         let mean_square = |bounds: &Vec<tactomo_study::Bound>| {
             bounds.iter().map(|bound| bound.position_any_radius_m.powi(2)).sum::<f64>() / bounds.len() as f64
         };
         Ok(Self {
             signal_to_noise_db: 20.0 * (largest_v / noise_v).log10(),
             place_m: bounds.as_ref().map(|bounds| mean_square(bounds).sqrt()),
-            worst_place_m: bounds.as_ref().map(|bounds| bounds.iter().map(|bound| bound.position_any_radius_m).fold(0.0, f64::max)),
+            worst_place_m: bounds
+                .as_ref()
+                .map(|bounds| bounds.iter().map(|bound| bound.position_any_radius_m).fold(0.0, f64::max)),
             conductance: bounds.as_ref().map(|bounds| bounds[4].conductance),
-            two_points_m: two_points_m(model, press, strength)?,
-            range: range(model, press, strengths)?,
+            two_points_m: two_points_m(model, press, strength, noise_v)?,
+            range: range(model, press, strengths, noise_v)?,
         })
     }
 }
 
-/// Least distance of two contacts of a strength, side by side about the middle, that can be told apart (m).
+/// Root mean square over so many places all over the surface of the standard error of a place (m); `None` if it is not told at one of them.
+///
+/// # Errors
+/// [`ForwardError`] if the model cannot have the contact.
+pub fn place_everywhere_m(
+    model: &dyn ForwardModel,
+    press: &Press,
+    strength: f64,
+    noise_v: f64,
+    places: usize,
+) -> Result<Option<f64>, ForwardError> {
+    let sides_m = model.detector().outline.size_m();
+    let mut squares_m2 = Vec::with_capacity(places);
+    for index in 0..places {
+        let share = |axis: usize| (0.5 + STEPS[axis] * index as f64).fract() * (1.0 - 2.0 * MARGIN) + MARGIN - 0.5;
+        let place = [0, 1].map(|axis| share(axis) * sides_m[axis]);
+        let bounds = cramer_rao(model, &[press.at(place, strength)], noise_v)?;
+        let Some(bound) = bounds.and_then(|bounds| bounds.first().copied()) else { return Ok(None) };
+        squares_m2.push(bound.position_any_radius_m.powi(2));
+    }
+    Ok(super::metrics::mean(&squares_m2).map(f64::sqrt).filter(|place_m| place_m.is_finite()))
+}
+
+/// Least distance of two contacts of a strength, side by side about the middle, that can be told apart (m) where a reading has noise of such a standard
+/// deviation (V).
 ///
 /// # Errors
 /// [`ForwardError`] if the contacts are off the detector.
-pub fn two_points_m(model: &dyn ForwardModel, press: &Press, strength: f64) -> Result<Option<f64>, ForwardError> {
+pub fn two_points_m(
+    model: &dyn ForwardModel,
+    press: &Press,
+    strength: f64,
+    noise_v: f64,
+) -> Result<Option<f64>, ForwardError> {
     let detector = model.detector();
-    let noise_v = detector.adc.deviation_v();
     let [width_m, height_m] = detector.outline.size_m();
     let side_m = width_m.min(height_m);
     // Along the longer side, where there is room.
@@ -115,16 +149,21 @@ pub fn range(
     model: &dyn ForwardModel,
     press: &Press,
     strengths: [f64; 2],
+    noise_v: f64,
 ) -> Result<[Option<f64>; 2], ForwardError> {
     let hardest = hardest(model, press, strengths)?;
     // Of a contact that is saturated, the conductance is not told.
     let [low, high] = strengths;
-    Ok([lightest(model, press, [low, hardest.map_or(high, |hardest| hardest.min(high))])?, hardest])
+    Ok([lightest(model, press, [low, hardest.map_or(high, |hardest| hardest.min(high))], noise_v)?, hardest])
 }
 
 /// The strength from which on a contact in the middle is seen.
-fn lightest(model: &dyn ForwardModel, press: &Press, [low, high]: [f64; 2]) -> Result<Option<f64>, ForwardError> {
-    let noise_v = model.detector().adc.deviation_v();
+fn lightest(
+    model: &dyn ForwardModel,
+    press: &Press,
+    [low, high]: [f64; 2],
+    noise_v: f64,
+) -> Result<Option<f64>, ForwardError> {
     let seen = |strength: f64| {
         let bound = cramer_rao(model, &[press.at(MIDDLE, strength)], noise_v)?;
         Ok(bound.is_some_and(|bounds| bounds[0].conductance * SEEN_DEVIATIONS <= 1.0))

@@ -57,14 +57,10 @@ impl Sweep {
     ///
     /// # Errors
     /// [`ForwardError`] if a contact is off the detector.
-    pub fn of(
-        model: &dyn ForwardModel,
-        press: &Press,
-        strengths: &[f64],
-        compared: f64,
-    ) -> Result<Self, ForwardError> {
+    pub fn of(model: &dyn ForwardModel, press: &Press, strengths: &[f64], compared: f64) -> Result<Self, ForwardError> {
         let detector = model.detector();
-        let readings = |contact: Contact| Ok::<_, ForwardError>(readings_v(&model.impedance_ohm(&[contact])?, detector));
+        let readings =
+            |contact: Contact| Ok::<_, ForwardError>(readings_v(&model.impedance_ohm(&[contact])?, detector));
         let curve = strengths.iter().map(|strength| Ok((*strength, readings(press.at(MIDDLE, *strength))?)));
         let places = nine_places(detector).map(|place| press.at(place, compared));
         let places = places.into_iter().map(|contact| Ok((contact, readings(contact)?)));

@@ -46,11 +46,7 @@ impl PaperSolver {
     /// [`ForwardError`] if there is no thin shell of it.
     pub fn new(detector: &Detector) -> Result<Self, ForwardError> {
         let shell = Shell::with_nodes(
-            &Detector {
-                layers: vec![Layer::uniform(THICKNESS_M, 1.0)],
-                drive_v: DRIVE_V,
-                ..detector.taken_as_exact()
-            },
+            &Detector { layers: vec![Layer::uniform(THICKNESS_M, 1.0)], drive_v: DRIVE_V, ..detector.taken_as_exact() },
             NODES,
         )?;
         let jacobian = Jacobian::of(&shell);
@@ -115,7 +111,10 @@ mod tests {
         let [light, firm] = [1e-4, 1e-2].map(imaged);
         assert!(firm.output > light.output && light.output > 0.0);
         for found in [light, firm] {
-            assert!(found.centroid_m[0] > 0.0 && found.centroid_m[0] < 0.02 && found.centroid_m[1].abs() < 1e-3, "{found:?}");
+            assert!(
+                found.centroid_m[0] > 0.0 && found.centroid_m[0] < 0.02 && found.centroid_m[1].abs() < 1e-3,
+                "{found:?}"
+            );
             let error_m = 0.06 * (1.0 - found.figures.position_accuracy);
             assert!((geometry::distance(found.centroid_m, [0.02, 0.0]) - error_m).abs() < 1e-9);
         }

@@ -48,7 +48,15 @@ impl Press {
     /// # Errors
     /// [`SkinError`] if that is no elastic layer.
     pub fn indenter(detector: &Detector, skin: Skin) -> Result<Self, SkinError> {
-        Ok(Self::Ball { radius_m: INDENTER_DIAMETER_M / 2.0, hertz: Hertz::new(detector, skin)? })
+        Self::ball(detector, skin, INDENTER_DIAMETER_M / 2.0)
+    }
+
+    /// A ball of a radius (m) on a detector of such a skin.
+    ///
+    /// # Errors
+    /// [`SkinError`] if that is no elastic layer.
+    pub fn ball(detector: &Detector, skin: Skin, radius_m: f64) -> Result<Self, SkinError> {
+        Ok(Self::Ball { radius_m, hertz: Hertz::new(detector, skin)? })
     }
 
     /// The contact of a strength at a place (m).
@@ -94,7 +102,10 @@ mod tests {
         let detector = Detector::default();
         let skin = Foam::of('A').unwrap().into();
         let ball = Press::indenter(&detector, skin).unwrap();
-        assert_eq!(ball.at(MIDDLE, 1.0).conductance_s, Hertz::new(&detector, skin).unwrap().ball(0.0025, 1.0).conductance_s);
+        assert_eq!(
+            ball.at(MIDDLE, 1.0).conductance_s,
+            Hertz::new(&detector, skin).unwrap().ball(0.0025, 1.0).conductance_s
+        );
     }
 
     #[test]
@@ -109,6 +120,8 @@ mod tests {
     #[test]
     fn decades_have_both_ends() {
         let values = in_decades([0.001, 100.0], 11);
-        assert!((values[0] - 0.001).abs() < 1e-15 && (values[10] - 100.0).abs() < 1e-9 && (values[2] - 0.01).abs() < 1e-12);
+        assert!(
+            (values[0] - 0.001).abs() < 1e-15 && (values[10] - 100.0).abs() < 1e-9 && (values[2] - 0.01).abs() < 1e-12
+        );
     }
 }

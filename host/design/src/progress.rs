@@ -1,6 +1,6 @@
 //! How far a study is, and the end that Ctrl-C gives it.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use tactomo_physics::threads::map_until;
@@ -12,6 +12,8 @@ pub struct Progress<'a> {
     pub stop: &'a AtomicBool,
     /// Told, on any thread, what is done.
     pub say: &'a (dyn Fn(&Step) + Sync),
+    /// What was done before of the whole, how large that is, and since when; if this is a part of it.
+    whole: Option<(usize, usize, Instant)>,
 }
 
 /// How far a study is.
@@ -27,7 +29,24 @@ pub struct Step {
     pub left: Duration,
 }
 
-impl Progress<'_> {
+impl<'a> Progress<'a> {
+    /// Progress of a whole.
+    pub fn new(stop: &'a AtomicBool, say: &'a (dyn Fn(&Step) + Sync)) -> Self {
+        Self { stop, say, whole: None }
+    }
+
+    /// The same for a part of `all`, of which so many are done.
+    #[must_use]
+    pub fn part(&self, done: usize, all: usize) -> Self {
+        let since = self.whole.map_or_else(Instant::now, |(.., since)| since);
+        Self { whole: Some((done, all, since)), ..*self }
+    }
+
+    /// Whether it is to end.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
     /// A function of each of some things on all cores, in their order; `None` of what was not begun when it was stopped.
     pub fn map<T: Sync, R: Send>(
         &self,
@@ -35,10 +54,11 @@ impl Progress<'_> {
         all: &[T],
         function: impl Fn(&T) -> R + Sync,
     ) -> Vec<Option<R>> {
-        let start = Instant::now();
+        let (before, count, start) = self.whole.unwrap_or((0, all.len(), Instant::now()));
         let done = |done: usize| {
-            let left = start.elapsed().mul_f64((all.len() - done) as f64 / done.max(1) as f64);
-            (self.say)(&Step { what, done, all: all.len(), left });
+            let done = before + done;
+            let left = start.elapsed().mul_f64(count.saturating_sub(done) as f64 / done.max(1) as f64);
+            (self.say)(&Step { what, done, all: count, left });
         };
         map_until(all, self.stop, &done, function)
     }
@@ -53,7 +73,8 @@ mod tests {
     fn each_step_is_told_and_the_last_one_has_nothing_left() {
         let steps = Mutex::new(Vec::new());
         let stop = AtomicBool::new(false);
-        let progress = Progress { stop: &stop, say: &|step| steps.lock().unwrap().push(step.clone()) };
+        let say = |step: &Step| steps.lock().unwrap().push(step.clone());
+        let progress = Progress::new(&stop, &say);
         let doubled = progress.map("numbers", &[1, 2, 3], |x| 2 * x);
         assert_eq!(doubled, [Some(2), Some(4), Some(6)]);
         let mut steps = steps.into_inner().unwrap();

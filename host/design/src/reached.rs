@@ -20,25 +20,57 @@ pub struct Reached {
 /// # Errors
 /// [`StudyError`] if it cannot be modelled, or a contact is off it.
 pub fn by_auto(detector: &Detector, contacts: &[Contact], seed: u64) -> Result<Reached, StudyError> {
-    let experiment = Experiment::new(detector)?;
-    let touches: Vec<_> = contacts.iter().map(|contact| vec![Touch::from(*contact)]).collect();
-    let frames = experiment.frames(&touches, seed)?;
-    let mut solver = Method::Auto.build(&experiment.problem)?;
-    let mut squares_m2 = Vec::new();
-    for (contact, frame) in contacts.iter().zip(&frames) {
-        solver.reset();
-        let solution = solver
-            .solve(&frame.readings)
-            .map_err(|error| StudyError::Solve { solver: Method::Auto.name().to_owned(), error })?;
-        if solution.is_contacts() && solution.contacts.len() == 1 {
-            let matching = Matching::within(f64::INFINITY, &[*contact], &solution.contacts);
-            squares_m2.extend(matching.pairs.iter().map(|pair| pair.distance_m.powi(2)));
+    let mut presses = Presses::default();
+    presses.on(&Experiment::new(detector)?, contacts, seed)?;
+    Ok(presses.reached())
+}
+
+/// The same on so many detectors as built, drawn from its tolerances, of which `auto` knows the description only.
+///
+/// # Errors
+/// As for [`by_auto`].
+pub fn as_built(detector: &Detector, contacts: &[Contact], seed: u64, drawn: u64) -> Result<Reached, StudyError> {
+    let nominal = Experiment::new(detector)?;
+    let mut presses = Presses::default();
+    for index in 0..drawn {
+        let seed = seed.wrapping_add(index);
+        presses.on(&nominal.as_built(seed)?, contacts, seed)?;
+    }
+    Ok(presses.reached())
+}
+
+/// Presses so far.
+#[derive(Default)]
+struct Presses {
+    squares_m2: Vec<f64>,
+    all: usize,
+}
+
+impl Presses {
+    fn on(&mut self, experiment: &Experiment, contacts: &[Contact], seed: u64) -> Result<(), StudyError> {
+        let touches: Vec<_> = contacts.iter().map(|contact| vec![Touch::from(*contact)]).collect();
+        let frames = experiment.frames(&touches, seed)?;
+        let mut solver = Method::Auto.build(&experiment.problem)?;
+        for (contact, frame) in contacts.iter().zip(&frames) {
+            solver.reset();
+            let solution = solver
+                .solve(&frame.readings)
+                .map_err(|error| StudyError::Solve { solver: Method::Auto.name().to_owned(), error })?;
+            if solution.is_contacts() && solution.contacts.len() == 1 {
+                let matching = Matching::within(f64::INFINITY, &[*contact], &solution.contacts);
+                self.squares_m2.extend(matching.pairs.iter().map(|pair| pair.distance_m.powi(2)));
+            }
+        }
+        self.all += contacts.len();
+        Ok(())
+    }
+
+    fn reached(&self) -> Reached {
+        Reached {
+            place_m: super::metrics::mean(&self.squares_m2).map(f64::sqrt),
+            found: self.squares_m2.len() as f64 / self.all.max(1) as f64,
         }
     }
-    Ok(Reached {
-        place_m: super::metrics::mean(&squares_m2).map(f64::sqrt),
-        found: squares_m2.len() as f64 / contacts.len().max(1) as f64,
-    })
 }
 
 #[cfg(test)]

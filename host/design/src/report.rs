@@ -55,7 +55,9 @@ pub fn page(reports: &[&dyn Report], command: &str) -> String {
         parts.push(format!("<{rank} id=\"{}\">{}</{rank}>", report.name(), escaped(report.title())));
         parts.push(format!("<p class=\"lead-in\">{}</p>", escaped(report.lead_in())));
         if report.is_stopped() {
-            parts.push("<p><b>Stopped before the end</b>: what is shown and concluded is of what was done.</p>".to_owned());
+            parts.push(
+                "<p><b>Stopped before the end</b>: what is shown and concluded is of what was done.</p>".to_owned(),
+            );
         }
         if reports.len() == 1 && !report.claims().is_empty() {
             parts.push(super::claim::html(report.claims()));
@@ -63,6 +65,9 @@ pub fn page(reports: &[&dyn Report], command: &str) -> String {
         parts.extend(report.parts());
     }
     let seconds: f64 = reports.iter().map(|report| report.seconds()).sum();
-    parts.push(format!("<h2>How it was computed</h2>\n<p class=\"note\">In {seconds:.1} s.</p>{}", machine(&Machine::this(), command)));
+    parts.push(format!(
+        "<h2>How it was computed</h2>\n<p class=\"note\">In {seconds:.1} s.</p>{}",
+        machine(&Machine::this(), command)
+    ));
     html(&format!("Tactomo: {}", title.to_lowercase()), &parts)
 }

@@ -7,10 +7,18 @@ pub(crate) fn number(value: Option<f64>, factor: f64) -> String {
     value.map_or("-".to_owned(), |value| {
         let value = value * factor;
         let decade = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
-        if (-4.0..5.0).contains(&decade) { format!("{value:.*}", (2.0 - decade).max(0.0) as usize) } else { short(value) }
+        if (-4.0..5.0).contains(&decade) {
+            format!("{value:.*}", (2.0 - decade).max(0.0) as usize)
+        } else {
+            short(value)
+        }
     })
 }
 
+/// A length or the like that was chosen, without digits that say nothing.
+pub(crate) fn plain(value: f64) -> String {
+    short((value * 1e3).round() / 1e3)
+}
 
 /// Cells of a row for other programs: empty where a figure is open.
 pub(crate) fn cells(figures: &[Option<f64>]) -> String {

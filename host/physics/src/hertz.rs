@@ -81,6 +81,15 @@ impl Skin {
         Self { young_pa, poisson: POISSON, surface_depth_m: SURFACE_DEPTH_M }
     }
 
+    /// A skin of layers of such thicknesses (any unit) and Young's moduli (Pa): they give way one after the other, so that their compliances add up.
+    pub fn of_layers(layers: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let add = |[thickness, compliance]: [f64; 2], (own, young_pa): (f64, f64)| {
+            [thickness + own, compliance + own / young_pa]
+        };
+        let [thickness, compliance] = layers.into_iter().fold([0.0; 2], add);
+        Self::of(thickness / compliance)
+    }
+
     fn check(&self) -> Result<(), SkinError> {
         let wrong = |what, value, allowed| Err(SkinError { what, value, allowed });
         if !(self.young_pa > 0.0 && self.young_pa.is_finite()) {
@@ -103,11 +112,9 @@ impl From<Foam> for Skin {
 }
 
 impl From<&Stack> for Skin {
-    /// Foams of equal thickness give way one after the other: their compliances add up.
+    /// Foams of equal thickness.
     fn from(stack: &Stack) -> Self {
-        let foams = stack.foams();
-        let compliance: f64 = foams.iter().map(|foam| 1.0 / foam.elasticity_pa).sum();
-        Self::of(foams.len() as f64 / compliance)
+        Self::of_layers(stack.foams().iter().map(|foam| (1.0, foam.elasticity_pa)))
     }
 }
 

@@ -4,6 +4,7 @@ mod as_built;
 mod browser;
 mod calibrate;
 mod choice;
+mod design;
 mod detector;
 mod forward;
 mod interrupt;
@@ -43,6 +44,7 @@ enum Command {
     Tradeoff(tradeoff::Args),
     Stability(stability::Args),
     Study(study::Args),
+    Design(Box<design::Args>),
     Reconstruct(reconstruct::Args),
     Calibrate(calibrate::Args),
 }
@@ -60,6 +62,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Tradeoff(args) => tradeoff::run(&args),
         Command::Stability(args) => stability::run(&args),
         Command::Study(args) => study::run(&args),
+        Command::Design(args) => design::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
     }

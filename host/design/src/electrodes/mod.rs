@@ -9,21 +9,15 @@ mod table;
 use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
-use tactomo_physics::forward::{ForwardError, ForwardModel, Slab};
-use tactomo_physics::geometry::Point;
-use tactomo_study::cramer_rao;
+use tactomo_physics::forward::Slab;
 
+use super::limit::place_everywhere_m;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, nine_places};
 use super::reached::by_auto;
 use super::{Claim, DesignError, Layout, Limit, Press, Progress, Reached};
 
-/// Places over the whole surface. Right above an electrode a place is told worse, so that a few places in rows would meet or miss just those.
+/// Places over the whole surface.
 const PLACES: usize = 100;
-/// Steps from one place to the next as shares of the sides, which fill a square evenly: powers of the plastic number (Roberts, "The unreasonable
-/// effectiveness of quasirandom sequences", 2018).
-const STEPS: [f64; 2] = [0.754_877_666, 0.569_840_291];
-/// Share of each side that is left free at each edge.
-const MARGIN: f64 = 0.05;
 /// Diameter of the paper's electrodes (m).
 const DIAMETER_M: f64 = 0.004;
 /// Conversions of a frame that others are compared with: 16 grounds, 16 electrodes.
@@ -106,12 +100,17 @@ impl Group {
             Self::Number => [[2, 2], [4, 2], [3, 3], [4, 3], [4, 4], [5, 4], [5, 5], [6, 5], [8, 4]]
                 .map(|[columns, rows]| usual(Layout::grid(columns, rows)))
                 .to_vec(),
-            Self::Pattern => {
-                [Layout::grid(4, 4), Layout::Staggered { columns: 4, rows: 4 }, Layout::grid(8, 2), Layout::Ring { count: 16 }]
-                    .map(usual)
-                    .to_vec()
+            Self::Pattern => [
+                Layout::grid(4, 4),
+                Layout::Staggered { columns: 4, rows: 4 },
+                Layout::grid(8, 2),
+                Layout::Ring { count: 16 },
+            ]
+            .map(usual)
+            .to_vec(),
+            Self::Diameter => {
+                [1e-3, 2e-3, 4e-3, 6e-3, 8e-3, 12e-3].map(|diameter_m| (Layout::grid(4, 4), diameter_m)).to_vec()
             }
-            Self::Diameter => [1e-3, 2e-3, 4e-3, 6e-3, 8e-3, 12e-3].map(|diameter_m| (Layout::grid(4, 4), diameter_m)).to_vec(),
             Self::Pitch => [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]
                 .map(|spread| usual(Layout::Grid { columns: 4, rows: 4, spread }))
                 .to_vec(),
@@ -129,8 +128,8 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
         .into_iter()
         .flat_map(|group| group.layouts().into_iter().map(move |(layout, diameter_m)| (group, layout, diameter_m)))
         .collect();
-    let computed = progress
-        .map("electrodes", &tasks, |(group, layout, diameter_m)| row(*group, *layout, *diameter_m, plan.seed));
+    let computed =
+        progress.map("electrodes", &tasks, |(group, layout, diameter_m)| row(*group, *layout, *diameter_m, plan.seed));
     Ok(Report {
         is_stopped: computed.iter().any(Option::is_none),
         rows: computed.into_iter().flatten().collect::<Result<_, _>>()?,
@@ -145,7 +144,8 @@ fn row(group: Group, layout: Layout, diameter_m: f64, seed: u64) -> Result<Row, 
     let detector = Detector { electrodes, ..base };
     let slab = Slab::new(&detector)?;
     let conversions = layout.count().pow(2);
-    let place_everywhere_m = place_everywhere_m(&slab)?;
+    let noise_v = detector.adc.deviation_v();
+    let place_everywhere_m = place_everywhere_m(&slab, &Press::PAPER, COMPARED_S_PER_M, noise_v, PLACES)?;
     let contacts = nine_places(&detector).map(|place| Press::PAPER.at(place, COMPARED_S_PER_M));
     let name = match group {
         Group::Diameter => format!("{:.0} mm", diameter_m * 1e3),
@@ -166,30 +166,14 @@ fn row(group: Group, layout: Layout, diameter_m: f64, seed: u64) -> Result<Row, 
         conversions,
         limit: Limit::of(&slab, &Press::PAPER, COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M)?,
         place_everywhere_m,
-        place_in_same_time_m: place_everywhere_m.map(|place_m| place_m * (conversions as f64 / USUAL_CONVERSIONS).sqrt()),
+        place_in_same_time_m: place_everywhere_m
+            .map(|place_m| place_m * (conversions as f64 / USUAL_CONVERSIONS).sqrt()),
         reached: by_auto(&detector, &contacts, seed)?,
     })
 }
 
 fn base_width_m(detector: &Detector) -> f64 {
     detector.outline.size_m()[0]
-}
-
-/// Root mean square over places across the whole surface of the standard error of a place (m).
-fn place_everywhere_m(model: &dyn ForwardModel) -> Result<Option<f64>, ForwardError> {
-    let detector = model.detector();
-    let [width_m, height_m] = detector.outline.size_m();
-    let share = |index: usize, axis: usize| {
-        (0.5 + STEPS[axis] * index as f64).fract() * (1.0 - 2.0 * MARGIN) + MARGIN - 0.5
-    };
-    let mut squares_m2 = Vec::new();
-    for index in 0..PLACES {
-        let place: Point = [share(index, 0) * width_m, share(index, 1) * height_m];
-        let bounds = cramer_rao(model, &[Press::PAPER.at(place, COMPARED_S_PER_M)], detector.adc.deviation_v())?;
-        let Some(bound) = bounds.and_then(|bounds| bounds.first().copied()) else { return Ok(None) };
-        squares_m2.push(bound.position_any_radius_m.powi(2));
-    }
-    Ok(super::metrics::mean(&squares_m2).map(f64::sqrt).filter(|place_m| place_m.is_finite()))
 }
 
 impl super::Report for Report {

@@ -24,7 +24,8 @@ pub(super) fn parts(report: &Report) -> Vec<String> {
         (Group::Diameter, "diameter", |row| row.diameter_m, Unit::Metres),
         (Group::Pitch, "pitch", pitch_m, Unit::Metres),
     ];
-    let charts: String = charts.into_iter().map(|(group, title, x, unit)| chart(report, group, title, x, unit).svg() + "\n").collect();
+    let charts: String =
+        charts.into_iter().map(|(group, title, x, unit)| chart(report, group, title, x, unit).svg() + "\n").collect();
     let tables: String = Group::ALL.into_iter().map(|group| rows(report, group)).collect();
     vec![
         "<p class=\"quiet\">Standard error of a place over the whole surface, with one frame and with as many frames as take the time of one of 16 electrodes; what `auto` reaches with \

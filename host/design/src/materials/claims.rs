@@ -71,9 +71,7 @@ impl<'a> Map<'a> {
             normalised.iter().map(|share| share(c)).try_fold(f64::INFINITY, |least, share| Some(least.min(share?)))
         };
         let balanced = best(self.uniform(), balance);
-        let covers = |c: &&Condition| {
-            matches!(c.force_range_n, [Some(low), high] if low <= TOUCH_N[0] && high.is_none_or(|high| high >= TOUCH_N[1]))
-        };
+        let covers = |c: &&Condition| matches!(c.force_range_n, [Some(low), high] if low <= TOUCH_N[0] && high.is_none_or(|high| high >= TOUCH_N[1]));
         let suited: Vec<f64> = self.uniform().filter(covers).map(|c| c.bottom_s_per_m).collect();
         let is_about = |found: f64| (1.0 / ABOUT..=ABOUT).contains(&(found / SUITED_S_PER_M));
         let is_only = suited.iter().any(|found| is_about(*found)) && suited.iter().all(|found| is_about(*found));
@@ -104,7 +102,10 @@ impl<'a> Map<'a> {
         let place = |c: &Condition| c.title();
         Claim {
             claim: "the most sensitive is a conductive top (0.5 S/m) on a poor bottom (0.001 S/m)",
-            verdict: Verdict::of(solver.or(at_half).map(|c| is_there(c) || at_half.is_some_and(is_there)), sensor.map(is_there)),
+            verdict: Verdict::of(
+                solver.or(at_half).map(|c| is_there(c) || at_half.is_some_and(is_there)),
+                sensor.map(is_there),
+            ),
             solver: format!(
                 "SENS is highest at {}; at half of FMAX instead of half of what is applied, at {}",
                 said(solver, place),
@@ -194,10 +195,7 @@ impl<'a> Map<'a> {
         };
         Claim {
             claim: "no condition is best in all four",
-            verdict: Verdict::of(
-                found[0].as_ref().map(Vec::is_empty),
-                found[1].as_ref().map(Vec::is_empty),
-            ),
+            verdict: Verdict::of(found[0].as_ref().map(Vec::is_empty), found[1].as_ref().map(Vec::is_empty)),
             solver: text(&found[0]),
             sensor: text(&found[1]),
         }

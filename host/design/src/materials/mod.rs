@@ -18,8 +18,8 @@ use tactomo_physics::simulate::Noise;
 use super::limit::range;
 use super::metrics::Sweep;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, FORCES_N, in_decades, nine_places};
-use super::{Claim, DesignError, Limit, Metrics, PaperSolver, Press, Progress, Reached};
 use super::reached::by_auto;
+use super::{Claim, DesignError, Limit, Metrics, PaperSolver, Press, Progress, Reached};
 
 /// Conductivities of top and bottom (S/m), section III.A.
 const RANGE_S_PER_M: [f64; 2] = [1e-3, 100.0];
@@ -154,7 +154,7 @@ fn condition(base: &Detector, task: &Task, solver: &PaperSolver, reached: bool) 
         exact: sweep.metrics(solver),
         noisy: sweep.noisy_metrics(solver, &mut Noise::new(task.seed)),
         limit: Limit::of(&slab, &Press::PAPER, COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M)?,
-        force_range_n: range(&slab, &Press::indenter(&detector, task.skin)?, FORCES_N)?,
+        force_range_n: range(&slab, &Press::indenter(&detector, task.skin)?, FORCES_N, detector.adc.deviation_v())?,
         reached,
     })
 }
@@ -162,8 +162,7 @@ fn condition(base: &Detector, task: &Task, solver: &PaperSolver, reached: bool) 
 impl Condition {
     /// What it is, for people.
     pub fn title(&self) -> String {
-        let conductivities =
-            format!("bottom {} S/m, top {} S/m", short(self.bottom_s_per_m), short(self.top_s_per_m));
+        let conductivities = format!("bottom {} S/m, top {} S/m", short(self.bottom_s_per_m), short(self.top_s_per_m));
         self.name.map_or(conductivities.clone(), |name| format!("{name}: {conductivities}"))
     }
 
@@ -232,7 +231,7 @@ mod tests {
     #[test]
     fn a_small_map_has_all_conditions_and_samples_and_repeats_with_its_seed() {
         let stop = AtomicBool::new(false);
-        let progress = Progress { stop: &stop, say: &|_| {} };
+        let progress = Progress::new(&stop, &|_| {});
         let [a, b] = [1, 1].map(|_| run(&plan(3, false), progress).unwrap());
         assert_eq!((a.conditions.len(), a.samples.len(), a.is_stopped), (9, 10, false));
         assert_eq!(serde(&a), serde(&b));
@@ -248,10 +247,13 @@ mod tests {
     #[test]
     fn what_is_done_when_it_is_stopped_is_kept() {
         let stop = AtomicBool::new(false);
-        let progress = Progress { stop: &stop, say: &|step| stop.store(step.done >= 12, Ordering::Relaxed) };
+        let say = |step: &crate::Step| stop.store(step.done >= 12, Ordering::Relaxed);
+        let progress = Progress::new(&stop, &say);
         let report = run(&plan(5, false), progress).unwrap();
         assert!(report.is_stopped && (2..25).contains(&report.conditions.len()), "{}", report.conditions.len());
         let page = crate::page(&[&report], "tactomo study materials");
-        assert!(page.contains("Stopped before the end") && crate::Report::table(&report).contains("stopped before the end"));
+        assert!(
+            page.contains("Stopped before the end") && crate::Report::table(&report).contains("stopped before the end")
+        );
     }
 }

@@ -2,8 +2,8 @@
 
 use tactomo_study::page::{Axis, Chart, Map, Mark, Series, Unit, folded, table};
 
-use super::claims::extent;
 use super::super::text::number;
+use super::claims::extent;
 use super::{Condition, Report};
 
 /// Two conductivities that are one node of the map (relative).
@@ -133,7 +133,8 @@ fn map(report: &Report, figure: &Figure) -> Map {
         found.and_then(figure.of)
     };
     let rows = ticks.iter().map(|top| ticks.iter().map(|bottom| value(*bottom, *top)).collect()).collect();
-    let mark = |c: &Condition| Some(([c.bottom_s_per_m, c.top_s_per_m], c.name.filter(|name| *name != "BB")?.to_owned()));
+    let mark =
+        |c: &Condition| Some(([c.bottom_s_per_m, c.top_s_per_m], c.name.filter(|name| *name != "BB")?.to_owned()));
     Map {
         title: figure.title.to_owned(),
         subtitle: figure.subtitle.to_owned(),
@@ -155,7 +156,8 @@ fn positions(report: &Report, [x, y]: [usize; 2]) -> Chart {
         (figure.of)(c).map(|value| (scaled(value) - low) / (high - low)).filter(|share| share.is_finite())
     };
     let mark = |c: &Condition| {
-        let tooltip = format!("{}: {} {}, {} {}", c.title(), x.title, number((x.of)(c), 1.0), y.title, number((y.of)(c), 1.0));
+        let tooltip =
+            format!("{}: {} {}, {} {}", c.title(), x.title, number((x.of)(c), 1.0), y.title, number((y.of)(c), 1.0));
         Some(Mark { x: normalised(x, c)?, y: normalised(y, c)?, tooltip })
     };
     let sample = |c: &Condition| {

@@ -48,7 +48,8 @@ pub(super) const METRICS: [Metric; 4] = [
 
 pub(super) fn of(samples: &[Sample]) -> Vec<Claim> {
     let claim = |metric: &Metric| {
-        let [solver, sensor] = [metric.solver, metric.sensor.1].map(|figure| Ranked::of(samples, metric.measured, figure));
+        let [solver, sensor] =
+            [metric.solver, metric.sensor.1].map(|figure| Ranked::of(samples, metric.measured, figure));
         Claim {
             claim: metric.claim,
             verdict: Verdict::of(solver.is_there(), sensor.is_there()),

@@ -5,9 +5,9 @@ use std::fmt::Write;
 use tactomo_physics::geometry::Point;
 use tactomo_study::page::{Axis, Chart, Mark, Series, Unit, escaped, table};
 
+use super::super::text::number;
 use super::claims::METRICS;
 use super::table::{banded, maximum, sensitivity};
-use super::super::text::number;
 use super::{Report, Sample};
 
 /// Side of a small chart, and room around its plot (px).
@@ -20,7 +20,8 @@ const CURVE_POINTS: usize = 60;
 
 pub(super) fn parts(report: &Report) -> Vec<String> {
     let cards: String = report.samples.iter().map(card).collect();
-    let charts: String = METRICS.iter().zip(TITLES).map(|(metric, title)| beside(report, metric, title).svg() + "\n").collect();
+    let charts: String =
+        METRICS.iter().zip(TITLES).map(|(metric, title)| beside(report, metric, title).svg() + "\n").collect();
     vec![
         "<h3>Simulated against measured</h3>".to_owned(),
         format!("<div class=\"charts small\">{charts}</div>"),
@@ -39,7 +40,8 @@ const TITLES: [&str; 4] = ["SENS", "FMAX, N", "SR", "PA"];
 fn beside(report: &Report, metric: &super::claims::Metric, title: &str) -> Chart {
     let series = |sample: &Sample| {
         let (x, y) = ((metric.measured)(sample)?, (metric.solver)(sample)?);
-        let tooltip = format!("{}: measured {}, simulated {}", sample.measured.name, number(Some(x), 1.0), number(Some(y), 1.0));
+        let tooltip =
+            format!("{}: measured {}, simulated {}", sample.measured.name, number(Some(x), 1.0), number(Some(y), 1.0));
         let marks = vec![Mark { x, y, tooltip }];
         Some(Series { name: sample.measured.name.to_owned(), class: "contacts", marks, main: 0, is_joined: false })
     };

@@ -199,7 +199,8 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
     let contacts = |row: &Row| row.solvers.iter().find(|row| row.solver == Method::Contacts.name()).cloned();
     let correlated = rows.iter().all(|row| row.correlation > STRONG);
     let off = |of: fn(&SolverRow) -> f64| {
-        let all = rows.iter().filter_map(|row| Some(format!("{:.2} mm at {:.0} mm", of(&contacts(row)?) * 1e3, mm(row))));
+        let all =
+            rows.iter().filter_map(|row| Some(format!("{:.2} mm at {:.0} mm", of(&contacts(row)?) * 1e3, mm(row))));
         all.collect::<Vec<_>>().join(", ")
     };
     let grows = Trend {
@@ -239,9 +240,7 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
 impl Report {
     /// The thinnest detector (m) on which a solver fails that takes it for a shell; `None` if it fails on none.
     pub fn fails_at_m(&self, solver: &str, error_m: fn(&SolverRow) -> f64) -> Option<f64> {
-        let fails = |row: &&Row| {
-            row.solvers.iter().any(|row| row.solver == solver && error_m(row) > self.fails_from_m)
-        };
+        let fails = |row: &&Row| row.solvers.iter().any(|row| row.solver == solver && error_m(row) > self.fails_from_m);
         self.rows.iter().find(fails).map(|row| row.thickness_m)
     }
 }
@@ -293,7 +292,7 @@ mod tests {
     fn shells_are_right_for_thin_detectors_and_correlate_less_with_thick_ones() {
         let stop = AtomicBool::new(false);
         let plan = Plan { methods: vec![Method::Contacts, Method::TikhonovPaper], seed: 1 };
-        let report = run(&plan, Progress { stop: &stop, say: &|_| {} }).unwrap();
+        let report = run(&plan, Progress::new(&stop, &|_| {})).unwrap();
         let rows = &report.rows;
         assert_eq!(rows.iter().map(|row| row.thickness_m).collect::<Vec<_>>(), THICKNESSES_M);
         assert!(rows[0].correlation > 0.9 && rows.windows(2).all(|pair| pair[1].correlation < pair[0].correlation));

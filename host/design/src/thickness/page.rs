@@ -11,7 +11,12 @@ const FLOOR_M: f64 = 1e-5;
 
 pub(super) fn parts(report: &Report) -> Vec<String> {
     let figures = [
-        chart(report, "Correlation", "with the thin shell of the same sheet conductance", &[("", "linear", |row| row.correlation)]),
+        chart(
+            report,
+            "Correlation",
+            "with the thin shell of the same sheet conductance",
+            &[("", "linear", |row| row.correlation)],
+        ),
         chart(
             report,
             "Largest reading",
@@ -72,7 +77,8 @@ fn thickness(report: &Report) -> Axis {
 }
 
 fn solvers(report: &Report, title: &str, error_m: fn(&SolverRow) -> f64) -> Chart {
-    let all: Vec<_> = report.rows.iter().flat_map(|row| &row.solvers).flat_map(|row| [row.on_shell_m, row.on_slab_m]).collect();
+    let all: Vec<_> =
+        report.rows.iter().flat_map(|row| &row.solvers).flat_map(|row| [row.on_shell_m, row.on_slab_m]).collect();
     let series = by_solver(report).into_iter().map(|(name, rows, _)| {
         let mark = |(row, own): (&Row, &SolverRow)| Mark {
             x: row.thickness_m,
@@ -99,14 +105,16 @@ fn errors(report: &Report) -> String {
     let mut heads = vec!["mean error, mm: shell / slab".to_owned()];
     heads.extend(report.rows.iter().map(|row| format!("{:.0} mm", row.thickness_m * 1e3)));
     heads.extend(["fails from, as a shell".to_owned(), "as a slab".to_owned()]);
-    let pair = |row: &SolverRow| format!("{} / {}", number(Some(row.on_shell_m), 1e3), number(Some(row.on_slab_m), 1e3));
+    let pair =
+        |row: &SolverRow| format!("{} / {}", number(Some(row.on_shell_m), 1e3), number(Some(row.on_slab_m), 1e3));
     let rows: Vec<Vec<String>> = by_solver(report)
         .into_iter()
-        .map(|(name, rows, fails)| {
-            std::iter::once(name.to_owned()).chain(rows.iter().map(pair)).chain(fails).collect()
-        })
+        .map(|(name, rows, fails)| std::iter::once(name.to_owned()).chain(rows.iter().map(pair)).chain(fails).collect())
         .collect();
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     table(&heads, &rows)
-        + &format!("<p class=\"note\">A solver fails from a mean error of {:.0} mm on, a fifth of the distance of electrodes.</p>", report.fails_from_m * 1e3)
+        + &format!(
+            "<p class=\"note\">A solver fails from a mean error of {:.0} mm on, a fifth of the distance of electrodes.</p>",
+            report.fails_from_m * 1e3
+        )
 }

@@ -23,11 +23,16 @@ pub(super) fn table(report: &Report) -> String {
             row.mean_absolute_error
         );
     }
-    _ = write!(text, "\nmean error, mm, of solvers that take the detector for a shell / that invert the slab\n{:16}", "");
+    _ = write!(
+        text,
+        "\nmean error, mm, of solvers that take the detector for a shell / that invert the slab\n{:16}",
+        ""
+    );
     report.rows.iter().for_each(|row| _ = write!(text, "{:>9.0} mm    ", row.thickness_m * 1e3));
     text += "fails from\n";
     for (name, errors, [shell, slab]) in by_solver(report) {
-        let pair = |row: &SolverRow| format!("{} / {}", number(Some(row.on_shell_m), 1e3), number(Some(row.on_slab_m), 1e3));
+        let pair =
+            |row: &SolverRow| format!("{} / {}", number(Some(row.on_shell_m), 1e3), number(Some(row.on_slab_m), 1e3));
         let errors: String = errors.iter().map(|row| format!("{:>14}  ", pair(row))).collect();
         _ = writeln!(text, "{name:15}{errors}  {shell} / {slab}");
     }
@@ -56,8 +61,7 @@ pub(super) fn csv(report: &Report) -> String {
     text.extend(names);
     text.push('\n');
     for row in &report.rows {
-        let models =
-            [row.thickness_m, row.correlation, row.largest_v, row.shell_largest_v, row.mean_absolute_error];
+        let models = [row.thickness_m, row.correlation, row.largest_v, row.shell_largest_v, row.mean_absolute_error];
         let errors = row.solvers.iter().flat_map(|row| [row.on_shell_m, row.on_slab_m]);
         let figures: Vec<_> = models.into_iter().chain(errors).map(Some).collect();
         text += &(cells(&figures) + "\n");

@@ -64,7 +64,7 @@ pub fn several<R: Serialize>(
 }
 
 /// Runs something that tells how far it is, until Ctrl-C.
-fn watched<R>(run: impl FnOnce(Progress) -> Result<R, design::DesignError>) -> anyhow::Result<R> {
+pub fn watched<R>(run: impl FnOnce(Progress) -> Result<R, design::DesignError>) -> anyhow::Result<R> {
     let stop = interrupt::flag()?;
     let last = Mutex::new(Instant::now());
     let say = |step: &Step| {
@@ -72,18 +72,18 @@ fn watched<R>(run: impl FnOnce(Progress) -> Result<R, design::DesignError>) -> a
         if last.elapsed() >= TOLD_EVERY && step.done < step.all {
             *last = Instant::now();
             let left_s = step.left.as_secs_f64().ceil();
-            message!("{}: {} of {}, about {left_s:.0} s left; Ctrl-C keeps what is done", step.what, step.done, step.all);
+            message!(
+                "{}: {} of {}, about {left_s:.0} s left; Ctrl-C keeps what is done",
+                step.what,
+                step.done,
+                step.all
+            );
         }
     };
-    Ok(run(Progress { stop: &stop, say: &say })?)
+    Ok(run(Progress::new(&stop, &say))?)
 }
 
-fn put_out(
-    args: &Output,
-    page: Option<NewFile>,
-    reports: &[&dyn Report],
-    json: &impl Serialize,
-) -> anyhow::Result<()> {
+fn put_out(args: &Output, page: Option<NewFile>, reports: &[&dyn Report], json: &impl Serialize) -> anyhow::Result<()> {
     page.map(|page| page.write(design::page(reports, &output::command_line()))).transpose()?;
     if let Some(path) = &args.out {
         message!("page written to {}", path.display());

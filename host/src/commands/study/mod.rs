@@ -11,6 +11,7 @@ mod samples;
 mod thickness;
 
 pub use self::args::StudyArgs;
+pub use self::design::watched;
 
 /// Studies of detectors, and of how well touch is found.
 ///

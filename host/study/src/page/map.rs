@@ -88,9 +88,8 @@ impl Map {
                 // Where cells are few each is one, with its value; where there are many, those of a colour are one.
                 let same = colours[column..].iter().take_while(|colour| **colour == colours[column]).count();
                 let count = if values.len() <= COLOURS / 2 { 1 } else { same };
-                let fill = colours[column].map_or("var(--grid)".to_owned(), |colour| {
-                    colour::of_share(colour as f64 / (COLOURS - 1) as f64)
-                });
+                let fill = colours[column]
+                    .map_or("var(--grid)".to_owned(), |colour| colour::of_share(colour as f64 / (COLOURS - 1) as f64));
                 _ = writeln!(
                     svg,
                     "<rect x=\"{:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{fill}\"><title>{}</title></rect>",
@@ -107,7 +106,12 @@ impl Map {
 
     fn tooltip(&self, [column, row]: [usize; 2], value: Option<f64>) -> String {
         let at = |axis: usize, index: usize| Unit::Plain.text(self.ticks[axis].get(index).copied().unwrap_or(0.0));
-        let [low, high] = self.rows.iter().flatten().flatten().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+        let [low, high] = self
+            .rows
+            .iter()
+            .flatten()
+            .flatten()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
         let normalised = |value: f64| if high > low { (value - low) / (high - low) } else { 0.0 };
         let text = |value: f64| format!("{}, normalised {:.2},", (self.text)(value), normalised(value));
         let value = value.map_or("no figure".to_owned(), text);
@@ -273,7 +277,10 @@ mod tests {
     #[test]
     fn cells_have_their_values_and_contours_run_between_them() {
         let svg = map(vec![vec![Some(0.0), Some(1.0)], vec![Some(0.0), None]]).svg();
-        assert!(svg.contains("<title>1.0, normalised 1.00, at x 10, y 1</title>") && svg.contains("<title>no figure at x 10, y 10</title>"));
+        assert!(
+            svg.contains("<title>1.0, normalised 1.00, at x 10, y 1</title>")
+                && svg.contains("<title>no figure at x 10, y 10</title>")
+        );
         assert!(!svg.contains("class=\"contour"), "a square with a missing corner has no line");
         let svg = map(vec![vec![Some(0.0), Some(1.0)], vec![Some(0.0), Some(1.0)]]).svg();
         assert_eq!(svg.matches("class=\"contour").count(), CONTOURS);

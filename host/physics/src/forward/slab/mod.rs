@@ -57,16 +57,18 @@ pub struct Resolution {
     pub contact_degree: usize,
     /// Half waves along a side of the modes that unevenness couples.
     pub uneven_modes: usize,
+    /// Most steps in a pad's radius of the table of the pads' fields: what limits it on layers that are thin against the pads.
+    pub steps_in_pad: usize,
 }
 
 impl Resolution {
     /// Enough for readings within a few tenths of a per cent: against reference readings, one degree more changes nothing.
-    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2, uneven_modes: 10 };
+    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2, uneven_modes: 10, steps_in_pad: 10 };
     /// For how readings change from one detector to another: on `square-60` changes are off by up to 3 % of themselves, those with a pad's own
     /// impedance by a sixth.
-    const COARSE: Self = Self { pad_degree: 1, contact_degree: 2, uneven_modes: 8 };
+    pub const COARSE: Self = Self { pad_degree: 1, contact_degree: 2, uneven_modes: 8, steps_in_pad: 3 };
     /// Finer than any solver needs.
-    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, uneven_modes: 16 };
+    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, uneven_modes: 16, steps_in_pad: 10 };
 }
 
 /// A rectangular detector, layered in depth.
@@ -154,8 +156,16 @@ impl Slab {
         let basis = DiscBasis::of_degree(resolution.pad_degree);
         let points = PadPoints::new(detector, size_m, basis, &bottom, as_even.map(|like| &*like.points));
         let impedances = points.impedances(basis, &bottom, uneven.as_deref());
-        let pads = PadFields::new(points.pads(), basis, impedances, &covered, uneven.as_deref(), &mut planner)
-            .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
+        let pads = PadFields::new(
+            points.pads(),
+            basis,
+            impedances,
+            &covered,
+            uneven.as_deref(),
+            resolution.steps_in_pad as f64,
+            &mut planner,
+        )
+        .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
         Ok(Self {
             detector: detector.clone(),
             size_m,

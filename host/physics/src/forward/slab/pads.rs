@@ -26,9 +26,6 @@ const ACROSS_END: f64 = 11.0;
 /// Table steps in a thickness: the finest mode that crosses the slab still fits.
 const STEPS_IN_THICKNESS: f64 = 3.6;
 
-/// Most table steps in a pad's radius, for layers that are thin against it: finer modes only matter at the pads' rims.
-const STEPS_IN_PAD: f64 = 10.0;
-
 /// A pad, from the corner (m).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pad {
@@ -188,17 +185,19 @@ pub(super) struct Mode {
 }
 
 impl PadFields {
-    /// Eliminates the pads from `impedances`; `None` if they are not positive definite.
+    /// Eliminates the pads from `impedances`; `None` if they are not positive definite. `steps_in_pad`: most steps of the table in a pad's radius, for layers that are
+    /// thin against it, where finer modes only matter at the pads' rims.
     pub fn new(
         pads: &[Pad],
         basis: &DiscBasis,
         impedances: DMatrix<f64>,
         covered: &Covered<'_>,
         uneven: Option<&Uneven>,
+        steps_in_pad: f64,
         planner: &mut RealFftPlanner<f64>,
     ) -> Option<Self> {
         let smallest_m = pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min);
-        let step_m = (covered.thickness_m() / STEPS_IN_THICKNESS).max(smallest_m / STEPS_IN_PAD);
+        let step_m = (covered.thickness_m() / STEPS_IN_THICKNESS).max(smallest_m / steps_in_pad);
         let grid = Grid::new(covered.size_m(), step_m.min(std::f64::consts::PI / covered.finest()));
         let modes = modes(covered, &grid);
         let size = basis.len();
