@@ -16,7 +16,7 @@ use self::electrodes::ElectrodeTable;
 use super::check::{LENGTH_M, Problem, within};
 use super::material::Foam;
 use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
-use super::{Adc, Correction, Detector, ForceLaw, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
+use super::{Adc, Bond, Correction, Detector, ForceLaw, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
 use crate::geometry::area;
 
 /// No detector's file is longer (bytes).
@@ -101,6 +101,16 @@ struct LayerTable {
     conductivity_s_per_m: Option<f64>,
     bottom_s_per_m: Option<f64>,
     top_s_per_m: Option<f64>,
+    bond: Option<BondTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BondTable {
+    grid: [usize; 2],
+    diameter_m: f64,
+    sheet_conductance_s: Option<f64>,
+    contact_impedance_ohm_m2: Option<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -260,9 +270,19 @@ impl Layer {
     fn write_toml(&self, text: &mut String) -> std::fmt::Result {
         writeln!(text, "\n[[layers]]\nthickness_m = {:?}", self.thickness_m)?;
         if self.bottom_s_per_m == self.top_s_per_m {
-            return writeln!(text, "conductivity_s_per_m = {:?}", self.bottom_s_per_m);
+            writeln!(text, "conductivity_s_per_m = {:?}", self.bottom_s_per_m)?;
+        } else {
+            writeln!(text, "bottom_s_per_m = {:?}\ntop_s_per_m = {:?}", self.bottom_s_per_m, self.top_s_per_m)?;
         }
-        writeln!(text, "bottom_s_per_m = {:?}\ntop_s_per_m = {:?}", self.bottom_s_per_m, self.top_s_per_m)
+        self.bond.as_ref().map_or(Ok(()), |bond| bond.write_toml(text))
+    }
+}
+
+impl Bond {
+    fn write_toml(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "[layers.bond]\ngrid = {:?}\ndiameter_m = {:?}", self.grid, self.diameter_m)?;
+        writeln!(text, "sheet_conductance_s = {:?}", self.sheet_conductance_s)?;
+        writeln!(text, "contact_impedance_ohm_m2 = {:?}", self.contact_impedance_ohm_m2)
     }
 }
 
@@ -326,22 +346,34 @@ impl OutlineTable {
 
 impl LayerTable {
     fn into_layer(self, field: &str) -> Result<Layer, Problem> {
-        let Self { thickness_m, material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m } = self;
-        match (material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m) {
+        let Self { thickness_m, material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m, bond } = self;
+        let layer = match (material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m) {
             (Some(material), None, None, None) => {
                 let foam = single(&material).and_then(Foam::of);
                 let what = || format!("is {}, but has to be \"A\", \"B\", \"C\" or \"D\"", quoted(&material));
                 let foam = foam.ok_or_else(|| Problem::new(format!("{field}.material"), what()))?;
-                Ok(Layer::uniform(thickness_m, foam.conductivity_s_per_m))
+                Layer::uniform(thickness_m, foam.conductivity_s_per_m)
             }
-            (None, Some(conductivity), None, None) => Ok(Layer::uniform(thickness_m, conductivity)),
-            (None, None, Some(bottom), Some(top)) => {
-                Ok(Layer { thickness_m, bottom_s_per_m: bottom, top_s_per_m: top })
+            (None, Some(conductivity), None, None) => Layer::uniform(thickness_m, conductivity),
+            (None, None, Some(bottom), Some(top)) => Layer::graded(thickness_m, [bottom, top]),
+            _ => {
+                return Err(Problem::new(
+                    field,
+                    "has to have one of material, conductivity_s_per_m, or bottom_s_per_m with top_s_per_m",
+                ));
             }
-            _ => Err(Problem::new(
-                field,
-                "has to have one of material, conductivity_s_per_m, or bottom_s_per_m with top_s_per_m",
-            )),
+        };
+        Ok(Layer { bond: bond.map(BondTable::into_bond), ..layer })
+    }
+}
+
+impl BondTable {
+    fn into_bond(self) -> Bond {
+        let usual = Bond::of_dots(self.grid, self.diameter_m);
+        Bond {
+            sheet_conductance_s: self.sheet_conductance_s.unwrap_or(usual.sheet_conductance_s),
+            contact_impedance_ohm_m2: self.contact_impedance_ohm_m2.unwrap_or(usual.contact_impedance_ohm_m2),
+            ..usual
         }
     }
 }
