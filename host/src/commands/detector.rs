@@ -97,9 +97,12 @@ fn table(list: &List) -> String {
         let [conductivity, elasticity] = [*conductivity_s_per_m, elasticity_pa * 1e-6].map(short);
         format!("{letter}  {product:<22} {conductivity:>9} S/m {elasticity:>6} MPa")
     });
-    let mut lines = vec!["detectors, in foam A:".to_owned()];
+    let mut lines = vec!["detectors, in foam A or in the foams of their name:".to_owned()];
     lines.extend(detectors);
-    lines.push("\nfoams for --material, alone or stacked with the upper one first, as in BC:".to_owned());
+    lines.push(
+        "\nfoams for --material, alone or stacked with the upper one first, as in BC, or joined by dots, as in BC-5x5:"
+            .to_owned(),
+    );
     lines.extend(foams);
     lines.join("\n")
 }
@@ -125,7 +128,10 @@ fn show(args: ShowArgs) -> anyhow::Result<()> {
 fn description(detector: &Detector) -> String {
     let mut lines = vec![format!("{}: {}", detector.name, detector.summary())];
     lines.push("layers, the top one first:".to_owned());
-    lines.extend(detector.layers.iter().rev().map(|layer| format!("  {}", layer.summary())));
+    for layer in detector.layers.iter().rev() {
+        lines.push(format!("  {}", layer.summary()));
+        lines.extend(layer.bond.map(|bond| format!("  - {} of glue", bond.summary())));
+    }
     lines.extend(detector.facts().into_iter().map(|(what, value)| format!("{what}: {value}")));
     let axes = if detector.surface.is_some() { 3 } else { 2 };
     lines.push(format!("electrodes, {} in mm from the middle:", ["x and y", "x, y and z"][axes - 2]));

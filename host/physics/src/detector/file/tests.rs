@@ -2,6 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::detector::Electrode;
+use crate::detector::Layer;
 use crate::space;
 
 const DOCUMENTATION: &str = include_str!("../../../../../docs/detector.md");

@@ -18,6 +18,7 @@ mod pads;
 mod quadrature;
 mod spline;
 mod spots;
+mod stacks;
 #[cfg(test)]
 mod tests;
 mod uneven;
@@ -34,10 +35,11 @@ use self::bond::{Dots, Stacks};
 use self::check::check;
 use self::disc::{DiscBasis, MAX_DEGREE};
 use self::driving::Covered;
-use self::green::{Surface, SurfaceGreen};
+use self::green::SurfaceGreen;
 use self::image::{CellFields, ImageGrid};
 use self::pads::{PadFields, PadPoints};
 use self::spots::SlabSpots;
+use self::stacks::{bottom_surface, split_m, stacks, top_surface, widest_m};
 use self::uneven::Uneven;
 pub(super) use self::uneven::UnevenPlace;
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
@@ -49,9 +51,6 @@ use crate::scene::Contact;
 
 /// Nodes of the image unless said otherwise, about.
 const IMAGE_NODES: usize = 2000;
-
-/// The kernels' split length is at least this share of a pad's radius.
-const SPLIT_IN_PAD: f64 = 1.0;
 
 /// How finely a [`Slab`] is resolved: degrees of the polynomials that current densities are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,12 +67,12 @@ pub struct Resolution {
 
 impl Resolution {
     /// Enough for readings within a few tenths of a per cent: against reference readings, one degree more changes nothing.
-    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2, dot_degree: 2, uneven_modes: 10 };
+    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2, dot_degree: 3, uneven_modes: 10 };
     /// For how readings change from one detector to another: on `square-60` changes are off by up to 3 % of themselves, those with a pad's own
     /// impedance by a sixth.
-    const COARSE: Self = Self { pad_degree: 1, contact_degree: 2, dot_degree: 1, uneven_modes: 8 };
+    const COARSE: Self = Self { pad_degree: 1, contact_degree: 2, dot_degree: 2, uneven_modes: 8 };
     /// Finer than any solver needs.
-    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, dot_degree: 3, uneven_modes: 16 };
+    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, dot_degree: 4, uneven_modes: 16 };
 }
 
 /// A rectangular detector, layered in depth.
@@ -100,8 +99,6 @@ pub struct Slab {
 #[derive(Clone, Debug)]
 struct Bonded {
     dots: Arc<Dots>,
-    /// The first layer above the dots.
-    above: usize,
     /// Of the layers below the dots.
     uneven: Option<Arc<Uneven>>,
 }
@@ -171,11 +168,10 @@ impl Slab {
         let uneven = |stack: Covered<'_>| {
             Uneven::new(size_m, &detector.unevenness, stack.layers(), resolution.uneven_modes).map(Arc::new)
         };
-        let bonded = bond.map(|(above, bond)| {
+        let bonded = bond.map(|(_, bond)| {
             let dots = || Dots::new(bond, resolution.dot_degree, stacks, &mut planner).into();
             let bonded = |like: &'_ Self| like.bonded.clone();
             Bonded {
-                above,
                 dots: as_even.and_then(bonded).map_or_else(dots, |bonded| Arc::clone(&bonded.dots)),
                 uneven: as_uneven.and_then(bonded).map_or_else(|| uneven(lower), |bonded| bonded.uneven.clone()),
             }
@@ -364,46 +360,6 @@ impl ForwardModel for Slab {
 /// A place from the corner, given from the middle (m).
 fn from_corner(size_m: [f64; 2], at_m: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|axis| at_m[axis] + size_m[axis] / 2.0)
-}
-
-/// The layers below dots of glue and those above, with what lies on them; without dots all of them, twice.
-fn stacks(detector: &Detector, size_m: [f64; 2], driving: DrivingLayer) -> [Covered<'_>; 2] {
-    match detector.bond() {
-        None => [Covered::new(&detector.layers, size_m, driving); 2],
-        Some((above, _)) => {
-            let (lower, upper) = detector.layers.split_at(above);
-            [Covered::new(lower, size_m, DrivingLayer::default()), Covered::new(upper, size_m, driving)]
-        }
-    }
-}
-
-/// Radius of the widest pad (m).
-fn widest_m(detector: &Detector) -> f64 {
-    detector.electrodes.iter().map(|pad| pad.radius_m).fold(0.0, f64::max)
-}
-
-/// Length at which the kernels of layers with discs of up to a radius are split: short enough that the near part fades within a few thicknesses,
-/// long enough that the tables stay small, and that what bends the current on a disc is in the near part, which is resolved to high orders there.
-fn split_m(thickness_m: f64, size_m: [f64; 2], widest_m: f64) -> f64 {
-    (0.6 * thickness_m).min(0.05 * size_m[0].max(size_m[1])).max(SPLIT_IN_PAD * widest_m)
-}
-
-fn top_surface<'a>(covered: Covered<'a>) -> Surface<impl Fn(f64) -> f64 + use<'a>> {
-    Surface {
-        response: move |k| covered.response(k).tt,
-        floating: covered.floating().tt,
-        sheet_s: covered.gap_sheet_s(),
-        sigma: covered.layers().last().map_or(0.0, |layer| layer.top_s_per_m),
-    }
-}
-
-fn bottom_surface<'a>(covered: Covered<'a>) -> Surface<impl Fn(f64) -> f64 + use<'a>> {
-    Surface {
-        response: move |k| covered.response(k).bb,
-        floating: covered.floating().bb,
-        sheet_s: covered.sheet_s(),
-        sigma: covered.layers().first().map_or(0.0, |layer| layer.bottom_s_per_m),
-    }
 }
 
 impl Image {

@@ -144,17 +144,7 @@ fn between_points(
     images: &[super::green::Image],
     same: bool,
 ) -> DMatrix<f64> {
-    let value = |a: [f64; 2], b: [f64; 2]| {
-        let near: f64 = images
-            .iter()
-            .filter(|image| !(same && image.in_place()))
-            .map(|image| {
-                let at = image.of(b);
-                kernel.near_ohm(((a[0] - at[0]).powi(2) + (a[1] - at[1]).powi(2)).sqrt())
-            })
-            .sum();
-        kernel.smooth_ohm(a, b) + near
-    };
+    let value = |a: [f64; 2], b: [f64; 2]| kernel.smooth_ohm(a, b) + kernel.images_ohm(images, same, a, b);
     let mut points = DMatrix::zeros(nodes.len(), other_nodes.len());
     for (j, &b) in other_nodes.iter().enumerate() {
         let first = if same { j } else { 0 };

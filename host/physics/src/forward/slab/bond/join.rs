@@ -260,12 +260,17 @@ fn solve_lower(factor: &DMatrix<f64>, first: usize, right: &mut DMatrix<f64>) {
 fn compressed(rows: &DMatrix<f64>) -> DMatrix<f64> {
     let (count, columns) = rows.shape();
     let mut left: Vec<f64> = rows.column_iter().map(|column| column.norm_squared()).collect();
-    let end = NEGLIGIBLE * left.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let largest = left.iter().fold(0.0, |a: f64, b| a.max(*b));
+    let end = NEGLIGIBLE * largest;
+    // Columns whose products with any other are less than that are left out whole.
+    let kept: Vec<_> = (0..columns).filter(|column| left[*column] > NEGLIGIBLE * end).collect();
+    let rows = &rows.select_columns(&kept);
+    left = kept.iter().map(|column| left[*column]).collect();
     // A factor row after row, one for each pivot, stored by columns of the transpose.
-    let mut factor = DMatrix::zeros(columns, count);
+    let mut factor = DMatrix::zeros(kept.len(), count);
     let mut rank = 0;
     while rank < count {
-        let pivot = (0..columns).max_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
+        let pivot = (0..kept.len()).max_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
         if left[pivot] <= end {
             break;
         }
@@ -277,7 +282,11 @@ fn compressed(rows: &DMatrix<f64>) -> DMatrix<f64> {
         factor.set_column(rank, &row);
         rank += 1;
     }
-    factor.columns(0, rank).transpose()
+    let mut few = DMatrix::zeros(rank, columns);
+    kept.iter()
+        .enumerate()
+        .for_each(|(i, column)| few.column_mut(*column).tr_copy_from(&factor.view((i, 0), (1, rank))));
+    few
 }
 
 #[cfg(test)]

@@ -35,11 +35,14 @@ use self::glue::{Glue, Joint};
 pub(super) use self::join::Stacks;
 use super::disc::{DiscBasis, DiscSelf};
 use super::driving::Covered;
-use super::green::SurfaceGreen;
-use super::pads::between;
+use super::from_corner;
+use super::green::{Image, SurfaceGreen};
+use super::stacks::{bottom_surface, split_m, top_surface};
 use super::uneven::UnevenPlace;
-use super::{bottom_surface, from_corner, split_m, top_surface};
 use crate::detector::Bond;
+
+/// Distances of two dots' middles, in radii, up to which the near part between them has the points of a basis of so many degrees more.
+const MORE_DEGREES: [(f64, usize); 3] = [(2.06, 6), (2.3, 4), (2.7, 2)];
 
 /// The dots of a slab, with the impedances between them on each of the stacks alone.
 #[derive(Clone, Debug)]
@@ -127,15 +130,33 @@ fn between_dots(kernel: &SurfaceGreen, basis: &DiscBasis, centres_m: &[[f64; 2]]
     let mut all = DMatrix::zeros(centres_m.len() * size, centres_m.len() * size);
     for (d, at_m) in centres_m.iter().enumerate() {
         for (e, other_m) in centres_m[..=d].iter().enumerate() {
-            let apart_m = (at_m[0] - other_m[0]).hypot(at_m[1] - other_m[1]);
-            let degree = if d == e { basis.degree() } else { basis.degree_seen_from(radius_m / apart_m) };
-            let seen = DiscBasis::of_degree(degree);
-            let [nodes, other_nodes] = [at_m, other_m].map(|centre_m| seen.nodes_m(*centre_m, radius_m));
-            let images = kernel.images(*at_m, *other_m, 2.0 * radius_m);
-            let block = between(seen, &nodes, seen, &other_nodes, kernel, &images, d == e);
+            let block = between_two(kernel, basis, [*at_m, *other_m], radius_m);
             all.view_mut((d * size, e * size), block.shape()).copy_from(&block);
             all.view_mut((e * size, d * size), block.shape()).tr_copy_from(&block);
         }
     }
     all
+}
+
+/// The same between two dots, or of one with its mirror images, up to the degree that they see of each other. Near dots have more points for
+/// the near part of the kernel, which is steep between their rims.
+fn between_two(kernel: &SurfaceGreen, basis: &DiscBasis, centres_m: [[f64; 2]; 2], radius_m: f64) -> DMatrix<f64> {
+    let [at_m, other_m] = centres_m;
+    let same = at_m == other_m;
+    let images = kernel.images(at_m, other_m, 2.0 * radius_m);
+    let apart = |image: &Image| (at_m[0] - image.of(other_m)[0]).hypot(at_m[1] - image.of(other_m)[1]) / radius_m;
+    let nearest = images.iter().map(apart).filter(|apart| *apart > 0.0).fold(f64::INFINITY, f64::min);
+    let degree = if same { basis.degree() } else { basis.degree_seen_from(1.0 / nearest) };
+    let part = |degree: usize, value: &dyn Fn([f64; 2], [f64; 2]) -> f64| {
+        let fine = DiscBasis::of_degree(degree);
+        let [nodes, others] = centres_m.map(|centre_m| fine.nodes_m(centre_m, radius_m));
+        let points = DMatrix::from_fn(nodes.len(), others.len(), |i, j| value(nodes[i], others[j]));
+        fine.weights() * points * fine.weights().transpose()
+    };
+    let kept = DiscBasis::of_degree(degree).len();
+    let smooth = part(degree, &|a, b| kernel.smooth_ohm(a, b));
+    let more = MORE_DEGREES.into_iter().find(|(within, _)| nearest < *within).map_or(0, |(_, more)| more);
+    // The densities of a lower degree are the first of those of a higher one.
+    let near = part(degree + more, &|a, b| kernel.images_ohm(&images, same, a, b));
+    smooth + near.view((0, 0), (kept, kept))
 }
