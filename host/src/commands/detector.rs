@@ -47,7 +47,7 @@ struct ShowArgs {
     /// Name of a preset, or a TOML file
     #[arg(value_name = "NAME|FILE", value_parser = choice::detector, default_value = Detector::DEFAULT)]
     detector: Chosen,
-    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC
+    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC or, joined by dots of glue, BB-5x5
     #[arg(long, value_name = "A..D|STACK")]
     material: Option<Stack>,
     #[command(flatten)]
@@ -128,10 +128,7 @@ fn show(args: ShowArgs) -> anyhow::Result<()> {
 fn description(detector: &Detector) -> String {
     let mut lines = vec![format!("{}: {}", detector.name, detector.summary())];
     lines.push("layers, the top one first:".to_owned());
-    for layer in detector.layers.iter().rev() {
-        lines.push(format!("  {}", layer.summary()));
-        lines.extend(layer.bond.map(|bond| format!("  - {} of glue", bond.summary())));
-    }
+    lines.extend(detector.layers.iter().rev().map(|layer| format!("  {}", layer.summary())));
     lines.extend(detector.facts().into_iter().map(|(what, value)| format!("{what}: {value}")));
     let axes = if detector.surface.is_some() { 3 } else { 2 };
     lines.push(format!("electrodes, {} in mm from the middle:", ["x and y", "x, y and z"][axes - 2]));
