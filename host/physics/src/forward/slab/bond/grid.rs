@@ -108,7 +108,7 @@ impl Cubes<'_> {
     }
 
     fn are_neighbours(&self, index: usize, next: usize) -> bool {
-        next != index + 1 || next % self.along[0] != 0
+        next != index + 1 || !next.is_multiple_of(self.along[0])
     }
 
     /// A plane of nodes, joined along it by a conductance between neighbours; 0 stands for none.

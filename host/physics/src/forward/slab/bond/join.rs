@@ -107,7 +107,7 @@ impl Stacks<'_> {
         let [on_lower, on_upper] = self.places();
         let lower = self.dots.lower.uneven_ohm(on_lower.as_deref());
         let upper = self.dots.upper.uneven_ohm(on_upper.as_deref());
-        let to_pads = self.from_pads(on_lower.as_deref());
+        let to_dots = self.pads_to_dots(on_lower.as_deref());
         let count = self.first_seen() + self.dots.len() * size;
         let mut all = DMatrix::zeros(count, count);
         all.view_mut((0, 0), pads_ohm.shape()).copy_from(pads_ohm);
@@ -116,8 +116,8 @@ impl Stacks<'_> {
         for column in 0..lower.ncols() {
             let to = self.on_lower_face(column);
             for pad in 0..pads_ohm.nrows() {
-                all[(pad, to)] = to_pads[(pad, column)];
-                all[(to, pad)] = to_pads[(pad, column)];
+                all[(pad, to)] = to_dots[(pad, column)];
+                all[(to, pad)] = to_dots[(pad, column)];
             }
             (0..lower.nrows()).for_each(|row| all[(self.on_lower_face(row), to)] += lower[(row, column)]);
         }
@@ -135,7 +135,7 @@ impl Stacks<'_> {
     }
 
     /// Impedances between densities of the pads and those on the dots' lower faces (ohm).
-    fn from_pads(&self, places: Option<&[UnevenPlace]>) -> DMatrix<f64> {
+    fn pads_to_dots(&self, places: Option<&[UnevenPlace]>) -> DMatrix<f64> {
         let [covered, _] = self.covered;
         let grid = table_grid(&covered, smallest_m(self.pads).min(self.dots.radius_m()));
         let modes = modes(&covered, &grid);

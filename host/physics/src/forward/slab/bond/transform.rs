@@ -23,7 +23,7 @@ pub(super) fn means(
     for (disc, centre_m) in centres_m.iter().enumerate() {
         let waves = [0, 1].map(|axis| -> Vec<[f64; 2]> {
             let wave = |mode| (grid.wave_number(axis, mode) * centre_m[axis]).sin_cos();
-            (0..=grid.modes(axis)).map(|mode| wave(mode)).map(|(sin, cos)| [cos, sin]).collect()
+            (0..=grid.modes(axis)).map(wave).map(|(sin, cos)| [cos, sin]).collect()
         });
         for (d, density) in basis.densities().iter().enumerate() {
             // Of x and y, whether the sine is left: odd orders turn one of them, the density's sine both.
