@@ -109,7 +109,8 @@ mod tests {
 
     #[test]
     fn dots_that_cannot_be_are_refused_with_their_line() {
-        let error = |from: &str, to: &str| Detector::from_toml(&FILE.replace(from, to), "").unwrap_err().to_string();
+        let error =
+            |from: &str, to: &str| Detector::from_toml(&FILE.replace(from, to), "glued").unwrap_err().to_string();
         assert!(
             error("0.007", "0.0151")
                 .starts_with("line 11: layers[1].bond.diameter_m is 0.0151, which makes the dots overlap")
@@ -118,7 +119,7 @@ mod tests {
         assert!(error("diameter_m = 0.007", "radius_m = 0.003").contains("radius_m"));
         let below =
             FILE.replacen("material = \"B\"", "material = \"B\"\nbond = { grid = [5, 5], diameter_m = 0.003 }", 1);
-        let below = Detector::from_toml(&below, "").unwrap_err().to_string();
+        let below = Detector::from_toml(&below, "glued").unwrap_err().to_string();
         assert!(below.starts_with("line 6: layers[0].bond joins a layer to the one below"), "{below}");
     }
 }
