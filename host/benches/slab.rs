@@ -17,6 +17,11 @@ fn slab() -> Slab {
     Slab::new(&detector()).unwrap_or_else(|error| unreachable!("{error}"))
 }
 
+fn bonded(preset: &str) -> Slab {
+    let detector = Detector::preset(preset).unwrap_or_else(|| unreachable!("{preset} is a preset"));
+    Slab::new(&detector).unwrap_or_else(|error| unreachable!("{error}"))
+}
+
 /// Contacts of 2 mm radius in a row across the detector.
 fn contacts(count: usize) -> Vec<Contact> {
     let place = |i: usize| 0.05 * ((i as f64 + 0.5) / count as f64 - 0.5);
@@ -42,4 +47,17 @@ fn image(bencher: Bencher, nodes: usize) {
     let slab = slab().on_image(nodes);
     let image_s = vec![1e-5; slab.image_mesh().nodes_m.len()];
     bencher.bench(|| slab.image_fields(&image_s).map(|fields| readings_v(&fields.impedance_ohm, slab.detector())));
+}
+
+/// All fields of two layers joined by dots of glue, ready to solve with.
+#[divan::bench(args = ["BB-5x5", "BB-7x7"])]
+fn fields_of_bonded(bencher: Bencher, preset: &str) {
+    bencher.bench(|| bonded(preset));
+}
+
+/// Readings for a number of contacts on a detector of 49 dots.
+#[divan::bench(args = [1, 2, 5])]
+fn readings_of_bonded(bencher: Bencher, count: usize) {
+    let (slab, contacts) = (bonded("BB-7x7"), contacts(count));
+    bencher.bench(|| slab.impedance_ohm(&contacts).map(|z| readings_v(&z, slab.detector())));
 }

@@ -36,7 +36,7 @@ fn main() -> Result<(), ForwardError> {
 fn error(thickness_m: f64, ratio: f64, pad_degree: usize) -> Result<f64, ForwardError> {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap_or_else(|| unreachable!("the default is a preset"));
     let [bottom_s_per_m, top_s_per_m] = [-0.5, 0.5].map(|power| CONDUCTIVITY_S_PER_M * ratio.powf(power));
-    detector.layers = vec![Layer { thickness_m, bottom_s_per_m, top_s_per_m }];
+    detector.layers = vec![Layer::graded(thickness_m, [bottom_s_per_m, top_s_per_m])];
     let slab = Slab::with_resolution(&detector, Resolution { pad_degree, ..Resolution::FINE })?;
     let shell = Shell::with_nodes(&detector, 10_000)?;
     let conductance_s = 0.3 * detector.sheet_conductance_s();

@@ -58,7 +58,7 @@ pub struct DetectorArgs {
     /// Detector: name of a preset, or a TOML file; unless given, that of the recording that is read, or square-60
     #[arg(long, value_name = "NAME|FILE", value_parser = detector)]
     pub detector: Option<Chosen>,
-    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC
+    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC or, joined by dots of glue, BB-5x5
     #[arg(long, value_name = "A..D|STACK")]
     pub material: Option<Stack>,
 }

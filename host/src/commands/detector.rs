@@ -47,7 +47,7 @@ struct ShowArgs {
     /// Name of a preset, or a TOML file
     #[arg(value_name = "NAME|FILE", value_parser = choice::detector, default_value = Detector::DEFAULT)]
     detector: Chosen,
-    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC
+    /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC or, joined by dots of glue, BB-5x5
     #[arg(long, value_name = "A..D|STACK")]
     material: Option<Stack>,
     #[command(flatten)]
@@ -97,9 +97,12 @@ fn table(list: &List) -> String {
         let [conductivity, elasticity] = [*conductivity_s_per_m, elasticity_pa * 1e-6].map(short);
         format!("{letter}  {product:<22} {conductivity:>9} S/m {elasticity:>6} MPa")
     });
-    let mut lines = vec!["detectors, in foam A:".to_owned()];
+    let mut lines = vec!["detectors, in foam A or in the foams of their name:".to_owned()];
     lines.extend(detectors);
-    lines.push("\nfoams for --material, alone or stacked with the upper one first, as in BC:".to_owned());
+    lines.push(
+        "\nfoams for --material, alone or stacked with the upper one first, as in BC, or joined by dots, as in BC-5x5:"
+            .to_owned(),
+    );
     lines.extend(foams);
     lines.join("\n")
 }

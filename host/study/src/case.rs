@@ -219,7 +219,7 @@ impl Conductivity {
         let uniform = |layer: LayerShare| Layer::uniform(layer.thickness_share * thickness_m, layer.conductivity);
         match self.kind {
             Kind::Layers => self.layers.into_iter().map(uniform).collect(),
-            Kind::Gradient => vec![Layer { thickness_m, bottom_s_per_m: self.bottom, top_s_per_m: self.top }],
+            Kind::Gradient => vec![Layer::graded(thickness_m, [self.bottom, self.top])],
         }
     }
 }
@@ -288,7 +288,7 @@ mod tests {
         let end = TWO_ELECTRODES.find("]},").unwrap_or_default() + 2;
         let gradient = r#"{"kind": "gradient", "bottom": 1.0, "top": 0.01}"#;
         let case = parse(&format!("{}{gradient}{}", &TWO_ELECTRODES[..start], &TWO_ELECTRODES[end..]))?;
-        assert_eq!(case.detector.layers, [Layer { thickness_m: 0.01, bottom_s_per_m: 1.0, top_s_per_m: 0.01 }]);
+        assert_eq!(case.detector.layers, [Layer::graded(0.01, [1.0, 0.01])]);
         Ok(())
     }
 

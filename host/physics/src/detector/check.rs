@@ -83,7 +83,8 @@ impl Detector {
             let what = format!("has {} layers, but has to have 1 to {MAX_LAYERS}", self.layers.len());
             return Err(Problem::new("layers", what));
         }
-        self.layers.iter().enumerate().try_for_each(|(index, layer)| layer.check(&format!("layers[{index}]")))
+        self.layers.iter().enumerate().try_for_each(|(index, layer)| layer.check(&format!("layers[{index}]")))?;
+        self.check_bond()
     }
 
     fn check_calibration(&self) -> Result<(), Problem> {

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod electrodes;
+mod layers;
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -13,10 +14,10 @@ use toml::de::{DeTable, DeValue};
 
 use self::calibration::CalibrationTable;
 use self::electrodes::ElectrodeTable;
+use self::layers::LayerTable;
 use super::check::{LENGTH_M, Problem, within};
-use super::material::Foam;
 use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
-use super::{Adc, Correction, Detector, ForceLaw, Layer, Outline, Surface, SurfaceError, Tolerances, Unevenness};
+use super::{Adc, Correction, Detector, ForceLaw, Outline, Surface, SurfaceError, Tolerances, Unevenness};
 use crate::geometry::area;
 
 /// No detector's file is longer (bytes).
@@ -91,16 +92,6 @@ struct OutlineTable {
     corners_m: Option<Vec<[f64; 2]>>,
     #[serde(default)]
     holes_m: Vec<Vec<[f64; 2]>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct LayerTable {
-    thickness_m: f64,
-    material: Option<String>,
-    conductivity_s_per_m: Option<f64>,
-    bottom_s_per_m: Option<f64>,
-    top_s_per_m: Option<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -256,16 +247,6 @@ impl Outline {
     }
 }
 
-impl Layer {
-    fn write_toml(&self, text: &mut String) -> std::fmt::Result {
-        writeln!(text, "\n[[layers]]\nthickness_m = {:?}", self.thickness_m)?;
-        if self.bottom_s_per_m == self.top_s_per_m {
-            return writeln!(text, "conductivity_s_per_m = {:?}", self.bottom_s_per_m);
-        }
-        writeln!(text, "bottom_s_per_m = {:?}\ntop_s_per_m = {:?}", self.bottom_s_per_m, self.top_s_per_m)
-    }
-}
-
 impl Document {
     fn into_detector(self, read_surface: &ReadSurface, name: &str) -> Result<Detector, Problem> {
         let (outline, surface, shift_m) = match (self.outline, self.surface) {
@@ -324,28 +305,6 @@ impl OutlineTable {
     }
 }
 
-impl LayerTable {
-    fn into_layer(self, field: &str) -> Result<Layer, Problem> {
-        let Self { thickness_m, material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m } = self;
-        match (material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m) {
-            (Some(material), None, None, None) => {
-                let foam = single(&material).and_then(Foam::of);
-                let what = || format!("is {}, but has to be \"A\", \"B\", \"C\" or \"D\"", quoted(&material));
-                let foam = foam.ok_or_else(|| Problem::new(format!("{field}.material"), what()))?;
-                Ok(Layer::uniform(thickness_m, foam.conductivity_s_per_m))
-            }
-            (None, Some(conductivity), None, None) => Ok(Layer::uniform(thickness_m, conductivity)),
-            (None, None, Some(bottom), Some(top)) => {
-                Ok(Layer { thickness_m, bottom_s_per_m: bottom, top_s_per_m: top })
-            }
-            _ => Err(Problem::new(
-                field,
-                "has to have one of material, conductivity_s_per_m, or bottom_s_per_m with top_s_per_m",
-            )),
-        }
-    }
-}
-
 impl AdcTable {
     fn into_adc(self) -> Adc {
         let usual = Adc::default();
@@ -372,12 +331,6 @@ fn read_text(path: &Path) -> io::Result<String> {
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, "it is longer than 1 MiB"));
     }
     Ok(text)
-}
-
-/// The only character of a text.
-fn single(text: &str) -> Option<char> {
-    let mut characters = text.chars();
-    characters.next().filter(|_| characters.next().is_none())
 }
 
 /// A basic string of TOML.

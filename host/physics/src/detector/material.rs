@@ -2,7 +2,8 @@
 
 use std::str::FromStr;
 
-use super::{Detector, Layer};
+use super::bond::DOT_DIAMETER_M;
+use super::{Bond, Detector, Layer};
 
 /// Letters that a stack may have.
 const MAX_LETTERS: usize = 8;
@@ -34,6 +35,8 @@ pub struct Stack {
     name: String,
     /// Bottom first.
     foams: Vec<Foam>,
+    /// What joins the two, if they do not touch all over.
+    bond: Option<Bond>,
 }
 
 impl Foam {
@@ -54,22 +57,37 @@ impl FromStr for Stack {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let foams: Option<Vec<Foam>> = name.chars().rev().map(Foam::of).collect();
-        foams
-            .filter(|foams| (1..=MAX_LETTERS).contains(&foams.len()))
-            .map(|foams| Self { name: name.to_owned(), foams })
-            .ok_or_else(|| {
-                format!("a foam A, B, C or D is needed, or up to {MAX_LETTERS} of them as in BA, the upper one first")
-            })
+        let (letters, dots) = match name.split_once('-') {
+            Some((letters, dots)) => (letters, Some(dots)),
+            None => (name, None),
+        };
+        let foams: Option<Vec<Foam>> = letters.chars().rev().map(Foam::of).collect();
+        let foams = foams.filter(|foams| (1..=MAX_LETTERS).contains(&foams.len())).ok_or_else(|| {
+            format!(
+                "a foam A, B, C or D is needed, or up to {MAX_LETTERS} of them as in BA, the upper one first, or two that are joined by \
+                 dots of glue as in BB-5x5"
+            )
+        })?;
+        let bond = dots.map(|dots| bond(dots, foams.len())).transpose()?;
+        Ok(Self { name: name.to_owned(), foams, bond })
     }
+}
+
+/// The paper's dots in columns and rows as in `5x5`.
+fn bond(dots: &str, foams: usize) -> Result<Bond, String> {
+    let grid = dots.split_once('x').and_then(|(columns, rows)| Some([columns.parse().ok()?, rows.parse().ok()?]));
+    let grid = grid.filter(|_| foams == 2);
+    let wrong = || format!("`-{dots}` has to follow two foams and be columns and rows of dots, as in BB-5x5");
+    grid.map(|grid| Bond::of_dots(grid, DOT_DIAMETER_M)).ok_or_else(wrong)
 }
 
 impl Detector {
     /// This detector in another material, with no law of force and no correction: those were another material's. A stack of as many foams as there are layers keeps each layer's thickness; on a
-    /// single layer, each foam has that layer's thickness, as the paper's stacks do.
+    /// single layer, each foam has that layer's thickness, as the paper's stacks do. Layers that are joined by dots stay so, unless the stack has
+    /// dots of its own.
     ///
     /// # Errors
-    /// What does not fit, if there are several layers but another number of foams.
+    /// What does not fit, if there are several layers but another number of foams, or dots that have no room.
     pub fn in_material(mut self, stack: &Stack) -> Result<Self, String> {
         let (layers, foams) = (self.layers.len(), stack.foams.len());
         if layers != 1 && layers != foams {
@@ -79,8 +97,13 @@ impl Detector {
             ));
         }
         let thickness_m = |index: usize| self.layers[index.min(layers - 1)].thickness_m;
-        let layer = |(index, foam): (usize, &Foam)| Layer::uniform(thickness_m(index), foam.conductivity_s_per_m);
+        let own_bond = |index: usize| self.layers.get(index).and_then(|layer| layer.bond);
+        let layer = |(index, foam): (usize, &Foam)| Layer {
+            bond: stack.bond.filter(|_| index == 1).or(own_bond(index)),
+            ..Layer::uniform(thickness_m(index), foam.conductivity_s_per_m)
+        };
         self.layers = stack.foams.iter().enumerate().map(layer).collect();
+        self.check_bond().map_err(|problem| format!("material {} on {}: {problem}", stack.name, self.name))?;
         self.name = format!("{} in {}", self.name, stack.name);
         (self.force, self.correction) = (None, None);
         Ok(self)
@@ -114,8 +137,22 @@ mod tests {
 
     #[test]
     fn other_letters_are_refused() {
-        for wrong in ["", "E", "a", "AE", "ABCDABCDA", "BB-5x5"] {
+        for wrong in ["", "E", "a", "AE", "ABCDABCDA", "-5x5"] {
             assert!(wrong.parse::<Stack>().is_err_and(|what| what.contains("A, B, C or D")), "{wrong}");
         }
+        for wrong in ["BB-", "BB-5", "BB-5x", "BB-5x-5", "B-5x5", "BBB-5x5"] {
+            assert!(wrong.parse::<Stack>().is_err_and(|what| what.contains("as in BB-5x5")), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn two_letters_may_be_joined_by_dots() {
+        let detector = in_material("AD-7x6");
+        assert_eq!(detector.layers[0], Layer::uniform(0.005, 0.008));
+        assert_eq!(detector.bond(), Some((1, Bond::of_dots([7, 6], 0.00722))));
+        let other = detector.in_material(&"BC".parse().unwrap()).unwrap();
+        assert_eq!(other.bond(), Some((1, Bond::of_dots([7, 6], 0.00722))), "another foam, the same glue");
+        let small = Detector::preset("fingertip-10").unwrap().in_material(&"BB-5x5".parse().unwrap());
+        assert!(small.is_err_and(|what| what.contains("makes the dots overlap")));
     }
 }

@@ -1,5 +1,6 @@
 //! What a detector is: outline, layers, electrodes, and how it is measured.
 
+mod bond;
 mod calibration;
 mod check;
 mod correction;
@@ -13,6 +14,7 @@ mod svg;
 mod tolerances;
 mod uneven;
 
+pub use self::bond::Bond;
 pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
 pub use self::check::{ELECTRODES, Problem};
 pub use self::correction::{ConductanceErrors, Correction, PlaceErrors};
@@ -86,6 +88,9 @@ pub struct Layer {
     pub bottom_s_per_m: f64,
     /// Conductivity at its top (S/m).
     pub top_s_per_m: f64,
+    /// What joins it to the layer below, if the two do not touch all over.
+    #[serde(default)]
+    pub bond: Option<Bond>,
 }
 
 /// A round pad under the layer.
@@ -219,8 +224,13 @@ impl Electrode {
 
 impl Layer {
     /// A layer of one conductivity.
-    pub fn uniform(thickness_m: f64, conductivity_s_per_m: f64) -> Self {
-        Self { thickness_m, bottom_s_per_m: conductivity_s_per_m, top_s_per_m: conductivity_s_per_m }
+    pub const fn uniform(thickness_m: f64, conductivity_s_per_m: f64) -> Self {
+        Self::graded(thickness_m, [conductivity_s_per_m; 2])
+    }
+
+    /// A layer with a conductivity at its bottom and one at its top (S/m).
+    pub const fn graded(thickness_m: f64, [bottom_s_per_m, top_s_per_m]: [f64; 2]) -> Self {
+        Self { thickness_m, bottom_s_per_m, top_s_per_m, bond: None }
     }
 
     /// Integral of the conductivity over the thickness (S): thickness times the logarithmic mean of bottom and top.

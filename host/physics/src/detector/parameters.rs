@@ -231,7 +231,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn layered() -> Detector {
-        let lower = Layer { thickness_m: 0.002, bottom_s_per_m: 0.4, top_s_per_m: 0.1 };
+        let lower = Layer::graded(0.002, [0.4, 0.1]);
         Detector { layers: vec![lower, Layer::uniform(0.003, 0.2273)], ..Detector::default() }
     }
 

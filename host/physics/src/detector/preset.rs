@@ -10,6 +10,9 @@ pub(super) const DRIVE_V: f64 = 2.0;
 /// On-resistance where none is given: the ADG726's (ohm).
 pub(super) const ON_RESISTANCE_OHM: f64 = 4.0;
 
+/// The paper's stacks of two foams on the default preset, joined by dots of glue.
+const BONDED: [&str; 2] = ["BB-5x5", "BB-7x7"];
+
 /// Name, width, height, thickness (m), columns and rows of electrodes, their diameter (m).
 type Row = (&'static str, f64, f64, f64, usize, usize, f64);
 
@@ -29,11 +32,15 @@ impl Detector {
 
     /// Names of all presets.
     pub fn preset_names() -> impl Iterator<Item = &'static str> {
-        ROWS.iter().map(|row| row.0)
+        ROWS.iter().map(|row| row.0).chain(BONDED)
     }
 
-    /// A detector of the paper in sample A, or `None` if there is none of that name.
+    /// A detector of the paper in sample A, or in the foams of its name; `None` if there is none of that name.
     pub fn preset(name: &str) -> Option<Self> {
+        if BONDED.contains(&name) {
+            let stacked = Self::default().in_material(&name.parse().ok()?).ok()?;
+            return Some(Self { name: name.to_owned(), ..stacked });
+        }
         ROWS.iter().find(|row| row.0 == name).map(Self::of)
     }
 

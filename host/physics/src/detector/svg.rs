@@ -25,7 +25,7 @@ const MOST_FACETS: usize = 4000;
 const STYLE: &str = ".facet { stroke: #4b4653; stroke-opacity: 0.25; fill: none } text { font: 12px -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif; \
     fill: #1d1b22 } .title { font-size: 19px; font-weight: 650 } .muted { fill: #66626e } .middle { text-anchor: middle } \
     .end { text-anchor: end } .pad { fill: #1d1b22 } .on { fill: #ffffff; font-weight: 600 } \
-    .axis { stroke: #8b8793; fill: none } .edge { stroke: #4b4653; stroke-width: 1.5; stroke-linejoin: round }";
+    .dot { stroke: #4b4653; stroke-dasharray: 3 3; fill: none } .axis { stroke: #8b8793; fill: none } .edge { stroke: #4b4653; stroke-width: 1.5; stroke-linejoin: round }";
 
 impl Detector {
     /// A picture of it (SVG): outline, electrodes with the numbers of their channels, axes in millimetres, layers.
@@ -87,6 +87,7 @@ impl<'a> Picture<'a> {
         self.write_outline(out)?;
         self.write_facets(out)?;
         self.write_electrodes(out)?;
+        self.write_dots(out)?;
         self.write_axes(out)?;
         self.write_section(out)?;
         self.write_facts(out)?;
@@ -132,6 +133,16 @@ impl<'a> Picture<'a> {
             let (class, x, y) =
                 if radius >= NUMBERED_PX { ("on middle", x, y + 4.2) } else { ("", x + radius + 2.0, y - radius) };
             writeln!(out, r#"<text class="{class}" x="{x:.1}" y="{y:.1}">{channel}</text>"#)?;
+        }
+        Ok(())
+    }
+
+    /// Outlines of the dots of glue between two layers.
+    fn write_dots(&self, out: &mut String) -> fmt::Result {
+        let Some((_, bond)) = self.detector.bond() else { return Ok(()) };
+        for [x_m, y_m] in bond.centres_m(self.size_m) {
+            let (x, y, radius) = (self.x_px(x_m), self.y_px(y_m), bond.diameter_m / 2.0 * self.px_per_m);
+            writeln!(out, r#"<circle class="dot" cx="{x:.1}" cy="{y:.1}" r="{radius:.1}"/>"#)?;
         }
         Ok(())
     }
@@ -268,6 +279,7 @@ impl Detector {
             ("ADC", format!("{} bits to {} V", self.adc.bits, short(self.adc.full_scale_v))),
             ("noise", format!("{} LSB", short(self.adc.noise_lsb))),
         ];
+        facts.extend(self.bond().map(|(_, bond)| ("layers joined by", bond.summary())));
         facts.extend(self.force.as_ref().map(|law| ("forces", format!("up to {} N", short(law.limit_n())))));
         let presses = |correction: &Correction| ("corrected", format!("by {} known presses", correction.presses()));
         facts.extend(self.correction.as_ref().map(presses));
@@ -338,6 +350,17 @@ mod tests {
         assert!(svg.contains(r#"<circle class="pad" cx="126.5" cy="451.5" r="14.0"/>"#), "{svg}");
         assert!((0..16).all(|channel| svg.contains(&format!(">{channel}</text>"))), "{svg}");
         assert!(svg.contains("x (mm)") && svg.contains("5 mm of 0.2273 S/m") && svg.ends_with("</svg>\n"), "{svg}");
+    }
+
+    #[test]
+    fn dots_of_glue_are_drawn_and_told() {
+        let svg = Detector::preset("BB-7x7").unwrap().to_svg();
+        assert_eq!(svg.matches(r#"<circle class="dot""#).count(), 49);
+        // 7.22 mm at 7 px a millimetre.
+        assert!(
+            svg.contains(r#"cx="284.0" cy="294.0" r="25.3""#) && svg.contains("7 \u{d7} 7 dots of 7.22 mm"),
+            "{svg}"
+        );
     }
 
     #[test]

@@ -57,6 +57,9 @@ fn needs_slab(detector: &Detector) -> (bool, String) {
     if detector.outline.as_rectangle().is_none() {
         return (false, "its outline is not a rectangle, which the slab has to be".to_owned());
     }
+    if detector.bond().is_some() {
+        return (true, "dots of glue join its layers, which only the slab can have".to_owned());
+    }
     let pad_m = detector.electrodes.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min);
     let thickness = detector.thickness_m() / pad_m;
     if thickness > SHELL_THICKNESS {
@@ -88,6 +91,13 @@ mod tests {
         assert_eq!(Auto::under(&detector, None, driving).unwrap().model.name(), "slab");
         detector.layers[0].top_s_per_m = 2.0;
         assert!(needs_slab(&detector).0 && needs_slab(&detector).1.contains("10.0 times"));
+    }
+
+    #[test]
+    fn layers_joined_by_dots_need_the_slab_however_thin() {
+        let mut detector = Detector::preset("BB-5x5").unwrap();
+        detector.layers.iter_mut().for_each(|layer| layer.thickness_m = 0.0001);
+        assert!(needs_slab(&detector).0 && needs_slab(&detector).1.contains("dots of glue"));
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub use self::jacobian_file::JacobianFileError;
 pub use self::joined::{Exchanges, Joint};
 pub use self::nuisance::{Nuisance, Similar};
 pub use self::patches::Patches;
-pub use self::slab::{Resolution, Slab};
+pub use self::slab::{DotCurrent, DotCurrents, Face, Resolution, Slab};
 use self::spots::SpotFields;
 pub use self::spread::touched_impedance_ohm;
 pub use self::through::Through;

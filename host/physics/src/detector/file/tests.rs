@@ -2,6 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::detector::Electrode;
+use crate::detector::Layer;
 use crate::space;
 
 const DOCUMENTATION: &str = include_str!("../../../../../docs/detector.md");
@@ -169,7 +170,8 @@ fn detectors() -> impl Strategy<Value = Detector> {
             let shift_m = outline.centre();
             let mut electrodes: Vec<_> = (0..count).map(pad).collect();
             electrodes.iter_mut().for_each(|pad| (pad.x_m, pad.y_m) = (pad.x_m + shift_m[0], pad.y_m + shift_m[1]));
-            let layer = |(thickness_m, bottom_s_per_m, top_s_per_m)| Layer { thickness_m, bottom_s_per_m, top_s_per_m };
+            let layer =
+                |(thickness_m, bottom_s_per_m, top_s_per_m)| Layer::graded(thickness_m, [bottom_s_per_m, top_s_per_m]);
             let detector = Detector {
                 name,
                 outline,

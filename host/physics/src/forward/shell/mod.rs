@@ -32,7 +32,7 @@ use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::driving::DrivingLayer;
 use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image, leaks};
-use crate::detector::{Detector, Electrode};
+use crate::detector::{Bond, Detector, Electrode};
 use crate::scene::Contact;
 
 /// A pad's contact impedance is at least this share of `radius^2 / sheet conductance`: below, it makes no difference to a
@@ -92,6 +92,9 @@ impl Shell {
     /// # Errors
     /// [`ForwardError::Detector`] if the detector cannot be meshed.
     pub fn with_nodes(detector: &Detector, nodes: usize) -> Result<Self, ForwardError> {
+        if let Some((_, bond)) = detector.bond() {
+            return Err(joined_by_dots(detector, &bond));
+        }
         let singular = |_: Singular| singular(detector);
         let pad_impedance_ohm_m2: Vec<_> =
             detector.electrodes.iter().map(|pad| pad_impedance_ohm_m2(detector, pad)).collect();
@@ -303,6 +306,15 @@ fn symmetric(count: usize, element: impl Fn(usize, usize) -> f64) -> DMatrix<f64
 fn pad_impedance_ohm_m2(detector: &Detector, pad: &Electrode) -> f64 {
     let smallest = SMALLEST_PAD_IMPEDANCE * pad.radius_m * pad.radius_m / detector.sheet_conductance_s();
     detector.pad_impedance_ohm_m2(pad).max(smallest)
+}
+
+fn joined_by_dots(detector: &Detector, bond: &Bond) -> ForwardError {
+    let what = format!(
+        "its layers are joined by {}, and a thin shell has one layer: use the slab (--model slab or auto), or take `bond` out of the layer for layers \
+         that touch all over",
+        bond.summary()
+    );
+    ForwardError::Detector { detector: detector.name.clone(), what }
 }
 
 fn singular(detector: &Detector) -> ForwardError {

@@ -13,10 +13,10 @@ use nalgebra::{Cholesky, DMatrix};
 use super::quadrature::{gauss_legendre, panels};
 
 /// Radial orders above the degree of a basis that are eliminated on the disc.
-const LOCAL_ORDERS: usize = 10;
+pub(super) const LOCAL_ORDERS: usize = 10;
 
 /// Highest radial order of which the self-impedance is known.
-const MAX_ORDER: usize = 31;
+pub(super) const MAX_ORDER: usize = 31;
 
 /// Orders up to which the layers' part of the self-impedance is integrated; above it only the half-space's counts.
 const LAYERED_ORDER: usize = 8;
@@ -33,10 +33,10 @@ const NEAR: f64 = 0.25;
 
 /// One density: radial order, angular order, and whether it is the sine.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Density {
-    n: usize,
-    m: usize,
-    sine: bool,
+pub(super) struct Density {
+    pub n: usize,
+    pub m: usize,
+    pub sine: bool,
 }
 
 /// All densities up to a degree, and points that integrate them; the uniform one comes first.
@@ -102,6 +102,11 @@ impl DiscBasis {
         self.degree
     }
 
+    /// The densities.
+    pub fn densities(&self) -> &[Density] {
+        &self.densities
+    }
+
     /// Number of densities.
     pub fn len(&self) -> usize {
         self.densities.len()
@@ -131,7 +136,7 @@ impl DiscBasis {
 
 impl Density {
     /// Value at a point of the unit disc, without `1 / (pi a^2)`.
-    fn at(self, rho: f64, theta: f64) -> f64 {
+    pub fn at(self, rho: f64, theta: f64) -> f64 {
         let angle = self.m as f64 * theta;
         radial(self.n, self.m, rho) * if self.sine { angle.sin() } else { angle.cos() }
     }
@@ -139,14 +144,17 @@ impl Density {
 
 /// Zernike's radial polynomial `R_n^m`.
 fn radial(n: usize, m: usize, rho: f64) -> f64 {
+    radial_terms(n, m).map(|(power, factor)| factor * rho.powi(power as i32)).sum()
+}
+
+/// Powers of the radius in `R_n^m`, and their factors.
+pub(super) fn radial_terms(n: usize, m: usize) -> impl Iterator<Item = (usize, f64)> {
     let factorial = |n: usize| (1..=n).map(|i| i as f64).product::<f64>();
-    (0..=(n - m) / 2)
-        .map(|s| {
-            let sign = if s % 2 == 0 { 1.0 } else { -1.0 };
-            let below = factorial(s) * factorial((n + m) / 2 - s) * factorial((n - m) / 2 - s);
-            sign * factorial(n - s) / below * rho.powi((n - 2 * s) as i32)
-        })
-        .sum()
+    (0..=(n - m) / 2).map(move |s| {
+        let sign = if s % 2 == 0 { 1.0 } else { -1.0 };
+        let below = factorial(s) * factorial((n + m) / 2 - s) * factorial((n - m) / 2 - s);
+        (n - 2 * s, sign * factorial(n - s) / below)
+    })
 }
 
 /// Self-impedance of a disc, without the smooth part of the kernel: by radial orders, for angular order 0.
@@ -175,7 +183,7 @@ impl DiscSelf {
     }
 
     /// Impedance between two densities of angular order 0; for others it is half of that.
-    fn between(&self, n: usize, other: usize) -> f64 {
+    pub fn between(&self, n: usize, other: usize) -> f64 {
         let sign = if n.abs_diff(other).is_multiple_of(4) { 1.0 } else { -1.0 };
         sign * 2.0 / PI * self.0[n.max(other) * (MAX_ORDER + 1) + n.min(other)]
     }

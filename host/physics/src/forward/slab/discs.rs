@@ -33,6 +33,9 @@ struct Disc {
     uneven: Option<UnevenPlace>,
 }
 
+/// A point, and the current into it for each electrode.
+pub(super) type PointCurrents = ([f64; 2], Vec<f64>);
+
 /// Some discs, with the fields between them.
 pub(super) struct Discs<'a> {
     slab: &'a Slab,
@@ -58,6 +61,23 @@ impl Slab {
         let between = pairs.map(|(disc, other)| self.between(disc, other)).collect();
         let own = discs.iter().map(|disc| self.own(disc)).collect();
         Ok(Discs { slab: self, discs, between, own })
+    }
+
+    /// The impedance matrix (ohm), and points from the corner (m) that stand for the contacts, with the current into each for 1 A into each
+    /// electrode.
+    pub(super) fn currents_on_top(
+        &self,
+        contacts: &[Contact],
+    ) -> Result<(DMatrix<f64>, Vec<PointCurrents>), ForwardError> {
+        let discs = self.discs(contacts)?;
+        let at = Solved::new(&discs)?;
+        let mut points = Vec::new();
+        for (k, disc) in discs.discs.iter().enumerate() {
+            let currents = disc.basis.weights().tr_mul(&at.of(k)) * disc.conductance_s.sqrt();
+            let nodes = nodes_m(disc.basis, disc.centre_m, disc.contact.radius_m, disc.cut);
+            points.extend(nodes.into_iter().zip(currents.row_iter().map(|row| row.iter().copied().collect())));
+        }
+        Ok((at.contacted.impedance_ohm, points))
     }
 
     fn disc(&self, contact: &Contact, basis: &'static DiscBasis) -> Disc {

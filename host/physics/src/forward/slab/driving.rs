@@ -21,7 +21,7 @@ use nalgebra::{DMatrix, DVector};
 use super::layers::{self, Response};
 use super::pads::Mode;
 use super::spline::Grid;
-use crate::detector::{Detector, Layer};
+use crate::detector::Layer;
 use crate::forward::driving::DrivingLayer;
 use crate::geometry::Point;
 
@@ -40,9 +40,19 @@ pub(super) struct Covered<'a> {
 }
 
 impl<'a> Covered<'a> {
-    /// Those of a rectangular detector.
-    pub fn new(detector: &'a Detector, size_m: [f64; 2], driving: DrivingLayer) -> Self {
-        Self { layers: &detector.layers, driving, size_m }
+    /// Those of a rectangle.
+    pub fn new(layers: &'a [Layer], size_m: [f64; 2], driving: DrivingLayer) -> Self {
+        Self { layers, driving, size_m }
+    }
+
+    /// The layers, bottom first.
+    pub fn layers(&self) -> &'a [Layer] {
+        self.layers
+    }
+
+    /// Sheet conductance of the layers (S).
+    pub fn sheet_s(&self) -> f64 {
+        self.layers.iter().map(Layer::sheet_conductance_s).sum()
     }
 
     /// Length and width (m).
@@ -79,8 +89,7 @@ impl<'a> Covered<'a> {
 
     /// Sheet conductance of slab and driving layer one after the other (S), which long waves across the gap see.
     pub fn gap_sheet_s(&self) -> f64 {
-        let sheet_s: f64 = self.layers.iter().map(Layer::sheet_conductance_s).sum();
-        1.0 / (1.0 / sheet_s + self.driving.sheet_ohm)
+        1.0 / (1.0 / self.sheet_s() + self.driving.sheet_ohm)
     }
 
     /// Wave number (1/m) up to which fields of the electrodes are needed on the top, if the driving layer asks for any.
@@ -203,7 +212,7 @@ fn left_at(mut columns: DMatrix<f64>, uniform: &[usize], first: usize) -> DMatri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detector::{Electrode, Outline};
+    use crate::detector::{Detector, Electrode, Outline};
     use crate::forward::contact::conducting_patches;
     use crate::forward::{ConnectingPoints, ForwardModel, Resolution, Slab};
     use crate::scene::Contact;

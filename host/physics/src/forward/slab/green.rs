@@ -97,9 +97,14 @@ impl SurfaceGreen {
         0.25 * sum
     }
 
-    /// Near part at a distance (ohm).
-    pub fn near_ohm(&self, distance_m: f64) -> f64 {
-        self.near.at(distance_m)
+    /// Near part between a point and mirror images of another (ohm); `same`: both are on one disc, of which the singular part is left out.
+    pub fn images_ohm(&self, images: &[Image], same: bool, a: [f64; 2], b: [f64; 2]) -> f64 {
+        let others = images.iter().filter(|image| !(same && image.in_place()));
+        let distance_m = |image: &Image| {
+            let at = image.of(b);
+            ((a[0] - at[0]).powi(2) + (a[1] - at[1]).powi(2)).sqrt()
+        };
+        others.map(|image| self.near.at(distance_m(image))).sum()
     }
 
     /// Self-impedance of a disc on this surface, without the smooth part.
@@ -146,7 +151,7 @@ impl Image {
     }
 
     /// Whether this is the point itself.
-    pub fn in_place(&self) -> bool {
+    fn in_place(&self) -> bool {
         self.sign == [1.0, 1.0] && self.offset_m == [0.0, 0.0]
     }
 }

@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn a_gradient_is_the_limit_of_many_thin_layers() {
         let (bottom, top, t) = (1.0_f64, 0.01, 0.01);
-        let gradient = [Layer { thickness_m: t, bottom_s_per_m: bottom, top_s_per_m: top }];
+        let gradient = [Layer::graded(t, [bottom, top])];
         let count = 400;
         let steps: Vec<_> = (0..count)
             .map(|i| {
@@ -101,12 +101,9 @@ mod tests {
 
     #[test]
     fn cutting_a_layer_in_two_changes_nothing() {
-        let whole = Layer { thickness_m: 0.006, bottom_s_per_m: 0.1, top_s_per_m: 2.5 };
+        let whole = Layer::graded(0.006, [0.1, 2.5]);
         let middle = 0.1 * 25.0_f64.powf(1.0 / 3.0);
-        let cut = [
-            Layer { thickness_m: 0.002, bottom_s_per_m: 0.1, top_s_per_m: middle },
-            Layer { thickness_m: 0.004, bottom_s_per_m: middle, top_s_per_m: 2.5 },
-        ];
+        let cut = [Layer::graded(0.002, [0.1, middle]), Layer::graded(0.004, [middle, 2.5])];
         for k in [1.0, 50.0, 3000.0] {
             let (a, b) = (response(&[whole], k), response(&cut, k));
             assert!(close(a.tt, b.tt, 1e-10) && close(a.tb, b.tb, 1e-10) && close(a.bb, b.bb, 1e-10), "k {k}");
@@ -122,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_one_dimensional_bar_has_the_resistance_of_its_depth() {
-        let layers = [Layer::uniform(0.003, 0.5), Layer { thickness_m: 0.004, bottom_s_per_m: 0.1, top_s_per_m: 0.4 }];
+        let layers = [Layer::uniform(0.003, 0.5), Layer::graded(0.004, [0.1, 0.4])];
         let found = floating_response(&layers);
         let gradient = 0.004 * (1.0 / 0.1 - 1.0 / 0.4) / 4.0_f64.ln();
         assert!(close(found.tt + found.bb - 2.0 * found.tb, 0.003 / 0.5 + gradient, 1e-5));

@@ -3,8 +3,10 @@
 //! The slab is diagonal in cosine modes in the plane and exact in depth ([`layers`]). Its kernel between points of a surface
 //! is a look-up ([`kernel`]); pads and contacts are discs of a few densities ([`disc`]); the pads are eliminated once
 //! ([`pads`]), so that a contact costs a few look-ups and a small solve. Conductivity that differs across the plane changes the kernels
-//! ([`uneven`]).
+//! ([`uneven`]). Layers that are joined by dots of glue are two slabs, of which the dots are eliminated with the pads ([`bond`]).
 
+mod bond;
+mod check;
 mod cut;
 mod disc;
 mod discs;
@@ -16,6 +18,7 @@ mod pads;
 mod quadrature;
 mod spline;
 mod spots;
+mod stacks;
 #[cfg(test)]
 mod tests;
 mod uneven;
@@ -27,26 +30,27 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 
+pub use self::bond::{DotCurrent, DotCurrents, Face};
+use self::bond::{Dots, Stacks};
+use self::check::check;
 use self::disc::{DiscBasis, MAX_DEGREE};
 use self::driving::Covered;
-use self::green::{Surface, SurfaceGreen};
+use self::green::SurfaceGreen;
 use self::image::{CellFields, ImageGrid};
 use self::pads::{PadFields, PadPoints};
 use self::spots::SlabSpots;
+use self::stacks::{bottom_surface, split_m, stacks, top_surface, widest_m};
 use self::uneven::Uneven;
 pub(super) use self::uneven::UnevenPlace;
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::driving::DrivingLayer;
 use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image, leaks};
-use crate::detector::{Detector, Layer};
+use crate::detector::Detector;
 use crate::scene::Contact;
 
 /// Nodes of the image unless said otherwise, about.
 const IMAGE_NODES: usize = 2000;
-
-/// The kernels' split length is at least this share of a pad's radius.
-const SPLIT_IN_PAD: f64 = 1.0;
 
 /// How finely a [`Slab`] is resolved: degrees of the polynomials that current densities are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,6 +59,8 @@ pub struct Resolution {
     pub pad_degree: usize,
     /// On contacts that are small against the thickness; wider ones get more.
     pub contact_degree: usize,
+    /// On dots of glue.
+    pub dot_degree: usize,
     /// Half waves along a side of the modes that unevenness couples.
     pub uneven_modes: usize,
     /// Most steps in a pad's radius of the table of the pads' fields: what limits it on layers that are thin against the pads.
@@ -63,12 +69,13 @@ pub struct Resolution {
 
 impl Resolution {
     /// Enough for readings within a few tenths of a per cent: against reference readings, one degree more changes nothing.
-    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2, uneven_modes: 10, steps_in_pad: 10 };
+    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2, dot_degree: 3, uneven_modes: 10, steps_in_pad: 10 };
     /// For how readings change from one detector to another: on `square-60` changes are off by up to 3 % of themselves, those with a pad's own
     /// impedance by a sixth.
-    pub const COARSE: Self = Self { pad_degree: 1, contact_degree: 2, uneven_modes: 8, steps_in_pad: 3 };
+    pub const COARSE: Self =
+        Self { pad_degree: 1, contact_degree: 2, dot_degree: 2, uneven_modes: 8, steps_in_pad: 3 };
     /// Finer than any solver needs.
-    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, uneven_modes: 16, steps_in_pad: 10 };
+    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, dot_degree: 4, uneven_modes: 16, steps_in_pad: 10 };
 }
 
 /// A rectangular detector, layered in depth.
@@ -84,9 +91,19 @@ pub struct Slab {
     top: Arc<SurfaceGreen>,
     points: Arc<PadPoints>,
     pads: Arc<PadFields>,
-    /// `None` where the conductivity is even across the plane.
+    /// Of the layers below the top, down to dots of glue; `None` where the conductivity is even across the plane.
     uneven: Option<Arc<Uneven>>,
+    /// `None` where all layers touch all over.
+    bonded: Option<Arc<Bonded>>,
     image: Arc<Image>,
+}
+
+/// What a slab has besides if dots of glue join two of its layers.
+#[derive(Clone, Debug)]
+struct Bonded {
+    dots: Arc<Dots>,
+    /// Of the layers below the dots.
+    uneven: Option<Arc<Uneven>>,
 }
 
 /// Degree on the contacts of a [rough](ForwardModel::rough) slab.
@@ -136,37 +153,36 @@ impl Slab {
         let wrong = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
         let size_m = check(detector).map_err(wrong)?;
         let mut planner = RealFftPlanner::new();
-        let covered = Covered::new(detector, size_m, driving);
-        let split_m = split_m(detector, size_m);
+        let bond = detector.bond();
+        let stacks @ [lower, upper] = stacks(detector, size_m, driving);
+        let split_m = stacks.map(|stack| split_m(stack.thickness_m(), size_m, widest_m(detector)));
         let as_even = like.filter(|like| {
             let other = &like.detector;
-            (like.size_m, &other.layers, self::split_m(other, size_m)) == (size_m, &detector.layers, split_m)
+            (like.size_m, &other.layers, widest_m(other)) == (size_m, &detector.layers, widest_m(detector))
         });
         let [bottom, top] = match as_even {
             Some(like) => [Arc::clone(&like.bottom), Arc::clone(&like.top)],
             None => [
-                SurfaceGreen::new(size_m, split_m, &mut planner, &bottom_surface(detector, covered)).into(),
-                SurfaceGreen::new(size_m, split_m, &mut planner, &top_surface(detector, covered)).into(),
+                SurfaceGreen::new(size_m, split_m[0], &mut planner, &bottom_surface(lower)).into(),
+                SurfaceGreen::new(size_m, split_m[1], &mut planner, &top_surface(upper)).into(),
             ],
         };
-        let uneven = match as_even.filter(|like| like.detector.unevenness == detector.unevenness) {
-            Some(like) => like.uneven.clone(),
-            None => Uneven::new(size_m, &detector.unevenness, &detector.layers, resolution.uneven_modes).map(Arc::new),
+        let as_uneven = as_even.filter(|like| like.detector.unevenness == detector.unevenness);
+        let uneven = |stack: Covered<'_>| {
+            Uneven::new(size_m, &detector.unevenness, stack.layers(), resolution.uneven_modes).map(Arc::new)
         };
+        let bonded = bond.map(|(_, bond)| {
+            let dots = || Dots::new(bond, resolution.dot_degree, stacks, &mut planner).into();
+            let bonded = |like: &'_ Self| like.bonded.clone();
+            Bonded {
+                dots: as_even.and_then(bonded).map_or_else(dots, |bonded| Arc::clone(&bonded.dots)),
+                uneven: as_uneven.and_then(bonded).map_or_else(|| uneven(lower), |bonded| bonded.uneven.clone()),
+            }
+        });
+        let uneven = as_uneven.map_or_else(|| uneven(upper), |like| like.uneven.clone());
         let basis = DiscBasis::of_degree(resolution.pad_degree);
         let points = PadPoints::new(detector, size_m, basis, &bottom, as_even.map(|like| &*like.points));
-        let impedances = points.impedances(basis, &bottom, uneven.as_deref());
-        let pads = PadFields::new(
-            points.pads(),
-            basis,
-            impedances,
-            &covered,
-            uneven.as_deref(),
-            resolution.steps_in_pad as f64,
-            &mut planner,
-        )
-        .ok_or_else(|| wrong("its pads touch each other; pads need a gap between them".to_owned()))?;
-        Ok(Self {
+        let mut slab = Self {
             detector: detector.clone(),
             size_m,
             driving,
@@ -175,10 +191,47 @@ impl Slab {
             bottom,
             top,
             points: points.into(),
-            pads: pads.into(),
+            pads: PadFields::default().into(),
             uneven,
+            bonded: bonded.map(Arc::new),
             image: Image::new(ImageGrid::new(size_m, IMAGE_NODES)).into(),
-        })
+        };
+        slab.pads = slab.pad_fields(&mut planner).ok_or_else(|| slab.not_positive())?.into();
+        Ok(slab)
+    }
+
+    /// Eliminates the pads, and the dots of glue if there are any; `None` if they are not positive definite.
+    fn pad_fields(&self, planner: &mut RealFftPlanner<f64>) -> Option<PadFields> {
+        let impedances = self.pad_impedances();
+        if let Some(bonded) = &self.bonded {
+            return self.stacks(bonded).fields(&impedances, planner);
+        }
+        let [_, covered] = stacks(&self.detector, self.size_m, self.driving);
+        let basis = DiscBasis::of_degree(self.resolution.pad_degree);
+        let steps_in_pad = self.resolution.steps_in_pad as f64;
+        PadFields::new(self.points.pads(), basis, impedances, &covered, self.uneven.as_deref(), steps_in_pad, planner)
+    }
+
+    /// Impedances between all densities of the pads (ohm), below their layers alone.
+    fn pad_impedances(&self) -> DMatrix<f64> {
+        let uneven = self.bonded.as_ref().map_or(&self.uneven, |bonded| &bonded.uneven);
+        self.points.impedances(DiscBasis::of_degree(self.resolution.pad_degree), &self.bottom, uneven.as_deref())
+    }
+
+    fn stacks<'a>(&'a self, bonded: &'a Bonded) -> Stacks<'a> {
+        Stacks {
+            dots: &bonded.dots,
+            covered: stacks(&self.detector, self.size_m, self.driving),
+            uneven: [bonded.uneven.as_deref(), self.uneven.as_deref()],
+            pads: self.points.pads(),
+            basis: DiscBasis::of_degree(self.resolution.pad_degree),
+            steps_in_pad: self.resolution.steps_in_pad as f64,
+        }
+    }
+
+    fn not_positive(&self) -> ForwardError {
+        let what = "its pads touch each other; pads need a gap between them".to_owned();
+        ForwardError::Detector { detector: self.detector.name.clone(), what }
     }
 
     /// The same model with images of about `nodes` nodes instead of 2000; at least 9.
@@ -193,27 +246,10 @@ impl Slab {
 
     fn cells(&self) -> &CellFields {
         self.image.cells.get_or_init(|| {
-            let top = top_surface(&self.detector, Covered::new(&self.detector, self.size_m, self.driving));
+            let [_, upper] = stacks(&self.detector, self.size_m, self.driving);
+            let top = top_surface(upper);
             CellFields::new(self.image.grid, &self.pads, self.uneven.as_deref(), top.response, top.floating)
         })
-    }
-
-    /// Whether a contact can be on this detector, or what is wrong with it.
-    ///
-    /// # Errors
-    /// What is wrong, in words.
-    pub fn check_contact(&self, contact: &Contact) -> Result<(), String> {
-        let inside = 2.0 * contact.x_m.abs() <= self.size_m[0] && 2.0 * contact.y_m.abs() <= self.size_m[1];
-        if !inside {
-            return Err(format!("its middle, {} {} m, is not on the detector", contact.x_m, contact.y_m));
-        }
-        if !(contact.radius_m > 0.0 && contact.radius_m <= self.size_m[0].max(self.size_m[1])) {
-            return Err(format!("its radius is {} m", contact.radius_m));
-        }
-        if !(contact.conductance_s >= 0.0 && contact.conductance_s.is_finite()) {
-            return Err(format!("its conductance is {} S", contact.conductance_s));
-        }
-        Ok(())
     }
 
     /// The nodes of an image that conduct, and their system.
@@ -326,66 +362,9 @@ impl ForwardModel for Slab {
     }
 }
 
-/// Width and height of a detector that the model can be made for (m), or what is wrong with it.
-fn check(detector: &Detector) -> Result<[f64; 2], String> {
-    let size_m =
-        detector.outline.as_rectangle().ok_or("its outline is not a rectangle; use the shell for other outlines")?;
-    if detector.surface.is_some() {
-        return Err("it is curved; use the shell".to_owned());
-    }
-    let positive = |value: f64| value > 0.0 && value.is_finite();
-    let sound = |layer: &Layer| [layer.thickness_m, layer.bottom_s_per_m, layer.top_s_per_m].into_iter().all(positive);
-    if detector.layers.is_empty() {
-        return Err("it has no layer".to_owned());
-    }
-    if let Some(index) = detector.layers.iter().position(|layer| !sound(layer)) {
-        return Err(format!("layer {index} needs a thickness and conductivities above zero"));
-    }
-    if detector.electrodes.is_empty() {
-        return Err("it has no electrode".to_owned());
-    }
-    for (index, pad) in detector.electrodes.iter().enumerate() {
-        let inside =
-            [(pad.x_m, size_m[0]), (pad.y_m, size_m[1])].iter().all(|(at, size)| at.abs() + pad.radius_m <= size / 2.0);
-        if !(positive(pad.radius_m) && inside) {
-            return Err(format!("electrode {index} needs a radius above zero and a place inside the outline"));
-        }
-        let impedance_ohm_m2 = detector.pad_impedance_ohm_m2(pad);
-        if !(impedance_ohm_m2 >= 0.0 && impedance_ohm_m2.is_finite()) {
-            return Err(format!("the contact impedance of electrode {index} is below zero or not a number"));
-        }
-    }
-    Ok(size_m)
-}
-
 /// A place from the corner, given from the middle (m).
 fn from_corner(size_m: [f64; 2], at_m: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|axis| at_m[axis] + size_m[axis] / 2.0)
-}
-
-/// Length at which the kernels are split: short enough that the near part fades within a few thicknesses, long enough that
-/// the tables stay small, and that what bends the current on a pad is in the near part, which is resolved to high orders there.
-fn split_m(detector: &Detector, size_m: [f64; 2]) -> f64 {
-    let pad_m = detector.electrodes.iter().map(|pad| pad.radius_m).fold(0.0, f64::max);
-    (0.6 * detector.thickness_m()).min(0.05 * size_m[0].max(size_m[1])).max(SPLIT_IN_PAD * pad_m)
-}
-
-fn top_surface<'a>(detector: &Detector, covered: Covered<'a>) -> Surface<impl Fn(f64) -> f64 + use<'a>> {
-    Surface {
-        response: move |k| covered.response(k).tt,
-        floating: covered.floating().tt,
-        sheet_s: covered.gap_sheet_s(),
-        sigma: detector.layers.last().map_or(0.0, |layer| layer.top_s_per_m),
-    }
-}
-
-fn bottom_surface<'a>(detector: &Detector, covered: Covered<'a>) -> Surface<impl Fn(f64) -> f64 + use<'a>> {
-    Surface {
-        response: move |k| covered.response(k).bb,
-        floating: covered.floating().bb,
-        sheet_s: detector.sheet_conductance_s(),
-        sigma: detector.layers.first().map_or(0.0, |layer| layer.bottom_s_per_m),
-    }
 }
 
 impl Image {

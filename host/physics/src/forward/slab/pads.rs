@@ -141,17 +141,7 @@ fn between_points(
     images: &[super::green::Image],
     same: bool,
 ) -> DMatrix<f64> {
-    let value = |a: [f64; 2], b: [f64; 2]| {
-        let near: f64 = images
-            .iter()
-            .filter(|image| !(same && image.in_place()))
-            .map(|image| {
-                let at = image.of(b);
-                kernel.near_ohm(((a[0] - at[0]).powi(2) + (a[1] - at[1]).powi(2)).sqrt())
-            })
-            .sum();
-        kernel.smooth_ohm(a, b) + near
-    };
+    let value = |a: [f64; 2], b: [f64; 2]| kernel.smooth_ohm(a, b) + kernel.images_ohm(images, same, a, b);
     let mut points = DMatrix::zeros(nodes.len(), other_nodes.len());
     for (j, &b) in other_nodes.iter().enumerate() {
         let first = if same { j } else { 0 };
@@ -166,7 +156,7 @@ fn between_points(
 }
 
 /// Fields of the pads on the top, as a table of all of them at once.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct PadFields {
     grid: Grid,
     electrodes: usize,
@@ -181,12 +171,13 @@ pub(super) struct PadFields {
 pub(super) struct Mode {
     pub m: usize,
     pub n: usize,
-    amplitude: f64,
+    /// Of its field on the top, for a mean of one over what the current enters by.
+    pub amplitude: f64,
 }
 
 impl PadFields {
-    /// Eliminates the pads from `impedances`; `None` if they are not positive definite. `steps_in_pad`: most steps of the table in a pad's radius, for layers that are
-    /// thin against it, where finer modes only matter at the pads' rims.
+    /// Eliminates the pads from `impedances`; `None` if they are not positive definite. Finer modes than `steps_in_pad` to a pad's radius only matter at
+    /// the pads' rims.
     pub fn new(
         pads: &[Pad],
         basis: &DiscBasis,
@@ -196,12 +187,9 @@ impl PadFields {
         steps_in_pad: f64,
         planner: &mut RealFftPlanner<f64>,
     ) -> Option<Self> {
-        let smallest_m = pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min);
-        let step_m = (covered.thickness_m() / STEPS_IN_THICKNESS).max(smallest_m / steps_in_pad);
-        let grid = Grid::new(covered.size_m(), step_m.min(std::f64::consts::PI / covered.finest()));
+        let grid = table_grid(covered, smallest_m(pads) / steps_in_pad);
         let modes = modes(covered, &grid);
-        let size = basis.len();
-        let uniform: Vec<_> = (0..pads.len()).map(|pad| pad * size).collect();
+        let uniform = uniform(pads, basis);
         let fields = pad_modes(pads, basis, &grid, &modes, uneven);
         let [impedances, fields] = covered.connect([impedances, fields], &uniform, &grid, &modes);
         let others: Vec<_> = (0..fields.ncols()).filter(|i| !uniform.contains(i)).collect();
@@ -212,10 +200,22 @@ impl PadFields {
         let electrodes_ohm = impedances.select_rows(&uniform).select_columns(&uniform) - coupling.tr_mul(&coupling);
 
         let correction = fields.select_columns(&others) * inverse.transpose();
-        let electrode_fields = fields.select_columns(&uniform) - &correction * coupling;
-        let columns = pads.len() + others.len();
+        let electrodes = fields.select_columns(&uniform) - &correction * coupling;
+        Some(Self::of(grid, &modes, Eliminated { electrodes_ohm, electrodes, correction }, uneven, planner))
+    }
+
+    /// The table of fields that are given by modes.
+    pub fn of(
+        grid: Grid,
+        modes: &[Mode],
+        eliminated: Eliminated,
+        uneven: Option<&Uneven>,
+        planner: &mut RealFftPlanner<f64>,
+    ) -> Self {
+        let Eliminated { electrodes_ohm, electrodes, correction } = eliminated;
+        let columns = electrodes.ncols() + correction.ncols();
         let mut table = vec![0.0; grid.nodes(0) * grid.nodes(1) * columns];
-        let all = electrode_fields.column_iter().chain(correction.column_iter());
+        let all = electrodes.column_iter().chain(correction.column_iter());
         let roots = uneven.map(|uneven| grid.values(|at_m| uneven.inverse_root(at_m)));
         for (column, amplitudes) in all.enumerate() {
             let mut amplitude = vec![0.0; (grid.modes(0) + 1) * (grid.modes(1) + 1)];
@@ -230,7 +230,7 @@ impl PadFields {
                 table[node * columns + column] = value as f32;
             }
         }
-        Some(Self { grid, electrodes: pads.len(), columns, table, electrodes_ohm })
+        Self { grid, electrodes: electrodes.ncols(), columns, table, electrodes_ohm }
     }
 
     /// Number of electrodes.
@@ -274,7 +274,34 @@ impl PadFields {
     }
 }
 
-fn modes(covered: &Covered<'_>, grid: &Grid) -> Vec<Mode> {
+/// What is left when densities are eliminated.
+pub(super) struct Eliminated {
+    /// Fields between the electrodes (ohm): `n x n`.
+    pub electrodes_ohm: DMatrix<f64>,
+    /// Those of the electrodes on the top, by modes (ohm): `modes x n`.
+    pub electrodes: DMatrix<f64>,
+    /// The correction by modes (square root of ohm): `modes x columns`.
+    pub correction: DMatrix<f64>,
+}
+
+/// The uniform densities of the pads, among all of theirs.
+pub(super) fn uniform(pads: &[Pad], basis: &DiscBasis) -> Vec<usize> {
+    (0..pads.len()).map(|pad| pad * basis.len()).collect()
+}
+
+/// Radius of the smallest pad (m).
+pub(super) fn smallest_m(pads: &[Pad]) -> f64 {
+    pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min)
+}
+
+/// The grid of a table of fields on the top, of steps of at least a length (m).
+pub(super) fn table_grid(covered: &Covered<'_>, least_m: f64) -> Grid {
+    let step_m = (covered.thickness_m() / STEPS_IN_THICKNESS).max(least_m);
+    Grid::new(covered.size_m(), step_m.min(std::f64::consts::PI / covered.finest()))
+}
+
+/// The modes that cross the layers.
+pub(super) fn modes(covered: &Covered<'_>, grid: &Grid) -> Vec<Mode> {
     let area_m2 = covered.size_m()[0] * covered.size_m()[1];
     let end = (ACROSS_END / covered.thickness_m()).max(covered.finest());
     let mode = |m: usize, n: usize| {
@@ -288,7 +315,13 @@ fn modes(covered: &Covered<'_>, grid: &Grid) -> Vec<Mode> {
 
 /// Amplitudes of the field on the top of each density of each pad: `modes x densities`; with unevenness but for the root of its factor at
 /// the top.
-fn pad_modes(pads: &[Pad], basis: &DiscBasis, grid: &Grid, modes: &[Mode], uneven: Option<&Uneven>) -> DMatrix<f64> {
+pub(super) fn pad_modes(
+    pads: &[Pad],
+    basis: &DiscBasis,
+    grid: &Grid,
+    modes: &[Mode],
+    uneven: Option<&Uneven>,
+) -> DMatrix<f64> {
     let rows: HashMap<_, _> = modes.iter().enumerate().map(|(row, mode)| ([mode.m, mode.n], row)).collect();
     let mut all = DMatrix::zeros(modes.len(), pads.len() * basis.len());
     for (e, pad) in pads.iter().enumerate() {

@@ -3,7 +3,7 @@
 use realfft::RealFftPlanner;
 
 /// A grid over `[0, size]` in both directions, with one cell more around it, so that a look-up never meets an edge.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Grid {
     size_m: [f64; 2],
     cells: [usize; 2],

@@ -5,7 +5,6 @@
 
 use super::cut::CutDisc;
 use super::disc::DiscBasis;
-use super::green::Image;
 use super::image::ImageGrid;
 use super::uneven::uneven_ohm;
 use super::{Slab, from_corner};
@@ -69,13 +68,7 @@ impl SlabSpots {
     /// The kernel of the top between two places from the corner (ohm); of a place with itself without its singular part.
     fn kernel_ohm(&self, a: [f64; 2], b: [f64; 2], same: bool) -> f64 {
         let top = &self.slab.top;
-        let distance_m = |image: &Image| {
-            let at = image.of(b);
-            (a[0] - at[0]).hypot(a[1] - at[1])
-        };
-        let images = top.images(a, b, 0.0);
-        let others = images.iter().filter(|image| !(same && image.in_place()));
-        top.smooth_ohm(a, b) + others.map(|image| top.near_ohm(distance_m(image))).sum::<f64>()
+        top.smooth_ohm(a, b) + top.images_ohm(&top.images(a, b, 0.0), same, a, b)
     }
 }
 

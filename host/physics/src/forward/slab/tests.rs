@@ -1,7 +1,7 @@
 //! The slab against answers known otherwise.
 
 use super::*;
-use crate::detector::{Electrode, Outline, Parameter};
+use crate::detector::{Electrode, Layer, Outline, Parameter};
 use crate::forward::contact::conducting_patches;
 use crate::forward::readings_v;
 use crate::forward::shell::Shell;
@@ -36,7 +36,7 @@ fn impedance_is_symmetric_and_positive_definite() {
 #[test]
 fn more_densities_change_next_to_nothing() {
     let mut detector = square(0.01, 0.002);
-    detector.layers = vec![Layer { thickness_m: 0.01, bottom_s_per_m: 1.0, top_s_per_m: 0.01 }];
+    detector.layers = vec![Layer::graded(0.01, [1.0, 0.01])];
     let contacts = [contact(-0.01, 0.012, 0.002, 1e-3), contact(0.012, -0.02, 0.006, 1e-2)];
     let finest = Resolution { pad_degree: 4, contact_degree: 6, ..Resolution::FINE };
     let [coarse, fine] = [Resolution::STANDARD, finest]

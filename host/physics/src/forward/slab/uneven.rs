@@ -43,7 +43,7 @@ pub(super) struct Uneven {
     top: DMatrix<f64>,
 }
 
-/// A place of the top, as unevenness changes its fields.
+/// A place of the top, or of the bottom, as unevenness changes the fields on that side.
 #[derive(Clone, Debug)]
 pub(in crate::forward) struct UnevenPlace {
     /// `1 / sqrt(s)`.
@@ -133,6 +133,12 @@ impl Uneven {
     pub fn place(&self, at_m: [f64; 2]) -> UnevenPlace {
         let modes = self.modes_at(at_m);
         UnevenPlace { inverse_root: self.inverse_root(at_m), fields: &self.top * &modes, modes }
+    }
+
+    /// The same of a place of the bottom.
+    pub fn place_below(&self, at_m: [f64; 2]) -> UnevenPlace {
+        let modes = self.modes_at(at_m);
+        UnevenPlace { inverse_root: self.inverse_root(at_m), fields: &self.bottom * &modes, modes }
     }
 
     /// What belongs to the points of a pad, from the corner (m).

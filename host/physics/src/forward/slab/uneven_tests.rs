@@ -1,7 +1,7 @@
 //! Unevenness against answers known otherwise.
 
 use super::*;
-use crate::detector::Unevenness;
+use crate::detector::{Layer, Unevenness};
 use crate::forward::shell::Shell;
 
 /// A detector whose conductivity differs by a few cosines, a tenth each.

@@ -58,8 +58,10 @@ fn off_m(truth: &Contact, found: &FoundContact) -> f64 {
 }
 
 #[test]
-fn single_contacts_are_found_on_outlines_shells_and_curved_surfaces() {
-    for (seed, detector) in [(31, example("l-shape.toml")), (32, example("fingertip.toml")), (33, thin())] {
+fn single_contacts_are_found_on_outlines_shells_curved_surfaces_and_dots_of_glue() {
+    let glued = Detector::preset("BB-5x5").unwrap().taken_as_exact();
+    for (seed, detector) in [(31, example("l-shape.toml")), (32, example("fingertip.toml")), (33, thin()), (36, glued)]
+    {
         let width_m = detector.outline.size_m().into_iter().fold(0.0, f64::max);
         let mut bench = Bench::new(detector, seed);
         let mut places = fastrand::Rng::with_seed(seed);
