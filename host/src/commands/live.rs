@@ -33,6 +33,7 @@ const REQUESTS: usize = 64;
 ///   tactomo live                                    finds the board and serves the page
 ///   tactomo live --simulate                         without hardware
 ///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
+///   tactomo live --simulate --scene gripper         a demonstration, on the detector that it was made for
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
 ///   tactomo live --replay touch.tactomo --speed 0.25
@@ -115,7 +116,11 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let detector = source::described(&args.board, source::detector(&args.picture.detector, args.replay.as_deref())?);
+    let chosen = &args.picture.detector;
+    let detector = match &args.replay {
+        Some(path) => source::recorded_detector(chosen, path)?,
+        None => source::described(&args.board, chosen.get_or(args.board.scene.preset())?),
+    };
     let (source, finger) = match args.replay {
         Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &args.picture.detector, &detector)?,

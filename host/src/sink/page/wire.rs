@@ -97,7 +97,7 @@ fn electrodes(setup: &PageSetup) -> Vec<ElectrodeMessage> {
 /// The scenes that a simulated detector can play: only discs can touch a curved one.
 fn scenes(setup: &PageSetup) -> Vec<String> {
     let is_flat = setup.detector.surface.is_none();
-    let plays = |scene: &SceneName| is_flat || !matches!(scene, SceneName::Ring | SceneName::Line);
+    let plays = |scene: &SceneName| is_flat || scene.is_of_discs();
     SceneName::ALL.iter().filter(|scene| plays(scene)).map(SceneName::to_string).collect()
 }
 
@@ -319,7 +319,7 @@ mod tests {
         let count = |name: &str| value[name].as_array().map_or(0, Vec::len);
         assert_eq!(count("places_m"), mesh.nodes_m.len());
         assert_eq!(count("triangles") + count("torn_triangles"), mesh.triangles.len());
-        assert_eq!(count("scenes"), SceneName::ALL.len() - 2, "no line and no ring");
+        assert_eq!(count("scenes"), SceneName::ALL.len() - 3, "no line, no ring and no rod");
     }
 
     #[test]
