@@ -171,7 +171,7 @@ impl Demonstration {
             self.ball(self.off(place_m), BUMP_M, share)
         };
         let columns = (-2..=1).map(f64::from);
-        columns.flat_map(|column| [-0.5, 0.5].map(|row| (row, column))).filter_map(bump).collect()
+        columns.map(|column| (0.0, column)).filter_map(bump).collect()
     }
 
     /// A hand that is laid down, the fingers first.
