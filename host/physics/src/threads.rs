@@ -1,10 +1,20 @@
-//! Work on all cores.
+//! Work on several cores.
 
 use std::thread;
 
 /// A function of each of some things, in their order, on as many threads as there are cores.
 pub fn map<T: Sync, R: Send>(all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let cores = thread::available_parallelism().map_or(1, usize::from).min(all.len());
+    map_on(cores(), all, function)
+}
+
+/// How many cores there are.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The same on at most so many threads.
+pub fn map_on<T: Sync, R: Send>(cores: usize, all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let cores = cores.min(all.len());
     if cores < 2 {
         return all.iter().map(function).collect();
     }

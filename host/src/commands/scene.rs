@@ -69,7 +69,10 @@ impl SceneArgs {
     pub fn scene(&self, otherwise: SceneName, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Scene> {
         let hand = self.hand(foams, detector)?;
         let name = self.scene.unwrap_or(otherwise);
-        ensure!(detector.surface.is_none() || name.is_of_discs(), "only discs can touch a curved detector: choose another scene");
+        ensure!(
+            detector.surface.is_none() || name.is_of_discs(),
+            "only discs can touch a curved detector: choose another scene"
+        );
         ensure!(
             self.tip.is_none() || name.detector().is_none(),
             "the scene {name} presses with tips of its own: leave out --tip"

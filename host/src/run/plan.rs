@@ -99,6 +99,7 @@ pub struct Solving {
 impl Solving {
     /// Reads the touch of a problem's detector by a method.
     pub fn new(method: Method, problem: Problem) -> Self {
+        problem.make_nuisance_beside();
         let at_rest = problem.clone();
         let problems = Arc::new(Problems { described: problem, other: Mutex::new(None) });
         let looked_at = Arc::clone(&problems);

@@ -19,12 +19,16 @@ const STEP_M: f64 = 0.2e-3;
 /// mistake, and no motion.
 const FASTEST_M_PER_S: f64 = 1.5;
 const PUT_RIGHT_M: f64 = 2e-3;
-/// A press is harder by this factor than the contact rests, and has ended below the second one. In between lies what a rolling ball's apparent
-/// conductance changes by on detectors as built to default tolerances.
+/// A press is harder by this factor than the contact rests, and has ended below the second one. A ball under six times the force has an apparent
+/// conductance of about twice.
 const PRESSED: f64 = 1.4;
 const RELEASED: f64 = 1.2;
 /// Time that either has to last (s).
 const LASTS_S: f64 = 0.01;
+/// A press begins while the contact stands still: within this (m) for so long (s). Rolling over a detector that is not quite the one described
+/// looks like pressing harder and less hard.
+const STILL_M: f64 = 1.5e-3;
+const STILL_S: f64 = 0.05;
 /// Time constant with which the firmness of rest follows (s), and how many times slower above [`RELEASED`].
 const REST_S: f64 = 0.3;
 const SLOWER: f64 = 8.0;
@@ -86,6 +90,9 @@ struct Held {
     place_m: [f64; 2],
     /// Where the motion was told up to (m).
     told_m: [f64; 2],
+    /// Where it has been near since when (m, s).
+    stands_m: [f64; 2],
+    stands_s: f64,
     /// Logarithm of the firmness of rest.
     rest: f64,
     /// Since when firmness has been beyond the threshold that would change what follows (s).
@@ -157,6 +164,8 @@ impl Held {
             seen_s: time_s,
             place_m,
             told_m: place_m,
+            stands_m: place_m,
+            stands_s: time_s,
             rest: firmness(contact).ln(),
             turning_s: None,
             press: None,
@@ -168,6 +177,9 @@ impl Held {
         let place_m = [contact.x_m, contact.y_m];
         let jumped = distance(place_m, self.place_m) > FASTEST_M_PER_S * since_s + PUT_RIGHT_M;
         (self.seen_s, self.place_m) = (time_s, place_m);
+        if distance(place_m, self.stands_m) > STILL_M {
+            (self.stands_m, self.stands_s) = (place_m, time_s);
+        }
         let firmness = firmness(contact).max(f64::MIN_POSITIVE).ln();
         if time_s - self.came_s < SETTLES_S {
             (self.told_m, self.rest) = (place_m, firmness);
@@ -198,7 +210,8 @@ impl Held {
     /// Takes the logarithm of its firmness, `since_s` after the last one.
     fn feel(&mut self, time_s: f64, since_s: f64, firmness: f64, events: &mut Vec<PointerEvent>) {
         let harder = firmness - self.rest;
-        let turns = if self.press.is_some() { harder < RELEASED.ln() } else { harder > PRESSED.ln() };
+        let is_still = time_s - self.stands_s > STILL_S;
+        let turns = if self.press.is_some() { harder < RELEASED.ln() } else { is_still && harder > PRESSED.ln() };
         if self.press.is_none() {
             let time_s = if harder > RELEASED.ln() { SLOWER * REST_S } else { REST_S };
             self.rest += harder * (1.0 - (-since_s / time_s).exp());
@@ -316,6 +329,15 @@ mod tests {
             vec![contact(1, [0.0; 2], 1e-3 * slowly * odd)]
         });
         assert_eq!(events, []);
+    }
+
+    #[test]
+    fn what_is_firmer_here_and_there_is_no_press_while_it_rolls() {
+        let (events, _) = drawn(3.0, |time_s| {
+            let x_m = 0.1 * time_s;
+            vec![contact(1, [x_m, 0.0], 1e-3 * (0.7 * (300.0 * x_m).sin()).exp())]
+        });
+        assert!(events.len() > 100 && events.iter().all(|(_, event)| is_move(event)), "{events:?}");
     }
 
     #[test]

@@ -48,7 +48,10 @@ export class VibrationPanel {
   /** Shows a status message. */
   show({ vibration, playing }) {
     if (playing.scene !== this.scene) {
-      if (playing.scene === "texture") this.card.open = true;
+      if (playing.scene === "texture") {
+        this.card.open = true;
+        this.layOut();
+      }
       this.scene = playing.scene;
     }
     this.spectrum = vibration;
