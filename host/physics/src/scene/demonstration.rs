@@ -54,7 +54,7 @@ const ROLLING: f64 = 1.0 / 6.0;
 
 /// When the texture comes to lie on the fingertip (s).
 const TEXTURE_FROM_S: [f64; 2] = [0.3, 0.5];
-/// Radius of a bump (m); pitch of bumps along and across the way, in shares of the shorter side.
+/// Radius of a bump (m); their pitch, in shares of the shorter side.
 const BUMP_M: f64 = 0.001;
 const PITCH: f64 = 0.5;
 /// The fingertip is round: the force fades to nothing at this distance from its middle, in shares of the shorter side.
@@ -158,20 +158,18 @@ impl Demonstration {
         self.ball(self.at_share(place), BALL_M, rise(time_s, LAID_S) * (ROLLING + (1.0 - ROLLING) * press))
     }
 
-    /// Rows of bumps of rubber that pass under a round fingertip.
+    /// A row of bumps of rubber that passes under a round fingertip.
     fn texture(&self, time_s: f64) -> Vec<Touch> {
         let shorter_m = 2.0 * self.half_size_m[0].min(self.half_size_m[1]);
         let (pitch_m, cap_m) = (PITCH * shorter_m, CAP * shorter_m);
         let passed = (TEXTURE_HZ * time_s).fract();
         let laid = rise(time_s, TEXTURE_FROM_S);
-        let bump = |(row, column): (f64, f64)| {
-            let place_m = [(column + passed) * pitch_m, row * pitch_m];
-            let from_middle = (place_m[0].hypot(place_m[1]) / cap_m).min(1.0);
-            let share = laid * (TAU / 4.0 * from_middle).cos().powi(2);
-            self.ball(self.off(place_m), BUMP_M, share)
+        let bump = |number: i32| {
+            let along_m = (f64::from(number) + passed) * pitch_m;
+            let share = laid * (TAU / 4.0 * (along_m / cap_m).clamp(-1.0, 1.0)).cos().powi(2);
+            self.ball(self.off([along_m, 0.0]), BUMP_M, share)
         };
-        let columns = (-2..=1).map(f64::from);
-        columns.map(|column| (0.0, column)).filter_map(bump).collect()
+        (-2..=1).filter_map(bump).collect()
     }
 
     /// A hand that is laid down, the fingers first.
@@ -220,4 +218,155 @@ fn rise(time_s: f64, [from_s, to_s]: [f64; 2]) -> f64 {
 /// 1 between two times (s) and 0 before and after; coming down and lifting takes so long each.
 fn down(time_s: f64, [from_s, to_s]: [f64; 2], landing_s: f64) -> f64 {
     rise(time_s, [from_s, from_s + landing_s]) * (1.0 - rise(time_s, [to_s - landing_s, to_s]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry;
+    use crate::scene::{Fingertip, Scene};
+
+    const ALL: [SceneName; 5] =
+        [SceneName::Gripper, SceneName::Display, SceneName::Pointer, SceneName::Texture, SceneName::Hand];
+
+    fn own(name: SceneName) -> Detector {
+        Detector::preset(name.detector().unwrap()).unwrap()
+    }
+
+    fn scene(name: SceneName) -> Scene {
+        let detector = own(name);
+        Scene::new(name, &detector, Hand::relative(&detector), 1)
+    }
+
+    /// Each hundredth of a second of a round and more.
+    fn times() -> impl Iterator<Item = f64> {
+        (0..1000).map(|i| 0.01 * f64::from(i))
+    }
+
+    #[test]
+    fn they_are_the_demonstrations_of_the_paper_and_each_begins_with_nothing() {
+        let detectors = ALL.map(|name| name.detector().unwrap());
+        assert_eq!(detectors, ["strip-13x60", "display-140x70", "pad-257x182", "fingertip-10", "square-150"]);
+        for name in ALL {
+            assert!(
+                times().take_while(|time_s| *time_s < 0.3).all(|time_s| scene(name).at(time_s).is_empty()),
+                "{name}"
+            );
+            assert!(times().any(|time_s| !scene(name).at(time_s).is_empty()), "{name}");
+        }
+        assert_eq!(SceneName::ALL.into_iter().filter(|name| name.detector().is_some()).count(), ALL.len());
+    }
+
+    #[test]
+    fn contacts_stay_on_every_detector_and_firmer_than_light_and_no_firmer_than_a_short() {
+        for (name, preset) in
+            ALL.into_iter().flat_map(|name| Detector::preset_names().map(move |preset| (name, preset)))
+        {
+            let detector = Detector::preset(preset).unwrap();
+            let (scene, sheet_s) =
+                (Scene::new(name, &detector, Hand::relative(&detector), 2), detector.sheet_conductance_s());
+            for touch in times().step_by(7).flat_map(|time_s| scene.at(time_s)) {
+                let inside = |corner: &Point| geometry::is_inside(*corner, &detector.outline.outer);
+                assert!(touch.pieces().iter().flatten().all(inside), "{name} on {preset}: {touch:?}");
+                let sheets = touch.conductance_s / sheet_s;
+                assert!((0.01..500.0).contains(&sheets), "{name} on {preset}: {sheets} sheet conductances");
+            }
+        }
+    }
+
+    #[test]
+    fn presses_are_those_of_hertz_on_sample_a() {
+        // E* = 0.35 MPa / 0.91; a^3 = 3 F R / (4 E*), and a rod's b^2 = 4 F R / (pi E* L).
+        let widest_m = |name| {
+            let radius = |touch: Touch| match touch.shape {
+                Shape::Disc { radius_m } => radius_m,
+                Shape::Line { width_m, .. } => width_m / 2.0,
+                _ => f64::NAN,
+            };
+            times().flat_map(|time_s| scene(name).at(time_s)).map(radius).fold(0.0, f64::max)
+        };
+        for (name, radius_m) in [
+            (SceneName::Display, 1.4612e-3),
+            (SceneName::Pointer, 4.4436e-3),
+            (SceneName::Texture, 0.24986e-3),
+            (SceneName::Hand, 4.8915e-3),
+        ] {
+            assert!((widest_m(name) / radius_m - 1.0).abs() < 3e-3, "{name}: {} m", widest_m(name));
+        }
+        let rod_m = widest_m(SceneName::Gripper);
+        assert!((0.7e-3..1.0e-3).contains(&rod_m), "{rod_m} m");
+    }
+
+    #[test]
+    fn a_force_that_is_asked_for_is_that_of_the_firmest_press() {
+        let detector = own(SceneName::Pointer);
+        let hertz = Hertz::of_sample_a(&detector);
+        let hand = Hand::in_newtons(&detector, Fingertip { hertz, force_n: 0.5, radius_m: 0.008 });
+        let pressed = Scene::new(SceneName::Pointer, &detector, hand, 1);
+        let most_s = times().flat_map(|time_s| pressed.at(time_s)).map(|touch| touch.conductance_s).fold(0.0, f64::max);
+        let expected_s = hertz.ball(BALL_M, 0.5).conductance_s;
+        assert!((most_s / expected_s - 1.0).abs() < 5e-3, "{most_s} S instead of {expected_s} S");
+    }
+
+    #[test]
+    fn the_gripper_closes_holds_slips_and_lets_go() {
+        let at = |time_s| scene(SceneName::Gripper).at(time_s);
+        let length_m = |time_s| match at(time_s)[0].shape {
+            Shape::Line { length_m, .. } => length_m,
+            _ => 0.0,
+        };
+        assert!(length_m(0.9) < 0.5 * length_m(2.0), "it grows");
+        assert_eq!((at(2.0), at(3.6)), (at(3.1), at(4.5)), "it holds");
+        let slipped_m = at(4.0)[0].centre_m[1] - at(3.0)[0].centre_m[1];
+        assert!((slipped_m - 0.006).abs() < 1e-5, "{slipped_m} m");
+        assert!(at(5.4).is_empty());
+    }
+
+    #[test]
+    fn the_display_is_stroked_pinched_and_tapped() {
+        let at = |time_s| scene(SceneName::Display).at(time_s);
+        let [stroke, pinch, tap] = [1.4, 4.0, 6.05].map(|time_s| at(time_s).len());
+        assert_eq!((stroke, pinch, tap), (1, 2, 1));
+        assert!(geometry::distance(at(0.8)[0].centre_m, at(2.0)[0].centre_m) > 0.05);
+        let apart_m = |time_s| geometry::distance(at(time_s)[0].centre_m, at(time_s)[1].centre_m);
+        assert!(apart_m(4.3) < 0.5 * apart_m(3.1) && apart_m(5.2) > 1.3 * apart_m(4.3));
+    }
+
+    #[test]
+    fn the_ball_is_pressed_where_it_rests() {
+        let scene = scene(SceneName::Pointer);
+        let at = |time_s: f64| scene.at(LAID_S[1] + time_s)[0].clone();
+        for leg in 0..8 {
+            let begin_s = f64::from(leg) * (ROLLS_S + STAYS_S);
+            let (rest, press) = (at(begin_s + 1.3), at(begin_s + 1.525));
+            assert_eq!(rest.centre_m, press.centre_m);
+            assert!(press.conductance_s > 3.0 * rest.conductance_s);
+            assert!(geometry::distance(at(begin_s + 0.2).centre_m, rest.centre_m) > 0.04, "it rolls");
+        }
+    }
+
+    #[test]
+    fn bumps_travel_and_their_conductance_swings_twelve_times_a_second() {
+        let scene = scene(SceneName::Texture);
+        let touches = scene.at(1.01);
+        assert!((1..=2).contains(&touches.len()), "{touches:?}");
+        let later = scene.at(1.011);
+        // 5 mm of pitch at 12 Hz: 60 mm/s.
+        let way_m = later[0].centre_m[0] - touches[0].centre_m[0];
+        assert!((way_m - 60e-6).abs() < 1e-9, "{way_m} m");
+        let whole_s = |time_s: f64| scene.at(time_s).iter().map(|touch| touch.conductance_s).sum::<f64>();
+        let period_s = 1.0 / TEXTURE_HZ;
+        let over: Vec<f64> = (0..50).map(|i| whole_s(2.0 + period_s * f64::from(i) / 50.0)).collect();
+        let (least_s, most_s) = over.iter().fold((f64::INFINITY, 0.0f64), |(a, b), s| (a.min(*s), b.max(*s)));
+        assert!(most_s > 1.1 * least_s, "{least_s} S to {most_s} S");
+        assert!((whole_s(2.0) / whole_s(2.0 + 7.0 * period_s) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_hand_has_five_fingers_and_a_palm() {
+        let touches = scene(SceneName::Hand).at(2.0);
+        assert_eq!(touches.len(), 6);
+        let wide = touches.iter().filter(|touch| touch.area_m2() > 2.0 * touches[0].area_m2()).count();
+        assert_eq!(wide, 1, "{touches:?}");
+    }
 }
