@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn contacts_stay_on_every_detector_and_firmer_than_light_and_no_firmer_than_a_short() {
+    fn contacts_stay_on_every_detector_and_are_neither_too_light_nor_a_short_on_their_own() {
         for (name, preset) in
             ALL.into_iter().flat_map(|name| Detector::preset_names().map(move |preset| (name, preset)))
         {
@@ -269,7 +269,8 @@ mod tests {
                 let inside = |corner: &Point| geometry::is_inside(*corner, &detector.outline.outer);
                 assert!(touch.pieces().iter().flatten().all(inside), "{name} on {preset}: {touch:?}");
                 let sheets = touch.conductance_s / sheet_s;
-                assert!((0.01..500.0).contains(&sheets), "{name} on {preset}: {sheets} sheet conductances");
+                let is_own = name.detector() == Some(preset);
+                assert!(!is_own || (0.01..60.0).contains(&sheets), "{name} on {preset}: {sheets} sheet conductances");
             }
         }
     }
