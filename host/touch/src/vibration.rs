@@ -22,6 +22,8 @@ const GAP_S: f64 = 0.1;
 const HIGHEST_HZ: f64 = 100.0;
 /// A peak is above this frequency (Hz): what a hand does of itself is slower.
 const LOWEST_PEAK_HZ: f64 = 5.0;
+/// Its amplitude over the largest of all, at least: of a press that lands in 0.3 s, ripples of 1e-4 of it stand out too.
+const LEAST: f64 = 2e-3;
 /// A peak is so many times the median of what is on both sides of it, this far away (steps of a spectrum: Hann's own width, and further). Noise has
 /// amplitudes of Rayleigh's distribution, in which five medians have a probability of `2^-25`.
 const STANDS_OUT: f64 = 5.0;
@@ -126,6 +128,7 @@ fn amplitudes(values: &mut [f64]) -> Vec<f64> {
 fn peak(amplitudes: &[f64], step_hz: f64) -> Option<Peak> {
     let lowest = ((LOWEST_PEAK_HZ / step_hz) as usize).max(*BESIDE.end());
     let candidates = lowest..amplitudes.len().saturating_sub(1);
+    let least = LEAST * amplitudes.iter().copied().fold(0.0, f64::max);
     let stands_out = |i: &usize| {
         let beside = |side: fn(usize, usize) -> Option<usize>| {
             BESIDE.filter_map(move |far| amplitudes.get(side(*i, far)?).copied())
@@ -133,7 +136,7 @@ fn peak(amplitudes: &[f64], step_hz: f64) -> Option<Peak> {
         let mut around: Vec<f64> = beside(usize::checked_sub).chain(beside(usize::checked_add)).collect();
         around.sort_unstable_by(f64::total_cmp);
         let is_top = amplitudes[*i] >= amplitudes[i - 1] && amplitudes[*i] > amplitudes[i + 1];
-        is_top && amplitudes[*i] > STANDS_OUT * around.get(around.len() / 2).copied().unwrap_or(f64::INFINITY)
+        is_top && amplitudes[*i] > least && amplitudes[*i] > STANDS_OUT * around.get(around.len() / 2).copied().unwrap_or(f64::INFINITY)
     };
     let top = candidates.filter(stands_out).max_by(|a, b| amplitudes[*a].total_cmp(&amplitudes[*b]))?;
     let [before, at, after] = [top - 1, top, top + 1].map(|i| amplitudes[i].max(f64::MIN_POSITIVE).ln());
@@ -193,6 +196,10 @@ mod tests {
         assert_eq!(samples(5.0, |_| noise()).spectrum().unwrap().peak, None);
         let press = |t: f64| if (1.5..2.7).contains(&t) { 0.4 } else { 0.0 } + noise();
         assert_eq!(samples(5.0, press).spectrum().unwrap().peak, None);
+        // A hand that is laid down in 0.3 s, and lifted.
+        let ramp = |t: f64| t.clamp(0.0, 1.0).powi(2) * (3.0 - 2.0 * t.clamp(0.0, 1.0));
+        let hand = |t: f64| 0.5 * ramp((t - 1.4) / 0.3) * (1.0 - ramp((t - 4.2) / 0.3)) + 0.02 * noise();
+        assert_eq!(samples(5.0, hand).spectrum().unwrap().peak, None);
         // A finger that taps, five times a second and not evenly.
         let taps = |t: f64| 0.2 * (0.5 + 0.5 * (TAU * (2.5 * t + 0.3 * (3.1 * t).sin())).cos()).powi(4) + noise();
         assert_eq!(samples(5.0, taps).spectrum().unwrap().peak, None);
