@@ -92,7 +92,7 @@ impl Samples {
             while after + 1 < self.0.len() && self.0[after][0] < time_s {
                 after += 1;
             }
-            let ([from_s, from], [to_s, to]) = (self.0[after - 1].into(), self.0[after].into());
+            let ([from_s, from], [to_s, to]) = (self.0[after - 1], self.0[after]);
             from + (to - from) * ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0)
         };
         (0..self.0.len()).map(at).collect()
@@ -136,7 +136,9 @@ fn peak(amplitudes: &[f64], step_hz: f64) -> Option<Peak> {
         let mut around: Vec<f64> = beside(usize::checked_sub).chain(beside(usize::checked_add)).collect();
         around.sort_unstable_by(f64::total_cmp);
         let is_top = amplitudes[*i] >= amplitudes[i - 1] && amplitudes[*i] > amplitudes[i + 1];
-        is_top && amplitudes[*i] > least && amplitudes[*i] > STANDS_OUT * around.get(around.len() / 2).copied().unwrap_or(f64::INFINITY)
+        is_top
+            && amplitudes[*i] > least
+            && amplitudes[*i] > STANDS_OUT * around.get(around.len() / 2).copied().unwrap_or(f64::INFINITY)
     };
     let top = candidates.filter(stands_out).max_by(|a, b| amplitudes[*a].total_cmp(&amplitudes[*b]))?;
     let [before, at, after] = [top - 1, top, top + 1].map(|i| amplitudes[i].max(f64::MIN_POSITIVE).ln());
