@@ -10,7 +10,7 @@
 
 use std::f64::consts::PI;
 
-use crate::detector::{Detector, Foam, Stack};
+use crate::detector::{Detector, FOAMS, Foam, Stack};
 
 /// Poisson's ratio where none is given: open-cell foams are near 1/3. The paper gives none.
 pub const POISSON: f64 = 0.3;
@@ -125,12 +125,21 @@ impl Hertz {
     /// [`SkinError`] if a constant is not one of an elastic layer.
     pub fn new(detector: &Detector, skin: Skin) -> Result<Self, SkinError> {
         skin.check()?;
+        Ok(Self::under(detector, skin))
+    }
+
+    /// The mechanics of `detector` as if it were as soft as the paper's sample A, of which all its demonstrations are.
+    pub fn of_sample_a(detector: &Detector) -> Self {
+        Self::under(detector, FOAMS[0].into())
+    }
+
+    fn under(detector: &Detector, skin: Skin) -> Self {
         let top_s_per_m = detector.layers.last().map_or(0.0, |layer| layer.top_s_per_m);
-        Ok(Self {
+        Self {
             plane_modulus_pa: skin.young_pa / (1.0 - skin.poisson * skin.poisson),
             thickness_m: detector.thickness_m(),
             conductance_s_per_m2: top_s_per_m / skin.surface_depth_m,
-        })
+        }
     }
 
     /// The disc under a ball: `a^3 = 3 F R / (4 E*)` with `E* = E / (1 - nu^2)`. It is never wider than the ball.

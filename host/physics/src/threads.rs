@@ -1,15 +1,35 @@
-//! Work on all cores.
+//! Work on several cores.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
 /// A function of each of some things, in their order, on as many threads as there are cores.
 pub fn map<T: Sync, R: Send>(all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    map_until(all, &AtomicBool::new(false), &|_| {}, function).into_iter().flatten().collect()
+    map_on(cores(), all, function)
 }
 
-/// The same until `stop` is set: `None` of what was not begun by then. `done` is told, on any of the threads, how many are done.
+/// How many cores there are.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The same on at most so many threads.
+pub fn map_on<T: Sync, R: Send>(cores: usize, all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    work(cores, all, &AtomicBool::new(false), &|_| {}, function).into_iter().flatten().collect()
+}
+
+/// The same on all cores until `stop` is set: `None` of what was not begun by then. `done` is told, on any of the threads, how many are done.
 pub fn map_until<T: Sync, R: Send>(
+    all: &[T],
+    stop: &AtomicBool,
+    done: &(dyn Fn(usize) + Sync),
+    function: impl Fn(&T) -> R + Sync,
+) -> Vec<Option<R>> {
+    work(cores(), all, stop, done, function)
+}
+
+fn work<T: Sync, R: Send>(
+    cores: usize,
     all: &[T],
     stop: &AtomicBool,
     done: &(dyn Fn(usize) + Sync),
@@ -17,7 +37,7 @@ pub fn map_until<T: Sync, R: Send>(
 ) -> Vec<Option<R>> {
     let (next, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
     // Each takes the next one that nobody has taken, for some take longer than others.
-    let work = || {
+    let take = || {
         let mut results = Vec::new();
         while !stop.load(Ordering::Relaxed) {
             let index = next.fetch_add(1, Ordering::Relaxed);
@@ -27,11 +47,11 @@ pub fn map_until<T: Sync, R: Send>(
         }
         results
     };
-    let cores = thread::available_parallelism().map_or(1, usize::from).min(all.len());
+    let cores = cores.min(all.len());
     let mut results: Vec<Option<R>> = all.iter().map(|_| None).collect();
     thread::scope(|scope| {
-        let workers: Vec<_> = (1..cores).map(|_| scope.spawn(work)).collect();
-        let mut found = work();
+        let workers: Vec<_> = (1..cores).map(|_| scope.spawn(take)).collect();
+        let mut found = take();
         for worker in workers {
             found.extend(worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         }

@@ -107,7 +107,12 @@ impl DetectorArgs {
 
     /// The detector, or the default one, in the material that is asked for.
     pub fn get(&self) -> anyhow::Result<Detector> {
-        let preset = || Detector::preset(Detector::DEFAULT).context("the default detector is no preset");
+        self.get_or(Detector::DEFAULT)
+    }
+
+    /// The detector, or the preset `otherwise`, in the material that is asked for.
+    pub fn get_or(&self, otherwise: &str) -> anyhow::Result<Detector> {
+        let preset = || Detector::preset(otherwise).with_context(|| format!("{otherwise} is no preset"));
         self.in_material(self.detector.as_ref().map_or_else(preset, Chosen::get)?)
     }
 

@@ -154,7 +154,7 @@ fn detector(args: &Args) -> anyhow::Result<(Detector, Option<Stack>, Vec<Contact
             let case = Case::read(path)?;
             Ok((case.detector, None, case.contacts))
         }
-        None => Ok((args.detector.get()?, args.detector.foams(), Vec::new())),
+        None => Ok((args.detector.get_or(args.scene.preset())?, args.detector.foams(), Vec::new())),
     }
 }
 

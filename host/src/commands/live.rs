@@ -14,6 +14,7 @@ use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
 use tactomo::run::{Request, Snapshot};
+use tactomo::scene::SceneName;
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
 use tactomo::sink::stream::Stream;
 use tactomo::solve::{ContactSettings, Method, Problem};
@@ -33,6 +34,7 @@ const REQUESTS: usize = 64;
 ///   tactomo live                                    finds the board and serves the page
 ///   tactomo live --simulate                         without hardware
 ///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
+///   tactomo live --simulate --scene gripper         a demonstration, on the detector that it was made for
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
 ///   tactomo live --replay touch.tactomo --speed 0.25
@@ -56,7 +58,8 @@ pub struct Args {
     /// Keeps all bytes that come in a new file
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Writes each answer as a line of JSON to a new file, or to stdout with `-`: `{time_s, sequence, contacts, shape?, choice, flags, age_us}`
+    /// Writes each answer as a line of JSON to a new file, or to stdout with `-`: `{time_s, sequence, contacts, shape?, choice,
+    /// flags, age_us, events?}`
     #[arg(long, value_name = "FILE|-")]
     pub stream: Option<PathBuf>,
     /// ELF file of the board's firmware, to print its log
@@ -86,7 +89,12 @@ pub struct PictureArgs {
     /// Leaves it to you to open the page: else the browser opens by itself where there is a desktop
     #[arg(long)]
     pub no_open: bool,
-    /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, skipped, solved, corrupt, latency_us, age_us}` at the end as JSON
+    /// Makes a pointer of a contact: its motion, presses and clicks are `events` in `--stream`, and move a cursor on the page. The scene
+    /// `pointer` does so by itself
+    #[arg(long)]
+    pub pointer: bool,
+    /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, skipped, solved, corrupt, latency_us, age_us, vibration?}` at the
+    /// end as JSON
     #[arg(long)]
     pub json: bool,
 }
@@ -115,13 +123,19 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let detector = source::described(&args.board, source::detector(&args.picture.detector, args.replay.as_deref())?);
+    let chosen = &args.picture.detector;
+    let detector = match &args.replay {
+        Some(path) => source::recorded_detector(chosen, path)?,
+        None => source::described(&args.board, chosen.get_or(args.board.scene.preset())?),
+    };
     let (source, finger) = match args.replay {
         Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &args.picture.detector, &detector)?,
     };
     let settings = args.board.settings.requested();
-    let Args { picture, seconds, record, stream, elf, .. } = args;
+    let is_pointer = args.board.scene.scene == Some(SceneName::Pointer);
+    let Args { mut picture, seconds, record, stream, elf, .. } = args;
+    picture.pointer |= is_pointer;
     show(Show { source, finger, settings, detector, picture, seconds, record, stream, elf })
 }
 
@@ -166,6 +180,7 @@ fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
         recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
         begin_recording: Some(recording::on_request(detector.clone(), show.source.name())),
         listeners: stream.into_iter().map(|stream| Box::new(stream) as Box<dyn Listener>).collect(),
+        pointer: show.picture.pointer,
         board_log: recording::board_log(show.elf.as_deref())?,
         seconds: show.seconds,
         ..Plan::new(detector)

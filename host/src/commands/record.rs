@@ -46,7 +46,7 @@ pub fn record(
     detector_args: &DetectorArgs,
     seconds: Option<Duration>,
 ) -> anyhow::Result<()> {
-    let detector = source::described(board, detector_args.get()?);
+    let detector = source::described(board, detector_args.get_or(board.scene.preset())?);
     let (mut source, _) = source::board(board, detector_args, &detector)?;
     let plan = Plan {
         settings: board.settings.requested(),

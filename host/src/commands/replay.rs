@@ -35,7 +35,7 @@ pub struct Args {
 /// Plays it.
 pub fn run(args: Args) -> anyhow::Result<()> {
     live::show(Show {
-        detector: source::detector(&args.picture.detector, Some(&args.file))?,
+        detector: source::recorded_detector(&args.picture.detector, &args.file)?,
         source: source::recording(args.file, args.speed, !args.picture.json),
         finger: None,
         picture: args.picture,

@@ -18,7 +18,8 @@ const SEED: u64 = 1;
 /// A scene, its hand and faults.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SceneArgs {
-    /// What touches: rest, wandering, single, several, wide, ring, line, five-fingers, rolling-ball, moving, changing-force
+    /// What touches: rest, wandering, single, several, wide, ring, line, five-fingers, rolling-ball, moving, changing-force; and the paper's
+    /// demonstrations, each on its own detector unless --detector is given: gripper, display, pointer, texture, hand
     #[arg(long, value_name = "NAME")]
     pub scene: Option<SceneName>,
     /// Force of the scene's firmest press (N) [default: conductances relative to the detector's]
@@ -59,17 +60,32 @@ impl SceneArgs {
         self.seed.unwrap_or(SEED)
     }
 
+    /// Name of the detector where none is chosen: the one that the scene was made for, or the default.
+    pub fn preset(&self) -> &'static str {
+        self.scene.and_then(SceneName::detector).unwrap_or(Detector::DEFAULT)
+    }
+
     /// The scene, or `otherwise`, on a detector of such foams if they are known.
     pub fn scene(&self, otherwise: SceneName, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Scene> {
         let hand = self.hand(foams, detector)?;
-        let is_flat = detector.surface.is_none();
-        let has_shape = matches!(self.scene, Some(SceneName::Ring | SceneName::Line));
-        ensure!(is_flat || !has_shape, "only discs can touch a curved detector: choose another scene");
-        Ok(Scene::new(self.scene.unwrap_or(otherwise), detector, hand, self.seed()))
+        let name = self.scene.unwrap_or(otherwise);
+        ensure!(
+            detector.surface.is_none() || name.is_of_discs(),
+            "only discs can touch a curved detector: choose another scene"
+        );
+        ensure!(
+            self.tip.is_none() || name.detector().is_none(),
+            "the scene {name} presses with tips of its own: leave out --tip"
+        );
+        Ok(Scene::new(name, detector, hand, self.seed()))
     }
 
     fn hand(&self, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hand> {
-        let Some(force_n) = self.force else { return Ok(Hand::relative(detector)) };
+        let Some(force_n) = self.force else {
+            let hand = Hand::relative(detector);
+            let is_known = self.elasticity.is_some() || foams.is_some();
+            return Ok(if is_known { hand.on(self.hertz(foams, detector)?) } else { hand });
+        };
         let radius_m = self.tip.map_or_else(|| Fingertip::fitting_m(detector), |tip_mm| tip_mm * 1e-3);
         let hand = Hand::in_newtons(detector, Fingertip { hertz: self.hertz(foams, detector)?, force_n, radius_m });
         if let Some(beyond) = hand.beyond(1.0, 1.0) {

@@ -102,12 +102,9 @@ pub fn recording(path: PathBuf, speed: f64, is_watched: bool) -> Box<dyn Source>
     Box::new(Recording { path, speed, stays_open: is_watched && speed.is_finite() })
 }
 
-/// The detector that is chosen; unless one is given, that of the recording `replay`, if one is played.
-pub fn detector(chosen: &DetectorArgs, replay: Option<&Path>) -> anyhow::Result<Detector> {
-    match replay {
-        Some(path) => chosen.of_recording(path, RecordReader::open(path)?.header()),
-        None => chosen.get(),
-    }
+/// The detector that is chosen; unless one is given, that of a recording.
+pub fn recorded_detector(chosen: &DetectorArgs, path: &Path) -> anyhow::Result<Detector> {
+    chosen.of_recording(path, RecordReader::open(path)?.header())
 }
 
 /// A speed above zero, or `max`.

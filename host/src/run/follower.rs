@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use tactomo_board::baseline::Baseline;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
+use tactomo_touch::pointer::{Pointer, PointerState};
 use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, FoundContact, Method, Parts, Solution};
 
 use super::calibration::{Calibrate, Desk};
@@ -61,6 +62,7 @@ impl FollowThread {
             calibrations: 0,
             calibrated: None,
             folder,
+            pointer: None,
         };
         let thread = thread::Builder::new().name("follower".to_owned());
         Ok(Self(thread.spawn(move || desk.run())?))
@@ -102,6 +104,8 @@ struct FollowLoop {
     calibrated: Option<Arc<Detector>>,
     /// Where calibrated detectors are saved.
     folder: PathBuf,
+    /// What makes a pointer of a contact, if one is.
+    pointer: Option<Pointer>,
 }
 
 /// What belongs to one detector.
@@ -155,6 +159,7 @@ impl FollowLoop {
                 Event::Quiet => self.be_quiet(),
                 Event::Board(detector) => self.begin_with(detector),
                 Event::Method(method) => self.change_method(method),
+                Event::Pointer(on) => self.pointer = on.then(|| self.pointer.take().unwrap_or_default()),
                 Event::Solver(made) => self.change_solver(made)?,
                 Event::Conversions(conversions) => {
                     self.conversions = conversions;
@@ -375,7 +380,10 @@ impl FollowLoop {
             let came = if is_new { solved.frame.came } else { 0 };
             meter.solved(came, now - solved.frame.arrived, now - begun);
         });
-        let answered = SolvedFrame { frame: &solved.frame, solution: &solution, age: now - solved.frame.arrived };
+        let time_s = 1e-6 * solved.frame.board_time_us as f64;
+        let events = self.pointer.as_mut().map(|pointer| pointer.take(time_s, &solution.contacts)).unwrap_or_default();
+        let age = now - solved.frame.arrived;
+        let answered = SolvedFrame { frame: &solved.frame, solution: &solution, age, events: &events };
         self.listeners.iter_mut().for_each(|listener| listener.solved(&answered));
         if !self.search.is_busy() {
             if let Some(look) = board.watch.look(&solution) {
@@ -388,7 +396,8 @@ impl FollowLoop {
             }
         }
         self.found.clone_from(&solution.contacts);
-        let shown = solved.frame.snapshot(solution, board.baseline.state().is_taking());
+        let pointer = self.pointer.as_ref().map(Pointer::state);
+        let shown = solved.frame.snapshot(solution, pointer, board.baseline.state().is_taking());
         if self.notice.is_due() {
             self.unshown = None;
             self.notice.publish(|snapshot| snapshot.frame = Some(shown));
@@ -423,7 +432,7 @@ impl SearchPause {
 }
 
 impl Taken {
-    fn snapshot(&self, solution: Solution, rezeroing: bool) -> FrameSnapshot {
+    fn snapshot(&self, solution: Solution, pointer: Option<PointerState>, rezeroing: bool) -> FrameSnapshot {
         FrameSnapshot {
             sequence: self.sequence,
             board_time_us: self.board_time_us,
@@ -431,6 +440,7 @@ impl Taken {
             status: self.status,
             readings: self.newest.clone(),
             solution,
+            pointer,
             rezeroing,
         }
     }

@@ -56,6 +56,8 @@ pub enum Event {
     Looked(Look, Option<[usize; 2]>),
     /// Another method is to read the touch.
     Method(Method),
+    /// A contact is a pointer from now on, or is none.
+    Pointer(bool),
     /// Something is asked of the calibration, of a board of this identity.
     Calibrate(Calibrate, Option<String>),
     /// What has come of work for the calibration of this number.

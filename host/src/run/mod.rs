@@ -6,6 +6,7 @@
 //! [`Snapshot`]s through a cell that keeps the latest only, so that a slow page slows nothing. Pages answer with [`Request`]s.
 
 pub mod calibration;
+pub mod course;
 mod follower;
 mod inbox;
 mod maker;
@@ -29,7 +30,9 @@ use tactomo_board::session::RequestedSettings;
 use tactomo_protocol::{Hello, Status};
 
 use self::calibration::{Calibrate, Calibrating};
+use self::course::Course;
 use tactomo_physics::readings::Readings;
+use tactomo_touch::pointer::{PointerEvent, PointerState};
 use tactomo_touch::solve::{Method, Solution};
 
 /// What there is to show at a moment.
@@ -45,6 +48,8 @@ pub struct Snapshot {
     pub solver: Option<SolverState>,
     /// Counts since the start.
     pub statistics: Statistics,
+    /// The course of the readings, of every frame.
+    pub course: Course,
     /// What the link plays, and what a person may ask of it.
     pub playing: Playing,
     /// The recording that is being kept, if one is.
@@ -92,6 +97,8 @@ pub struct FrameSnapshot {
     pub readings: Readings,
     /// What the solver made of the readings less the baseline.
     pub solution: Solution,
+    /// What the pointer has done, if a contact is one.
+    pub pointer: Option<PointerState>,
     /// Whether the baseline is being taken.
     pub rezeroing: bool,
 }
@@ -105,6 +112,8 @@ pub struct SolvedFrame<'a> {
     pub solution: &'a Solution,
     /// Since the frame's last byte came.
     pub age: Duration,
+    /// What the pointer does with it, if a contact is one.
+    pub events: &'a [PointerEvent],
 }
 
 /// Counts since the start.

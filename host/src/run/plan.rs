@@ -19,8 +19,11 @@ use tactomo_board::session::{GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
+#[cfg(doc)]
+use tactomo_physics::scene::SceneName;
 use tactomo_protocol::Hello;
 use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
+use tactomo_touch::vibration::Peak;
 
 /// Makes the solver that is ordered; called in other threads.
 pub type MakeSolver = Arc<dyn Fn(&Order) -> Result<Box<dyn Solver>, BoxError> + Send + Sync>;
@@ -51,6 +54,8 @@ pub struct Plan {
     pub listeners: Vec<Box<dyn Listener>>,
     /// Where calibrated detectors are saved.
     pub folder: PathBuf,
+    /// Whether a contact is a pointer in every scene, not in [`SceneName::Pointer`] alone.
+    pub pointer: bool,
     /// Time from Hello to the end; `None` for without end.
     pub seconds: Option<Duration>,
 }
@@ -67,6 +72,7 @@ impl Plan {
             listeners: Vec::new(),
             board_log: BoardLog::unread(),
             folder: PathBuf::from("."),
+            pointer: false,
             seconds: None,
         }
     }
@@ -93,6 +99,7 @@ pub struct Solving {
 impl Solving {
     /// Reads the touch of a problem's detector by a method.
     pub fn new(method: Method, problem: Problem) -> Self {
+        problem.make_nuisance_beside();
         let at_rest = problem.clone();
         let problems = Arc::new(Problems { described: problem, other: Mutex::new(None) });
         let looked_at = Arc::clone(&problems);
@@ -168,6 +175,9 @@ pub struct Summary {
     pub latency_us: Latency,
     /// Age of answers when they are ready, since the last byte of their frame came, in microseconds (us).
     pub age_us: Latency,
+    /// The frequency at which the mean reading swung in the last seconds, if one stands out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vibration: Option<Peak>,
 }
 
 /// Why the run cannot go on.

@@ -8,15 +8,17 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tactomo_board::identity;
-use tactomo_board::link::{Link, Source};
+use tactomo_board::link::{Control, Link, Source};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::{Closing, RecordError, Recorder};
 use tactomo_board::sequence::Sequence;
 use tactomo_board::session::{self, GreetError};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::SceneName;
 use tactomo_protocol::{BoardMessage, DecodeError, Frame, Hello};
 
+use super::course::Course;
 use super::follower::FollowThread;
 use super::inbox::{Event, Inbox, Taken};
 use super::notice::NoticeBoard;
@@ -45,8 +47,11 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     if follower.is_some() {
         // Most boards measure as the detector's description says, so their first frame finds a solver.
         inbox.put(Event::Board(Arc::new(plan.detector.clone())));
+        inbox.put(Event::Pointer(plan.pointer));
         inbox.wait_until_ready(|| stop.load(Ordering::Relaxed));
     }
+    let course = Course::default();
+    notice.change(|snapshot| snapshot.course = course.clone());
     let mut reader = Reader {
         plan,
         requests,
@@ -59,6 +64,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         greeted: None,
         closing: Vec::new(),
         lost: None,
+        course: course.clone(),
     };
     reader.show_recording();
     let ended = reader.run(source);
@@ -69,10 +75,10 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     if let Err(error) = &ended {
         notice.publish(|snapshot| snapshot.link = LinkState::Ended(error.to_string()));
     }
-    ended.map(|source| summary(&notice, source))
+    ended.map(|source| summary(&notice, source, &course))
 }
 
-fn summary(notice: &NoticeBoard, source: String) -> Summary {
+fn summary(notice: &NoticeBoard, source: String, course: &Course) -> Summary {
     let (statistics, frames_per_s) =
         notice.count(|meter| (meter.statistics(Instant::now()), meter.overall_frames_per_s()));
     Summary {
@@ -86,6 +92,7 @@ fn summary(notice: &NoticeBoard, source: String) -> Summary {
         corrupt: statistics.corrupt,
         latency_us: statistics.latency,
         age_us: statistics.age,
+        vibration: course.peak(),
     }
 }
 
@@ -114,6 +121,7 @@ struct Reader {
     /// Recordings that were ended and are still written, and why one failed.
     closing: Vec<Closing>,
     lost: Option<RecordError>,
+    course: Course,
 }
 
 /// Who has said Hello, and what its frames mean.
@@ -290,6 +298,7 @@ impl Reader {
         let electrodes = usize::from(board.hello.electrodes);
         let mut newest = Readings::from_fn(electrodes, |_, _| 0.0);
         newest.volts_mut().iter_mut().zip(volts).for_each(|(to, volts)| *to = volts);
+        self.course.add(place.time_us, &newest);
         let taken = Taken {
             mean: newest.clone(),
             newest,
@@ -327,6 +336,9 @@ impl Reader {
                 }
                 Request::Control(control) => {
                     let refused = open.as_mut().and_then(|(link, _)| link.control(&control).err());
+                    if let (None, Control::Scene(scene)) = (&refused, control) {
+                        self.inbox.put(Event::Pointer(self.plan.pointer || scene == SceneName::Pointer));
+                    }
                     self.notice.change(|snapshot| snapshot.refused = refused.map(|error| error.to_string()));
                 }
             }

@@ -63,11 +63,12 @@ impl Stream {
 
 impl Listener for Stream {
     fn solved(&mut self, solved: &SolvedFrame<'_>) {
-        let SolvedFrame { frame, solution, age } = solved;
+        let SolvedFrame { frame, solution, age, events } = solved;
         let line = FrameReport {
             time_s: Some(frame.board_time_us as f64 * 1e-6),
             sequence: Some(frame.sequence),
             age_us: Some(age.as_secs_f64() * 1e6),
+            events,
             ..FrameReport::of(solution)
         };
         let sent = serde_json::to_string(&line).ok().zip(self.lines.as_ref()).map(|(line, lines)| lines.try_send(line));
@@ -121,6 +122,7 @@ mod tests {
     use super::*;
     use crate::run::Taken;
     use tactomo_physics::readings::Readings;
+    use tactomo_touch::pointer::PointerEvent;
     use tactomo_touch::solve::{FoundContact, Solution};
 
     #[derive(Clone, Default)]
@@ -154,7 +156,9 @@ mod tests {
                 arrived: Instant::now(),
                 status: Default::default(),
             };
-            stream.solved(&SolvedFrame { frame: &frame, solution: &solution, age: Duration::from_micros(50) });
+            let events = if sequence == 7 { &[PointerEvent::Press][..] } else { &[] };
+            let age = Duration::from_micros(50);
+            stream.solved(&SolvedFrame { frame: &frame, solution: &solution, age, events });
             thread::sleep(Duration::from_millis(5));
         }
         assert!(!out.0.lock().unwrap().is_empty(), "lines wait at most {FLUSH_EVERY:?}");
@@ -163,6 +167,7 @@ mod tests {
         let lines: Vec<serde_json::Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
         assert_eq!((lines.len(), &lines[19]["sequence"]), (20, &19.into()));
         assert_eq!((&lines[3]["contacts"][0]["x_m"], &lines[3]["time_s"]), (&0.01.into(), &0.003.into()));
+        assert_eq!((&lines[7]["events"][0]["kind"], lines[8].get("events")), (&"press".into(), None));
         assert!((lines[0]["age_us"].as_f64().unwrap() - 50.0).abs() < 1e-9);
     }
 }

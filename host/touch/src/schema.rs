@@ -7,6 +7,7 @@
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
+use crate::pointer::PointerEvent;
 use crate::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
 /// A number of a contact, by its name.
@@ -17,12 +18,13 @@ pub struct ContactColumn {
 }
 
 /// The numbers of a contact, in the order of every format.
-pub const CONTACT_COLUMNS: [ContactColumn; 13] = [
+pub const CONTACT_COLUMNS: [ContactColumn; 14] = [
     ContactColumn { name: "id", of: |contact| contact.id.map(f64::from) },
     ContactColumn { name: "x_m", of: |contact| Some(contact.x_m) },
     ContactColumn { name: "y_m", of: |contact| Some(contact.y_m) },
     ContactColumn { name: "z_m", of: |contact| Some(contact.z_m) },
     ContactColumn { name: "conductance_s", of: |contact| Some(contact.conductance_s) },
+    ContactColumn { name: "apparent_conductance_s", of: |contact| contact.apparent_conductance_s },
     ContactColumn { name: "radius_m", of: |contact| contact.radius_m },
     ContactColumn { name: "force_n", of: |contact| contact.force_n },
     ContactColumn { name: "force_deviation_n", of: |contact| contact.force_deviation_n },
@@ -50,7 +52,7 @@ pub fn contact_values(contact: &FoundContact) -> [f32; CONTACT_COLUMNS.len() - 1
     std::array::from_fn(|index| CONTACT_COLUMNS[index + 1].value(contact).map_or(f32::NAN, |value| value as f32))
 }
 
-/// `{id?, x_m, y_m, z_m?, conductance_s, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ...}`; z is left out on a flat detector.
+/// `{id?, x_m, y_m, z_m?, conductance_s, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ...}`; z is left out on a flat detector.
 impl Serialize for FoundContact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
@@ -185,6 +187,9 @@ pub struct FrameReport<'a> {
     /// The image, if it is wanted: contact conductance per area at each node (S/m2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_s_per_m2: Option<&'a [f32]>,
+    /// What the pointer did since the frame before; in JSON alone, of a live stream with a pointer.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub events: &'a [PointerEvent],
 }
 
 fn is_none_or_zero(count: &Option<u64>) -> bool {
@@ -284,6 +289,7 @@ mod tests {
         FoundContact {
             id: Some(7),
             z_m: 0.5,
+            apparent_conductance_s: Some(6.0),
             radius_m: Some(0.25),
             force_n: Some(3.0),
             force_deviation_n: Some(0.375),
@@ -382,7 +388,7 @@ mod tests {
         assert_eq!(json["flags"]["excluded"], serde_json::json!([3, 14]));
         assert_eq!(json["choice"]["what"], "2 contacts");
         assert_eq!(json["contacts"].as_array().map(Vec::len), Some(2));
-        assert!(json.get("image_s_per_m2").is_none() && json.get("frame").is_none() && json.get("shape").is_none());
+        assert!(["image_s_per_m2", "frame", "shape", "events"].iter().all(|name| json.get(name).is_none()));
         let rows = csv_rows(&FrameReport::of(&solution));
         assert_eq!(rows[1][csv_heads().len() - 2..], ["3 14", "2 contacts"]);
     }

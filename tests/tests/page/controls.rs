@@ -58,6 +58,19 @@ async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
         status_shown().await;
         stage.browser.select("scene", "five-fingers").await?;
         asks(&stage, Request::Control(Control::Scene(SceneName::FiveFingers))).await?;
+        for (scene, name) in [
+            ("gripper", SceneName::Gripper),
+            ("display", SceneName::Display),
+            ("pointer", SceneName::Pointer),
+            ("texture", SceneName::Texture),
+            ("hand", SceneName::Hand),
+        ] {
+            stage.browser.select("scene", scene).await?;
+            asks(&stage, Request::Control(Control::Scene(name))).await?;
+        }
+        let said = "return document.querySelector('#scene option[value=gripper]').textContent";
+        let said = stage.browser.run(said).await?;
+        ensure!(said == "gripper, scaled", "{said}: it was made for another detector than this one");
         stage.browser.select("fault", "open:3").await?;
         asks(&stage, Request::Control(Control::Faults(vec![Fault::Open { electrode: 3 }]))).await?;
         stage.browser.run("document.getElementById('details-card').open = true").await?;

@@ -70,6 +70,7 @@ impl Script {
             status: Default::default(),
             readings: Readings::from_fn(16, |g, e| if g == e { 0.0 } else { 0.01 * (g + e) as f64 }),
             solution,
+            pointer: None,
             rezeroing: false,
         };
         self.set(|snapshot| snapshot.frame = Some(frame));

@@ -62,6 +62,7 @@ impl Rig {
             status: Default::default(),
             readings: Readings::from_fn(16, |_, _| 0.0),
             solution: Solution::default(),
+            pointer: None,
             rezeroing: false,
         };
         self.snapshots.send_replace(Arc::new(Snapshot { frame: Some(frame), ..Snapshot::default() }));

@@ -96,12 +96,16 @@ impl Nuisance {
         Ok(Similar { model, board: steps.into_iter().filter(|(parameter, _)| parameter.is_of_board()).collect() })
     }
 
-    /// Of all that is not known of the detector that a model is of, as it is described; `None` if that is nothing. It takes a model for most parameters, made in as many
-    /// threads as there are cores.
+    /// Of all that is not known of the detector that a model is of, as it is described; `None` if that is nothing. It takes a model for most
+    /// parameters, made in so many threads.
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if a detector that is a little different cannot be modelled.
-    pub fn new(model: &Arc<dyn ForwardModel>, described: &Detector) -> Result<Option<Self>, ForwardError> {
+    pub fn new(
+        model: &Arc<dyn ForwardModel>,
+        described: &Detector,
+        cores: usize,
+    ) -> Result<Option<Self>, ForwardError> {
         let unknowns = described.unknowns().directions;
         let mut parameters: Vec<(Parameter, f64)> = Vec::new();
         for (parameter, step) in unknowns.iter().flatten() {
@@ -120,8 +124,8 @@ impl Nuisance {
             let (parameter, square) = parameters[row];
             step_of(&unknowns[column], parameter) / square.sqrt()
         });
-        let parameters =
-            threads::map(&parameters, |(parameter, square)| Changed::new(model, *parameter, square.sqrt()));
+        let changed = |(parameter, square): &(Parameter, f64)| Changed::new(model, *parameter, square.sqrt());
+        let parameters = threads::map_on(cores, &parameters, changed);
         let parameters = parameters.into_iter().collect::<Result<_, _>>()?;
         let pads_ohm = pads_ohm(&**model)?;
         Ok(Some(Self { model: Arc::clone(model), parameters, directions, pads_ohm }))

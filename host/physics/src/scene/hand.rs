@@ -1,5 +1,7 @@
 //! What presses in a scene, and how hard.
 
+#[cfg(doc)]
+use super::SceneName;
 use super::{Shape, Touch};
 use crate::detector::Detector;
 use crate::geometry::Point;
@@ -22,6 +24,7 @@ const FINGERTIP_SHARE: f64 = 1.0 / 7.0;
 pub struct Hand {
     shorter_m: f64,
     sheet_conductance_s: f64,
+    hertz: Hertz,
     fingertip: Option<Fingertip>,
 }
 
@@ -47,12 +50,32 @@ impl Hand {
     /// A hand without newtons, the same on any detector: conductances relative to its sheet conductance, radii to its size.
     /// A disc's radius grows as the cube root of firmness, a strip's width as the square root, as under Hertz.
     pub fn relative(detector: &Detector) -> Self {
-        Self { shorter_m: shorter_m(detector), sheet_conductance_s: detector.sheet_conductance_s(), fingertip: None }
+        Self {
+            shorter_m: shorter_m(detector),
+            sheet_conductance_s: detector.sheet_conductance_s(),
+            hertz: Hertz::of_sample_a(detector),
+            fingertip: None,
+        }
+    }
+
+    /// The same on a detector of such mechanics, for [demonstrations](SceneName::detector), which always press in newtons.
+    pub fn on(self, hertz: Hertz) -> Self {
+        Self { hertz, ..self }
     }
 
     /// A hand that presses in newtons.
     pub fn in_newtons(detector: &Detector, fingertip: Fingertip) -> Self {
-        Self { fingertip: Some(fingertip), ..Self::relative(detector) }
+        Self { hertz: fingertip.hertz, fingertip: Some(fingertip), ..Self::relative(detector) }
+    }
+
+    /// Mechanics of the detector: of sample A unless told otherwise.
+    pub(super) fn hertz(&self) -> Hertz {
+        self.hertz
+    }
+
+    /// Force of a press of firmness 1 (N), if it presses in newtons.
+    pub(super) fn force_n(&self) -> Option<f64> {
+        self.fingertip.map(|fingertip| fingertip.force_n)
     }
 
     /// The touch of a tip `breadth` times as wide as a finger's. (Under a force, a ball's contact is as wide as the cube root of

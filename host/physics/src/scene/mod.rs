@@ -1,9 +1,11 @@
 //! What presses: the contacts present at a moment, and scenes in which they come and go.
 
+mod demonstration;
 mod hand;
 mod script;
 mod touch;
 
+pub use self::demonstration::TEXTURE_HZ;
 pub use self::hand::{Fingertip, Hand};
 pub use self::script::{Scene, SceneName};
 pub use self::touch::{Shape, Touch};

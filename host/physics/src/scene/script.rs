@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 
+use super::demonstration::Demonstration;
 use super::hand::LIGHTEST;
 use super::{Contact, Hand, Touch};
 use crate::detector::{Detector, Outline, Surface};
@@ -27,7 +28,7 @@ const STEADY: f64 = 0.3;
 /// How much broader a wide contact is than a finger's.
 const WIDE: f64 = 5.0;
 /// Fingertips of a hand laid down: from the middle finger's root, in shares of the shorter side, thumb first.
-const FINGERTIPS: [Point; 5] = [[-0.30, -0.12], [-0.20, 0.20], [-0.02, 0.28], [0.14, 0.22], [0.29, 0.05]];
+pub(super) const FINGERTIPS: [Point; 5] = [[-0.30, -0.12], [-0.20, 0.20], [-0.02, 0.28], [0.14, 0.22], [0.29, 0.05]];
 /// Places tried before a scene gives up to find one inside the outline.
 const TRIES: usize = 1000;
 
@@ -56,6 +57,16 @@ pub enum SceneName {
     Moving,
     /// One contact at one place, from nothing to firm and back.
     ChangingForce,
+    /// A soft gripper's finger closes on a rod, holds it, feels it slip, and lets go.
+    Gripper,
+    /// A finger strokes, two pinch, one taps.
+    Display,
+    /// A ball rolls under a palm and is pressed, as a pointer that clicks.
+    Pointer,
+    /// Rows of bumps pass under a fingertip.
+    Texture,
+    /// A hand is laid down, fingers and palm.
+    Hand,
 }
 
 /// What touches a detector, moment by moment.
@@ -66,6 +77,7 @@ pub struct Scene {
     half_size_m: [f64; 2],
     places: Vec<Point>,
     phase: f64,
+    demonstration: Option<Demonstration>,
     /// Where places of the map are, on a curved detector.
     surface: Option<Surface>,
 }
@@ -77,7 +89,7 @@ pub struct UnknownScene(String);
 
 impl SceneName {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 16] = [
         Self::Rest,
         Self::Wandering,
         Self::Single,
@@ -89,7 +101,29 @@ impl SceneName {
         Self::RollingBall,
         Self::Moving,
         Self::ChangingForce,
+        Self::Gripper,
+        Self::Display,
+        Self::Pointer,
+        Self::Texture,
+        Self::Hand,
     ];
+
+    /// Name of the preset that it was made for, if it is one of the paper's demonstrations.
+    pub fn detector(self) -> Option<&'static str> {
+        match self {
+            Self::Gripper => Some("strip-13x60"),
+            Self::Display => Some("display-140x70"),
+            Self::Pointer => Some("pad-257x182"),
+            Self::Texture => Some("fingertip-10"),
+            Self::Hand => Some("square-150"),
+            _ => None,
+        }
+    }
+
+    /// Whether it is of discs alone, which are all that can touch a curved detector.
+    pub fn is_of_discs(self) -> bool {
+        !matches!(self, Self::Ring | Self::Line | Self::Gripper)
+    }
 }
 
 impl fmt::Display for SceneName {
@@ -106,6 +140,11 @@ impl fmt::Display for SceneName {
             Self::RollingBall => "rolling-ball",
             Self::Moving => "moving",
             Self::ChangingForce => "changing-force",
+            Self::Gripper => "gripper",
+            Self::Display => "display",
+            Self::Pointer => "pointer",
+            Self::Texture => "texture",
+            Self::Hand => "hand",
         })
     }
 }
@@ -129,7 +168,9 @@ impl Scene {
         };
         let half_size_m = detector.outline.size_m().map(|side_m| side_m / 2.0);
         let places = places(&detector.outline, half_size_m, count, &mut random);
-        Self { name, hand, half_size_m, places, phase: TAU * random.f64(), surface: detector.surface.clone() }
+        let phase = TAU * random.f64();
+        let demonstration = Demonstration::new(name, detector, &hand, phase);
+        Self { name, hand, half_size_m, places, phase, demonstration, surface: detector.surface.clone() }
     }
 
     /// Its name.
@@ -143,7 +184,7 @@ impl Scene {
     }
 
     /// All that touches at `time_s` seconds after the start. Parts of it may lie beside a detector that is no rectangle. On a curved one,
-    /// what touches beside its map is left out, and so are lines and rings.
+    /// what touches beside its map is left out, and so is all that is not a disc.
     pub fn at(&self, time_s: f64) -> Vec<Touch> {
         match &self.surface {
             Some(surface) => self.on_map(time_s).into_iter().filter_map(|touch| raised(touch, surface)).collect(),
@@ -166,6 +207,9 @@ impl Scene {
             SceneName::RollingBall => one(self.hand.tip(self.path_m(ROLL_PERIOD_S, time_s), STEADY, 1.5)),
             SceneName::Moving => one(self.hand.tip(self.round_m(time_s), STEADY, 1.0)),
             SceneName::ChangingForce => self.places.iter().flat_map(|place| self.pressed(*place, time_s)).collect(),
+            SceneName::Gripper | SceneName::Display | SceneName::Pointer | SceneName::Texture | SceneName::Hand => {
+                self.demonstration.map(|demonstration| demonstration.at(time_s)).unwrap_or_default()
+            }
         }
     }
 

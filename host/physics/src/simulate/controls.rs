@@ -74,10 +74,10 @@ impl Controls {
     /// Plays another scene, from its beginning.
     ///
     /// # Errors
-    /// [`SimulationError::Shape`] if the detector is curved and the scene a ring or a line.
+    /// [`SimulationError::Shape`] if the detector is curved and the scene not of discs.
     pub fn play(&self, name: SceneName) -> Result<(), SimulationError> {
         let Shared { detector, hand, seed, .. } = &*self.0;
-        if detector.surface.is_some() && matches!(name, SceneName::Ring | SceneName::Line) {
+        if detector.surface.is_some() && !name.is_of_discs() {
             return Err(SimulationError::Shape(name));
         }
         let scene = Scene::new(name, detector, *hand, *seed);

@@ -36,6 +36,7 @@ const ASSETS: &[Asset] = &[
     ("/method.js", SCRIPT, include_str!("web/method.js")),
     ("/palette.js", SCRIPT, include_str!("web/palette.js")),
     ("/picture.js", SCRIPT, include_str!("web/picture.js")),
+    ("/pointer.js", SCRIPT, include_str!("web/pointer.js")),
     ("/press.js", SCRIPT, include_str!("web/press.js")),
     ("/protocol.js", SCRIPT, include_str!("web/protocol.js")),
     ("/raster.js", SCRIPT, include_str!("web/raster.js")),
@@ -53,6 +54,7 @@ const ASSETS: &[Asset] = &[
     ("/triangles.js", SCRIPT, include_str!("web/triangles.js")),
     ("/units.js", SCRIPT, include_str!("web/units.js")),
     ("/verdict.js", SCRIPT, include_str!("web/verdict.js")),
+    ("/vibration.js", SCRIPT, include_str!("web/vibration.js")),
 ];
 
 /// Answer to a request for `path`.

@@ -43,6 +43,8 @@ struct Page<'a> {
     taken: bool,
     update_due: Instant,
     status_due: Instant,
+    /// Points of the course of the readings that it has.
+    course_points: u64,
     /// Whether this page presses on the simulated detector.
     presses: bool,
 }
@@ -57,7 +59,7 @@ impl<'a> Page<'a> {
         let mut snapshots = shared.snapshots.clone();
         snapshots.mark_changed();
         let now = Instant::now();
-        Self { shared, snapshots, taken: false, update_due: now, status_due: now, presses: false }
+        Self { shared, snapshots, taken: false, update_due: now, status_due: now, course_points: 0, presses: false }
     }
 
     /// Returns when the page has left, or with the reason to close.
@@ -122,7 +124,10 @@ impl<'a> Page<'a> {
         let snapshot = self.snapshots.borrow_and_update().clone();
         self.update_due = Instant::now() + UPDATE_INTERVAL;
         let frame = snapshot.frame.as_ref()?;
-        Some(Message::binary(update::update(frame, snapshot.statistics.frames, &self.shared.setup.detector)))
+        let (course_v, points) = snapshot.course.points_since(self.course_points);
+        self.course_points = points;
+        let detector = &self.shared.setup.detector;
+        Some(Message::binary(update::update(frame, snapshot.statistics.frames, &course_v, detector)))
     }
 }
 

@@ -4,28 +4,31 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 9 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; shape: 0 none, 1 a line, 2 a ring; flags: 1 saturated, 2 the readings do not fit, 4 unfinished, 8 the detector differs from its description; electrodes left out: bit `e` is electrode `e` |
+//! | 10 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; shape: 0 none, 1 a line, 2 a ring; flags: 1 saturated, 2 the readings do not fit, 4 unfinished, 8 the detector differs from its description; electrodes left out: bit `e` is electrode `e`; points of the [course](crate::run::course) `s` |
 //! | f32 | residual of the readings: root mean square, in standard deviations of the noise |
 //! | f32 | age of the answer when this was sent: since the last byte of its frame came (s) |
+//! | 4 x f32 | the pointer: sum of its motion along x and y (m), 1 while it is pressed, clicks so far; not numbers if no contact is one |
 //! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
 //! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
-//! | k x (u32, 14 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
+//! | s x f32 | points of the course of the readings (V) since the update before, 4 ms each |
+//! | k x (u32, 15 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
 //! | 18 x f32 | with a shape: its [columns](tactomo_touch::schema::SHAPE_COLUMNS); then the contacts are beside it |
 //! | the rest | UTF-8: what was chosen, a line feed, why; nothing if the solver does not choose |
 
 use crate::run::FrameSnapshot;
 use tactomo_physics::detector::Detector;
+use tactomo_touch::pointer::PointerState;
 use tactomo_touch::schema::{CONTACT_COLUMNS, contact_values, shape_values};
 use tactomo_touch::solve::{Flags, FoundContact, FoundShape};
 
 /// Version of the layout; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 6;
+pub(super) const LAYOUT: u32 = 7;
 
 /// Numbers of a contact: the columns after its id, and its place on the map.
 const CONTACT_FLOATS: usize = CONTACT_COLUMNS.len() - 1 + 2;
 
-/// An update; `frames` received so far.
-pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) -> Vec<u8> {
+/// An update; `frames` received so far, and the points of the course (V) since the last one.
+pub(super) fn update(frame: &FrameSnapshot, frames: u64, course_v: &[f32], detector: &Detector) -> Vec<u8> {
     let solution = &frame.solution;
     let age_s = frame.arrived.elapsed().as_secs_f32();
     let image = solution.image_s_per_m2.as_deref().unwrap_or_default();
@@ -33,8 +36,10 @@ pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) ->
     // The page counts modulo 2^32.
     let head = [LAYOUT, frame.sequence as u32, frames as u32].into_iter().chain(counts);
     let head = head.chain([kind(solution.shape.as_ref())]).chain(flags(&solution.flags));
+    let head = head.chain([course_v.len() as u32]);
     let readings = frame.readings.volts().iter().map(|&volt| volt as f32);
-    let values = [known(solution.residual), age_s].into_iter().chain(image.iter().copied()).chain(readings);
+    let first = [known(solution.residual), age_s].into_iter().chain(pointer(frame.pointer));
+    let values = first.chain(image.iter().copied()).chain(readings).chain(course_v.iter().copied());
     let mut bytes: Vec<u8> = head.flat_map(u32::to_le_bytes).chain(values.flat_map(f32::to_le_bytes)).collect();
     for found in &solution.contacts {
         bytes.extend(found.id.unwrap_or(0).to_le_bytes());
@@ -47,6 +52,13 @@ pub(super) fn update(frame: &FrameSnapshot, frames: u64, detector: &Detector) ->
         bytes.extend([choice.what.as_bytes(), b"\n", choice.why.as_bytes()].concat());
     }
     bytes
+}
+
+fn pointer(state: Option<PointerState>) -> [f32; 4] {
+    let of = |PointerState { way_m: [x_m, y_m], is_pressed, clicks }| {
+        [x_m as f32, y_m as f32, f32::from(u8::from(is_pressed)), clicks as f32]
+    };
+    state.map_or([f32::NAN; 4], of)
 }
 
 fn kind(shape: Option<&FoundShape>) -> u32 {
@@ -91,9 +103,10 @@ mod tests {
             status: Default::default(),
             readings: Readings::from_fn(2, |g, e| (2 * g + e) as f64),
             solution,
+            pointer: Some(PointerState { way_m: [0.5, -0.25], is_pressed: true, clicks: 3 }),
             rezeroing: false,
         };
-        update(&frame, 300, &Detector::preset(Detector::DEFAULT).unwrap())
+        update(&frame, 300, &[0.25, 0.75], &Detector::preset(Detector::DEFAULT).unwrap())
     }
 
     fn words(bytes: &[u8]) -> Vec<u32> {
@@ -109,6 +122,7 @@ mod tests {
         let errors = Uncertainty { x_m: 0.5, y_m: 0.25, correlation: -0.5, conductance_s: 4.0 };
         let known = FoundContact {
             id: Some(6),
+            apparent_conductance_s: Some(1.75),
             radius_m: Some(1.5),
             force_n: Some(3.0),
             force_deviation_n: Some(0.75),
@@ -126,19 +140,20 @@ mod tests {
             certainty: Some(0.75),
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
-        assert_eq!(words(&bytes[..36]), [LAYOUT, 9, 300, 3, 2, 2, 0, 0b101, 1 << 31 | 1 << 3]);
-        let head = floats(&bytes[36..72]);
+        assert_eq!(words(&bytes[..40]), [LAYOUT, 9, 300, 3, 2, 2, 0, 0b101, 1 << 31 | 1 << 3, 2]);
+        let head = floats(&bytes[40..100]);
         assert_eq!(head[0], 1.25);
         assert!((0.0..5.0).contains(&head[1]), "{} s old", head[1]);
-        assert_eq!(head[2..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0]);
-        assert_eq!(words(&bytes[72..76]), [6]);
-        let known = [0.25, -0.5, 0.0, 2.0, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5];
-        assert_eq!(floats(&bytes[76..132]), known);
-        assert_eq!(words(&bytes[132..136]), [0]);
-        assert_eq!(floats(&bytes[136..152]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[152..184]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[184..192]), [1.0, 2.0]);
-        assert_eq!(&bytes[192..], "2 contacts\nµ".as_bytes());
+        assert_eq!(head[2..6], [0.5, -0.25, 1.0, 3.0], "the pointer");
+        assert_eq!(head[6..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
+        assert_eq!(words(&bytes[100..104]), [6]);
+        let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5];
+        assert_eq!(floats(&bytes[104..164]), known);
+        assert_eq!(words(&bytes[164..168]), [0]);
+        assert_eq!(floats(&bytes[168..184]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[184..220]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[220..228]), [1.0, 2.0]);
+        assert_eq!(&bytes[228..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -151,7 +166,7 @@ mod tests {
             ..Solution::default()
         });
         assert_eq!(words(&bytes[20..28]), [1, 2]);
-        let shape = floats(&bytes[44 + 4 * 4 + 60..]);
+        let shape = floats(&bytes[64 + 4 * 6 + 64..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }
@@ -159,8 +174,8 @@ mod tests {
     #[test]
     fn nothing_found_is_head_and_readings_alone() {
         let bytes = bytes_of(Solution::default());
-        assert_eq!(words(&bytes[..36]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0, 0]);
-        assert!(floats(&bytes[36..40])[0].is_nan());
-        assert_eq!(bytes.len(), 44 + 4 * 4);
+        assert_eq!(words(&bytes[..40]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0, 0, 2]);
+        assert!(floats(&bytes[40..44])[0].is_nan());
+        assert_eq!(bytes.len(), 64 + 4 * 6);
     }
 }

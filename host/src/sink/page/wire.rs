@@ -20,6 +20,7 @@ use crate::run::{Latency, LinkState, Snapshot};
 use tactomo_board::link::Playing;
 use tactomo_physics::scene::SceneName;
 use tactomo_touch::solve::Method;
+use tactomo_touch::vibration::{Peak, Spectrum};
 
 #[derive(Serialize)]
 struct SetupMessage<'a> {
@@ -40,7 +41,7 @@ struct SetupMessage<'a> {
     sheet_conductance_s: f64,
     usual_radius_m: f64,
     solvers: Vec<SolverMessage>,
-    scenes: Vec<String>,
+    scenes: Vec<SceneMessage>,
     source: &'a str,
     simulated: bool,
 }
@@ -49,6 +50,13 @@ struct SetupMessage<'a> {
 struct SolverMessage {
     name: &'static str,
     explanation: &'static str,
+}
+
+#[derive(Serialize)]
+struct SceneMessage {
+    name: String,
+    /// The preset that it was made for, if it is one of the paper's demonstrations.
+    detector: Option<&'static str>,
 }
 
 #[derive(Serialize)]
@@ -95,10 +103,11 @@ fn electrodes(setup: &PageSetup) -> Vec<ElectrodeMessage> {
 }
 
 /// The scenes that a simulated detector can play: only discs can touch a curved one.
-fn scenes(setup: &PageSetup) -> Vec<String> {
+fn scenes(setup: &PageSetup) -> Vec<SceneMessage> {
     let is_flat = setup.detector.surface.is_none();
-    let plays = |scene: &SceneName| is_flat || !matches!(scene, SceneName::Ring | SceneName::Line);
-    SceneName::ALL.iter().filter(|scene| plays(scene)).map(SceneName::to_string).collect()
+    let plays = |scene: &SceneName| is_flat || scene.is_of_discs();
+    let message = |scene: SceneName| SceneMessage { name: scene.to_string(), detector: scene.detector() };
+    SceneName::ALL.into_iter().filter(plays).map(message).collect()
 }
 
 /// The solvers to choose from, those that most people look for first.
@@ -123,6 +132,7 @@ struct StatusMessage<'a> {
     hello: Option<HelloMessage<'a>>,
     solver: Option<SolverStateMessage<'a>>,
     statistics: StatisticsMessage,
+    vibration: Option<VibrationMessage>,
     rezeroing: bool,
     rezeros: u64,
     playing: PlayingMessage,
@@ -131,6 +141,14 @@ struct StatusMessage<'a> {
     baseline: Option<&'a str>,
     calibration: Option<&'a str>,
     calibrating: Option<CalibratingMessage<'a>>,
+}
+
+/// The spectrum of the mean reading.
+#[derive(Serialize)]
+struct VibrationMessage {
+    step_hz: f32,
+    amplitudes_v: Vec<f32>,
+    peak: Option<Peak>,
 }
 
 /// What the link plays.
@@ -207,6 +225,11 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
             corrupt: counts.corrupt,
             age_us: counts.age,
         },
+        vibration: snapshot.course.spectrum().map(|Spectrum { step_hz, amplitudes, peak }| VibrationMessage {
+            step_hz: step_hz as f32,
+            amplitudes_v: amplitudes.into_iter().map(|amplitude| amplitude as f32).collect(),
+            peak,
+        }),
         rezeroing: snapshot.frame.as_ref().is_some_and(|frame| frame.rezeroing),
         rezeros,
         playing: playing(&snapshot.playing),
@@ -306,6 +329,9 @@ mod tests {
         assert_eq!(value["solvers"].as_array().map(Vec::len), Some(Method::ALL.len()));
         assert_eq!(value["solvers"][0]["name"], "auto");
         assert_eq!(value["scenes"].as_array().map(Vec::len), Some(SceneName::ALL.len()));
+        let scene = |index: usize| &value["scenes"][index];
+        assert_eq!(*scene(0), serde_json::json!({"name": "rest", "detector": null}));
+        assert_eq!(*scene(11), serde_json::json!({"name": "gripper", "detector": "strip-13x60"}));
         assert_eq!(value["triangles"], serde_json::json!([[0, 1, 2]]));
     }
 
@@ -319,7 +345,7 @@ mod tests {
         let count = |name: &str| value[name].as_array().map_or(0, Vec::len);
         assert_eq!(count("places_m"), mesh.nodes_m.len());
         assert_eq!(count("triangles") + count("torn_triangles"), mesh.triangles.len());
-        assert_eq!(count("scenes"), SceneName::ALL.len() - 2, "no line and no ring");
+        assert_eq!(count("scenes"), SceneName::ALL.len() - 3, "no line, no ring and no rod");
     }
 
     #[test]

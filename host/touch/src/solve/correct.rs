@@ -102,7 +102,9 @@ impl Corrector {
         let [x_m, y_m] = deviations_m;
         let uncertainty = Uncertainty { x_m, y_m, correlation, conductance_s: deviation_s };
         let uncertainty = found.uncertainty.map(|_| uncertainty);
-        FoundContact { x_m: at_m[0], y_m: at_m[1], conductance_s, uncertainty, ..*found }
+        let apparent_conductance_s =
+            found.apparent_conductance_s.map(|apparent_s| apparent_s * conductance_s / found.conductance_s);
+        FoundContact { x_m: at_m[0], y_m: at_m[1], conductance_s, apparent_conductance_s, uncertainty, ..*found }
     }
 
     /// Ends of a line, and the centre of a ring. How long or wide they are is not corrected.

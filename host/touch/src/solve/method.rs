@@ -166,7 +166,7 @@ const TABLE: [Row; 12] = [
     Row {
         method: Method::Contacts,
         name: "contacts",
-        explanation: "for fingertips and probes: fits position and conductance of up to five contacts, with standard errors",
+        explanation: "for fingertips and probes: fits position and conductance of up to six contacts, with standard errors",
         family: Family::Contacts,
         parameter: Some(ParameterKind::MaxContacts),
         build: |problem, parameter| {

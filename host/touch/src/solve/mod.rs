@@ -151,6 +151,9 @@ pub struct FoundContact {
     pub z_m: f64,
     /// Conductance (S).
     pub conductance_s: f64,
+    /// Conductance (S) of it in series with the current that crowds under it, its spreading resistance: of a firm contact readings give that far
+    /// better than either. Of a method that fits contacts.
+    pub apparent_conductance_s: Option<f64>,
     /// Radius (m), where the readings tell it.
     pub radius_m: Option<f64>,
     /// Force (N): on a detector with a law of force, or of a solver that was taught forces.

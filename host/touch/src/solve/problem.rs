@@ -1,10 +1,13 @@
 //! What solvers are made for.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
+use std::thread;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Nuisance, Through};
+use tactomo_physics::threads;
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -13,8 +16,15 @@ pub struct Problem {
     pub model: Arc<dyn ForwardModel>,
     /// The linear theory for the detector as measured, and the mesh that solvers' images are on.
     pub jacobian: Arc<Jacobian>,
-    /// What is not known of the detector; made when it is asked for first.
-    nuisance: Arc<OnceLock<Option<Nuisance>>>,
+    nuisance: Arc<Unknown>,
+}
+
+/// What is not known of the detector; made when it is asked for first.
+#[derive(Default)]
+struct Unknown {
+    made: OnceLock<Option<Nuisance>>,
+    /// Whether a thread of its own makes it.
+    beside: AtomicBool,
 }
 
 impl Problem {
@@ -54,17 +64,36 @@ impl Problem {
         &self.jacobian.detector
     }
 
-    /// What is not known of the detector; `None` if it is taken as exact. The first call makes a model for each of some dozens of parameters,
-    /// which takes about a second.
+    /// What is not known of the detector; `None` if it is taken as exact, and as long as it is [made beside](Self::make_nuisance_beside). Else the
+    /// first call makes a model for each of some dozens of parameters, which takes about a second with 16 electrodes, and half a minute with 32.
     pub fn nuisance(&self) -> Option<&Nuisance> {
+        if self.nuisance.beside.load(Ordering::Acquire) {
+            return self.nuisance.made.get()?.as_ref();
+        }
+        self.made_nuisance(threads::cores())
+    }
+
+    /// Begins to make what is not known of the detector in a thread of its own, and leaves a core to others. Meanwhile the detector is taken as exact: live, contacts that are
+    /// a little off are better than none for half a minute.
+    pub fn make_nuisance_beside(&self) {
+        let problem = self.clone();
+        let made = move || {
+            problem.made_nuisance(threads::cores().saturating_sub(1).max(1));
+        };
+        // Without a thread, whoever asks first makes it.
+        let thread = thread::Builder::new().name("unknowns".to_owned()).spawn(made);
+        self.nuisance.beside.store(thread.is_ok(), Ordering::Release);
+    }
+
+    fn made_nuisance(&self, cores: usize) -> Option<&Nuisance> {
         let made = || {
-            let nuisance = Nuisance::new(&self.model, self.detector());
+            let nuisance = Nuisance::new(&self.model, self.detector(), cores);
             nuisance.unwrap_or_else(|error| {
                 tracing::warn!("what is not known of the detector is left out: {error}");
                 None
             })
         };
-        self.nuisance.get_or_init(made).as_ref()
+        self.nuisance.made.get_or_init(made).as_ref()
     }
 
     /// Mean distance of electrodes (m): the side of a square that each has for itself.

@@ -9,6 +9,7 @@ import { History } from "./history.js";
 import { linkOf, showState } from "./link.js";
 import { MethodSelect } from "./method.js";
 import { Picture } from "./picture.js";
+import { PointerPanel } from "./pointer.js";
 import { listenForPresses } from "./press.js";
 import { Connection } from "./protocol.js";
 import { ReadingsMap } from "./readings.js";
@@ -18,11 +19,13 @@ import { StripChart } from "./strip.js";
 import { listenForTheme, theme } from "./theme.js";
 import { Transport } from "./transport.js";
 import { Verdict } from "./verdict.js";
+import { VibrationPanel } from "./vibration.js";
 
 const { dataset } = document.documentElement;
 const send = (request) => connection.send(request);
 const figures = new Figures();
 const verdict = new Verdict();
+const vibration = new VibrationPanel();
 const transport = new Transport(send);
 const recordButton = new RecordButton(send);
 const rezeroButton = new RezeroButton(send);
@@ -45,7 +48,7 @@ function start(setup) {
     text, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
-    calibrate: new CalibratePanel(setup, send),
+    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup),
   };
   const plot = document.getElementById("plot");
   plot.classList.toggle("pressable", setup.simulated);
@@ -58,7 +61,7 @@ function start(setup) {
 function showStatus(status) {
   const { state, text } = linkOf(status);
   if (showState(state, text)) verdict.hold();
-  for (const part of [figures, transport, recordButton, rezeroButton, parts.board, parts.simulation, parts.calibrate]) part.show(status);
+  for (const part of [figures, vibration, transport, recordButton, rezeroButton, parts.board, parts.simulation, parts.calibrate]) part.show(status);
   if (parts.method.show(status.solver, status.link.state === "streaming")) parts.picture.fitNext();
   document.getElementById("pause").hidden = transport.isThere;
   showNotice(status);
@@ -79,6 +82,7 @@ function draw(now) {
   waiting = null;
   if (!update || !parts) return;
   dataset.received = String(update.frames);
+  vibration.take(update);
   if (!frozen) show(update, now);
   connection.taken();
 }
@@ -90,6 +94,8 @@ function show(update, now) {
   parts.readings.show(update, now);
   parts.table.show(update, now);
   parts.strip.draw(now);
+  parts.pointer.show(update, now);
+  vibration.draw(now);
   verdict.show(update, parts.method.explanation, now);
   dataset.sequence = String(update.sequence);
   dataset.updates = String(Number(dataset.updates ?? 0) + 1);
@@ -154,11 +160,15 @@ listenForTheme((name) => {
   parts?.picture.recolour(name);
   parts?.readings.recolour(name);
   parts?.strip.recolour();
+  parts?.pointer.recolour();
+  vibration.recolour();
   parts?.calibrate.draw();
 });
 const sizes = new ResizeObserver(() => {
   parts?.picture.layOut();
   parts?.readings.layOut();
   parts?.strip.layOut();
+  parts?.pointer.layOut();
+  vibration.layOut();
 });
-for (const id of ["plot", "readings", "strip-card"]) sizes.observe(document.getElementById(id));
+for (const id of ["plot", "readings", "strip-card", "vibration-card"]) sizes.observe(document.getElementById(id));

@@ -8,7 +8,7 @@ import { count, millimetres, withError, withPrefix } from "./units.js";
 // Numbers that change faster cannot be read.
 const SHOWN_EVERY_MS = 120;
 // Rows that there is place for.
-const ROWS = 5;
+const ROWS = 6;
 // Firmness in words and as a bar: conductance over the sheet conductance, from the lightest touch that linear theory describes
 // (a thirtieth) to a press that conducts as well as the detector itself and more.
 const WORDS = [[0.03, "light"], [0.3, "medium"], [1, "firm"], [Infinity, "hard"]];

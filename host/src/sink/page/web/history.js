@@ -4,7 +4,8 @@ const KEPT_MS = 61_000;
 // Samples are this far apart at least: more do not fit on a screen.
 const EVERY_MS = 40;
 
-const strength = ({ forceN, conductanceS }) => forceN ?? conductanceS;
+// Of a firm contact the apparent conductance is known far better than the conductance, which goes up and down with the noise.
+const strength = ({ forceN, apparentS, conductanceS }) => forceN ?? apparentS ?? conductanceS;
 
 /** Samples of each contact, by its number; those of an image without contacts under 0. */
 export class History {

@@ -2,9 +2,9 @@
 // the same.
 
 /** Version of the layout below; the setup carries the program's. */
-export const LAYOUT = 6;
+export const LAYOUT = 7;
 
-const HEAD_WORDS = 9;
+const HEAD_WORDS = 10;
 // From the lowest bit on.
 const FLAGS = ["saturated", "misfit", "unfinished", "calibrate"];
 
@@ -36,13 +36,18 @@ class Taker {
 
 function contact(taker) {
   const id = taker.word() || null;
-  const [x, y, z, conductanceS, ...others] = taker.floats(14);
-  const [radiusM, forceN, forceErrorN, beyond, xErrorM, yErrorM, correlation, errorS] = others.slice(0, 8).map(known);
-  const [xM, yM] = others.slice(8);
+  const [x, y, z, conductanceS, ...others] = taker.floats(15);
+  const [apparentS, radiusM, forceN, forceErrorN, beyond, xErrorM, yErrorM, correlation, errorS] = others.slice(0, 9).map(known);
+  const [xM, yM] = others.slice(9);
   return {
-    id, xM, yM, conductanceS, radiusM, forceN, forceErrorN, beyondMaximum: beyond === 1, xErrorM, yErrorM, correlation, errorS,
+    id, xM, yM, conductanceS, apparentS, radiusM, forceN, forceErrorN, beyondMaximum: beyond === 1, xErrorM, yErrorM, correlation, errorS,
     place: [x, y, z],
   };
+}
+
+// What the pointer has done, if a contact is one.
+function pointer([xM, yM, pressed, clicks]) {
+  return Number.isNaN(clicks) ? null : { wayM: [xM, yM], pressed: pressed === 1, clicks };
 }
 
 const SHAPES = [null, "line", "ring"];
@@ -68,15 +73,17 @@ function choice(text) {
  */
 export function decodeUpdate(buffer) {
   const taker = new Taker(buffer);
-  const [layout, sequence, frames, nodes, electrodes, count, kind, flags, excluded] =
+  const [layout, sequence, frames, nodes, electrodes, count, kind, flags, excluded, points] =
     Array.from({ length: HEAD_WORDS }, () => taker.word());
   if (layout !== LAYOUT) throw new Error("The program is of another version than this page: reload it.");
   const [residual, ageS] = [...taker.floats(2)].map(known);
-  const [image, readings] = [taker.floats(nodes), taker.floats(electrodes * electrodes)];
+  const pointed = pointer(taker.floats(4));
+  const [image, readings, course] = [taker.floats(nodes), taker.floats(electrodes * electrodes), taker.floats(points)];
   const contacts = Array.from({ length: count }, () => contact(taker));
   return {
     sequence, frames, residual, ageS, electrodes, flags: bitsOf(flags).map((bit) => FLAGS[bit]), excluded: bitsOf(excluded),
-    image, readings,
+    image, readings, course,
+    pointer: pointed,
     contacts: kind ? [] : contacts,
     beside: kind ? contacts : [],
     shape: kind ? shape(taker, SHAPES[kind]) : null,

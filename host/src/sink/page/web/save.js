@@ -1,6 +1,6 @@
 // Files for the person: the picture as PNG, the readings and contacts as CSV.
 
-const FIELDS = ["id", "x_m", "y_m", "z_m", "conductance_s", "conductance_error_s", "radius_m",
+const FIELDS = ["id", "x_m", "y_m", "z_m", "conductance_s", "conductance_error_s", "apparent_conductance_s", "radius_m",
   "force_n", "force_error_n", "force_beyond_maximum", "x_error_m", "y_error_m", "correlation"];
 
 const stamp = () => new Date().toISOString().slice(0, 19).replace("T", "-").replaceAll(":", "");
@@ -34,7 +34,7 @@ export function savePicture(layers, background) {
 export function csvOf({ contacts, beside = [], readings, electrodes }) {
   const cell = (value) => (value === null ? "" : String(value));
   const force = (c) => [c.forceN, c.forceErrorN, c.forceN === null ? null : Number(c.beyondMaximum)];
-  const contact = (c) => [c.id, ...c.place, c.conductanceS, c.errorS, c.radiusM, ...force(c), c.xErrorM, c.yErrorM, c.correlation].map(cell).join(",");
+  const contact = (c) => [c.id, ...c.place, c.conductanceS, c.errorS, c.apparentS ?? null, c.radiusM, ...force(c), c.xErrorM, c.yErrorM, c.correlation].map(cell).join(",");
   const heads = ["grounded", ...Array.from({ length: electrodes }, (_, e) => `electrode_${e}_v`)];
   const row = (g) => [g, ...readings.slice(g * electrodes, (g + 1) * electrodes)].join(",");
   return `${[FIELDS.join(","), ...[...contacts, ...beside].map(contact), "", heads.join(","), ...Array.from({ length: electrodes }, (_, g) => row(g))].join("\n")}\n`;

@@ -10,14 +10,28 @@ const FAULTS = [
 const namesNone = ([text]) => !/^(open|short|swap|gain|invert)/.test(text);
 const WISH_STAYS_MS = 500;
 
+// A scene that was made for another detector is scaled to this one, and says so.
+function sceneOption(name, madeFor) {
+  const option = new Option(name.replaceAll("-", " "), name);
+  if (madeFor) {
+    option.text += ", scaled";
+    option.title = `Made for ${madeFor}, and scaled to this detector: to see it on its own, tactomo live --simulate --scene ${name}`;
+  }
+  return option;
+}
+
 /** The choice of scene and fault; asks through `send`. */
 export class Simulation {
-  constructor({ scenes, electrodes }, send) {
+  constructor({ scenes, detector, electrodes }, send) {
     this.box = document.getElementById("simulation");
     this.scene = document.getElementById("scene");
     this.fault = document.getElementById("fault");
     this.asked = -Infinity;
-    this.scene.replaceChildren(...scenes.map((name) => new Option(name.replaceAll("-", " "), name)));
+    const option = ({ name, detector: own }) => sceneOption(name, own && own !== detector ? own : null);
+    const demonstrations = document.createElement("optgroup");
+    demonstrations.label = "Demonstrations";
+    demonstrations.append(...scenes.filter(({ detector: own }) => own).map(option));
+    this.scene.replaceChildren(...scenes.filter(({ detector: own }) => !own).map(option), demonstrations);
     // The faults of the list name electrodes up to 7.
     const faults = electrodes.length > 7 ? FAULTS : FAULTS.filter(namesNone);
     this.fault.replaceChildren(...faults.map(([text, words]) => new Option(words, text)));
@@ -34,6 +48,7 @@ export class Simulation {
     this.box.hidden = playing.kind !== "simulated";
     if (this.box.hidden || performance.now() - this.asked < WISH_STAYS_MS) return;
     this.scene.value = playing.scene;
+    this.scene.title = this.scene.selectedOptions[0]?.title ?? "";
     // Faults of the command line may be none of the list.
     const text = playing.faults.join(" ");
     if (![...this.fault.options].some(({ value }) => value === text)) this.fault.add(new Option(text, text));

@@ -8,11 +8,11 @@ const MARGIN = { left: 34, right: 8, top: 8, bottom: 18 };
 const DRAWN_EVERY_MS = 40;
 const FONT = "11px system-ui, sans-serif";
 
-// The largest value that lasts: the least of three after each other, so that one odd sample does not flatten all others.
+// The largest value that lasts: the lesser of two after each other, so that one odd sample does not flatten all others, and a click shows.
 function lastingMost(line) {
-  if (line.length < 3) return line.reduce((most, { value }) => Math.max(most, value), 0);
+  if (line.length < 2) return line.reduce((most, { value }) => Math.max(most, value), 0);
   let most = 0;
-  for (let i = 2; i < line.length; i += 1) most = Math.max(most, Math.min(line[i].value, line[i - 1].value, line[i - 2].value));
+  for (let i = 1; i < line.length; i += 1) most = Math.max(most, Math.min(line[i].value, line[i - 1].value));
   return most;
 }
 

@@ -1,6 +1,6 @@
 //! No more model than the scene needs.
 //!
-//! Nothing, one contact, two, up to five, a line, a ring, an image: what explains the readings at the lowest price ([`Evidence`]) is the
+//! Nothing, one contact, two, up to six, a line, a ring, an image: what explains the readings at the lowest price ([`Evidence`]) is the
 //! answer, and the solution says which and why. What is known is followed from frame to frame, which costs least, and searched anew
 //! only when it no longer explains the readings, or now and then.
 

@@ -77,7 +77,8 @@ impl ContactSettings {
         // Against three times its nodes, a shell of 2000 is off by 0.0005 (curved) to 0.002 (0.4 mm of square-60), in the root of
         // the mean square and but for the pads' own impedances; the slab by 0.0002 to 0.0005.
         let model_error = if problem.model.name() == "shell" { 0.0015 } else { 0.0003 };
-        Self { most: 5, radius_m: problem.spacing_m() / 6.0, radius_deviation: 0.7, model_error, pad_error: 0.03 }
+        // Five fingers and a palm.
+        Self { most: 6, radius_m: problem.spacing_m() / 6.0, radius_deviation: 0.7, model_error, pad_error: 0.03 }
     }
 }
 
@@ -265,6 +266,7 @@ impl ContactFinder {
         let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
         FoundContact {
             z_m: contact.z_m,
+            apparent_conductance_s: Some(contact.conductance_s / (1.0 + fit.exchange(k))),
             uncertainty,
             radius_m: radius.map(|[mean, _]| mean.exp()),
             ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)

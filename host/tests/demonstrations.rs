@@ -1,0 +1,57 @@
+//! The demonstrations, live, as a user starts them.
+
+#![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
+
+use std::process::Command;
+
+use serde_json::Value;
+use tactomo::scene::TEXTURE_HZ;
+
+/// What `live --simulate --scene` says of a scene at the end.
+fn live(scene: &str, others: &[&str]) -> Value {
+    let fixed = ["live", "--simulate", "--json", "--scene", scene];
+    let output = Command::new(env!("CARGO_BIN_EXE_tactomo")).args(fixed).args(others).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn the_frequency_of_the_texture_is_found_exact_and_as_built_and_on_another_detector() {
+    for others in [&[][..], &["--as-built", "3"], &["--detector", "square-60"]] {
+        let summary = live("texture", &[&["--seconds", "4"], others].concat());
+        let found_hz = summary["vibration"]["frequency_hz"].as_f64().unwrap();
+        assert!((found_hz / TEXTURE_HZ - 1.0).abs() < 0.02, "{summary}");
+        assert!(summary["vibration"]["amplitude_v"].as_f64() > Some(1e-3), "{summary}");
+        assert_eq!(summary["dropped"], 0, "{summary}");
+    }
+    assert!(live("rest", &["--seconds", "2"]).get("vibration").is_none(), "nothing swings at rest");
+}
+
+#[test]
+fn the_pointer_moves_and_clicks_in_the_stream() {
+    let folder = new_folder("pointer");
+    let file = folder.join("touch.jsonl");
+    live("pointer", &["--seconds", "3.5", "--stream", file.to_str().unwrap()]);
+    let text = std::fs::read_to_string(&file).unwrap();
+    let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let events: Vec<Value> = lines.filter_map(|line| line.get("events")?.as_array().cloned()).flatten().collect();
+    let of = |kind: &str| events.iter().filter(|event| event["kind"] == kind).collect::<Vec<_>>();
+    let [clicks, moves] = [of("click"), of("move")];
+    assert_eq!(clicks.len(), 1, "{events:?}");
+    // The second target of the scene: 0.45 and 0.35 of half the pad's sides, within what the seed may put it off.
+    for (axis, expected_m) in [("x_m", 0.0578), ("y_m", 0.0319)] {
+        assert!((clicks[0][axis].as_f64().unwrap() - expected_m).abs() < 2.5e-3, "{clicks:?}");
+    }
+    // From the first target to there, and a little of the way to the third one.
+    let way_m: f64 = moves.iter().map(|event| event["dx_m"].as_f64().unwrap()).sum();
+    assert!((0.10..0.13).contains(&way_m), "{way_m} m in {} steps", moves.len());
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// A new folder of that name.
+fn new_folder(name: &str) -> std::path::PathBuf {
+    let folder = std::env::temp_dir().join(format!("tactomo-{name}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
