@@ -128,7 +128,7 @@ fn tasks(base: &Detector, conductivities_s_per_m: &[f64], seed: u64) -> Vec<Task
     let on_map = conductivities_s_per_m.iter().flat_map(|bottom_s_per_m| {
         conductivities_s_per_m.iter().filter_map(move |top_s_per_m| {
             let (bottom_s_per_m, top_s_per_m) = (*bottom_s_per_m, *top_s_per_m);
-            let layer = Layer { thickness_m: THICKNESS_M, bottom_s_per_m, top_s_per_m };
+            let layer = Layer { bottom_s_per_m, top_s_per_m, ..Layer::uniform(THICKNESS_M, top_s_per_m) };
             Some((None, vec![layer], softest()?))
         })
     });
