@@ -3,6 +3,7 @@
 //! The paper's studies ([`materials`] and others) put its four metrics, which are those of a thin shell and Tikhonov's image, beside the
 //! [limit](Limit) of the sensor itself. Nothing here knows of commands or files.
 
+pub mod bonding;
 pub mod claim;
 pub mod curve;
 pub mod electrodes;

@@ -165,7 +165,11 @@ fn lightest(
     noise_v: f64,
 ) -> Result<Option<f64>, ForwardError> {
     let seen = |strength: f64| {
-        let bound = cramer_rao(model, &[press.at(MIDDLE, strength)], noise_v)?;
+        let bound = match cramer_rao(model, &[press.at(MIDDLE, strength)], noise_v) {
+            // So light that it conducts nothing in numbers of this size.
+            Err(ForwardError::NoContact) => None,
+            bound => bound?,
+        };
         Ok(bound.is_some_and(|bounds| bounds[0].conductance * SEEN_DEVIATIONS <= 1.0))
     };
     least([LIGHTEST * low, high], STRENGTH_HALVINGS, seen)

@@ -56,33 +56,26 @@ pub fn find(
     let mut tried = Tried { found: Vec::new(), seen: HashMap::new() };
     let searching = progress.part(0, most.min(space.len()));
     if most >= space.len() {
-        tried.rate(space, wishes, space.all(), most, searching)?;
+        tried.rate(space, wishes, space.all(), most, searching);
         return tried.in_full(wishes, progress);
     }
     let mut random = fastrand::Rng::with_seed(seed);
     let sample = std::iter::repeat_with(|| space.any(&mut random)).take((most as f64 * SAMPLED) as usize).collect();
-    tried.rate(space, wishes, sample, most, searching)?;
+    tried.rate(space, wishes, sample, most, searching);
     while tried.seen.len() < most && !progress.is_stopped() {
         let next = tried.neighbours(space, wishes);
         if next.is_empty() {
             break;
         }
         let room = most - tried.seen.len();
-        tried.rate(space, wishes, next.into_iter().take(room).collect(), most, searching)?;
+        tried.rate(space, wishes, next.into_iter().take(room).collect(), most, searching);
     }
     tried.in_full(wishes, progress)
 }
 
 impl Tried {
     /// Rates those that were not seen yet.
-    fn rate(
-        &mut self,
-        space: &Space,
-        wishes: &Wishes,
-        candidates: Vec<Candidate>,
-        most: usize,
-        progress: Progress,
-    ) -> Result<(), DesignError> {
+    fn rate(&mut self, space: &Space, wishes: &Wishes, candidates: Vec<Candidate>, most: usize, progress: Progress) {
         let mut new = Vec::new();
         for candidate in candidates {
             if self.seen.insert(candidate, false).is_none() {
@@ -94,13 +87,13 @@ impl Tried {
             "detectors",
             &built,
             |(candidate, (detector, skin))| {
-                let rating = Rating::roughly(detector, *skin, wishes)?;
+                // What has no model, such as electrodes that touch, is no candidate.
+                let rating = Rating::roughly(detector, *skin, wishes).ok()?;
                 let detector = Detector { drive_v: rating.drive_v, ..detector.clone() };
-                Ok(Found { candidate: *candidate, detector, skin: *skin, rating, is_in_full: false })
+                Some(Found { candidate: *candidate, detector, skin: *skin, rating, is_in_full: false })
             },
         );
-        self.found.extend(rated.into_iter().flatten().collect::<Result<Vec<_>, DesignError>>()?);
-        Ok(())
+        self.found.extend(rated.into_iter().flatten().flatten());
     }
 
     /// Neighbours, not seen yet, of the best and of those that none beats, of which neighbours were not looked at.

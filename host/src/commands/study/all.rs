@@ -1,8 +1,8 @@
 //! `tactomo study all`: all studies of detectors on one page.
 
-use tactomo::design::{DesignError, Progress, Report, electrodes, materials, samples, thickness};
+use tactomo::design::{DesignError, Progress, Report, bonding, electrodes, materials, samples, thickness};
 
-use super::design::{Output, several};
+use super::design::{Output, Seeded, several};
 
 /// All studies of detectors, on one page: what of the paper holds, and what of it belongs to its solver.
 ///
@@ -13,10 +13,9 @@ use super::design::{Output, several};
 #[command(verbatim_doc_comment)]
 pub struct Args {
     #[command(flatten)]
+    noise: Seeded,
+    #[command(flatten)]
     output: Output,
-    /// Seed of the noise: the same seed gives the same figures
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
 }
 
 /// What all of them found, by their names.
@@ -25,21 +24,23 @@ struct All {
     materials: materials::Report,
     thickness: thickness::Report,
     samples: samples::Report,
+    bonding: bonding::Report,
     electrodes: electrodes::Report,
 }
 
 /// Runs the studies.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let seed = args.seed;
+    let seed = args.noise.seed;
     let run = |progress: Progress| -> Result<All, DesignError> {
         Ok(All {
             materials: materials::run(&materials::Plan { side: 11, reached: false, seed }, progress)?,
             thickness: thickness::run(&thickness::Plan { methods: thickness::methods(), seed }, progress)?,
             samples: samples::run(&samples::Plan { seed }, progress)?,
+            bonding: bonding::run(progress)?,
             electrodes: electrodes::run(&electrodes::Plan { seed }, progress)?,
         })
     };
     several(&args.output, run, |all: &All| -> Vec<&dyn Report> {
-        vec![&all.materials, &all.thickness, &all.samples, &all.electrodes]
+        vec![&all.materials, &all.thickness, &all.samples, &all.bonding, &all.electrodes]
     })
 }

@@ -35,6 +35,11 @@ pub struct OneOutput {
     /// Writes all figures as comma-separated values, a row for each thing that was computed
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+}
+
+/// What noise there is.
+#[derive(Debug, clap::Args)]
+pub struct Seeded {
     /// Seed of the noise: the same seed gives the same figures
     #[arg(long, default_value_t = 1)]
     pub seed: u64,

@@ -2,7 +2,7 @@
 
 use tactomo::design::electrodes::{self, Plan};
 
-use super::design::{self, OneOutput};
+use super::design::{self, OneOutput, Seeded};
 
 /// Compares electrodes: 4 to 32 of them, grids, a ring around the edge, diameters and pitches.
 ///
@@ -16,11 +16,13 @@ use super::design::{self, OneOutput};
 #[command(verbatim_doc_comment)]
 pub struct Args {
     #[command(flatten)]
+    noise: Seeded,
+    #[command(flatten)]
     output: OneOutput,
 }
 
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let plan = Plan { seed: args.output.seed };
+    let plan = Plan { seed: args.noise.seed };
     design::one(&args.output, |progress| electrodes::run(&plan, progress))
 }

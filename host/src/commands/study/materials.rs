@@ -2,7 +2,7 @@
 
 use tactomo::design::materials::{self, Plan};
 
-use super::design::{self, OneOutput};
+use super::design::{self, OneOutput, Seeded};
 
 /// Maps what the conductivities of a detector's bottom and top do: the paper's figures 2 and 3.
 ///
@@ -24,11 +24,13 @@ pub struct Args {
     #[arg(long)]
     auto: bool,
     #[command(flatten)]
+    noise: Seeded,
+    #[command(flatten)]
     output: OneOutput,
 }
 
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let plan = Plan { side: usize::from(args.side), reached: args.auto, seed: args.output.seed };
+    let plan = Plan { side: usize::from(args.side), reached: args.auto, seed: args.noise.seed };
     design::one(&args.output, |progress| materials::run(&plan, progress))
 }

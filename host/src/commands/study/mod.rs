@@ -2,6 +2,7 @@
 
 mod all;
 mod args;
+mod bonding;
 mod built;
 mod contacts;
 mod design;
@@ -32,6 +33,7 @@ enum Study {
     Materials(materials::Args),
     Thickness(thickness::Args),
     Samples(samples::Args),
+    Bonding(bonding::Args),
     Electrodes(electrodes::Args),
     All(all::Args),
 }
@@ -44,6 +46,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Study::Materials(args) => materials::run(args),
         Study::Thickness(args) => thickness::run(args),
         Study::Samples(args) => samples::run(args),
+        Study::Bonding(args) => bonding::run(args),
         Study::Electrodes(args) => electrodes::run(args),
         Study::All(args) => all::run(args),
     }

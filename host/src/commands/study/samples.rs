@@ -2,7 +2,7 @@
 
 use tactomo::design::samples::{self, Plan};
 
-use super::design::{self, OneOutput};
+use super::design::{self, OneOutput, Seeded};
 
 /// Simulates the paper's foams A to D and their stacks as it measured them, with its figures beside: tables I and II.
 ///
@@ -16,11 +16,13 @@ use super::design::{self, OneOutput};
 #[command(verbatim_doc_comment)]
 pub struct Args {
     #[command(flatten)]
+    noise: Seeded,
+    #[command(flatten)]
     output: OneOutput,
 }
 
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let plan = Plan { seed: args.output.seed };
+    let plan = Plan { seed: args.noise.seed };
     design::one(&args.output, |progress| samples::run(&plan, progress))
 }

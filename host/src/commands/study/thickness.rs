@@ -3,7 +3,7 @@
 use tactomo::design::thickness::{self, Plan};
 use tactomo::solve::Method;
 
-use super::design::{self, OneOutput};
+use super::design::{self, OneOutput, Seeded};
 use crate::commands::choice;
 
 /// Compares detectors of 1 to 16 mm with the thin shell that the paper's solver takes them for: its figure 4.
@@ -21,12 +21,14 @@ pub struct Args {
     #[arg(long, value_name = "NAME", value_parser = choice::method(), hide_possible_values = true)]
     solver: Vec<Method>,
     #[command(flatten)]
+    noise: Seeded,
+    #[command(flatten)]
     output: OneOutput,
 }
 
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let methods = if args.solver.is_empty() { thickness::methods() } else { args.solver.clone() };
-    let plan = Plan { methods, seed: args.output.seed };
+    let plan = Plan { methods, seed: args.noise.seed };
     design::one(&args.output, |progress| thickness::run(&plan, progress))
 }

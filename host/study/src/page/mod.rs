@@ -2,7 +2,7 @@
 
 mod axis;
 mod chart;
-mod colour;
+pub mod colour;
 mod heat;
 mod label;
 mod map;

@@ -69,11 +69,11 @@ pub struct Resolution {
 
 impl Resolution {
     /// Enough for readings within a few tenths of a per cent: against reference readings, one degree more changes nothing.
-    pub const STANDARD: Self = Self { pad_degree: 2, contact_degree: 2, dot_degree: 3, uneven_modes: 10, steps_in_pad: 10 };
+    pub const STANDARD: Self =
+        Self { pad_degree: 2, contact_degree: 2, dot_degree: 3, uneven_modes: 10, steps_in_pad: 10 };
     /// For how readings change from one detector to another: on `square-60` changes are off by up to 3 % of themselves, those with a pad's own
     /// impedance by a sixth.
-    pub const COARSE: Self =
-        Self { pad_degree: 1, contact_degree: 2, dot_degree: 2, uneven_modes: 8, steps_in_pad: 3 };
+    pub const COARSE: Self = Self { pad_degree: 1, contact_degree: 2, dot_degree: 2, uneven_modes: 8, steps_in_pad: 3 };
     /// Finer than any solver needs.
     pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, dot_degree: 4, uneven_modes: 16, steps_in_pad: 10 };
 }

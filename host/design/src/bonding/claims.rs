@@ -1,0 +1,98 @@
+//! What the paper concludes on bonding, on ours.
+
+use super::super::claim::{Trend, Verdict};
+use super::super::rank::spearman;
+use super::super::text::number;
+use super::{Claim, GRIDS, Glue, Row};
+
+/// Where the paper sees a local peak of the error (m), and within what a peak is that one.
+const PEAK_M: f64 = 5e-3;
+const NEAR_PEAK_M: f64 = 1.5e-3;
+
+/// With the paper's solver, and of the sensor.
+const ERRORS: [fn(&Row) -> Option<f64>; 2] = [|row| row.position_error_m, |row| row.limit.place_m];
+
+pub(super) fn of(rows: &[Row]) -> Vec<Claim> {
+    if rows.iter().filter(|row| row.glue == Some(Glue::Conducting)).count() < 4 {
+        return Vec::new();
+    }
+    let trend = |of, error: fn(&Row) -> Option<f64>| {
+        let each = GRIDS.iter().filter_map(|dots| {
+            let pairs: Vec<_> =
+                series(rows, *dots, Glue::Conducting).filter_map(|row| Some([row.diameter_m?, -error(row)?])).collect();
+            spearman(&pairs)
+        });
+        let each: Vec<f64> = each.collect();
+        Trend { of, correlation: super::super::metrics::mean(&each) }
+    };
+    vec![
+        Claim::of_trends(
+            "wider dots lower the error of places",
+            trend("error with diameter, reversed", ERRORS[0]),
+            trend("standard error with diameter, reversed", ERRORS[1]),
+        ),
+        more_dots(rows),
+        peak(rows),
+    ]
+}
+
+/// Of a grid and a glue, by diameter.
+pub(super) fn series(rows: &[Row], dots: usize, glue: Glue) -> impl Iterator<Item = &Row> {
+    rows.iter().filter(move |row| row.dots == dots && row.glue == Some(glue))
+}
+
+/// Dots of the same share of the pitch cover the same area: only their number differs.
+fn more_dots(rows: &[Row]) -> Claim {
+    let found = ERRORS.map(|error| {
+        let pairs = series(rows, GRIDS[0], Glue::Conducting).zip(series(rows, GRIDS[1], Glue::Conducting));
+        let lower: Vec<bool> = pairs.filter_map(|(few, many)| Some(error(many)? < error(few)?)).collect();
+        (!lower.is_empty()).then(|| lower.iter().filter(|lower| **lower).count() as f64 / lower.len() as f64)
+    });
+    let text = |what: &str, share: Option<f64>| {
+        share.map_or("not computed".to_owned(), |share| {
+            format!(
+                "{what} is lower with 7 x 7 than with 5 x 5 of the same area in {:.0} % of diameters",
+                100.0 * share
+            )
+        })
+    };
+    Claim {
+        claim: "more dots lower the error of places",
+        verdict: Verdict::of(found[0].map(|share| share > 0.5), found[1].map(|share| share > 0.5)),
+        solver: text("the error", found[0]),
+        sensor: text("the standard error", found[1]),
+    }
+}
+
+/// Where the error of a grid, over the diameter, is higher (or lower) than on both sides.
+fn turns(rows: &[Row], error: fn(&Row) -> Option<f64>, sign: f64) -> Vec<(usize, f64)> {
+    let of = |dots: &usize| {
+        let all: Vec<[f64; 2]> = series(rows, *dots, Glue::Conducting)
+            .filter_map(|row| Some([row.diameter_m?, sign * error(row)?]))
+            .collect();
+        let peaks = all.windows(3).filter(|three| three[1][1] > three[0][1] && three[1][1] > three[2][1]);
+        peaks.map(|three| (*dots, three[1][0])).collect::<Vec<_>>()
+    };
+    GRIDS.iter().flat_map(of).collect()
+}
+
+fn peak(rows: &[Row]) -> Claim {
+    let [peaks, lows] = [1.0, -1.0].map(|sign| ERRORS.map(|error| turns(rows, error, sign)));
+    let is_there = |peaks: &[(usize, f64)]| Some(peaks.iter().any(|(_, at_m)| (at_m - PEAK_M).abs() <= NEAR_PEAK_M));
+    let each = |turns: &[(usize, f64)]| {
+        let each =
+            turns.iter().map(|(dots, at_m)| format!("{} mm with {dots} x {dots}", number(Some(at_m * 1e3), 1.0)));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let text = |peaks: &[(usize, f64)], lows: &[(usize, f64)]| match (peaks, lows) {
+        ([], []) => "no local peak and no least error between the ends".to_owned(),
+        ([], lows) => format!("no local peak, but the least error at {}", each(lows)),
+        (peaks, _) => format!("local peak at {}", each(peaks)),
+    };
+    Claim {
+        claim: "the error has a local peak near dots of 5 mm",
+        verdict: Verdict::of(is_there(&peaks[0]), is_there(&peaks[1])),
+        solver: text(&peaks[0], &lows[0]),
+        sensor: text(&peaks[1], &lows[1]),
+    }
+}
