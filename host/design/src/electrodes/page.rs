@@ -11,6 +11,9 @@ const FLOOR_M: f64 = 1e-6;
 /// A line of the charts: name, class, and the figure (m).
 type Line = (&'static str, &'static str, fn(&Row) -> Option<f64>);
 
+/// What is varied in a chart: the group, the title of its axis, the value and its unit.
+type Varied = (Group, &'static str, fn(&Row) -> f64, Unit);
+
 const LINES: [Line; 4] = [
     ("one frame", "linear", |row| row.place_everywhere_m),
     ("same time", "bound", |row| row.place_in_same_time_m),
@@ -19,7 +22,7 @@ const LINES: [Line; 4] = [
 ];
 
 pub(super) fn parts(report: &Report) -> Vec<String> {
-    let charts: [(Group, &str, fn(&Row) -> f64, Unit); 3] = [
+    let charts: [Varied; 3] = [
         (Group::Number, "electrodes", |row| row.layout.count() as f64, Unit::Plain),
         (Group::Diameter, "diameter", |row| row.diameter_m, Unit::Metres),
         (Group::Pitch, "pitch", pitch_m, Unit::Metres),

@@ -126,7 +126,7 @@ impl<'a> Map<'a> {
         };
         let found = MAXIMUM.map(|figure| {
             let pairs: Vec<_> = self.uniform().filter_map(|c| Some([c.bottom_s_per_m, figure(c)?])).collect();
-            [spearman(&pairs), self.share_of_pairs(figure, |c, other| is_even_of(c, other))]
+            [spearman(&pairs), self.share_of_pairs(figure, is_even_of)]
         });
         let holds = found.map(|[rises, even]| Some(rises? > 0.5 && even? > 0.5));
         Claim {

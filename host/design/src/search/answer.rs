@@ -44,7 +44,7 @@ pub struct Choice {
     pub meets_all: bool,
     /// What `auto` makes of four presses, one frame each, on the detector as described.
     pub reached: Reached,
-    /// The same on detectors as built, that is drawn from the tolerances, uncalibrated.
+    /// What a fit misses of the same presses on detectors as built, drawn from the tolerances, if the description is taken as exact.
     pub as_built: Reached,
     /// The detector itself.
     #[serde(skip)]
@@ -129,7 +129,7 @@ pub fn answer(plan: &Plan, progress: Progress) -> Result<Answer, DesignError> {
     let meeting = found.iter().filter(|found| found.rating.meets(wishes, None)).count();
     let is_met = in_full.iter().any(|found| found.rating.meets(wishes, None));
     Ok(Answer {
-        candidates: space.len(),
+        candidates: space.count(),
         tried: found.len(),
         meeting,
         choices: choices.into_iter().flatten().collect::<Result<_, _>>()?,

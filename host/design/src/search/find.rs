@@ -54,8 +54,8 @@ pub fn find(
     progress: Progress,
 ) -> Result<Vec<Found>, DesignError> {
     let mut tried = Tried { found: Vec::new(), seen: HashMap::new() };
-    let searching = progress.part(0, most.min(space.len()));
-    if most >= space.len() {
+    let searching = progress.part(0, most.min(space.count()));
+    if most >= space.count() {
         tried.rate(space, wishes, space.all(), most, searching);
         return tried.in_full(wishes, progress);
     }
@@ -178,7 +178,7 @@ mod tests {
         let all = find(&space, &wishes, usize::MAX, 0, progress).unwrap();
         let best = all[0].rating.score(&wishes);
         for seed in 1..=3 {
-            let found = find(&space, &wishes, space.len() / 3, seed, progress).unwrap();
+            let found = find(&space, &wishes, space.count() / 3, seed, progress).unwrap();
             assert!(found.len() < all.len());
             let score = found[0].rating.score(&wishes);
             assert!(score > best - 0.02, "{} of {}: {score} {best}", found.len(), all.len());

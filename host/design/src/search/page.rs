@@ -12,8 +12,13 @@ const FLOOR_M: f64 = 1e-6;
 /// A self-contained HTML page: what to order, and the front of what can be had.
 pub fn page(answer: &Answer, command: &str) -> String {
     let wishes = &answer.wishes;
-    let wanted: Vec<String> =
-        Wish::ALL.into_iter().map(|wish| format!("{} {}", wish.name(), wish.text(wishes.wanted(wish)))).collect();
+    let wanted: Vec<String> = Wish::ALL
+        .into_iter()
+        .map(|wish| match wish {
+            Wish::Frames => wish.text(wishes.wanted(wish)),
+            _ => format!("{} {}", wish.name(), wish.text(wishes.wanted(wish))),
+        })
+        .collect();
     let [width_mm, height_mm] = wishes.size_m.map(|side_m| side_m * 1e3);
     let mut parts = vec![
         "<h1>Which detector to order</h1>".to_owned(),
@@ -35,7 +40,7 @@ pub fn page(answer: &Answer, command: &str) -> String {
         parts.push(format!("<p>{}.</p>", escaped(&of_compared(compared, answer.tried))));
     }
     let charts = [
-        chart(answer, Wish::Place, "frames a second, reversed", |rating| 1.0 / rating.frames_per_s, Unit::Seconds),
+        chart(answer, Wish::Place, "time of a frame", |rating| 1.0 / rating.frames_per_s, Unit::Seconds),
         chart(answer, Wish::TwoPoints, "error of places", |rating| rating.place_m.unwrap_or(f64::NAN), Unit::Metres),
         chart(
             answer,
@@ -72,7 +77,7 @@ fn choices(answer: &Answer) -> String {
         ]
     };
     let rows: Vec<_> = answer.choices.iter().enumerate().map(row).collect();
-    let heads = ["detector", "why", "what it gives", "auto, as described", "as built"];
+    let heads = ["detector", "why", "what it gives", "auto", "as built, tolerances ignored"];
     table(&heads, &rows).replace("<table>", "<table class=\"claims\">")
 }
 

@@ -65,7 +65,7 @@ impl Space {
     }
 
     /// How many there are, detectors that cannot be built among them.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         let single: usize = self.foams.iter().map(|foam| foam.thicknesses_m.len()).sum();
         let stacks: usize = (0..self.foams.len())
             .flat_map(|a| (0..self.foams.len()).filter(move |b| *b != a).map(move |b| [a, b]))
@@ -100,7 +100,7 @@ impl Space {
             std::iter::once(None).chain(others)
         };
         let stacks = layers.iter().flat_map(|bottom| tops(*bottom).map(|top| [Some(*bottom), top]));
-        let mut all = Vec::with_capacity(self.len());
+        let mut all = Vec::with_capacity(self.count());
         for layers in stacks {
             for layout in 0..self.layouts.len() {
                 for spread in 0..SPREADS.len() {
@@ -212,7 +212,7 @@ impl Space {
         }
     }
 
-    /// As one would order it: foams from the top, thickness, electrodes, drive.
+    /// As one would order it: foams from the top, thickness, electrodes.
     fn name(&self, candidate: &Candidate, layout: &Layout, diameter_m: f64) -> String {
         let layers: Vec<_> = candidate
             .layers
@@ -224,7 +224,8 @@ impl Space {
                 format!("{} {} mm", foam.name, crate::text::plain(foam.thicknesses_m[*thickness] * 1e3))
             })
             .collect();
-        format!("{}, {} of {} mm", layers.join(" on "), layout.name(), crate::text::plain(diameter_m * 1e3))
+        let diameter_mm = crate::text::plain(diameter_m * 1e3);
+        format!("{}; electrodes of {diameter_mm} mm: {}", layers.join(" on "), layout.name())
     }
 }
 
@@ -239,7 +240,7 @@ mod tests {
         let space = Space::new(&Wishes { electrodes: 6, ..wishes() }, &Material::of_paper()[..2]);
         let all = space.all();
         let set: HashSet<_> = all.iter().collect();
-        assert_eq!((all.len(), set.len()), (space.len(), all.len()));
+        assert_eq!((all.len(), set.len()), (space.count(), all.len()));
         let mut random = fastrand::Rng::with_seed(1);
         for _ in 0..50 {
             let any = space.any(&mut random);

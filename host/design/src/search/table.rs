@@ -19,7 +19,7 @@ pub fn table(answer: &Answer) -> String {
         _ = writeln!(text, "{}. {}\n   {}\n   {}", index + 1, choice.name, choice.reason, gives(&choice.rating));
         _ = writeln!(
             text,
-            "   places by auto, one frame: as described {}, as built and not calibrated {}",
+            "   places by auto, one frame: {}; as built, not calibrated and tolerances ignored: {}",
             reached(&choice.reached),
             reached(&choice.as_built)
         );

@@ -71,6 +71,8 @@ impl Wish {
     pub fn text(self, value: f64) -> String {
         let three = |value: f64| crate::text::number(Some(value), 1.0);
         match self {
+            // Below this it is the mesh between the layers that decides, which nothing here knows.
+            Self::Smallest if value < 1e-3 => "under 0.001 N".to_owned(),
             Self::Smallest | Self::Largest => format!("{} N", three(value)),
             Self::Place | Self::TwoPoints => format!("{} mm", three(value * 1e3)),
             Self::Frames => format!("{value:.0} frames/s"),

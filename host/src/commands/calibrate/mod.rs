@@ -37,7 +37,7 @@ pub struct Args {
 enum Way {
     Rub(Box<rub::Args>),
     Presses(Box<presses::Args>),
-    Force(force::Args),
+    Force(Box<force::Args>),
 }
 
 /// Calibrates.

@@ -74,9 +74,9 @@ impl Chart {
         self.axes(&mut svg);
         let front = if self.has_front { self.front() } else { Vec::new() };
         self.front_line(&front, &mut svg);
-        // What leads is drawn last, over the others, but is labelled first.
+        // What leads is drawn last, over the others, but is labelled first; what has no name is behind all.
         let mut order: Vec<_> = self.series.iter().filter(|series| !series.marks.is_empty()).collect();
-        order.sort_by_key(|series| self.leads(series, &front));
+        order.sort_by_key(|series| (!series.name.is_empty(), self.leads(series, &front)));
         order.iter().for_each(|series| self.draw(series, &front, &mut svg));
         self.labels(order.iter().rev().copied(), &front, &mut svg);
         svg + "</svg>"
