@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
+#[allow(dead_code, reason = "other tests write recordings too")]
 mod samples;
 
 use std::process::Output;

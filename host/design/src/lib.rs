@@ -33,4 +33,4 @@ pub use self::press::Press;
 pub use self::progress::{Progress, Step};
 pub use self::rank::spearman;
 pub use self::reached::Reached;
-pub use self::report::{Report, page};
+pub use self::report::{Course, Heading, Report, page};

@@ -14,7 +14,7 @@ use tactomo_physics::forward::{ForwardError, Slab};
 
 use super::metrics::Sweep;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, MIDDLE};
-use super::{Claim, DesignError, Limit, PaperSolver, Press, Progress};
+use super::{Claim, Course, DesignError, Heading, Limit, PaperSolver, Press, Progress};
 
 /// What is stacked.
 const MATERIAL: &str = "BB";
@@ -72,12 +72,9 @@ pub struct Current {
 pub struct Report {
     /// Each glue and grid, by diameter; the layers that touch all over first.
     pub rows: Vec<Row>,
-    /// Whether each of the paper's claims holds.
-    pub claims: Vec<Claim>,
-    /// Whether it was ended before all was done.
-    pub is_stopped: bool,
-    /// What it took (s).
-    pub seconds: f64,
+    /// What was concluded, and how the study went.
+    #[serde(flatten)]
+    pub course: Course,
 }
 
 /// Runs the study. It has no noise, and so no seed.
@@ -100,7 +97,8 @@ pub fn run(progress: Progress) -> Result<Report, DesignError> {
     let computed = progress.map("bonds", &tasks, |bond| row(&touching, *bond, &solver));
     let is_stopped = computed.iter().any(Option::is_none);
     let rows: Vec<Row> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
-    Ok(Report { claims: claims::of(&rows), rows, is_stopped, seconds: start.elapsed().as_secs_f64() })
+    let course = Course::since(start, is_stopped, claims::of(&rows));
+    Ok(Report { rows, course })
 }
 
 fn row(touching: &Detector, bond: Option<(Glue, usize, f64)>, solver: &PaperSolver) -> Result<Row, DesignError> {
@@ -163,29 +161,17 @@ impl Glue {
 }
 
 impl super::Report for Report {
-    fn name(&self) -> &'static str {
-        "bonding"
+    fn heading(&self) -> Heading {
+        Heading {
+            name: "bonding",
+            title: "How layers are joined",
+            lead_in: "Two layers of sample B joined by 5 x 5 or 7 x 7 dots of conductive glue: errors of places over the dots' diameter, up to dots that touch, and the current through \
+         the dots.",
+        }
     }
 
-    fn title(&self) -> &'static str {
-        "How layers are joined"
-    }
-
-    fn lead_in(&self) -> &'static str {
-        "Two layers of sample B joined by 5 x 5 or 7 x 7 dots of conductive glue: errors of places over the dots' diameter, up to dots that touch, and the current through \
-         the dots."
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.is_stopped
-    }
-
-    fn seconds(&self) -> f64 {
-        self.seconds
-    }
-
-    fn claims(&self) -> &[Claim] {
-        &self.claims
+    fn course(&self) -> &Course {
+        &self.course
     }
 
     fn table(&self) -> String {

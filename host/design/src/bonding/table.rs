@@ -7,8 +7,12 @@ use super::super::text::{cells, number};
 use super::{Report, Row};
 
 pub(super) fn table(report: &Report) -> String {
-    let mut text =
-        format!("{} bonds in {:.1} s\n\n{}", report.rows.len(), report.seconds, claim::table(&report.claims));
+    let mut text = format!(
+        "{} bonds in {:.1} s\n\n{}",
+        report.rows.len(),
+        report.course.seconds,
+        claim::table(&report.course.claims)
+    );
     let mut name = String::new();
     for row in &report.rows {
         if row.name() != name {

@@ -14,7 +14,7 @@ use tactomo_physics::forward::Slab;
 use super::limit::place_everywhere_m;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, nine_places};
 use super::reached::by_auto;
-use super::{Claim, DesignError, Layout, Limit, Press, Progress, Reached};
+use super::{Course, DesignError, Heading, Layout, Limit, Press, Progress, Reached};
 
 /// Places over the whole surface.
 const PLACES: usize = 100;
@@ -72,12 +72,11 @@ pub enum Group {
 pub struct Report {
     /// Group by group.
     pub rows: Vec<Row>,
-    /// Whether it was ended before all was done.
-    pub is_stopped: bool,
     /// Seed of the noise.
     pub seed: u64,
-    /// What it took (s).
-    pub seconds: f64,
+    /// What was concluded, and how the study went.
+    #[serde(flatten)]
+    pub course: Course,
 }
 
 impl Group {
@@ -130,12 +129,8 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
         .collect();
     let computed =
         progress.map("electrodes", &tasks, |(group, layout, diameter_m)| row(*group, *layout, *diameter_m, plan.seed));
-    Ok(Report {
-        is_stopped: computed.iter().any(Option::is_none),
-        rows: computed.into_iter().flatten().collect::<Result<_, _>>()?,
-        seed: plan.seed,
-        seconds: start.elapsed().as_secs_f64(),
-    })
+    let course = Course::since(start, computed.iter().any(Option::is_none), Vec::new());
+    Ok(Report { rows: computed.into_iter().flatten().collect::<Result<_, _>>()?, seed: plan.seed, course })
 }
 
 fn row(group: Group, layout: Layout, diameter_m: f64, seed: u64) -> Result<Row, DesignError> {
@@ -177,29 +172,17 @@ fn base_width_m(detector: &Detector) -> f64 {
 }
 
 impl super::Report for Report {
-    fn name(&self) -> &'static str {
-        "electrodes"
+    fn heading(&self) -> Heading {
+        Heading {
+            name: "electrodes",
+            title: "Which electrodes",
+            lead_in: "How many electrodes, in which pattern, how wide and how far apart: what the sensor itself can tell with them, on sample A of 60 x 60 x 5 mm. The paper does \
+         not study this.",
+        }
     }
 
-    fn title(&self) -> &'static str {
-        "Which electrodes"
-    }
-
-    fn lead_in(&self) -> &'static str {
-        "How many electrodes, in which pattern, how wide and how far apart: what the sensor itself can tell with them, on sample A of 60 x 60 x 5 mm. The paper does \
-         not study this."
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.is_stopped
-    }
-
-    fn seconds(&self) -> f64 {
-        self.seconds
-    }
-
-    fn claims(&self) -> &[Claim] {
-        &[]
+    fn course(&self) -> &Course {
+        &self.course
     }
 
     fn table(&self) -> String {

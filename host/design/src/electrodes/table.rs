@@ -6,7 +6,7 @@ use super::super::text::{cells, number};
 use super::{Group, Report};
 
 pub(super) fn table(report: &Report) -> String {
-    let mut text = format!("{} sets of electrodes in {:.1} s\n", report.rows.len(), report.seconds);
+    let mut text = format!("{} sets of electrodes in {:.1} s\n", report.rows.len(), report.course.seconds);
     for group in Group::ALL {
         _ = writeln!(
             text,

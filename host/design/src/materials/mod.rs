@@ -19,7 +19,7 @@ use super::limit::range;
 use super::metrics::Sweep;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, FORCES_N, in_decades, nine_places};
 use super::reached::by_auto;
-use super::{Claim, DesignError, Limit, Metrics, PaperSolver, Press, Progress, Reached};
+use super::{Claim, Course, DesignError, Heading, Limit, Metrics, PaperSolver, Press, Progress, Reached};
 
 /// Conductivities of top and bottom (S/m), section III.A.
 const RANGE_S_PER_M: [f64; 2] = [1e-3, 100.0];
@@ -71,14 +71,11 @@ pub struct Report {
     pub conditions: Vec<Condition>,
     /// Foams and stacks.
     pub samples: Vec<Condition>,
-    /// Whether each of the paper's claims holds.
-    pub claims: Vec<Claim>,
-    /// Whether it was ended before all was done.
-    pub is_stopped: bool,
     /// Seed of the noise.
     pub seed: u64,
-    /// What it took (s).
-    pub seconds: f64,
+    /// What was concluded, and how the study went.
+    #[serde(flatten)]
+    pub course: Course,
 }
 
 /// A material before it is computed.
@@ -103,15 +100,8 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
     let is_stopped = computed.iter().any(Option::is_none);
     let all: Vec<Condition> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
     let (samples, conditions): (Vec<_>, Vec<_>) = all.into_iter().partition(|condition| condition.name.is_some());
-    Ok(Report {
-        claims: claims::of(&conditions, &conductivities_s_per_m),
-        conductivities_s_per_m,
-        conditions,
-        samples,
-        is_stopped,
-        seed: plan.seed,
-        seconds: start.elapsed().as_secs_f64(),
-    })
+    let course = Course::since(start, is_stopped, claims::of(&conditions, &conductivities_s_per_m));
+    Ok(Report { conductivities_s_per_m, conditions, samples, seed: plan.seed, course })
 }
 
 /// The samples, for a picture needs them, and then the map.
@@ -176,29 +166,17 @@ impl Condition {
 }
 
 impl super::Report for Report {
-    fn name(&self) -> &'static str {
-        "materials"
+    fn heading(&self) -> Heading {
+        Heading {
+            name: "materials",
+            title: "Which material",
+            lead_in: "What the conductivities of bottom and top do to a tomographic tactile sensor: the four metrics of the paper with its solver, and beside \
+         them what the sensor itself can tell, whatever the solver.",
+        }
     }
 
-    fn title(&self) -> &'static str {
-        "Which material"
-    }
-
-    fn lead_in(&self) -> &'static str {
-        "What the conductivities of bottom and top do to a tomographic tactile sensor: the four metrics of the paper with its solver, and beside \
-         them what the sensor itself can tell, whatever the solver."
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.is_stopped
-    }
-
-    fn seconds(&self) -> f64 {
-        self.seconds
-    }
-
-    fn claims(&self) -> &[Claim] {
-        &self.claims
+    fn course(&self) -> &Course {
+        &self.course
     }
 
     fn table(&self) -> String {
@@ -233,7 +211,7 @@ mod tests {
         let stop = AtomicBool::new(false);
         let progress = Progress::new(&stop, &|_| {});
         let [a, b] = [1, 1].map(|_| run(&plan(3, false), progress).unwrap());
-        assert_eq!((a.conditions.len(), a.samples.len(), a.is_stopped), (9, 10, false));
+        assert_eq!((a.conditions.len(), a.samples.len(), a.course.is_stopped), (9, 10, false));
         assert_eq!(serde(&a), serde(&b));
         assert_eq!((a.conditions[1].bottom_s_per_m, a.conditions[1].top_s_per_m), (1e-3, a.conductivities_s_per_m[1]));
         let bc = a.samples.iter().find(|sample| sample.name == Some("BC")).unwrap();
@@ -250,7 +228,7 @@ mod tests {
         let say = |step: &crate::Step| stop.store(step.done >= 12, Ordering::Relaxed);
         let progress = Progress::new(&stop, &say);
         let report = run(&plan(5, false), progress).unwrap();
-        assert!(report.is_stopped && (2..25).contains(&report.conditions.len()), "{}", report.conditions.len());
+        assert!(report.course.is_stopped && (2..25).contains(&report.conditions.len()), "{}", report.conditions.len());
         let page = crate::page(&[&report], "tactomo study materials");
         assert!(
             page.contains("Stopped before the end") && crate::Report::table(&report).contains("stopped before the end")

@@ -13,10 +13,10 @@ pub(super) fn table(report: &Report) -> String {
         report.conditions.len(),
         report.conductivities_s_per_m.len().pow(2),
         report.samples.len(),
-        report.seconds,
-        if report.is_stopped { ", stopped before the end" } else { "" }
+        report.course.seconds,
+        if report.course.is_stopped { ", stopped before the end" } else { "" }
     );
-    text += &claim::table(&report.claims);
+    text += &claim::table(&report.course.claims);
     text += "\n          paper's solver                                the sensor itself, contact of 1 S/m\n\
              sample    SENS       FMAX     SR     PA    PA noisy     place   auto    two points  S/N   from - to, N\n";
     for sample in &report.samples {

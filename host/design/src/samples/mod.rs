@@ -24,7 +24,7 @@ use super::curve::{Fit, fit};
 use super::metrics::mean;
 use super::press::{FORCES_N, MIDDLE, nine_places};
 use super::reached::by_auto;
-use super::{Claim, DesignError, Limit, PaperSolver, Press, Progress, Reached};
+use super::{Claim, Course, DesignError, Heading, Limit, PaperSolver, Press, Progress, Reached};
 
 /// Forces on the way up, and as many on the way down: every 0.125 N.
 const STEPS: usize = 40;
@@ -72,14 +72,11 @@ pub struct Sample {
 pub struct Report {
     /// In the order of the table.
     pub samples: Vec<Sample>,
-    /// Whether the simulation ranks the samples as the experiment did, metric by metric.
-    pub claims: Vec<Claim>,
-    /// Whether it was ended before all was done.
-    pub is_stopped: bool,
     /// Seed of the noise.
     pub seed: u64,
-    /// What it took (s).
-    pub seconds: f64,
+    /// What was concluded, and how the study went.
+    #[serde(flatten)]
+    pub course: Course,
 }
 
 /// Runs the study.
@@ -93,13 +90,8 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
     let computed = progress.map("samples", &tasks, |(seed, measured)| sample(*measured, &solver, *seed));
     let is_stopped = computed.iter().any(Option::is_none);
     let samples: Vec<Sample> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
-    Ok(Report {
-        claims: claims::of(&samples),
-        samples,
-        is_stopped,
-        seed: plan.seed,
-        seconds: start.elapsed().as_secs_f64(),
-    })
+    let course = Course::since(start, is_stopped, claims::of(&samples));
+    Ok(Report { samples, seed: plan.seed, course })
 }
 
 fn sample(measured: Measured, solver: &PaperSolver, seed: u64) -> Result<Sample, DesignError> {
@@ -174,29 +166,17 @@ fn normalised(profile: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 }
 
 impl super::Report for Report {
-    fn name(&self) -> &'static str {
-        "samples"
+    fn heading(&self) -> Heading {
+        Heading {
+            name: "samples",
+            title: "The paper's samples",
+            lead_in: "Foams A to D and stacks of them under an indenter of 5 mm, simulated as the paper measured them, with its measured figures beside: does the \
+         simulation predict the experiment?",
+        }
     }
 
-    fn title(&self) -> &'static str {
-        "The paper's samples"
-    }
-
-    fn lead_in(&self) -> &'static str {
-        "Foams A to D and stacks of them under an indenter of 5 mm, simulated as the paper measured them, with its measured figures beside: does the \
-         simulation predict the experiment?"
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.is_stopped
-    }
-
-    fn seconds(&self) -> f64 {
-        self.seconds
-    }
-
-    fn claims(&self) -> &[Claim] {
-        &self.claims
+    fn course(&self) -> &Course {
+        &self.course
     }
 
     fn table(&self) -> String {

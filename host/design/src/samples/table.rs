@@ -11,8 +11,8 @@ pub(super) fn table(report: &Report) -> String {
     let mut text = format!(
         "{} samples in {:.1} s; simulated (measured in the paper)\n\n{}",
         report.samples.len(),
-        report.seconds,
-        claim::table(&report.claims)
+        report.course.seconds,
+        claim::table(&report.course.claims)
     );
     text += "\nsample   SENS             FMAX, N                          SR             PA             place, mm   auto, mm  two points, mm\n";
     for sample in &report.samples {

@@ -18,7 +18,7 @@ use super::claim::{Trend, Verdict};
 use super::metrics::mean;
 use super::press::{COMPARED_S_PER_M, nine_places};
 use super::rank::spearman;
-use super::{Claim, DesignError, Press, Progress};
+use super::{Claim, Course, DesignError, Heading, Press, Progress};
 
 /// Thicknesses (m), and conductivity (S/m), section III.B.
 const THICKNESSES_M: [f64; 5] = [1e-3, 2e-3, 4e-3, 8e-3, 16e-3];
@@ -80,14 +80,11 @@ pub struct SolverRow {
 pub struct Report {
     /// From the thinnest.
     pub rows: Vec<Row>,
-    /// Whether each of the paper's claims holds.
-    pub claims: Vec<Claim>,
     /// Error from which on a solver counts as failing (m).
     pub fails_from_m: f64,
-    /// Whether it was ended before all was done.
-    pub is_stopped: bool,
-    /// What it took (s).
-    pub seconds: f64,
+    /// What was concluded, and how the study went.
+    #[serde(flatten)]
+    pub course: Course,
 }
 
 /// Runs the study.
@@ -102,13 +99,8 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
     let is_stopped = computed.iter().any(Option::is_none);
     let mut rows: Vec<Row> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
     rows.reverse();
-    Ok(Report {
-        claims: claims(&rows),
-        rows,
-        fails_from_m: FAILS_OF_WIDTH * Detector::default().outline.size_m()[0],
-        is_stopped,
-        seconds: start.elapsed().as_secs_f64(),
-    })
+    let course = Course::since(start, is_stopped, claims(&rows));
+    Ok(Report { rows, fails_from_m: FAILS_OF_WIDTH * Detector::default().outline.size_m()[0], course })
 }
 
 fn row(plan: &Plan, thickness_m: f64) -> Result<Row, DesignError> {
@@ -246,28 +238,16 @@ impl Report {
 }
 
 impl super::Report for Report {
-    fn name(&self) -> &'static str {
-        "thickness"
+    fn heading(&self) -> Heading {
+        Heading {
+            name: "thickness",
+            title: "How thick",
+            lead_in: "How far a detector of 1, 2, 4, 8 or 16 mm is from the thin shell that the paper's solver takes it for, and which solvers fail because of it.",
+        }
     }
 
-    fn title(&self) -> &'static str {
-        "How thick"
-    }
-
-    fn lead_in(&self) -> &'static str {
-        "How far a detector of 1, 2, 4, 8 or 16 mm is from the thin shell that the paper's solver takes it for, and which solvers fail because of it."
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.is_stopped
-    }
-
-    fn seconds(&self) -> f64 {
-        self.seconds
-    }
-
-    fn claims(&self) -> &[Claim] {
-        &self.claims
+    fn course(&self) -> &Course {
+        &self.course
     }
 
     fn table(&self) -> String {

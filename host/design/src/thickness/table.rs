@@ -10,7 +10,7 @@ use super::{Report, SolverRow};
 const NOWHERE: &str = "-";
 
 pub(super) fn table(report: &Report) -> String {
-    let mut text = format!("Thickness, in {:.1} s\n\n{}", report.seconds, claim::table(&report.claims));
+    let mut text = format!("Thickness, in {:.1} s\n\n{}", report.course.seconds, claim::table(&report.course.claims));
     text += "\nthickness  correlation  largest, V   of shell  mean absolute error\n";
     for row in &report.rows {
         _ = writeln!(
