@@ -5,7 +5,7 @@
 //! sense, by Levenberg and Marquardt's method.
 //!
 //! What the data leave open is not given as a number. Where the curve is still a power law at the largest force, any saturation above some
-//! value fits: it is open unless the power law (`H` to infinity) fits worse by more than [`OPEN_DEVIATIONS`]. Forces far beyond those that were applied
+//! value fits: it is open unless the power law (`H` to infinity) fits worse by more than chance makes it. Forces far beyond those that were applied
 //! are open as well.
 
 use nalgebra::{Matrix3, Vector3};
