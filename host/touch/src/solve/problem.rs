@@ -64,17 +64,22 @@ impl Problem {
         &self.jacobian.detector
     }
 
-    /// What is not known of the detector; `None` if it is taken as exact, and as long as it is [made beside](Self::make_nuisance_beside). Else the
+    /// What is not known of the detector; `None` if it is exact, and as long as it is [made beside](Self::make_nuisance_beside). Else the
     /// first call makes a model for each of some dozens of parameters, which takes about a second with 16 electrodes, and half a minute with 32.
     pub fn nuisance(&self) -> Option<&Nuisance> {
         if self.nuisance.beside.load(Ordering::Acquire) {
-            return self.nuisance.made.get()?.as_ref();
+            return self.made_already();
         }
         self.made_nuisance(threads::cores())
     }
 
-    /// Begins to make what is not known of the detector in a thread of its own, and leaves a core to others. Meanwhile the detector is taken as exact: live, contacts that are
-    /// a little off are better than none for half a minute.
+    /// What is not known of the detector, if that was made.
+    pub(super) fn made_already(&self) -> Option<&Nuisance> {
+        self.nuisance.made.get()?.as_ref()
+    }
+
+    /// Begins to make what is not known of the detector in a thread of its own, and leaves a core to others. Meanwhile contacts are found
+    /// by an error of each reading that stands for it, and flagged as unfinished: live, rough ones are better than none for half a minute.
     pub fn make_nuisance_beside(&self) {
         let problem = self.clone();
         let made = move || {

@@ -98,6 +98,7 @@ impl AutoFollower {
     fn beside(&mut self, mut followed: Followed, target: Option<&Target>) -> Followed {
         if let (Some(contacts), Some(target)) = (&mut self.contacts, target) {
             contacts.follow(target);
+            followed.search |= contacts.finder().is_outdated(target);
             followed.solution.contacts = contacts.solution(target).contacts;
         }
         followed
@@ -163,6 +164,7 @@ impl AutoFollower {
             (Answer::Image(why), _) => (Some(as_whole(self.image.solution(readings)?, why)), self.skip == 0),
             _ => (None, search),
         };
+        let search = search || self.contacts.as_ref().is_some_and(|contacts| contacts.finder().is_outdated(target));
         let solution = match whole {
             Some(whole) => Solution { contacts: contacts.contacts, ..whole },
             None => as_contacts(contacts, search),

@@ -1,13 +1,16 @@
 //! The thorough half: which model explains a frame at the lowest price.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use super::words::instead_of;
 use super::{
-    ContactFinder, ContactSearcher, Evidence, Nonlinear, ShapeFinder, Solution, SolveError, Target, image_evidence,
+    ContactFinder, ContactSearcher, Evidence, Found, Nonlinear, ShapeFinder, Solution, SolveError, Target,
+    image_evidence,
 };
 use crate::solve::follow::{Lead, Searcher, Whole};
 use crate::solve::shapes::StripFit;
+use crate::solve::still::Mean;
 use tactomo_physics::readings::Readings;
 
 /// So many contacts may stand for something else, if they leave more than noise does.
@@ -49,8 +52,28 @@ impl AutoSearcher {
         let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
         let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
         // What is not known of a detector makes explanations more alike than their evidence tells.
-        let margin = if target.error().is_some() { CLEARLY } else { 0.0 };
+        let margin = if target.error().is_some() || target.is_provisional() { CLEARLY } else { 0.0 };
         (shape.evidence().score() < evidence.score() - margin).then_some(shape)
+    }
+
+    /// The line or ring that explains a frame of a detector that is not known exactly, where the contacts so far do not: each more
+    /// of them takes longer than to look for it.
+    fn early(
+        &self,
+        searcher: &ContactSearcher,
+        contacts: &Found,
+        from: Option<&(Whole, String)>,
+        mean: &Mean,
+    ) -> Option<StripFit> {
+        let finder = self.finder.as_ref()?;
+        let target = finder.target_of(mean, Some(contacts.error()?)).ok()?;
+        let evidence = finder.evidence_of_found(contacts);
+        if !evidence.is_misfit(target.count()) {
+            return None;
+        }
+        let solution = searcher.solution(contacts, mean).ok()?;
+        let shape = self.shape((&solution, evidence), from, &target)?;
+        (!shape.evidence().is_misfit(target.count())).then_some(shape)
     }
 
     /// The image that explains a frame, from the one that was followed if it was one.
@@ -87,7 +110,8 @@ impl AutoSearcher {
         let shape = self.shape((solution, contacts), from.as_ref(), target);
         let best = shape.as_ref().map_or(contacts, StripFit::evidence);
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
-        let noise_share = (target.noise_v / target.deviation_v()).powi(2);
+        // Of a provisional target nothing is claimed that another model could do better than.
+        let noise_share = if target.is_provisional() { 1.0 } else { (target.noise_v / target.deviation_v()).powi(2) };
         let is_doubtful = solution.contacts.len() >= SUSPICIOUS && best.may_be_better(noise_share, target.count());
         if !(is_doubtful || best.is_misfit(target.count())) {
             return Ok(shape);
@@ -105,16 +129,26 @@ impl Searcher for AutoSearcher {
         let readings = &mean.readings;
         let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings) };
         let Lead { contacts, whole: from, .. } = from;
-        // A picture does not change to contacts that may not explain it.
-        let mut nowhere = |_| {};
-        let (contacts, found) =
-            if from.is_some() { (None, &mut nowhere as &mut dyn FnMut(Lead)) } else { (contacts, found) };
+        let contacts = contacts.filter(|_| from.is_none());
         let searcher = ContactSearcher::new(Arc::clone(&finder));
-        let Some((contacts, solution)) = searcher.contacts(contacts.map(|found| *found), &mean, found)? else {
+        let mut early = None;
+        let mut better = |better: Found| {
+            early = self.early(&searcher, &better, from.as_ref(), &mean);
+            // A picture does not change to contacts that may not explain it.
+            if early.is_none() && from.is_none() {
+                found(Lead::of_contacts(Some(better), Some(mean.clone())));
+            }
+            if early.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let contacts = searcher.contacts(contacts.map(|found| *found), &mean, &mut better)?;
+        let Some((contacts, solution)) = contacts else {
             return Ok(Lead { mean: Some(mean), ..Lead::default() });
         };
         let target = finder.target_of(&mean, contacts.error())?;
-        let whole = self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?;
+        let whole = match early {
+            Some(shape) => Some(Whole::Shape(Box::new(shape))),
+            None => self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?,
+        };
         let whole = whole.map(|whole| (whole, instead_of(&solution)));
         Ok(Lead { contacts: Some(Box::new(contacts)), whole, mean: Some(mean) })
     }

@@ -5,13 +5,14 @@
 //! what the detector differs by. Explanations with targets of their own are compared by the evidence with the determinant of
 //! their readings' error.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use super::approximation::{ApproximationError, Linearised};
 use super::discs::DiscFit;
 use super::search::COLD;
 use super::target::Target;
-use super::{ContactFinder, Explanation};
+use super::{Better, ContactFinder, Explanation};
 use tactomo_physics::forward::readings_v;
 use tactomo_physics::scene::Contact;
 
@@ -31,24 +32,31 @@ pub(super) struct Informed {
 
 impl ContactFinder {
     /// What explains a frame, from what explains it so far if that leads there, else from nothing. Each better explanation on the way
-    /// goes to `better`.
+    /// goes to `better`, which may end the search.
     pub(super) fn search(
         &self,
         from: Option<&Explanation>,
         target: &Target,
-        better: &mut dyn FnMut(&Explanation),
+        better: &mut Better<'_>,
     ) -> Option<Explanation> {
         if self.problem.nuisance().is_none() {
             return self.search_exact(from, target, better);
+        }
+        // What was found before anything was known of the readings' errors is told with them first: to bring it to them takes a while.
+        let provisional = from.filter(|from| from.error.is_none());
+        if let Some(judged) = provisional.and_then(|from| self.informed_as_is(from, target))
+            && better(&judged).is_break()
+        {
+            return Some(judged);
         }
         let followed = from.and_then(|from| self.caught_up(from, target));
         let grown = followed.map(|followed| self.grown(followed, better));
         if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.explanation.fit, &grown.target)) {
             return Some(grown.explanation.clone());
         }
-        let anew = self.alone(target).map(|one| {
-            better(&one.explanation);
-            self.grown(one, better)
+        let anew = self.alone(target).map(|one| match better(&one.explanation) {
+            ControlFlow::Break(()) => one,
+            ControlFlow::Continue(()) => self.grown(one, better),
         });
         let all = [grown, anew].into_iter().flatten();
         all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.explanation)
@@ -63,6 +71,12 @@ impl ContactFinder {
         let again = self.one(&settled.target)?;
         let again = Informed { explanation: Explanation::of(again, &settled.target), target: settled.target.clone() };
         Some(self.better_informed(settled, again))
+    }
+
+    /// An explanation as it is, by what its readings may be off by together.
+    fn informed_as_is(&self, from: &Explanation, target: &Target) -> Option<Explanation> {
+        let target = self.informed(target, &from.fit.contacts, None)?;
+        self.judged(from.clone(), &target)
     }
 
     fn caught_up(&self, from: &Explanation, target: &Target) -> Option<Informed> {
@@ -101,18 +115,20 @@ impl ContactFinder {
     }
 
     /// More contacts as long as the evidence for them grows, then whatever other set of them is more likely.
-    fn grown(&self, first: Informed, better: &mut dyn FnMut(&Explanation)) -> Informed {
-        let mut best = self.one_by_one(first, better);
-        for _ in 0..GROWTHS {
+    fn grown(&self, first: Informed, better: &mut Better<'_>) -> Informed {
+        let (mut best, more) = self.one_by_one(first, better);
+        for _ in 0..if more.is_break() { 0 } else { GROWTHS } {
             let fit = &best.explanation.fit;
             let starts = self.pairs(fit, &best.target);
-            let grown = self.grow(fit.clone(), starts, &best.target, &mut |_| {});
+            let grown = self.grow(fit.clone(), starts, &best.target, &mut |_| ControlFlow::Continue(()));
             let is_other = grown.fit.contacts.len() != fit.contacts.len();
             let grown = self.settled(Informed { explanation: grown, target: best.target.clone() });
             let is_better = self.whole_evidence(&grown) > self.whole_evidence(&best);
             if is_better {
-                better(&grown.explanation);
                 best = grown;
+                if better(&best.explanation).is_break() {
+                    break;
+                }
             } else if !is_other {
                 // The same contacts, with what is known of their count.
                 best.explanation.certainty = grown.explanation.certainty;
@@ -125,7 +141,7 @@ impl ContactFinder {
     }
 
     /// One contact more at a time, each with what its readings may be off by, while there are too few.
-    fn one_by_one(&self, first: Informed, better: &mut dyn FnMut(&Explanation)) -> Informed {
+    fn one_by_one(&self, first: Informed, better: &mut Better<'_>) -> (Informed, ControlFlow<()>) {
         let (mut best, mut last) = (first.clone(), first);
         while self.is_misfit(&best.explanation.fit, &best.target) {
             let Informed { explanation: Explanation { fit, .. }, target } = last;
@@ -137,12 +153,14 @@ impl ContactFinder {
             last = self.settled(Informed { explanation: Explanation::of(more, &target), target });
             if self.whole_evidence(&last) > self.whole_evidence(&best) {
                 best = last.clone();
-                better(&best.explanation);
+                if better(&best.explanation).is_break() {
+                    return (best, ControlFlow::Break(()));
+                }
             } else if last.explanation.fit.contacts.len() > best.explanation.fit.contacts.len() + 1 {
                 break;
             }
         }
-        best
+        (best, ControlFlow::Continue(()))
     }
 
     fn better_informed(&self, one: Informed, other: Informed) -> Informed {

@@ -22,6 +22,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -52,6 +53,11 @@ const SATURATED: f64 = 270.0;
 const FULL: f64 = 0.995;
 /// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
 const KNOWN: f64 = 0.2;
+
+/// Error of a detector as built, as a share of the largest reading, as long as no more is known of it: one contact leaves 0.044 in the
+/// median of 100 presses on ten detectors drawn from the usual tolerances of `square-60`. With 0.05, places are off by 1.0 standard
+/// error in the median, and 95 % by less than 3.3.
+const UNKNOWN: f64 = 0.05;
 
 /// Factor on the standard errors of places from which a calibration is worth to be asked for.
 const WORTH: f64 = 2.0;
@@ -113,6 +119,9 @@ struct Explanation {
     error: Option<Arc<ApproximationError>>,
 }
 
+/// Takes each better explanation on the way of a search, and ends it if nothing more is wanted.
+type Better<'a> = dyn FnMut(&Explanation) -> ControlFlow<()> + 'a;
+
 impl Found {
     /// What the readings may be off by together, by which it was compared with others.
     pub fn error(&self) -> Option<&Arc<ApproximationError>> {
@@ -155,6 +164,7 @@ impl ContactFinder {
                 noise_v: detector.adc.deviation_v(),
                 rounding_v: still::rounding_v(&detector.adc),
                 model: settings.model_error,
+                detector: (!detector.unknowns().directions.is_empty()).then_some(UNKNOWN),
                 pad: settings.pad_error,
                 drive_v: detector.drive_v,
                 full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
@@ -186,7 +196,27 @@ impl ContactFinder {
     /// [`SolveError`] if they cannot be those of the detector.
     pub fn target_of(&self, mean: &Mean, error: Option<&Arc<ApproximationError>>) -> Result<Target, SolveError> {
         self.check(&mean.readings)?;
-        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, error))
+        Ok(match error {
+            Some(_) => Target::of_mean(&mean.readings, mean.frames, &self.errors, error),
+            None => Target::provisional(&mean.readings, mean.frames, &self.errors),
+        })
+    }
+
+    /// What the mean of some frames is searched in: what they may be off by together is found with the contacts, once that can be.
+    ///
+    /// # Errors
+    /// [`SolveError`] if they cannot be those of the detector.
+    pub fn target_to_search(&self, mean: &Mean) -> Result<Target, SolveError> {
+        if self.problem.nuisance().is_none() {
+            return self.target_of(mean, None);
+        }
+        self.check(&mean.readings)?;
+        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, None))
+    }
+
+    /// Whether it is known by now what the readings of a provisional target may be off by together.
+    pub fn is_outdated(&self, target: &Target) -> bool {
+        target.is_provisional() && self.problem.made_already().is_some()
     }
 
     /// What averages frames that stand still.
@@ -245,7 +275,7 @@ impl ContactFinder {
         let flags = Flags {
             saturated: target.is_saturated() || logs.iter().any(is_perfect),
             misfit: self.is_misfit(fit, target),
-            unfinished: !fit.settled,
+            unfinished: !fit.settled || target.is_provisional(),
             calibrate: calibrated.is_some(),
             excluded: Vec::new(),
         };

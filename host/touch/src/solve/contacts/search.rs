@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use super::discs::{DiscFit, DiscFitter, Effort, place_m};
 use super::network::LoadedSpot;
 use super::target::Target;
-use super::{ContactFinder, Explanation};
+use super::{Better, ContactFinder, Explanation};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::space::{self, Place};
@@ -66,12 +66,12 @@ impl ContactFinder {
     }
 
     /// What explains a frame of a detector that is as described, from what explains it so far if that leads there, else from nothing. Each better
-    /// explanation on the way goes to `better`.
+    /// explanation on the way goes to `better`; to the end, as it takes little.
     pub(super) fn search_exact(
         &self,
         from: Option<&Explanation>,
         target: &Target,
-        better: &mut dyn FnMut(&Explanation),
+        better: &mut Better<'_>,
     ) -> Option<Explanation> {
         let grown = from.and_then(|from| self.disc_fitter().go_on(&from.fit, target, COLD));
         let grown = grown.map(|fit| self.grow(fit, Vec::new(), target, better));
@@ -138,12 +138,12 @@ impl ContactFinder {
         first: DiscFit,
         mut starts: Vec<Vec<Contact>>,
         target: &Target,
-        better: &mut dyn FnMut(&Explanation),
+        better: &mut Better<'_>,
     ) -> Explanation {
         let mut by_count = vec![f64::NEG_INFINITY; self.settings.most + 1];
         let mut last = first.clone();
         let mut best = self.noted(first.clone(), &mut by_count);
-        better(&Explanation::new(first.clone(), &by_count, target));
+        let _ = better(&Explanation::new(first.clone(), &by_count, target));
         best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
         while last.contacts.len() < self.settings.most {
             let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
@@ -151,7 +151,7 @@ impl ContactFinder {
             last = more.0.clone();
             if more.1 > best.1 {
                 best = more;
-                better(&Explanation::new(best.0.clone(), &by_count, target));
+                let _ = better(&Explanation::new(best.0.clone(), &by_count, target));
             } else if !self.is_misfit(&best.0, target) || last.contacts.len() > best.0.contacts.len() + 1 {
                 break;
             }
@@ -162,7 +162,7 @@ impl ContactFinder {
             }
             let Some(other) = self.swapped(&best, target).map(|other| self.noted(other, &mut by_count)) else { break };
             best = other;
-            better(&Explanation::new(best.0.clone(), &by_count, target));
+            let _ = better(&Explanation::new(best.0.clone(), &by_count, target));
         }
         if self.is_misfit(&best.0, target) {
             best = self.noted(self.released(best.0, target), &mut by_count);

@@ -1,5 +1,6 @@
 //! Contacts from frame to frame: followed, and searched where following does not explain the readings.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use super::discs::DiscFit;
@@ -114,7 +115,8 @@ impl ContactFollower {
         let Some(found) = self.finder.without_weak(moved, target) else { return self.finder.stands_out(target) };
         let search = found.fit.cost > self.enough(&found.fit, target)
             || target.frames >= MORE * self.searched.frames
-            || target.is_stale(&found.fit.volts);
+            || target.is_stale(&found.fit.volts)
+            || self.finder.is_outdated(target);
         self.last = Some(found);
         search
     }
@@ -136,7 +138,7 @@ impl ContactFollower {
         let Some(last) = &self.last else { return self.finder.stands_out(target) };
         self.searched =
             Searched { excess: (left.min(last.fit.cost) - self.finder.freedom(&last.fit, target)).max(0.0), frames };
-        last.fit.cost > self.enough(&last.fit, target)
+        last.fit.cost > self.enough(&last.fit, target) || self.finder.is_outdated(target)
     }
 
     /// Sum of squares up to which what is followed explains the mean of some frames: what is not noise stands out by their number.
@@ -224,23 +226,30 @@ impl ContactSearcher {
         Self { finder }
     }
 
+    /// What contacts are in the mean of some frames, as a solution.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    pub fn solution(&self, found: &Found, mean: &Mean) -> Result<Solution, SolveError> {
+        let target = self.finder.target_of(mean, found.error())?;
+        Ok(self.finder.solution(&found.0, &target))
+    }
+
     /// The contacts that explain the mean of some frames, and the solution that they are; `None` if nothing touches. Better ones on the way there go
-    /// to `found`.
+    /// to `found`, which may end the search.
     pub fn contacts(
         &self,
         from: Option<Found>,
         mean: &Mean,
-        found: &mut dyn FnMut(Lead),
+        found: &mut dyn FnMut(Found) -> ControlFlow<()>,
     ) -> Result<Option<(Found, Solution)>, SolveError> {
-        let target = self.finder.target_of(mean, None)?;
-        let mut better =
-            |better: &Explanation| found(Lead::of_contacts(Some(Found(better.clone())), Some(mean.clone())));
+        let target = self.finder.target_to_search(mean)?;
+        let mut better = |better: &Explanation| found(Found(better.clone()));
         let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
         found
             .map(|found| {
-                let target = self.finder.target_of(mean, found.error.as_ref())?;
-                let solution = self.finder.solution(&found, &target);
-                Ok((Found(found), solution))
+                let found = Found(found);
+                Ok((found.clone(), self.solution(&found, mean)?))
             })
             .transpose()
     }
@@ -249,7 +258,11 @@ impl ContactSearcher {
 impl Searcher for ContactSearcher {
     fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
         let mean = from.mean_or(readings);
-        let found = self.contacts(from.contacts.map(|found| *found), &mean, found)?.map(|(found, _)| found);
+        let mut better = |better| {
+            found(Lead::of_contacts(Some(better), Some(mean.clone())));
+            ControlFlow::Continue(())
+        };
+        let found = self.contacts(from.contacts.map(|found| *found), &mean, &mut better)?.map(|(found, _)| found);
         Ok(Lead::of_contacts(found, Some(mean)))
     }
 }

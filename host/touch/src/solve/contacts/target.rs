@@ -21,6 +21,8 @@ pub(super) struct Errors {
     pub rounding_v: f64,
     /// Error of the model, as a share of the largest reading.
     pub model: f64,
+    /// Error of a detector that is not known exactly, as a share of the largest reading; none of one that is.
+    pub detector: Option<f64>,
     /// Error of a pad's own impedance, as a share of it.
     pub pad: f64,
     /// Voltage of the driving layer (V).
@@ -69,6 +71,8 @@ pub(in crate::solve) struct Target {
     error: Arc<ApproximationError>,
     /// Whether that is of what is not known of the detector.
     is_informed: bool,
+    /// Whether what is not known of the detector is taken as an error that is alike for all readings.
+    is_provisional: bool,
     /// `k` of each direction.
     shares: Vec<f64>,
 }
@@ -95,13 +99,22 @@ impl Target {
         let is_informed = error.is_some();
         let error = error.map_or_else(of_pads, Arc::clone);
         let shares = error.shares(deviation_v);
-        Self { frames, noise_v, volts: readings.volts().to_vec(), weights, error, is_informed, shares }
+        let volts = readings.volts().to_vec();
+        Self { frames, noise_v, volts, weights, error, is_informed, is_provisional: false, shares }
+    }
+
+    /// The target of the mean of some frames as long as it is not known what they may be off by together: an error of each reading by itself
+    /// stands for that. One that is alike for all of a detector that is as described.
+    pub(super) fn provisional(readings: &Readings, frames: usize, errors: &Errors) -> Self {
+        let model = errors.model.hypot(errors.detector.unwrap_or_default());
+        let target = Self::of_mean(readings, frames, &Errors { model, ..*errors }, None);
+        Self { is_provisional: errors.detector.is_some(), ..target }
     }
 
     /// The same with what the readings may be off by together.
     pub(super) fn with(&self, error: ApproximationError) -> Self {
         let shares = error.shares(self.deviation_v());
-        Self { error: Arc::new(error), is_informed: true, shares, ..self.clone() }
+        Self { error: Arc::new(error), is_informed: true, is_provisional: false, shares, ..self.clone() }
     }
 
     /// The same as if the detector were as described; `None` if it is taken as that already.
@@ -114,6 +127,11 @@ impl Target {
     /// What the readings may be off by together; none of a detector that is as described.
     pub fn error(&self) -> Option<&Arc<ApproximationError>> {
         Some(&self.error).filter(|_| self.is_informed)
+    }
+
+    /// Whether what is not known of the detector is taken as an error that is alike for all readings.
+    pub fn is_provisional(&self) -> bool {
+        self.is_provisional
     }
 
     /// Whether what the readings may be off by together was made for others than `volts`.

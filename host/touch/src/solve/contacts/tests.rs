@@ -8,7 +8,7 @@ use crate::solve::Solver;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::scene::Contact;
-use tactomo_physics::simulate::{Noise, measured};
+use tactomo_physics::simulate::{Noise, drawn, measured};
 
 static PROBLEM: LazyLock<Problem> = LazyLock::new(|| {
     let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector()).unwrap());
@@ -140,4 +140,38 @@ fn a_pad_that_is_not_as_the_model_has_it_does_not_matter() {
     let solution = solver().solve(&measured(&exact, &rough.adc, &mut Noise::new(4))).unwrap();
     let pairs = matched(&truth, &solution.contacts);
     assert!(pairs.iter().all(|pair| error_m(pair) < 4e-4), "{pairs:?}");
+}
+
+#[test]
+fn as_long_as_nothing_is_known_of_its_errors_a_detector_as_built_invents_little_and_claims_little() {
+    let told = Detector::preset(Detector::DEFAULT).unwrap();
+    let problem = Problem::of(&told).unwrap();
+    let solver = Contacts::new(&problem, ContactSettings::of(&problem)).unwrap();
+    let (finder, mut random) = (solver.finder(), fastrand::Rng::with_seed(8));
+    let (mut invented, mut far) = ([0, 0], 0);
+    for seed in 0..10 {
+        let built = drawn(&told, seed);
+        let model = Slab::with_resolution(&built, Resolution::FINE).unwrap();
+        for _ in 0..4 {
+            let [x_m, y_m] = [0, 1].map(|_| 0.05 * (random.f64() - 0.5));
+            let truth = contact(x_m, y_m, 10f64.powf(2.0 * random.f64() - 1.0));
+            let readings = readings_v(&model.impedance_ohm(&[truth]).unwrap(), &built);
+            let readings = measured(&readings, &told.adc, &mut Noise::new(seed));
+            let exact = Target::of_mean(&readings, 1, &finder.errors, None);
+            let exact = finder.search_exact(None, &exact, &mut |_| ControlFlow::Continue(())).unwrap();
+            invented[0] += usize::from(exact.fit.contacts.len() > 1);
+            let target = finder.target_of(&Mean { readings, frames: 1 }, None).unwrap();
+            let found = finder.search_exact(None, &target, &mut |_| ControlFlow::Continue(())).unwrap();
+            let solution = finder.solution(&found, &target);
+            assert!(solution.flags.unfinished);
+            invented[1] += usize::from(solution.contacts.len() > 1);
+            let nearest =
+                solution.contacts.iter().min_by(|a, b| error_m(&(truth, **a)).total_cmp(&error_m(&(truth, **b))));
+            let nearest = nearest.unwrap();
+            let sigma_m = nearest.uncertainty.map(|sigma| sigma.x_m.hypot(sigma.y_m)).unwrap();
+            far += usize::from(error_m(&(truth, *nearest)) > 3.0 * sigma_m);
+        }
+    }
+    // Of 40 presses.
+    assert!(invented[1] <= 10 && 2 * invented[1] < invented[0] && far <= 6, "{invented:?} {far}");
 }

@@ -208,7 +208,7 @@ impl ShapeFinder {
         let flags = Flags {
             saturated: target.is_saturated(),
             misfit: evidence.is_misfit(target.count()),
-            unfinished: !fit.settled,
+            unfinished: !fit.settled || target.is_provisional(),
             ..Flags::default()
         };
         Solution {
