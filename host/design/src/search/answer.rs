@@ -1,5 +1,6 @@
 //! What is answered: the few best with reasons, what is impossible, and which wish to relax.
 
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
@@ -123,7 +124,10 @@ pub fn answer(plan: &Plan, progress: Progress) -> Result<Answer, DesignError> {
     }
     let in_full: Vec<&Found> = found.iter().filter(|found| found.is_in_full).collect();
     let picked = picked(&in_full, wishes);
-    let choices = progress.map("choices as built", &picked, |(found, reason)| choice(found, reason, plan));
+    // Also after a search that was stopped: without choices there is no answer.
+    let never = AtomicBool::new(false);
+    let choices = Progress::new(&never, progress.say)
+        .map("choices as built", &picked, |(found, reason)| choice(found, reason, plan));
     let compared =
         plan.compared.as_ref().map(|(detector, skin)| compared(detector, *skin, &found, wishes)).transpose()?;
     let meeting = found.iter().filter(|found| found.rating.meets(wishes, None)).count();
@@ -260,7 +264,6 @@ impl Answer {
 mod tests {
     use super::super::wishes::tests::wishes;
     use super::*;
-    use std::sync::atomic::AtomicBool;
 
     fn answered(wishes: Wishes) -> Answer {
         let foams = Material::of_paper()

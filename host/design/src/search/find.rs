@@ -5,6 +5,7 @@
 //! those that none beats, are then rated in full.
 
 use std::collections::HashMap;
+use std::sync::atomic::AtomicBool;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::hertz::Skin;
@@ -112,8 +113,10 @@ impl Tried {
         next
     }
 
-    /// All, the best first, with those that matter rated in full.
+    /// All, the best first, with those that matter rated in full: also after a search that was stopped, whose answer they are.
     fn in_full(mut self, wishes: &Wishes, progress: Progress) -> Result<Vec<Found>, DesignError> {
+        let never = AtomicBool::new(false);
+        let progress = Progress::new(&never, progress.say);
         sort(&mut self.found, wishes);
         let best = self.found.iter().take(IN_FULL);
         let unbeaten = front(&self.found).into_iter().take(IN_FULL);
@@ -161,7 +164,6 @@ mod tests {
     use super::super::Material;
     use super::super::wishes::tests::wishes;
     use super::*;
-    use std::sync::atomic::AtomicBool;
 
     /// A small space can be searched in full, and what the search finds with a third of the work is as good within 2 %.
     #[test]

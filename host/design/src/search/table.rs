@@ -9,8 +9,12 @@ use super::{Answer, Compared, Rating, Unmet, Wish};
 /// What was found, for a terminal.
 pub fn table(answer: &Answer) -> String {
     let mut text = format!(
-        "{} of {} candidates tried in {:.0} s; {} meet all wishes\n\n",
-        answer.tried, answer.candidates, answer.seconds, answer.meeting
+        "{} of {} candidates tried in {:.0} s{}; {} meet all wishes\n\n",
+        answer.tried,
+        answer.candidates,
+        answer.seconds,
+        if answer.is_stopped { ", stopped before the end" } else { "" },
+        answer.meeting
     );
     for line in advice(answer) {
         _ = writeln!(text, "{line}");
