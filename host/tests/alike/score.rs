@@ -52,11 +52,11 @@ impl Score {
     }
 
     /// Whether it is as good, within 10 % and what is chance: places of contacts to 0.05 mm, peaks of images to a third of the 3 mm between the
-    /// nodes of the coarsest.
-    pub fn is_as_good_as(&self, other: &Self) -> bool {
+    /// nodes of the coarsest. Errors may be so many `times` larger besides.
+    pub fn is_as_good_as(&self, other: &Self, times: f64) -> bool {
         let chance_m = if other.images > 0 { 1e-3 } else { 5e-5 };
         self.count_right > 0.9 * other.count_right - 0.01
-            && self.error_m < 1.1 * other.error_m + chance_m
+            && self.error_m < 1.1 * times * other.error_m + chance_m
             && (other.images == 0
                 || self.images > 0 && self.correlation > other.correlation - 0.1 * other.correlation.abs() - 0.01)
     }
