@@ -14,9 +14,9 @@ use super::study::watched;
 
 /// Finds the detector that meets what you want: foams, thicknesses, electrodes and drive.
 ///
-/// Searches all detectors of that size that can be made of the foams at hand, and answers with the few best
-/// and why, what is impossible and which wish to relax, and how far tolerances spoil each. With --out the best
-/// is written as a detector file, ready for `live --simulate --detector`.
+/// Searches all detectors of that size that can be made of the foams at hand, and answers with the
+/// few best and why, what is impossible and which wish to relax, and how far tolerances spoil each.
+/// With --out the best is written as a detector file, ready for `live --simulate --detector`.
 ///
 /// Examples:
 ///   tactomo design --size 60x60 --largest 3 --two-points 6 --out mine.toml

@@ -6,8 +6,8 @@ use super::design::{self, OneOutput};
 
 /// Joins two layers of sample B by 5 x 5 and 7 x 7 dots of conductive glue, from 1 mm to dots that touch: figure 7.
 ///
-/// Errors of places with the paper's solver and the limit of the sensor itself over the dots' diameter, and
-/// the current through each dot.
+/// Errors of places with the paper's solver and the limit of the sensor itself over the dots'
+/// diameter, and the current through each dot.
 ///
 /// Examples:
 ///   tactomo study bonding --out bonding.html

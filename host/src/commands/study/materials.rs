@@ -6,10 +6,10 @@ use super::design::{self, OneOutput, Seeded};
 
 /// Maps what the conductivities of a detector's bottom and top do: the paper's figures 2 and 3.
 ///
-/// A slab of 60 x 60 x 10 mm with 16 electrodes, conductivities from 0.001 to 100 S/m at the bottom and at
-/// the top, and the paper's foams and stacks among them: sensitivity, maximum force, spatial resolution and
-/// position accuracy with the paper's solver, and beside them the limits of the sensor itself. Says of each
-/// of the paper's conclusions whether it holds.
+/// A slab of 60 x 60 x 10 mm with 16 electrodes, conductivities from 0.001 to 100 S/m at the
+/// bottom and at the top, and the paper's foams and stacks among them: sensitivity, maximum
+/// force, spatial resolution and position accuracy with the paper's solver, and beside them the
+/// limits of the sensor itself. Says of each of the paper's conclusions whether it holds.
 ///
 /// Examples:
 ///   tactomo study materials --out materials.html

@@ -6,8 +6,9 @@ use super::design::{self, OneOutput, Seeded};
 
 /// Simulates the paper's foams A to D and their stacks as it measured them, with its figures beside: tables I and II.
 ///
-/// Nine places, an indenter of 5 mm, 0 to 5 N up and down; curves of output over force with eq. (6) fitted, line
-/// profiles, places seen at 2.25 N; and whether the simulation puts the samples in the order that was measured.
+/// Nine places, an indenter of 5 mm, 0 to 5 N up and down; curves of output over force with eq.
+/// (6) fitted, line profiles, places seen at 2.25 N; and whether the simulation puts the
+/// samples in the order that was measured.
 ///
 /// Examples:
 ///   tactomo study samples --out samples.html

@@ -8,8 +8,8 @@ use crate::commands::choice;
 
 /// Compares detectors of 1 to 16 mm with the thin shell that the paper's solver takes them for: its figure 4.
 ///
-/// Correlation of the readings, largest reading, mean absolute error; and of each solver the error where it
-/// takes the detector for a shell, and where it inverts the slab.
+/// Correlation of the readings, largest reading, mean absolute error; and of each solver the
+/// error where it takes the detector for a shell, and where it inverts the slab.
 ///
 /// Examples:
 ///   tactomo study thickness --out thickness.html
