@@ -203,8 +203,8 @@ async fn picture_and_data_are_saved() -> Result<()> {
               place: [0.5, -0.25, 0], conductanceS: 0.125, errorS: null, radiusM: null, forceN: 2, forceErrorN: 0.25,
               beyondMaximum: true, xErrorM: 0.5, yErrorM: 1, correlation: 0 }] })))";
         let csv = stage.browser.client.execute_async(script, Vec::new()).await?;
-        let expected = "id,x_m,y_m,z_m,conductance_s,conductance_error_s,radius_m,force_n,force_error_n,\
-            force_beyond_maximum,x_error_m,y_error_m,correlation\n3,0.5,-0.25,0,0.125,,,2,0.25,1,0.5,1,0\n\ngrounded,electrode_0_v,electrode_1_v\n0,0,0.5\n1,0.25,0\n";
+        let expected = "id,x_m,y_m,z_m,conductance_s,conductance_error_s,apparent_conductance_s,radius_m,force_n,\
+            force_error_n,force_beyond_maximum,x_error_m,y_error_m,correlation\n3,0.5,-0.25,0,0.125,,,,2,0.25,1,0.5,1,0\n\ngrounded,electrode_0_v,electrode_1_v\n0,0,0.5\n1,0.25,0\n";
         ensure!(csv == expected, "{csv}");
         Ok(())
     })
