@@ -1,24 +1,104 @@
-//! The readings of one frame, in volts.
+//! The readings of one frame, in volts, and what each of them says.
 
 use crate::detector::{Detector, Electrode};
+
+/// What the number of a reading says of the pad's voltage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Says {
+    /// It is the voltage, but for noise.
+    #[default]
+    Voltage,
+    /// The voltage is that at most: the converter's floor was reached.
+    AtMost,
+    /// The voltage is that at least: the converter's ceiling was reached.
+    AtLeast,
+    /// Nothing: it was not read.
+    Nothing,
+}
+
+/// What a converter's readings can tell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Readings up to this say no more than that (V).
+    pub floor_v: f64,
+    /// Readings from this on say no less than that (V).
+    pub ceiling_v: f64,
+}
+
+impl Range {
+    /// What a reading (V) says.
+    fn says(&self, volts: f64) -> Says {
+        if volts <= self.floor_v {
+            Says::AtMost
+        } else if volts >= self.ceiling_v {
+            Says::AtLeast
+        } else {
+            Says::Voltage
+        }
+    }
+}
 
 /// `n x n` readings of one frame (V): reading `(g, e)` is electrode `e` while `g` is grounded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Readings {
     electrodes: usize,
     volts: Vec<f64>,
+    /// What each says; empty where all are voltages, as nearly always.
+    says: Vec<Says>,
 }
 
 impl Readings {
     /// Readings row by row (`volts[g * electrodes + e]`); `None` unless there are `electrodes` squared.
     pub fn new(electrodes: usize, volts: Vec<f64>) -> Option<Self> {
-        (volts.len() == electrodes * electrodes).then_some(Self { electrodes, volts })
+        (volts.len() == electrodes * electrodes).then_some(Self { electrodes, volts, says: Vec::new() })
     }
 
     /// Readings from a function of ground and electrode.
     pub fn from_fn(electrodes: usize, mut volts: impl FnMut(usize, usize) -> f64) -> Self {
         let volts = (0..electrodes * electrodes).map(|i| volts(i / electrodes, i % electrodes)).collect();
-        Self { electrodes, volts }
+        Self { electrodes, volts, says: Vec::new() }
+    }
+
+    /// The same, each of which says what a function of ground and electrode tells.
+    pub fn saying(mut self, mut says: impl FnMut(usize, usize) -> Says) -> Self {
+        let n = self.electrodes;
+        self.says = (0..n * n).map(|i| says(i / n, i % n)).collect();
+        if self.says.iter().all(|says| *says == Says::Voltage) {
+            self.says = Vec::new();
+        }
+        self
+    }
+
+    /// The same by converters of such ranges, one an electrode: readings at an end of the range are bounds. An electrode beyond them has no
+    /// range.
+    pub fn within(mut self, ranges: &[Range]) -> Self {
+        let n = self.electrodes.max(1);
+        let bounded = |(i, volts): (usize, &mut f64)| {
+            let Some(range) = ranges.get(i % n) else { return Says::Voltage };
+            let says = range.says(*volts);
+            *volts = volts.clamp(range.floor_v, range.ceiling_v);
+            says
+        };
+        let says: Vec<Says> = self.volts.iter_mut().enumerate().map(bounded).collect();
+        self.saying(|g, e| says[g * n + e])
+    }
+
+    /// What the reading of electrode `e` while `g` is grounded says.
+    pub fn says(&self, g: usize, e: usize) -> Says {
+        self.says.get(g * self.electrodes + e).copied().unwrap_or_default()
+    }
+
+    /// What each says, row by row; empty where all are voltages.
+    pub fn all_say(&self) -> &[Says] {
+        &self.says
+    }
+
+    /// The voltage (V), or what stands for it where only a bound of it is known, or nothing: zero below the floor.
+    pub fn touch_v(&self, g: usize, e: usize) -> f64 {
+        match self.says(g, e) {
+            Says::Voltage | Says::AtLeast => self.at(g, e),
+            Says::AtMost | Says::Nothing => 0.0,
+        }
     }
 
     /// Number of electrodes.
@@ -49,7 +129,8 @@ impl Readings {
     /// # Panics
     /// If there is no such electrode.
     pub fn of(&self, electrodes: &[usize]) -> Self {
-        Self::from_fn(electrodes.len(), |g, e| self.at(electrodes[g], electrodes[e]))
+        let some = Self::from_fn(electrodes.len(), |g, e| self.at(electrodes[g], electrodes[e]));
+        if self.says.is_empty() { some } else { some.saying(|g, e| self.says(electrodes[g], electrodes[e])) }
     }
 
     /// Takes from what each channel reads the offset that its detector says the baseline does not show, and divides it by its gain: no model
@@ -65,15 +146,47 @@ impl Readings {
         }
     }
 
-    /// The largest (V); zero if there are none.
+    /// The largest that is above the converter's floor (V); zero if there are none.
     pub fn largest_v(&self) -> f64 {
-        self.volts.iter().copied().fold(0.0, f64::max)
+        if self.says.is_empty() {
+            return self.volts.iter().copied().fold(0.0, f64::max);
+        }
+        let n = self.electrodes;
+        (0..n * n).map(|i| self.touch_v(i / n, i % n)).fold(0.0, f64::max)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn readings_at_an_end_of_the_range_are_bounds() {
+        let ranges = [Range { floor_v: 0.1, ceiling_v: 2.0 }, Range { floor_v: 0.2, ceiling_v: 9.0 }];
+        let readings = Readings::from_fn(3, |g, e| [0.05, 0.15, 0.05, 0.15, 0.25, 0.0, 2.5, 2.5, 7.0][3 * g + e]);
+        let bounded = readings.within(&ranges);
+        let says: Vec<_> = (0..9).map(|i| bounded.says(i / 3, i % 3)).collect();
+        use Says::{AtLeast, AtMost, Voltage};
+        assert_eq!(says, [AtMost, AtMost, Voltage, Voltage, Voltage, Voltage, AtLeast, Voltage, Voltage]);
+        assert_eq!(bounded.volts(), [0.1, 0.2, 0.05, 0.15, 0.25, 0.0, 2.0, 2.5, 7.0]);
+    }
+
+    #[test]
+    fn what_readings_say_goes_with_the_electrodes() {
+        let says = |g: usize, e: usize| match (g, e) {
+            (0, 2) => Says::AtMost,
+            (2, 0) => Says::AtLeast,
+            (2, 1) => Says::Nothing,
+            _ => Says::Voltage,
+        };
+        let readings = Readings::from_fn(3, |g, e| (3 * g + e) as f64).saying(says);
+        let some = readings.of(&[2, 0]);
+        assert_eq!([some.says(0, 1), some.says(1, 0), some.says(0, 0)], [Says::AtLeast, Says::AtMost, Says::Voltage]);
+        assert_eq!([readings.touch_v(0, 2), readings.touch_v(2, 1), readings.touch_v(2, 0)], [0.0, 0.0, 6.0]);
+        assert_eq!(readings.largest_v(), 8.0);
+        let all = readings.of(&[1, 2]).saying(|_, _| Says::Voltage);
+        assert_eq!(all, Readings::from_fn(2, |g, e| (3 * (g + 1) + e + 1) as f64));
+    }
 
     #[test]
     fn gains_are_those_of_the_channels_that_are_read() {

@@ -199,11 +199,11 @@ impl State {
     fn add(&mut self, mut frame: Taken, noise_v: f64) {
         let before = self.pending.take();
         let mut still = self.still.take().filter(|_| before.is_some()).unwrap_or_else(|| Still::new(noise_v));
-        still.add(frame.newest.volts());
+        still.add(&frame.newest);
         if let Some(before) = before {
             frame.came += before.came;
             frame.averaged = still.count() as u32;
-            frame.mean.volts_mut().copy_from_slice(&still.mean_v());
+            frame.mean = still.mean_readings().unwrap_or(frame.mean);
         }
         self.still = Some(still);
         self.pending = Some(frame);

@@ -8,7 +8,7 @@
 
 use std::fmt;
 
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 
 /// Smallest `1 - V / Vcc` that a logarithm is taken of: noise of 1.5 LSB is 3 % of it.
 const SMALLEST: f64 = 0.02;
@@ -81,23 +81,29 @@ pub fn faulty_electrodes(readings: &Readings, drive_v: f64, noise_v: f64) -> Opt
 /// Whether most others rise to the drive when `g` is to be grounded.
 fn is_open(readings: &Readings, g: usize, drive_v: f64) -> bool {
     let n = readings.electrodes();
-    let risen = (0..n).filter(|e| *e != g && readings.at(g, *e) > UNGROUNDED * drive_v).count();
+    let risen = (0..n).filter(|e| *e != g && readings.touch_v(g, *e) > UNGROUNDED * drive_v).count();
     4 * risen > 3 * (n - 1)
 }
 
 /// Electrodes that read what another reads, whatever is grounded, though the others differ.
 fn shorted(readings: &Readings, sound: &[usize], noise_v: f64) -> Vec<usize> {
-    let spread_v =
-        |e: usize, f: usize| sound.iter().map(|g| (readings.at(*g, e) - readings.at(*g, f)).abs()).fold(0.0, f64::max);
+    let spread_v = |e: usize, f: usize| {
+        sound.iter().map(|g| (readings.touch_v(*g, e) - readings.touch_v(*g, f)).abs()).fold(0.0, f64::max)
+    };
+    // Two that are below the converter's floor read the same whatever they are.
+    let is_told = |e: usize, f: usize| {
+        let both = |g: &&usize| [e, f].iter().all(|e| readings.says(**g, *e) == Says::Voltage);
+        2 * sound.iter().filter(both).count() > sound.len()
+    };
     let mut found = Vec::new();
     for (i, e) in sound.iter().enumerate() {
         for f in &sound[..i] {
             // With one of them grounded the other is too, which no two pads apart ever are.
-            let grounded_v = readings.at(*e, *f).max(readings.at(*f, *e));
+            let grounded_v = readings.touch_v(*e, *f).max(readings.touch_v(*f, *e));
             // Both rise while others are grounded: where nothing touches all read the same, but for a wire that floats.
-            let risen_v = sound.iter().map(|g| readings.at(*g, *e)).fold(0.0, f64::max);
-            let row_v = sound.iter().map(|other| readings.at(*e, *other)).fold(0.0, f64::max);
-            let is_touched = row_v.min(risen_v) > TOUCHED * noise_v;
+            let risen_v = sound.iter().map(|g| readings.touch_v(*g, *e)).fold(0.0, f64::max);
+            let row_v = sound.iter().map(|other| readings.touch_v(*e, *other)).fold(0.0, f64::max);
+            let is_touched = row_v.min(risen_v) > TOUCHED * noise_v && is_told(*e, *f);
             if is_touched && grounded_v < SAME * noise_v && spread_v(*e, *f) < SAME * noise_v {
                 found.extend([*e, *f]);
             }
@@ -162,6 +168,9 @@ fn disagreement(readings: &Readings, electrodes: &[usize], drive_v: f64, noise_v
 
 /// What the readings of two electrodes say.
 fn pair(readings: &Readings, g: usize, e: usize, drive_v: f64, noise_v: f64) -> Pair {
+    if [readings.says(g, e), readings.says(e, g)] != [Says::Voltage; 2] {
+        return Pair::default();
+    }
     let ratios = [readings.at(g, e), readings.at(e, g)].map(|volts| 1.0 - volts / drive_v);
     // A pad all but at the drive's potential says only that something conducts well; one above it cannot be.
     if ratios.iter().any(|ratio| ratio.abs() < SMALLEST) {

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::complete::Completing;
 use super::{
     Auto, Bsbl, ContactSettings, Contacts, KernelSolver, Lambda, Nonlinear, NonlinearSettings, Nonnegative, Problem,
     Solver, Tikhonov, Tsvd, Tv, Variant, correct, newtons,
@@ -332,6 +333,11 @@ impl Method {
     /// [`ForwardError`] if the model cannot give what the solver needs.
     pub fn build_with(self, problem: &Problem, parameter: Option<Parameter>) -> Result<Box<dyn Solver>, ForwardError> {
         let solver = (self.row().build)(problem, parameter)?;
+        // These take what each reading says into account by themselves.
+        let solver = match self {
+            Self::Auto | Self::Contacts | Self::Nonlinear => solver,
+            _ => Box::new(Completing::new(problem, solver)),
+        };
         // Newtons are measured where the model explains the readings, so before places are corrected.
         Ok(correct::with_correction(problem.detector(), newtons::with_newtons(problem, solver)))
     }

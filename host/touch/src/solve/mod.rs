@@ -3,6 +3,7 @@
 mod auto;
 mod balance;
 mod bsbl;
+mod complete;
 mod contacts;
 mod correct;
 mod evidence;

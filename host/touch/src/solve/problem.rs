@@ -1,5 +1,6 @@
 //! What solvers are made for.
 
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread;
@@ -7,7 +8,10 @@ use std::thread;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Nuisance, Through};
+use tactomo_physics::readings::Readings;
 use tactomo_physics::threads;
+
+use super::complete::Completer;
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -17,6 +21,8 @@ pub struct Problem {
     /// The linear theory for the detector as measured, and the mesh that solvers' images are on.
     pub jacobian: Arc<Jacobian>,
     nuisance: Arc<Unknown>,
+    /// Made when readings are not whole for the first time.
+    completer: Arc<OnceLock<Completer>>,
 }
 
 /// What is not known of the detector; made when it is asked for first.
@@ -40,12 +46,12 @@ impl Problem {
     pub fn new(model: impl Into<Arc<dyn ForwardModel>>) -> Self {
         let model = model.into();
         let jacobian = Arc::new(Jacobian::of(&*model));
-        Self { model, jacobian, nuisance: Arc::default() }
+        Self { model, jacobian, nuisance: Arc::default(), completer: Arc::default() }
     }
 
     /// The same with another linear theory, on a mesh of its own.
     pub fn with_jacobian(self, jacobian: Jacobian) -> Self {
-        Self { jacobian: Arc::new(jacobian), ..self }
+        Self { jacobian: Arc::new(jacobian), completer: Arc::default(), ..self }
     }
 
     /// The same with drive voltage, multiplexer and converter of `detector`, and with what is not known of it.
@@ -101,6 +107,15 @@ impl Problem {
         self.nuisance.made.get_or_init(made).as_ref()
     }
 
+    /// Readings that are all voltages: those that were not read, or reached an end of the converter's range, as the linear theory has them
+    /// from the others.
+    pub(super) fn completed<'a>(&self, readings: &'a Readings) -> Cow<'a, Readings> {
+        if readings.all_say().is_empty() {
+            return Cow::Borrowed(readings);
+        }
+        self.completer.get_or_init(|| Completer::new(&self.jacobian)).completed(readings)
+    }
+
     /// Mean distance of electrodes (m): the side of a square that each has for itself.
     pub fn spacing_m(&self) -> f64 {
         let area_m2: f64 = self.jacobian.image_mesh.node_areas_m2.iter().sum();
@@ -120,6 +135,7 @@ impl Problem {
             ..(*self.jacobian).clone()
         };
         let model = Through::new(Arc::clone(&self.model), kept.to_vec(), joints.to_vec());
-        Self { model: Arc::new(model), jacobian: Arc::new(jacobian), nuisance: Arc::default() }
+        let (model, jacobian) = (Arc::new(model), Arc::new(jacobian));
+        Self { model, jacobian, nuisance: Arc::default(), completer: Arc::default() }
     }
 }

@@ -18,7 +18,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::contacts::dot;
 use tactomo_physics::detector::Adc;
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 
 /// Frames that are looked at, at most: a fifth of a second of 1200 frames/s.
 pub(super) const LONGEST: usize = 256;
@@ -56,6 +56,9 @@ pub struct Still {
     /// Sums of the readings up to each frame that is remembered, the oldest first, after what they begin with (V).
     sums_v: VecDeque<Vec<f64>>,
     newest_v: Vec<f64>,
+    /// What each reading of the mean says: what that of any frame does that is no voltage. Empty where all are voltages.
+    says: Vec<Says>,
+    newest_says: Vec<Says>,
     /// Whether anything has moved since the beginning.
     has_moved: bool,
 }
@@ -81,21 +84,22 @@ impl Still {
     /// Begins with nothing; `noise_v` is the standard deviation of a reading (V).
     pub fn new(noise_v: f64) -> Self {
         let noise_v = noise_v.max(f64::MIN_POSITIVE.sqrt());
-        Self { noise_v, sums_v: VecDeque::new(), newest_v: Vec::new(), has_moved: false }
+        Self { noise_v, sums_v: VecDeque::new(), newest_v: Vec::new(), says: Vec::new(), newest_says: Vec::new(), has_moved: false }
     }
 
-    /// Adds a frame's readings (V).
-    pub fn add(&mut self, volts: &[f64]) {
-        self.add_beside(volts, &[]);
+    /// Adds a frame's readings.
+    pub fn add(&mut self, readings: &Readings) {
+        self.add_beside(readings, &[]);
     }
 
-    /// Adds a frame's readings (V); `slopes_v` are their derivatives by the parameters of contacts that are known, in pairs that belong
+    /// Adds a frame's readings; `slopes_v` are their derivatives by the parameters of contacts that are known, in pairs that belong
     /// together (V).
-    pub(super) fn add_beside(&mut self, volts: &[f64], slopes_v: &[Vec<f64>]) {
-        if self.newest_v.len() != volts.len() {
+    pub(super) fn add_beside(&mut self, readings: &Readings, slopes_v: &[Vec<f64>]) {
+        if self.newest_v.len() != readings.volts().len() {
             self.reset();
         }
-        self.push(volts);
+        self.push(readings.volts());
+        self.merge(readings.all_say());
         if self.frames() > 1 {
             let moves = Moves::new(slopes_v, self.noise_v);
             self.forget_what_differs(moves.as_ref());
@@ -103,9 +107,9 @@ impl Still {
     }
 
     /// Adds a frame unless it is the newest already.
-    pub(super) fn add_if_new(&mut self, volts: &[f64], slopes_v: &[Vec<f64>]) {
-        if self.newest_v != volts {
-            self.add_beside(volts, slopes_v);
+    pub(super) fn add_if_new(&mut self, readings: &Readings, slopes_v: &[Vec<f64>]) {
+        if self.newest_v != readings.volts() {
+            self.add_beside(readings, slopes_v);
         }
     }
 
@@ -116,18 +120,36 @@ impl Still {
         (all / SHARE).max(all.min(at_first))
     }
 
+    /// A reading that is a bound in one frame is one in the mean.
+    fn merge(&mut self, says: &[Says]) {
+        self.newest_says.clear();
+        self.newest_says.extend_from_slice(says);
+        if self.says.is_empty() || self.frames() == 1 {
+            self.says.clone_from(&self.newest_says);
+            return;
+        }
+        let changed = self.says.iter_mut().zip(says).filter(|(_, says)| **says != Says::Voltage);
+        changed.for_each(|(ours, theirs)| *ours = *theirs);
+    }
+
     /// Their mean (V), once there is a frame.
-    pub fn mean_v(&self) -> Vec<f64> {
+    fn mean_v(&self) -> Vec<f64> {
         match self.count() {
             0 | 1 => self.newest_v.clone(),
             count => self.mean_between(self.frames() - count, self.frames()),
         }
     }
 
-    /// The same as readings; `None` before the first frame.
+    /// Their mean, once there is a frame.
+    pub fn mean_readings(&self) -> Option<Readings> {
+        let n = self.newest_v.len().isqrt();
+        let readings = Readings::new(n, self.mean_v()).filter(|_| self.frames() > 0)?;
+        Some(if self.says.is_empty() { readings } else { readings.saying(|g, e| self.says[g * n + e]) })
+    }
+
+    /// The same with their number.
     pub(super) fn mean(&self) -> Option<Mean> {
-        let readings = Readings::new(self.newest_v.len().isqrt(), self.mean_v()).filter(|_| self.frames() > 0)?;
-        Some(Mean { readings, frames: self.count() })
+        self.mean_readings().map(|readings| Mean { readings, frames: self.count() })
     }
 
     /// The same, or else a frame.
@@ -185,6 +207,7 @@ impl Still {
     /// Forgets all but so many of the newest frames, and what their sums began with: that may be far larger than they are.
     fn begin_with_newest(&mut self, newest: usize) {
         self.has_moved = true;
+        self.says.clone_from(&self.newest_says);
         self.sums_v.drain(..self.frames() - newest);
         if newest == 1 {
             self.sums_v = VecDeque::from([vec![0.0; self.newest_v.len()], self.newest_v.clone()]);
@@ -202,8 +225,10 @@ impl Still {
         let (before_v, mut change_v) = (self.mean_between(0, all - newest), self.mean_between(all - newest, all));
         let scale = (1.0 / newest as f64 + 1.0 / (all - newest) as f64).sqrt().recip();
         change_v.iter_mut().zip(&before_v).for_each(|(change, before)| *change = scale * (*change - before));
+        // What stays beyond the converter's range has no noise.
+        let bounds = self.says.iter().filter(|says| **says != Says::Voltage).count();
         let squares = change_v.iter().map(|change| change * change).sum::<f64>() / (self.noise_v * self.noise_v);
-        let readings = change_v.len() as f64;
+        let readings = (change_v.len() - bounds).max(1) as f64;
         Difference {
             overall: (squares - readings) / (2.0 * readings).sqrt(),
             of_contacts: moves.map_or(0.0, |moves| moves.largest(&change_v)),
@@ -289,9 +314,11 @@ mod tests {
             Self { random, slopes_v, still: Still::new(NOISE_V) }
         }
 
-        fn frame(&mut self, moved: f64) -> Vec<f64> {
+        fn frame(&mut self, moved: f64) -> Readings {
             let noise = |random: &mut fastrand::Rng| (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
-            self.slopes_v[0].iter().map(|slope| 0.5 + moved * slope + NOISE_V * noise(&mut self.random)).collect()
+            let volts =
+                self.slopes_v[0].iter().map(|slope| 0.5 + moved * slope + NOISE_V * noise(&mut self.random)).collect();
+            Readings::new(READINGS.isqrt(), volts).unwrap()
         }
 
         fn add(&mut self, moved: f64) {
@@ -376,8 +403,8 @@ mod tests {
     fn other_readings_begin_anew() {
         let mut still = Still::new(NOISE_V);
         assert_eq!((still.count(), still.mean()), (0, None));
-        (0..5).for_each(|_| still.add(&[0.5; 16]));
-        still.add(&[0.5; 9]);
+        (0..5).for_each(|_| still.add(&Readings::from_fn(4, |_, _| 0.5)));
+        still.add(&Readings::from_fn(3, |_, _| 0.5));
         assert_eq!((still.count(), still.mean_v().len()), (1, 9));
     }
 

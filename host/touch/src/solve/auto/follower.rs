@@ -214,13 +214,13 @@ fn lower(one: Option<Evidence>, other: Option<Evidence>) -> Option<Evidence> {
 impl Follower for AutoFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         crate::solve::check(readings, self.electrodes)?;
-        self.still.add_beside(readings.volts(), Self::slopes_v(self.contacts.as_ref()));
+        self.still.add_beside(readings, Self::slopes_v(self.contacts.as_ref()));
         self.follow_mean(&self.still.mean_or(readings))
     }
 
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         crate::solve::check(readings, self.electrodes)?;
-        self.still.add_if_new(readings.volts(), Self::slopes_v(self.contacts.as_ref()));
+        self.still.add_if_new(readings, Self::slopes_v(self.contacts.as_ref()));
         let mean = self.still.mean_or(readings);
         let readings = &mean.readings;
         let Some(target) = self.target(&mean, lead.contacts.as_deref())? else {

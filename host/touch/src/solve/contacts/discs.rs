@@ -290,6 +290,7 @@ impl DiscFitter<'_> {
     }
 
     fn normal(&self, slopes: &Slopes, target: &Target) -> DMatrix<f64> {
+        let target = target.at(&slopes.volts);
         let whitened: Vec<_> = slopes.by.iter().map(|slope| target.whitened(slope)).collect();
         let size = whitened.len();
         let mut normal = DMatrix::zeros(size, size);

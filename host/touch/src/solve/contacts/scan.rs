@@ -9,6 +9,7 @@ use super::network::{LoadedSpot, Network};
 use super::target::{Target, dot};
 use crate::solve::balance;
 use tactomo_physics::forward::spots::{Spot, SpotFields};
+use tactomo_physics::readings::Readings;
 use tactomo_physics::space;
 
 /// Every so many places one is looked at in pairs.
@@ -71,9 +72,9 @@ impl Scan {
     ///
     /// Balanced readings of one contact are exactly linear in the fields at its place (`solve::balance`), whatever its force and
     /// whatever the pads' own impedances, so the scan finds it; the rows' mean load is `A - 2 f + E[g][g] + R`, which gives its
-    /// resistance `A`.
-    pub fn at_first(&self, network: &Network, target: &Target) -> Looks<'_> {
-        let mut volts = target.volts.clone();
+    /// resistance `A`. `readings` are those of the target, completed.
+    pub fn at_first(&self, network: &Network, target: &Target, readings: &Readings) -> Looks<'_> {
+        let mut volts = readings.volts().to_vec();
         balance::balance(&mut volts, network.electrodes(), network.drive_v);
         Looks {
             patterns: Cow::Borrowed(&self.first.patterns),
@@ -98,6 +99,7 @@ impl Scan {
     ) -> Option<Looks<'_>> {
         let n = network.electrodes();
         let solved = network.solve(spots, fields)?;
+        let target = target.at(&fit.volts);
         let mut patterns = DMatrix::zeros(n * n, self.spots.len());
         for (mut column, spot) in patterns.column_iter_mut().zip(&self.spots) {
             let potentials_ohm = network.potentials_ohm(&solved, spots, spot, fields);

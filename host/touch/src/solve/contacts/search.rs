@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use super::discs::{DiscFit, DiscFitter, Effort, place_m};
 use super::network::LoadedSpot;
+use super::scan::Looks;
 use super::target::Target;
 use super::{Better, ContactFinder, Explanation};
 use tactomo_physics::readings::Readings;
@@ -59,9 +60,14 @@ impl ContactFinder {
         Some(cost / count.max(1) as f64)
     }
 
+    /// A look for contacts where there are none yet.
+    fn looks(&self, target: &Target) -> Looks<'_> {
+        self.scan.at_first(&self.network, target, &self.problem.completed(&target.readings()))
+    }
+
     /// Whether there is any contact at all, as far as single ones tell.
     pub fn stands_out(&self, target: &Target) -> bool {
-        let looks = self.scan.at_first(&self.network, target);
+        let looks = self.looks(target);
         self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= WORTH_FIRST)
     }
 
@@ -90,21 +96,21 @@ impl ContactFinder {
         if one.contacts.len() > 1 || !self.is_doubtful(one, target) {
             return Vec::new();
         }
-        let looks = self.scan.at_first(&self.network, target);
+        let looks = self.looks(target);
         let pairs = self.scan.pairs(&looks, STARTS, self.apart_m());
         pairs.iter().map(|pair| self.discs_of(&self.scan.start(&looks, pair))).collect()
     }
 
     /// A first guess of a single contact; `None` if nothing stands out.
     pub(super) fn begun(&self, target: &Target) -> Option<Vec<Contact>> {
-        let looks = self.scan.at_first(&self.network, target);
+        let looks = self.looks(target);
         let best = self.scan.ones(&looks, 1, self.apart_m()).into_iter().next()?;
         (best.gain >= WORTH_FIRST).then(|| self.discs_of(&self.scan.start(&looks, &best)))
     }
 
     /// The best single contact, if anything stands out.
     pub(super) fn one(&self, target: &Target) -> Option<DiscFit> {
-        let looks = self.scan.at_first(&self.network, target);
+        let looks = self.looks(target);
         let ones = self.scan.ones(&looks, STARTS, self.apart_m());
         if ones.first().is_none_or(|best| best.gain < WORTH_FIRST) {
             return None;

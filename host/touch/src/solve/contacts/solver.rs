@@ -190,7 +190,7 @@ impl FrameFollower {
 impl Follower for FrameFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
-        self.still.add_beside(readings.volts(), self.contacts.slopes_v());
+        self.still.add_beside(readings, self.contacts.slopes_v());
         let target = self.target(readings)?;
         let search = self.contacts.follow(&target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
@@ -198,7 +198,7 @@ impl Follower for FrameFollower {
 
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
-        self.still.add_if_new(readings.volts(), self.contacts.slopes_v());
+        self.still.add_if_new(readings, self.contacts.slopes_v());
         let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
         let target = self.contacts.finder.target_of(&self.still.mean_or(readings), error)?;
         let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);

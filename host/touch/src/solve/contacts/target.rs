@@ -4,13 +4,16 @@
 //! known of the detector, which changes many readings together ([`ApproximationError`]). Of a detector that is as described the last is
 //! the resistance between a pad and the layer alone, which meshes and polynomials get wrong first: it adds to `Z[g][g]`, so that
 //! `dV[g][e] = (Vcc - V[g][e]) d / (Z[g][g] + R)` for all `e` but `g`, one pattern for each ground.
+//!
+//! A reading at an end of the converter's range is a bound: a model is held against it only where it breaks it, by as much as it does.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
 use super::approximation::ApproximationError;
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 
 /// What is known of the errors of readings.
 #[derive(Clone, Copy, Debug)]
@@ -47,13 +50,13 @@ impl Errors {
     /// over the readings.
     pub fn pad_patterns_v(&self, readings: &Readings) -> Vec<f64> {
         let electrodes = readings.electrodes();
-        let row = |(g, row): (usize, &[f64])| {
-            let share = self.pad * row.iter().copied().fold(0.0, f64::max) / self.drive_v;
+        let row = |g: usize| {
+            let volts = move |e: usize| readings.touch_v(g, e);
+            let share = self.pad * (0..electrodes).map(volts).fold(0.0, f64::max) / self.drive_v;
             let drive_v = self.drive_v;
-            let pattern = |(e, volts): (usize, &f64)| if e == g { 0.0 } else { share * (drive_v - volts).max(0.0) };
-            row.iter().enumerate().map(pattern).collect::<Vec<_>>()
+            (0..electrodes).map(move |e| if e == g { 0.0 } else { share * (drive_v - volts(e)).max(0.0) })
         };
-        readings.volts().chunks_exact(electrodes).enumerate().flat_map(row).collect()
+        (0..electrodes).flat_map(row).collect()
     }
 }
 
@@ -68,6 +71,8 @@ pub(in crate::solve) struct Target {
     pub(super) volts: Vec<f64>,
     /// One over the standard deviation of each (1/V); zero leaves a reading out.
     weights: Vec<f64>,
+    /// What each says; empty where all are voltages.
+    says: Vec<Says>,
     error: Arc<ApproximationError>,
     /// Whether that is of what is not known of the detector.
     is_informed: bool,
@@ -89,18 +94,54 @@ impl Target {
         let noise_v = errors.of_mean_v(frames);
         let deviation_v = noise_v.hypot(errors.model * readings.largest_v());
         let weight = |volts: &f64| if *volts < errors.full_v { 1.0 / deviation_v } else { 0.0 };
-        let weights: Vec<_> = readings.volts().iter().map(weight).collect();
+        let mut weights: Vec<_> = readings.volts().iter().map(weight).collect();
+        let says = readings.all_say().to_vec();
+        let unread = says.iter().zip(&mut weights).filter(|(says, _)| **says == Says::Nothing);
+        unread.for_each(|(_, weight)| *weight = 0.0);
         let of_pads = || {
             let mut patterns_v = errors.pad_patterns_v(readings);
-            let counted = patterns_v.iter_mut().zip(&weights).filter(|(_, weight)| **weight == 0.0);
-            counted.for_each(|(volts, _)| *volts = 0.0);
+            let is_counted = |i: usize| weights[i] > 0.0 && is_voltage(&says, i);
+            let left_out = patterns_v.iter_mut().enumerate().filter(|(i, _)| !is_counted(*i));
+            left_out.for_each(|(_, volts)| *volts = 0.0);
             Arc::new(ApproximationError::of_rows(&patterns_v, readings.electrodes()))
         };
         let is_informed = error.is_some();
         let error = error.map_or_else(of_pads, Arc::clone);
         let shares = error.shares(deviation_v);
         let volts = readings.volts().to_vec();
-        Self { frames, noise_v, volts, weights, error, is_informed, is_provisional: false, shares }
+        Self { frames, noise_v, volts, weights, says, error, is_informed, is_provisional: false, shares }
+    }
+
+    /// The same where a model predicts `volts` (V): bounds that it keeps are left out. Derivatives are whitened by this one.
+    pub fn at(&self, volts: &[f64]) -> Cow<'_, Self> {
+        if self.says.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let mut target = self.clone();
+        for (i, weight) in target.weights.iter_mut().enumerate() {
+            if !is_voltage(&self.says, i) && self.left(i, volts[i]) == 0.0 {
+                *weight = 0.0;
+            }
+        }
+        Cow::Owned(target)
+    }
+
+    /// How far a reading is from a predicted one (V): of a bound, by as much as that breaks it.
+    fn left(&self, i: usize, predicted_v: f64) -> f64 {
+        let left = self.volts[i] - predicted_v - self.error.mean_v.get(i).copied().unwrap_or_default();
+        match self.says.get(i).copied().unwrap_or_default() {
+            Says::Voltage => left,
+            Says::AtMost => left.min(0.0),
+            Says::AtLeast => left.max(0.0),
+            Says::Nothing => 0.0,
+        }
+    }
+
+    /// The readings that they are of, with what each says.
+    pub fn readings(&self) -> Readings {
+        let n = self.volts.len().isqrt();
+        let readings = Readings::from_fn(n, |g, e| self.volts[g * n + e]);
+        if self.says.is_empty() { readings } else { readings.saying(|g, e| self.says[g * n + e]) }
     }
 
     /// The target of the mean of some frames as long as it is not known what they may be off by together: an error of each reading by itself
@@ -119,9 +160,7 @@ impl Target {
 
     /// The same as if the detector were as described; `None` if it is taken as that already.
     pub(super) fn as_exact(&self, errors: &Errors) -> Option<Self> {
-        let n = self.volts.len().isqrt();
-        let readings = Readings::from_fn(n, |g, e| self.volts[g * n + e]);
-        self.is_informed.then(|| Self::of_mean(&readings, self.frames, errors, None))
+        self.is_informed.then(|| Self::of_mean(&self.readings(), self.frames, errors, None))
     }
 
     /// What the readings may be off by together; none of a detector that is as described.
@@ -146,10 +185,10 @@ impl Target {
         self.error.steps(&pulls)
     }
 
-    /// Leaves readings that do not count out of patterns.
+    /// Leaves readings that do not count, or are bounds, out of patterns.
     pub(super) fn mask(&self, patterns_v: &mut DMatrix<f64>) {
-        let left_out = self.weights.iter().enumerate().filter(|(_, weight)| **weight == 0.0);
-        left_out.for_each(|(row, _)| patterns_v.row_mut(row).fill(0.0));
+        let left_out = (0..self.weights.len()).filter(|i| self.weights[*i] == 0.0 || !is_voltage(&self.says, *i));
+        left_out.for_each(|row| patterns_v.row_mut(row).fill(0.0));
     }
 
     /// Makes the errors of volts alike, independent and of deviation one.
@@ -179,6 +218,8 @@ impl Target {
     pub fn residuals(&self, volts: &[f64]) -> Vec<f64> {
         let mut all: Vec<_> = self.volts.iter().zip(volts).map(|(ours, theirs)| ours - theirs).collect();
         all.iter_mut().zip(&self.error.mean_v).for_each(|(left, mean)| *left -= mean);
+        // Few have bounds.
+        (0..self.says.len()).for_each(|i| all[i] = self.left(i, volts[i]));
         self.whiten(&mut all);
         all
     }
@@ -195,7 +236,10 @@ impl Target {
         if !self.is_informed {
             return self.cost(&vec![0.0; self.volts.len()]);
         }
-        let squares = self.volts.iter().zip(&self.weights).map(|(volts, weight)| (volts * weight).powi(2));
+        let squares = self.volts.iter().zip(&self.weights).enumerate().map(|(i, (volts, weight))| match self.says.get(i) {
+            Some(Says::AtMost | Says::Nothing) => 0.0,
+            _ => (volts * weight).powi(2),
+        });
         squares.sum::<f64>() - self.ln_determinant()
     }
 
@@ -209,15 +253,20 @@ impl Target {
         1.0 / self.weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
     }
 
-    /// Readings that count.
+    /// Readings that count, but for those that are bounds.
     pub fn count(&self) -> usize {
-        self.weights.iter().filter(|weight| **weight > 0.0).count()
+        (0..self.weights.len()).filter(|i| self.weights[*i] > 0.0 && is_voltage(&self.says, *i)).count()
     }
 
-    /// Whether there are readings that do not count.
+    /// Whether there are readings that are too large to count.
     pub fn is_saturated(&self) -> bool {
-        self.weights.contains(&0.0)
+        let is_full = |i: usize| self.weights[i] == 0.0 && is_voltage(&self.says, i);
+        self.says.contains(&Says::AtLeast) || (0..self.weights.len()).any(is_full)
     }
+}
+
+fn is_voltage(says: &[Says], i: usize) -> bool {
+    says.get(i).is_none_or(|says| *says == Says::Voltage)
 }
 
 /// Scalar product, in four sums for the processor to do at once.

@@ -18,7 +18,7 @@ use crate::solve::contacts::network::{LoadedSpot, Network, Solved};
 use crate::solve::evidence::misfit_limit;
 use crate::solve::{ContactSettings, FoundContact, Problem};
 use tactomo_physics::forward::spots::SpotFields;
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 
 /// Most contacts that are measured together.
 const MOST: usize = 16;
@@ -144,6 +144,11 @@ impl Meter {
         None
     }
 
+    /// Whether a reading tells a conductance.
+    fn counts(&self, readings: &Readings, g: usize, e: usize) -> bool {
+        e != g && readings.at(g, e) < self.full_v && readings.says(g, e) == Says::Voltage
+    }
+
     /// What resistances leave of the readings, in deviations of the noise.
     fn look(&self, logs: Vec<f64>, spots: &mut [LoadedSpot], readings: &Readings) -> Option<Fit> {
         for (spot, log) in spots.iter_mut().zip(&logs) {
@@ -154,7 +159,7 @@ impl Meter {
         let residual = |(index, volts): (usize, &f64)| {
             let (g, e) = (index / n, index % n);
             let model_v = self.network.drive_v * (1.0 - solved.impedance_ohm[e * n + g] / solved.loads_ohm[g]);
-            if *volts < self.full_v && e != g { (volts - model_v) / self.noise_v } else { 0.0 }
+            if self.counts(readings, g, e) { (volts - model_v) / self.noise_v } else { 0.0 }
         };
         let residuals: Vec<f64> = readings.volts().iter().enumerate().map(residual).collect();
         residuals.iter().all(|residual| residual.is_finite()).then_some(Fit { logs, solved, residuals })
@@ -166,9 +171,9 @@ impl Meter {
         let of = |k: usize| {
             let currents = &fit.solved.currents[k * n..(k + 1) * n];
             let ohm = fit.logs[k].exp();
-            let slope = |(index, volts): (usize, &f64)| {
+            let slope = |index: usize| {
                 let (g, e) = (index / n, index % n);
-                if *volts >= self.full_v || e == g {
+                if !self.counts(readings, g, e) {
                     return 0.0;
                 }
                 let load_ohm = fit.solved.loads_ohm[g];
@@ -176,7 +181,7 @@ impl Meter {
                 let change = currents[g] * (currents[e] - share * currents[g]);
                 -self.network.drive_v * ohm * change / (load_ohm * self.noise_v)
             };
-            readings.volts().iter().enumerate().map(slope).collect()
+            (0..n * n).map(slope).collect()
         };
         (0..fit.logs.len()).map(of).collect()
     }
@@ -185,7 +190,9 @@ impl Meter {
     /// detector do: some of that lies along what a resistance changes, and is taken for it.
     fn deviations(&self, fit: &Fit, spots: &[LoadedSpot], readings: &Readings) -> Option<Vec<f64>> {
         let (normal, _) = normal(&self.slopes(fit, readings), &fit.residuals);
-        let freedom = readings.volts().len().saturating_sub(readings.electrodes() + spots.len()).max(1) as f64;
+        let n = readings.electrodes();
+        let counted = (0..n * n).filter(|index| self.counts(readings, index / n, index % n)).count();
+        let freedom = counted.saturating_sub(spots.len()).max(1) as f64;
         let beyond_noise = (squares(&fit.residuals) - freedom * misfit_limit(freedom)).max(0.0);
         let covariance = Cholesky::new(normal)?.inverse();
         let variance = |k: usize| covariance[(k, k)] * (1.0 + TAKEN * TAKEN * beyond_noise);

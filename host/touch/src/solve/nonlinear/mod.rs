@@ -61,6 +61,7 @@ pub struct Nonlinear {
 
 /// What does not change from frame to frame.
 struct Shared {
+    problem: Problem,
     settings: NonlinearSettings,
     scene: Scene,
     to_image: Interpolation,
@@ -101,13 +102,13 @@ impl Shared {
         let scene = Scene { patches, detector, unit_s, sparsity: settings.sparsity };
         let even = EVEN.iter().filter_map(|&root| scene.image(DVector::from_element(areas_m2.len(), root)));
         let even = even.map(|image| readings_v(&image.fields.impedance_ohm, &scene.detector)).collect();
-        Ok(Self { settings, scene, to_image, areas_m2, locator, noise_v, full_v, even })
+        Ok(Self { problem: problem.clone(), settings, scene, to_image, areas_m2, locator, noise_v, full_v, even })
     }
 
     /// What is fitted, if the readings can be those of the detector.
     fn checked(&self, readings: &Readings) -> Result<Target, SolveError> {
         super::check(readings, self.scene.detector.electrodes.len())?;
-        Ok(self.target(readings))
+        Ok(self.target(&self.problem.completed(readings)))
     }
 
     fn target(&self, readings: &Readings) -> Target {
@@ -250,7 +251,7 @@ impl Nonlinear {
 
     /// Whether readings are no more than noise and quantisation.
     pub(super) fn is_rest(&self, readings: &Readings) -> bool {
-        self.shared.locator.is_rest(readings)
+        self.shared.locator.is_rest(&self.shared.problem.completed(readings))
     }
 }
 

@@ -182,6 +182,7 @@ impl StripFitter<'_> {
     /// Derivatives of what the residuals are the distance to, by the parameters.
     pub fn slopes(&self, laid: &Laid, target: &Target) -> DMatrix<f64> {
         let (layout, readings) = (laid.strip.layout(), laid.volts.len());
+        let target = target.at(&laid.volts);
         let mut slopes = DMatrix::zeros(readings + KNOWN, laid.strip.parameters());
         let touched: Vec<_> = (0..laid.image_s.len()).filter(|node| laid.image_s[*node] > 0.0).collect();
         for (parameter, mut slope) in slopes.column_iter_mut().enumerate() {

@@ -1,0 +1,174 @@
+//! Readings that are not known, or by a bound only, as the others have them.
+//!
+//! Readings of one contact have, once their rows are [balanced](super::balance), as few dimensions as there are electrodes, so those that
+//! are known tell the others. Of a converter with a floor, and of scans that leave grounds or electrodes out, methods that need every
+//! reading get them so. The answer is the mean of what is left possible (ridge regression):
+//!
+//! ```text
+//! minimise  sum over known readings (b[g] V - U c)^2 / s^2 + sum c[i]^2 / (t s[i])^2
+//! ```
+//!
+//! with the linear theory's readings `U`, their singular values `s[i]`, the scale `t` at which images give readings as large as those that
+//! are known, and the noise `s`. A bound counts where the answer breaks it. Limits: of several firm contacts rows are not linear when
+//! balanced, and what is completed is off by some per cent of the largest reading.
+
+use std::borrow::Cow;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::linear::Decomposition;
+use super::{Problem, Solution, SolveError, Solver, balance};
+use tactomo_physics::forward::jacobian::Jacobian;
+use tactomo_physics::readings::{Readings, Says};
+
+/// Rounds in which rows are balanced and bounds judged: after three, what is completed changes by less than noise.
+const ROUNDS: usize = 4;
+/// Error of the linear theory, as a share of the largest reading: of two firm contacts a hundredth is left of it.
+const MODEL_ERROR: f64 = 0.01;
+
+/// Completes readings of a detector.
+pub(super) struct Completer {
+    /// `electrodes^2 x rank`, orthonormal.
+    units: DMatrix<f64>,
+    singular_values: Vec<f64>,
+    drive_v: f64,
+    noise_v: f64,
+}
+
+impl Completer {
+    /// Makes it ready for a detector.
+    pub fn new(jacobian: &Jacobian) -> Self {
+        let Decomposition { readings, singular_values, .. } = Decomposition::of(jacobian);
+        let (drive_v, noise_v) = (jacobian.detector.drive_v, jacobian.detector.adc.deviation_v());
+        Self { units: readings, singular_values, drive_v, noise_v }
+    }
+
+    /// Readings that are all voltages: those that are known as they are, the others by them.
+    pub fn completed<'a>(&self, readings: &'a Readings) -> Cow<'a, Readings> {
+        if readings.all_say().is_empty() || readings.volts().len() != self.units.nrows() {
+            return Cow::Borrowed(readings);
+        }
+        let n = readings.electrodes();
+        let mut volts: Vec<f64> = (0..n * n).map(|i| readings.touch_v(i / n, i % n)).collect();
+        let mut scales = vec![1.0; n];
+        for round in 0..ROUNDS {
+            let Some(found) = self.found(readings, &volts, &scales, round == 0) else { break };
+            for (i, says) in readings.all_say().iter().enumerate() {
+                let value = (found[i] / scales[i / n]).clamp(-self.drive_v, self.drive_v);
+                volts[i] = match says {
+                    Says::Voltage => readings.volts()[i],
+                    Says::AtMost => value.min(readings.volts()[i]),
+                    Says::AtLeast => value.max(readings.volts()[i]),
+                    Says::Nothing => value,
+                };
+            }
+            scales = balance::scales(&volts, n, self.drive_v);
+        }
+        Cow::Owned(Readings::from_fn(n, |g, e| volts[g * n + e]))
+    }
+
+    /// Balanced readings by those that are known, and by the bounds that `before` breaks or is at; `None` where nothing is known.
+    fn found(&self, readings: &Readings, before: &[f64], scales: &[f64], is_first: bool) -> Option<DVector<f64>> {
+        let n = readings.electrodes();
+        let counts = |i: usize| match readings.all_say()[i] {
+            Says::Voltage => true,
+            Says::Nothing => false,
+            Says::AtMost => is_first || before[i] >= readings.volts()[i],
+            Says::AtLeast => before[i] <= readings.volts()[i],
+        };
+        let counted: Vec<usize> = (0..n * n).filter(|i| counts(*i)).collect();
+        let value = |i: &usize| before[*i] * scales[i / n];
+        let values = DVector::from_iterator(counted.len(), counted.iter().map(value));
+        let known_v2 = values.norm_squared() / counted.len().max(1) as f64;
+        let all_v2: f64 = self.singular_values.iter().map(|value| value * value).sum();
+        if known_v2 <= 0.0 || all_v2 <= 0.0 {
+            return None;
+        }
+        let scale2 = known_v2 * (n * n) as f64 / all_v2;
+        let noise_v2 = self.noise_v.powi(2) + (MODEL_ERROR * values.amax()).powi(2);
+        let units = self.units.select_rows(&counted);
+        let mut normal = units.tr_mul(&units);
+        for (i, value) in self.singular_values.iter().enumerate() {
+            normal[(i, i)] += noise_v2 / (scale2 * value * value).max(f64::MIN_POSITIVE);
+        }
+        Some(&self.units * Cholesky::new(normal)?.solve(&units.tr_mul(&values)))
+    }
+}
+
+/// A solver that needs every reading.
+pub(super) struct Completing {
+    problem: Problem,
+    solver: Box<dyn Solver>,
+}
+
+impl Completing {
+    /// Completes readings for a solver of a problem.
+    pub fn new(problem: &Problem, solver: Box<dyn Solver>) -> Self {
+        Self { problem: problem.clone(), solver }
+    }
+}
+
+impl Solver for Completing {
+    fn name(&self) -> &'static str {
+        self.solver.name()
+    }
+
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
+        super::check_count(readings, self.problem.detector().electrodes.len())?;
+        self.solver.solve(&self.problem.completed(readings))
+    }
+
+    fn reset(&mut self) {
+        self.solver.reset();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::samples;
+    use tactomo_physics::scene::Contact;
+
+    /// Largest error of what is completed, as a share of the largest reading.
+    fn error(contact: Contact, says: impl Fn(f64, usize, usize) -> Says, limit_v: f64) -> f64 {
+        let exact = samples::readings(contact);
+        let known = Readings::from_fn(16, |g, e| exact.at(g, e).max(limit_v))
+            .saying(|g, e| says(exact.at(g, e), g, e));
+        let completed = Completer::new(&samples::jacobian(2000)).completed(&known).into_owned();
+        let pairs = completed.volts().iter().zip(exact.volts());
+        pairs.map(|(found, truth)| (found - truth).abs()).fold(0.0, f64::max) / exact.largest_v()
+    }
+
+    #[test]
+    fn rows_that_were_not_read_follow_from_four_of_them() {
+        let four = |_: f64, g: usize, _: usize| if g % 5 == 0 { Says::Voltage } else { Says::Nothing };
+        // Of the lightest, noise hides a tenth.
+        for (conductance_s, most) in [(1e-5, 0.12), (2e-4, 0.05), (5e-3, 0.05)] {
+            let found = error(Contact { conductance_s, ..samples::CONTACT }, four, 0.0);
+            assert!(found < most, "{conductance_s} S: {found}");
+        }
+    }
+
+    #[test]
+    fn what_is_below_a_floor_follows_from_what_is_above() {
+        let floor_v = 0.14;
+        let below = |volts: f64, _: usize, _: usize| if volts < floor_v { Says::AtMost } else { Says::Voltage };
+        for conductance_s in [2e-4, 5e-3] {
+            let found = error(Contact { conductance_s, ..samples::CONTACT }, below, floor_v);
+            assert!(found < 0.05, "{conductance_s} S: {found}");
+        }
+    }
+
+    #[test]
+    fn where_all_is_below_the_floor_nothing_touches() {
+        let rest = Readings::from_fn(16, |_, _| 0.142).saying(|_, _| Says::AtMost);
+        let completed = Completer::new(&samples::jacobian(400)).completed(&rest).into_owned();
+        assert_eq!(completed, Readings::from_fn(16, |_, _| 0.0));
+    }
+
+    #[test]
+    fn whole_readings_stay_as_they_are() {
+        let readings = samples::readings(samples::CONTACT);
+        assert!(matches!(Completer::new(&samples::jacobian(400)).completed(&readings), Cow::Borrowed(_)));
+    }
+}
