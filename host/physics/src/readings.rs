@@ -1,5 +1,7 @@
 //! The readings of one frame, in volts, and what each of them says.
 
+use std::borrow::Cow;
+
 use crate::detector::{Detector, Electrode};
 
 /// What the number of a reading says of the pad's voltage.
@@ -146,13 +148,18 @@ impl Readings {
         }
     }
 
-    /// The largest that is above the converter's floor (V); zero if there are none.
-    pub fn largest_v(&self) -> f64 {
+    /// All of them as [`touch_v`](Self::touch_v) has them, row by row (V).
+    pub fn touches_v(&self) -> Cow<'_, [f64]> {
         if self.says.is_empty() {
-            return self.volts.iter().copied().fold(0.0, f64::max);
+            return Cow::Borrowed(&self.volts);
         }
         let n = self.electrodes;
-        (0..n * n).map(|i| self.touch_v(i / n, i % n)).fold(0.0, f64::max)
+        Cow::Owned((0..n * n).map(|i| self.touch_v(i / n, i % n)).collect())
+    }
+
+    /// The largest that is above the converter's floor (V); zero if there are none.
+    pub fn largest_v(&self) -> f64 {
+        self.touches_v().iter().copied().fold(0.0, f64::max)
     }
 }
 

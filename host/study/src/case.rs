@@ -178,6 +178,7 @@ impl File {
                 electrodes: self.electrodes.into_list(),
                 contact_impedance_ohm_m2: self.electrode_contact_impedance_ohm_m2,
                 drive_v: self.drive_v,
+                ground_v: 0.0,
                 on_resistance_ohm: self.multiplexer_on_resistance_ohm,
                 adc: Adc::default(),
                 // What was solved is what the case describes.

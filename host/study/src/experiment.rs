@@ -248,7 +248,7 @@ impl Experiment {
         for _ in 0..BASELINE_FRAMES {
             sum.add(measurement.readings_v(rest_ohm.as_ref()).volts(), 1);
         }
-        sum.rest(&self.detector.adc, 1)
+        sum.rest(&self.detector.adc, self.detector.ground_v, 1)
     }
 
     /// Leakage, and how much of it is in a baseline (sheet conductances); none on a detector that does not leak.

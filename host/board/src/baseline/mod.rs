@@ -154,7 +154,7 @@ impl Baseline {
         (self.state, self.held) = (state, true);
         match &mut self.known {
             Some(Known { judge, conversions, following }) => {
-                self.rest = sum.rest(&judge.detector().adc, *conversions);
+                self.rest = sum.rest(&judge.detector().adc, judge.detector().ground_v, *conversions);
                 self.leakage_sheets = judge.leakage_sheets(self.rest.offset_v());
                 *following = Following::from(self.rest.mean_v().to_vec(), sum.frames(), time_s);
             }

@@ -68,6 +68,7 @@ struct Document {
     name: Option<String>,
     contact_impedance_ohm_m2: Option<f64>,
     drive_v: Option<f64>,
+    ground_v: Option<f64>,
     on_resistance_ohm: Option<f64>,
     surface: Option<String>,
     surface_unit: Option<String>,
@@ -164,7 +165,11 @@ impl Detector {
     fn write_toml(&self, text: &mut String) -> std::fmt::Result {
         writeln!(text, "name = {}", quoted(&self.name))?;
         writeln!(text, "contact_impedance_ohm_m2 = {:?}", self.contact_impedance_ohm_m2)?;
-        writeln!(text, "drive_v = {:?}", self.drive_v)?;
+        // In the file both are above the converter's zero, as a meter shows them.
+        writeln!(text, "drive_v = {:?}", self.drive_v + self.ground_v)?;
+        if self.ground_v != 0.0 {
+            writeln!(text, "ground_v = {:?}", self.ground_v)?;
+        }
         writeln!(text, "on_resistance_ohm = {:?}", self.on_resistance_ohm)?;
         if !self.unevenness.is_even() {
             writeln!(text, "uneven_log_amplitudes = {:?}", self.unevenness.log_amplitudes)?;
@@ -275,7 +280,8 @@ impl Document {
             surface,
             unevenness: Unevenness { log_amplitudes: self.uneven_log_amplitudes },
             contact_impedance_ohm_m2: self.contact_impedance_ohm_m2.unwrap_or(CONTACT_IMPEDANCE_OHM_M2),
-            drive_v: self.drive_v.unwrap_or(DRIVE_V),
+            drive_v: self.drive_v.unwrap_or(DRIVE_V) - self.ground_v.unwrap_or_default(),
+            ground_v: self.ground_v.unwrap_or_default(),
             on_resistance_ohm: self.on_resistance_ohm.unwrap_or(ON_RESISTANCE_OHM),
             adc: self.adc.into_adc(),
             tolerances: self.tolerances,

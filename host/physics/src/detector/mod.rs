@@ -51,8 +51,12 @@ pub struct Detector {
     pub electrodes: Vec<Electrode>,
     /// Contact impedance between pad and layer, in ohm square metres (ohm m2), of pads that have none of their own.
     pub contact_impedance_ohm_m2: f64,
-    /// Voltage of the driving layer (V).
+    /// Voltage of the driving layer above that of a grounded electrode's switch (V).
     pub drive_v: f64,
+    /// Voltage of a grounded electrode's switch above the converter's zero (V): zero unless the multiplexer's drain is lifted, so that readings
+    /// stay clear of a converter's floor. All readings are told above it.
+    #[serde(default)]
+    pub ground_v: f64,
     /// Resistance of the multiplexer's closed switch (ohm).
     pub on_resistance_ohm: f64,
     /// How the voltages become numbers.

@@ -54,6 +54,7 @@ impl Detector {
             electrodes: electrode_grid(width_m, height_m, columns, rows, diameter_m / 2.0),
             contact_impedance_ohm_m2: CONTACT_IMPEDANCE_OHM_M2,
             drive_v: DRIVE_V,
+            ground_v: 0.0,
             on_resistance_ohm: ON_RESISTANCE_OHM,
             adc: Adc::default(),
             tolerances: Tolerances::default(),

@@ -38,6 +38,8 @@ pub struct RestSum {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rest {
     lsb_v: f64,
+    /// The converter's zero (V): where the ground is lifted, below that of the readings.
+    zero_v: f64,
     clipping: Clipping,
     mean_v: Vec<f64>,
     offset_v: Vec<f64>,
@@ -70,18 +72,18 @@ impl RestSum {
         self.sum_v.iter().map(|sum| sum / f64::from(self.frames.max(1))).collect()
     }
 
-    /// What a converter reads at rest, whose readings are means of so many conversions each. How much noise there is, the frames tell; of
+    /// What a converter reads at rest, whose readings are means of so many conversions each, above a ground of `ground_v` above its zero (V). How much noise there is, the frames tell; of
     /// few means it is what the converter's description says.
-    pub fn rest(&self, adc: &Adc, conversions: u32) -> Rest {
+    pub fn rest(&self, adc: &Adc, ground_v: f64, conversions: u32) -> Rest {
         let (mean_v, lsb_v) = (self.mean_v(), adc.lsb_v());
         let clipping = match self.noise_of(&mean_v) {
             None => Clipping::new(adc.noise_lsb),
             Some((means_v, variance_v2)) => {
-                let means: Vec<f64> = means_v.iter().map(|volts| volts / lsb_v).collect();
+                let means: Vec<f64> = means_v.iter().map(|volts| (volts + ground_v) / lsb_v).collect();
                 Clipping::of_variance(&means, variance_v2 * f64::from(conversions) / (lsb_v * lsb_v))
             }
         };
-        let mut rest = Rest { lsb_v, clipping, mean_v: Vec::new(), offset_v: Vec::new() };
+        let mut rest = Rest { lsb_v, zero_v: -ground_v, clipping, mean_v: Vec::new(), offset_v: Vec::new() };
         rest.set(mean_v, f64::from(self.frames) * f64::from(conversions));
         rest
     }
@@ -109,14 +111,15 @@ impl RestSum {
 impl Rest {
     /// Readings that are all zero at rest, of a converter whose noise nothing is known of.
     pub fn zero(readings: usize) -> Self {
-        Self { lsb_v: 1.0, clipping: Clipping::new(0.0), mean_v: vec![0.0; readings], offset_v: vec![0.0; readings] }
+        let zeros = || vec![0.0; readings];
+        Self { lsb_v: 1.0, zero_v: 0.0, clipping: Clipping::new(0.0), mean_v: zeros(), offset_v: zeros() }
     }
 
     /// The same noise with other mean readings (V), of so many conversions each.
     pub fn set(&mut self, mean_v: Vec<f64>, conversions: f64) {
-        let clear_v = CLEAR * self.clipping.deviation() * self.lsb_v;
+        let clear_v = self.zero_v + CLEAR * self.clipping.deviation() * self.lsb_v;
         let offset_v = |mean_v: &f64| match *mean_v < clear_v {
-            true => self.lsb_v * self.clipping.level(mean_v / self.lsb_v, conversions),
+            true => self.zero_v + self.lsb_v * self.clipping.level((mean_v - self.zero_v) / self.lsb_v, conversions),
             false => *mean_v,
         };
         self.offset_v = mean_v.iter().map(offset_v).collect();
@@ -138,7 +141,7 @@ impl Rest {
     /// At rest that is the mean, and from two standard deviations on the offset. Between them it goes from one to the other on a straight
     /// line, so that the mean of frames has the same taken off as the frames have in the mean.
     pub fn subtract(&self, readings_v: &[f64], touch_v: &mut [f64]) {
-        let knee_v = KNEE * self.clipping.deviation() * self.lsb_v;
+        let knee_v = self.zero_v + KNEE * self.clipping.deviation() * self.lsb_v;
         let rest = self.mean_v.iter().zip(&self.offset_v);
         for ((touch, volts), (mean, offset)) in touch_v.iter_mut().zip(readings_v).zip(rest) {
             let cut_v = mean - offset;
@@ -170,7 +173,7 @@ mod tests {
         let mut sum = RestSum::default();
         (0..frames).for_each(|_| sum.add(measured(&at(offset_lsb), &adc, &mut noise).volts(), 1));
         // What the description says of the noise is not needed.
-        let rest = sum.rest(&Adc { noise_lsb: 9.0, ..adc }, 1);
+        let rest = sum.rest(&Adc { noise_lsb: 9.0, ..adc }, 0.0, 1);
         let (mut touch_v, mut all, loaded) = (vec![0.0; 256], vec![0.0; 256], at(offset_lsb + load_lsb));
         for _ in 0..400 {
             let frame = measured(&loaded, &adc, &mut noise);
@@ -226,7 +229,7 @@ mod tests {
                 of_channel.filter(|_| floats).for_each(|volts| *volts = 2.0 + 0.3 * floating.normal());
                 sum.add(frame.volts(), 1);
             }
-            sum.rest(&adc, 1)
+            sum.rest(&adc, 0.0, 1)
         };
         let [sound, broken] = [false, true].map(|floats| rest(floats, &mut noise, &mut floating));
         let others = |rest: &Rest| {
@@ -240,9 +243,23 @@ mod tests {
     fn a_mean_alone_is_read_with_the_noise_of_the_description() {
         let mut sum = RestSum::default();
         sum.add(&[0.6e-3; 4], 64);
-        let rest = sum.rest(&Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 }, 1);
+        let rest = sum.rest(&Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 }, 0.0, 1);
         assert!(rest.offset_v()[2].abs() < 0.03e-3 && rest.mean_v()[2] == 0.6e-3, "{:?}", rest.offset_v());
         assert_eq!(Rest::zero(2).offset_v(), [0.0; 2]);
+    }
+
+    #[test]
+    fn nothing_is_cut_off_where_the_ground_is_lifted() {
+        let adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 };
+        let (mut noise, mut sum) = (Noise::new(8), RestSum::default());
+        for _ in 0..64 {
+            let frame = measured(&Readings::from_fn(16, |_, _| 0.2495), &adc, &mut noise);
+            let above_ground: Vec<f64> = frame.volts().iter().map(|volts| volts - 0.25).collect();
+            sum.add(&above_ground, 1);
+        }
+        let rest = sum.rest(&adc, 0.25, 1);
+        let offset_v = rest.offset_v().iter().sum::<f64>() / 256.0;
+        assert!((offset_v + 0.5e-3).abs() < 0.1e-3 && rest.offset_v() == rest.mean_v(), "{offset_v}");
     }
 
     #[test]
@@ -259,7 +276,7 @@ mod tests {
             }
             sum.add(&mean_v, 1);
         }
-        let offsets = sum.rest(&adc, 16).offset_v().iter().sum::<f64>() / 256.0;
+        let offsets = sum.rest(&adc, 0.0, 16).offset_v().iter().sum::<f64>() / 256.0;
         assert!((offsets + 1e-3).abs() < 0.1e-3, "{offsets}");
     }
 }

@@ -70,8 +70,12 @@ impl Measurement {
 
     /// The next frame as the converter gives it (V), with its noise and in its steps.
     pub fn readings_v(&mut self, impedance_ohm: Option<&DMatrix<f64>>) -> Readings {
-        let volts = self.pad_voltages(impedance_ohm);
-        measured(&volts, &self.detector.adc, &mut self.conversion)
+        let mut volts = self.pad_voltages(impedance_ohm);
+        let ground_v = self.detector.ground_v;
+        volts.volts_mut().iter_mut().for_each(|volts| *volts += ground_v);
+        let mut readings = measured(&volts, &self.detector.adc, &mut self.conversion);
+        readings.volts_mut().iter_mut().for_each(|volts| *volts -= ground_v);
+        readings
     }
 
     /// What is connected; other channels as if they were at ground.

@@ -12,20 +12,15 @@ const SMALLEST: f64 = 1e-3;
 /// theory says exactly for one contact, however firm, of conductance `1 / mean D`; for several it is nearer than before.
 /// In the limit of light contacts nothing changes.
 pub fn balance(volts: &mut [f64], electrodes: usize, drive_v: f64) {
-    let scales = scales(volts, electrodes, drive_v);
+    let ratio = |volts: &[f64], g: usize, e: usize| (1.0 - volts[g * electrodes + e] / drive_v).max(SMALLEST);
+    let mut scales = vec![1.0; electrodes];
+    for (g, scale) in scales.iter_mut().enumerate() {
+        let product: f64 = (0..electrodes).map(|e| ratio(volts, e, g) / ratio(volts, g, e)).product();
+        *scale = product.powf(1.0 / electrodes as f64);
+    }
     for (row, scale) in volts.chunks_exact_mut(electrodes).zip(scales) {
         row.iter_mut().for_each(|volts| *volts *= scale);
     }
-}
-
-/// What [`balance`] multiplies each row with.
-pub fn scales(volts: &[f64], electrodes: usize, drive_v: f64) -> Vec<f64> {
-    let ratio = |g: usize, e: usize| (1.0 - volts[g * electrodes + e] / drive_v).max(SMALLEST);
-    let scale = |g: usize| {
-        let product: f64 = (0..electrodes).map(|e| ratio(e, g) / ratio(g, e)).product();
-        product.powf(1.0 / electrodes as f64)
-    };
-    (0..electrodes).map(scale).collect()
 }
 
 #[cfg(test)]

@@ -17,12 +17,16 @@ use std::borrow::Cow;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::linear::Decomposition;
-use super::{Problem, Solution, SolveError, Solver, balance};
+use super::{Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::readings::{Readings, Says};
 
-/// Rounds in which rows are balanced and bounds judged: after three, what is completed changes by less than noise.
+/// Rounds in which bounds are judged: after three, what is completed changes by less than noise.
 const ROUNDS: usize = 4;
+/// Sweeps for the rows' scales.
+const SWEEPS: usize = 8;
+/// Smallest `1 - V / Vcc` that a logarithm is taken of: below, a reading is at the drive voltage to its noise.
+const SMALLEST: f64 = 1e-3;
 /// Error of the linear theory, as a share of the largest reading: of two firm contacts a hundredth is left of it.
 const MODEL_ERROR: f64 = 0.01;
 
@@ -49,22 +53,59 @@ impl Completer {
             return Cow::Borrowed(readings);
         }
         let n = readings.electrodes();
+        let known = self.known_scales(readings);
+        let mut scales: Vec<f64> = known.iter().map(|scale| scale.unwrap_or(1.0)).collect();
         let mut volts: Vec<f64> = (0..n * n).map(|i| readings.touch_v(i / n, i % n)).collect();
-        let mut scales = vec![1.0; n];
         for round in 0..ROUNDS {
             let Some(found) = self.found(readings, &volts, &scales, round == 0) else { break };
-            for (i, says) in readings.all_say().iter().enumerate() {
+            scales = self.scales(&known, &found);
+            for (i, volts) in volts.iter_mut().enumerate() {
                 let value = (found[i] / scales[i / n]).clamp(-self.drive_v, self.drive_v);
-                volts[i] = match says {
+                *volts = match readings.says(i / n, i % n) {
                     Says::Voltage => readings.volts()[i],
                     Says::AtMost => value.min(readings.volts()[i]),
                     Says::AtLeast => value.max(readings.volts()[i]),
                     Says::Nothing => value,
                 };
             }
-            scales = balance::scales(&volts, n, self.drive_v);
         }
         Cow::Owned(Readings::from_fn(n, |g, e| volts[g * n + e]))
+    }
+
+    /// What balancing multiplies each row with, but for a common factor, as far as pairs of readings tell: `r[g][e] D[g] = r[e][g] D[e]`.
+    fn known_scales(&self, readings: &Readings) -> Vec<Option<f64>> {
+        let n = readings.electrodes();
+        let is_pair =
+            |g: usize, e: usize| g != e && [readings.says(g, e), readings.says(e, g)] == [Says::Voltage; 2];
+        let log = |g: usize, e: usize| (1.0 - readings.at(g, e) / self.drive_v).max(SMALLEST).ln();
+        let mut logs: Vec<Option<f64>> = (0..n).map(|g| (0..n).any(|e| is_pair(g, e)).then_some(0.0)).collect();
+        for _ in 0..SWEEPS {
+            for g in 0..n {
+                let others = (0..n).filter(|e| is_pair(g, *e));
+                let told = others.map(|e| log(e, g) - log(g, e) + logs[e].unwrap_or_default());
+                let (sum, count) = told.fold((0.0, 0.0), |(sum, count), told| (sum + told, count + 1.0));
+                if count > 0.0 {
+                    logs[g] = Some(sum / count);
+                }
+            }
+        }
+        let told = logs.iter().flatten();
+        let mean = told.clone().sum::<f64>() / told.count().max(1) as f64;
+        logs.into_iter().map(|log| log.map(|log| (log - mean).exp())).collect()
+    }
+
+    /// The same of all rows, by balanced readings `b`: `b[g][e] - b[e][g] = Vcc (D[g] - D[e])`.
+    fn scales(&self, known: &[Option<f64>], balanced_v: &DVector<f64>) -> Vec<f64> {
+        let n = known.len();
+        let told: Vec<(usize, f64)> = known.iter().enumerate().filter_map(|(g, scale)| Some((g, (*scale)?))).collect();
+        let of = |g: usize| {
+            if told.is_empty() {
+                return 1.0;
+            }
+            let by = |(e, scale): &(usize, f64)| scale + (balanced_v[g * n + e] - balanced_v[e * n + g]) / self.drive_v;
+            (told.iter().map(by).sum::<f64>() / told.len() as f64).max(SMALLEST)
+        };
+        (0..n).map(|g| known[g].unwrap_or_else(|| of(g))).collect()
     }
 
     /// Balanced readings by those that are known, and by the bounds that `before` breaks or is at; `None` where nothing is known.

@@ -183,6 +183,7 @@ fn detectors() -> impl Strategy<Value = Detector> {
                 electrodes,
                 contact_impedance_ohm_m2: impedance,
                 drive_v,
+                ground_v: 0.0,
                 on_resistance_ohm,
                 adc: Adc { bits, ..Adc::default() },
                 force,
@@ -191,6 +192,20 @@ fn detectors() -> impl Strategy<Value = Detector> {
             detector.check().is_ok().then_some(detector)
         },
     )
+}
+
+#[test]
+fn a_lifted_ground_is_told_as_a_meter_shows_it() {
+    let lifted = |drive_v: f64| {
+        let text = Detector { drive_v, ground_v: 0.25, ..Detector::default() }.to_toml();
+        (text.clone(), Detector::from_toml(&text, ""))
+    };
+    let (text, read) = lifted(1.75);
+    assert!(text.contains("drive_v = 2.0\nground_v = 0.25\n"), "{text}");
+    let read = read.unwrap();
+    assert_eq!((read.drive_v, read.ground_v), (1.75, 0.25));
+    let wrong = lifted(-0.05).1.unwrap_err().to_string();
+    assert!(wrong.contains("drive_v is 0.2, but has to be above ground_v, which is 0.25"), "{wrong}");
 }
 
 proptest! {

@@ -34,6 +34,7 @@ fn flat(outline: Outline, electrodes: Vec<Electrode>) -> Detector {
         electrodes,
         contact_impedance_ohm_m2: 1e-5,
         drive_v: 2.0,
+        ground_v: 0.0,
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
         force: None,

@@ -33,6 +33,7 @@ fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
         electrodes,
         contact_impedance_ohm_m2: 1e-5,
         drive_v: 2.0,
+        ground_v: 0.0,
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
         force: None,
