@@ -1,6 +1,9 @@
 //! A detector as a board measures it, and the volts of the board's codes.
 
 use tactomo_physics::detector::Detector;
+#[cfg(doc)]
+use tactomo_physics::readings::Says;
+use tactomo_physics::readings::{Range, Readings};
 use tactomo_protocol::{Frame, Hello};
 
 /// A board that does not fit the detector.
@@ -18,7 +21,7 @@ pub struct Mismatch {
     expected: usize,
 }
 
-/// `detector` as `board` measures it: drive voltage and ADC are the board's, who knows them.
+/// `detector` as `board` measures it: drive voltage and ADC are the board's, who knows them; whether its ground is lifted the detector tells.
 ///
 /// # Errors
 /// [`Mismatch`] if the board scans another number of electrodes.
@@ -28,7 +31,7 @@ pub fn as_measured(detector: &Detector, board: &Hello) -> Result<Detector, Misma
         return Err(Mismatch { board: found, detector: detector.name.clone(), expected });
     }
     let mut measured = detector.clone();
-    measured.drive_v = volts(board.drive_mv);
+    measured.drive_v = volts(board.drive_mv) - detector.ground_v;
     measured.adc.bits = board.adc_bits;
     measured.adc.full_scale_v = volts(board.adc_full_scale_mv);
     Ok(measured)
@@ -39,34 +42,85 @@ fn volts(millivolts: u16) -> f64 {
     f64::from(millivolts) / 1000.0
 }
 
+/// Readings this near to an end of a converter's range count as at it (V), or as many codes as that is if it is more. A voltage a little below
+/// an ESP32's floor reads as much above it as noise is, of which two standard deviations are about so much.
+const MARGIN_V: f64 = 0.006;
+const MARGIN_CODES: f64 = 3.0;
+
 /// Makes volts of a board's codes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Volts {
     /// Volts of one code.
     per_code: f64,
-    /// Readings in a frame.
-    readings: usize,
+    electrodes: u8,
+    /// What can be told of each electrode; empty where nothing hides below a floor or above a ceiling.
+    ranges: Vec<Range>,
+    /// Voltage of a grounded electrode's switch (V), above which readings are told.
+    ground_v: f64,
 }
 
 impl Volts {
     /// For frames of a board.
     pub fn of(board: &Hello) -> Self {
-        let codes = f64::from(1u32 << board.adc_bits.min(31));
-        let electrodes = usize::from(board.electrodes);
-        Self { per_code: volts(board.adc_full_scale_mv) / codes, readings: electrodes * electrodes }
+        let per_code = volts(board.adc_full_scale_mv) / f64::from(1u32 << board.adc_bits.min(31));
+        let margin_v = MARGIN_V.max(MARGIN_CODES * per_code);
+        let last = (1u32 << board.adc_bits.min(16)) - 1;
+        // Where every code counts, noise cut off at zero is the baseline's business, and the last code that of solvers.
+        let range = |range: tactomo_protocol::Range| Range {
+            floor_v: match range.floor {
+                0 => f64::NEG_INFINITY,
+                floor => f64::from(floor) * per_code + margin_v,
+            },
+            ceiling_v: match u32::from(range.ceiling) {
+                ceiling if ceiling >= last => f64::INFINITY,
+                ceiling => f64::from(ceiling) * per_code - margin_v,
+            },
+        };
+        let mut ranges: Vec<Range> = (0..board.electrodes).map_while(|e| board.range_of(e)).map(range).collect();
+        if ranges.iter().all(|range| range.floor_v.is_infinite() && range.ceiling_v.is_infinite()) {
+            ranges.clear();
+        }
+        Self { per_code, electrodes: board.electrodes, ranges, ground_v: 0.0 }
     }
 
-    /// Readings of a whole frame (V), row by row; `None` if it is a frame of another board, or not whole.
-    pub fn of_frame<'a>(&self, frame: &'a Frame) -> Option<impl Iterator<Item = f64> + use<'a>> {
+    /// The same above a ground that is lifted by `ground_v` (V).
+    pub fn above(mut self, ground_v: f64) -> Self {
+        let more_v = ground_v - self.ground_v;
+        for range in &mut self.ranges {
+            (range.floor_v, range.ceiling_v) = (range.floor_v - more_v, range.ceiling_v - more_v);
+        }
+        Self { ground_v, ..self }
+    }
+
+    /// Readings of a frame (V), those that it does not hold say [nothing](Says::Nothing); of a cell that it holds several times the mean.
+    /// `None` if it is a frame of another board.
+    pub fn readings(&self, frame: &Frame) -> Option<Readings> {
+        let n = usize::from(self.electrodes);
+        if frame.scope.electrodes() != self.electrodes || frame.readings.len() != frame.scope.readings() {
+            return None;
+        }
         let per_unit = self.per_code / f64::from(1u32 << frame.head.fraction_bits.min(31));
-        (frame.scope.is_whole() && frame.readings.len() == self.readings)
-            .then(|| frame.readings.iter().map(move |units| f64::from(*units) * per_unit))
+        let volt = |units: &u16| f64::from(*units) * per_unit - self.ground_v;
+        if frame.scope.is_whole() {
+            let readings = Readings::new(n, frame.readings.iter().map(volt).collect())?;
+            return Some(if self.ranges.is_empty() { readings } else { readings.within(&self.ranges) });
+        }
+        let (mut sums_v, mut counts) = (vec![0.0; n * n], vec![0u32; n * n]);
+        for ((g, e), units) in frame.scope.cells().zip(&frame.readings) {
+            let cell = usize::from(g) * n + usize::from(e);
+            sums_v[cell] += volt(units);
+            counts[cell] += 1;
+        }
+        let means_v = sums_v.iter().zip(&counts).map(|(sum, count)| sum / f64::from((*count).max(1)));
+        let readings = Readings::new(n, means_v.collect())?.within(&self.ranges);
+        Some(readings.hiding(|g, e| counts[g * n + e] == 0))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tactomo_physics::readings::Says;
     use tactomo_protocol::{FrameHead, Scope};
 
     fn hello(electrodes: u8) -> Hello {
@@ -94,14 +148,46 @@ mod tests {
         let head = FrameHead { fraction_bits: 2, ..FrameHead::default() };
         let scope = Scope::whole(16).unwrap();
         let frame = Frame { head, scope, readings: std::iter::repeat_n(0x110, 256).collect() };
-        let volts: Vec<_> = Volts::of(&hello(16)).of_frame(&frame).unwrap().collect();
-        assert!(volts.len() == 256 && (volts[0] - 0.068).abs() < 1e-12, "272 quarters of a millivolt");
-        assert!(Volts::of(&hello(32)).of_frame(&frame).is_none());
-        let reversed: Vec<u8> = (0..16).rev().collect();
-        let rows = Frame { scope: Scope::of_rows(16, &reversed, 0xFFFF).unwrap(), ..frame };
-        assert!(
-            Volts::of(&hello(16)).of_frame(&rows).is_none(),
-            "as many readings, but not in the order of a whole frame"
-        );
+        let readings = Volts::of(&hello(16)).readings(&frame).unwrap();
+        assert!((readings.at(0, 0) - 0.068).abs() < 1e-12, "272 quarters of a millivolt");
+        assert!(readings.all_say().is_empty());
+        let lifted = Volts::of(&hello(16)).above(0.05).readings(&frame).unwrap();
+        assert!((lifted.at(3, 4) - 0.018).abs() < 1e-12);
+        assert_eq!(Volts::of(&hello(32)).readings(&frame), None);
+    }
+
+    #[test]
+    fn rows_say_nothing_of_what_they_do_not_hold() {
+        let head = FrameHead::default();
+        let scope = Scope::of_rows(16, &[3, 9, 3], 0b110).unwrap();
+        let frame = Frame { head, scope, readings: [10, 20, 30, 40, 12, 22].into_iter().collect() };
+        let readings = Volts::of(&hello(16)).readings(&frame).unwrap();
+        let known: Vec<_> = (0..256).filter(|i| readings.says(i / 16, i % 16) == Says::Voltage).collect();
+        assert_eq!(known, [3 * 16 + 1, 3 * 16 + 2, 9 * 16 + 1, 9 * 16 + 2]);
+        let volts = known.iter().map(|i| 1e3 * readings.volts()[*i]).collect::<Vec<_>>();
+        assert!(volts.iter().zip([11.0, 21.0, 30.0, 40.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{volts:?}");
+    }
+
+    #[test]
+    fn what_a_converter_cannot_see_is_a_bound() {
+        let range = |electrodes, floor| tactomo_protocol::Range { electrodes, floor, ceiling: 900 };
+        let board = Hello { ranges: [range(6, 142), range(10, 128)].into_iter().collect(), ..hello(16) };
+        let scope = Scope::whole(16).unwrap();
+        let frame = |code: u16| Frame {
+            head: FrameHead::default(),
+            scope: scope.clone(),
+            readings: std::iter::repeat_n(code, 256).collect(),
+        };
+        let says = |code: u16| {
+            let readings = Volts::of(&board).readings(&frame(code)).unwrap();
+            [5, 6].map(|e| (readings.says(2, e), (1e3 * readings.at(2, e)).round()))
+        };
+        use Says::{AtLeast, AtMost, Voltage};
+        assert_eq!(says(128), [(AtMost, 148.0), (AtMost, 134.0)]);
+        assert_eq!(says(140), [(AtMost, 148.0), (Voltage, 140.0)]);
+        assert_eq!(says(500), [(Voltage, 500.0), (Voltage, 500.0)]);
+        assert_eq!(says(899), [(AtLeast, 894.0), (AtLeast, 894.0)]);
+        let lifted = Volts::of(&board).above(0.25).readings(&frame(250)).unwrap();
+        assert!(lifted.all_say().is_empty() && lifted.at(1, 1).abs() < 1e-12, "rest is clear of the floor");
     }
 }

@@ -85,6 +85,16 @@ impl Readings {
         self.saying(|g, e| says[g * n + e])
     }
 
+    /// The same where some were not read.
+    pub fn hiding(self, is_unread: impl Fn(usize, usize) -> bool) -> Self {
+        let says = self.says.clone();
+        let n = self.electrodes;
+        self.saying(|g, e| match is_unread(g, e) {
+            true => Says::Nothing,
+            false => says.get(g * n + e).copied().unwrap_or_default(),
+        })
+    }
+
     /// What the reading of electrode `e` while `g` is grounded says.
     pub fn says(&self, g: usize, e: usize) -> Says {
         self.says.get(g * self.electrodes + e).copied().unwrap_or_default()

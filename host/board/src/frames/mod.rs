@@ -2,6 +2,7 @@
 
 mod recorded;
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use tactomo_protocol::Hello;
 
 pub use self::recorded::{Recorded, RecordingLoss};
 use crate::record::{self, RecordError};
+use tactomo_physics::readings::{Readings, Says};
 use tactomo_table::{Array, Table, TableError};
 
 /// Names that an array of readings may have in an NPZ file.
@@ -40,6 +42,25 @@ pub struct FileFrame {
     pub lost_before: u64,
     /// Readings (V) in the order of the channels; of a detector row by row.
     pub volts: Vec<f64>,
+    /// What each says; empty where all are voltages.
+    pub says: Vec<Says>,
+}
+
+impl FileFrame {
+    /// As the readings of a detector; `None` if they are no square.
+    pub fn readings(&self) -> Option<Readings> {
+        let n = self.volts.len().isqrt();
+        let readings = Readings::new(n, self.volts.clone())?;
+        Some(if self.says.is_empty() { readings } else { readings.saying(|g, e| self.says[g * n + e]) })
+    }
+
+    /// Readings as [`Readings::touch_v`] has them (V).
+    pub fn touches_v(&self) -> Cow<'_, [f64]> {
+        match self.readings() {
+            Some(readings) if !self.says.is_empty() => Cow::Owned(readings.touches_v().into_owned()),
+            _ => Cow::Borrowed(&self.volts),
+        }
+    }
 }
 
 /// Why a file gives no frames.
@@ -118,6 +139,13 @@ impl FrameFile {
         }
     }
 
+    /// Tells readings of a recording above a ground that is lifted by so much (V); those of a table are as they are.
+    pub fn set_ground(&mut self, ground_v: f64) {
+        if let Self::Recording(recorded) = self {
+            recorded.set_ground(ground_v);
+        }
+    }
+
     /// Numbers in each frame.
     pub fn channels(&self) -> usize {
         match self {
@@ -159,7 +187,13 @@ impl Rows {
 
     fn next_frame(&mut self) -> Option<FileFrame> {
         let volts: Vec<f64> = self.rows.by_ref().take(self.channels).collect();
-        (volts.len() == self.channels).then_some(FileFrame { time_s: None, sequence: None, lost_before: 0, volts })
+        (volts.len() == self.channels).then_some(FileFrame {
+            time_s: None,
+            sequence: None,
+            lost_before: 0,
+            volts,
+            says: Vec::new(),
+        })
     }
 }
 

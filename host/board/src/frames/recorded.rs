@@ -38,7 +38,7 @@ pub struct RecordingLoss {
     pub corrupt: u64,
     /// Frames that are missing by their numbers: lost in the file, on the line, or by the board.
     pub missing_frames: u64,
-    /// Frames of a board with another number of electrodes than the first one, or of some rows only, which are left out.
+    /// Frames of a board with another number of electrodes than the first one, which are left out.
     pub other_frames: u64,
 }
 
@@ -60,8 +60,8 @@ impl fmt::Display for RecordingLoss {
             count(self.corrupt, "message is corrupt", "messages are corrupt"),
             count(
                 self.other_frames,
-                "frame is of another board or scan plan",
-                "frames are of another board or scan plan",
+                "frame is of another board",
+                "frames are of another board",
             ),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
@@ -106,6 +106,14 @@ impl Recorded {
         self.reader.header()
     }
 
+    /// Tells readings that are still to come above a ground that is lifted by so much (V).
+    pub(super) fn set_ground(&mut self, ground_v: f64) {
+        self.volts = self.volts.clone().above(ground_v);
+        for frame in &mut self.frames {
+            frame.volts.iter_mut().for_each(|volts| *volts -= ground_v);
+        }
+    }
+
     /// The board, as it said who it is first.
     pub fn board(&self) -> &Hello {
         &self.board
@@ -129,7 +137,7 @@ impl Recorded {
         }
     }
 
-    /// Takes the whole frames out of a chunk. Those of another board than the first one say nothing of its detector.
+    /// Takes the frames out of a chunk. Those of another board than the first one say nothing of its detector.
     fn decode(&mut self) {
         let chunk = std::mem::take(&mut self.chunk);
         let mut input = &chunk[..];
@@ -144,14 +152,20 @@ impl Recorded {
         self.chunk = chunk;
     }
 
-    /// Readings and time of a frame; `None` if it is of a board with other electrodes, or not whole.
+    /// Readings and time of a frame; `None` if it is of a board with other electrodes.
     fn in_volts(&mut self, frame: &Frame) -> Option<FileFrame> {
-        let volts = self.volts.of_frame(frame)?.collect();
+        let readings = self.volts.readings(frame)?;
         let place = self.sequence.place(&frame.head);
         self.lost.missing_frames += place.dropped;
         let first_us = *self.first_us.get_or_insert(place.time_us);
         let time_s = Some(place.time_us.saturating_sub(first_us) as f64 * 1e-6);
-        Some(FileFrame { time_s, sequence: Some(place.sequence), lost_before: place.dropped, volts })
+        Some(FileFrame {
+            time_s,
+            sequence: Some(place.sequence),
+            lost_before: place.dropped,
+            volts: readings.volts().to_vec(),
+            says: readings.all_say().to_vec(),
+        })
     }
 }
 

@@ -168,6 +168,11 @@ impl Solver for InPlace<dyn Solver> {
         Ok(self.corrector.solution(solution))
     }
 
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        let solution = self.half.solve_rows(rows, latest, elapsed_s)?;
+        Ok(self.corrector.solution(solution))
+    }
+
     fn reset(&mut self) {
         self.half.reset();
     }
@@ -182,6 +187,11 @@ impl Solver for InPlace<dyn Solver> {
 impl Follower for InPlace<dyn Follower> {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         let Followed { solution, search } = self.half.follow(readings)?;
+        Ok(Followed { solution: self.corrector.solution(solution), search })
+    }
+
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        let Followed { solution, search } = self.half.follow_rows(rows, latest, elapsed_s)?;
         Ok(Followed { solution: self.corrector.solution(solution), search })
     }
 

@@ -18,6 +18,16 @@ pub trait Follower: Send {
     /// [`SolveError`] if the readings cannot be those of the detector.
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError>;
 
+    /// The answer for rows of readings that come `elapsed_s` (s) after those before, the others of which say
+    /// [nothing](tactomo_physics::readings::Says); `latest` are the latest of all, which are taken by a follower that does not go by rows.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        let _ = (rows, elapsed_s);
+        self.follow(latest)
+    }
+
     /// Goes on from what a search has found, if that explains these readings better than what is followed; the answer for these
     /// readings, which are those of the frame that was followed last, or of the next one.
     ///
@@ -117,12 +127,31 @@ pub(super) fn follow_and_search(
     Ok(follower.adopt(lead, readings)?.solution)
 }
 
+/// The same for rows of readings.
+pub(super) fn follow_rows_and_search(
+    follower: &mut dyn Follower,
+    searcher: &mut dyn Searcher,
+    (rows, latest): (&Readings, &Readings),
+    elapsed_s: f64,
+) -> Result<Solution, SolveError> {
+    let followed = follower.follow_rows(rows, latest, elapsed_s)?;
+    if !followed.search {
+        return Ok(followed.solution);
+    }
+    let lead = searcher.search(follower.lead(), latest, &mut |_| {})?;
+    Ok(follower.adopt(lead, latest)?.solution)
+}
+
 /// A solver whose every answer is thorough, as a follower.
 pub(super) struct Direct<S: ?Sized>(pub Box<S>);
 
 impl<S: Solver + ?Sized> Follower for Direct<S> {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         Ok(Followed { solution: self.0.solve(readings)?, search: false })
+    }
+
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        Ok(Followed { solution: self.0.solve_rows(rows, latest, elapsed_s)?, search: false })
     }
 
     fn adopt(&mut self, _lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {

@@ -40,6 +40,27 @@ impl Guard {
         &self.watch.faulty().faults
     }
 
+    /// An answer of the solver, without the electrodes that the latest readings show to be wrong.
+    fn guarded(
+        &mut self,
+        readings: &Readings,
+        solve: impl Fn(&mut dyn Solver) -> Result<Solution, SolveError>,
+    ) -> Result<Solution, SolveError> {
+        super::check_count(readings, self.problem.detector().electrodes.len())?;
+        if self.watch.note(readings) {
+            self.rebuild();
+        }
+        let solution = solve(&mut *self.solver)?;
+        if let Some(look) = self.watch.look(&solution) {
+            let found = look.run(&self.problem, self.watch.faulty(), readings);
+            if self.watch.conclude(look, found) {
+                self.rebuild();
+                return solve(&mut *self.solver);
+            }
+        }
+        Ok(solution)
+    }
+
     fn rebuild(&mut self) {
         match without(self.method, &self.problem, self.watch.faulty()) {
             Ok(solver) => self.solver = solver,
@@ -54,19 +75,11 @@ impl Solver for Guard {
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        super::check_count(readings, self.problem.detector().electrodes.len())?;
-        if self.watch.note(readings) {
-            self.rebuild();
-        }
-        let solution = self.solver.solve(readings)?;
-        if let Some(look) = self.watch.look(&solution) {
-            let found = look.run(&self.problem, self.watch.faulty(), readings);
-            if self.watch.conclude(look, found) {
-                self.rebuild();
-                return self.solver.solve(readings);
-            }
-        }
-        Ok(solution)
+        self.guarded(readings, |solver| solver.solve(readings))
+    }
+
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        self.guarded(latest, |solver| solver.solve_rows(rows, latest, elapsed_s))
     }
 
     fn reset(&mut self) {
@@ -124,6 +137,11 @@ impl Solver for Without {
         self.solver.solve(&self.lens.readings(readings)?).map(|solution| self.lens.flagged(solution))
     }
 
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        let (rows, latest) = (self.lens.readings(rows)?, self.lens.readings(latest)?);
+        self.solver.solve_rows(&rows, &latest, elapsed_s).map(|solution| self.lens.flagged(solution))
+    }
+
     fn reset(&mut self) {
         self.solver.reset();
     }
@@ -145,6 +163,12 @@ struct Half<T: ?Sized> {
 impl Follower for Half<dyn Follower> {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         let followed = self.half.follow(&self.lens.readings(readings)?)?;
+        Ok(Followed { solution: self.lens.flagged(followed.solution), ..followed })
+    }
+
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        let (rows, latest) = (self.lens.readings(rows)?, self.lens.readings(latest)?);
+        let followed = self.half.follow_rows(&rows, &latest, elapsed_s)?;
         Ok(Followed { solution: self.lens.flagged(followed.solution), ..followed })
     }
 

@@ -14,6 +14,7 @@ mod interpolate;
 mod kernel;
 mod lambda;
 mod laplace;
+mod latest;
 mod linear;
 mod locate;
 mod method;
@@ -43,6 +44,7 @@ pub use self::guard::{Guard, without};
 pub use self::health::{ElectrodeFault, faulty_electrodes};
 pub use self::kernel::{Kernel, KernelSolver, Press, Presses, PressesError, Strength, TeachError};
 pub use self::lambda::Lambda;
+pub use self::latest::Latest;
 use self::lambda::Spectrum;
 pub use self::method::{Family, Method, Parameter, ParameterKind};
 pub use self::nonlinear::{Nonlinear, NonlinearSettings};
@@ -67,6 +69,16 @@ pub trait Solver: Send + 'static {
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError>;
+
+    /// What rows of readings that come `elapsed_s` (s) after those before say, the others of which say [nothing](tactomo_physics::readings::Says);
+    /// `latest` are the latest of all. A solver that does not go by rows takes those.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        let _ = (rows, elapsed_s);
+        self.solve(latest)
+    }
 
     /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.
     fn reset(&mut self) {}

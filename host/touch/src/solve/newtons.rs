@@ -64,6 +64,11 @@ impl Solver for InNewtons<dyn Solver> {
         Ok(self.scale.told(readings, solution))
     }
 
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        let solution = self.half.solve_rows(rows, latest, elapsed_s)?;
+        Ok(self.scale.told(rows, solution))
+    }
+
     fn reset(&mut self) {
         self.half.reset();
     }
@@ -79,6 +84,11 @@ impl Follower for InNewtons<dyn Follower> {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         let Followed { solution, search } = self.half.follow(readings)?;
         Ok(Followed { solution: self.scale.told(readings, solution), search })
+    }
+
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        let Followed { solution, search } = self.half.follow_rows(rows, latest, elapsed_s)?;
+        Ok(Followed { solution: self.scale.told(rows, solution), search })
     }
 
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {

@@ -112,6 +112,18 @@ impl ApproximationError {
         self.patterns_v.tr_mul(&DVector::from_column_slice(pulls)).as_slice().to_vec()
     }
 
+    /// What readings are most likely off by (V), from residuals times the inverse of their covariance (1/V).
+    pub fn likely_v(&self, pulls: &[f64]) -> Vec<f64> {
+        let mut off_v = self.mean_v.clone();
+        off_v.resize(pulls.len(), 0.0);
+        for direction in &self.directions {
+            let part = direction.start..direction.start + direction.unit.len();
+            let along = direction.variance_v2 * dot(&direction.unit, &pulls[part.clone()]);
+            off_v[part].iter_mut().zip(&direction.unit).for_each(|(off, unit)| *off += along * unit);
+        }
+        off_v
+    }
+
     /// Whether steps of the detector are far from where it was made linear, for readings with noise of `deviation_v`: a change by some share of
     /// the readings is not linear by about the square of that share.
     pub fn is_far(&self, steps: &[f64], deviation_v: f64) -> bool {

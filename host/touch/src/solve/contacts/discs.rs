@@ -138,6 +138,11 @@ impl DiscFit {
         self.slopes.exchange[k] * now.conductance_s / before.conductance_s * before.radius_m / now.radius_m
     }
 
+    /// Units of the places' parameters (m), a contact each.
+    pub fn units_m(&self) -> Vec<f64> {
+        self.slopes.at.iter().map(|contact| contact.radius_m).collect()
+    }
+
     /// Derivatives of the readings by all parameters (V).
     pub fn slopes_v(&self) -> &[Vec<f64>] {
         &self.slopes.by
@@ -251,7 +256,7 @@ impl DiscFitter<'_> {
     }
 
     /// A fit at other contacts: with the derivatives that there are, unless it is far from where they were taken.
-    fn next(&self, fit: &DiscFit, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
+    pub fn next(&self, fit: &DiscFit, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
         let offset = fit.slopes.offset(&contacts);
         if fit.is_far(&offset) {
             return self.anew(contacts, target);

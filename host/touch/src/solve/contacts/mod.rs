@@ -5,6 +5,7 @@
 //! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
 
 mod approximation;
+mod bank;
 mod discs;
 mod evidence;
 mod exchange;
@@ -15,6 +16,7 @@ mod motion_tests;
 pub(super) mod network;
 #[cfg(test)]
 mod places_tests;
+mod rows;
 mod scan;
 mod search;
 mod solver;

@@ -4,9 +4,11 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use super::discs::DiscFit;
+use super::rows::{RowState, Step};
 use super::{ApproximationError, ContactFinder, ContactSettings, Explanation, Found, Target};
 use crate::solve::evidence::Evidence;
-use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search};
+use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and_search, follow_rows_and_search};
+use crate::solve::latest::Latest;
 use crate::solve::still::{Mean, Still};
 use crate::solve::track::Tracker;
 use crate::solve::{FoundContact, Problem, Solution, SolveError, Solver};
@@ -15,6 +17,8 @@ use tactomo_physics::readings::Readings;
 
 /// The sum of squares may be this times what the last search would leave of as many frames.
 const WORSE: f64 = 1.3;
+/// Rows older than this say nothing to a search (s): all grounds of 32 electrodes are read within.
+const OLDEST_S: f64 = 0.06;
 /// A scene that has not changed is searched again with so many times the frames: many frames show what one frame's noise hides.
 const MORE: usize = 2;
 
@@ -27,6 +31,8 @@ pub struct Contacts {
 struct FrameFollower {
     still: Still,
     contacts: ContactFollower,
+    /// The latest of each reading, while rows come.
+    latest: Option<Latest>,
 }
 
 /// Follows contacts from frame to frame.
@@ -36,6 +42,8 @@ pub(in crate::solve) struct ContactFollower {
     searched: Searched,
     /// Whether what is followed could not be brought to the newest frame.
     is_stale: bool,
+    /// What is known besides by rows, since all readings were explained last.
+    rows: Option<Box<RowState>>,
     tracker: Tracker,
     /// The tracker before this frame: a frame that has several answers is one frame.
     before: Tracker,
@@ -62,7 +70,7 @@ impl Contacts {
     /// [`ForwardError::Detector`] if the model has no spots.
     pub fn new(problem: &Problem, settings: ContactSettings) -> Result<Self, ForwardError> {
         let contacts = ContactFollower::new(Arc::new(ContactFinder::new(problem, settings)?));
-        Ok(Self { follower: FrameFollower { still: contacts.finder.still(), contacts } })
+        Ok(Self { follower: FrameFollower { still: contacts.finder.still(), contacts, latest: None } })
     }
 
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
@@ -80,7 +88,8 @@ impl ContactFollower {
     /// Follows nothing yet.
     pub fn new(finder: Arc<ContactFinder>) -> Self {
         let tracker = Tracker::new(finder.spacing_m);
-        Self { finder, last: None, searched: Searched::default(), is_stale: false, before: tracker.clone(), tracker }
+        let searched = Searched::default();
+        Self { finder, last: None, searched, is_stale: false, rows: None, before: tracker.clone(), tracker }
     }
 
     /// What finds the contacts.
@@ -106,6 +115,7 @@ impl ContactFollower {
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
         self.before = self.tracker.clone();
+        self.rows = None;
         let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
         let Some(moved) = self.finder.follow(&last, target) else {
             (self.last, self.is_stale) = (Some(last), true);
@@ -119,6 +129,39 @@ impl ContactFollower {
             || self.finder.is_outdated(target);
         self.last = Some(found);
         search
+    }
+
+    /// Brings the contacts to rows of readings, `elapsed_s` (s) after those before; the rows as they were fitted, and whether the contacts
+    /// have to be searched.
+    pub fn follow_rows(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
+        self.before = self.tracker.clone();
+        let off_v = |state: &Option<Box<RowState>>| state.as_ref().map_or(Vec::new(), |state| state.off_v().to_vec());
+        let target = self.finder.target_of_rows(rows, &off_v(&self.rows));
+        let Some(last) = self.last.take() else {
+            self.rows = None;
+            let search = self.finder.stands_out(&target);
+            return (target, search);
+        };
+        let state = self.rows.take().unwrap_or_else(|| Box::new(RowState::new(&last, &target)));
+        match self.finder.step(last.clone(), *state, &target, elapsed_s) {
+            Step::Followed(found, state, search) => {
+                (self.last, self.rows, self.is_stale) = (Some(found), Some(state), false);
+                (target, search)
+            }
+            Step::Gone => {
+                self.is_stale = false;
+                (target, false)
+            }
+            Step::Lost => {
+                (self.last, self.is_stale) = (Some(last), true);
+                (target, true)
+            }
+        }
+    }
+
+    /// Readings that what is followed predicts (V).
+    pub fn predicted_v(&self) -> Option<&[f64]> {
+        self.last.as_ref().map(|last| &last.fit.volts[..])
     }
 
     /// Takes what a search has found in the mean of some frames, if it explains this frame better than what is followed; whether the search has to be repeated, because
@@ -135,6 +178,7 @@ impl ContactFollower {
         if self.is_stale || evidence(&caught_up) >= evidence(&self.last) {
             (self.last, self.is_stale) = (caught_up, false);
         }
+        self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(last, target)));
         let Some(last) = &self.last else { return self.finder.stands_out(target) };
         self.searched =
             Searched { excess: (left.min(last.fit.cost) - self.finder.freedom(&last.fit, target)).max(0.0), frames };
@@ -170,7 +214,7 @@ impl ContactFollower {
 
     /// Follows nothing for a time, and keeps the numbers of contacts.
     pub fn let_go(&mut self) {
-        (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
+        (self.last, self.searched, self.is_stale, self.rows) = (None, Searched::default(), false, None);
     }
 
     /// Forgets all.
@@ -182,6 +226,11 @@ impl ContactFollower {
 }
 
 impl FrameFollower {
+    /// The latest readings, told for the contacts as they are now; none while whole frames come.
+    fn latest(&self) -> Option<Readings> {
+        self.latest.as_ref().map(|latest| latest.readings(OLDEST_S, self.contacts.predicted_v()))
+    }
+
     fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
         self.contacts.finder.target_of(&self.still.mean_or(readings), self.contacts.error())
     }
@@ -190,15 +239,32 @@ impl FrameFollower {
 impl Follower for FrameFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
+        self.latest = None;
         self.still.add_beside(readings, self.contacts.slopes_v());
         let target = self.target(readings)?;
         let search = self.contacts.follow(&target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
     }
 
+    fn follow_rows(&mut self, rows: &Readings, _latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        self.contacts.finder.check(rows)?;
+        self.still.reset();
+        let (target, search) = self.contacts.follow_rows(rows, elapsed_s);
+        let latest = self.latest.get_or_insert_with(|| Latest::new(rows.electrodes()));
+        if !search && self.contacts.predicted_v().is_none() {
+            // What presses next begins with its first rows.
+            latest.forget();
+        }
+        latest.add(rows, elapsed_s, self.contacts.predicted_v());
+        Ok(Followed { solution: self.contacts.solution(&target), search })
+    }
+
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
-        self.still.add_if_new(readings, self.contacts.slopes_v());
+        match self.latest() {
+            Some(latest) => self.still.add(&latest),
+            None => self.still.add_if_new(readings, self.contacts.slopes_v()),
+        }
         let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
         let target = self.contacts.finder.target_of(&self.still.mean_or(readings), error)?;
         let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
@@ -207,7 +273,11 @@ impl Follower for FrameFollower {
     }
 
     fn lead(&self) -> Lead {
-        Lead::of_contacts(self.contacts.found(), self.still.mean())
+        let mean = match self.latest() {
+            Some(readings) => Some(Mean { readings, frames: 1 }),
+            None => self.still.mean(),
+        };
+        Lead::of_contacts(self.contacts.found(), mean)
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {
@@ -215,6 +285,7 @@ impl Follower for FrameFollower {
     }
 
     fn reset(&mut self) {
+        self.latest = None;
         self.still.reset();
         self.contacts.reset();
     }
@@ -275,6 +346,11 @@ impl Solver for Contacts {
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         let mut searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
         follow_and_search(&mut self.follower, &mut searcher, readings)
+    }
+
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        let mut searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
+        follow_rows_and_search(&mut self.follower, &mut searcher, (rows, latest), elapsed_s)
     }
 
     fn reset(&mut self) {

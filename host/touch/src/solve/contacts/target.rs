@@ -185,6 +185,13 @@ impl Target {
         self.error.steps(&pulls)
     }
 
+    /// What the readings are most likely off by (V), with contacts that predict `volts`.
+    pub(super) fn likely_off_v(&self, volts: &[f64]) -> Vec<f64> {
+        let mut pulls = self.residuals(volts);
+        self.whiten_transposed(&mut pulls);
+        self.error.likely_v(&pulls)
+    }
+
     /// Leaves readings that do not count, or are bounds, out of patterns.
     pub(super) fn mask(&self, patterns_v: &mut DMatrix<f64>) {
         let left_out = (0..self.weights.len()).filter(|i| self.weights[*i] == 0.0 || !is_voltage(&self.says, *i));

@@ -1,0 +1,103 @@
+//! The latest of each reading, of scans that read some rows at a time.
+//!
+//! Rows that were read some milliseconds ago are those of contacts that have moved since. What they say of others than the contacts that are
+//! followed is still true: so each reading is kept as what it is beside the model's at that time, and told as the model's now with that.
+
+use tactomo_physics::readings::{Readings, Says};
+
+/// The latest of each reading, beside what was expected of it.
+#[derive(Clone, Debug)]
+pub struct Latest {
+    electrodes: usize,
+    cells: Vec<Cell>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    /// As read (V).
+    volts: f64,
+    says: Says,
+    /// What was expected then (V).
+    expected_v: f64,
+    /// Time since (s); infinite if it was never read.
+    age_s: f64,
+}
+
+impl Latest {
+    /// None was read yet.
+    pub fn new(electrodes: usize) -> Self {
+        let never = Cell { volts: 0.0, says: Says::Nothing, expected_v: 0.0, age_s: f64::INFINITY };
+        Self { electrodes, cells: vec![never; electrodes * electrodes] }
+    }
+
+    /// Takes rows that come `elapsed_s` (s) after those before, of which a model expects `expected_v` (V); none where nothing is followed.
+    pub fn add(&mut self, rows: &Readings, elapsed_s: f64, expected_v: Option<&[f64]>) {
+        if rows.electrodes() != self.electrodes {
+            *self = Self::new(rows.electrodes());
+        }
+        let n = self.electrodes;
+        for (i, cell) in self.cells.iter_mut().enumerate() {
+            cell.age_s += elapsed_s.max(0.0);
+            let says = rows.says(i / n, i % n);
+            if says != Says::Nothing {
+                let expected_v = expected_v.map_or(0.0, |all| all[i]);
+                *cell = Cell { volts: rows.volts()[i], says, expected_v, age_s: 0.0 };
+            }
+        }
+    }
+
+    /// Forgets all: what comes does not follow what was.
+    pub fn forget(&mut self) {
+        self.cells.iter_mut().for_each(|cell| cell.age_s = f64::INFINITY);
+    }
+
+    /// The readings that are younger than `oldest_s` (s), told for a model that expects `expected_v` (V) now. Those that are bounds are told
+    /// as they were read.
+    pub fn readings(&self, oldest_s: f64, expected_v: Option<&[f64]>) -> Readings {
+        let n = self.electrodes;
+        let volts = |i: usize| {
+            let cell = &self.cells[i];
+            match (cell.says, expected_v) {
+                (Says::Voltage, Some(now_v)) => cell.volts - cell.expected_v + now_v[i],
+                _ => cell.volts,
+            }
+        };
+        let is_old = |i: usize| self.cells[i].age_s > oldest_s;
+        let all = Readings::from_fn(n, |g, e| volts(g * n + e)).saying(|g, e| self.cells[g * n + e].says);
+        all.hiding(|g, e| is_old(g * n + e))
+    }
+
+    /// Whether every reading was read within `oldest_s` (s).
+    pub fn is_whole(&self, oldest_s: f64) -> bool {
+        self.cells.iter().all(|cell| cell.age_s <= oldest_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(g: usize, volts: f64) -> Readings {
+        Readings::from_fn(4, |_, _| volts).hiding(|ground, _| ground != g)
+    }
+
+    #[test]
+    fn rows_are_told_as_long_as_they_are_young() {
+        let mut latest = Latest::new(4);
+        (0..4).for_each(|g| latest.add(&row(g, 0.1 * g as f64), 1e-3, None));
+        assert!(latest.is_whole(3.5e-3) && !latest.is_whole(2.5e-3));
+        let young = latest.readings(1.5e-3, None);
+        assert_eq!([0, 1, 2, 3].map(|g| young.says(g, 1) == Says::Nothing), [true, true, false, false]);
+        latest.forget();
+        assert!(latest.readings(9.0, None).all_say().iter().all(|says| *says == Says::Nothing));
+    }
+
+    #[test]
+    fn what_was_not_expected_goes_with_what_is() {
+        let mut latest = Latest::new(4);
+        latest.add(&row(1, 0.5), 0.0, Some(&[0.4; 16]));
+        latest.add(&row(2, 0.5), 1e-3, Some(&[0.5; 16]));
+        let now = latest.readings(1.0, Some(&[0.7; 16]));
+        assert!((now.at(1, 3) - 0.8).abs() < 1e-12 && (now.at(2, 3) - 0.7).abs() < 1e-12);
+    }
+}
