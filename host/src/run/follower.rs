@@ -5,15 +5,15 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tactomo_board::baseline::Baseline;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::pointer::{Pointer, PointerState};
-use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, FoundContact, Method, Parts, Solution};
+use tactomo_touch::solve::{ElectrodeWatch, Followed, FoundContact, Method, Parts, Solution};
 
+use super::board::BoardState;
 use super::calibration::{Calibrate, Desk};
 use super::inbox::{Event, Inbox, Searched, Taken};
-use super::maker::{Made, Maker, Order};
+use super::maker::{Made, Maker};
 use super::notice::NoticeBoard;
 use super::plan::{BeginBaseline, Listener, LiveError, Solving};
 use super::searcher::SearchThread;
@@ -106,17 +106,6 @@ struct FollowLoop {
     folder: PathBuf,
     /// What makes a pointer of a contact, if one is.
     pointer: Option<Pointer>,
-}
-
-/// What belongs to one detector.
-struct BoardState {
-    /// As it is described, and as it is solved for: calibrated, or the same.
-    description: Arc<Detector>,
-    detector: Arc<Detector>,
-    baseline: Baseline,
-    watch: ElectrodeWatch,
-    /// `None` until the first solver is made.
-    follower: Option<Box<dyn Follower>>,
 }
 
 /// A frame that was answered.
@@ -244,13 +233,8 @@ impl FollowLoop {
         let calibrated =
             |known: &Arc<Detector>| Arc::new(Detector { drive_v: *drive_v, adc: *adc, ..(**known).clone() });
         let detector = self.calibrated.as_ref().map_or_else(|| Arc::clone(&description), calibrated);
-        self.board = Some(BoardState {
-            baseline: (self.begin_baseline)(&detector, self.conversions),
-            watch: ElectrodeWatch::new(&detector),
-            description,
-            detector,
-            follower: None,
-        });
+        let baseline = (self.begin_baseline)(&detector, self.conversions);
+        self.board = Some(BoardState::new(description, detector, baseline));
         self.solved = None;
         // Frames of another board, or of other settings of its converter, are no part of it.
         self.calibration = None;
@@ -302,9 +286,7 @@ impl FollowLoop {
         if board.baseline.state().is_taking() {
             return;
         }
-        let mut touch = frame.newest.clone();
-        board.baseline.subtract(frame.newest.volts(), touch.volts_mut());
-        desk.take(&touch, found);
+        desk.take(&board.less_rest(&frame.newest), found);
         self.show_calibration();
     }
 
@@ -348,23 +330,18 @@ impl FollowLoop {
     fn frame(&mut self, frame: Taken) -> Result<(), LiveError> {
         let Some(board) = &mut self.board else { return Ok(()) };
         let begun = Instant::now();
-        let left_out: Vec<usize> = board.watch.faulty().faults.iter().map(|(electrode, _)| *electrode).collect();
-        let time_s = 1e-6 * frame.board_time_us as f64;
-        if board.baseline.add(frame.mean.volts(), frame.averaged, time_s, &left_out) {
+        let noted = board.note(&frame);
+        if noted.baseline {
             let notice = board.baseline.state().notice();
             notice.iter().for_each(|notice| tracing::warn!("{notice}"));
             self.notice.change(|snapshot| snapshot.baseline = notice);
         }
-        let mut touch = frame.mean.clone();
-        board.baseline.subtract(frame.mean.volts(), touch.volts_mut());
-        touch.correct_channels(&board.detector);
-        let changed = board.watch.note(&touch);
-        let Some(follower) = &mut board.follower else { return Ok(()) };
-        let followed = follower.follow(&touch)?;
+        let touch = board.touch(&frame.mean);
+        let Some(followed) = board.follow(&frame, &touch)? else { return Ok(()) };
         self.rub(&frame, &followed.solution.contacts);
         self.solved = Some(Solved { frame, touch });
         self.answer(followed, begun, true);
-        if changed {
+        if noted.electrodes {
             self.order(self.maker.method());
         }
         Ok(())
@@ -404,13 +381,6 @@ impl FollowLoop {
         } else {
             self.unshown = Some(shown);
         }
-    }
-}
-
-impl BoardState {
-    /// The solver of a method for this detector as it is.
-    fn order(&self, method: Method) -> Order {
-        Order { method, detector: Arc::clone(&self.detector), faulty: self.watch.faulty().clone() }
     }
 }
 

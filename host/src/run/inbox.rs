@@ -14,14 +14,27 @@ use tactomo_touch::solve::{Lead, Look, Method, Parts, Solver, Still};
 use super::calibration::{Calibrate, Outcome};
 use super::maker::Made;
 
+/// Frames of rows that wait at most: 50 ms of an ESP32's.
+const MOST_ROWS: usize = 64;
 /// Longest wait before it is asked whether there is still something to wait for.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
+
+/// Rows of readings that came as a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rows {
+    /// Readings (V); those that are not in it say nothing.
+    pub readings: Readings,
+    /// Board time at their start, unwrapped, in microseconds (us).
+    pub time_us: u64,
+}
 
 /// A frame, or the mean of some that stood still.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taken {
-    /// Readings (V): of the newest frame as measured.
+    /// Readings (V): of the newest frame as measured; of rows the latest of each.
     pub newest: Readings,
+    /// The rows that came since the last one was taken, the oldest first; none of whole frames.
+    pub rows: Vec<Rows>,
     /// The mean of the last frames as far as they stood still (V).
     pub mean: Readings,
     /// How many frames that is the mean of.
@@ -198,6 +211,18 @@ impl Inbox {
 impl State {
     fn add(&mut self, mut frame: Taken, noise_v: f64) {
         let before = self.pending.take();
+        if !frame.rows.is_empty() {
+            // Each row tells what is new in it: none is left out, but where a follower stands still for long.
+            if let Some(before) = before {
+                frame.came += before.came;
+                frame.rows.splice(0..0, before.rows);
+                let surplus = frame.rows.len().saturating_sub(MOST_ROWS);
+                frame.rows.drain(..surplus);
+            }
+            self.still = None;
+            self.pending = Some(frame);
+            return;
+        }
         let mut still = self.still.take().filter(|_| before.is_some()).unwrap_or_else(|| Still::new(noise_v));
         still.add(&frame.newest);
         if let Some(before) = before {
@@ -218,6 +243,7 @@ mod tests {
         let readings = Readings::from_fn(4, |_, _| volts);
         Taken {
             newest: readings.clone(),
+            rows: Vec::new(),
             mean: readings,
             averaged: 1,
             came: 1,

@@ -5,6 +5,7 @@
 //! finds thorough answers, from which the follower goes on once they explain the present better. What there is to show is published as
 //! [`Snapshot`]s through a cell that keeps the latest only, so that a slow page slows nothing. Pages answer with [`Request`]s.
 
+mod board;
 pub mod calibration;
 pub mod course;
 mod follower;

@@ -14,13 +14,13 @@ use tactomo_board::record::{Closing, RecordError, Recorder};
 use tactomo_board::sequence::Sequence;
 use tactomo_board::session::{self, GreetError};
 use tactomo_physics::detector::Detector;
-use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::SceneName;
 use tactomo_protocol::{BoardMessage, DecodeError, Frame, Hello};
+use tactomo_touch::solve::Latest;
 
 use super::course::Course;
 use super::follower::FollowThread;
-use super::inbox::{Event, Inbox, Taken};
+use super::inbox::{Event, Inbox, Rows, Taken};
 use super::notice::NoticeBoard;
 use super::plan::{Ends, LiveError, Plan, Summary};
 use super::talk::{PATIENCE, Talk};
@@ -65,6 +65,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         closing: Vec::new(),
         lost: None,
         course: course.clone(),
+        latest: None,
     };
     reader.show_recording();
     let ended = reader.run(source);
@@ -122,6 +123,8 @@ struct Reader {
     closing: Vec<Closing>,
     lost: Option<RecordError>,
     course: Course,
+    /// The latest of each reading, while the board sends rows.
+    latest: Option<Latest>,
 }
 
 /// Who has said Hello, and what its frames mean.
@@ -177,6 +180,7 @@ impl Reader {
         let mut talk = Talk::new(self.plan.settings);
         let mut buffer = [0; READ_BYTES];
         self.sequence.restart();
+        self.latest = None;
         self.enter(LinkState::Waiting);
         while !self.is_over() {
             self.answer_requests(Some((&mut *link, &mut talk)));
@@ -184,6 +188,7 @@ impl Reader {
                 Ok(count) => {
                     if link.jumped() {
                         self.sequence.restart();
+                        self.latest = None;
                         talk.jumped();
                         self.inbox.jump();
                     }
@@ -279,7 +284,7 @@ impl Reader {
             self.notice.change(|snapshot| {
                 (snapshot.hello, snapshot.calibration) = (Some(hello.clone()), other_board);
             });
-            self.board = Some(Board { volts: Volts::of(&hello), hello, detector: measured, noise_v });
+            self.board = Some(Board { volts: Volts::of(&hello).above(measured.ground_v), hello, detector: measured, noise_v });
         }
         Ok(())
     }
@@ -289,7 +294,7 @@ impl Reader {
         let (Some(board), Some(_)) = (&self.board, talk.junk) else { return };
         talk.session.frame(received);
         talk.landing = false;
-        let Some(volts) = board.volts.of_frame(frame) else {
+        let Some(readings) = board.volts.readings(frame) else {
             return self.notice.count(|meter| meter.corrupt(1));
         };
         let place = self.sequence.place(&frame.head);
@@ -297,13 +302,23 @@ impl Reader {
         if !self.follows {
             return;
         }
-        let electrodes = usize::from(board.hello.electrodes);
-        let mut newest = Readings::from_fn(electrodes, |_, _| 0.0);
-        newest.volts_mut().iter_mut().zip(volts).for_each(|(to, volts)| *to = volts);
+        // Elapsed time is nothing to the latest of all.
+        let (newest, rows) = match frame.scope.is_whole() {
+            true => (readings, Vec::new()),
+            false => {
+                let latest = self.latest.get_or_insert_with(|| Latest::new(readings.electrodes()));
+                latest.add(&readings, 0.0, None);
+                (latest.readings(f64::MAX, None), vec![Rows { readings, time_us: place.time_us }])
+            }
+        };
+        if rows.is_empty() {
+            self.latest = None;
+        }
         self.course.add(place.time_us, &newest);
         let taken = Taken {
             mean: newest.clone(),
             newest,
+            rows,
             averaged: 1,
             came: 1,
             sequence: place.sequence,

@@ -148,6 +148,7 @@ mod tests {
         for sequence in 0..20 {
             let frame = Taken {
                 newest: readings.clone(),
+                rows: Vec::new(),
                 mean: readings.clone(),
                 averaged: 1,
                 came: 1,

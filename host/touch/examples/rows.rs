@@ -5,7 +5,7 @@
 //! frame's rows, and against where it is when the frame has arrived.
 
 use tactomo_physics::detector::Detector;
-use tactomo_physics::forward::{ForwardModel, readings_v};
+use tactomo_physics::forward::readings_v;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, finer_model, measured};

@@ -65,6 +65,11 @@ impl AutoFollower {
         self.contacts.as_ref().map(of).transpose()
     }
 
+    /// The latest readings while contacts go by rows, told for them as they are now.
+    fn latest(&self) -> Option<Mean> {
+        self.contacts.as_ref().and_then(ContactFollower::latest)
+    }
+
     /// Derivatives of the readings by the parameters of the contacts that are followed (V).
     fn slopes_v(contacts: Option<&ContactFollower>) -> &[Vec<f64>] {
         contacts.map_or(&[], ContactFollower::slopes_v)
@@ -218,9 +223,23 @@ impl Follower for AutoFollower {
         self.follow_mean(&self.still.mean_or(readings))
     }
 
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        match (&self.answer, &mut self.contacts) {
+            (Answer::Contacts, Some(contacts)) => {
+                self.still.reset();
+                let Followed { solution, search } = contacts.follow_rows(rows, elapsed_s)?;
+                Ok(Followed { solution: as_contacts(solution, search), search })
+            }
+            _ => self.follow(latest),
+        }
+    }
+
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         crate::solve::check(readings, self.electrodes)?;
-        self.still.add_if_new(readings, Self::slopes_v(self.contacts.as_ref()));
+        match self.latest() {
+            Some(latest) => self.still.add(&latest.readings),
+            None => self.still.add_if_new(readings, Self::slopes_v(self.contacts.as_ref())),
+        }
         let mean = self.still.mean_or(readings);
         let readings = &mean.readings;
         let Some(target) = self.target(&mean, lead.contacts.as_deref())? else {
@@ -263,7 +282,7 @@ impl Follower for AutoFollower {
             }
         };
         let contacts = self.contacts.as_ref().and_then(ContactFollower::found).map(Box::new);
-        Lead { contacts, whole, mean: self.still.mean() }
+        Lead { contacts, whole, mean: self.latest().or_else(|| self.still.mean()) }
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {

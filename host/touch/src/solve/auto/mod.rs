@@ -16,7 +16,7 @@ use self::follower::AutoFollower;
 use self::searcher::AutoSearcher;
 use super::contacts::{ContactFinder, ContactFollower, ContactSearcher, Found, Target};
 use super::evidence::Evidence;
-use super::follow::{Follower, Parts, follow_and_search};
+use super::follow::{Follower, Parts, follow_and_search, follow_rows_and_search};
 use super::nonlinear::Complexity;
 use super::shapes::{ShapeFinder, ShapeFollower};
 use super::{ContactSettings, Nonlinear, NonlinearSettings, Problem, Solution, SolveError, Solver};
@@ -60,6 +60,10 @@ impl Solver for Auto {
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         follow_and_search(&mut self.follower, &mut self.searcher, readings)
+    }
+
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        follow_rows_and_search(&mut self.follower, &mut self.searcher, (rows, latest), elapsed_s)
     }
 
     fn reset(&mut self) {

@@ -31,8 +31,6 @@ pub struct Contacts {
 struct FrameFollower {
     still: Still,
     contacts: ContactFollower,
-    /// The latest of each reading, while rows come.
-    latest: Option<Latest>,
 }
 
 /// Follows contacts from frame to frame.
@@ -44,6 +42,8 @@ pub(in crate::solve) struct ContactFollower {
     is_stale: bool,
     /// What is known besides by rows, since all readings were explained last.
     rows: Option<Box<RowState>>,
+    /// The latest of each reading, while rows come.
+    latest: Option<Latest>,
     tracker: Tracker,
     /// The tracker before this frame: a frame that has several answers is one frame.
     before: Tracker,
@@ -70,7 +70,7 @@ impl Contacts {
     /// [`ForwardError::Detector`] if the model has no spots.
     pub fn new(problem: &Problem, settings: ContactSettings) -> Result<Self, ForwardError> {
         let contacts = ContactFollower::new(Arc::new(ContactFinder::new(problem, settings)?));
-        Ok(Self { follower: FrameFollower { still: contacts.finder.still(), contacts, latest: None } })
+        Ok(Self { follower: FrameFollower { still: contacts.finder.still(), contacts } })
     }
 
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
@@ -89,7 +89,8 @@ impl ContactFollower {
     pub fn new(finder: Arc<ContactFinder>) -> Self {
         let tracker = Tracker::new(finder.spacing_m);
         let searched = Searched::default();
-        Self { finder, last: None, searched, is_stale: false, rows: None, before: tracker.clone(), tracker }
+        let before = tracker.clone();
+        Self { finder, last: None, searched, is_stale: false, rows: None, latest: None, before, tracker }
     }
 
     /// What finds the contacts.
@@ -115,7 +116,7 @@ impl ContactFollower {
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
         self.before = self.tracker.clone();
-        self.rows = None;
+        (self.rows, self.latest) = (None, None);
         let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
         let Some(moved) = self.finder.follow(&last, target) else {
             (self.last, self.is_stale) = (Some(last), true);
@@ -131,9 +132,31 @@ impl ContactFollower {
         search
     }
 
-    /// Brings the contacts to rows of readings, `elapsed_s` (s) after those before; the rows as they were fitted, and whether the contacts
-    /// have to be searched.
-    pub fn follow_rows(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
+    /// The answer for rows of readings, `elapsed_s` (s) after those before.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    pub fn follow_rows(&mut self, rows: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        self.finder.check(rows)?;
+        let (target, search) = self.step(rows, elapsed_s);
+        let mut latest = self.latest.take().unwrap_or_else(|| Latest::new(rows.electrodes()));
+        if !search && self.last.is_none() {
+            // What presses next begins with its first rows.
+            latest.forget();
+        }
+        latest.add(rows, elapsed_s, self.predicted_v());
+        self.latest = Some(latest);
+        Ok(Followed { solution: self.solution(&target), search })
+    }
+
+    /// The latest readings, told for the contacts as they are now; none while whole frames come.
+    pub fn latest(&self) -> Option<Mean> {
+        let readings = self.latest.as_ref()?.readings(OLDEST_S, self.predicted_v());
+        Some(Mean { readings, frames: 1 })
+    }
+
+    /// Brings the contacts to rows of readings; the rows as they were fitted, and whether the contacts have to be searched.
+    fn step(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
         self.before = self.tracker.clone();
         let off_v = |state: &Option<Box<RowState>>| state.as_ref().map_or(Vec::new(), |state| state.off_v().to_vec());
         let target = self.finder.target_of_rows(rows, &off_v(&self.rows));
@@ -160,7 +183,7 @@ impl ContactFollower {
     }
 
     /// Readings that what is followed predicts (V).
-    pub fn predicted_v(&self) -> Option<&[f64]> {
+    fn predicted_v(&self) -> Option<&[f64]> {
         self.last.as_ref().map(|last| &last.fit.volts[..])
     }
 
@@ -214,23 +237,20 @@ impl ContactFollower {
 
     /// Follows nothing for a time, and keeps the numbers of contacts.
     pub fn let_go(&mut self) {
-        (self.last, self.searched, self.is_stale, self.rows) = (None, Searched::default(), false, None);
+        (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
+        self.rows = None;
     }
 
     /// Forgets all.
     pub fn reset(&mut self) {
         self.let_go();
+        self.latest = None;
         self.tracker.reset();
         self.before = self.tracker.clone();
     }
 }
 
 impl FrameFollower {
-    /// The latest readings, told for the contacts as they are now; none while whole frames come.
-    fn latest(&self) -> Option<Readings> {
-        self.latest.as_ref().map(|latest| latest.readings(OLDEST_S, self.contacts.predicted_v()))
-    }
-
     fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
         self.contacts.finder.target_of(&self.still.mean_or(readings), self.contacts.error())
     }
@@ -239,7 +259,6 @@ impl FrameFollower {
 impl Follower for FrameFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
-        self.latest = None;
         self.still.add_beside(readings, self.contacts.slopes_v());
         let target = self.target(readings)?;
         let search = self.contacts.follow(&target);
@@ -247,22 +266,14 @@ impl Follower for FrameFollower {
     }
 
     fn follow_rows(&mut self, rows: &Readings, _latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
-        self.contacts.finder.check(rows)?;
         self.still.reset();
-        let (target, search) = self.contacts.follow_rows(rows, elapsed_s);
-        let latest = self.latest.get_or_insert_with(|| Latest::new(rows.electrodes()));
-        if !search && self.contacts.predicted_v().is_none() {
-            // What presses next begins with its first rows.
-            latest.forget();
-        }
-        latest.add(rows, elapsed_s, self.contacts.predicted_v());
-        Ok(Followed { solution: self.contacts.solution(&target), search })
+        self.contacts.follow_rows(rows, elapsed_s)
     }
 
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
-        match self.latest() {
-            Some(latest) => self.still.add(&latest),
+        match self.contacts.latest() {
+            Some(latest) => self.still.add(&latest.readings),
             None => self.still.add_if_new(readings, self.contacts.slopes_v()),
         }
         let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
@@ -273,10 +284,7 @@ impl Follower for FrameFollower {
     }
 
     fn lead(&self) -> Lead {
-        let mean = match self.latest() {
-            Some(readings) => Some(Mean { readings, frames: 1 }),
-            None => self.still.mean(),
-        };
+        let mean = self.contacts.latest().or_else(|| self.still.mean());
         Lead::of_contacts(self.contacts.found(), mean)
     }
 
@@ -285,7 +293,6 @@ impl Follower for FrameFollower {
     }
 
     fn reset(&mut self) {
-        self.latest = None;
         self.still.reset();
         self.contacts.reset();
     }
