@@ -7,12 +7,13 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use anyhow::ensure;
+use anyhow::{anyhow, ensure};
 use tactomo::board::link::Source;
 use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
+use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Request, Snapshot};
 use tactomo::scene::SceneName;
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
@@ -37,6 +38,7 @@ const REQUESTS: usize = 64;
 ///   tactomo live --simulate --scene gripper         a demonstration, on the detector that it was made for
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
+///   tactomo live --simulate --scan adaptive         the rows that tell most, as they come
 ///   tactomo live --replay touch.tactomo --speed 0.25
 ///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network
 #[derive(Debug, clap::Args)]
@@ -52,6 +54,11 @@ pub struct Args {
     pub speed: f64,
     #[command(flatten)]
     pub picture: PictureArgs,
+    /// Which rows the board scans: `whole` frames; `four` grounds far apart; `adaptive`, those that tell most of what touches at the moment,
+    /// which gives some thousand answers a second where a slow line carries 230 whole frames; or a list of electrodes to ground, such as
+    /// 0,5,10,15
+    #[arg(long, value_name = "PLAN", default_value_t = ScanChoice::Whole, conflicts_with = "replay")]
+    pub scan: ScanChoice,
     /// Ends this many seconds after the board said Hello
     #[arg(long, value_parser = source::seconds)]
     pub seconds: Option<Duration>,
@@ -111,6 +118,8 @@ pub struct Show {
     pub picture: PictureArgs,
     /// Settings asked of the board.
     pub settings: RequestedSettings,
+    /// Which rows the board is asked to scan.
+    pub scan: ScanChoice,
     /// Time from Hello to the end.
     pub seconds: Option<Duration>,
     /// Where all bytes are kept.
@@ -134,9 +143,10 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     };
     let settings = args.board.settings.requested();
     let is_pointer = args.board.scene.scene == Some(SceneName::Pointer);
-    let Args { mut picture, seconds, record, stream, elf, .. } = args;
+    let Args { mut picture, scan, seconds, record, stream, elf, .. } = args;
+    scan.check(detector.electrodes.len()).map_err(|what| anyhow!("--scan {scan}: {what}"))?;
     picture.pointer |= is_pointer;
-    show(Show { source, finger, settings, detector, picture, seconds, record, stream, elf })
+    show(Show { source, finger, settings, scan, detector, picture, seconds, record, stream, elf })
 }
 
 /// Serves the page, or only counts, until the end.
@@ -176,6 +186,7 @@ fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
     let stream = show.stream.as_deref().map(Stream::create).transpose()?;
     Ok(Plan {
         settings: show.settings,
+        scan: show.scan.clone(),
         solving: Some(Solving::new(show.picture.solver, problem)),
         recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
         begin_recording: Some(recording::on_request(detector.clone(), show.source.name())),

@@ -97,7 +97,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut times_us = Vec::new();
     while let Some(frame) = reader.next_frame()? {
         let begin = Instant::now();
-        let solved = reader.solve(frame.volts);
+        let solved = reader.solve(&frame);
         let frame_us = begin.elapsed().as_secs_f64() * 1e6;
         let solution = solved.with_context(|| reader.place())?;
         times_us.push(frame_us);

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use tactomo::board::session::RequestedSettings;
+use tactomo::run::scanning::ScanChoice;
 
 use super::live::{self, PictureArgs, Show};
 use super::source;
@@ -39,6 +40,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         source: source::recording(args.file, args.speed, !args.picture.json),
         finger: None,
         picture: args.picture,
+        scan: ScanChoice::Whole,
         settings: RequestedSettings::default(),
         seconds: None,
         record: None,

@@ -35,14 +35,7 @@ pub(super) struct Noted {
 impl BoardState {
     /// Begins with a detector as it is described and as it is solved for.
     pub fn new(description: Arc<Detector>, detector: Arc<Detector>, baseline: Baseline) -> Self {
-        Self {
-            baseline,
-            watch: ElectrodeWatch::new(&detector),
-            description,
-            detector,
-            follower: None,
-            rows_us: None,
-        }
+        Self { baseline, watch: ElectrodeWatch::new(&detector), description, detector, follower: None, rows_us: None }
     }
 
     /// The solver of a method for this detector as it is.

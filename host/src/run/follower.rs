@@ -16,6 +16,7 @@ use super::inbox::{Event, Inbox, Searched, Taken};
 use super::maker::{Made, Maker};
 use super::notice::NoticeBoard;
 use super::plan::{BeginBaseline, Listener, LiveError, Solving};
+use super::scanning::{PlanWish, Planner, ScanChoice};
 use super::searcher::SearchThread;
 use super::{FrameSnapshot, SolvedFrame};
 
@@ -39,6 +40,7 @@ impl FollowThread {
         notice: &Arc<NoticeBoard>,
         listeners: Vec<Box<dyn Listener>>,
         folder: PathBuf,
+        (scan, wish): (ScanChoice, Arc<PlanWish>),
     ) -> std::io::Result<Self> {
         let search = SearchThread::start(Arc::clone(inbox), Arc::clone(&solving.look_at_wires))?;
         let begin_baseline = Arc::clone(&solving.begin_baseline);
@@ -63,6 +65,8 @@ impl FollowThread {
             calibrated: None,
             folder,
             pointer: None,
+            planner: Planner::new(scan),
+            wish,
         };
         let thread = thread::Builder::new().name("follower".to_owned());
         Ok(Self(thread.spawn(move || desk.run())?))
@@ -106,6 +110,9 @@ struct FollowLoop {
     folder: PathBuf,
     /// What makes a pointer of a contact, if one is.
     pointer: Option<Pointer>,
+    /// Which rows the board is asked to scan.
+    planner: Planner,
+    wish: Arc<PlanWish>,
 }
 
 /// A frame that was answered.
@@ -236,6 +243,7 @@ impl FollowLoop {
         let baseline = (self.begin_baseline)(&detector, self.conversions);
         self.board = Some(BoardState::new(description, detector, baseline));
         self.solved = None;
+        self.planner.restart();
         // Frames of another board, or of other settings of its converter, are no part of it.
         self.calibration = None;
         self.show_calibration();
@@ -372,6 +380,8 @@ impl FollowLoop {
                 self.search.search(follower.lead(), solved.touch.clone());
             }
         }
+        let telling = |count: usize| board.follower.as_ref()?.telling_grounds(count);
+        self.planner.consider(&self.wish, &board.detector, !solution.contacts.is_empty(), telling);
         self.found.clone_from(&solution.contacts);
         let pointer = self.pointer.as_ref().map(Pointer::state);
         let shown = solved.frame.snapshot(solution, pointer, board.baseline.state().is_taking());

@@ -14,6 +14,7 @@ mod maker;
 mod notice;
 pub mod plan;
 mod reader;
+pub mod scanning;
 mod searcher;
 mod statistics;
 mod talk;

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 
+use super::scanning::ScanChoice;
 use super::{Latency, Order, Request, Snapshot, SolvedFrame};
 use tactomo_board::baseline::Baseline;
 use tactomo_board::board_log::BoardLog;
@@ -42,6 +43,8 @@ pub struct Plan {
     pub detector: Detector,
     /// Settings asked of the board.
     pub settings: RequestedSettings,
+    /// Which rows the board is asked to scan.
+    pub scan: ScanChoice,
     /// What reads the touch; `None` only receives.
     pub solving: Option<Solving>,
     /// Keeps the bytes.
@@ -66,6 +69,7 @@ impl Plan {
         Self {
             detector,
             settings: RequestedSettings::default(),
+            scan: ScanChoice::default(),
             solving: None,
             recorder: None,
             begin_recording: None,

@@ -12,10 +12,10 @@ use tactomo_board::link::{Control, Link, Source};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::{Closing, RecordError, Recorder};
 use tactomo_board::sequence::Sequence;
-use tactomo_board::session::{self, GreetError};
+use tactomo_board::session::{self, GreetError, PlanState};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::SceneName;
-use tactomo_protocol::{BoardMessage, DecodeError, Frame, Hello};
+use tactomo_protocol::{self as protocol, BoardMessage, DecodeError, Frame, Hello};
 use tactomo_touch::solve::Latest;
 
 use super::course::Course;
@@ -23,6 +23,7 @@ use super::follower::FollowThread;
 use super::inbox::{Event, Inbox, Rows, Taken};
 use super::notice::NoticeBoard;
 use super::plan::{Ends, LiveError, Plan, Summary};
+use super::scanning::PlanWish;
 use super::talk::{PATIENCE, Talk};
 use super::{LinkState, Request};
 
@@ -42,7 +43,9 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     let solving = plan.solving.take();
     let listeners = std::mem::take(&mut plan.listeners);
     let folder = plan.folder.clone();
-    let started = solving.map(|solving| FollowThread::start(solving, &inbox, &notice, listeners, folder)).transpose();
+    let (wish, scan) = (Arc::new(PlanWish::default()), plan.scan.clone());
+    let start = |solving| FollowThread::start(solving, &inbox, &notice, listeners, folder, (scan, Arc::clone(&wish)));
+    let started = solving.map(start).transpose();
     let follower = started.map_err(LiveError::Thread)?;
     if follower.is_some() {
         // Most boards measure as the detector's description says, so their first frame finds a solver.
@@ -66,6 +69,9 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         lost: None,
         course: course.clone(),
         latest: None,
+        wish,
+        scan: None,
+        is_refused: false,
     };
     reader.show_recording();
     let ended = reader.run(source);
@@ -125,6 +131,10 @@ struct Reader {
     course: Course,
     /// The latest of each reading, while the board sends rows.
     latest: Option<Latest>,
+    /// The plan that the follower wishes, the one that was asked of the board, and whether the board has refused plans.
+    wish: Arc<PlanWish>,
+    scan: Option<protocol::Plan>,
+    is_refused: bool,
 }
 
 /// Who has said Hello, and what its frames mean.
@@ -178,12 +188,16 @@ impl Reader {
     /// Talks with the board on `link` to the end.
     fn talk(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
         let mut talk = Talk::new(self.plan.settings);
+        if let Some(plan) = &self.scan {
+            talk.session.request_plan(Some(plan.clone()));
+        }
         let mut buffer = [0; READ_BYTES];
         self.sequence.restart();
         self.latest = None;
         self.enter(LinkState::Waiting);
         while !self.is_over() {
             self.answer_requests(Some((&mut *link, &mut talk)));
+            self.ask_for_plan(&mut talk);
             match talk.exchange(link, &mut buffer) {
                 Ok(count) => {
                     if link.jumped() {
@@ -202,6 +216,22 @@ impl Reader {
             self.show_link(link, &mut talk);
         }
         Ok(End::Stopped)
+    }
+
+    /// Asks the board for the rows that are wished, as far as it takes plans at all.
+    fn ask_for_plan(&mut self, talk: &mut Talk) {
+        if let Some(plan) = self.wish.take() {
+            talk.session.request_plan(Some(plan.clone()));
+            self.scan = Some(plan);
+        }
+        let is_refused = self.scan.is_some() && talk.session.plan_state() == PlanState::Refused;
+        if is_refused && !self.is_refused {
+            tracing::warn!(
+                "the board takes no scan plans, so it goes on with whole frames: its firmware is older than this program"
+            );
+        }
+        self.is_refused = is_refused;
+        self.wish.set_refused(is_refused);
     }
 
     /// No board has answered: at the start that is an error, later it may come back.
@@ -284,7 +314,8 @@ impl Reader {
             self.notice.change(|snapshot| {
                 (snapshot.hello, snapshot.calibration) = (Some(hello.clone()), other_board);
             });
-            self.board = Some(Board { volts: Volts::of(&hello).above(measured.ground_v), hello, detector: measured, noise_v });
+            self.board =
+                Some(Board { volts: Volts::of(&hello).above(measured.ground_v), hello, detector: measured, noise_v });
         }
         Ok(())
     }

@@ -26,7 +26,7 @@ pub fn answers(problem: &Problem, method: Method, live: &Live) -> Vec<Answer> {
         if sequence > last {
             break;
         }
-        baseline.add(&frame.volts, 1, frame.time_s.unwrap(), &[]);
+        baseline.add(&frame.touches_v(), 1, frame.time_s.unwrap(), &[]);
         let is_answered = answered.contains(&sequence);
         if is_answered || !SLOW.contains(&method) {
             let mut touch = frame.volts.clone();

@@ -46,7 +46,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let problem = Problem::of(&detector)?;
     let mut bench = Bench { fine, problem, noise: Noise::new(seed), detector };
     for (name, told) in [("bounds", Told::Bounds), ("numbers", Told::Numbers), ("no floor", Told::NoFloor)] {
-        println!("{name:<9} {:>8} {:>7} {:>9} {:>8} {:>8} {:>8}", "N", "one %", "misfit %", "median mm", "p95 mm", "above");
+        println!(
+            "{name:<9} {:>8} {:>7} {:>9} {:>8} {:>8} {:>8}",
+            "N", "one %", "misfit %", "median mm", "p95 mm", "above"
+        );
         for force_n in FORCES_N {
             bench.report(force_n, told, places, seed)?;
         }

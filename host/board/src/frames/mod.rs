@@ -54,6 +54,11 @@ impl FileFrame {
         Some(if self.says.is_empty() { readings } else { readings.saying(|g, e| self.says[g * n + e]) })
     }
 
+    /// The same if some were not read: rows of a scan; `None` of a whole frame.
+    pub fn rows(&self) -> Option<Readings> {
+        self.says.contains(&Says::Nothing).then(|| self.readings()).flatten()
+    }
+
     /// Readings as [`Readings::touch_v`] has them (V).
     pub fn touches_v(&self) -> Cow<'_, [f64]> {
         match self.readings() {

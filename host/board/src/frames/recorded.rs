@@ -58,11 +58,7 @@ impl fmt::Display for RecordingLoss {
             count(self.missing_frames, "frame is missing", "frames are missing"),
             self.file.is_any().then(|| self.file.to_string()),
             count(self.corrupt, "message is corrupt", "messages are corrupt"),
-            count(
-                self.other_frames,
-                "frame is of another board",
-                "frames are of another board",
-            ),
+            count(self.other_frames, "frame is of another board", "frames are of another board"),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
         if parts.is_empty() { write!(f, "nothing is missing") } else { write!(f, "{}", parts.join("; ")) }

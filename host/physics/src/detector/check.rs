@@ -64,7 +64,10 @@ impl Detector {
         within("contact_impedance_ohm_m2", self.contact_impedance_ohm_m2, IMPEDANCE_OHM_M2)?;
         if self.ground_v != 0.0 && self.drive_v <= 0.0 {
             let drive_v = self.drive_v + self.ground_v;
-            return Err(Problem::new("drive_v", format!("is {drive_v}, but has to be above ground_v, which is {}", self.ground_v)));
+            return Err(Problem::new(
+                "drive_v",
+                format!("is {drive_v}, but has to be above ground_v, which is {}", self.ground_v),
+            ));
         }
         within("drive_v", self.drive_v, DRIVE_V)?;
         within("ground_v", self.ground_v, 0.0..=5.0)?;

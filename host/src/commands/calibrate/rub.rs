@@ -8,7 +8,6 @@ use tactomo::board::identity;
 use tactomo::calibrate::{Frame, Rub, RubSettings, rub};
 use tactomo::date::today;
 use tactomo::detector::Detector;
-use tactomo::readings::Readings;
 use tactomo::solve::Method;
 
 use super::known::{KnownPlace, check_places, check_used, places};
@@ -114,7 +113,8 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
             used[*index] = true;
             place.at_m
         });
-        let readings = Readings::new(electrodes, frame.volts).with_context(|| reader.place())?;
+        let readings = frame.readings().filter(|readings| readings.electrodes() == electrodes);
+        let readings = readings.with_context(|| reader.place())?;
         if readings.volts().iter().any(|volts| !volts.is_finite()) {
             bail!("{}: a reading is not a finite number", reader.place());
         }

@@ -10,8 +10,9 @@ use tactomo::board::{identity, measured};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
 use tactomo::forward::jacobian::Jacobian;
-use tactomo::readings::Readings;
-use tactomo::solve::{Guard, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver};
+use tactomo::solve::{
+    Guard, Kernel, Lambda, Latest, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver,
+};
 
 use tactomo_protocol::Hello;
 
@@ -68,9 +69,16 @@ enum Frames {
 /// What solves frames.
 enum Touch {
     /// A solver for a detector, as the file's board measures it, and the places of its images.
-    Solver { solver: Box<dyn Solver>, detector: Box<Detector>, mesh: ImageMesh },
+    Solver { solver: Box<dyn Solver>, detector: Box<Detector>, mesh: ImageMesh, rows: Option<Box<RowsBefore>> },
     /// A kernel that has learned from presses in a file, on whatever they were made.
     Kernel(Box<Kernel>),
+}
+
+/// What came before rows of readings.
+struct RowsBefore {
+    latest: Latest,
+    /// Board time of the newest (s).
+    time_s: f64,
 }
 
 impl Reader {
@@ -118,7 +126,8 @@ impl Reader {
 
     /// Forgets the frames before: the next one need not follow them.
     pub fn reset(&mut self) {
-        if let Touch::Solver { solver, .. } = &mut self.touch {
+        if let Touch::Solver { solver, rows, .. } = &mut self.touch {
+            *rows = None;
             solver.reset();
         }
     }
@@ -128,7 +137,7 @@ impl Reader {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
             if self.given == 0 {
-                self.baseline.add(&frame.volts, 1, frame.time_s.unwrap_or_default(), &[]);
+                self.note_rest(&frame);
                 let volts = frame.volts.clone();
                 self.baseline.subtract(&volts, &mut frame.volts);
                 return Ok(Some(frame));
@@ -136,10 +145,18 @@ impl Reader {
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
                 bail!("{}: the baseline needs finite readings, but some of these are not", self.place());
             }
-            self.baseline.add(&frame.volts, 1, frame.time_s.unwrap_or_default(), &[]);
+            self.note_rest(&frame);
             self.given -= 1;
         }
         Ok(None)
+    }
+
+    fn note_rest(&mut self, frame: &FileFrame) {
+        let time_s = frame.time_s.unwrap_or_default();
+        match frame.rows() {
+            Some(rows) => _ = self.baseline.add_rows(&rows, time_s, &[]),
+            None => _ = self.baseline.add(&frame.touches_v(), 1, time_s, &[]),
+        }
     }
 
     /// What is missing in the file, in words; `None` if nothing is.
@@ -153,16 +170,25 @@ impl Reader {
         self.baseline.state().notice()
     }
 
-    /// What a frame's readings (V, less the baseline) say.
-    pub fn solve(&mut self, readings_v: Vec<f64>) -> anyhow::Result<Solution> {
+    /// What a frame's readings (less the baseline) say.
+    pub fn solve(&mut self, frame: &FileFrame) -> anyhow::Result<Solution> {
         match &mut self.touch {
-            Touch::Solver { solver, detector, .. } => {
-                let readings = Readings::new(detector.electrodes.len(), readings_v);
+            Touch::Solver { solver, detector, rows, .. } => {
+                let readings = frame.readings().filter(|readings| readings.electrodes() == detector.electrodes.len());
                 let mut readings = readings.context("a frame of another length")?;
                 readings.correct_channels(detector);
-                Ok(solver.solve(&readings)?)
+                if frame.rows().is_none() {
+                    return Ok(solver.solve(&readings)?);
+                }
+                let time_s = frame.time_s.unwrap_or_default();
+                let RowsBefore { latest, time_s: before_s } = rows
+                    .get_or_insert_with(|| Box::new(RowsBefore { latest: Latest::new(readings.electrodes()), time_s }))
+                    .as_mut();
+                let elapsed_s = time_s - std::mem::replace(before_s, time_s);
+                latest.add(&readings, 0.0, None);
+                Ok(solver.solve_rows(&readings, &latest.readings(f64::MAX, None), elapsed_s)?)
             }
-            Touch::Kernel(kernel) => match kernel.press(&readings_v) {
+            Touch::Kernel(kernel) => match kernel.press(&frame.volts) {
                 Ok(press) => Ok(press.map(|press| press.solution(kernel.strength())).unwrap_or_default()),
                 Err(Some(channel)) => Err(anyhow!("channel {channel} is not a finite number")),
                 Err(None) => Err(anyhow!("a frame of another length")),
@@ -284,7 +310,7 @@ fn learned(input: &Input, presses: Presses) -> anyhow::Result<Opened> {
 fn solved(input: &Input) -> anyhow::Result<Opened> {
     // That of a recording is in its header, unless another one is given.
     let given = input.detector.get()?.electrodes.len();
-    let file = FrameFile::open(input.file, Some(given * given))?;
+    let mut file = FrameFile::open(input.file, Some(given * given))?;
     let chosen = match file.header() {
         Some(header) => input.detector.of_recording(input.file, header)?,
         None => input.detector.get()?,
@@ -295,7 +321,9 @@ fn solved(input: &Input) -> anyhow::Result<Opened> {
             if let Some(notice) = identity::other_board(&chosen, board) {
                 message!("warning: {notice}");
             }
-            measured::as_measured(&chosen, board)?
+            let measured = measured::as_measured(&chosen, board)?;
+            file.set_ground(measured.ground_v);
+            measured
         }
         None => chosen.clone(),
     };
@@ -314,7 +342,7 @@ fn solved(input: &Input) -> anyhow::Result<Opened> {
     let problem = Problem::new(input.model.build(&detector, None)?);
     let solver = solver(input.solver, input.lambda, &problem)?;
     let mesh = problem.jacobian.image_mesh.clone();
-    let touch = Touch::Solver { solver, detector: Box::new(detector), mesh };
+    let touch = Touch::Solver { solver, detector: Box::new(detector), mesh, rows: None };
     Ok(Opened { file, touch, jacobian: Some(problem.jacobian), chosen: Some(chosen) })
 }
 

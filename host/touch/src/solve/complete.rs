@@ -75,8 +75,7 @@ impl Completer {
     /// What balancing multiplies each row with, but for a common factor, as far as pairs of readings tell: `r[g][e] D[g] = r[e][g] D[e]`.
     fn known_scales(&self, readings: &Readings) -> Vec<Option<f64>> {
         let n = readings.electrodes();
-        let is_pair =
-            |g: usize, e: usize| g != e && [readings.says(g, e), readings.says(e, g)] == [Says::Voltage; 2];
+        let is_pair = |g: usize, e: usize| g != e && [readings.says(g, e), readings.says(e, g)] == [Says::Voltage; 2];
         let log = |g: usize, e: usize| (1.0 - readings.at(g, e) / self.drive_v).max(SMALLEST).ln();
         let mut logs: Vec<Option<f64>> = (0..n).map(|g| (0..n).any(|e| is_pair(g, e)).then_some(0.0)).collect();
         for _ in 0..SWEEPS {
@@ -173,8 +172,7 @@ mod tests {
     /// Largest error of what is completed, as a share of the largest reading.
     fn error(contact: Contact, says: impl Fn(f64, usize, usize) -> Says, limit_v: f64) -> f64 {
         let exact = samples::readings(contact);
-        let known = Readings::from_fn(16, |g, e| exact.at(g, e).max(limit_v))
-            .saying(|g, e| says(exact.at(g, e), g, e));
+        let known = Readings::from_fn(16, |g, e| exact.at(g, e).max(limit_v)).saying(|g, e| says(exact.at(g, e), g, e));
         let completed = Completer::new(&samples::jacobian(2000)).completed(&known).into_owned();
         let pairs = completed.volts().iter().zip(exact.volts());
         pairs.map(|(found, truth)| (found - truth).abs()).fold(0.0, f64::max) / exact.largest_v()

@@ -200,6 +200,10 @@ impl Follower for InPlace<dyn Follower> {
         Ok(Followed { solution: self.corrector.solution(solution), search })
     }
 
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        self.half.telling_grounds(count)
+    }
+
     fn lead(&self) -> Lead {
         self.half.lead()
     }

@@ -35,6 +35,13 @@ pub trait Follower: Send {
     /// [`SolveError`] if the readings cannot be those of the detector.
     fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError>;
 
+    /// The grounds whose rows tell most of what is followed, so many of them, some perhaps more than once; where nothing touches, those that
+    /// see a touch come. `None` where whole frames tell it best.
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        let _ = count;
+        None
+    }
+
     /// What is followed: where a search may begin.
     fn lead(&self) -> Lead;
 

@@ -177,6 +177,11 @@ impl Follower for Half<dyn Follower> {
         Ok(Followed { solution: self.lens.flagged(followed.solution), ..followed })
     }
 
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        let grounds = self.half.telling_grounds(count)?;
+        Some(grounds.into_iter().filter_map(|ground| self.lens.kept.get(ground).copied()).collect())
+    }
+
     fn lead(&self) -> Lead {
         self.half.lead()
     }

@@ -96,6 +96,10 @@ impl Follower for InNewtons<dyn Follower> {
         Ok(Followed { solution: self.scale.told(readings, solution), search })
     }
 
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        self.half.telling_grounds(count)
+    }
+
     fn lead(&self) -> Lead {
         self.half.lead()
     }

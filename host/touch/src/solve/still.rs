@@ -84,7 +84,14 @@ impl Still {
     /// Begins with nothing; `noise_v` is the standard deviation of a reading (V).
     pub fn new(noise_v: f64) -> Self {
         let noise_v = noise_v.max(f64::MIN_POSITIVE.sqrt());
-        Self { noise_v, sums_v: VecDeque::new(), newest_v: Vec::new(), says: Vec::new(), newest_says: Vec::new(), has_moved: false }
+        Self {
+            noise_v,
+            sums_v: VecDeque::new(),
+            newest_v: Vec::new(),
+            says: Vec::new(),
+            newest_says: Vec::new(),
+            has_moved: false,
+        }
     }
 
     /// Adds a frame's readings.

@@ -58,7 +58,7 @@ fn moments(reader: &mut Reader) -> anyhow::Result<Vec<Moment>> {
     let mut last = Solution::default();
     while let Some(frame) = reader.next_frame()? {
         let time_s = frame.time_s.with_context(|| format!("{} has no time", reader.place()))?;
-        let solution = reader.solve(frame.volts).with_context(|| reader.place())?;
+        let solution = reader.solve(&frame).with_context(|| reader.place())?;
         let first = solution.contacts.first();
         moments.push(Moment {
             time_s,
@@ -142,7 +142,7 @@ fn of_rows(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec<Rep
         // Rows are presses of their own, wherever and whenever they were made.
         reader.reset();
         rows += 1;
-        let solution = reader.solve(frame.volts).with_context(|| reader.place())?;
+        let solution = reader.solve(&frame).with_context(|| reader.place())?;
         let place = format!("row {}", reader.count());
         match &solution.contacts[..] {
             [] => empty.push(rows),

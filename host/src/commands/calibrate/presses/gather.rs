@@ -137,7 +137,7 @@ fn of_rows(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, Fo
         if let Some(index) = at {
             // Rows are presses of their own, wherever and whenever they were made.
             reader.reset();
-            let contacts = reader.solve(frame.volts).with_context(|| reader.place())?.contacts;
+            let contacts = reader.solve(&frame).with_context(|| reader.place())?.contacts;
             found[index] = Some(single(&contacts));
         }
     }
@@ -171,7 +171,7 @@ fn of_times(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, F
         if current.replace(index) != Some(index) {
             reader.reset();
         }
-        frames[index].push(reader.solve(frame.volts).with_context(|| reader.place())?.contacts);
+        frames[index].push(reader.solve(&frame).with_context(|| reader.place())?.contacts);
     }
     let unused = known.places.iter().zip(&frames).find(|(_, frames)| frames.is_empty()).map(|(place, _)| place);
     check_used(reader.path(), unused, true)?;
@@ -196,7 +196,7 @@ fn of_stands(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, 
     let (mut moments, mut frames) = (Vec::new(), Vec::new());
     while let Some(frame) = reader.next_frame()? {
         let time_s = frame.time_s.with_context(|| format!("{} has no time", reader.place()))?;
-        let contacts = reader.solve(frame.volts).with_context(|| reader.place())?.contacts;
+        let contacts = reader.solve(&frame).with_context(|| reader.place())?.contacts;
         let first = contacts.first();
         moments.push(Moment {
             time_s,

@@ -240,6 +240,7 @@ impl Follower for AutoFollower {
             Some(latest) => self.still.add(&latest.readings),
             None => self.still.add_if_new(readings, Self::slopes_v(self.contacts.as_ref())),
         }
+        self.contacts.iter_mut().for_each(|contacts| contacts.searched_in(lead.mean.as_ref()));
         let mean = self.still.mean_or(readings);
         let readings = &mean.readings;
         let Some(target) = self.target(&mean, lead.contacts.as_deref())? else {
@@ -268,6 +269,11 @@ impl Follower for AutoFollower {
             _ => Answer::Image(why),
         });
         self.answered(readings, &target, search)
+    }
+
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        let contacts = self.contacts.as_ref().filter(|_| matches!(self.answer, Answer::Contacts))?;
+        Some(contacts.telling_grounds(count))
     }
 
     fn lead(&self) -> Lead {

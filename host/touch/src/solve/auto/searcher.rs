@@ -68,7 +68,7 @@ impl AutoSearcher {
         let finder = self.finder.as_ref()?;
         let target = finder.target_of(mean, Some(contacts.error()?)).ok()?;
         let evidence = finder.evidence_of_found(contacts);
-        if !evidence.is_misfit(target.count()) {
+        if !evidence.is_misfit(target.count()) || is_partial(&target) {
             return None;
         }
         let solution = searcher.solution(contacts, mean).ok()?;
@@ -104,7 +104,7 @@ impl AutoSearcher {
         target: &Target,
         readings: &Readings,
     ) -> Result<Option<Whole>, SolveError> {
-        if self.image.is_rest(readings) {
+        if self.image.is_rest(readings) || is_partial(target) {
             return Ok(None);
         }
         let shape = self.shape((solution, contacts), from.as_ref(), target);
@@ -121,6 +121,11 @@ impl AutoSearcher {
         let is_better = evidence.is_some_and(|evidence| evidence.score() < best.score());
         Ok(if is_better { image } else { shape })
     }
+}
+
+/// Whether so few rows were read that any shape explains them.
+fn is_partial(target: &Target) -> bool {
+    2 * target.known() < target.readings().volts().len()
 }
 
 impl Searcher for AutoSearcher {

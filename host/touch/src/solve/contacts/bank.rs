@@ -185,9 +185,8 @@ mod tests {
 
     impl Bench {
         fn new(seed: u64) -> Self {
-            let information = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
-                if i == j { DEVIATIONS[i].powi(-2) } else { 0.0 }
-            });
+            let information =
+                DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| if i == j { DEVIATIONS[i].powi(-2) } else { 0.0 });
             Self { bank: Bank::new(information), random: fastrand::Rng::with_seed(seed), believed: [0.0; PARAMETERS] }
         }
 
@@ -197,9 +196,8 @@ mod tests {
 
         fn frame(&mut self, truth: [f64; PARAMETERS]) -> [f64; PARAMETERS] {
             self.bank.predict(FRAME_S, &UNIT_M).unwrap();
-            let left: Vec<f64> = (0..PARAMETERS)
-                .map(|i| (truth[i] - self.believed[i]) / DEVIATIONS[i] + self.normal())
-                .collect();
+            let left: Vec<f64> =
+                (0..PARAMETERS).map(|i| (truth[i] - self.believed[i]) / DEVIATIONS[i] + self.normal()).collect();
             let rows = Rows {
                 information: DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
                     if i == j { DEVIATIONS[i].powi(-2) } else { 0.0 }

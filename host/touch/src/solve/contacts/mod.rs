@@ -9,6 +9,7 @@ mod bank;
 mod discs;
 mod evidence;
 mod exchange;
+mod focus;
 mod informed;
 mod keep;
 #[cfg(test)]
@@ -25,7 +26,7 @@ mod target;
 mod tests;
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 
@@ -105,6 +106,8 @@ pub(super) struct ContactFinder {
     widest_m: f64,
     errors: Errors,
     prior: Prior,
+    /// The grounds that see a contact come; made when they are asked for first.
+    watching: OnceLock<Vec<usize>>,
 }
 
 /// Contacts that explain a frame, for another frame to go on from.
@@ -178,6 +181,7 @@ impl ContactFinder {
                 area_m2: problem.jacobian.image_mesh.node_areas_m2.iter().sum(),
                 radius_deviation: settings.radius_deviation,
             },
+            watching: OnceLock::new(),
             rough: problem.model.rough().unwrap_or_else(|| Arc::clone(&problem.model)),
             problem: problem.clone(),
             settings,

@@ -4,7 +4,7 @@
 //! all readings are off by together, as those of a detector that is not known exactly are, was found with the contacts, and is taken off.
 
 use super::bank::{Bank, Rows};
-use super::discs::DiscFit;
+use super::discs::{DiscFit, DiscFitter, Effort};
 use super::target::{Errors, Target, dot};
 use super::{ContactFinder, Explanation};
 use tactomo_physics::readings::Readings;
@@ -23,6 +23,9 @@ const UNFIT: f64 = 5.0;
 const FRAMES: u32 = 3;
 /// Logarithm of the odds by which frames of late have to speak for no contact before it is let go.
 const GONE: f64 = 12.0;
+
+/// Of a contact that has just come.
+const GLIMPSE: Effort = Effort { steps: 4, gain: 1.0, share: 0.05 };
 
 /// What is known besides the contacts that are followed.
 #[derive(Clone, Debug)]
@@ -89,6 +92,15 @@ impl ContactFinder {
         let search = state.unfit >= FRAMES;
         (fit.normal, fit.settled) = (state.bank.information().clone(), true);
         Step::Followed(Explanation { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
+    }
+
+    /// A first, rough contact in rows where something stands out.
+    pub(super) fn glimpsed(&self, target: &Target) -> Option<Explanation> {
+        let begun = self.begun(target)?;
+        let rough = DiscFitter { model: &*self.rough, ..self.disc_fitter() };
+        let first = rough.fit(begun, target, GLIMPSE)?;
+        let fit = self.disc_fitter().fit(first.contacts, target, Effort { steps: 1, ..GLIMPSE })?;
+        Some(Explanation::of(fit, target))
     }
 
     /// Whether what is followed has become so light that it cannot be told from nothing.

@@ -13,7 +13,7 @@ use crate::solve::still::{Mean, Still};
 use crate::solve::track::Tracker;
 use crate::solve::{FoundContact, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 
 /// The sum of squares may be this times what the last search would leave of as many frames.
 const WORSE: f64 = 1.3;
@@ -44,6 +44,8 @@ pub(in crate::solve) struct ContactFollower {
     rows: Option<Box<RowState>>,
     /// The latest of each reading, while rows come.
     latest: Option<Latest>,
+    /// Whether what is followed was found in some of the rows only.
+    is_glimpsed: bool,
     tracker: Tracker,
     /// The tracker before this frame: a frame that has several answers is one frame.
     before: Tracker,
@@ -90,7 +92,17 @@ impl ContactFollower {
         let tracker = Tracker::new(finder.spacing_m);
         let searched = Searched::default();
         let before = tracker.clone();
-        Self { finder, last: None, searched, is_stale: false, rows: None, latest: None, before, tracker }
+        Self {
+            finder,
+            last: None,
+            searched,
+            is_stale: false,
+            rows: None,
+            latest: None,
+            is_glimpsed: false,
+            before,
+            tracker,
+        }
     }
 
     /// What finds the contacts.
@@ -145,8 +157,22 @@ impl ContactFollower {
             latest.forget();
         }
         latest.add(rows, elapsed_s, self.predicted_v());
+        let search = search || self.is_glimpsed && latest.is_whole(OLDEST_S);
         self.latest = Some(latest);
         Ok(Followed { solution: self.solution(&target), search })
+    }
+
+    /// Takes note of what a search has looked at.
+    pub fn searched_in(&mut self, mean: Option<&Mean>) {
+        self.is_glimpsed = mean.is_some_and(|mean| mean.readings.all_say().contains(&Says::Nothing));
+    }
+
+    /// The grounds whose rows tell most of what is followed, so many of them; of nothing, those that see a contact come.
+    pub fn telling_grounds(&self, count: usize) -> Vec<usize> {
+        match &self.last {
+            Some(last) => self.finder.telling_grounds(&last.fit, count),
+            None => self.finder.watching_grounds(),
+        }
     }
 
     /// The latest readings, told for the contacts as they are now; none while whole frames come.
@@ -163,6 +189,11 @@ impl ContactFollower {
         let Some(last) = self.last.take() else {
             self.rows = None;
             let search = self.finder.stands_out(&target);
+            // A rough contact is better than none for the time of a search.
+            if let Some(begun) = search.then(|| self.finder.glimpsed(&target)).flatten() {
+                self.rows = Some(Box::new(RowState::new(&begun, &target)));
+                (self.last, self.is_stale, self.is_glimpsed) = (Some(begun), true, true);
+            }
             return (target, search);
         };
         let state = self.rows.take().unwrap_or_else(|| Box::new(RowState::new(&last, &target)));
@@ -276,11 +307,16 @@ impl Follower for FrameFollower {
             Some(latest) => self.still.add(&latest.readings),
             None => self.still.add_if_new(readings, self.contacts.slopes_v()),
         }
+        self.contacts.searched_in(lead.mean.as_ref());
         let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
         let target = self.contacts.finder.target_of(&self.still.mean_or(readings), error)?;
         let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
         let search = self.contacts.adopt(lead.contacts.map(|found| *found), frames, &target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
+    }
+
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        Some(self.contacts.telling_grounds(count))
     }
 
     fn lead(&self) -> Lead {

@@ -243,10 +243,11 @@ impl Target {
         if !self.is_informed {
             return self.cost(&vec![0.0; self.volts.len()]);
         }
-        let squares = self.volts.iter().zip(&self.weights).enumerate().map(|(i, (volts, weight))| match self.says.get(i) {
-            Some(Says::AtMost | Says::Nothing) => 0.0,
-            _ => (volts * weight).powi(2),
-        });
+        let squares =
+            self.volts.iter().zip(&self.weights).enumerate().map(|(i, (volts, weight))| match self.says.get(i) {
+                Some(Says::AtMost | Says::Nothing) => 0.0,
+                _ => (volts * weight).powi(2),
+            });
         squares.sum::<f64>() - self.ln_determinant()
     }
 
@@ -263,6 +264,11 @@ impl Target {
     /// Readings that count, but for those that are bounds.
     pub fn count(&self) -> usize {
         (0..self.weights.len()).filter(|i| self.weights[*i] > 0.0 && is_voltage(&self.says, *i)).count()
+    }
+
+    /// Readings that say anything.
+    pub fn known(&self) -> usize {
+        self.volts.len() - self.says.iter().filter(|says| **says == Says::Nothing).count()
     }
 
     /// Whether there are readings that are too large to count.
