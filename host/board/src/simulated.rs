@@ -246,21 +246,28 @@ fn identity(detector: &Detector, model: BoardModel) -> Result<Identity<'static>,
         let board = model.figures().name;
         return Err(SimulatedBoardError::Electrodes { detector: name(), electrodes, board, most });
     }
-    if !(1..=16).contains(&detector.adc.bits) {
-        let source = NewBoardError::AdcBits(detector.adc.bits);
-        return Err(SimulatedBoardError::Board { detector: name(), source });
-    }
-    let adc = match model.firmware_adc() {
-        Some(adc) => adc,
-        None => Adc::new(detector.adc.bits, millivolts(detector, "adc.full_scale_v", detector.adc.full_scale_v)?),
-    };
     Ok(Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),
         board: model.figures().name,
         electrodes: u8::try_from(electrodes).unwrap_or(u8::MAX),
-        adc,
+        adc: adc(detector, model)?,
         drive_mv: millivolts(detector, "drive_v", detector.drive_v)?,
     })
+}
+
+/// The board's own converter, or the one that the detector's description has.
+fn adc(detector: &Detector, model: BoardModel) -> Result<Adc, SimulatedBoardError> {
+    let bits = detector.adc.bits;
+    match model.firmware_adc() {
+        Some(adc) => Ok(adc),
+        None if (1..=16).contains(&bits) => {
+            Ok(Adc::new(bits, millivolts(detector, "adc.full_scale_v", detector.adc.full_scale_v)?))
+        }
+        None => {
+            let source = NewBoardError::AdcBits(bits);
+            Err(SimulatedBoardError::Board { detector: detector.name.clone(), source })
+        }
+    }
 }
 
 fn millivolts(detector: &Detector, field: &'static str, volts: f64) -> Result<u16, SimulatedBoardError> {

@@ -117,7 +117,7 @@ const SAMPLING_F: f64 = 8e-12;
 /// Nine cycles of the ESP32's ADC clock, 8 MHz by 2 (reset values of `SENS_SAR1_SAMPLE_CYCLE` and `SENS_SAR1_CLK_DIV`).
 const SAMPLING_S: f64 = 2.25e-6;
 /// Across the strapping resistors, as `docs/hardware.md` has the wiring, and why.
-const ACROSS_F: f64 = 10e-9;
+const ACROSS_F: f64 = 47e-9;
 
 const INPUT: InputFigures = InputFigures {
     source_ohm: PAD_OHM + SERIES_OHM,

@@ -136,3 +136,108 @@ impl RealFront {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::circuit::{MuxLine, MuxPin};
+    use super::super::model::{BoardModel, InputFigures};
+    use super::*;
+    use tactomo_firmware::Mux;
+    use tactomo_firmware::mux::Transparent;
+    use tactomo_physics::detector::Detector;
+    use tactomo_physics::readings::Readings;
+    use tactomo_physics::scene::{Hand, Scene, SceneName};
+    use tactomo_physics::simulate::Simulation;
+
+    /// Electrodes on strapping pins of the ESP32.
+    const STRAPPING: [u8; 4] = [7, 8, 9, 11];
+    const SETTLE_NS: u64 = 20_000;
+    /// Ten time constants of the slowest input below.
+    const SCANS: u32 = 20;
+
+    struct Fixed(Readings);
+
+    impl Physics for Fixed {
+        fn readings_v(&mut self, _time_s: f64) -> Readings {
+            self.0.clone()
+        }
+    }
+
+    /// Five fingers on the default detector.
+    fn pressed() -> Readings {
+        let detector = Detector::preset(Detector::DEFAULT).unwrap();
+        let scene = Scene::new(SceneName::FiveFingers, &detector, Hand::relative(&detector), 1);
+        Simulation::new(&detector, scene, &[], 1).unwrap().readings_v(1.0)
+    }
+
+    fn esp32() -> (&'static Analog, InputFigures) {
+        let analog = BoardModel::Esp32.figures().analog.as_ref().unwrap();
+        (analog, analog.strapping.1)
+    }
+
+    /// How a scan is made.
+    #[derive(Clone, Copy)]
+    struct Scanning {
+        strapping: InputFigures,
+        settle_ns: u64,
+        /// Conversions of a reading, of which the last counts.
+        conversions: usize,
+    }
+
+    /// Largest errors (mV) that settling and kickback make in the last scan: of strapping inputs, and of others.
+    fn errors_mv(volts: &Readings, scanning: Scanning) -> [f64; 2] {
+        let (esp32, _) = esp32();
+        let analog: &'static Analog = Box::leak(Box::new(Analog {
+            converters: esp32.converters,
+            input: esp32.input,
+            strapping: (&[7, 8, 9, 11], scanning.strapping),
+        }));
+        let circuit = Arc::new(Circuit::default());
+        let mut noise = Noise::new(1);
+        let mut front = RealFront::new(analog, Wiring::Transparent, &mut noise);
+        let mut pads = Pads::new(Box::new(Fixed(volts.clone())), true);
+        let mut mux = Transparent::new([0, 1, 2, 3].map(|bit| MuxPin::new(&circuit, MuxLine::Address(bit))));
+        let mut errors = [0.0; 2];
+        for scan in 0..SCANS {
+            for ground in 0..16 {
+                mux.ground(ground).unwrap();
+                circuit.advance(scanning.settle_ns);
+                for electrode in 0..16 {
+                    for _ in 0..scanning.conversions {
+                        front.convert(electrode, &circuit, &mut pads, &mut noise);
+                        circuit.advance(10_000);
+                    }
+                    let found_v = front.converters[usize::from(electrode >= 6)].held_v;
+                    let error_mv = 1e3 * (found_v - volts.at(usize::from(ground), usize::from(electrode))).abs();
+                    let kind = usize::from(!STRAPPING.contains(&electrode));
+                    if scan + 1 == SCANS {
+                        errors[kind] = f64::max(errors[kind], error_mv);
+                    }
+                }
+            }
+        }
+        errors
+    }
+
+    /// The figures of `docs/hardware.md`: readings up to 1.35 V.
+    #[test]
+    fn strapping_resistors_need_a_capacitor_across_them_and_no_wait_replaces_it() {
+        let volts = pressed();
+        let (_, wired) = esp32();
+        let across = |across_f| InputFigures { across_f, ..wired };
+        let bare = Scanning { strapping: across(0.0), settle_ns: SETTLE_NS, conversions: 1 };
+        let [strapping_mv, others_mv] = errors_mv(&volts, bare);
+        assert!(strapping_mv > 100.0, "{strapping_mv}");
+        assert!(others_mv < 1e-6, "{others_mv}");
+        let [patient_mv, _] = errors_mv(&volts, Scanning { settle_ns: 200_000, ..bare });
+        assert!((patient_mv - strapping_mv).abs() < 1e-3, "the conversions make it, not the settling");
+        let repeated = [2, 3, 4].map(|conversions| errors_mv(&volts, Scanning { conversions, ..bare })[0]);
+        assert!(repeated[0] < strapping_mv / 5.0 && repeated[1] > 1.0 && repeated[2] < 1.0, "{repeated:?}");
+        let capacitors = [1e-9, 10e-9, 47e-9].map(across);
+        let bypassed = capacitors.map(|strapping| errors_mv(&volts, Scanning { strapping, ..bare })[0]);
+        assert!(bypassed[0] > 10.0 && bypassed[1] > 1.0 && bypassed[2] < 1.0, "{bypassed:?}");
+        assert_eq!(wired, across(47e-9), "which is what the model has");
+        let to_ground = InputFigures { node_f: 47e-9, ..across(0.0) };
+        assert!(errors_mv(&volts, Scanning { strapping: to_ground, ..bare })[0] > 500.0, "not from pin to ground");
+    }
+}
