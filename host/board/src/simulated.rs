@@ -134,7 +134,7 @@ impl SimulatedBoard {
         physics: Box<dyn Physics>,
         options: Options,
     ) -> Result<Self, SimulatedBoardError> {
-        let circuit = Arc::new(Circuit::default());
+        let circuit = Arc::new(Circuit::new(options.model.figures().row_work_ns));
         let line = Arc::new(Line::default());
         let step = firmware(detector, physics, options, &circuit, &line)?;
         let thread = {

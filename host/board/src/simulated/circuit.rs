@@ -23,6 +23,8 @@ pub(super) struct Circuit {
     /// When either half last took one.
     grounded_ns: AtomicU64,
     selected_ns: AtomicU64,
+    /// The firmware's own work for a row.
+    row_work_ns: u64,
 }
 
 /// A line of the multiplexer.
@@ -51,6 +53,11 @@ impl MuxLine {
 }
 
 impl Circuit {
+    /// The circuit of a board whose firmware works so long for a row (ns).
+    pub(super) fn new(row_work_ns: u64) -> Self {
+        Self { row_work_ns, ..Self::default() }
+    }
+
     /// Board time since the reset.
     pub(super) fn now(&self) -> Duration {
         Duration::from_nanos(self.now_ns())
@@ -93,12 +100,16 @@ impl Circuit {
         self.selected_ns.load(Relaxed)
     }
 
-    /// A half follows the address while WR and its chip select are low, and keeps what it had otherwise.
+    /// A half follows the address while WR and its chip select are low, and keeps what it had otherwise. The firmware's work for a row passes
+    /// before half A takes the row's address: before its first bit where the switch is transparent, before WR where it is latched.
     fn drive(&self, line: MuxLine, high: bool) {
         let mut levels = self.levels.load(Relaxed);
         levels = if high { levels | line.mask() } else { levels & !line.mask() };
         self.levels.store(levels, Relaxed);
         let follows = |select: MuxLine| levels & (MuxLine::Wr.mask() | select.mask()) == 0;
+        if follows(MuxLine::Csa) && matches!(line, MuxLine::Address(0) | MuxLine::Wr) {
+            self.advance(self.row_work_ns);
+        }
         let (address, now_ns) = ((levels & MuxLine::ADDRESS) as u8, self.now_ns());
         if follows(MuxLine::Csa) {
             self.grounded.store(address, Relaxed);

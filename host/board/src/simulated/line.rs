@@ -158,13 +158,12 @@ pub(super) struct BoardEnd {
     line: Arc<Line>,
     circuit: Arc<Circuit>,
     fifo: Option<Fifo>,
-    row_work_ns: u64,
 }
 
 impl BoardEnd {
     pub(super) fn new(line: &Arc<Line>, circuit: &Arc<Circuit>, figures: &Figures) -> Self {
         let fifo = figures.line.map(|figures| Fifo { figures, held: 0.0, at: Duration::ZERO });
-        Self { line: Arc::clone(line), circuit: Arc::clone(circuit), fifo, row_work_ns: figures.row_work_ns }
+        Self { line: Arc::clone(line), circuit: Arc::clone(circuit), fifo }
     }
 }
 
@@ -178,9 +177,7 @@ impl Serial for BoardEnd {
         count
     }
 
-    /// The firmware pulls once before every row: its own work passes here, before the next electrode is grounded.
     fn pull(&mut self, buffer: &mut [u8]) -> usize {
-        self.circuit.advance(self.row_work_ns);
         self.line.down.take(buffer)
     }
 }

@@ -4,6 +4,7 @@
 
 use tactomo_firmware::Adc as FirmwareAdc;
 use tactomo_physics::detector::Adc;
+use tactomo_protocol::Range;
 
 /// Which board is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -227,10 +228,18 @@ impl BoardModel {
         }
     }
 
-    /// What the firmware is told of its converter, where the board has one of its own.
+    /// What the firmware is told of its converters, where the board has some of its own.
     pub(super) fn firmware_adc(self) -> Option<FirmwareAdc> {
         let analog = self.figures().analog.as_ref()?;
-        let ceiling_mv = analog.converters.iter().map(|converter| converter.ceiling_mv).fold(f64::MAX, f64::min);
-        Some(FirmwareAdc { bits: BITS, full_scale_mv: FULL_SCALE_MV, saturated_from: ceiling_mv as u16 })
+        let ranges: Vec<Range> = analog.converters.iter().map(ConverterFigures::range).collect();
+        Some(FirmwareAdc::new(BITS, FULL_SCALE_MV).with_ranges(&ranges))
+    }
+}
+
+impl ConverterFigures {
+    /// What it can see, in codes, which are millivolts.
+    fn range(&self) -> Range {
+        let [floor, ceiling] = [self.floor_mv, self.ceiling_mv].map(|mv| mv as u16);
+        Range { electrodes: self.electrodes as u8, floor, ceiling }
     }
 }
