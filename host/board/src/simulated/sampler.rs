@@ -104,6 +104,7 @@ impl RealFront {
         Self { converters, inputs: inputs.take(count).collect(), wiring, groundings: 0 }
     }
 
+    /// Samples now, as the conversion begins: what time the firmware and the chip take before that is counted after it, to be on the safe side.
     fn convert(&mut self, electrode: u8, circuit: &Circuit, pads: &mut Pads, noise: &mut Noise) -> u16 {
         let now = moment(circuit);
         self.take_ground(now, pads);
