@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use tactomo_firmware::{Sampler, TimedOut};
+use tactomo_firmware::{Row, Sampler, TimedOut};
 use tactomo_physics::detector::Adc;
 use tactomo_physics::simulate::{Noise, Physics, code};
+use tactomo_protocol::MAX_ELECTRODES;
 
 use super::circuit::Circuit;
 use super::converter::Converter;
@@ -19,6 +20,8 @@ pub(super) struct SimulatedSampler {
     conversion_ns: u64,
     noise: Noise,
     front: Front,
+    /// Electrodes of each converter, from electrode 0 on.
+    runs: Vec<u8>,
 }
 
 /// What lies between a pad and its code.
@@ -43,28 +46,69 @@ impl SimulatedSampler {
             Some(analog) => Front::Real(RealFront::new(analog, figures.wiring, &mut noise)),
             None => Front::Ideal(adc),
         };
+        let runs = match &figures.analog {
+            Some(analog) => analog.converters.iter().map(|converter| converter.electrodes as u8).collect(),
+            None => vec![MAX_ELECTRODES as u8],
+        };
         Self {
             circuit: Arc::clone(circuit),
             pads: Pads::new(physics, figures.analog.is_some()),
             conversion_ns: figures.conversion_ns,
             noise,
             front,
+            runs,
         }
     }
 }
 
-impl Sampler for SimulatedSampler {
-    fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
-        let code = match &mut self.front {
+impl SimulatedSampler {
+    /// The code of a conversion that begins now.
+    fn convert(&mut self, electrode: u8) -> u16 {
+        match &mut self.front {
             Front::Ideal(adc) => {
                 let volts = self.pads.at(moment(&self.circuit), electrode);
                 // The board refuses converters of more than 16 bits.
                 code(volts, adc, &mut self.noise).min(u32::from(u16::MAX)) as u16
             }
             Front::Real(front) => front.convert(electrode, &self.circuit, &mut self.pads, &mut self.noise),
-        };
+        }
+    }
+}
+
+impl Sampler for SimulatedSampler {
+    fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
+        let code = self.convert(electrode);
         self.circuit.advance(self.conversion_ns);
         Ok(code)
+    }
+
+    /// Converters work side by side, each through its own electrodes: a row takes as long as the one that has most.
+    fn sample_row<R: Row>(&mut self, row: &mut R) -> Result<(), R::Error> {
+        let asked = row.electrodes();
+        let mut begin = 0;
+        let mut queues: Vec<_> = self
+            .runs
+            .iter()
+            .map(|count| {
+                let run = begin..begin + count;
+                begin = run.end;
+                run.filter(move |electrode| asked >> electrode & 1 == 1)
+            })
+            .collect();
+        loop {
+            let slot: Vec<u8> = queues.iter_mut().filter_map(Iterator::next).collect();
+            if slot.is_empty() {
+                return Ok(());
+            }
+            slot.iter().try_for_each(|electrode| row.select(*electrode))?;
+            for _ in 0..row.conversions() {
+                row.attend();
+                for electrode in &slot {
+                    row.take(*electrode, Ok(self.convert(*electrode)));
+                }
+                self.circuit.advance(self.conversion_ns);
+            }
+        }
     }
 }
 
@@ -203,15 +247,20 @@ mod tests {
             for ground in 0..16 {
                 mux.ground(ground).unwrap();
                 circuit.advance(scanning.settle_ns);
-                for electrode in 0..16 {
+                // ADC2's ten inputs, one after the other; ADC1 works beside it on the first six.
+                for slot in 0..10 {
+                    let pair = [slot, slot + 6];
+                    let electrodes = if slot < 6 { &pair[..] } else { &pair[1..] };
                     for _ in 0..scanning.conversions {
-                        front.convert(electrode, &circuit, &mut pads, &mut noise);
+                        for electrode in electrodes {
+                            front.convert(*electrode, &circuit, &mut pads, &mut noise);
+                        }
                         circuit.advance(10_000);
                     }
-                    let found_v = front.converters[usize::from(electrode >= 6)].held_v;
-                    let error_mv = 1e3 * (found_v - volts.at(usize::from(ground), usize::from(electrode))).abs();
-                    let kind = usize::from(!STRAPPING.contains(&electrode));
-                    if scan + 1 == SCANS {
+                    for electrode in electrodes.iter().filter(|_| scan + 1 == SCANS) {
+                        let found_v = front.converters[usize::from(*electrode >= 6)].held_v;
+                        let error_mv = 1e3 * (found_v - volts.at(ground.into(), (*electrode).into())).abs();
+                        let kind = usize::from(!STRAPPING.contains(electrode));
                         errors[kind] = f64::max(errors[kind], error_mv);
                     }
                 }
