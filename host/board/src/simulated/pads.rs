@@ -2,14 +2,14 @@
 //!
 //! The scene of the ideal board stands still for the length of a scan. On the others it moves on while they scan, as a real one does: a
 //! contact at 0.5 m/s goes 1.2 mm in a scan of 2.4 ms. To ask the physics at every row would take more time than the row: 105 us
-//! for one contact and 390 us for five fingers, on a row of 148 us. So it is asked once a millisecond of board time, one step ahead, and
-//! voltages between are interpolated linearly. That misses the voltages of a contact at 0.5 m/s by 0.2 mV of 1.1 V at most.
+//! for one contact and 390 us for five fingers, on a row of 148 us. So it is asked every 2 ms of board time, one step ahead, and
+//! voltages between are interpolated linearly. That misses the voltages of a contact at 0.5 m/s by 0.9 mV of 1.1 V at most, a fifth of a conversion's noise.
 
 use tactomo_physics::readings::Readings;
 use tactomo_physics::simulate::Physics;
 
 /// Board time between two moments at which the physics are asked (ns).
-const STEP_NS: u64 = 1_000_000;
+const STEP_NS: u64 = 2_000_000;
 
 /// Where and when a voltage is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -133,9 +133,9 @@ mod tests {
             controls.press(hand.tip([x_m, 0.006], 0.5, 1.0).disc().into_iter().collect());
             simulation.readings_v(0.0)
         };
-        let half_step_m = 0.5 * 0.5e-3;
+        let half_step_m = 0.5 * 0.5 * seconds(STEP_NS);
         let (mut missed_v, mut largest_v) = (0.0, 0.0);
-        for step in -40..40 {
+        for step in -20..=20 {
             let x_m = 2.0 * half_step_m * f64::from(step);
             let [before, middle, after] = [x_m - half_step_m, x_m, x_m + half_step_m].map(&mut at);
             let ends = before.volts().iter().zip(after.volts()).map(|(before, after)| 0.5 * (before + after));
@@ -143,7 +143,7 @@ mod tests {
             missed_v = misses.fold(missed_v, f64::max);
             largest_v = middle.largest_v().max(largest_v);
         }
-        assert!(missed_v < 5e-4 && largest_v > 0.5, "{missed_v} V of {largest_v} V");
+        assert!(missed_v < 1e-3 && largest_v > 0.5, "{missed_v} V of {largest_v} V");
     }
 
     fn moment(ground: u8, groundings: u64, now_ns: u64) -> Moment {
@@ -158,7 +158,7 @@ mod tests {
             let read_s = pads.at(moment(now_us as u8 % 4, now_us, 5_000_000 + 1000 * now_us), 0);
             assert!((read_s - now_us as f64 * 1e-6).abs() < 1e-12, "time begins with the first scan");
         }
-        assert_eq!(*clock.0.lock().unwrap(), [0.0, 1e-3, 2e-3, 3e-3]);
+        assert_eq!(*clock.0.lock().unwrap(), [0.0, 2e-3, 4e-3]);
     }
 
     #[test]
