@@ -52,6 +52,8 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["live", "--scene", "ring"], "--simulate"),
         (&["record", "some.file", "--fault", "open:3"], "--simulate"),
         (&["live", "--as-built", "7"], "--simulate"),
+        (&["record", "some.file", "--board", "esp32"], "--simulate"),
+        (&["live", "--simulate", "--board", "esp8266"], "ideal, esp32, esp32c3"),
         (&["forward", "--as-built", "7", "--save-jacobian", "some.file"], "--save-jacobian"),
         (&["forward", "--as-built", "seven"], "a seed, or a detector"),
         (&["forward", "--scene", "jazz"], "rolling-ball"),

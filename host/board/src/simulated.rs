@@ -1,21 +1,31 @@
 //! The simulated board: the firmware library, unchanged, over simulated pins and a simulated converter, in a thread of its own.
 //!
-//! The board has a clock of its own, which conversions and delays move on; its thread runs ahead and sleeps once a frame until the
-//! wall clock has caught up. At the settings after a reset a frame of 16 electrodes takes 16 (20 us + 16 x 2 us) = 832 us.
+//! The board has a clock of its own, which conversions, delays and the firmware's own work move on; its thread runs ahead and sleeps once a
+//! frame until the wall clock has caught up. [`BoardModel`] says which board it is. At the settings after a reset a scan of 16
+//! electrodes takes the ideal one 16 (20 us + 16 x 2 us) = 832 us.
 
 mod circuit;
+mod converter;
+mod input;
 mod line;
+mod model;
+mod pads;
+mod sampler;
 
+use std::convert::Infallible;
 use std::io;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Activity, Adc, Board32, Identity, NewBoardError, Parts};
+use tactomo_firmware::mux::{LatchLines, Latched, Transparent};
+use tactomo_firmware::{Activity, Adc, Board32, Identity, Mux, NewBoardError, Parts};
 
-use self::circuit::{AddressPin, Circuit, SimulatedChip, SimulatedSampler};
+use self::circuit::{Circuit, MuxLine, MuxPin, SimulatedChip};
 use self::line::{BoardEnd, Line};
+pub use self::model::BoardModel;
+use self::model::Wiring;
+use self::sampler::SimulatedSampler;
 use crate::link::{Control, ControlError, Link, Playing};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::simulate::{Controls, Physics, Simulation};
@@ -31,21 +41,22 @@ const READ_WAIT: Duration = Duration::from_millis(50);
 /// Longest wait for room of one write.
 const WRITE_WAIT: Duration = Duration::from_secs(1);
 
-/// Electrodes are addressed by five lines, as an ADG732 has them: 32 are the most that the protocol carries.
-type SimulatedFirmware = Board32<Transparent<AddressPin, 5>, SimulatedSampler, BoardEnd, SimulatedChip>;
+type SimulatedFirmware<M> = Board32<M, SimulatedSampler, BoardEnd, SimulatedChip>;
+/// One step of the firmware, whatever its multiplexer.
+type Step = Box<dyn FnMut() -> Activity + Send>;
 
-/// How the simulated board differs from one of the detector's description.
+/// Which board is simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Seed of the converter's noise.
+    /// Seed of the converter's noise, and of what is not as it should be in this one chip.
     pub seed: u64,
-    /// Bits a second of its UART (ten bits a byte, FIFO of 128 bytes); `None` for USB, as fast as the host reads.
-    pub baud: Option<u32>,
+    /// The board.
+    pub model: BoardModel,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { seed: 1, baud: None }
+        Self { seed: 1, model: BoardModel::default() }
     }
 }
 
@@ -59,6 +70,20 @@ pub enum SimulatedBoardError {
         detector: String,
         /// Why not.
         source: NewBoardError,
+    },
+    /// The board has fewer inputs.
+    #[error(
+        "detector `{detector}` has {electrodes} electrodes; a {board} board has inputs for {most}: choose the ideal board"
+    )]
+    Electrodes {
+        /// Name of the detector.
+        detector: String,
+        /// Its electrodes.
+        electrodes: usize,
+        /// Name of the board.
+        board: &'static str,
+        /// Most electrodes that it has inputs for.
+        most: usize,
     },
     /// The protocol has voltages as whole millivolts up to 65535.
     #[error("detector `{detector}`: {field} is {volts} V; a board can report 0.001 V to 65.535 V")]
@@ -78,6 +103,7 @@ pub enum SimulatedBoardError {
 /// The host's end of a simulated board's line; the board stops when this is dropped.
 pub struct SimulatedBoard {
     line: Arc<Line>,
+    model: BoardModel,
     /// `None` if the physics are given from outside.
     controls: Option<Controls>,
     thread: Option<JoinHandle<()>>,
@@ -108,20 +134,21 @@ impl SimulatedBoard {
         physics: Box<dyn Physics>,
         options: Options,
     ) -> Result<Self, SimulatedBoardError> {
-        let circuit = Arc::new(Circuit::default());
+        let circuit = Arc::new(Circuit::new(options.model.figures().row_work_ns));
         let line = Arc::new(Line::default());
-        let board = firmware(detector, physics, options, &circuit, &line)?;
+        let step = firmware(detector, physics, options, &circuit, &line)?;
         let thread = {
             let line = Arc::clone(&line);
-            thread::Builder::new().name("simulated board".to_owned()).spawn(move || run(board, &circuit, &line))
+            thread::Builder::new().name("simulated board".to_owned()).spawn(move || run(step, &circuit, &line))
         };
-        Ok(Self { line, controls: None, thread: Some(thread.map_err(SimulatedBoardError::Thread)?) })
+        let thread = Some(thread.map_err(SimulatedBoardError::Thread)?);
+        Ok(Self { line, model: options.model, controls: None, thread })
     }
 }
 
 impl Link for SimulatedBoard {
     fn name(&self) -> String {
-        "simulated board".to_owned()
+        self.model.figures().link.to_owned()
     }
 
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
@@ -171,25 +198,76 @@ fn firmware(
     options: Options,
     circuit: &Arc<Circuit>,
     line: &Arc<Line>,
-) -> Result<SimulatedFirmware, SimulatedBoardError> {
-    let parts = Parts {
-        mux: Transparent::new([0, 1, 2, 3, 4].map(|line| AddressPin::new(circuit, line))),
-        sampler: SimulatedSampler::new(circuit, physics, detector.adc, options.seed),
-        serial: BoardEnd::new(line, circuit, options.baud),
-        chip: SimulatedChip::new(circuit),
+) -> Result<Step, SimulatedBoardError> {
+    let figures = options.model.figures();
+    let identity = identity(detector, options.model)?;
+    let sampler = SimulatedSampler::new(circuit, physics, figures, detector.adc, options.seed);
+    let serial = BoardEnd::new(line, circuit, figures);
+    let chip = SimulatedChip::new(circuit);
+    let pin = |line| MuxPin::new(circuit, line);
+    let address = |bit| pin(MuxLine::Address(bit));
+    let made = match figures.wiring {
+        // Five lines, as an ADG732 has them: 32 electrodes are the most that the protocol carries.
+        Wiring::Transparent => {
+            let mux = Transparent::new([0, 1, 2, 3, 4].map(address));
+            steps(Parts { mux, sampler, serial, chip }, identity)
+        }
+        Wiring::Latched => {
+            let lines = LatchLines { wr: pin(MuxLine::Wr), csa: pin(MuxLine::Csa), csb: pin(MuxLine::Csb) };
+            let mux = match Latched::new([0, 1, 2, 3].map(address), lines) {
+                Ok(mux) => mux,
+                Err(never) => match never {},
+            };
+            steps(Parts { mux, sampler, serial, chip }, identity)
+        }
     };
-    let refused = |source| SimulatedBoardError::Board { detector: detector.name.clone(), source };
-    if !(1..=16).contains(&detector.adc.bits) {
-        return Err(refused(NewBoardError::AdcBits(detector.adc.bits)));
+    made.map_err(|source| SimulatedBoardError::Board { detector: detector.name.clone(), source })
+}
+
+fn steps<M>(
+    parts: Parts<M, SimulatedSampler, BoardEnd, SimulatedChip>,
+    identity: Identity,
+) -> Result<Step, NewBoardError>
+where
+    M: Mux<Error = Infallible> + Send + 'static,
+{
+    let mut board = SimulatedFirmware::new(parts, identity)?;
+    Ok(Box::new(move || match board.step() {
+        Ok(activity) => activity,
+        Err(never) => match never {},
+    }))
+}
+
+/// What the board says of itself.
+fn identity(detector: &Detector, model: BoardModel) -> Result<Identity<'static>, SimulatedBoardError> {
+    let name = || detector.name.clone();
+    let (electrodes, most) = (detector.electrodes.len(), model.most_electrodes());
+    if model != BoardModel::Ideal && electrodes > most {
+        let board = model.figures().name;
+        return Err(SimulatedBoardError::Electrodes { detector: name(), electrodes, board, most });
     }
-    let identity = Identity {
+    Ok(Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),
-        board: "simulated",
-        electrodes: u8::try_from(detector.electrodes.len()).unwrap_or(u8::MAX),
-        adc: Adc::new(detector.adc.bits, millivolts(detector, "adc.full_scale_v", detector.adc.full_scale_v)?),
+        board: model.figures().name,
+        electrodes: u8::try_from(electrodes).unwrap_or(u8::MAX),
+        adc: adc(detector, model)?,
         drive_mv: millivolts(detector, "drive_v", detector.drive_v)?,
-    };
-    SimulatedFirmware::new(parts, identity).map_err(refused)
+    })
+}
+
+/// The board's own converter, or the one that the detector's description has.
+fn adc(detector: &Detector, model: BoardModel) -> Result<Adc, SimulatedBoardError> {
+    let bits = detector.adc.bits;
+    match model.firmware_adc() {
+        Some(adc) => Ok(adc),
+        None if (1..=16).contains(&bits) => {
+            Ok(Adc::new(bits, millivolts(detector, "adc.full_scale_v", detector.adc.full_scale_v)?))
+        }
+        None => {
+            let source = NewBoardError::AdcBits(bits);
+            Err(SimulatedBoardError::Board { detector: detector.name.clone(), source })
+        }
+    }
 }
 
 fn millivolts(detector: &Detector, field: &'static str, volts: f64) -> Result<u16, SimulatedBoardError> {
@@ -201,19 +279,18 @@ fn millivolts(detector: &Detector, field: &'static str, volts: f64) -> Result<u1
 }
 
 /// Runs the board until the host lets go of the line.
-fn run(mut board: SimulatedFirmware, circuit: &Circuit, line: &Line) {
+fn run(mut step: Step, circuit: &Circuit, line: &Line) {
     // Even if the board's thread panics, the host is not left waiting.
     let _closes = line::CloseOnDrop(line);
     let clocks = Clocks { circuit, start: Instant::now() };
     while line.is_open() {
-        match board.step() {
-            Ok(Activity::Row) => clocks.wait_if_ahead_by(AHEAD),
-            Ok(Activity::Frame) => clocks.wait_if_ahead_by(Duration::ZERO),
-            Ok(Activity::Idle) => clocks.idle(line, IDLE),
-            Ok(Activity::Waiting { until_us }) => {
+        match step() {
+            Activity::Row => clocks.wait_if_ahead_by(AHEAD),
+            Activity::Frame => clocks.wait_if_ahead_by(Duration::ZERO),
+            Activity::Idle => clocks.idle(line, IDLE),
+            Activity::Waiting { until_us } => {
                 clocks.idle(line, Duration::from_micros(until_us).saturating_sub(clocks.wall()).min(IDLE));
             }
-            Err(never) => match never {},
         }
     }
 }

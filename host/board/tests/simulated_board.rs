@@ -9,12 +9,12 @@ use tactomo_board::frames::FrameFile;
 use tactomo_board::link::{Control, ControlError, Link, Playing};
 use tactomo_board::record::{Header, Recorder};
 use tactomo_board::session::{RequestedSettings, Session, send};
-use tactomo_board::simulated::{Options, SimulatedBoard};
+use tactomo_board::simulated::{BoardModel, Options, SimulatedBoard, SimulatedBoardError};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Contact, Hand, Scene, SceneName};
 use tactomo_physics::simulate::{Physics, Simulation};
-use tactomo_protocol::{BoardMessage, BoardReceiver, Frame, Hello, Settings};
+use tactomo_protocol::{BoardMessage, BoardReceiver, Frame, Hello, Settings, Status};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -224,6 +224,130 @@ fn presses_scenes_and_faults_come_while_frames_go_on() {
     assert!(error.contains("there is no electrode 99"), "{error}");
     let mut fixed = board(Untouched::default());
     assert_eq!(fixed.control(&Control::Press(Vec::new())), Err(ControlError::Fixed));
+}
+
+/// The same voltage everywhere (V), which rises with time (V/s).
+#[derive(Clone, Copy)]
+struct Rising(f64, f64);
+
+impl Physics for Rising {
+    fn readings_v(&mut self, time_s: f64) -> Readings {
+        Readings::from_fn(16, |_, _| self.0 + self.1 * time_s)
+    }
+}
+
+fn model(model: BoardModel, seed: u64, physics: impl Physics + 'static) -> Host {
+    let board = SimulatedBoard::start(&detector(), Box::new(physics), Options { seed, model });
+    Host::new(board.unwrap(), RequestedSettings::default())
+}
+
+/// Frames of a board at a constant voltage (V).
+fn frames_at(board: BoardModel, volts: f64, seed: u64) -> Vec<Frame> {
+    let mut host = model(board, seed, Rising(volts, 0.0));
+    host.frames_more(10);
+    host.frames
+}
+
+#[test]
+fn boards_scan_as_fast_as_their_budgets_say() {
+    // Settle, conversions and the firmware's work of sixteen rows (`docs/hardware.md`).
+    let budgets_us = [(BoardModel::Ideal, 832.0), (BoardModel::Esp32, 2365.0), (BoardModel::Esp32c3, 11_227.0)];
+    for (board, budget_us) in budgets_us {
+        let mut host = model(board, 1, Rising(0.5, 0.0));
+        host.frames_more(40);
+        let mut scans_us: Vec<f64> = host.frames.windows(2).map(|pair| scan_us(&pair[0], &pair[1])).collect();
+        scans_us.sort_by(f64::total_cmp);
+        let median_us = scans_us[scans_us.len() / 2];
+        assert!((median_us / budget_us - 1.0).abs() < 0.01, "{board:?}: {median_us} us a scan");
+    }
+}
+
+#[test]
+fn boards_tell_their_names_and_what_their_converters_can_see() {
+    let told = |board| {
+        let mut host = model(board, 1, Rising(0.0, 0.0));
+        host.exchange_until("hello", |host| host.hello.is_some());
+        let hello = host.hello.unwrap();
+        let ranges: Vec<_> = hello.ranges.iter().map(|range| (range.electrodes, range.floor, range.ceiling)).collect();
+        (hello.board.to_string(), hello.adc_full_scale_mv, ranges)
+    };
+    assert_eq!(told(BoardModel::Ideal), ("simulated".to_owned(), 3300, vec![(16, 0, 4095)]));
+    let esp32 = vec![(6, 142, 3100), (10, 128, 3100)];
+    assert_eq!(told(BoardModel::Esp32), ("esp32 (simulated)".to_owned(), 4096, esp32));
+    assert_eq!(told(BoardModel::Esp32c3), ("esp32c3 (simulated)".to_owned(), 4096, vec![(16, 0, 2500)]));
+}
+
+/// Board time of a scan, of the frames that went lost between too.
+fn scan_us(one: &Frame, next: &Frame) -> f64 {
+    let scans = next.head.sequence.wrapping_sub(one.head.sequence);
+    f64::from(next.head.time_us - one.head.time_us) / f64::from(scans)
+}
+
+#[test]
+fn the_wire_of_the_esp32_carries_no_more_than_its_baud_rate() {
+    // Above 2.05 V a frame is twelve bits a reading, 398 to 400 bytes: 230 frames/s, fewer than are scanned.
+    let mut host = model(BoardModel::Esp32, 1, Rising(2.5, 0.0));
+    host.frames_more(300);
+    let [first, last] = [&host.frames[100], &host.frames[299]].map(|frame| frame.head);
+    let frames_per_s = 199.0 / (f64::from(last.time_us - first.time_us) * 1e-6);
+    assert!(frames_per_s < 92_160.0 / 396.0, "{frames_per_s}");
+    assert!(last.sequence - first.sequence > 199, "scans that find no room are dropped");
+}
+
+#[test]
+fn floors_and_ceilings_show_in_the_readings() {
+    let ends = |board, volts| {
+        let frame = frames_at(board, volts, 3).remove(5);
+        let row = frame.readings[32..48].to_vec();
+        assert!(frame.readings.chunks(16).all(|other| other == row), "noise does not reach in");
+        (row[0], row[5], row[6], row[15])
+    };
+    assert_eq!(ends(BoardModel::Esp32, 0.05), (142, 142, 128, 128));
+    assert_eq!(ends(BoardModel::Esp32, 3.3), (3100, 3100, 3100, 3100));
+    assert_eq!(ends(BoardModel::Esp32c3, -0.1), (0, 0, 0, 0));
+    assert_eq!(ends(BoardModel::Esp32c3, 2.7), (2500, 2500, 2500, 2500));
+    let head = |volts| frames_at(BoardModel::Esp32, volts, 3)[5].head;
+    assert_eq!([head(3.3), head(2.0)].map(|head| head.status), [Status::SATURATED, Status::default()]);
+}
+
+#[test]
+fn a_seed_repeats_a_board_and_another_is_another_chip() {
+    for board in [BoardModel::Esp32, BoardModel::Esp32c3] {
+        let codes = |seed| frames_at(board, 1.0, seed)[0].readings.to_vec();
+        assert_eq!(codes(5), codes(5));
+        // A chip's gain is in the mean of a frame.
+        let mean = |codes: Vec<u16>| codes.into_iter().map(f64::from).sum::<f64>() / 256.0;
+        let means: Vec<f64> = (1..8).map(|seed| mean(codes(seed))).collect();
+        let spread = means.iter().copied().fold(f64::MIN, f64::max) - means.iter().copied().fold(f64::MAX, f64::min);
+        assert!(spread > 4.0 && means.iter().all(|mean| (mean - 1000.0).abs() < 60.0), "{means:?}");
+    }
+}
+
+#[test]
+fn the_scene_moves_on_while_a_real_board_scans() {
+    // 10 V/s over fifteen rows of 702 us, and the ideal board's noise.
+    let risen = |board| {
+        let frame = first_frame(model(board, 2, Rising(0.5, 10.0)));
+        let row =
+            |ground: usize| frame.readings[16 * ground..][..16].iter().map(|code| f64::from(*code)).sum::<f64>() / 16.0;
+        row(15) - row(0)
+    };
+    assert!((risen(BoardModel::Esp32c3) - 105.0).abs() < 8.0, "{} mV", risen(BoardModel::Esp32c3));
+    assert!(risen(BoardModel::Ideal).abs() < 3.0, "{} codes", risen(BoardModel::Ideal));
+}
+
+fn first_frame(mut host: Host) -> Frame {
+    host.frames_more(1);
+    host.frames.remove(0)
+}
+
+#[test]
+fn a_board_takes_no_more_electrodes_than_it_has_inputs_for() {
+    let wide = Detector::preset("display-140x70").unwrap();
+    let start = |model| SimulatedBoard::start(&wide, Box::new(Rising(0.0, 0.0)), Options { seed: 1, model }).err();
+    let error = start(BoardModel::Esp32).unwrap();
+    assert!(matches!(error, SimulatedBoardError::Electrodes { electrodes: 32, most: 16, .. }), "{error}");
+    assert!(start(BoardModel::Ideal).is_none());
 }
 
 /// Reads of any length, so that the recording begins anywhere in a packet.

@@ -36,6 +36,7 @@ const REQUESTS: usize = 64;
 ///   tactomo live --simulate                         without hardware
 ///   tactomo live --simulate --scene five-fingers --force 2 --fault open:3
 ///   tactomo live --simulate --scene gripper         a demonstration, on the detector that it was made for
+///   tactomo live --simulate --board esp32           at the pace and with the ADCs of the paper's board
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
 ///   tactomo live --simulate --scan adaptive         the rows that tell most, as they come

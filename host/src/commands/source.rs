@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::ArgGroup;
+use clap::{ArgGroup, ValueEnum};
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::link::{AnyBoard, NamedPort, Opened, Recording, Source};
 use tactomo::board::record::RecordReader;
 use tactomo::board::session::RequestedSettings;
-use tactomo::board::simulated::{Options, SimulatedBoard};
+use tactomo::board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo::detector::Detector;
 use tactomo::scene::SceneName;
 use tactomo::simulate::Simulation;
@@ -19,6 +19,9 @@ use super::scene::{self, SceneArgs};
 /// How firmly the mouse presses on the simulated detector, from 0 to 1.
 const MOUSE_FIRMNESS: f64 = 0.3;
 
+/// The board that is simulated unless one is chosen.
+const DEFAULT_BOARD: BoardModel = BoardModel::Ideal;
+
 /// A board: on the port that is named, or on whichever USB serial port one is found.
 #[derive(Clone, Debug, clap::Args)]
 #[command(group(ArgGroup::new("simulated").args(SceneArgs::NAMES).multiple(true).requires("simulate")))]
@@ -29,6 +32,9 @@ pub struct BoardArgs {
     /// Uses the simulated board: the real firmware on simulated pins
     #[arg(long)]
     pub simulate: bool,
+    /// Which board is simulated [default: ideal]
+    #[arg(long, value_enum, value_name = "BOARD", requires = "simulate")]
+    board: Option<BoardName>,
     /// Baud rate of the serial port
     #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     pub baud: u32,
@@ -39,6 +45,17 @@ pub struct BoardArgs {
     /// How many times faster than the simulated board its scene plays and its foam creeps and drifts: a day in 86 seconds with 1000
     #[arg(long, value_name = "FACTOR", default_value = "1", requires = "simulate", value_parser = scene::positive)]
     pub time_factor: f64,
+}
+
+/// Boards that can be simulated.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum BoardName {
+    /// The converter of the detector's description, at 2 us a conversion, on a line without end
+    Ideal,
+    /// ESP-WROOM-32: two ADCs with a floor at 0.14 V, 921600 baud
+    Esp32,
+    /// ESP32-C3: one ADC behind the multiplexer, USB
+    Esp32c3,
 }
 
 /// Settings of the scan; what is not given stays as the board has it.
@@ -55,7 +72,24 @@ pub struct SettingsArgs {
     max_fps: Option<u16>,
 }
 
+impl From<BoardName> for BoardModel {
+    fn from(name: BoardName) -> Self {
+        match name {
+            BoardName::Ideal => Self::Ideal,
+            BoardName::Esp32 => Self::Esp32,
+            BoardName::Esp32c3 => Self::Esp32c3,
+        }
+    }
+}
+
 impl BoardArgs {
+    /// The board to simulate: one that was chosen, or the default where it has inputs for the detector.
+    fn model(&self, detector: &Detector) -> BoardModel {
+        let fits = detector.electrodes.len() <= DEFAULT_BOARD.most_electrodes();
+        let default = if fits { DEFAULT_BOARD } else { BoardModel::Ideal };
+        self.board.map_or(default, BoardModel::from)
+    }
+
     /// The board on a serial port.
     fn serial(&self) -> Box<dyn Source> {
         let baud = self.baud;
@@ -73,10 +107,14 @@ impl SettingsArgs {
     }
 }
 
-/// What is told of the detector: one that is simulated is as it is described, unless it is one as built.
+/// What is told of the detector: one that is simulated is as it is described, unless it is one as built, and has the converter of its board.
 pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
-    let is_exact = args.simulate && !args.scene.as_built.is_given();
-    if is_exact { detector.taken_as_exact() } else { detector }
+    if !args.simulate {
+        return detector;
+    }
+    let adc = args.model(&detector).adc(detector.adc);
+    let detector = Detector { adc, ..detector };
+    if args.scene.as_built.is_given() { detector } else { detector.taken_as_exact() }
 }
 
 /// The board that is chosen, and what the mouse presses with on a simulated one.
@@ -93,7 +131,7 @@ pub fn board(
     let seed = args.scene.seed();
     let built = args.scene.as_built.of(detector)?;
     let simulation = Simulation::new(&built, scene, &args.scene.fault, seed)?.at_speed(args.time_factor);
-    let link = SimulatedBoard::simulate(&built, simulation, Options { seed, ..Options::default() })?;
+    let link = SimulatedBoard::simulate(&built, simulation, Options { seed, model: args.model(&built) })?;
     Ok((Box::new(Opened::new(Box::new(link))), finger))
 }
 

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use tactomo::board::link::Link;
-use tactomo::board::simulated::{Options, SimulatedBoard, SimulatedBoardError};
+use tactomo::board::simulated::{BoardModel, Options, SimulatedBoard, SimulatedBoardError};
 use tactomo::detector::{Adc, Detector};
 use tactomo::readings::Readings;
 use tactomo::simulate::Physics;
@@ -165,7 +165,7 @@ fn detectors_of_32_electrodes_are_scanned_and_larger_ones_refused() {
 
 #[test]
 fn a_uart_at_921600_baud_drops_whole_frames_and_keeps_the_board_time() {
-    let options = Options { baud: Some(921_600), ..Options::default() };
+    let options = Options { model: BoardModel::Esp32, ..Options::default() };
     let mut host = Host::start(&detector(12, 1.5), Constant(16, 3.0), options);
     host.send(Command::Start);
     let frames = host.frames(300);

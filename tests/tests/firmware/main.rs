@@ -4,5 +4,7 @@
 mod closed_loop;
 mod commands;
 mod parts;
+mod plans;
+mod samplers;
 mod scan;
 mod uplink;

@@ -1,37 +1,70 @@
-//! The circuit around the simulated firmware: address lines, converter, and the clock that both move on.
+//! The circuit around the simulated firmware: the multiplexer's lines and latches, and the clock of the board.
 
 use std::convert::Infallible;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use tactomo_firmware::{Chip, Sampler, TimedOut};
-
-use tactomo_physics::detector::Adc;
-use tactomo_physics::readings::Readings;
-use tactomo_physics::simulate::{Noise, Physics, code};
-
-/// Time of one conversion, the firmware's share included: that of a fast SAR converter.
-const CONVERSION_NS: u64 = 2_000;
+use tactomo_firmware::Chip;
 
 /// What pins, converter and chip share. Only the board's thread touches it.
 #[derive(Debug, Default)]
 pub(super) struct Circuit {
     now_ns: AtomicU64,
-    /// The electrode on the address lines: the grounded one.
-    address: AtomicU8,
-    /// Times that an address line was driven, which tells a ground set anew from one that stayed.
-    writes: AtomicU64,
-    /// When that was last.
-    written_ns: AtomicU64,
+    /// Levels of the multiplexer's lines: a bit for each [`MuxLine`]. All are low, and the switches transparent, until they are driven.
+    levels: AtomicU16,
+    /// The electrode that half A grounds, and the one that half B brings to the converter.
+    grounded: AtomicU8,
+    selected: AtomicU8,
+    /// Times that half A took an address, which tells a ground set anew from one that stayed.
+    groundings: AtomicU64,
+    /// When either half last took one.
+    grounded_ns: AtomicU64,
+    selected_ns: AtomicU64,
+    /// The firmware's own work for a row.
+    row_work_ns: u64,
+}
+
+/// A line of the multiplexer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MuxLine {
+    /// Address bit 0 to 4.
+    Address(u8),
+    /// Write, active low.
+    Wr,
+    /// Chip selects of the halves, active low.
+    Csa,
+    Csb,
+}
+
+impl MuxLine {
+    const ADDRESS: u16 = 0b1_1111;
+
+    fn mask(self) -> u16 {
+        match self {
+            Self::Address(bit) => 1 << bit,
+            Self::Wr => 1 << 5,
+            Self::Csa => 1 << 6,
+            Self::Csb => 1 << 7,
+        }
+    }
 }
 
 impl Circuit {
+    /// The circuit of a board whose firmware works so long for a row (ns).
+    pub(super) fn new(row_work_ns: u64) -> Self {
+        Self { row_work_ns, ..Self::default() }
+    }
+
     /// Board time since the reset.
     pub(super) fn now(&self) -> Duration {
-        Duration::from_nanos(self.now_ns.load(Relaxed))
+        Duration::from_nanos(self.now_ns())
+    }
+
+    pub(super) fn now_ns(&self) -> u64 {
+        self.now_ns.load(Relaxed)
     }
 
     /// Moves the board's clock on to `time`, never back.
@@ -39,43 +72,82 @@ impl Circuit {
         self.now_ns.fetch_max(time.as_nanos() as u64, Relaxed);
     }
 
-    fn advance(&self, ns: u64) {
+    pub(super) fn advance(&self, ns: u64) {
         self.now_ns.fetch_add(ns, Relaxed);
     }
 
-    fn note_write(&self) {
-        self.writes.fetch_add(1, Relaxed);
-        self.written_ns.store(self.now_ns.load(Relaxed), Relaxed);
+    /// The grounded electrode.
+    pub(super) fn grounded(&self) -> u8 {
+        self.grounded.load(Relaxed)
+    }
+
+    /// The electrode at the one input of a board that has one.
+    pub(super) fn selected(&self) -> u8 {
+        self.selected.load(Relaxed)
+    }
+
+    pub(super) fn groundings(&self) -> u64 {
+        self.groundings.load(Relaxed)
+    }
+
+    /// Board time of the last grounding (ns).
+    pub(super) fn grounded_ns(&self) -> u64 {
+        self.grounded_ns.load(Relaxed)
+    }
+
+    /// Board time of the last selection (ns).
+    pub(super) fn selected_ns(&self) -> u64 {
+        self.selected_ns.load(Relaxed)
+    }
+
+    /// A half follows the address while WR and its chip select are low, and keeps what it had otherwise. The firmware's work for a row passes
+    /// before half A takes the row's address: before its first bit where the switch is transparent, before WR where it is latched.
+    fn drive(&self, line: MuxLine, high: bool) {
+        let mut levels = self.levels.load(Relaxed);
+        levels = if high { levels | line.mask() } else { levels & !line.mask() };
+        self.levels.store(levels, Relaxed);
+        let follows = |select: MuxLine| levels & (MuxLine::Wr.mask() | select.mask()) == 0;
+        if follows(MuxLine::Csa) && matches!(line, MuxLine::Address(0) | MuxLine::Wr) {
+            self.advance(self.row_work_ns);
+        }
+        let (address, now_ns) = ((levels & MuxLine::ADDRESS) as u8, self.now_ns());
+        if follows(MuxLine::Csa) {
+            self.grounded.store(address, Relaxed);
+            self.groundings.fetch_add(1, Relaxed);
+            self.grounded_ns.store(now_ns, Relaxed);
+        }
+        if follows(MuxLine::Csb) {
+            self.selected.store(address, Relaxed);
+            self.selected_ns.store(now_ns, Relaxed);
+        }
     }
 }
 
-/// One address line of the multiplexer.
+/// The pin that drives a line of the multiplexer.
 #[derive(Debug)]
-pub(super) struct AddressPin {
+pub(super) struct MuxPin {
     circuit: Arc<Circuit>,
-    mask: u8,
+    line: MuxLine,
 }
 
-impl AddressPin {
-    pub(super) fn new(circuit: &Arc<Circuit>, line: u8) -> Self {
-        Self { circuit: Arc::clone(circuit), mask: 1 << line }
+impl MuxPin {
+    pub(super) fn new(circuit: &Arc<Circuit>, line: MuxLine) -> Self {
+        Self { circuit: Arc::clone(circuit), line }
     }
 }
 
-impl ErrorType for AddressPin {
+impl ErrorType for MuxPin {
     type Error = Infallible;
 }
 
-impl OutputPin for AddressPin {
+impl OutputPin for MuxPin {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        self.circuit.address.fetch_and(!self.mask, Relaxed);
-        self.circuit.note_write();
+        self.circuit.drive(self.line, false);
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        self.circuit.address.fetch_or(self.mask, Relaxed);
-        self.circuit.note_write();
+        self.circuit.drive(self.line, true);
         Ok(())
     }
 }
@@ -102,60 +174,4 @@ impl Chip for SimulatedChip {
     }
 
     fn feed_watchdog(&mut self) {}
-}
-
-/// The converter on the pads of a simulated detector. The scene stands still for the length of a scan.
-pub(super) struct SimulatedSampler {
-    circuit: Arc<Circuit>,
-    physics: Box<dyn Physics>,
-    adc: Adc,
-    noise: Noise,
-    /// Pad voltages of the scan under way.
-    readings: Option<Readings>,
-    /// Writes to the address lines when the last scan began.
-    begun_at_write: u64,
-    /// When the first scan began: the scene begins with it, however long the host took to start the board.
-    first_scan: Option<Duration>,
-}
-
-impl SimulatedSampler {
-    pub(super) fn new(circuit: &Arc<Circuit>, physics: Box<dyn Physics>, adc: Adc, seed: u64) -> Self {
-        Self {
-            circuit: Arc::clone(circuit),
-            physics,
-            adc,
-            noise: Noise::new(seed),
-            readings: None,
-            begun_at_write: 0,
-            first_scan: None,
-        }
-    }
-
-    /// Asks for the pad voltages anew, as they were at that moment, if electrode 0 was grounded since the last time: a scan
-    /// begins there.
-    fn readings(&mut self, ground: u8) -> &Readings {
-        let writes = self.circuit.writes.load(Relaxed);
-        if ground == 0 && writes != self.begun_at_write {
-            self.begun_at_write = writes;
-            self.readings = None;
-        }
-        let begun = Duration::from_nanos(self.circuit.written_ns.load(Relaxed));
-        let first = *self.first_scan.get_or_insert(begun);
-        self.readings.get_or_insert_with(|| self.physics.readings_v((begun - first).as_secs_f64()))
-    }
-
-    /// The code nearest to a voltage (V), with noise.
-    fn convert(&mut self, volts: f64) -> u16 {
-        // The board refuses converters of more than 16 bits.
-        code(volts, &self.adc, &mut self.noise).min(u32::from(u16::MAX)) as u16
-    }
-}
-
-impl Sampler for SimulatedSampler {
-    fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
-        let ground = self.circuit.address.load(Relaxed);
-        let volts = self.readings(ground).at(usize::from(ground), usize::from(electrode));
-        self.circuit.advance(CONVERSION_NS);
-        Ok(self.convert(volts))
-    }
 }

@@ -8,15 +8,12 @@ use std::time::{Duration, Instant};
 use tactomo_firmware::Serial;
 
 use super::circuit::Circuit;
+use super::model::{Figures, LineFigures};
 
 /// Bytes that wait for the host: as many as the kernel keeps for a serial port that nobody reads.
 const UP_BYTES: usize = 64 * 1024;
 /// Bytes that wait for the board.
 const DOWN_BYTES: usize = 4 * 1024;
-/// Bytes in the FIFO of the board's UART.
-const FIFO_BYTES: f64 = 128.0;
-/// Bits that a UART sends for a byte: start, eight, stop.
-const BITS_A_BYTE: f64 = 10.0;
 
 /// Both directions.
 #[derive(Debug)]
@@ -159,21 +156,23 @@ fn gone() -> io::Error {
 #[derive(Debug)]
 pub(super) struct BoardEnd {
     line: Arc<Line>,
-    uart: Option<Uart>,
+    circuit: Arc<Circuit>,
+    fifo: Option<Fifo>,
 }
 
 impl BoardEnd {
-    pub(super) fn new(line: &Arc<Line>, circuit: &Arc<Circuit>, baud: Option<u32>) -> Self {
-        Self { line: Arc::clone(line), uart: baud.map(|baud| Uart::new(circuit, baud)) }
+    pub(super) fn new(line: &Arc<Line>, circuit: &Arc<Circuit>, figures: &Figures) -> Self {
+        let fifo = figures.line.map(|figures| Fifo { figures, held: 0.0, at: Duration::ZERO });
+        Self { line: Arc::clone(line), circuit: Arc::clone(circuit), fifo }
     }
 }
 
 impl Serial for BoardEnd {
     fn push(&mut self, bytes: &[u8]) -> usize {
-        let room = self.uart.as_mut().map_or(bytes.len(), Uart::room);
+        let room = self.fifo.as_mut().map_or(bytes.len(), |fifo| fifo.room(self.circuit.now()));
         let count = self.line.up.put(&bytes[..bytes.len().min(room)]);
-        if let Some(uart) = &mut self.uart {
-            uart.held += count as f64;
+        if let Some(fifo) = &mut self.fifo {
+            fifo.held += count as f64;
         }
         count
     }
@@ -183,27 +182,20 @@ impl Serial for BoardEnd {
     }
 }
 
-/// The FIFO of a UART that empties at a baud rate. A byte reaches the host when the FIFO takes it: up to 128 byte times early.
+/// The FIFO of a transmitter that empties at a steady rate. A byte reaches the host when the FIFO takes it: up to a FIFO's time early.
 #[derive(Debug)]
-struct Uart {
-    circuit: Arc<Circuit>,
-    bytes_per_s: f64,
+struct Fifo {
+    figures: LineFigures,
     held: f64,
     at: Duration,
 }
 
-impl Uart {
-    fn new(circuit: &Arc<Circuit>, baud: u32) -> Self {
-        let bytes_per_s = f64::from(baud) / BITS_A_BYTE;
-        Self { circuit: Arc::clone(circuit), bytes_per_s, held: 0.0, at: Duration::ZERO }
-    }
-
-    /// Bytes that the FIFO has room for now.
-    fn room(&mut self) -> usize {
-        let now = self.circuit.now();
-        let sent = (now - self.at).as_secs_f64() * self.bytes_per_s;
+impl Fifo {
+    /// Bytes that it has room for at this board time.
+    fn room(&mut self, now: Duration) -> usize {
+        let sent = (now - self.at).as_secs_f64() * self.figures.bytes_per_s;
         self.at = now;
         self.held = (self.held - sent).max(0.0);
-        (FIFO_BYTES - self.held) as usize
+        (self.figures.fifo_bytes - self.held) as usize
     }
 }

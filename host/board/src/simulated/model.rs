@@ -1,0 +1,245 @@
+//! What a simulated board has of a real one: its times, its line and its analogue side, in figures with their sources.
+//!
+//! None of them was measured on a board of ours: they are of data sheets, of Espressif's own pages, and of what users published.
+
+use tactomo_firmware::Adc as FirmwareAdc;
+use tactomo_physics::detector::Adc;
+use tactomo_protocol::Range;
+
+/// Which board is simulated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BoardModel {
+    /// The detector's own converter behind a fast multiplexer, a line without end, and a scene that stands still for a scan.
+    #[default]
+    Ideal,
+    /// An ESP-WROOM-32: two ADCs with a floor, 16 inputs of which four are behind strapping resistors, UART at 921600 baud.
+    Esp32,
+    /// An ESP32-C3: one ADC behind the multiplexer's second half, USB.
+    Esp32c3,
+}
+
+/// How electrodes reach ground and converter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wiring {
+    /// Half A grounds, every electrode has an input of its own.
+    Transparent,
+    /// Half A grounds, half B brings the electrode to the only input.
+    Latched,
+}
+
+/// Figures of a board.
+#[derive(Debug)]
+pub(super) struct Figures {
+    /// Its name in Hello.
+    pub(super) name: &'static str,
+    /// Its name as a link.
+    pub(super) link: &'static str,
+    pub(super) wiring: Wiring,
+    /// Time of one conversion, the firmware's share included (ns).
+    pub(super) conversion_ns: u64,
+    /// The firmware's own work for a row (ns): packing, checksum, framing, commands.
+    pub(super) row_work_ns: u64,
+    /// `None`: as fast as the host reads.
+    pub(super) line: Option<LineFigures>,
+    /// `None`: the converter that the detector's description has.
+    pub(super) analog: Option<Analog>,
+}
+
+/// The transmitter of a board.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LineFigures {
+    pub(super) bytes_per_s: f64,
+    pub(super) fifo_bytes: f64,
+}
+
+/// The analogue side of a board.
+#[derive(Debug)]
+pub(super) struct Analog {
+    /// Runs of electrodes that share an ADC.
+    pub(super) converters: &'static [ConverterFigures],
+    /// What every electrode's input is like, unless it is one of `strapping`.
+    pub(super) input: InputFigures,
+    /// The inputs on strapping pins, and their electrodes.
+    pub(super) strapping: (&'static [usize], InputFigures),
+}
+
+/// One ADC, calibrated by its factory's figures: its codes are millivolts.
+#[derive(Debug)]
+pub(super) struct ConverterFigures {
+    /// Electrodes on it.
+    pub(super) electrodes: usize,
+    /// What its lowest and highest raw codes read (mV).
+    pub(super) floor_mv: f64,
+    pub(super) ceiling_mv: f64,
+    /// Standard deviation of one conversion (mV).
+    pub(super) noise_mv: f64,
+    /// Standard deviation, from chip to chip, of the gain that calibration leaves.
+    pub(super) gain_deviation: f64,
+    /// Standard deviation, from chip to chip, of the height of the bow that calibration leaves in the middle of the range (mV).
+    pub(super) bow_mv: f64,
+}
+
+/// The way from a pad to an ADC.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct InputFigures {
+    /// Resistance of the foam at the pad and of what is in series (ohm).
+    pub(super) source_ohm: f64,
+    /// Capacitor across the series resistor (F).
+    pub(super) across_f: f64,
+    /// Capacitance of the pin and of what hangs on it (F).
+    pub(super) node_f: f64,
+    /// The ADC's sampling capacitor (F), and for how long it is on the pin (s).
+    pub(super) sampling_f: f64,
+    pub(super) sampling_s: f64,
+}
+
+/// Calibrated codes are millivolts: 12 bits of 4096 mV, as `firmware/boards/espressif/src/analog.rs` has them.
+const BITS: u8 = 12;
+const FULL_SCALE_MV: u16 = 1 << BITS;
+
+/// Standard deviation of one calibrated conversion (mV): nine of 721 mV at a fixed divider, published by a user of an ESP32 with
+/// factory calibration, have 4.9 mV (forum.pycom.io, "ADC woes"). The C3's is not published and taken as the same.
+const NOISE_MV: f64 = 5.0;
+/// The firmware's instructions outside conversions and waits, for each of 16 rows (`docs/hardware.md`), and cycles for each.
+const ROW_CYCLES: u64 = 71_261 * 3 / 2 / 16;
+
+/// The foam at a pad: 976 ohm between two electrodes of the 5 mm detector by an independent solver; and 1 kilohm against discharges.
+const PAD_OHM: f64 = 1e3;
+const SERIES_OHM: f64 = 1e3;
+const STRAPPING_OHM: f64 = 100e3;
+/// A pin of the chip with its wire (F), an open switch of the ADG726, and the drain of a half with the closed one (data sheet, 13 and
+/// 200 pF).
+const PIN_F: f64 = 20e-12;
+const SOURCE_OFF_F: f64 = 13e-12;
+const DRAIN_ON_F: f64 = 200e-12;
+/// The sampling capacitor is not published for these chips. Sharing with a probe of 18 pF, an STM32's was seen to carry 27 % of the voltage
+/// of the channel before (efton.sk, STM32 gotcha 220): 8 pF with the pin's own few.
+const SAMPLING_F: f64 = 8e-12;
+/// Nine cycles of the ESP32's ADC clock, 8 MHz by 2 (reset values of `SENS_SAR1_SAMPLE_CYCLE` and `SENS_SAR1_CLK_DIV`).
+const SAMPLING_S: f64 = 2.25e-6;
+/// Across the strapping resistors, as `docs/hardware.md` has the wiring, and why.
+const ACROSS_F: f64 = 47e-9;
+
+const INPUT: InputFigures = InputFigures {
+    source_ohm: PAD_OHM + SERIES_OHM,
+    across_f: 0.0,
+    node_f: PIN_F + SOURCE_OFF_F,
+    sampling_f: SAMPLING_F,
+    sampling_s: SAMPLING_S,
+};
+const STRAPPING_INPUT: InputFigures =
+    InputFigures { source_ohm: PAD_OHM + STRAPPING_OHM, across_f: ACROSS_F, node_f: PIN_F, ..INPUT };
+
+/// Integral non-linearity 12 LSB of 0.76 mV by the data sheet, and 60 mV of total error from 150 to 2450 mV after calibration at this
+/// attenuation: a bow of 12 mV and a gain of 1 % make 60 mV at 2450 mV about twice their deviation together.
+const ESP32_ADC1: ConverterFigures = ConverterFigures {
+    electrodes: 6,
+    floor_mv: 142.0,
+    ceiling_mv: 3100.0,
+    noise_mv: NOISE_MV,
+    gain_deviation: 0.01,
+    bow_mv: 12.0,
+};
+
+static IDEAL: Figures = Figures {
+    name: "simulated",
+    link: "simulated board",
+    wiring: Wiring::Transparent,
+    // A fast SAR converter.
+    conversion_ns: 2_000,
+    row_work_ns: 0,
+    line: None,
+    analog: None,
+};
+
+static ESP32: Figures = Figures {
+    name: "esp32 (simulated)",
+    link: "simulated ESP32",
+    wiring: Wiring::Transparent,
+    // 5 us is the data sheet's limit (200 000 a second); users' loops of single conversions take about 10, the software's share in it.
+    conversion_ns: 10_000,
+    // At 240 MHz.
+    row_work_ns: ROW_CYCLES * 1000 / 240,
+    // 921600 baud, ten bits a byte; FIFO of 128 bytes.
+    line: Some(LineFigures { bytes_per_s: 92_160.0, fifo_bytes: 128.0 }),
+    analog: Some(Analog {
+        // The floors are what code 0 of either ADC reads after calibration.
+        converters: &[ESP32_ADC1, ConverterFigures { electrodes: 10, floor_mv: 128.0, ..ESP32_ADC1 }],
+        input: INPUT,
+        // GPIO 0, 2, 15 and 12.
+        strapping: (&[7, 8, 9, 11], STRAPPING_INPUT),
+    }),
+};
+
+static ESP32C3: Figures = Figures {
+    name: "esp32c3 (simulated)",
+    link: "simulated ESP32-C3",
+    wiring: Wiring::Latched,
+    // 40 us with the 2 us after each change of half B (`docs/hardware.md`).
+    conversion_ns: 38_000,
+    // At 160 MHz.
+    row_work_ns: ROW_CYCLES * 1000 / 160,
+    // Nineteen packets of 64 bytes a millisecond (USB 2.0, 5.8.4: bulk transfers at full speed).
+    line: Some(LineFigures { bytes_per_s: 1_216_000.0, fifo_bytes: 64.0 }),
+    analog: Some(Analog {
+        // 35 mV of total error from 0 to 2500 mV by the data sheet, after a curve that takes most of the bow away.
+        converters: &[ConverterFigures {
+            electrodes: 16,
+            floor_mv: 0.0,
+            ceiling_mv: 2500.0,
+            noise_mv: NOISE_MV,
+            gain_deviation: 0.005,
+            bow_mv: 5.0,
+        }],
+        input: InputFigures { source_ohm: PAD_OHM, node_f: DRAIN_ON_F + PIN_F, ..INPUT },
+        strapping: (&[], STRAPPING_INPUT),
+    }),
+};
+
+impl BoardModel {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Ideal, Self::Esp32, Self::Esp32c3];
+
+    pub(super) fn figures(self) -> &'static Figures {
+        match self {
+            Self::Ideal => &IDEAL,
+            Self::Esp32 => &ESP32,
+            Self::Esp32c3 => &ESP32C3,
+        }
+    }
+
+    /// Most electrodes that it has inputs for.
+    pub fn most_electrodes(self) -> usize {
+        match &self.figures().analog {
+            Some(analog) => analog.converters.iter().map(|converter| converter.electrodes).sum(),
+            None => tactomo_protocol::MAX_ELECTRODES,
+        }
+    }
+
+    /// The converter of a detector on this board: the board's own, where it has one.
+    pub fn adc(self, described: Adc) -> Adc {
+        match &self.figures().analog {
+            Some(analog) => Adc {
+                bits: BITS,
+                full_scale_v: f64::from(FULL_SCALE_MV) * 1e-3,
+                noise_lsb: analog.converters.iter().map(|converter| converter.noise_mv).fold(0.0, f64::max),
+            },
+            None => described,
+        }
+    }
+
+    /// What the firmware is told of its converters, where the board has some of its own.
+    pub(super) fn firmware_adc(self) -> Option<FirmwareAdc> {
+        let analog = self.figures().analog.as_ref()?;
+        let ranges: Vec<Range> = analog.converters.iter().map(ConverterFigures::range).collect();
+        Some(FirmwareAdc::new(BITS, FULL_SCALE_MV).with_ranges(&ranges))
+    }
+}
+
+impl ConverterFigures {
+    /// What it can see, in codes, which are millivolts.
+    fn range(&self) -> Range {
+        let [floor, ceiling] = [self.floor_mv, self.ceiling_mv].map(|mv| mv as u16);
+        Range { electrodes: self.electrodes as u8, floor, ceiling }
+    }
+}
