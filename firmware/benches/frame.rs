@@ -10,7 +10,7 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use tactomo_firmware::mux::{LatchLines, Latched, Transparent};
 use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Mux, Parts, Sampler, Serial, TimedOut};
-use tactomo_protocol::{Command, MAX_COMMAND, Settings, encode_command};
+use tactomo_protocol::{Command, MAX_COMMAND, Request, Settings, VERSION, encode_request};
 
 fn main() {
     divan::main();
@@ -80,10 +80,11 @@ impl Chip for NullChip {
 fn commands(average_log2: u8) -> Vec<u8> {
     let settings = Settings { average_log2, ..Settings::default() };
     [Command::Configure(settings), Command::Start]
-        .iter()
+        .into_iter()
         .flat_map(|command| {
             let mut packet = [0; MAX_COMMAND];
-            let length = encode_command(command, &mut packet).unwrap_or_default();
+            let request = Request { tag: 1, command };
+            let length = encode_request(&request, VERSION, &mut packet).unwrap_or_default();
             packet.into_iter().take(length)
         })
         .collect()

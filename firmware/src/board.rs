@@ -2,8 +2,8 @@
 
 use heapless::String;
 use tactomo_protocol::{
-    BoardMessage, Command, CommandReceiver, DecodeError, Fault, Hello, MAX_ELECTRODES, MIN_ELECTRODES, Settings, frame,
-    wire_bytes,
+    BoardMessage, Command, CommandReceiver, DecodeError, Fault, Hello, MAX_ELECTRODES, MIN_ELECTRODES, Plan, Request,
+    Settings, VERSION, frame, scope, wire_bytes,
 };
 
 use crate::pace::Pace;
@@ -16,7 +16,9 @@ const RECEIVED_A_STEP: usize = 64;
 
 /// Longest packet of a frame of `electrodes` on the wire, in bytes.
 pub const fn frame_bytes(electrodes: usize) -> usize {
-    wire_bytes(1 + frame::HEAD_BYTES + 2 * electrodes * electrodes + tactomo_protocol::CRC_BYTES)
+    wire_bytes(
+        1 + frame::HEAD_BYTES + scope::MAX_SCOPE_BYTES + 2 * electrodes * electrodes + tactomo_protocol::CRC_BYTES,
+    )
 }
 
 /// A board with room for 16 electrodes.
@@ -48,6 +50,9 @@ pub enum NewBoardError {
     /// A reading has 16 bits.
     #[error("a converter of {0} bits: 1 to 16 fit")]
     AdcBits(u8),
+    /// A range without electrodes or codes.
+    #[error("the converters' ranges do not fit the electrodes and codes")]
+    Ranges,
     /// Without them the host cannot make volts of readings.
     #[error("the converter's full scale and the drive need to be above 0 mV")]
     Millivolts,
@@ -80,7 +85,6 @@ pub struct Board<M, S, L, C, const READINGS: usize, const WIRE: usize> {
     uplink: Uplink<WIRE>,
     pace: Pace,
     sequence: u16,
-    streaming: bool,
     /// Whether the host knows that the converter is stuck.
     stuck_told: bool,
     /// What went wrong before the reset, until a host has surely heard of it.
@@ -105,25 +109,28 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         if identity.adc.full_scale_mv == 0 || identity.drive_mv == 0 {
             return Err(NewBoardError::Millivolts);
         }
+        let hello = hello(&identity);
+        if !hello.is_valid() {
+            return Err(NewBoardError::Ranges);
+        }
         let mut board = Self {
             parts,
             adc: identity.adc,
-            hello: hello(&identity),
+            hello,
             receiver: CommandReceiver::default(),
             scan: Scan::new(identity.electrodes).ok_or(electrodes)?,
             uplink: Uplink::default(),
             pace: Pace::default(),
             sequence: 0,
-            streaming: false,
             stuck_told: false,
             boot_fault: None,
         };
-        board.say_hello();
+        board.say_hello(0);
         Ok(board)
     }
 
     /// Tells the host what went wrong before the reset. A host that was not listening yet hears it again after its first
-    /// [`Command::Hello`].
+    /// command.
     pub fn report(&mut self, fault: Fault) {
         self.fault(fault.clone());
         self.boot_fault = Some(fault);
@@ -154,9 +161,9 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         let mut bytes = [0; RECEIVED_A_STEP];
         let count = self.parts.serial.pull(&mut bytes);
         let mut input = bytes.get(..count).unwrap_or_default();
-        while let Some(command) = self.receiver.receive(&mut input) {
-            match command {
-                Ok(command) => self.obey(command),
+        while let Some(request) = self.receiver.receive(&mut input) {
+            match request {
+                Ok(request) => self.obey(request),
                 Err(DecodeError::Version(version)) => self.fault(Fault::UnknownVersion(version)),
                 // Noise is dropped; a body that this version does not know cannot be answered.
                 Err(DecodeError::Corrupt | DecodeError::Body) => {}
@@ -164,23 +171,32 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         }
     }
 
-    fn obey(&mut self, command: Command) {
-        let boot_fault = self.boot_fault.take();
+    fn obey(&mut self, Request { tag, command }: Request) {
+        match self.carry_out(tag, command) {
+            Ok(()) => self.say_hello(tag),
+            Err(refusal) => self.fault(refusal),
+        }
+        self.boot_fault.take().into_iter().for_each(|fault| self.fault(fault));
+    }
+
+    /// # Errors
+    /// The fault that refuses the command.
+    fn carry_out(&mut self, answers: u8, command: Command) -> Result<(), Fault> {
         match command {
-            Command::Hello => {
-                self.say_hello();
-                boot_fault.into_iter().for_each(|fault| self.fault(fault));
-            }
+            Command::Hello => {}
             Command::Start => self.start(),
             Command::Stop => self.stop(),
             Command::Configure(settings) if settings.is_valid() => self.configure(settings),
-            Command::Configure(_) => self.fault(Fault::BadSettings),
+            Command::Configure(_) => return Err(Fault::BadSettings { answers }),
+            Command::Scan(plan) if plan == Plan::default() => {}
+            Command::Scan(_) => return Err(Fault::BadPlan { answers }),
         }
+        Ok(())
     }
 
     fn start(&mut self) {
-        if !self.streaming {
-            self.streaming = true;
+        if !self.hello.is_streaming {
+            self.hello.is_streaming = true;
             self.stuck_told = false;
             self.restart_pace();
         }
@@ -188,16 +204,17 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
 
     /// Ends the stream; up to two frames that are already on their way may follow.
     fn stop(&mut self) {
-        self.streaming = false;
+        self.hello.is_streaming = false;
         self.scan.abandon();
     }
 
     /// Takes the settings over; the scan under way, begun under the old ones, is abandoned without a number.
     fn configure(&mut self, settings: Settings) {
-        self.hello.settings = settings;
-        self.scan.abandon();
-        self.restart_pace();
-        self.say_hello();
+        if self.hello.settings != settings {
+            self.hello.settings = settings;
+            self.scan.abandon();
+            self.restart_pace();
+        }
     }
 
     fn restart_pace(&mut self) {
@@ -206,7 +223,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
     }
 
     fn scan_if_due(&mut self) -> Result<Activity, M::Error> {
-        if !self.streaming {
+        if !self.hello.is_streaming {
             return Ok(Activity::Idle);
         }
         if !self.scan.is_under_way() {
@@ -244,8 +261,9 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         self.sequence = self.sequence.wrapping_add(1);
     }
 
-    fn say_hello(&mut self) {
-        self.uplink.message(&BoardMessage::Hello(self.hello.clone()));
+    /// Says Hello in answer to the command with this tag, or, with 0, by itself.
+    fn say_hello(&mut self, answers: u8) {
+        self.uplink.message(&BoardMessage::Hello(Hello { answers, ..self.hello.clone() }));
     }
 
     fn fault(&mut self, fault: Fault) {
@@ -255,6 +273,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
 
 fn hello(identity: &Identity) -> Hello {
     Hello {
+        version: VERSION,
+        answers: 0,
         firmware_version: cut(identity.firmware_version),
         board: cut(identity.board),
         electrodes: identity.electrodes,
@@ -262,6 +282,8 @@ fn hello(identity: &Identity) -> Hello {
         adc_full_scale_mv: identity.adc.full_scale_mv,
         drive_mv: identity.drive_mv,
         settings: Settings::default(),
+        is_streaming: false,
+        ranges: identity.adc.ranges_of(identity.electrodes),
     }
 }
 

@@ -1,24 +1,67 @@
 //! The scan: every electrode read under every ground, row by row, with averaging.
 
-use tactomo_protocol::{FrameHead, MAX_READINGS, Settings, Status};
+use heapless::Vec;
+use tactomo_protocol::{FrameHead, MAX_RANGES, MAX_READINGS, Range, Settings, Status};
 
 use crate::{Chip, Mux, Sampler, TimedOut};
 
-/// What a board's converter gives.
+/// What a board's converters give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Adc {
     /// Bits of one conversion, at most 16.
     pub bits: u8,
     /// Code `2^bits` stands for this many millivolts (mV).
     pub full_scale_mv: u16,
-    /// From this code on, a conversion counts as at the end of the scale.
-    pub saturated_from: u16,
+    /// What the converters can see, from electrode 0 on; the last one that has electrodes reaches over all that are left.
+    pub ranges: [Range; MAX_RANGES],
 }
 
+/// No converter.
+const NO_RANGE: Range = Range { electrodes: 0, floor: 0, ceiling: 0 };
+
 impl Adc {
-    /// A converter that is saturated at its largest code.
+    /// A converter all of whose codes count, for all electrodes.
     pub const fn new(bits: u8, full_scale_mv: u16) -> Self {
-        Self { bits, full_scale_mv, saturated_from: ((1u32 << bits) - 1) as u16 }
+        Self { bits, full_scale_mv, ranges: [Range::of_codes(u8::MAX, bits), NO_RANGE, NO_RANGE, NO_RANGE] }
+    }
+
+    /// Converters with these ranges, from electrode 0 on; those beyond the fourth are left out.
+    pub fn with_ranges(self, ranges: &[Range]) -> Self {
+        let mut own = [NO_RANGE; MAX_RANGES];
+        own.iter_mut().zip(ranges).for_each(|(own, range)| *own = *range);
+        Self { ranges: own, ..self }
+    }
+
+    /// The ranges of `electrodes` electrodes: the last one shrunk or stretched to end with them.
+    pub(crate) fn ranges_of(&self, electrodes: u8) -> Vec<Range, MAX_RANGES> {
+        let mut left = electrodes;
+        let mut ranges: Vec<Range, MAX_RANGES> = Vec::new();
+        for range in self.ranges.iter().filter(|range| range.electrodes > 0) {
+            let electrodes = range.electrodes.min(left);
+            left -= electrodes;
+            if electrodes > 0 {
+                // There is room for as many as there are.
+                let _ = ranges.push(Range { electrodes, ..*range });
+            }
+        }
+        if let Some(last) = ranges.last_mut() {
+            last.electrodes += left;
+        }
+        ranges
+    }
+
+    /// Code at which a conversion of `electrode` is at the end of the scale.
+    fn ceiling(&self, electrode: u8) -> u16 {
+        let mut end = 0u16;
+        let mut ceiling = u16::MAX;
+        for range in self.ranges.iter().filter(|range| range.electrodes > 0) {
+            ceiling = range.ceiling;
+            end += u16::from(range.electrodes);
+            if u16::from(electrode) < end {
+                break;
+            }
+        }
+        ceiling
     }
 
     /// Bits below one code that averaging `2^average_log2` conversions wins: as many as it has doublings, as far as a reading of
@@ -173,10 +216,11 @@ impl<M: Mux, S: Sampler, C: Chip> Bench<'_, M, S, C> {
     /// and a stuck converter costs one bound a reading, whatever the averaging.
     fn read(&mut self, electrode: u8, mut between: impl FnMut(&mut C)) -> (u16, Status) {
         let (mut sum, mut status) = (0u32, Status::default());
+        let ceiling = self.adc.ceiling(electrode);
         for _ in 0..1u32 << self.settings.average_log2 {
             between(self.chip);
             match self.sampler.sample(electrode) {
-                Ok(code) if code >= self.adc.saturated_from => {
+                Ok(code) if code >= ceiling => {
                     status.insert(Status::SATURATED);
                     sum += u32::from(code);
                 }

@@ -3,8 +3,8 @@
 use heapless::Vec;
 
 use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
-use crate::message::{BoardMessage, Command, Kind, Log};
-use crate::{CRC, CRC_BYTES, Hello, MAX_COMMAND, MAX_WIRE, VERSION, cobs};
+use crate::message::{BoardMessage, Hello, Kind, Log, Request};
+use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_WIRE, Scope, VERSION, cobs, v1};
 
 /// Why bytes between two zeros are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -12,11 +12,11 @@ pub enum DecodeError {
     /// Not a packet: noise, boot text, half a packet, or one with a flipped bit.
     #[error("not a whole packet")]
     Corrupt,
-    /// A whole packet in another version of the protocol.
+    /// A whole packet in a version of the protocol that the receiver does not know.
     #[error("the peer speaks version {0} of the protocol, this side version {VERSION}: update the older of the two")]
     Version(u8),
-    /// A whole packet whose body breaks this version's rules.
-    #[error("a whole packet that version {VERSION} of the protocol does not know")]
+    /// A whole packet whose body breaks the rules of its version.
+    #[error("a whole packet that its version of the protocol does not know")]
     Body,
 }
 
@@ -40,7 +40,7 @@ pub struct Receiver<const N: usize> {
     counters: Counters,
 }
 
-/// The host's receiver.
+/// The host's receiver, which knows version 1 of the protocol too.
 pub type BoardReceiver = Receiver<MAX_WIRE>;
 /// The board's receiver.
 pub type CommandReceiver = Receiver<MAX_COMMAND>;
@@ -116,58 +116,73 @@ impl BoardReceiver {
 impl CommandReceiver {
     /// Takes bytes from the front of `input` up to the end of the next packet or stretch of junk; `None` when `input` is
     /// used up.
-    pub fn receive(&mut self, input: &mut &[u8]) -> Option<Result<Command, DecodeError>> {
-        self.receive_with(input, command)
+    pub fn receive(&mut self, input: &mut &[u8]) -> Option<Result<Request, DecodeError>> {
+        self.receive_with(input, request)
     }
 }
 
-/// Checks CRC and version; returns the kind's bits and the body.
-fn open(packet: &[u8]) -> Result<(u8, &[u8]), DecodeError> {
+/// Checks the CRC; returns the version, the kind's bits and the body.
+fn open(packet: &[u8]) -> Result<(u8, u8, &[u8]), DecodeError> {
     let (content, crc) = packet.split_last_chunk::<CRC_BYTES>().ok_or(DecodeError::Corrupt)?;
     let (head, body) = content.split_first().ok_or(DecodeError::Corrupt)?;
     if CRC.checksum(content) != u32::from_le_bytes(*crc) {
         return Err(DecodeError::Corrupt);
     }
-    if head >> 4 != VERSION {
-        return Err(DecodeError::Version(head >> 4));
-    }
-    Ok((head & 15, body))
+    Ok((head >> 4, head & 15, body))
 }
 
 fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
-    let (kind, body) = open(packet)?;
-    Ok(match Kind::from_bits(kind).ok_or(DecodeError::Body)? {
+    let (version, kind, body) = open(packet)?;
+    if ![v1::VERSION, VERSION].contains(&version) {
+        return Err(DecodeError::Version(version));
+    }
+    let kind = Kind::from_bits(kind).ok_or(DecodeError::Body)?;
+    if version == v1::VERSION {
+        return v1::board_message(kind, body);
+    }
+    Ok(match kind {
         Kind::Hello => BoardMessage::Hello(hello(body)?),
-        Kind::Frame => BoardMessage::Frame(frame(body)?),
-        Kind::Log => BoardMessage::Log(Log(Vec::from_slice(body).map_err(|_| DecodeError::Body)?)),
+        Kind::Frame => BoardMessage::Frame(frame(body).ok_or(DecodeError::Body)?),
+        Kind::Log => BoardMessage::Log(log(body)?),
         Kind::Fault => BoardMessage::Fault(from_postcard(body)?),
         Kind::Command => return Err(DecodeError::Body),
     })
 }
 
 fn hello(body: &[u8]) -> Result<Hello, DecodeError> {
-    from_postcard(body).and_then(|hello: Hello| if hello.is_valid() { Ok(hello) } else { Err(DecodeError::Body) })
+    let hello = Hello { version: VERSION, ..from_postcard(body)? };
+    if hello.is_valid() { Ok(hello) } else { Err(DecodeError::Body) }
 }
 
-fn command(packet: &[u8]) -> Result<Command, DecodeError> {
-    match open(packet)? {
-        (kind, body) if kind == Kind::Command as u8 => from_postcard(body),
-        _ => Err(DecodeError::Body),
+pub(crate) fn log(body: &[u8]) -> Result<Log, DecodeError> {
+    Vec::from_slice(body).map(Log).map_err(|_| DecodeError::Body)
+}
+
+fn request(packet: &[u8]) -> Result<Request, DecodeError> {
+    let (version, kind, body) = open(packet)?;
+    if version != VERSION {
+        return Err(DecodeError::Version(version));
     }
+    if kind != Kind::Command as u8 {
+        return Err(DecodeError::Body);
+    }
+    let request: Request = from_postcard(body)?;
+    if request.tag == 0 { Err(DecodeError::Body) } else { Ok(request) }
 }
 
 /// The whole of `body`, nothing left over.
-fn from_postcard<'a, T: serde::Deserialize<'a>>(body: &'a [u8]) -> Result<T, DecodeError> {
+pub(crate) fn from_postcard<'a, T: serde::Deserialize<'a>>(body: &'a [u8]) -> Result<T, DecodeError> {
     match postcard::take_from_bytes(body) {
         Ok((value, [])) => Ok(value),
         _ => Err(DecodeError::Body),
     }
 }
 
-fn frame(body: &[u8]) -> Result<Frame, DecodeError> {
-    let (head, packed) = body.split_first_chunk::<HEAD_BYTES>().ok_or(DecodeError::Body)?;
+fn frame(body: &[u8]) -> Option<Frame> {
+    let (head, rest) = body.split_first_chunk::<HEAD_BYTES>()?;
     let (head, width) = FrameHead::from_bytes(*head);
-    let electrodes = frame::electrodes(width, packed.len()).ok_or(DecodeError::Body)?;
-    let readings = frame::unpack(packed, width, electrodes * electrodes).ok_or(DecodeError::Body)?;
-    Ok(Frame { head, readings })
+    let (scope, packed) = Scope::read(rest)?;
+    let fits = packed.len() == frame::packed_bytes(width, scope.readings());
+    let readings = fits.then(|| frame::unpack(packed, width, scope.readings()))??;
+    Some(Frame { head, scope, readings })
 }

@@ -1,4 +1,4 @@
-//! A frame's body: a fixed head of eight bytes, then the readings packed at the width of the largest.
+//! A frame's body: a fixed head of eight bytes, what it holds, then the readings packed at the width of the largest.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -6,31 +6,33 @@
 //! | 4 | board time at the start of the scan in microseconds, little-endian, wraps |
 //! | 1 | [status bits](Status) |
 //! | 1 | width of a reading in bits less one (low four), fraction bits (high four) |
-//! | rest | readings, row by row (`g * electrodes + e`), least significant bit first, no gaps; the last byte is filled with zeros |
+//! | 2 and up | which readings it holds: its [scope](crate::Scope) |
+//! | rest | readings, row by row, least significant bit first, no gaps; the last byte is filled with zeros |
 //!
-//! The electrode count follows from the length, which for each width fits one count only.
-//! A frame of 16 x 16 readings of 12 bits takes at most 400 bytes on the wire.
+//! A whole frame of 16 x 16 readings of 12 bits takes at most 402 bytes on the wire.
 
 use heapless::Vec;
 
-use crate::{MAX_ELECTRODES, MAX_READINGS, MIN_ELECTRODES};
+use crate::{MAX_READINGS, Scope};
 
-/// Bytes before the packed readings.
+/// Bytes before the scope.
 pub const HEAD_BYTES: usize = 8;
 
-/// One scan: `readings[g * electrodes + e]` is electrode `e` while `g` is grounded.
+/// One scan, or the rows of a [plan](crate::Plan) that make a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// Everything but the readings.
+    /// Everything but the scope and the readings.
     pub head: FrameHead,
+    /// Which readings these are; its [cells](Scope::cells) are in their order.
+    pub scope: Scope,
     /// Row by row; a unit is `adc_full_scale / 2^(adc_bits + fraction_bits)`.
     pub readings: Vec<u16, MAX_READINGS>,
 }
 
-/// Everything of a frame but its readings.
+/// Everything of a frame but its scope and its readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameHead {
-    /// Number of the scan, modulo 65536; scans that were dropped for want of room on the link count.
+    /// Number of the frame, modulo 65536; frames that were dropped for want of room on the link count.
     pub sequence: u16,
     /// Board time at the start of the scan, in microseconds (us), modulo 2^32.
     pub time_us: u32,
@@ -40,15 +42,17 @@ pub struct FrameHead {
     pub fraction_bits: u8,
 }
 
-/// Status bits of a scan.
+/// Status bits of a scan. Bits without a name are sent as zero, and a receiver drops them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status(pub u8);
 
 impl Status {
-    /// A conversion was at the end of the ADC's scale.
+    /// A conversion was at the ceiling of its electrode's [range](crate::Range), or above.
     pub const SATURATED: Self = Self(1);
     /// A conversion did not finish in time; its reading is zero.
     pub const TIMED_OUT: Self = Self(2);
+    /// The bits that have a name.
+    const NAMED: u8 = Self::SATURATED.0 | Self::TIMED_OUT.0;
 
     /// Whether all bits of `other` are set.
     pub fn contains(self, other: Self) -> bool {
@@ -67,7 +71,7 @@ impl FrameHead {
         let [s0, s1] = self.sequence.to_le_bytes();
         let [t0, t1, t2, t3] = self.time_us.to_le_bytes();
         let shape = (width - 1) as u8 | self.fraction_bits << 4;
-        [s0, s1, t0, t1, t2, t3, self.status.0, shape]
+        [s0, s1, t0, t1, t2, t3, self.status.0 & Status::NAMED, shape]
     }
 
     /// The head and the width of a reading in bits.
@@ -75,7 +79,7 @@ impl FrameHead {
         let head = Self {
             sequence: u16::from_le_bytes([s0, s1]),
             time_us: u32::from_le_bytes([t0, t1, t2, t3]),
-            status: Status(status),
+            status: Status(status & Status::NAMED),
             fraction_bits: shape >> 4,
         };
         (head, u32::from(shape & 15) + 1)
@@ -91,11 +95,6 @@ pub(crate) fn width(readings: &[u16]) -> u32 {
 /// Bytes that `count` readings of `width` bits take.
 pub(crate) fn packed_bytes(width: u32, count: usize) -> usize {
     (count * width as usize).div_ceil(8)
-}
-
-/// Electrode count whose readings of `width` bits fill exactly `bytes`, if there is one.
-pub(crate) fn electrodes(width: u32, bytes: usize) -> Option<usize> {
-    (MIN_ELECTRODES..=MAX_ELECTRODES).find(|n| packed_bytes(width, n * n) == bytes)
 }
 
 /// Packs the readings at `width` bits into `packed`, which has just room for them.
@@ -142,18 +141,4 @@ fn bits_from(bytes: &[u8], bit: usize) -> u64 {
         None => bytes.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte)),
     };
     word >> (bit % 8)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_length_fits_one_electrode_count_only() {
-        for width in 1..=16 {
-            for n in MIN_ELECTRODES..=MAX_ELECTRODES {
-                assert_eq!(electrodes(width, packed_bytes(width, n * n)), Some(n), "width {width}");
-            }
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! The wire between a tomographic tactile sensor board and its host.
 //!
-//! The board sends [`BoardMessage`]s: who it is, its scans, its log and its faults. The host sends [`Command`]s. Both use this crate; it
+//! The board sends [`BoardMessage`]s: who it is, its scans, its log and its faults. The host sends [`Request`]s. Both use this crate; it
 //! has no allocator, no floating point and no unsafe code, and it never panics, whatever comes down the line.
 //!
 //! A *packet* is one message. On the wire it is stuffed (COBS) and ends with a zero byte, so a receiver that joins in the
@@ -19,11 +19,13 @@
 //! A host asks, and gets the answer through a line that said something else before:
 //!
 //! ```
-//! use tactomo_protocol::{BoardMessage, BoardReceiver, Command, Fault, MAX_COMMAND, encode_board, encode_command};
+//! use tactomo_protocol::{
+//!     BoardMessage, BoardReceiver, Command, Fault, MAX_COMMAND, Request, VERSION, encode_board, encode_request,
+//! };
 //!
 //! let mut command = [0; MAX_COMMAND];
-//! let length = encode_command(&Command::Start, &mut command)?;
-//! assert_eq!(command[..length], [0x07, 0x18, 0x01, 0x30, 0xBA, 0xC5, 0xB4, 0x00]);
+//! let length = encode_request(&Request { tag: 7, command: Command::Start }, VERSION, &mut command)?;
+//! assert_eq!(command[..length], [0x08, 0x28, 0x07, 0x01, 0x1B, 0x68, 0x59, 0xF1, 0x00]);
 //!
 //! let mut line = *b"ets Jul 29 2019\r\n\0.............";
 //! let length = encode_board(&BoardMessage::Fault(Fault::AdcStuck), &mut line[18..])?;
@@ -50,26 +52,30 @@ pub mod decode;
 pub mod encode;
 pub mod frame;
 pub mod message;
+pub mod scope;
+mod v1;
 
 pub use decode::{BoardReceiver, CommandReceiver, Counters, DecodeError, Receiver};
-pub use encode::{EncodeError, encode_board, encode_command, encode_frame, encode_log};
+pub use encode::{EncodeError, encode_board, encode_frame, encode_hello, encode_log, encode_request, encode_rows};
 pub use frame::{Frame, FrameHead, Status};
-pub use message::{BoardMessage, Command, Fault, Hello, Kind, Log, MAX_LOG, Settings};
+pub use message::{BoardMessage, Command, Fault, Hello, Kind, Log, MAX_LOG, MAX_RANGES, Range, Request, Settings};
+pub use scope::{MAX_PLAN_ROWS, MAX_ROWS, Plan, Scope};
 
-/// Version of the protocol that this crate speaks: 1 to 15.
-pub const VERSION: u8 = 1;
+/// Version of the protocol that this crate speaks: 1 to 15. Hosts understand boards of version 1 too.
+pub const VERSION: u8 = 2;
 /// Most electrodes that a frame can carry.
 pub const MAX_ELECTRODES: usize = 32;
-/// Fewest electrodes that a frame can carry (fewer would make a frame's length ambiguous).
+/// Fewest electrodes that a frame can carry (in version 1, fewer would make a frame's length ambiguous).
 pub const MIN_ELECTRODES: usize = 4;
 /// Most readings in a frame: every electrode under every ground.
 pub const MAX_READINGS: usize = MAX_ELECTRODES * MAX_ELECTRODES;
-/// Longest packet before COBS: head, frame head, 1024 readings of 16 bits, CRC.
-pub const MAX_PACKET: usize = 1 + frame::HEAD_BYTES + 2 * MAX_READINGS + CRC_BYTES;
+/// Longest packet before COBS: head, frame head, the longest scope, 1024 readings of 16 bits, CRC.
+pub const MAX_PACKET: usize = 1 + frame::HEAD_BYTES + scope::MAX_SCOPE_BYTES + 2 * MAX_READINGS + CRC_BYTES;
 /// Longest packet on the wire, with COBS overhead (one byte in 254, at least one) and the closing zero.
 pub const MAX_WIRE: usize = wire_bytes(MAX_PACKET);
-/// Longest command on the wire; a board's receive buffer needs no more.
-pub const MAX_COMMAND: usize = 32;
+/// Longest command on the wire; a board's receive buffer needs no more: head, tag, number of the command, a plan (length and grounds, mask, two
+/// bytes), CRC. It fits the receive FIFO of a UART of 128 bytes.
+pub const MAX_COMMAND: usize = wire_bytes(1 + 1 + 1 + (1 + MAX_PLAN_ROWS + 5 + 2) + CRC_BYTES);
 /// Bytes of the closing checksum.
 pub const CRC_BYTES: usize = 4;
 

@@ -3,8 +3,13 @@
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "test-support")]
+use crate::VERSION;
 use crate::frame::Frame;
-use crate::{MAX_ELECTRODES, MIN_ELECTRODES};
+use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Plan};
+
+/// Most [ranges](Range) of a board.
+pub const MAX_RANGES: usize = 4;
 
 /// Most defmt bytes in one [`Log`] packet.
 pub const MAX_LOG: usize = 64;
@@ -21,7 +26,7 @@ pub enum Kind {
     Log = 2,
     /// [`Fault`], board to host.
     Fault = 3,
-    /// [`Command`], host to board.
+    /// [`Request`], host to board.
     Command = 8,
 }
 
@@ -35,7 +40,7 @@ impl Kind {
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "a frame is the common case, and there is no allocator to box it")]
 pub enum BoardMessage {
-    /// Who the board is; the answer to [`Command::Hello`], and sent once after a reset.
+    /// Who the board is; the answer to every command, and sent once after a reset.
     Hello(Hello),
     /// One scan.
     Frame(Frame),
@@ -45,14 +50,19 @@ pub enum BoardMessage {
     Fault(Fault),
 }
 
-/// Who the board is and what its readings mean. The protocol version is in the head of this and every packet.
+/// Who the board is, what its readings mean, and what it does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
+    /// Version of the protocol in which it came: the one in the packet's head, and not a part of the body.
+    #[serde(skip)]
+    pub version: u8,
+    /// Tag of the command that this answers; 0 if nobody asked: the board has just started. Always 0 in version 1.
+    pub answers: u8,
     /// Version of the firmware, such as `0.1.0`.
     pub firmware_version: String<24>,
     /// Name of the board, such as `esp32`.
     pub board: String<24>,
-    /// Electrodes scanned; a frame has its square of readings.
+    /// Electrodes scanned; a whole frame has its square of readings.
     pub electrodes: u8,
     /// Bits of one conversion.
     pub adc_bits: u8,
@@ -62,6 +72,29 @@ pub struct Hello {
     pub drive_mv: u16,
     /// Settings in force.
     pub settings: Settings,
+    /// Whether the board sends frames. Not told in version 1.
+    pub is_streaming: bool,
+    /// What the converters can see, from electrode 0 on.
+    pub ranges: Vec<Range, MAX_RANGES>,
+}
+
+/// What a converter can see: a run of electrodes that share one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Range {
+    /// Electrodes of the run.
+    pub electrodes: u8,
+    /// At this code of one conversion, or below, a reading says only that the voltage is at most that. A converter that sees down to zero
+    /// has 0.
+    pub floor: u16,
+    /// At this code, or above, it says only that the voltage is at least that.
+    pub ceiling: u16,
+}
+
+impl Range {
+    /// The range of a converter of `adc_bits` (1 to 16) all of whose codes count.
+    pub const fn of_codes(electrodes: u8, adc_bits: u8) -> Self {
+        Self { electrodes, floor: 0, ceiling: ((1u32 << adc_bits) - 1) as u16 }
+    }
 }
 
 #[cfg(feature = "test-support")]
@@ -69,6 +102,8 @@ impl Hello {
     /// What a board with an ESP32 says, of so many electrodes: 12 bits of 3.3 V, a drive of 2 V. For tests.
     pub fn example(electrodes: u8) -> Self {
         Self {
+            version: VERSION,
+            answers: 0,
             firmware_version: "0.1.0".try_into().unwrap_or_default(),
             board: "test".try_into().unwrap_or_default(),
             electrodes,
@@ -76,19 +111,41 @@ impl Hello {
             adc_full_scale_mv: 3300,
             drive_mv: 2000,
             settings: Settings::default(),
+            is_streaming: false,
+            ranges: [Range::of_codes(electrodes, 12)].into_iter().collect(),
         }
     }
 }
 
 impl Hello {
     /// Whether the values are within the protocol's limits: 4 to 32 electrodes, 1 to 16 bits, voltages above zero,
-    /// [settings](Settings::is_valid) that a board may take.
+    /// [settings](Settings::is_valid) that a board may take, and ranges of at least one electrode that sum up to all of them, each with its
+    /// floor below its ceiling and that among the codes.
     pub fn is_valid(&self) -> bool {
         (MIN_ELECTRODES..=MAX_ELECTRODES).contains(&usize::from(self.electrodes))
             && (1..=16).contains(&self.adc_bits)
             && self.adc_full_scale_mv > 0
             && self.drive_mv > 0
             && self.settings.is_valid()
+            && self.has_valid_ranges()
+    }
+
+    fn has_valid_ranges(&self) -> bool {
+        let codes = 1u32 << self.adc_bits;
+        let is_valid =
+            |range: &Range| range.electrodes > 0 && range.floor < range.ceiling && u32::from(range.ceiling) < codes;
+        let electrodes: u32 = self.ranges.iter().map(|range| u32::from(range.electrodes)).sum();
+        electrodes == u32::from(self.electrodes) && self.ranges.iter().all(is_valid)
+    }
+
+    /// What the converter of an electrode can see; `None` if there is no such electrode.
+    pub fn range_of(&self, electrode: u8) -> Option<Range> {
+        let mut end = 0u32;
+        let holds = |range: &&Range| {
+            end += u32::from(range.electrodes);
+            u32::from(electrode) < end
+        };
+        self.ranges.iter().find(holds).copied()
     }
 }
 
@@ -131,27 +188,47 @@ pub struct Log(pub Vec<u8, MAX_LOG>);
 /// Something went wrong on the board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Fault {
-    /// The firmware panicked before the last reset, here (file, line).
+    /// The firmware panicked before the last reset, here (file, line, message).
     Panic(String<96>),
     /// The chip restarted by itself: watchdog, brown-out, and so on.
     Reset(String<24>),
     /// No conversion finished in time in a whole frame: is the ADC stuck?
     AdcStuck,
     /// A command with settings out of range; the old ones stay.
-    BadSettings,
+    BadSettings {
+        /// Tag of the command. Always 0 in version 1.
+        answers: u8,
+    },
     /// A command in another version of the protocol; the board speaks the one in this packet's head.
     UnknownVersion(u8),
+    /// A command with a plan that this board cannot scan; the old one stays.
+    BadPlan {
+        /// Tag of the command.
+        answers: u8,
+    },
 }
 
-/// Host to board.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Host to board: a command, and a tag by which the answer names it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Request {
+    /// 1 to 255, as the host likes.
+    pub tag: u8,
+    /// What the board is to do.
+    pub command: Command,
+}
+
+/// What a board is to do. It answers each with [`Hello`], which names the tag, or with [`Fault::BadSettings`] or [`Fault::BadPlan`]; so a host
+/// can repeat a command until it is answered, and the repetition changes nothing.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Command {
     /// Asks for [`Hello`].
     Hello,
     /// Starts the stream of frames.
     Start,
-    /// Stops it.
+    /// Stops it, and abandons the frame under way.
     Stop,
-    /// Changes the settings; the board answers with [`Hello`].
+    /// Changes the settings, and abandons the frame under way.
     Configure(Settings),
+    /// Changes the rows that are scanned, and abandons the frame under way.
+    Scan(Plan),
 }

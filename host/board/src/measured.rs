@@ -56,10 +56,10 @@ impl Volts {
         Self { per_code: volts(board.adc_full_scale_mv) / codes, readings: electrodes * electrodes }
     }
 
-    /// Readings of a frame (V), row by row; `None` if it is a frame of another board.
+    /// Readings of a whole frame (V), row by row; `None` if it is a frame of another board, or not whole.
     pub fn of_frame<'a>(&self, frame: &'a Frame) -> Option<impl Iterator<Item = f64> + use<'a>> {
         let per_unit = self.per_code / f64::from(1u32 << frame.head.fraction_bits.min(31));
-        (frame.readings.len() == self.readings)
+        (frame.scope.is_whole() && frame.readings.len() == self.readings)
             .then(|| frame.readings.iter().map(move |units| f64::from(*units) * per_unit))
     }
 }
@@ -67,7 +67,7 @@ impl Volts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tactomo_protocol::FrameHead;
+    use tactomo_protocol::{FrameHead, Scope};
 
     fn hello(electrodes: u8) -> Hello {
         Hello { adc_bits: 10, adc_full_scale_mv: 1024, drive_mv: 1500, ..Hello::example(electrodes) }
@@ -92,9 +92,16 @@ mod tests {
     #[test]
     fn codes_become_volts_and_frames_of_other_boards_nothing() {
         let head = FrameHead { fraction_bits: 2, ..FrameHead::default() };
-        let frame = Frame { head, readings: std::iter::repeat_n(0x110, 256).collect() };
+        let scope = Scope::whole(16).unwrap();
+        let frame = Frame { head, scope, readings: std::iter::repeat_n(0x110, 256).collect() };
         let volts: Vec<_> = Volts::of(&hello(16)).of_frame(&frame).unwrap().collect();
         assert!(volts.len() == 256 && (volts[0] - 0.068).abs() < 1e-12, "272 quarters of a millivolt");
         assert!(Volts::of(&hello(32)).of_frame(&frame).is_none());
+        let reversed: Vec<u8> = (0..16).rev().collect();
+        let rows = Frame { scope: Scope::of_rows(16, &reversed, 0xFFFF).unwrap(), ..frame };
+        assert!(
+            Volts::of(&hello(16)).of_frame(&rows).is_none(),
+            "as many readings, but not in the order of a whole frame"
+        );
     }
 }

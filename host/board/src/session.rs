@@ -1,13 +1,23 @@
-//! The talk with a board: who are you, here are your settings, start.
+//! The talk with a board: who are you, here are your settings and your scan plan, start.
 //!
 //! No input or output happens here: a [`Session`] is given what came and asked what to send.
 
-use std::fmt;
+mod greet;
+mod plan;
+mod requested;
+
 use std::time::{Duration, Instant};
 
-use tactomo_protocol::{BoardMessage, BoardReceiver, Command, DecodeError, Fault, Hello, MAX_COMMAND, Settings};
+use tactomo_protocol::{Command, Fault, Hello, Plan, Request, Settings, VERSION};
 
-use crate::link::Link;
+use self::plan::PlanWish;
+
+pub use greet::{GreetError, Outgoing, explain, greet, send};
+pub use plan::PlanState;
+pub use requested::{Refusal, RequestedSettings};
+
+/// The version of the protocol before this one, which boards with older firmware speak.
+const OLD_VERSION: u8 = 1;
 
 /// Time between two askings for Hello.
 const ASK_EVERY: Duration = Duration::from_millis(250);
@@ -15,11 +25,11 @@ const ASK_EVERY: Duration = Duration::from_millis(250);
 /// A board that was started and sends no frame for this long is asked again.
 const SILENCE: Duration = Duration::from_millis(1500);
 
-/// Time between two sendings of settings that the board has not confirmed. It obeys between two rows of a scan, of which the longest (16 x 256
+/// Time between two sendings of a command that the board has not answered. It obeys between two rows of a scan, of which the longest (16 x 256
 /// conversions of 40 us, 66 ms to settle) takes 0.23 s; but one that is just starting, or a flipped bit on the line, loses them.
-const CONFIGURE_EVERY: Duration = Duration::from_millis(500);
-/// How often they are sent before they count as refused: 2.5 s, in which a board has started anew, too.
-const CONFIGURE_TRIES: u32 = 5;
+const REPEAT_EVERY: Duration = Duration::from_millis(500);
+/// How often it is sent before it counts as refused: 2.5 s, in which a board has started anew, too.
+const TRIES: u32 = 5;
 
 /// A started board that sends no frame for this long, and the time of its slowest frame, is [mute](Session::is_mute): by then it was asked
 /// again twice, and a chip that had just restarted would have answered.
@@ -31,108 +41,38 @@ const CONVERSION: Duration = Duration::from_micros(50);
 pub const MUTE: &str = "the board answers but sends no frames: its scan hangs, or the line loses long packets. Press the board's reset button; \
      if that does not help, try another cable or USB port, a lower baud rate on both sides, and flash the firmware again";
 
-/// Settings of the scan that the user asks for; what is `None` stays as the board has it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RequestedSettings {
-    /// Wait between grounding an electrode and its first conversion, in microseconds (us).
-    pub settle_us: Option<u16>,
-    /// Base-2 logarithm of the conversions averaged into one reading.
-    pub average_log2: Option<u8>,
-    /// Frames a second at most; 0 for as fast as the board can.
-    pub max_frames_per_s: Option<u16>,
-}
-
-impl RequestedSettings {
-    /// These, with those that are asked for later.
-    pub fn changed_by(self, later: Self) -> Self {
-        Self {
-            settle_us: later.settle_us.or(self.settle_us),
-            average_log2: later.average_log2.or(self.average_log2),
-            max_frames_per_s: later.max_frames_per_s.or(self.max_frames_per_s),
-        }
-    }
-
-    /// The settings `now`, with those that are asked for.
-    fn over(&self, now: Settings) -> Settings {
-        Settings {
-            settle_us: self.settle_us.unwrap_or(now.settle_us),
-            average_log2: self.average_log2.unwrap_or(now.average_log2),
-            max_frames_per_s: self.max_frames_per_s.unwrap_or(now.max_frames_per_s),
-        }
-    }
-}
-
-/// Why a board cannot be talked to.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum GreetError {
-    /// No Hello in time.
-    #[error("no board said Hello within {seconds} s ({junk_bytes} bytes came that were no message)")]
-    Silent {
-        /// How long was waited (s).
-        seconds: u64,
-        /// Bytes that came and were no message: many mean another baud rate or another program on the board.
-        junk_bytes: u64,
-    },
-    /// The board's version of the protocol is another.
-    #[error("this board cannot be used: {0}")]
-    Version(DecodeError),
-    /// The link broke.
-    #[error("the link broke: {0}")]
-    Link(String),
-}
-
-/// Settings that a board does not take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Refusal {
-    /// What was asked for.
-    pub wanted: Settings,
-    /// What the board keeps.
-    pub kept: Settings,
-}
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { wanted, kept } = self;
-        let rate = |settings: &Settings| match settings.max_frames_per_s {
-            0 => "as many frames a second as it can".to_owned(),
-            rate => format!("at most {rate} frames a second"),
-        };
-        let parts = [
-            (wanted.settle_us != kept.settle_us)
-                .then(|| format!("a settle time of {} us instead of {} us", kept.settle_us, wanted.settle_us)),
-            (wanted.average_log2 != kept.average_log2).then(|| {
-                format!("an average over {} instead of {} conversions", kept.conversions(), wanted.conversions())
-            }),
-            (wanted.max_frames_per_s != kept.max_frames_per_s)
-                .then(|| format!("{} instead of {}", rate(kept), rate(wanted))),
-        ];
-        let parts: Vec<String> = parts.into_iter().flatten().collect();
-        write!(f, "the board keeps {}", parts.join(", and "))
-    }
-}
-
-/// Settings on their way to the board.
-#[derive(Clone, Copy, Debug)]
-struct Configuring {
-    wanted: Settings,
-    /// How often they were sent.
+/// A command that was sent and is not answered yet.
+#[derive(Debug)]
+struct Pending {
+    request: Request,
+    /// How often it was sent.
     tries: u32,
-    /// When they were sent last.
-    sent: Option<Instant>,
+    /// When it was sent last.
+    sent: Instant,
 }
 
-/// The talk with one board, from the opening of its link on.
+/// The talk with one board, from the opening of its link on. One command at a time is on its way.
 ///
-/// Any Hello may be an old one: the one of the board's start, or the answer to an earlier question. So only [`Fault::BadSettings`], or
-/// silence about settings that were sent several times, is a refusal.
+/// A board of version 2 names the command that it answers, so an answer to an earlier one is known as such. Any Hello of a board of version 1 may
+/// be an old one: the one of the board's start, or the answer to an earlier question. There, settings count as taken when a Hello shows them, and as
+/// refused after [`Fault::BadSettings`], or silence about settings that were sent several times.
 #[derive(Debug)]
 pub struct Session {
+    /// The version of the protocol to speak.
+    version: u8,
+    /// Tag of the last command.
+    tag: u8,
     requested: RequestedSettings,
-    /// What the board said of itself last.
+    /// Whether the board's settings are to be compared with those requested.
+    settings_due: bool,
+    /// Whether settings were sent of which nobody knows if they arrived.
+    settings_in_doubt: bool,
+    plan: PlanWish,
+    /// Whether Start is to be sent.
+    start_due: bool,
+    /// What the board said of itself last, in answer to what it was asked last.
     hello: Option<Hello>,
-    configuring: Option<Configuring>,
-    /// Whether Start is to be sent at once.
-    start_is_due: bool,
+    pending: Option<Pending>,
     /// Since when frames are expected and none came: since the first Start after the last frame.
     waiting_since: Option<Instant>,
     /// Whether the board was started.
@@ -146,10 +86,15 @@ impl Session {
     /// The talk with a board of which nothing is known yet.
     pub fn new(requested: RequestedSettings) -> Self {
         Self {
+            version: VERSION,
+            tag: 0,
             requested,
+            settings_due: false,
+            settings_in_doubt: false,
+            plan: PlanWish::default(),
+            start_due: false,
             hello: None,
-            configuring: None,
-            start_is_due: false,
+            pending: None,
             waiting_since: None,
             started: false,
             heard: None,
@@ -158,16 +103,30 @@ impl Session {
     }
 
     /// Asks the board for other settings, which may be while frames come; what is `None` stays as it is. A board that starts anew gets
-    /// them again.
+    /// them again. What was asked for before and is not sent yet, or not answered, is sent along with it.
     pub fn request(&mut self, requested: RequestedSettings) {
         self.requested = self.requested.changed_by(requested);
         self.refusal = None;
-        if let Some(hello) = &self.hello {
-            let wanted = self.requested.over(hello.settings);
-            // Settings that are on their way may still arrive, so they have to be taken back too.
-            let is_wanted = hello.settings == wanted && self.configuring.is_none();
-            self.configuring = (!is_wanted).then_some(Configuring { wanted, tries: 0, sent: None });
+        self.settings_due = self.hello.is_some();
+        self.give_way(|command| matches!(command, Command::Configure(_)));
+    }
+
+    /// Asks the board to scan other rows, or whole frames again; [`plan_state`](Self::plan_state) says what became of it. A board that starts
+    /// anew gets the plan again.
+    pub fn request_plan(&mut self, plan: Option<Plan>) {
+        self.plan.request(plan.unwrap_or_default());
+        if self.give_way(|command| matches!(command, Command::Scan(_))) {
+            // It may arrive all the same.
+            self.plan.forget();
         }
+        if self.version == OLD_VERSION {
+            self.plan.not_offered();
+        }
+    }
+
+    /// What became of the plan that was [asked for](Self::request_plan) last: whole frames, if none was.
+    pub fn plan_state(&self) -> PlanState {
+        self.plan.state()
     }
 
     /// The settings that the board did not take, if there are such since the last [request](Self::request).
@@ -175,33 +134,76 @@ impl Session {
         self.refusal
     }
 
-    /// The command to send now, if any.
-    pub fn command(&mut self, now: Instant) -> Option<Command> {
-        let command = self.next_command(now)?;
-        self.heard = Some(now);
-        Some(command)
+    /// Waits no longer for the answer to a command of this kind, or to a question of a board that is known; returns whether a command was
+    /// under way.
+    fn give_way(&mut self, kind: impl Fn(&Command) -> bool) -> bool {
+        let is_known = self.hello.is_some();
+        let idle = |pending: &mut Pending| is_known && pending.request.command == Command::Hello;
+        self.pending.take_if(idle);
+        self.pending.take_if(|pending| kind(&pending.request.command)).is_some()
     }
 
-    fn next_command(&mut self, now: Instant) -> Option<Command> {
-        if std::mem::take(&mut self.start_is_due) {
+    /// The command to send now, if any.
+    pub fn command(&mut self, now: Instant) -> Option<Outgoing> {
+        let request = self.next_request(now)?;
+        self.heard = Some(now);
+        Some(Outgoing { version: self.version, request })
+    }
+
+    fn next_request(&mut self, now: Instant) -> Option<Request> {
+        if let Some(pending) = &mut self.pending {
+            let is_question = pending.request.command == Command::Hello;
+            let patience = match is_question {
+                true if self.started => SILENCE,
+                true => ASK_EVERY,
+                false => REPEAT_EVERY,
+            };
+            if now.saturating_duration_since(pending.sent) < patience {
+                return None;
+            }
+            if is_question || pending.tries < TRIES {
+                pending.tries += 1;
+                pending.sent = now;
+                return Some(pending.request.clone());
+            }
+            self.unanswered();
+        }
+        let command = self.due(now)?;
+        Some(self.ask(command, now))
+    }
+
+    /// What the board is to be told next.
+    fn due(&mut self, now: Instant) -> Option<Command> {
+        let silence = self.is_silent(now).then_some(Command::Hello);
+        let Some(hello) = &self.hello else { return silence };
+        let wanted = self.requested.over(hello.settings);
+        let is_other = wanted != hello.settings || self.settings_in_doubt;
+        self.settings_due &= is_other;
+        if self.settings_due {
+            return Some(Command::Configure(wanted));
+        }
+        if let Some(plan) = self.plan.due() {
+            return Some(Command::Scan(plan.clone()));
+        }
+        if self.start_due { Some(Command::Start) } else { silence }
+    }
+
+    /// Gives a command a tag, and waits for its answer: in version 1 only settings have one that is sure to come.
+    fn ask(&mut self, command: Command, now: Instant) -> Request {
+        self.tag = self.tag.checked_add(1).unwrap_or(1);
+        let is_settings = matches!(command, Command::Configure(_));
+        self.settings_in_doubt |= is_settings;
+        if command == Command::Start {
             self.started = true;
             self.waiting_since.get_or_insert(now);
-            return Some(Command::Start);
         }
-        if let Some(configuring) = &mut self.configuring {
-            let is_due = configuring.sent.is_none_or(|sent| now.saturating_duration_since(sent) >= CONFIGURE_EVERY);
-            if is_due && configuring.tries < CONFIGURE_TRIES {
-                configuring.tries += 1;
-                configuring.sent = Some(now);
-                return Some(Command::Configure(configuring.wanted));
-            }
-            if is_due {
-                self.refused();
-                return self.next_command(now);
-            }
-            return None;
+        let request = Request { tag: self.tag, command };
+        if self.version != OLD_VERSION || is_settings {
+            self.pending = Some(Pending { request: request.clone(), tries: 1, sent: now });
+        } else if request.command == Command::Start {
+            self.start_due = false;
         }
-        self.is_silent(now).then_some(Command::Hello)
+        request
     }
 
     fn is_silent(&self, now: Instant) -> bool {
@@ -211,35 +213,133 @@ impl Session {
 
     /// Takes a Hello: an answer, an old one, or that of a board that has started anew and has to be told everything again.
     pub fn hello(&mut self, hello: &Hello, now: Instant) {
-        self.heard = Some(now);
-        let wanted = self.requested.over(hello.settings);
-        let is_changing = self.configuring.is_some_and(|configuring| configuring.wanted == wanted);
-        if hello.settings == wanted {
-            self.configuring = None;
-            self.start_is_due = true;
-        } else if !is_changing {
-            self.configuring = Some(Configuring { wanted, tries: 0, sent: None });
+        if hello.version != self.version {
+            self.speak(hello.version);
         }
+        if self.version == OLD_VERSION {
+            return self.untagged_hello(hello, now);
+        }
+        if hello.answers == 0 {
+            return self.board_has_started(hello, now);
+        }
+        let is_answer = |pending: &mut Pending| pending.request.tag == hello.answers;
+        let Some(answered) = self.pending.take_if(is_answer) else { return };
+        self.heard = Some(now);
+        let is_first = self.hello.replace(hello.clone()).is_none();
+        if !is_first && !self.start_due && !hello.is_streaming {
+            // It was started, and does not stream: it has started anew, and its Hello was lost.
+            return self.board_has_started(hello, now);
+        }
+        self.settings_due = true;
+        match answered.request.command {
+            Command::Hello if is_first => self.greeted(hello, now),
+            Command::Hello => {}
+            Command::Start | Command::Stop => self.start_due = !hello.is_streaming,
+            Command::Configure(wanted) if wanted == hello.settings => self.settings_in_doubt = false,
+            Command::Configure(wanted) => self.refused(wanted, true),
+            Command::Scan(plan) => self.plan.confirmed(plan),
+        }
+    }
+
+    /// The first answer of a board that may have been talked to before.
+    fn greeted(&mut self, hello: &Hello, now: Instant) {
+        self.start_due = !hello.is_streaming;
+        self.plan.forget();
+        if hello.is_streaming {
+            self.started = true;
+            self.waiting_since.get_or_insert(now);
+        }
+    }
+
+    /// The board knows nothing any more of what it was told, but for a command that came after its start and before its Hello was heard here.
+    fn board_has_started(&mut self, hello: &Hello, now: Instant) {
+        self.heard = Some(now);
+        self.pending = None;
+        (self.settings_due, self.start_due) = (true, true);
+        self.plan.forget();
         self.hello = Some(hello.clone());
     }
 
-    /// Takes note of a fault that the board reports.
-    pub fn fault(&mut self, fault: &Fault) {
-        if *fault == Fault::BadSettings && self.configuring.is_some_and(|configuring| configuring.tries > 0) {
-            self.refused();
+    /// A Hello of version 1.
+    fn untagged_hello(&mut self, hello: &Hello, now: Instant) {
+        self.heard = Some(now);
+        let wanted = self.requested.over(hello.settings);
+        let sent = self.pending.as_ref().map(|pending| &pending.request.command);
+        if hello.settings == wanted {
+            self.pending = None;
+            (self.settings_due, self.settings_in_doubt) = (false, false);
+        } else if sent != Some(&Command::Configure(wanted)) {
+            self.pending = None;
+            self.settings_due = true;
+        }
+        self.plan.not_offered();
+        self.start_due = true;
+        self.hello = Some(hello.clone());
+    }
+
+    /// Begins anew in this version of the protocol.
+    fn speak(&mut self, version: u8) {
+        tracing::debug!("the board speaks version {version} of the protocol");
+        self.version = version;
+        (self.hello, self.pending, self.heard) = (None, None, None);
+        (self.settings_in_doubt, self.start_due) = (false, false);
+        if version == OLD_VERSION { self.plan.not_offered() } else { self.plan.forget() }
+    }
+
+    /// Takes note of a fault that the board reports; returns whether it was an answer, and no news for people.
+    pub fn fault(&mut self, fault: &Fault) -> bool {
+        match *fault {
+            Fault::UnknownVersion(version) => {
+                // An answer to what was said before the version changed is no reason to change it again.
+                if version == self.version {
+                    self.speak(if version == VERSION { OLD_VERSION } else { VERSION });
+                }
+                return true;
+            }
+            Fault::BadSettings { answers } if self.is_answer(answers) => {}
+            Fault::BadPlan { answers } if self.is_answer(answers) => {}
+            _ => return false,
+        }
+        match self.pending.take().map(|pending| pending.request.command) {
+            Some(Command::Configure(wanted)) => self.refused(wanted, true),
+            Some(Command::Scan(_)) => self.plan_refused("does not take"),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Whether what names this tag answers the command that is on its way.
+    fn is_answer(&self, answers: u8) -> bool {
+        self.pending.as_ref().is_some_and(|pending| pending.request.tag == answers || self.version == OLD_VERSION)
+    }
+
+    /// Gives up the command that is on its way. A board that cannot be started is [mute](Self::is_mute).
+    fn unanswered(&mut self) {
+        match self.pending.take().map(|pending| pending.request.command) {
+            Some(Command::Configure(wanted)) => self.refused(wanted, false),
+            // Whole frames nobody has asked for; the frames themselves say what they are.
+            Some(Command::Scan(plan)) if plan.is_whole() => self.plan.confirmed(plan),
+            Some(Command::Scan(_)) => self.plan_refused("did not confirm"),
+            _ => self.start_due = false,
         }
     }
 
     /// Gives up the settings that were asked for; the board goes on with those that it has.
-    fn refused(&mut self) {
-        let wanted = self.configuring.take().map(|configuring| configuring.wanted);
-        if let Some((wanted, hello)) = wanted.zip(self.hello.as_ref()) {
-            let refusal = Refusal { wanted, kept: hello.settings };
+    fn refused(&mut self, wanted: Settings, is_said: bool) {
+        if let Some(hello) = &self.hello {
+            let refusal = Refusal { wanted, kept: hello.settings, is_said };
             tracing::warn!("{refusal}");
             self.refusal = Some(refusal);
         }
         self.requested = RequestedSettings::default();
-        self.start_is_due = true;
+        (self.settings_due, self.settings_in_doubt) = (false, false);
+        // A board of version 1 says nothing of whether it has been started.
+        self.start_due |= self.version == OLD_VERSION;
+    }
+
+    fn plan_refused(&mut self, how: &str) {
+        tracing::warn!("the board {how} the scan plan, and keeps the one before");
+        self.plan.refused();
     }
 
     /// Takes note of a frame.
@@ -252,71 +352,26 @@ impl Session {
 
     /// Whether the board answers and sends no frames, although it was started, and asked again.
     pub fn is_mute(&self, now: Instant) -> bool {
-        let patience = MUTE_AFTER + self.hello.as_ref().map(slowest_frame).unwrap_or_default();
+        let slowest = self.hello.as_ref().map(|hello| slowest_frame(hello, self.plan.in_force()));
+        let patience = MUTE_AFTER + slowest.unwrap_or_default();
         self.waiting_since.is_some_and(|since| now.saturating_duration_since(since) >= patience)
     }
 }
 
-/// Longest that a board takes for a frame with its settings.
-fn slowest_frame(hello: &Hello) -> Duration {
+/// Longest that a board takes for a frame with its settings and its plan.
+fn slowest_frame(hello: &Hello, plan: Option<&Plan>) -> Duration {
     let (electrodes, settings) = (u32::from(hello.electrodes), hello.settings);
-    let conversions = (electrodes * electrodes) << settings.average_log2.min(Settings::MAX_AVERAGE_LOG2);
-    let scan = CONVERSION * conversions + Duration::from_micros(settings.settle_us.into()) * electrodes;
+    let (rows, average_log2) = match plan.filter(|plan| !plan.is_whole()) {
+        Some(plan) => (u32::from(plan.rows_a_frame), plan.average_log2),
+        None => (electrodes, settings.average_log2),
+    };
+    let conversions = (rows * electrodes) << average_log2.min(Settings::MAX_AVERAGE_LOG2);
+    let scan = CONVERSION * conversions + Duration::from_micros(settings.settle_us.into()) * rows;
     let period = match settings.max_frames_per_s {
         0 => Duration::ZERO,
         rate => Duration::from_secs(1) / u32::from(rate),
     };
     scan.max(period)
-}
-
-/// Asks the board on `link` for Hello until it answers.
-///
-/// # Errors
-/// [`GreetError`] if it does not before `deadline`, or not in this version of the protocol.
-pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError> {
-    let begin = Instant::now();
-    let mut receiver = BoardReceiver::default();
-    let mut session = Session::new(RequestedSettings::default());
-    let mut buffer = [0; 512];
-    while Instant::now() < deadline {
-        if let Some(command) = session.command(Instant::now()) {
-            send(link, &command).map_err(|error| GreetError::Link(error.to_string()))?;
-        }
-        let count = link.read(&mut buffer).map_err(|error| GreetError::Link(error.to_string()))?;
-        let mut input = &buffer[..count];
-        while let Some(message) = receiver.receive(&mut input) {
-            match message {
-                Ok(BoardMessage::Hello(hello)) => return Ok(hello),
-                Err(error @ DecodeError::Version(_)) => return Err(GreetError::Version(error)),
-                _ => {}
-            }
-        }
-    }
-    let seconds = begin.elapsed().as_secs();
-    Err(GreetError::Silent { seconds, junk_bytes: receiver.counters().dropped_bytes })
-}
-
-/// Sends a command.
-///
-/// # Errors
-/// If the link does not take it.
-pub fn send(link: &mut dyn Link, command: &Command) -> std::io::Result<()> {
-    let mut wire = [0; MAX_COMMAND];
-    let length = tactomo_protocol::encode_command(command, &mut wire).map_err(std::io::Error::other)?;
-    // A zero ends whatever noise the board may have got before.
-    link.write_all(&[0])?;
-    link.write_all(&wire[..length])
-}
-
-/// What a fault means, for people.
-pub fn explain(fault: &Fault) -> String {
-    match fault {
-        Fault::Panic(place) => format!("its firmware panicked at {place} and started anew"),
-        Fault::Reset(cause) => format!("it restarted by itself: {cause}"),
-        Fault::AdcStuck => "no conversion of its ADC finishes in time".to_owned(),
-        Fault::BadSettings => "it refuses the settings, and keeps the old ones".to_owned(),
-        Fault::UnknownVersion(version) => format!("it got a command in version {version} of the protocol"),
-    }
 }
 
 #[cfg(test)]

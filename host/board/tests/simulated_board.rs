@@ -1,6 +1,7 @@
 //! The talk with a simulated board, from its start to a recording of it.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should")]
 
+use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -43,9 +44,40 @@ fn simulated(scene: SceneName) -> SimulatedBoard {
     SimulatedBoard::simulate(&detector, simulation, Options::default()).unwrap()
 }
 
+/// A line that loses one command in a few, or none.
+struct Lossy {
+    board: SimulatedBoard,
+    /// Which of the writes are lost, a bit each, from the lowest on; then none.
+    lost: u32,
+}
+
+impl Link for Lossy {
+    fn name(&self) -> String {
+        self.board.name()
+    }
+
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.board.read(buffer)
+    }
+
+    fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let is_lost = self.lost & 1 == 1;
+        self.lost >>= 1;
+        if is_lost { Ok(()) } else { self.board.write_all(bytes) }
+    }
+
+    fn control(&mut self, control: &Control) -> Result<(), ControlError> {
+        self.board.control(control)
+    }
+
+    fn playing(&self) -> Playing {
+        self.board.playing()
+    }
+}
+
 /// A host that talks as `live` does.
 struct Host {
-    board: SimulatedBoard,
+    board: Lossy,
     session: Session,
     receiver: BoardReceiver,
     hello: Option<Hello>,
@@ -56,6 +88,7 @@ struct Host {
 impl Host {
     fn new(board: SimulatedBoard, requested: RequestedSettings) -> Self {
         let (session, receiver) = (Session::new(requested), BoardReceiver::default());
+        let board = Lossy { board, lost: 0 };
         Self { board, session, receiver, hello: None, frames: Vec::new(), recorder: None }
     }
 
@@ -80,7 +113,7 @@ impl Host {
                     self.session.frame(arrived);
                     self.frames.push(frame);
                 }
-                Ok(BoardMessage::Fault(fault)) => self.session.fault(&fault),
+                Ok(BoardMessage::Fault(fault)) => drop(self.session.fault(&fault)),
                 _ => {}
             }
         }
@@ -104,13 +137,22 @@ impl Host {
     }
 }
 
-/// The board's Hello of its start and its answer to the first question come in one read, apart, or after the settings were sent.
+/// The board's Hello of its start and its answer to the first question come in one read, apart, or after the settings were sent; and some commands
+/// are lost.
 #[test]
 fn settings_reach_the_board_before_its_first_frame_every_time() {
-    for run in 0..60u64 {
+    for run in 0..100u64 {
         let requested =
             RequestedSettings { settle_us: Some(70), average_log2: Some(1), max_frames_per_s: Some(500 + run as u16) };
         let mut host = Host::new(board(Untouched::default()), requested);
+        // A command is two writes, of which the first ends whatever was on the line before.
+        host.board.lost = match run {
+            0 => 0b10,
+            1 => 0b1000,
+            2 => 0b10_0000,
+            3 => 0b1000_1010,
+            _ => 0,
+        };
         std::thread::sleep(Duration::from_micros(run % 6 * 400));
         host.frames_more(2);
         let expected = Settings { settle_us: 70, average_log2: 1, max_frames_per_s: 500 + run as u16 };

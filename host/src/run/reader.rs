@@ -222,8 +222,10 @@ impl Reader {
                 Ok(BoardMessage::Hello(hello)) => self.hello(talk, hello, received)?,
                 Ok(BoardMessage::Log(log)) => self.plan.board_log.take(&log.0),
                 Ok(BoardMessage::Fault(fault)) => {
-                    tracing::warn!("the board says: {}", session::explain(&fault));
-                    talk.session.fault(&fault);
+                    // What answers a command is told where that is given up.
+                    if !talk.session.fault(&fault) {
+                        tracing::warn!("the board says: {}", session::explain(&fault));
+                    }
                 }
                 Err(error @ DecodeError::Version(_)) => {
                     return Err(LiveError::Greet { link: link.name(), error: GreetError::Version(error) });
@@ -258,7 +260,7 @@ impl Reader {
         talk.junk.get_or_insert(talk.receiver.counters().corrupt);
         self.greeted.get_or_insert(now);
         let known = self.board.as_ref();
-        if known.is_none_or(|board| board.hello != hello) {
+        if known.is_none_or(|board| !is_same(&board.hello, &hello)) {
             let Hello { board, firmware_version, electrodes, .. } = &hello;
             tracing::info!("board {board} with firmware {firmware_version}: {electrodes} electrodes");
             let measured = Arc::new(measured::as_measured(&self.plan.detector, &hello)?);
@@ -399,6 +401,11 @@ impl Reader {
             self.notice.publish(|snapshot| snapshot.link = state);
         }
     }
+}
+
+/// Whether two Hellos say the same, whichever commands they answer.
+fn is_same(one: &Hello, other: &Hello) -> bool {
+    *one == Hello { answers: one.answers, is_streaming: one.is_streaming, ..other.clone() }
 }
 
 fn lost(link: &dyn Link, error: io::Error, comes_back: bool) -> Result<End, LiveError> {

@@ -54,21 +54,19 @@ impl FakeBoard {
         }
     }
 
-    fn obey(&mut self, command: Command) {
+    fn obey(&mut self, tag: u8, command: Command) {
         match command {
-            Command::Hello => self.say_hello(),
-            Command::Configure(settings) => {
-                self.settings = settings;
-                self.say_hello();
-            }
+            Command::Hello | Command::Scan(_) => {}
+            Command::Configure(settings) => self.settings = settings,
             Command::Start => self.streaming = true,
             Command::Stop => self.streaming = false,
         }
+        self.say_hello(tag);
     }
 
-    fn say_hello(&mut self) {
-        let board = "fake".try_into().unwrap();
-        let hello = Hello { board, settings: self.settings, ..Hello::example(self.electrodes) };
+    fn say_hello(&mut self, answers: u8) {
+        let (board, settings, is_streaming) = ("fake".try_into().unwrap(), self.settings, self.streaming);
+        let hello = Hello { answers, board, settings, is_streaming, ..Hello::example(self.electrodes) };
         let mut wire = [0; MAX_WIRE];
         let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
         self.out.extend(&wire[..length]);
@@ -120,8 +118,8 @@ impl Link for FakeBoard {
     }
 
     fn write_all(&mut self, mut bytes: &[u8]) -> io::Result<()> {
-        while let Some(Ok(command)) = self.receiver.receive(&mut bytes) {
-            self.obey(command);
+        while let Some(Ok(request)) = self.receiver.receive(&mut bytes) {
+            self.obey(request.tag, request.command);
         }
         Ok(())
     }

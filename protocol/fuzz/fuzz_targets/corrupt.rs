@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Log, MAX_WIRE, Settings,
-    encode_board, encode_command,
+    BoardMessage, BoardReceiver, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Log, MAX_WIRE, Plan, Range,
+    Request, Scope, Settings, VERSION, encode_board, encode_hello, encode_request,
 };
 
 /// Packets in a stream at most.
@@ -16,46 +16,70 @@ const PACKETS: usize = 8;
 
 enum Sent {
     Board(BoardMessage),
-    Host(Command),
+    Host(Request),
 }
 
 static PACKETS_SENT: LazyLock<Vec<(Sent, Vec<u8>)>> = LazyLock::new(|| {
-    let frame = |sequence, readings: &[u16]| {
-        let head = FrameHead { sequence, time_us: 7 * u32::from(sequence), ..FrameHead::default() };
-        BoardMessage::Frame(Frame { head, readings: readings.iter().copied().collect() })
-    };
-    let settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 0 };
-    let board = [
-        BoardMessage::Hello(Hello {
-            firmware_version: "0.1.0".try_into().expect("short"),
-            board: "esp32".try_into().expect("short"),
-            electrodes: 16,
-            adc_bits: 12,
-            adc_full_scale_mv: 3300,
-            drive_mv: 2000,
-            settings,
-        }),
-        frame(1, &std::array::from_fn::<u16, 16, _>(|i| i as u16)),
-        frame(0, &[0; 64]),
-        frame(2, &std::array::from_fn::<u16, 256, _>(|i| (i * i % 2000) as u16)),
-        frame(3, &[4095; 256]),
-        BoardMessage::Log(Log([0xFF, 0, 1, 0, 0].into_iter().collect())),
-        BoardMessage::Fault(Fault::AdcStuck),
-        BoardMessage::Fault(Fault::Reset("watchdog".try_into().expect("short"))),
-    ];
-    let host = [Command::Hello, Command::Start, Command::Stop, Command::Configure(settings)];
-    let mut out = [0; MAX_WIRE];
     let mut sent = Vec::new();
-    for message in board {
-        let length = encode_board(&message, &mut out).expect("within the limits");
+    let mut out = [0; MAX_WIRE];
+    for message in board_messages() {
+        let encoded = match &message {
+            BoardMessage::Hello(hello) => encode_hello(hello, &mut out),
+            message => encode_board(message, &mut out),
+        };
+        let length = encoded.expect("within the limits");
         sent.push((Sent::Board(message), out[..length].to_vec()));
     }
-    for command in host {
-        let length = encode_command(&command, &mut out).expect("within the limits");
-        sent.push((Sent::Host(command), out[..length].to_vec()));
+    for request in requests() {
+        let length = encode_request(&request, VERSION, &mut out).expect("within the limits");
+        sent.push((Sent::Host(request), out[..length].to_vec()));
     }
     sent
 });
+
+const SETTINGS: Settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 0 };
+
+/// Messages of this version, and a Hello of version 1.
+fn board_messages() -> Vec<BoardMessage> {
+    let frame = |sequence, scope: Option<Scope>, readings: &[u16]| {
+        let head = FrameHead { sequence, time_us: 7 * u32::from(sequence), ..FrameHead::default() };
+        let scope = scope.expect("within the limits");
+        BoardMessage::Frame(Frame { head, scope, readings: readings.iter().copied().collect() })
+    };
+    let hello = Hello {
+        version: VERSION,
+        answers: 3,
+        firmware_version: "0.1.0".try_into().expect("short"),
+        board: "esp32".try_into().expect("short"),
+        electrodes: 16,
+        adc_bits: 12,
+        adc_full_scale_mv: 3300,
+        drive_mv: 2000,
+        settings: SETTINGS,
+        is_streaming: false,
+        ranges: [Range::of_codes(16, 12)].into_iter().collect(),
+    };
+    vec![
+        BoardMessage::Hello(Hello { version: 1, answers: 0, ..hello.clone() }),
+        BoardMessage::Hello(hello),
+        frame(1, Scope::whole(4), &std::array::from_fn::<u16, 16, _>(|i| i as u16)),
+        frame(0, Scope::whole(8), &[0; 64]),
+        frame(2, Scope::whole(16), &std::array::from_fn::<u16, 256, _>(|i| (i * i % 2000) as u16)),
+        frame(3, Scope::whole(16), &[4095; 256]),
+        frame(4, Scope::of_rows(16, &[3, 0, 3], 0x8001), &[5, 0, 1, 2, 3, 4]),
+        BoardMessage::Log(Log([0xFF, 0, 1, 0, 0].into_iter().collect())),
+        BoardMessage::Fault(Fault::AdcStuck),
+        BoardMessage::Fault(Fault::BadPlan { answers: 9 }),
+        BoardMessage::Fault(Fault::Reset("watchdog".try_into().expect("short"))),
+    ]
+}
+
+fn requests() -> Vec<Request> {
+    let grounds = [0, 5, 10, 15].into_iter().collect();
+    let plan = Plan { grounds, reads: 0xFFFF, rows_a_frame: 2, average_log2: 1 };
+    let commands = [Command::Hello, Command::Start, Command::Stop, Command::Configure(SETTINGS), Command::Scan(plan)];
+    (1..).zip(commands).map(|(tag, command)| Request { tag, command }).collect()
+}
 
 fuzz_target!(|input: &[u8]| {
     let Some((choice, disturbances)) = input.split_first_chunk::<PACKETS>() else { return };
@@ -124,9 +148,9 @@ fn check_board(choice: &[u8], mut stream: &[u8]) {
     let mut receiver = CommandReceiver::default();
     let mut accepted = 0;
     while let Some(result) = receiver.receive(&mut stream) {
-        let Ok(command) = result else { continue };
-        let sent = |choice: &u8| matches!(&chosen(*choice).0, Sent::Host(sent) if *sent == command);
-        assert!(choice.iter().any(sent), "never sent: {command:?}");
+        let Ok(request) = result else { continue };
+        let sent = |choice: &u8| matches!(&chosen(*choice).0, Sent::Host(sent) if *sent == request);
+        assert!(choice.iter().any(sent), "never sent: {request:?}");
         accepted += 1;
     }
     assert!(accepted >= whole, "{whole} packets arrived whole, {accepted} were received");

@@ -4,7 +4,7 @@ use heapless::Vec as Fixed;
 use proptest::prelude::*;
 use tactomo_protocol::{
     BoardMessage, BoardReceiver, Command, CommandReceiver, Counters, DecodeError, Fault, Frame, FrameHead, Hello, Log,
-    MAX_COMMAND, MAX_WIRE, Settings, Status, encode_board, encode_command,
+    MAX_COMMAND, MAX_WIRE, Plan, Range, Request, Scope, Settings, Status, VERSION, encode_board, encode_request,
 };
 
 /// A text of up to `N` bytes, not all of them ASCII.
@@ -21,30 +21,75 @@ pub fn settings() -> impl Strategy<Value = Settings> {
         .prop_map(|(settle_us, average_log2, max_frames_per_s)| Settings { settle_us, average_log2, max_frames_per_s })
 }
 
+/// One to four ranges that sum up to all electrodes.
+fn ranges(electrodes: u8, adc_bits: u8) -> impl Strategy<Value = Fixed<Range, 4>> {
+    let largest = ((1u32 << adc_bits) - 1) as u16;
+    let cuts = prop::collection::vec(1..electrodes, 0..=3);
+    (cuts, prop::collection::vec((0..largest, 1..=largest), 4)).prop_map(move |(mut cuts, codes)| {
+        cuts.extend([0, electrodes]);
+        cuts.sort_unstable();
+        cuts.dedup();
+        let runs = cuts.windows(2).map(|cut| cut[1] - cut[0]);
+        let range =
+            |(electrodes, (a, b)): (u8, &(u16, u16))| Range { electrodes, floor: (*a).min(*b - 1), ceiling: *b };
+        runs.zip(&codes).map(range).collect()
+    })
+}
+
 fn any_hello() -> impl Strategy<Value = BoardMessage> {
-    (text(), text(), 4..=32u8, 1..=16u8, 1u16.., 1u16.., settings()).prop_map(
-        |(firmware_version, board, electrodes, adc_bits, adc_full_scale_mv, drive_mv, settings)| {
-            let hello = Hello { firmware_version, board, electrodes, adc_bits, adc_full_scale_mv, drive_mv, settings };
-            BoardMessage::Hello(hello)
+    let shape = (4..=32u8, 1..=16u8).prop_flat_map(|(n, bits)| (Just(n), Just(bits), ranges(n, bits)));
+    (text(), text(), shape, 1u16.., 1u16.., settings(), any::<u8>(), any::<bool>()).prop_map(
+        |(firmware_version, board, shape, adc_full_scale_mv, drive_mv, settings, answers, is_streaming)| {
+            let (electrodes, adc_bits, ranges) = shape;
+            BoardMessage::Hello(Hello {
+                version: VERSION,
+                answers,
+                firmware_version,
+                board,
+                electrodes,
+                adc_bits,
+                adc_full_scale_mv,
+                drive_mv,
+                settings,
+                is_streaming,
+                ranges,
+            })
         },
     )
 }
 
+/// Some of the electrodes' bits, never none.
+fn reads(electrodes: u8) -> impl Strategy<Value = u32> {
+    let all = u32::MAX >> (32 - u32::from(electrodes));
+    prop_oneof![Just(all), (1..=all)]
+}
+
+/// Whole frames, and rows of any kind that hold no more than a whole one.
+fn scope() -> impl Strategy<Value = Scope> {
+    let rows = (4..=32u8).prop_flat_map(|n| (Just(n), prop::collection::vec(0..n, 1..=32), reads(n)));
+    let some = rows.prop_map(|(n, mut grounds, reads)| {
+        grounds.truncate((usize::from(n).pow(2) / reads.count_ones() as usize).min(grounds.len()));
+        Scope::of_rows(n, &grounds, reads).expect("a scope")
+    });
+    prop_oneof![(4..=32u8).prop_map(|n| Scope::whole(n).expect("4 to 32")), some]
+}
+
 fn frame() -> impl Strategy<Value = BoardMessage> {
-    let head = (any::<u16>(), any::<u32>(), any::<u8>(), 0..=15u8);
+    let head = (any::<u16>(), any::<u32>(), 0..=3u8, 0..=15u8);
     let head = head.prop_map(|(sequence, time_us, status, fraction_bits)| FrameHead {
         sequence,
         time_us,
         status: Status(status),
         fraction_bits,
     });
-    let readings = (4..=32usize, 0..=16u32).prop_flat_map(|(electrodes, bits)| {
+    let readings = (scope(), 0..=16u32).prop_flat_map(|(scope, bits)| {
         let largest = ((1u32 << bits) - 1) as u16;
-        prop::collection::vec(prop_oneof![Just(0), 0..=largest], electrodes * electrodes)
+        let readings = prop::collection::vec(prop_oneof![Just(0), 0..=largest], scope.readings());
+        (Just(scope), readings)
     });
-    (head, readings).prop_map(|(head, readings)| {
+    (head, readings).prop_map(|(head, (scope, readings))| {
         let readings = Fixed::from_slice(&readings).expect("room for 32 x 32");
-        BoardMessage::Frame(Frame { head, readings })
+        BoardMessage::Frame(Frame { head, scope, readings })
     })
 }
 
@@ -59,7 +104,8 @@ fn fault() -> impl Strategy<Value = BoardMessage> {
         text().prop_map(Fault::Panic),
         text().prop_map(Fault::Reset),
         Just(Fault::AdcStuck),
-        Just(Fault::BadSettings),
+        any::<u8>().prop_map(|answers| Fault::BadSettings { answers }),
+        any::<u8>().prop_map(|answers| Fault::BadPlan { answers }),
         any::<u8>().prop_map(Fault::UnknownVersion),
     ]
     .prop_map(BoardMessage::Fault)
@@ -69,25 +115,45 @@ pub fn board_message() -> impl Strategy<Value = BoardMessage> {
     prop_oneof![any_hello(), frame(), log(), fault()]
 }
 
-pub fn command() -> impl Strategy<Value = Command> {
-    prop_oneof![
+/// Any plan that the wire carries, whether or not a board would take it.
+fn plan() -> impl Strategy<Value = Plan> {
+    (prop::collection::vec(any::<u8>(), 0..=96), any::<u32>(), any::<u8>(), any::<u8>()).prop_map(
+        |(grounds, reads, rows_a_frame, average_log2)| Plan {
+            grounds: Fixed::from_slice(&grounds).expect("room for 96"),
+            reads,
+            rows_a_frame,
+            average_log2,
+        },
+    )
+}
+
+pub fn request() -> impl Strategy<Value = Request> {
+    let command = prop_oneof![
         Just(Command::Hello),
         Just(Command::Start),
         Just(Command::Stop),
         settings().prop_map(Command::Configure),
-    ]
+        plan().prop_map(Command::Scan),
+    ];
+    (1u8.., command).prop_map(|(tag, command)| Request { tag, command })
 }
 
-/// A Hello as the paper's board sends it.
+/// A Hello as the paper's board sends it, whose two converters see different ranges.
 pub fn hello() -> Hello {
+    let ranges =
+        [Range { electrodes: 6, floor: 142, ceiling: 3100 }, Range { electrodes: 10, floor: 128, ceiling: 3080 }];
     Hello {
+        version: VERSION,
+        answers: 7,
         firmware_version: "0.1.0".try_into().unwrap(),
         board: "esp32".try_into().unwrap(),
         electrodes: 16,
         adc_bits: 12,
-        adc_full_scale_mv: 3300,
+        adc_full_scale_mv: 4096,
         drive_mv: 2000,
         settings: Settings::default(),
+        is_streaming: true,
+        ranges: ranges.into_iter().collect(),
     }
 }
 
@@ -97,9 +163,9 @@ pub fn board_wire(message: &BoardMessage) -> Vec<u8> {
     out[..length].to_vec()
 }
 
-pub fn command_wire(command: &Command) -> Vec<u8> {
+pub fn request_wire(request: &Request) -> Vec<u8> {
     let mut out = [0; MAX_COMMAND];
-    let length = encode_command(command, &mut out).expect("every command fits");
+    let length = encode_request(request, VERSION, &mut out).expect("every command fits");
     out[..length].to_vec()
 }
 
@@ -121,7 +187,7 @@ pub fn receive_board(chunks: &[&[u8]]) -> (Vec<Result<BoardMessage, DecodeError>
 }
 
 /// What a board's receiver makes of the bytes, and its counters.
-pub fn receive_command(mut bytes: &[u8]) -> (Vec<Result<Command, DecodeError>>, Counters) {
+pub fn receive_command(mut bytes: &[u8]) -> (Vec<Result<Request, DecodeError>>, Counters) {
     let mut receiver = CommandReceiver::default();
     let received = std::iter::from_fn(|| receiver.receive(&mut bytes)).collect();
     (received, receiver.counters())

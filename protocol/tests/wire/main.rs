@@ -5,3 +5,4 @@ mod common;
 mod limits;
 mod properties;
 mod specification;
+mod version1;

@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 use proptest::sample::Index;
-use tactomo_protocol::{Counters, EncodeError, MAX_COMMAND, encode_board, encode_command};
+use tactomo_protocol::{Counters, EncodeError, MAX_COMMAND, VERSION, encode_board, encode_request};
 
-use crate::common::{board_message, board_wire, command, command_wire, receive_board, receive_command};
+use crate::common::{board_message, board_wire, receive_board, receive_command, request, request_wire};
 
 /// One disturbance of a stream.
 #[derive(Clone, Debug)]
@@ -101,20 +101,20 @@ proptest! {
     }
 
     #[test]
-    fn a_command_comes_back_as_it_was(command in command()) {
-        let wire = command_wire(&command);
+    fn a_command_comes_back_as_it_was(request in request()) {
+        let wire = request_wire(&request);
         prop_assert!(wire.len() <= MAX_COMMAND);
-        prop_assert_eq!(receive_command(&wire).0, [Ok(command)]);
+        prop_assert_eq!(receive_command(&wire).0, [Ok(request)]);
     }
 
     #[test]
-    fn an_output_too_short_is_refused(message in board_message(), command in command(), missing: Index) {
+    fn an_output_too_short_is_refused(message in board_message(), request in request(), missing: Index) {
         let wire = board_wire(&message);
         let mut out = vec![0; missing.index(wire.len())];
         prop_assert_eq!(encode_board(&message, &mut out), Err(EncodeError::Full));
-        let wire = command_wire(&command);
+        let wire = request_wire(&request);
         let mut out = vec![0; missing.index(wire.len())];
-        prop_assert_eq!(encode_command(&command, &mut out), Err(EncodeError::Full));
+        prop_assert_eq!(encode_request(&request, VERSION, &mut out), Err(EncodeError::Full));
     }
 
     #[test]
@@ -149,10 +149,10 @@ proptest! {
 
     #[test]
     fn disturbed_commands_give_what_arrived_whole_and_nothing_else(
-        commands in prop::collection::vec(command(), 1..9),
+        requests in prop::collection::vec(request(), 1..9),
         disturbances in prop::collection::vec(disturbance(), 1..6),
     ) {
-        let sent: Vec<_> = commands.into_iter().map(|command| (command, command_wire(&command))).collect();
+        let sent: Vec<_> = requests.into_iter().map(|request| (request.clone(), request_wire(&request))).collect();
         let mut stream: Vec<u8> = sent.iter().flat_map(|(_, wire)| wire.clone()).collect();
         disturbances.iter().for_each(|disturbance| disturbance.apply(&mut stream));
         let (arrived, expected) = whole(&sent, &stream);

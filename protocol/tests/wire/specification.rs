@@ -5,9 +5,11 @@
 use std::fmt::Debug;
 
 use heapless::Vec as Fixed;
-use tactomo_protocol::{BoardMessage, Command, DecodeError, Fault, Frame, FrameHead, Log, Settings, Status};
+use tactomo_protocol::{
+    BoardMessage, Command, DecodeError, Fault, Frame, FrameHead, Log, Plan, Request, Scope, Settings, Status,
+};
 
-use crate::common::{board_wire, command_wire, hello, packet, receive_board, receive_command};
+use crate::common::{board_wire, hello, packet, receive_board, receive_command, request_wire};
 
 const PAGE: &str = include_str!("../../../docs/protocol.md");
 
@@ -27,8 +29,8 @@ fn examples() -> Vec<Example> {
         .collect()
 }
 
-fn frame(head: FrameHead, readings: &[u16]) -> BoardMessage {
-    BoardMessage::Frame(Frame { head, readings: Fixed::from_slice(readings).unwrap() })
+fn frame(head: FrameHead, scope: Option<Scope>, readings: &[u16]) -> BoardMessage {
+    BoardMessage::Frame(Frame { head, scope: scope.unwrap(), readings: Fixed::from_slice(readings).unwrap() })
 }
 
 /// One of every kind of message, and the edges of a frame's coding.
@@ -39,22 +41,38 @@ fn board_messages() -> Vec<BoardMessage> {
     timed_out.status.insert(Status::TIMED_OUT);
     vec![
         BoardMessage::Hello(hello()),
-        frame(head, &[0, 1, 2, 3, 4, 0, 6, 7, 8, 9, 0, 11, 12, 13, 14, 0]),
-        frame(head, &std::array::from_fn::<u16, 25, _>(|i| if i % 6 == 0 { 0 } else { 150 * i as u16 })),
-        frame(timed_out, &[65535, 256, 0, 1, 255, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
-        frame(head, &[0; 16]),
+        frame(head, Scope::whole(4), &[0, 1, 2, 3, 4, 0, 6, 7, 8, 9, 0, 11, 12, 13, 14, 0]),
+        frame(
+            head,
+            Scope::whole(5),
+            &std::array::from_fn::<u16, 25, _>(|i| if i % 6 == 0 { 0 } else { 150 * i as u16 }),
+        ),
+        frame(timed_out, Scope::whole(4), &[65535, 256, 0, 1, 255, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
+        frame(head, Scope::whole(4), &[0; 16]),
+        frame(head, Scope::of_rows(16, &[12, 0, 12], 0b1001_0000_0000_0001), &[3, 0, 450, 0, 7, 440, 2, 0, 451]),
         BoardMessage::Log(Log(Fixed::from_slice(&[0xFF, 0x00, 0x12, 0x00]).unwrap())),
         BoardMessage::Fault(Fault::Panic("src/main.rs:42".try_into().unwrap())),
         BoardMessage::Fault(Fault::Reset("watchdog".try_into().unwrap())),
         BoardMessage::Fault(Fault::AdcStuck),
-        BoardMessage::Fault(Fault::BadSettings),
-        BoardMessage::Fault(Fault::UnknownVersion(2)),
+        BoardMessage::Fault(Fault::BadSettings { answers: 8 }),
+        BoardMessage::Fault(Fault::UnknownVersion(3)),
+        BoardMessage::Fault(Fault::BadPlan { answers: 9 }),
     ]
 }
 
-fn commands() -> Vec<Command> {
+fn requests() -> Vec<Request> {
     let settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 100 };
-    vec![Command::Hello, Command::Start, Command::Stop, Command::Configure(settings)]
+    let grounds = [0, 5, 10, 15].into_iter().collect();
+    let plan = Plan { grounds, reads: 0xFFFF, rows_a_frame: 2, average_log2: 1 };
+    let commands = [
+        Command::Hello,
+        Command::Start,
+        Command::Stop,
+        Command::Configure(settings),
+        Command::Scan(plan),
+        Command::Scan(Plan::default()),
+    ];
+    (7..).zip(commands).map(|(tag, command)| Request { tag, command }).collect()
 }
 
 fn told<M: Debug>(result: &Result<M, DecodeError>) -> String {
@@ -68,12 +86,12 @@ fn told<M: Debug>(result: &Result<M, DecodeError>) -> String {
 fn expected() -> Vec<Example> {
     let boards = board_messages().into_iter().map(|message| (board_wire(&message), Ok(message)));
     let refused = [
-        (packet(0x20, &[0xC0, 0xDE]), Err(DecodeError::Version(2))),
+        (packet(0x30, &[0xC0, 0xDE]), Err(DecodeError::Version(3))),
         (board_wire(&BoardMessage::Fault(Fault::AdcStuck))[1..].to_vec(), Err(DecodeError::Corrupt)),
     ];
-    let hosts = commands().into_iter().map(|command| (command_wire(&command), command));
+    let hosts = requests().into_iter().map(|request| (request_wire(&request), request));
     let boards = boards.chain(refused).map(|(wire, result)| (format!("board: {}", told(&result)), wire));
-    boards.chain(hosts.map(|(wire, command)| (format!("host: {command:?}"), wire))).collect()
+    boards.chain(hosts.map(|(wire, request)| (format!("host: {request:?}"), wire))).collect()
 }
 
 fn page_text(examples: &[Example]) -> String {

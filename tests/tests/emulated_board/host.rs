@@ -7,7 +7,9 @@ use anyhow::{Context, Result, bail};
 use defmt_decoder::{DecodeError, Table};
 use tactomo::board::link::Link;
 use tactomo::board::link::serial::{DEFAULT_BAUD, SerialLink};
-use tactomo_protocol::{BoardMessage, BoardReceiver, Command, Counters, Frame, Hello, MAX_COMMAND, encode_command};
+use tactomo_protocol::{
+    BoardMessage, BoardReceiver, Command, Counters, Frame, Hello, MAX_COMMAND, Request, VERSION, encode_request,
+};
 
 /// Longest wait for anything, on a machine under load.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -41,7 +43,8 @@ impl Host {
     /// If the line does not take it.
     pub fn send(&mut self, command: &Command) -> Result<()> {
         let mut bytes = [0; MAX_COMMAND];
-        let length = encode_command(command, &mut bytes)?;
+        let request = Request { tag: 1, command: command.clone() };
+        let length = encode_request(&request, VERSION, &mut bytes)?;
         Ok(self.link.write_all(&bytes[..length])?)
     }
 

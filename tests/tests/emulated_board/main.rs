@@ -86,7 +86,7 @@ fn settings_out_of_range_are_refused() -> Result<()> {
     let mut host = Host::open(board.pty(), elf)?;
     let before = host.hello()?.settings;
     host.send(&Command::Configure(Settings { average_log2: 9, ..before }))?;
-    host.wait_for(|message| matches!(message, BoardMessage::Fault(Fault::BadSettings)).then_some(()))?;
+    host.wait_for(|message| matches!(message, BoardMessage::Fault(Fault::BadSettings { answers: 1 })).then_some(()))?;
     assert_eq!(host.hello()?.settings, before);
     Ok(())
 }

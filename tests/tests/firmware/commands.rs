@@ -2,7 +2,7 @@
 
 use tactomo_firmware::mux::Transparent;
 use tactomo_firmware::{Activity, Board16, Identity, NewBoardError, Parts};
-use tactomo_protocol::{Command, Fault, Settings, encode_command};
+use tactomo_protocol::{Command, Fault, Hello, MAX_COMMAND, Plan, Request, Settings, VERSION, encode_request};
 
 use super::parts::*;
 
@@ -40,7 +40,8 @@ fn settings_take_effect_at_once_and_are_confirmed() {
     let messages = outside.messages();
     assert_eq!(
         hellos(&messages).iter().map(|hello| hello.settings).collect::<Vec<_>>(),
-        [Settings::default(), settings]
+        [Settings::default(), Settings::default(), settings],
+        "at the start, after Start, and after Configure"
     );
     assert_eq!(u64::from(frames(&messages)[0].head.time_us), begin_us, "a frame has settings of one kind");
 }
@@ -55,23 +56,50 @@ fn settings_out_of_range_are_refused_and_the_old_ones_stay() {
     outside.send(Command::Hello);
     board.step().unwrap();
     let messages = outside.messages();
-    assert_eq!(faults(&messages), [&Fault::BadSettings]);
+    assert_eq!(faults(&messages), [&Fault::BadSettings { answers: 1 }]);
     assert_eq!(hellos(&messages)[0].settings, Settings::default());
+}
+
+#[test]
+fn every_command_is_answered_by_its_tag_and_the_repetition_changes_nothing() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    board.step().unwrap();
+    outside.messages();
+    let settings = Settings { settle_us: 30, ..Settings::default() };
+    let commands = [
+        (Command::Hello, Settings::default(), false),
+        (Command::Configure(settings), settings, false),
+        (Command::Scan(Plan::default()), settings, false),
+        (Command::Start, settings, true),
+        (Command::Stop, settings, false),
+    ];
+    for (tag, (command, settings, is_streaming)) in (200..).step_by(10).zip(commands) {
+        for tag in [tag, tag, tag + 1] {
+            outside.send_tagged(tag, command.clone());
+            board.step().unwrap();
+            let messages = outside.messages();
+            let [Hello { answers, settings: told, is_streaming: streams, .. }] = hellos(&messages)[..] else {
+                panic!("{command:?}: {messages:?}")
+            };
+            assert_eq!((*answers, *told, *streams), (tag, settings, is_streaming));
+        }
+    }
 }
 
 #[test]
 fn a_newer_host_is_told_by_number_and_not_obeyed() {
     let outside = Outside::default();
     let mut board = simple_board(&outside, numbered);
-    outside.send_bytes(&in_version(2, Command::Start));
+    outside.send_bytes(&in_version(3, Command::Start));
     assert_eq!(board.step(), Ok(Activity::Idle));
-    assert_eq!(faults(&outside.messages()), [&Fault::UnknownVersion(2)]);
+    assert_eq!(faults(&outside.messages()), [&Fault::UnknownVersion(3)]);
 }
 
 /// A command as another version of the protocol would send it: head, checksum and framing are the same in every version.
 fn in_version(version: u8, command: Command) -> Vec<u8> {
-    let mut packet = [0; 32];
-    let length = encode_command(&command, &mut packet).unwrap();
+    let mut packet = [0; MAX_COMMAND];
+    let length = encode_request(&Request { tag: 1, command }, VERSION, &mut packet).unwrap();
     let mut content = cobs::decode_vec(&packet[..length - 1]).unwrap();
     content.truncate(content.len() - 4);
     content[0] = version << 4 | content[0] & 15;
@@ -90,7 +118,7 @@ fn commands_are_found_among_garbage() {
     outside.messages();
     // A byte of every value, a run longer than any command, half a command; then a zero ends the junk.
     outside.send_bytes(&(0..=255).chain([0x55; 500]).collect::<Vec<u8>>());
-    outside.send_bytes(&in_version(1, Command::Start)[..3]);
+    outside.send_bytes(&in_version(VERSION, Command::Start)[..3]);
     outside.send_bytes(&[0]);
     outside.send(Command::Hello);
     step(&mut board, 20);

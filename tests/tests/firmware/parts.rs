@@ -8,7 +8,9 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo_firmware::mux::Mux;
 use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Parts, Sampler, Serial, TimedOut};
-use tactomo_protocol::{BoardMessage, BoardReceiver, Command, Fault, Frame, Hello, MAX_COMMAND, encode_command};
+use tactomo_protocol::{
+    BoardMessage, BoardReceiver, Command, Fault, Frame, Hello, MAX_COMMAND, Request, VERSION, encode_request,
+};
 
 /// Time of one conversion of the test's converter (us).
 pub const CONVERSION_US: u64 = 10;
@@ -217,9 +219,14 @@ impl Outside {
         self.clock_us.set(self.clock_us.get() + us);
     }
 
+    /// Sends a command with the tag 1.
     pub fn send(&self, command: Command) {
+        self.send_tagged(1, command);
+    }
+
+    pub fn send_tagged(&self, tag: u8, command: Command) {
         let mut packet = [0; MAX_COMMAND];
-        let length = encode_command(&command, &mut packet).unwrap();
+        let length = encode_request(&Request { tag, command }, VERSION, &mut packet).unwrap();
         self.send_bytes(&packet[..length]);
     }
 

@@ -11,22 +11,14 @@ use tactomo::run::{LinkState, Request, Snapshot};
 use tactomo::scene::{Contact, SceneName};
 use tactomo::simulate::Fault;
 use tactomo::solve::FoundContact;
-use tactomo_protocol::{Hello, Settings};
+use tactomo_protocol::Hello;
 
 use crate::chromium::Browser;
 use crate::script::{FINGER, Script};
 use crate::stage::{Stage, in_front_of};
 
 fn hello() -> Hello {
-    Hello {
-        firmware_version: "0.1.0".try_into().unwrap_or_default(),
-        board: "test".try_into().unwrap_or_default(),
-        electrodes: 16,
-        adc_bits: 12,
-        adc_full_scale_mv: 2000,
-        drive_mv: 2000,
-        settings: Settings::default(),
-    }
+    Hello { adc_full_scale_mv: 2000, ..Hello::example(16) }
 }
 
 fn recording(position_s: f64, paused: bool) -> Playing {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serialport::{SerialPort, TTYPort};
 use tactomo_protocol::{
-    BoardMessage, Command, CommandReceiver, FrameHead, Hello, MAX_WIRE, encode_board, encode_frame,
+    BoardMessage, Command, CommandReceiver, FrameHead, Hello, MAX_WIRE, Request, encode_board, encode_frame,
 };
 
 /// How long the host may take for anything.
@@ -19,6 +19,7 @@ pub struct Board {
     port: PathBuf,
     receiver: CommandReceiver,
     sequence: u16,
+    streaming: bool,
 }
 
 impl Board {
@@ -29,7 +30,7 @@ impl Board {
         let port = std::env::temp_dir().join(format!("tactomo-{}-{name}", std::process::id()));
         let _ = std::fs::remove_file(&port); // Left by the board before, if there was one.
         std::os::unix::fs::symlink(slave.name().unwrap(), &port).unwrap();
-        Self { master: Some(master), port, receiver: CommandReceiver::default(), sequence: 0 }
+        Self { master: Some(master), port, receiver: CommandReceiver::default(), sequence: 0, streaming: false }
     }
 
     /// Pulls the cable: port and name are gone.
@@ -44,13 +45,35 @@ impl Board {
 
     /// Waits for a host that asks, and until it has started the board.
     pub fn greet(&mut self) {
-        self.wait_for(Command::Hello);
-        self.say_hello();
-        self.wait_for(Command::Start);
+        let tag = self.wait_for(Command::Hello);
+        self.answer(tag);
+        self.wait_for_start();
     }
 
-    /// Reads until the host says `command`.
-    pub fn wait_for(&mut self, command: Command) {
+    /// Waits until the host has started the board, and answers what it says on the way there.
+    pub fn wait_for_start(&mut self) {
+        loop {
+            let Request { tag, command } = self.next_request();
+            self.streaming |= command == Command::Start;
+            self.answer(tag);
+            if command == Command::Start {
+                return;
+            }
+        }
+    }
+
+    /// Reads until the host says `command`, and answers nothing; returns its tag.
+    pub fn wait_for(&mut self, command: Command) -> u8 {
+        loop {
+            let request = self.next_request();
+            if request.command == command {
+                return request.tag;
+            }
+        }
+    }
+
+    /// Reads until the host says something.
+    fn next_request(&mut self) -> Request {
         let begin = Instant::now();
         while begin.elapsed() < PATIENCE {
             let mut byte = [0];
@@ -59,15 +82,16 @@ impl Board {
                 std::thread::sleep(Duration::from_millis(1));
                 continue;
             };
-            if self.receiver.receive(&mut &byte[..]) == Some(Ok(command)) {
-                return;
+            if let Some(Ok(request)) = self.receiver.receive(&mut &byte[..]) {
+                return request;
             }
         }
-        panic!("the host never said {command:?}");
+        panic!("the host says nothing");
     }
 
-    pub fn say_hello(&mut self) {
-        self.say(&BoardMessage::Hello(Hello::example(16)));
+    /// Says Hello in answer to the command with this tag; 0 after a start.
+    pub fn answer(&mut self, answers: u8) {
+        self.say(&BoardMessage::Hello(Hello { answers, is_streaming: self.streaming, ..Hello::example(16) }));
     }
 
     pub fn say(&mut self, message: &BoardMessage) {
@@ -95,9 +119,9 @@ impl Board {
         }
     }
 
-    /// Counts and clock begin again.
+    /// Counts and clock begin again, and nothing is sent.
     pub fn reset(&mut self) {
-        self.sequence = 0;
+        (self.sequence, self.streaming) = (0, false);
     }
 
     /// Sends bytes as they are, however long the host takes to read them.

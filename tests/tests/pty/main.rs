@@ -23,12 +23,12 @@ const BOOT_TEXT: &[u8] = b"ets Jul 29 2019 12:21:46\r\n\r\nrst:0x1 (POWERON_RESE
 fn a_board_that_streams_already_is_joined_in_the_middle_of_a_frame() {
     let mut board = Board::plug("join");
     let host = Host::start(board.port());
-    board.wait_for(Command::Hello);
+    let tag = board.wait_for(Command::Hello);
     let frame = board.next_frame();
     board.raw(&frame[100..]);
     board.frames(5);
-    board.say_hello();
-    board.wait_for(Command::Start);
+    board.answer(tag);
+    board.wait_for_start();
     board.frames(50);
     host.wait_for_frames(50);
     let summary = host.finish().unwrap();
@@ -101,8 +101,8 @@ fn a_board_that_starts_anew_is_started_again() {
     board.raw(BOOT_TEXT);
     board.raw(&[0]);
     board.say(&BoardMessage::Fault(Fault::Reset("watchdog".try_into().unwrap())));
-    board.say_hello();
-    board.wait_for(Command::Start);
+    board.answer(0);
+    board.wait_for_start();
     board.frames(10);
     host.wait_for_frames(20);
     let summary = host.finish().unwrap();
@@ -133,9 +133,9 @@ fn a_board_of_a_newer_protocol_is_refused_by_name() {
     let host = Host::start(board.port());
     board.wait_for(Command::Hello);
     // The example of docs/protocol.md.
-    board.raw(&[0x08, 0x20, 0xC0, 0xDE, 0x6F, 0xB7, 0x9D, 0x6D, 0x00]);
+    board.raw(&[0x08, 0x30, 0xC0, 0xDE, 0x1F, 0x14, 0xBB, 0x71, 0x00]);
     let message = host.ended().unwrap_err().to_string();
-    for part in [board.port().to_str().unwrap(), "version 2", "version 1", "update"] {
+    for part in [board.port().to_str().unwrap(), "version 3", "version 2", "update"] {
         assert!(message.contains(part), "{part} is missing in: {message}");
     }
 }

@@ -8,11 +8,13 @@ use esp_hal::peripherals::{
     ADC1, ADC2, GPIO0, GPIO2, GPIO4, GPIO12, GPIO13, GPIO14, GPIO15, GPIO25, GPIO26, GPIO27, GPIO32, GPIO33, GPIO34,
     GPIO35, GPIO36, GPIO39,
 };
-use tactomo_board_espressif::analog::{ATTENUATION, AnalogUnit, ceiling_mv, millivolts};
+use tactomo_board_espressif::analog::{ATTENUATION, AnalogUnit, millivolts, range};
 use tactomo_firmware::{Adc, Sampler, TimedOut};
 
 /// Electrodes of the board.
 pub const ELECTRODES: u8 = 16;
+/// Electrodes at ADC1, which come first.
+const ADC1_ELECTRODES: u8 = 6;
 /// GPIO of each channel of ADC1 (37 and 38 are not on the module), from the chip's data sheet.
 const ADC1_GPIO: [u8; 8] = [36, 37, 38, 39, 32, 33, 34, 35];
 /// GPIO of each channel of ADC2.
@@ -59,6 +61,7 @@ macro_rules! inputs {
         const _: () = {
             $(assert!(has(&ADC1_GPIO, stringify!($gpio1)), "this pin is not an input of ADC1");)*
             $(assert!(has(&ADC2_GPIO, stringify!($gpio2)), "this pin is not an input of ADC2");)*
+            assert!([$($electrode1,)*].len() == ADC1_ELECTRODES as usize);
             let electrodes = [$($electrode1,)* $($electrode2,)*];
             let mut next = 0;
             while next < electrodes.len() {
@@ -77,10 +80,10 @@ inputs! {
         12 gpio14 GPIO14, 13 gpio27 GPIO27, 14 gpio25 GPIO25, 15 gpio26 GPIO26;
 }
 
-/// What the readings mean: the lower end of the two ADCs' scales counts.
+/// What the readings mean: the electrodes of ADC1 come first, those of ADC2 follow.
 pub fn adc() -> Adc {
-    let (ceiling1, ceiling2) = (ceiling_mv::<_, AdcCalLine<ADC1>>(), ceiling_mv::<_, AdcCalLine<ADC2>>());
-    millivolts(ceiling1.min(ceiling2))
+    let second = ELECTRODES - ADC1_ELECTRODES;
+    millivolts(&[range::<_, AdcCalLine<ADC1>>(ADC1_ELECTRODES), range::<_, AdcCalLine<ADC2>>(second)])
 }
 
 /// Whether an ADC with these GPIOs has the pin called `name`, such as `GPIO36`.

@@ -60,7 +60,9 @@ fn main() -> ! {
         Ok(board) => board,
         Err(_) => panic!("the board's identity does not fit the protocol"),
     };
-    defmt::info!("the ADCs' scale ends at {=u16} mV", adc.saturated_from);
+    adc.ranges.iter().filter(|range| range.electrodes > 0).for_each(|range| {
+        defmt::info!("{=u8} electrodes from {=u16} to {=u16} mV", range.electrodes, range.floor, range.ceiling);
+    });
     boot_fault().into_iter().for_each(|fault| board.report(fault));
     match board.run() {}
 }

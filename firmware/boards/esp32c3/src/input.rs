@@ -2,8 +2,11 @@
 
 use esp_hal::analog::adc::{AdcCalCurve, AdcConfig, AdcPin};
 use esp_hal::peripherals::{ADC1, GPIO0};
-use tactomo_board_espressif::analog::{ATTENUATION, AnalogUnit, ceiling_mv, millivolts};
+use tactomo_board_espressif::analog::{ATTENUATION, AnalogUnit, millivolts, range};
 use tactomo_firmware::{Adc, Sampler, TimedOut};
+
+/// Electrodes of the board.
+pub const ELECTRODES: u8 = 16;
 
 /// ADC1 and its calibrated pin.
 pub struct Input<'d> {
@@ -29,5 +32,5 @@ impl Sampler for Input<'_> {
 
 /// What the readings mean.
 pub fn adc() -> Adc {
-    millivolts(ceiling_mv::<_, AdcCalCurve<ADC1>>())
+    millivolts(&[range::<_, AdcCalCurve<ADC1>>(ELECTRODES)])
 }

@@ -3,6 +3,7 @@
 use esp_hal::Blocking;
 use esp_hal::analog::adc::{Adc, AdcCalScheme, AdcChannel, AdcConfig, AdcPin, Attenuation, RegisterAccess};
 use tactomo_firmware::TimedOut;
+use tactomo_protocol::Range;
 
 /// Range of the inputs: up to about 3.1 V (ESP32) or 2.5 V (ESP32-C3), which holds the 2 V of the driving layer.
 pub const ATTENUATION: Attenuation = Attenuation::_11dB;
@@ -14,15 +15,17 @@ const MAX_CODE: u16 = (1 << BITS) - 1;
 /// Looks at the ADC before a conversion is given up: 0.2 ms at least, some ten times what a conversion takes.
 const MAX_POLLS: u32 = 4_000;
 
-/// What calibrated readings mean: they are millivolts, so `2^BITS` of them are full scale, and the end of the ADC's scale
-/// lies at `ceiling_mv`.
-pub const fn millivolts(ceiling_mv: u16) -> tactomo_firmware::Adc {
-    tactomo_firmware::Adc { bits: BITS, full_scale_mv: 1 << BITS, saturated_from: ceiling_mv }
+/// What calibrated readings mean: they are millivolts, so `2^BITS` of them are full scale, and each ADC sees its range.
+pub fn millivolts(ranges: &[Range]) -> tactomo_firmware::Adc {
+    tactomo_firmware::Adc::new(BITS, 1 << BITS).with_ranges(ranges)
 }
 
-/// Reading at the end of the ADC's scale (mV), by its calibration.
-pub fn ceiling_mv<Unit, Calibration: AdcCalScheme<Unit>>() -> u16 {
-    Calibration::new_cal(ATTENUATION).adc_val(MAX_CODE)
+/// What an ADC sees, which `electrodes` share: the readings that its calibration makes of its lowest and its highest code (mV).
+pub fn range<Unit, Calibration: AdcCalScheme<Unit>>(electrodes: u8) -> Range {
+    let calibration = Calibration::new_cal(ATTENUATION);
+    // A calibration that lies outside the scale says nothing of the scale's ends.
+    let ceiling = calibration.adc_val(MAX_CODE).clamp(1, MAX_CODE);
+    Range { electrodes, floor: calibration.adc_val(0).min(ceiling - 1), ceiling }
 }
 
 /// An ADC.

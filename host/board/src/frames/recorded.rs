@@ -38,7 +38,7 @@ pub struct RecordingLoss {
     pub corrupt: u64,
     /// Frames that are missing by their numbers: lost in the file, on the line, or by the board.
     pub missing_frames: u64,
-    /// Frames of a board with another number of electrodes than the first one, which are left out.
+    /// Frames of a board with another number of electrodes than the first one, or of some rows only, which are left out.
     pub other_frames: u64,
 }
 
@@ -58,7 +58,11 @@ impl fmt::Display for RecordingLoss {
             count(self.missing_frames, "frame is missing", "frames are missing"),
             self.file.is_any().then(|| self.file.to_string()),
             count(self.corrupt, "message is corrupt", "messages are corrupt"),
-            count(self.other_frames, "frame is of another board", "frames are of another board"),
+            count(
+                self.other_frames,
+                "frame is of another board or scan plan",
+                "frames are of another board or scan plan",
+            ),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
         if parts.is_empty() { write!(f, "nothing is missing") } else { write!(f, "{}", parts.join("; ")) }
@@ -125,7 +129,7 @@ impl Recorded {
         }
     }
 
-    /// Takes the frames out of a chunk. Those of another board than the first one say nothing of its detector.
+    /// Takes the whole frames out of a chunk. Those of another board than the first one say nothing of its detector.
     fn decode(&mut self) {
         let chunk = std::mem::take(&mut self.chunk);
         let mut input = &chunk[..];
@@ -140,7 +144,7 @@ impl Recorded {
         self.chunk = chunk;
     }
 
-    /// Readings and time of a frame; `None` if it is of a board with other electrodes.
+    /// Readings and time of a frame; `None` if it is of a board with other electrodes, or not whole.
     fn in_volts(&mut self, frame: &Frame) -> Option<FileFrame> {
         let volts = self.volts.of_frame(frame)?.collect();
         let place = self.sequence.place(&frame.head);
@@ -163,10 +167,11 @@ mod tests {
     use crate::frames::FrameFile;
     use crate::record::RecordWriter;
     use proptest::prelude::*;
-    use tactomo_protocol::{FrameHead, MAX_WIRE, encode_board, encode_frame};
+    use tactomo_protocol::{FrameHead, MAX_WIRE, Range, encode_board, encode_frame};
 
     fn hello() -> Vec<u8> {
-        let hello = Hello { adc_bits: 10, adc_full_scale_mv: 1024, drive_mv: 1500, ..Hello::example(4) };
+        let ranges = [Range::of_codes(4, 10)].into_iter().collect();
+        let hello = Hello { adc_bits: 10, adc_full_scale_mv: 1024, drive_mv: 1500, ranges, ..Hello::example(4) };
         let mut wire = [0; MAX_WIRE];
         let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
         wire[..length].to_vec()

@@ -9,7 +9,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tactomo_protocol::{BoardMessage, Hello, MAX_WIRE, encode_board};
+use tactomo_protocol::{Hello, MAX_WIRE, encode_hello};
 
 use super::{Header, RecordError, RecordWriter};
 
@@ -69,8 +69,9 @@ impl Recorder {
     pub fn create_with_hello(path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
         let mut recorder = Self::create(path, header)?;
         let mut wire = [0; MAX_WIRE];
-        let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire).map_err(|error| {
-            RecordError::Write { path: path.to_owned(), source: io::Error::new(io::ErrorKind::InvalidInput, error) }
+        let length = encode_hello(hello, &mut wire).map_err(|error| RecordError::Write {
+            path: path.to_owned(),
+            source: io::Error::new(io::ErrorKind::InvalidInput, error),
         })?;
         for _ in 0..2 {
             recorder.push(&wire[..length], recorder.began)?;

@@ -1,0 +1,88 @@
+//! Commands on their way to a board, and the first word of one.
+
+use std::time::Instant;
+
+use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Fault, Hello, MAX_COMMAND, Request, encode_request};
+
+use super::{RequestedSettings, Session};
+use crate::link::Link;
+
+/// Why a board cannot be talked to.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GreetError {
+    /// No Hello in time.
+    #[error("no board said Hello within {seconds} s ({junk_bytes} bytes came that were no message)")]
+    Silent {
+        /// How long was waited (s).
+        seconds: u64,
+        /// Bytes that came and were no message: many mean another baud rate or another program on the board.
+        junk_bytes: u64,
+    },
+    /// The board's version of the protocol is not known here.
+    #[error("this board cannot be used: {0}")]
+    Version(DecodeError),
+    /// The link broke.
+    #[error("the link broke: {0}")]
+    Link(String),
+}
+
+/// A command, and the version of the protocol in which the board understands it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outgoing {
+    /// 1 or 2.
+    pub version: u8,
+    /// The command and its tag.
+    pub request: Request,
+}
+
+/// Asks the board on `link` for Hello until it answers.
+///
+/// # Errors
+/// [`GreetError`] if it does not before `deadline`, or not in a version of the protocol that is known here.
+pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError> {
+    let begin = Instant::now();
+    let mut receiver = BoardReceiver::default();
+    let mut session = Session::new(RequestedSettings::default());
+    let mut buffer = [0; 512];
+    while Instant::now() < deadline {
+        if let Some(command) = session.command(Instant::now()) {
+            send(link, &command).map_err(|error| GreetError::Link(error.to_string()))?;
+        }
+        let count = link.read(&mut buffer).map_err(|error| GreetError::Link(error.to_string()))?;
+        let mut input = &buffer[..count];
+        while let Some(message) = receiver.receive(&mut input) {
+            match message {
+                Ok(BoardMessage::Hello(hello)) => return Ok(hello),
+                Ok(BoardMessage::Fault(fault)) => drop(session.fault(&fault)),
+                Err(error @ DecodeError::Version(_)) => return Err(GreetError::Version(error)),
+                _ => {}
+            }
+        }
+    }
+    let seconds = begin.elapsed().as_secs();
+    Err(GreetError::Silent { seconds, junk_bytes: receiver.counters().dropped_bytes })
+}
+
+/// Sends a command.
+///
+/// # Errors
+/// If the link does not take it.
+pub fn send(link: &mut dyn Link, command: &Outgoing) -> std::io::Result<()> {
+    let mut wire = [0; MAX_COMMAND];
+    let length = encode_request(&command.request, command.version, &mut wire).map_err(std::io::Error::other)?;
+    // A zero ends whatever noise the board may have got before.
+    link.write_all(&[0])?;
+    link.write_all(&wire[..length])
+}
+
+/// What a fault means, for people.
+pub fn explain(fault: &Fault) -> String {
+    match fault {
+        Fault::Panic(place) => format!("its firmware panicked at {place} and started anew"),
+        Fault::Reset(cause) => format!("it restarted by itself: {cause}"),
+        Fault::AdcStuck => "no conversion of its ADC finishes in time".to_owned(),
+        Fault::BadSettings { .. } => "it refuses the settings, and keeps the old ones".to_owned(),
+        Fault::BadPlan { .. } => "it refuses the scan plan, and keeps the old one".to_owned(),
+        Fault::UnknownVersion(version) => format!("it got a command in version {version} of the protocol"),
+    }
+}
