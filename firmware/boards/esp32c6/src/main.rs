@@ -7,7 +7,7 @@
 use esp_hal::clock::CpuClock;
 use esp_hal::gpio::{Level, Output, OutputConfig, OutputPin};
 use esp_hal::timer::timg::TimerGroup;
-use tactomo_board_espressif::one_input::OneInput;
+use tactomo_board_espressif::one_input::{ELECTRODES, OneInput};
 use tactomo_board_espressif::usb_line::UsbLine;
 use tactomo_board_espressif::{EspChip, boot_fault};
 use tactomo_firmware::mux::{LatchLines, Latched};
@@ -28,13 +28,19 @@ fn main() -> ! {
         chip: EspChip::new(TimerGroup::new(chip.TIMG0)),
     };
     let adc = OneInput::adc();
-    let identity =
-        Identity { firmware_version: env!("CARGO_PKG_VERSION"), board: "esp32c6", electrodes: 16, adc, drive_mv: 2000 };
+    let identity = Identity {
+        firmware_version: env!("CARGO_PKG_VERSION"),
+        board: "esp32c6",
+        electrodes: ELECTRODES,
+        adc,
+        drive_mv: 2000,
+    };
     let mut board = match Board16::new(parts, identity) {
         Ok(board) => board,
         Err(_) => panic!("the board's identity does not fit the protocol"),
     };
-    defmt::info!("the ADC's scale ends at {=u16} mV", adc.saturated_from);
+    let range = adc.ranges[0];
+    defmt::info!("the ADC sees {=u16} to {=u16} mV", range.floor, range.ceiling);
     boot_fault().into_iter().for_each(|fault| board.report(fault));
     match board.run() {}
 }

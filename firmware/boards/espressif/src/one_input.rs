@@ -4,7 +4,10 @@ use esp_hal::analog::adc::{AdcCalCurve, AdcConfig, AdcPin};
 use esp_hal::peripherals::{ADC1, GPIO0};
 use tactomo_firmware::{Adc, Sampler, TimedOut};
 
-use crate::analog::{ATTENUATION, AnalogUnit, ceiling_mv, millivolts};
+use crate::analog::{ATTENUATION, AnalogUnit, millivolts, range};
+
+/// Electrodes of the board.
+pub const ELECTRODES: u8 = 16;
 
 /// ADC1 and its calibrated pin.
 pub struct OneInput<'d> {
@@ -22,7 +25,7 @@ impl<'d> OneInput<'d> {
 
     /// What the readings mean.
     pub fn adc() -> Adc {
-        millivolts(ceiling_mv::<_, AdcCalCurve<ADC1>>())
+        millivolts(&[range::<_, AdcCalCurve<ADC1>>(ELECTRODES)])
     }
 }
 

@@ -106,6 +106,8 @@ impl Listening {
                         listening.receive(input)?;
                         return Ok(listening);
                     }
+                    // A board of another version of the protocol says so, and is asked in its own.
+                    Ok(BoardMessage::Fault(fault)) => drop(session.fault(&fault)),
                     Err(error @ DecodeError::Version(_)) => return Err(version(&*link, error)),
                     _ => {}
                 }
@@ -181,8 +183,9 @@ impl Listening {
                     (self.volts, self.hello) = (Volts::of(&hello), hello);
                 }
                 Ok(BoardMessage::Fault(fault)) => {
-                    self.session.fault(&fault);
-                    self.faults.push(fault);
+                    if !self.session.fault(&fault) {
+                        self.faults.push(fault);
+                    }
                 }
                 Err(error @ DecodeError::Version(_)) => return Err(version(&*self.link, error)),
                 Ok(BoardMessage::Log(_)) | Err(_) => {}
