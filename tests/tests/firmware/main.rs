@@ -5,4 +5,5 @@ mod closed_loop;
 mod commands;
 mod parts;
 mod scan;
+mod switches;
 mod uplink;

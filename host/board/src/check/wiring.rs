@@ -5,6 +5,10 @@ use serde::Serialize;
 /// GPIO of each electrode of the `esp32`, in the order of the ADCs' channels.
 const ESP32: [u8; 16] = [36, 39, 32, 33, 34, 35, 4, 0, 2, 15, 13, 12, 14, 27, 25, 26];
 
+/// Pin of each electrode of the `stm32f405`, in the order of the ADC's channels.
+const STM32F405: [&str; 16] =
+    ["PA0", "PA1", "PA2", "PA3", "PA4", "PA5", "PA6", "PA7", "PB0", "PB1", "PC0", "PC1", "PC2", "PC3", "PC4", "PC5"];
+
 /// Where one electrode is wired to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Pins {
@@ -20,7 +24,8 @@ pub fn pins(board: &str, electrode: usize) -> Option<Pins> {
     let pins = |read_by: String| Some(Pins { grounded_by: format!("S{source}A"), read_by });
     match board {
         "esp32" => ESP32.get(electrode).and_then(|gpio| pins(format!("GPIO {gpio}"))),
-        "esp32c3" if electrode < 16 => pins(format!("S{source}B")),
+        "stm32f405" => STM32F405.get(electrode).and_then(|pin| pins((*pin).to_owned())),
+        "esp32c3" | "esp32c6" if electrode < 16 => pins(format!("S{source}B")),
         // Wired as the `esp32`, so that its reports read like a real board's.
         "simulated" if electrode < 16 => pins("its ADC input".to_owned()),
         _ => None,
@@ -38,6 +43,16 @@ mod tests {
         for (electrode, gpio) in ESP32.iter().enumerate() {
             assert!(firmware.contains(&format!("{electrode} gpio{gpio} GPIO{gpio}")), "{electrode}");
             assert!(page.contains(&format!("| {electrode} | GPIO {gpio}")), "{electrode}");
+        }
+    }
+
+    #[test]
+    fn pins_of_the_stm32_are_those_of_its_firmware_and_of_the_page() {
+        let firmware = include_str!("../../../../firmware/boards/stm32f405/src/inputs.rs");
+        let page = include_str!("../../../../docs/hardware.md");
+        for (electrode, pin) in STM32F405.iter().enumerate() {
+            assert!(firmware.contains(&format!("{electrode} {pin}")), "{electrode}");
+            assert!(page.contains(&format!("| {electrode} | {pin} |")), "{electrode}");
         }
     }
 

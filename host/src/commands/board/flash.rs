@@ -9,13 +9,14 @@ use anyhow::{Context, bail, ensure};
 use super::firmware::{self, Board, Tool};
 use crate::commands::output::message;
 
-/// Puts the firmware on a board, with the tool of the chip's maker.
+/// Puts the firmware on a board, with the tool for its chip: espflash or probe-rs.
 ///
 /// Says what to install or to build if something is missing, and shows the command that it runs.
 ///
 /// Examples:
 ///   tactomo board flash esp32 --port /dev/ttyUSB0
 ///   tactomo board flash esp32c3 --image tactomo-esp32c3
+///   tactomo board flash stm32f405                   through a debug probe
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -32,8 +33,13 @@ pub struct Args {
 
 /// Flashes.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    let Tool { program, install, advice } = args.board.tool();
+    ensure!(
+        args.port.is_none() || args.board.is_flashed_by_port(),
+        "{} is flashed by {program} through its debug pins, not through a serial port: leave out --port",
+        args.board.name()
+    );
     let image = image(args.board, args.image.as_deref())?;
-    let Tool { program, install } = args.board.tool();
     let found = on_path(program)
         .with_context(|| format!("{program} is not installed, and it is what flashes this board: {install}"))?;
     let arguments = args.board.arguments(&image, args.port.as_deref());
@@ -41,10 +47,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let status = Command::new(&found).args(&arguments).status();
     let status = status.with_context(|| format!("{} cannot be started", found.display()))?;
     if !status.success() {
-        bail!(
-            "{program} failed ({status}): what it says is above. A port that is busy is open in another program; a chip that does not answer \
-             wants its BOOT button held while it is plugged in or reset"
-        );
+        bail!("{program} failed ({status}): what it says is above. {advice}");
     }
     message!(
         "flashed. Now `tactomo board check{}`",
