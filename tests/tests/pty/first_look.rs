@@ -32,13 +32,13 @@ fn what_a_boot_loader_says_is_shown_and_explained() {
 fn frames_and_faults_of_a_board_are_taken_and_its_boot_text_is_not_counted() {
     let mut board = Board::plug("first-look");
     let looking = look(&board);
-    board.wait_for(Command::Hello);
+    let tag = board.wait_for(Command::Hello);
     board.raw(BOOT_TEXT);
     board.raw(&[0]);
-    board.say_hello();
+    board.answer(tag);
     let mut listening = looking.join().unwrap().unwrap();
     let serving = thread::spawn(move || {
-        board.wait_for(Command::Start);
+        board.wait_for_start();
         board.say(&BoardMessage::Fault(Fault::AdcStuck));
         board.frames(3);
         board.next_frame();

@@ -15,6 +15,8 @@ const BITS: u8 = 12;
 /// Time that the converter's capacitor charges, in cycles of its clock: 28 at 21 MHz, which is 1.3 us. By the data sheet that is enough behind
 /// 27 kOhm; an electrode has its series resistor of 1 kOhm and some foam. A conversion takes 12 cycles more, 1.9 us in all. Told to the registers as a 2.
 const SAMPLE_TIME: u32 = 2;
+/// The reference inside takes 10 us to start: twice that, in cycles of 168 MHz.
+const REFERENCE_CYCLES: u32 = 2 * 10 * 168;
 /// Looks at the ADC before a conversion is given up: about ten times what a conversion takes, at some 5 cycles of 168 MHz a look.
 const MAX_POLLS: u32 = 600;
 
@@ -56,7 +58,11 @@ impl Inputs {
     pub fn new(adc: ADC1, _pins: Pins, rcc: &mut Rcc) -> Self {
         let config = AdcConfig::default().clock(Clock::Pclk2_div_4).default_sample_time(SampleTime::Cycles_480);
         let mut driver = HalAdc::new(adc, true, config, rcc);
+        driver.enable_temperature_and_vref();
+        cortex_m::asm::delay(REFERENCE_CYCLES);
         driver.calibrate();
+        driver.disable_temperature_and_vref();
+        driver.enable();
         let supply_mv = driver.reference_voltage() as u16;
         // SAFETY: the driver ends here, so this is the one handle; the driver's own conversions would wait without a bound.
         let registers = unsafe { ADC1::steal() };
