@@ -6,13 +6,12 @@ use tactomo_protocol::{
     Settings, VERSION, frame, scope, wire_bytes,
 };
 
+use crate::inbox::Inbox;
 use crate::pace::Pace;
+use crate::row::Attended;
 use crate::scan::{Bench, Scan, Scanned};
 use crate::uplink::Uplink;
 use crate::{Adc, Chip, Mux, Parts, Sampler, Serial};
-
-/// Bytes that one step takes from the line at most, so that a flood does not hold up the scan.
-const RECEIVED_A_STEP: usize = 64;
 
 /// Longest packet of a frame of `electrodes` on the wire, in bytes.
 pub const fn frame_bytes(electrodes: usize) -> usize {
@@ -68,9 +67,9 @@ pub enum Activity {
         /// Board time at which the next frame is due (us).
         until_us: u64,
     },
-    /// One row of a scan.
+    /// One row of a frame.
     Row,
-    /// The last row of a scan: its frame is on its way.
+    /// The last row of a frame: it is on its way.
     Frame,
 }
 
@@ -80,6 +79,7 @@ pub struct Board<M, S, L, C, const READINGS: usize, const WIRE: usize> {
     parts: Parts<M, S, L, C>,
     adc: Adc,
     hello: Hello,
+    inbox: Inbox,
     receiver: CommandReceiver,
     scan: Scan<READINGS>,
     uplink: Uplink<WIRE>,
@@ -117,8 +117,9 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             parts,
             adc: identity.adc,
             hello,
+            inbox: Inbox::default(),
             receiver: CommandReceiver::default(),
-            scan: Scan::new(identity.electrodes).ok_or(electrodes)?,
+            scan: Scan::new(identity.electrodes, &identity.adc).ok_or(electrodes)?,
             uplink: Uplink::default(),
             pace: Pace::default(),
             sequence: 0,
@@ -158,10 +159,10 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
     }
 
     fn receive(&mut self) {
-        let mut bytes = [0; RECEIVED_A_STEP];
-        let count = self.parts.serial.pull(&mut bytes);
-        let mut input = bytes.get(..count).unwrap_or_default();
-        while let Some(request) = self.receiver.receive(&mut input) {
+        // A flood does not hold up the scan: no more than fits the inbox is looked at in one step.
+        self.inbox.fill(&mut self.parts.serial);
+        let mut looked_at = 0;
+        while let Some(request) = self.next_request(&mut looked_at) {
             match request {
                 Ok(request) => self.obey(request),
                 Err(DecodeError::Version(version)) => self.fault(Fault::UnknownVersion(version)),
@@ -169,6 +170,15 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
                 Err(DecodeError::Corrupt | DecodeError::Body) => {}
             }
         }
+        self.inbox.clear();
+    }
+
+    /// The next command among the bytes that came, of which so many were looked at.
+    fn next_request(&mut self, looked_at: &mut usize) -> Option<Result<Request, DecodeError>> {
+        let mut input = self.inbox.bytes().get(*looked_at..)?;
+        let request = self.receiver.receive(&mut input);
+        *looked_at = self.inbox.bytes().len() - input.len();
+        request
     }
 
     fn obey(&mut self, Request { tag, command }: Request) {
@@ -188,8 +198,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             Command::Stop => self.stop(),
             Command::Configure(settings) if settings.is_valid() => self.configure(settings),
             Command::Configure(_) => return Err(Fault::BadSettings { answers }),
-            Command::Scan(plan) if plan == Plan::default() => {}
-            Command::Scan(_) => return Err(Fault::BadPlan { answers }),
+            Command::Scan(plan) if plan == *self.scan.plan() => {}
+            Command::Scan(plan) => self.follow(plan, answers)?,
         }
         Ok(())
     }
@@ -217,6 +227,15 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         }
     }
 
+    /// Takes a plan over; the frame under way is abandoned without a number.
+    fn follow(&mut self, plan: Plan, answers: u8) -> Result<(), Fault> {
+        if !self.scan.set_plan(plan) {
+            return Err(Fault::BadPlan { answers });
+        }
+        self.restart_pace();
+        Ok(())
+    }
+
     fn restart_pace(&mut self) {
         let now_us = self.parts.chip.now_us();
         self.pace.reset(now_us);
@@ -238,10 +257,11 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
     }
 
     fn scan_row(&mut self) -> Result<Activity, M::Error> {
-        let Self { parts, scan, uplink, .. } = self;
+        let Self { parts, scan, uplink, inbox, .. } = self;
         let Parts { mux, sampler, serial, chip } = parts;
-        let mut bench = Bench { mux, sampler, chip, adc: self.adc, settings: self.hello.settings };
-        match scan.row(&mut bench, |chip| uplink.poll(serial, chip))? {
+        let line = &mut Line { uplink, serial, inbox };
+        let mut bench = Bench { mux, sampler, chip, line, adc: self.adc, settings: self.hello.settings };
+        match scan.row(&mut bench)? {
             None => Ok(Activity::Row),
             Some(scanned) => {
                 self.send(scanned);
@@ -255,9 +275,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             self.fault(Fault::AdcStuck);
         }
         self.stuck_told = scanned.stuck;
-        let fraction_bits = self.adc.fraction_bits(self.hello.settings.average_log2);
         // A frame that is dropped for it shows as a gap in the numbers.
-        self.uplink.frame(scanned.head(self.sequence, fraction_bits), self.scan.readings());
+        self.uplink.frame(scanned.head(self.sequence), self.scan.scope(), self.scan.readings());
         self.sequence = self.sequence.wrapping_add(1);
     }
 
@@ -268,6 +287,24 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
 
     fn fault(&mut self, fault: Fault) {
         self.uplink.message(&BoardMessage::Fault(fault));
+    }
+}
+
+/// The line while a row is scanned.
+struct Line<'a, L, const WIRE: usize> {
+    uplink: &'a mut Uplink<WIRE>,
+    serial: &'a mut L,
+    inbox: &'a mut Inbox,
+}
+
+impl<L: Serial, C: Chip, const WIRE: usize> Attended<C> for Line<'_, L, WIRE> {
+    fn push(&mut self, chip: &mut C) {
+        self.uplink.poll(self.serial, chip);
+    }
+
+    fn exchange(&mut self, chip: &mut C) {
+        self.uplink.poll(self.serial, chip);
+        self.inbox.fill(self.serial);
     }
 }
 

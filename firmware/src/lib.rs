@@ -5,7 +5,7 @@
 //! | part | trait | what it stands for |
 //! |---|---|---|
 //! | multiplexer | [`Mux`] | grounds an electrode; [`mux`] has the ADG726 in both of its wirings |
-//! | converter | [`Sampler`] | one bounded conversion of an electrode's voltage |
+//! | converter | [`Sampler`] | bounded conversions of the electrodes' voltages, one by one or a row at a time |
 //! | serial line | [`Serial`] | a UART or USB port that never waits |
 //! | chip | [`Chip`] | clock, delay, watchdog, log bytes |
 //!
@@ -16,20 +16,26 @@
 //! ```
 //!
 //! Guarantees: no allocation, no floating point, no wait without a bound. Sending overlaps sampling: bytes are pushed between
-//! conversions, as many as the line takes at that moment, so a slow host never delays the scan. A frame that finds no room is
-//! dropped, and the gap shows in the sequence numbers. A [`Board16`] takes about 2.6 kB of RAM.
+//! conversions and during waits, as many as the line takes at that moment, so a slow host never delays the scan. A frame that finds no room is
+//! dropped, and the gap shows in the sequence numbers. A [`Board16`] takes about 3 kB of RAM.
 #![no_std]
 
+mod adc;
 mod board;
+mod inbox;
 #[cfg(feature = "defmt")]
 pub mod log;
+#[cfg(any(feature = "defmt", test))]
+mod log_queue;
 pub mod mux;
 mod pace;
 mod parts;
-pub mod scan;
+mod row;
+mod scan;
 pub mod uplink;
 
+pub use adc::Adc;
 pub use board::{Activity, Board, Board16, Board32, Identity, NewBoardError};
 pub use mux::Mux;
 pub use parts::{Chip, Parts, Sampler, Serial, TimedOut};
-pub use scan::Adc;
+pub use row::Row;

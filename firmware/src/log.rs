@@ -7,64 +7,44 @@
 use core::cell::{RefCell, UnsafeCell};
 
 use critical_section::{Mutex, RestoreState};
-use heapless::Deque;
 
-/// Bytes of log that can wait.
-const QUEUE_BYTES: usize = 512;
+use crate::log_queue::LogQueue;
 
-/// Bytes that wait, and the frame being written behind them.
-struct Queue {
-    bytes: Deque<u8, QUEUE_BYTES>,
+/// Bytes that wait, and the encoder of the frame being written behind them.
+struct Log {
+    queue: LogQueue,
     encoder: defmt::Encoder,
-    /// Bytes of whole frames.
-    whole: usize,
-    /// Whether the frame under way did not fit.
-    overflowed: bool,
 }
 
-static QUEUE: Mutex<RefCell<Queue>> = Mutex::new(RefCell::new(Queue {
-    bytes: Deque::new(),
-    encoder: defmt::Encoder::new(),
-    whole: 0,
-    overflowed: false,
-}));
+static LOG: Mutex<RefCell<Log>> =
+    Mutex::new(RefCell::new(Log { queue: LogQueue::new(), encoder: defmt::Encoder::new() }));
 
-impl Queue {
-    fn put(bytes: &mut Deque<u8, QUEUE_BYTES>, overflowed: &mut bool, encoded: &[u8]) {
-        *overflowed |= encoded.iter().any(|byte| bytes.push_back(*byte).is_err());
-    }
-
+impl Log {
     fn begin(&mut self) {
-        let Self { bytes, encoder, whole, overflowed } = self;
-        (*whole, *overflowed) = (bytes.len(), false);
-        encoder.start_frame(|encoded| Self::put(bytes, overflowed, encoded));
+        let Self { queue, encoder } = self;
+        queue.begin();
+        encoder.start_frame(|encoded| queue.put(encoded));
     }
 
     fn write(&mut self, content: &[u8]) {
-        let Self { bytes, encoder, overflowed, .. } = self;
-        encoder.write(content, |encoded| Self::put(bytes, overflowed, encoded));
+        let Self { queue, encoder } = self;
+        encoder.write(content, |encoded| queue.put(encoded));
     }
 
     fn end(&mut self) {
-        let Self { bytes, encoder, whole, overflowed } = self;
-        encoder.end_frame(|encoded| Self::put(bytes, overflowed, encoded));
-        if *overflowed {
-            bytes.truncate(*whole);
-        }
+        let Self { queue, encoder } = self;
+        encoder.end_frame(|encoded| queue.put(encoded));
+        queue.end();
     }
 }
 
 /// Moves log bytes into `buffer`, as far as it fits; returns how many.
 pub fn pull(buffer: &mut [u8]) -> usize {
-    with_queue(|queue| {
-        let count = buffer.len().min(queue.bytes.len());
-        buffer.iter_mut().zip(core::iter::from_fn(|| queue.bytes.pop_front())).for_each(|(to, byte)| *to = byte);
-        count
-    })
+    with_log(|log| log.queue.pull(buffer))
 }
 
-fn with_queue<T>(action: impl FnOnce(&mut Queue) -> T) -> T {
-    critical_section::with(|section| action(&mut QUEUE.borrow_ref_mut(section)))
+fn with_log<T>(action: impl FnOnce(&mut Log) -> T) -> T {
+    critical_section::with(|section| action(&mut LOG.borrow_ref_mut(section)))
 }
 
 /// The critical section that a log frame holds from its begin to its end.
@@ -83,18 +63,18 @@ unsafe impl defmt::Logger for Logger {
     fn acquire() {
         // SAFETY: released in `release`, which defmt calls for every `acquire`; the cell is written inside the section.
         unsafe { *HELD.0.get() = critical_section::acquire() };
-        with_queue(Queue::begin);
+        with_log(Log::begin);
     }
 
     unsafe fn flush() {}
 
     unsafe fn release() {
-        with_queue(Queue::end);
+        with_log(Log::end);
         // SAFETY: ends the section that `acquire` began; the cell is read inside it.
         unsafe { critical_section::release(*HELD.0.get()) };
     }
 
     unsafe fn write(bytes: &[u8]) {
-        with_queue(|queue| queue.write(bytes));
+        with_log(|log| log.write(bytes));
     }
 }

@@ -2,6 +2,8 @@
 
 use embedded_hal::delay::DelayNs;
 
+use crate::Row;
+
 /// The parts that a [`Board`](crate::Board) is made of.
 #[derive(Debug)]
 pub struct Parts<M, S, L, C> {
@@ -20,17 +22,57 @@ pub struct Parts<M, S, L, C> {
 #[error("the conversion did not finish in time")]
 pub struct TimedOut;
 
-/// Converts the voltage of an electrode.
+/// Converts the voltages of electrodes.
+///
+/// A converter that does one thing after the other needs [`sample`](Self::sample) alone, and [`restart`](Self::restart) where it can hang. One that
+/// can do better writes [`sample_row`](Self::sample_row) itself: two converters that work side by side, or one behind a bus that takes the
+/// next address while it sends the last code.
+///
+/// A conversion that comes too late is never to be returned in place of another: whoever starts a conversion first clears, or reads and
+/// throws away, what an earlier one may have left.
 pub trait Sampler {
     /// Runs one conversion of `electrode` (0 and up) and returns its code.
     ///
-    /// With a multiplexer that brings every electrode to one input, [`Mux::select`](crate::Mux::select) came before, and
-    /// `electrode` may be ignored. The wait for the converter is bounded, by about ten times a normal conversion: the scan
-    /// never waits longer than 256 such bounds between two feeds of the watchdog.
+    /// With a multiplexer that brings every electrode to one input, [`Row::select`] came before, and `electrode` may be ignored. The wait
+    /// for the converter is bounded, by about ten times a normal conversion.
     ///
     /// # Errors
     /// [`TimedOut`] if the converter did not finish within that bound.
     fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut>;
+
+    /// Sets the converter up anew, and gives up a conversion that did not finish. It comes after each one that timed out, before the next
+    /// is started.
+    fn restart(&mut self) {}
+
+    /// Converts every electrode of a row as often as it says, and hands it the codes.
+    ///
+    /// This form takes one electrode after the other: [`select`](Row::select)s it, [`sample`](Self::sample)s it, and calls
+    /// [`attend`](Row::attend) before each conversion. The first conversion that times out is the electrode's last, so that a stuck converter
+    /// costs one bound an electrode, whatever the averaging, and the converter is [restarted](Self::restart). Other forms do so too.
+    ///
+    /// # Errors
+    /// Those of [`Row::select`].
+    fn sample_row<R: Row>(&mut self, row: &mut R) -> Result<(), R::Error> {
+        let mut electrodes = row.electrodes();
+        let mut electrode = 0;
+        while electrodes != 0 {
+            if electrodes & 1 == 1 {
+                row.select(electrode)?;
+                for _ in 0..row.conversions() {
+                    row.attend();
+                    let sampled = self.sample(electrode);
+                    row.take(electrode, sampled);
+                    if sampled.is_err() {
+                        self.restart();
+                        break;
+                    }
+                }
+            }
+            electrodes >>= 1;
+            electrode += 1;
+        }
+        Ok(())
+    }
 }
 
 /// The line to the host. Neither direction ever waits.
@@ -39,7 +81,7 @@ pub trait Serial {
     /// more than its FIFO has free.
     fn push(&mut self, bytes: &[u8]) -> usize;
 
-    /// Moves what was received into `buffer`, as far as it fits; returns how many bytes.
+    /// Moves what was received into `buffer`, as far as it fits; returns how many bytes. Called between two rows, and every 250 us of a wait.
     fn pull(&mut self, buffer: &mut [u8]) -> usize;
 }
 
@@ -48,7 +90,7 @@ pub trait Chip: DelayNs {
     /// Microseconds (us) since the reset; never runs backwards.
     fn now_us(&mut self) -> u64;
 
-    /// Feeds the watchdog; called before every reading, hence at least every 256 conversions or settle time.
+    /// Feeds the watchdog; called before every conversion, every 250 us of a wait, and in every step of a board that has nothing to do.
     fn feed_watchdog(&mut self);
 
     /// Moves bytes of the chip's defmt stream into `buffer`, as far as it fits; returns how many. Chips without a log keep

@@ -1,128 +1,99 @@
-//! The scan: every electrode read under every ground, row by row, with averaging.
+//! The scan: rows of readings, one ground after the other, as the plan says.
 
-use heapless::Vec;
-use tactomo_protocol::{FrameHead, MAX_RANGES, MAX_READINGS, Range, Settings, Status};
+use core::mem;
 
-use crate::{Chip, Mux, Sampler, TimedOut};
+use tactomo_protocol::scope::electrodes_of;
+use tactomo_protocol::{FrameHead, MAX_ELECTRODES, MAX_READINGS, Plan, Scope, Settings, Status};
 
-/// What a board's converters give.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Adc {
-    /// Bits of one conversion, at most 16.
-    pub bits: u8,
-    /// Code `2^bits` stands for this many millivolts (mV).
-    pub full_scale_mv: u16,
-    /// What the converters can see, from electrode 0 on; the last one that has electrodes reaches over all that are left.
-    pub ranges: [Range; MAX_RANGES],
-}
+use crate::adc::{Adc, Ceilings};
+use crate::row::{Attended, ScanRow, Sums};
+use crate::{Chip, Mux, Sampler};
 
-/// No converter.
-const NO_RANGE: Range = Range { electrodes: 0, floor: 0, ceiling: 0 };
+/// Longest stretch of a wait in which nobody looks at the line (us): at 921600 baud, 23 bytes of the 128 of a UART's FIFO.
+const WAIT_US: u32 = 250;
 
-impl Adc {
-    /// A converter all of whose codes count, for all electrodes.
-    pub const fn new(bits: u8, full_scale_mv: u16) -> Self {
-        Self { bits, full_scale_mv, ranges: [Range::of_codes(u8::MAX, bits), NO_RANGE, NO_RANGE, NO_RANGE] }
-    }
-
-    /// Converters with these ranges, from electrode 0 on; those beyond the fourth are left out.
-    pub fn with_ranges(self, ranges: &[Range]) -> Self {
-        let mut own = [NO_RANGE; MAX_RANGES];
-        own.iter_mut().zip(ranges).for_each(|(own, range)| *own = *range);
-        Self { ranges: own, ..self }
-    }
-
-    /// The ranges of `electrodes` electrodes: the last one shrunk or stretched to end with them.
-    pub(crate) fn ranges_of(&self, electrodes: u8) -> Vec<Range, MAX_RANGES> {
-        let mut left = electrodes;
-        let mut ranges: Vec<Range, MAX_RANGES> = Vec::new();
-        for range in self.ranges.iter().filter(|range| range.electrodes > 0) {
-            let electrodes = range.electrodes.min(left);
-            left -= electrodes;
-            if electrodes > 0 {
-                // There is room for as many as there are.
-                let _ = ranges.push(Range { electrodes, ..*range });
-            }
-        }
-        if let Some(last) = ranges.last_mut() {
-            last.electrodes += left;
-        }
-        ranges
-    }
-
-    /// Code at which a conversion of `electrode` is at the end of the scale.
-    fn ceiling(&self, electrode: u8) -> u16 {
-        let mut end = 0u16;
-        let mut ceiling = u16::MAX;
-        for range in self.ranges.iter().filter(|range| range.electrodes > 0) {
-            ceiling = range.ceiling;
-            end += u16::from(range.electrodes);
-            if u16::from(electrode) < end {
-                break;
-            }
-        }
-        ceiling
-    }
-
-    /// Bits below one code that averaging `2^average_log2` conversions wins: as many as it has doublings, as far as a reading of
-    /// 16 bits holds them. (Noise falls by half a bit a doubling; the rest keeps the sum exact, so that the host loses nothing.)
-    pub fn fraction_bits(&self, average_log2: u8) -> u8 {
-        average_log2.min(16u8.saturating_sub(self.bits))
-    }
-}
-
-/// A scan under way and the readings of the last whole one; room for `READINGS` of them.
+/// A scan under way and the readings of the last frame; room for `READINGS` of them.
 #[derive(Debug)]
 pub struct Scan<const READINGS: usize> {
     readings: [u16; READINGS],
-    electrodes: u8,
-    /// The ground whose row comes next.
-    row: u8,
+    /// Sums of the codes of the row under way; zero between rows.
+    sums: Sums,
+    ceilings: Ceilings,
+    plan: Plan,
+    /// What the frame under way, or the last one, holds.
+    scope: Scope,
+    /// Number of the plan's frame that comes next.
+    next_frame: usize,
+    /// The row of the frame that comes next.
+    row: usize,
     time_us: u64,
     status: Status,
     timed_out: u16,
 }
 
-/// What a whole scan met.
+/// What a whole frame met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scanned {
     /// Board time at its start (us).
     pub time_us: u64,
     /// Saturated and timed-out conversions.
     pub status: Status,
+    /// Bits below one code that averaging has won.
+    pub fraction_bits: u8,
     /// Whether no reading at all was converted in time.
     pub stuck: bool,
 }
 
 impl Scanned {
-    /// The head of the frame that carries this scan.
-    pub fn head(&self, sequence: u16, fraction_bits: u8) -> FrameHead {
-        FrameHead { sequence, time_us: self.time_us as u32, status: self.status, fraction_bits }
+    /// The head of the frame.
+    pub fn head(&self, sequence: u16) -> FrameHead {
+        FrameHead { sequence, time_us: self.time_us as u32, status: self.status, fraction_bits: self.fraction_bits }
     }
 }
 
 /// What the scan measures with, and how.
 #[derive(Debug)]
-pub struct Bench<'a, M, S, C> {
+pub(crate) struct Bench<'a, M, S, C, A> {
     /// Grounds and selects.
     pub mux: &'a mut M,
     /// Converts.
     pub sampler: &'a mut S,
     /// Waits, and feeds the watchdog.
     pub chip: &'a mut C,
+    /// What is sent and received meanwhile.
+    pub line: &'a mut A,
     /// What the converter gives.
     pub adc: Adc,
     /// Settle time and averaging.
     pub settings: Settings,
 }
 
+impl<M, S, C: Chip, A: Attended<C>> Bench<'_, M, S, C, A> {
+    /// Waits, at least for `us`, and keeps line and watchdog alive.
+    fn wait(&mut self, mut us: u32) {
+        while us > 0 {
+            let piece = us.min(WAIT_US);
+            self.chip.delay_us(piece);
+            us -= piece;
+            if us > 0 {
+                self.chip.feed_watchdog();
+                self.line.exchange(self.chip);
+            }
+        }
+    }
+}
+
 impl<const READINGS: usize> Scan<READINGS> {
-    /// A scan of `electrodes`; `None` if its readings do not fit.
-    pub fn new(electrodes: u8) -> Option<Self> {
-        let count = usize::from(electrodes) * usize::from(electrodes);
-        (count <= READINGS.min(MAX_READINGS)).then_some(Self {
+    /// A scan of whole frames of `electrodes`; `None` if their readings do not fit.
+    pub fn new(electrodes: u8, adc: &Adc) -> Option<Self> {
+        let scope = Scope::whole(electrodes)?;
+        (scope.readings() <= READINGS.min(MAX_READINGS)).then_some(Self {
             readings: [0; READINGS],
-            electrodes,
+            sums: [0; MAX_ELECTRODES],
+            ceilings: adc.ceilings(electrodes),
+            plan: Plan::default(),
+            scope,
+            next_frame: 0,
             row: 0,
             time_us: 0,
             status: Status::default(),
@@ -130,113 +101,111 @@ impl<const READINGS: usize> Scan<READINGS> {
         })
     }
 
-    /// Readings of the last whole scan, row by row (`readings[g * electrodes + e]`), in units of `2^-fraction_bits` codes.
+    /// Readings of the last frame, row by row, in units of `2^-fraction_bits` codes.
     pub fn readings(&self) -> &[u16] {
-        let count = usize::from(self.electrodes) * usize::from(self.electrodes);
-        self.readings.get(..count).unwrap_or_default()
+        self.readings.get(..self.scope.readings()).unwrap_or_default()
     }
 
-    /// Whether some rows of a scan are done and others not.
+    /// What the last frame holds.
+    pub fn scope(&self) -> &Scope {
+        &self.scope
+    }
+
+    /// The plan in force.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Goes over to another plan, beginning with its first row; returns whether it can be scanned. If not, the old one stays.
+    pub fn set_plan(&mut self, plan: Plan) -> bool {
+        let fits = plan.is_valid(self.scope.electrodes());
+        if fits {
+            self.plan = plan;
+            self.abandon();
+        }
+        fits
+    }
+
+    /// Whether some rows of a frame are done and others not.
     pub fn is_under_way(&self) -> bool {
         self.row != 0
     }
 
-    /// Abandons the scan under way.
+    /// Abandons the frame under way; the next one is the plan's first.
     pub fn abandon(&mut self) {
-        self.row = 0;
+        (self.row, self.next_frame) = (0, 0);
     }
 
-    /// Grounds the next electrode, waits the settle time and reads all electrodes; calls `between` before every conversion.
-    /// Returns what the scan met once its last row is done.
+    /// Grounds the next electrode, waits the settle time and reads what is to be read. Returns what the frame met once its last row is done.
     ///
     /// # Errors
-    /// If a pin of the multiplexer cannot be driven; the scan is then abandoned.
-    pub fn row<M: Mux, S: Sampler, C: Chip>(
+    /// If a pin of the multiplexer cannot be driven; the frame is then abandoned.
+    pub(crate) fn row<M: Mux, S: Sampler, C: Chip, A: Attended<C>>(
         &mut self,
-        bench: &mut Bench<M, S, C>,
-        between: impl FnMut(&mut C),
+        bench: &mut Bench<M, S, C, A>,
     ) -> Result<Option<Scanned>, M::Error> {
         if self.row == 0 {
             self.begin(bench.chip.now_us());
         }
-        let ground = core::mem::take(&mut self.row);
-        self.read_row(ground, bench, between)?;
-        let next = ground + 1;
-        if next < self.electrodes {
+        let row = mem::take(&mut self.row);
+        let average_log2 = if self.plan.is_whole() { bench.settings.average_log2 } else { self.plan.average_log2 };
+        bench.mux.ground(self.scope.ground(row))?;
+        bench.wait(bench.settings.settle_us.into());
+        let mut scanned = ScanRow {
+            mux: bench.mux,
+            chip: bench.chip,
+            line: bench.line,
+            electrodes: self.scope.reads(),
+            average_log2,
+            ceilings: &self.ceilings,
+            sums: &mut self.sums,
+            status: self.status,
+            timed_out: 0,
+        };
+        let sampled = bench.sampler.sample_row(&mut scanned);
+        let ScanRow { status, timed_out, .. } = scanned;
+        self.status = status;
+        let fraction_bits = bench.adc.fraction_bits(average_log2);
+        self.keep(row, timed_out, average_log2 - fraction_bits);
+        sampled?;
+        let next = row + 1;
+        if next < self.scope.rows() {
             self.row = next;
             return Ok(None);
         }
-        Ok(Some(self.scanned()))
+        let stuck = usize::from(self.timed_out) == self.scope.readings();
+        Ok(Some(Scanned { time_us: self.time_us, status, fraction_bits, stuck }))
     }
 
     fn begin(&mut self, now_us: u64) {
         self.time_us = now_us;
         self.status = Status::default();
         self.timed_out = 0;
-    }
-
-    fn scanned(&self) -> Scanned {
-        let stuck = usize::from(self.timed_out) == self.readings().len();
-        Scanned { time_us: self.time_us, status: self.status, stuck }
-    }
-
-    fn read_row<M: Mux, S: Sampler, C: Chip>(
-        &mut self,
-        ground: u8,
-        bench: &mut Bench<M, S, C>,
-        mut between: impl FnMut(&mut C),
-    ) -> Result<(), M::Error> {
-        bench.mux.ground(ground)?;
-        bench.chip.delay_us(u32::from(bench.settings.settle_us));
-        let first = usize::from(ground) * usize::from(self.electrodes);
-        for electrode in 0..self.electrodes {
-            bench.chip.feed_watchdog();
-            bench.select(electrode)?;
-            let (reading, status) = bench.read(electrode, &mut between);
-            self.status.insert(status);
-            self.timed_out += u16::from(status.contains(Status::TIMED_OUT));
-            if let Some(place) = self.readings.get_mut(first + usize::from(electrode)) {
-                *place = reading;
-            }
+        let stays_whole = self.plan.is_whole() && self.scope.is_whole();
+        if !stays_whole && let Some(scope) = self.plan.scope(self.next_frame, self.scope.electrodes()) {
+            self.scope = scope;
         }
-        Ok(())
-    }
-}
-
-impl<M: Mux, S: Sampler, C: Chip> Bench<'_, M, S, C> {
-    fn select(&mut self, electrode: u8) -> Result<(), M::Error> {
-        self.mux.select(electrode)?;
-        if M::SELECT_SETTLE_NS > 0 {
-            self.chip.delay_ns(M::SELECT_SETTLE_NS);
-        }
-        Ok(())
+        self.next_frame = if self.next_frame + 1 < self.plan.frames() { self.next_frame + 1 } else { 0 };
     }
 
-    /// The mean of `2^average_log2` conversions, and what they met. The first one that times out ends it: the reading is zero,
-    /// and a stuck converter costs one bound a reading, whatever the averaging.
-    fn read(&mut self, electrode: u8, mut between: impl FnMut(&mut C)) -> (u16, Status) {
-        let (mut sum, mut status) = (0u32, Status::default());
-        let ceiling = self.adc.ceiling(electrode);
-        for _ in 0..1u32 << self.settings.average_log2 {
-            between(self.chip);
-            match self.sampler.sample(electrode) {
-                Ok(code) if code >= ceiling => {
-                    status.insert(Status::SATURATED);
-                    sum += u32::from(code);
-                }
-                Ok(code) => sum += u32::from(code),
-                Err(TimedOut) => return (0, Status::TIMED_OUT),
-            }
-        }
-        (self.mean(sum), status)
-    }
-
-    /// Mean of `2^average_log2` codes in units of `2^-fraction_bits` codes, rounded to the nearest.
-    fn mean(&self, sum: u32) -> u16 {
-        let average_log2 = self.settings.average_log2;
-        let shift = u32::from(average_log2 - self.adc.fraction_bits(average_log2));
+    /// Keeps the means of a row's conversions, in units of `2^-fraction_bits` codes, rounded to the nearest: the sums less `shift` bits.
+    fn keep(&mut self, row: usize, timed_out: u32, shift: u8) {
+        let reads = self.scope.reads();
         let half = (1u32 << shift) >> 1;
         // A sum of codes within the converter's bits fits; codes beyond them are held at the end of the scale.
-        ((sum + half) >> shift).min(u32::from(u16::MAX)) as u16
+        let mean = |sum: &mut u32| ((mem::take(sum) + half) >> shift).min(u16::MAX.into()) as u16;
+        let count = self.scope.row_readings();
+        let places = self.readings.iter_mut().skip(row * count);
+        if reads & reads.wrapping_add(1) == 0 && timed_out == 0 {
+            // The common case, all electrodes from the first one on, is much of what a scan costs beside its conversions.
+            places.zip(&mut self.sums[..count]).for_each(|(place, sum)| *place = mean(sum));
+            return;
+        }
+        for (place, electrode) in places.zip(electrodes_of(reads)) {
+            let is_late = timed_out >> electrode & 1 == 1;
+            let reading = mean(&mut self.sums[usize::from(electrode)]);
+            *place = if is_late { 0 } else { reading };
+        }
+        self.timed_out += (timed_out & reads).count_ones() as u16;
     }
 }

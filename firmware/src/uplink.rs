@@ -4,7 +4,7 @@
 //! kept: when the line is slow the host gets fewer frames, but fresh ones.
 
 use heapless::Deque;
-use tactomo_protocol::{BoardMessage, FrameHead, MAX_LOG, encode_board, encode_frame, encode_log, wire_bytes};
+use tactomo_protocol::{BoardMessage, FrameHead, MAX_LOG, Scope, encode_board, encode_log, encode_rows, wire_bytes};
 
 use crate::{Chip, Serial};
 
@@ -91,14 +91,14 @@ impl<const WIRE: usize> Uplink<WIRE> {
     }
 
     /// Queues a frame in the place of those of which no byte is gone; returns whether nothing was dropped for it.
-    pub fn frame(&mut self, head: FrameHead, readings: &[u16]) -> bool {
+    pub fn frame(&mut self, head: FrameHead, scope: &Scope, readings: &[u16]) -> bool {
         let stalled = self.sending == Sending::Frame && self.gone == 0;
         if stalled {
             self.sending = Sending::Nothing;
         }
         let free = !core::mem::take(&mut self.frame_waits) && !stalled;
         let packet = &mut self.frames[1 - self.outgoing];
-        match encode_frame(head, readings, &mut packet.bytes) {
+        match encode_rows(head, scope, readings, &mut packet.bytes) {
             Ok(length) => packet.length = length,
             Err(_) => return false,
         }

@@ -208,8 +208,55 @@ fn an_identity_that_does_not_fit_is_refused() {
 }
 
 #[test]
-fn a_board_of_16_electrodes_takes_less_than_2560_bytes_of_ram() {
+fn a_board_of_16_electrodes_takes_less_than_3400_bytes_of_ram() {
     type Parts0 = Board16<Transparent<NullPart, 4>, NullPart, NullPart, NullPart>;
     let bytes = size_of::<Parts0>();
-    assert!(bytes < 2560, "{bytes} bytes");
+    assert!(bytes < 3400, "{bytes} bytes");
+}
+
+#[test]
+fn the_watchdog_is_fed_while_nothing_is_scanned() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    for feeds in 1..10 {
+        assert_eq!(board.step(), Ok(Activity::Idle));
+        assert_eq!(outside.watchdog.get().feeds, feeds);
+    }
+    outside.send(Command::Configure(Settings { max_frames_per_s: 1, ..Settings::default() }));
+    outside.send(Command::Start);
+    scan(&mut board, 1);
+    let feeds = outside.watchdog.get().feeds;
+    assert!(matches!(board.step(), Ok(Activity::Waiting { .. })));
+    assert_eq!(outside.watchdog.get().feeds, feeds + 1);
+}
+
+#[test]
+fn other_settings_begin_a_frame_at_once_and_the_same_again_do_not() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    let slow = Settings { max_frames_per_s: 1, ..Settings::default() };
+    outside.send(Command::Configure(slow));
+    outside.send(Command::Start);
+    scan(&mut board, 1);
+    for command in [Command::Configure(slow), Command::Start, Command::Scan(Plan::default()), Command::Hello] {
+        outside.send(command.clone());
+        assert!(matches!(board.step(), Ok(Activity::Waiting { .. })), "{command:?}");
+    }
+    outside.send(Command::Configure(Settings { settle_us: 30, ..slow }));
+    assert_eq!(board.step(), Ok(Activity::Row));
+}
+
+#[test]
+fn start_again_tells_a_stuck_converter_no_second_time() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, |_, _| Err(tactomo_firmware::TimedOut));
+    outside.send(Command::Start);
+    scan(&mut board, 2);
+    outside.send(Command::Start);
+    scan(&mut board, 2);
+    assert_eq!(faults(&outside.messages()), [&Fault::AdcStuck]);
+    outside.send(Command::Stop);
+    outside.send(Command::Start);
+    scan(&mut board, 1);
+    assert_eq!(faults(&outside.messages()), [&Fault::AdcStuck], "a host that starts anew hears it again");
 }

@@ -4,6 +4,8 @@
 mod closed_loop;
 mod commands;
 mod parts;
+mod plans;
+mod samplers;
 mod scan;
 mod switches;
 mod uplink;

@@ -36,11 +36,15 @@ pub struct Wire {
     pub to_board: VecDeque<u8>,
     /// Bytes that a push takes at most.
     pub room: usize,
+    /// Times that the board looked for bytes.
+    pub pulls: usize,
+    /// Comes when the board has looked for bytes twice more.
+    pub soon: Vec<u8>,
 }
 
 impl Default for Wire {
     fn default() -> Self {
-        Self { sent: Vec::new(), to_board: VecDeque::new(), room: usize::MAX }
+        Self { sent: Vec::new(), to_board: VecDeque::new(), room: usize::MAX, pulls: 0, soon: Vec::new() }
     }
 }
 
@@ -63,7 +67,13 @@ impl Serial for TestSerial {
     }
 
     fn pull(&mut self, buffer: &mut [u8]) -> usize {
-        let waiting = &mut self.0.wire.borrow_mut().to_board;
+        let mut wire = self.0.wire.borrow_mut();
+        wire.pulls += 1;
+        if wire.pulls.is_multiple_of(2) {
+            let soon = std::mem::take(&mut wire.soon);
+            wire.to_board.extend(soon);
+        }
+        let waiting = &mut wire.to_board;
         let count = buffer.len().min(waiting.len());
         buffer.iter_mut().zip(waiting.drain(..count)).for_each(|(to, byte)| *to = byte);
         count
@@ -170,6 +180,16 @@ pub fn numbered(number: u64, _electrode: u8) -> Result<u16, TimedOut> {
     Ok(4 * (number % 256) as u16)
 }
 
+/// The line of a board with this outside.
+pub fn serial(outside: &Outside) -> TestSerial {
+    TestSerial(outside.clone())
+}
+
+/// A converter that takes its time of this outside's clock.
+pub fn sampler<F: FnMut(u64, u8) -> Result<u16, TimedOut>>(outside: &Outside, sample: F) -> TestSampler<F> {
+    TestSampler(outside.clone(), sample)
+}
+
 /// A board of these parts.
 pub fn board<M: Mux, F, D: DelayNs>(outside: &Outside, mux: M, sample: F, delay: D) -> TestBoard<M, F, D>
 where
@@ -228,6 +248,15 @@ impl Outside {
         let mut packet = [0; MAX_COMMAND];
         let length = encode_request(&Request { tag, command }, VERSION, &mut packet).unwrap();
         self.send_bytes(&packet[..length]);
+    }
+
+    /// Sends a command of which nothing is there yet when the board looks next.
+    pub fn send_while_waiting(&self, command: Command) {
+        let mut packet = [0; MAX_COMMAND];
+        let length = encode_request(&Request { tag: 1, command }, VERSION, &mut packet).unwrap();
+        let mut wire = self.wire.borrow_mut();
+        wire.soon = packet[..length].to_vec();
+        wire.pulls = 0;
     }
 
     pub fn send_bytes(&self, bytes: &[u8]) {

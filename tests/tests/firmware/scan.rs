@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;
 
+use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use embedded_hal_mock::eh1::MockError;
 use embedded_hal_mock::eh1::delay::{CheckedDelay, NoopDelay, Transaction as Delay};
@@ -111,6 +112,36 @@ fn a_latch_opens_only_while_its_address_is_at_rest_and_before_the_conversion() {
     let first = ["a0", "b0", "c0", "d0", "csb0", "wr0", "wr1", "csb1", "convert 0"];
     let second = ["a1", "b0", "c0", "d0", "csb0", "wr0", "wr1", "csb1", "convert 1"];
     assert_eq!(second_row[..27], [ground, first, second].concat());
+}
+
+/// Delays in the same record as the pins.
+struct RecordedDelay(Rc<RefCell<Vec<String>>>);
+
+impl DelayNs for RecordedDelay {
+    fn delay_ns(&mut self, ns: u32) {
+        self.0.borrow_mut().push(format!("{ns} ns"));
+    }
+}
+
+#[test]
+fn an_electrode_settles_after_it_was_selected_and_before_it_is_converted() {
+    let record = Rc::new(RefCell::new(Vec::new()));
+    let pin = |name| Recorded(name, Rc::clone(&record));
+    let lines = LatchLines { wr: pin("wr"), csa: pin("csa"), csb: pin("csb") };
+    let mux = Latched::new(["a", "b", "c", "d"].map(pin), lines).unwrap();
+    let converted = Rc::clone(&record);
+    let sample = move |_, _| {
+        converted.borrow_mut().push("convert".to_owned());
+        Ok(0)
+    };
+    let outside = Outside::default();
+    let mut board = board(&outside, mux, sample, RecordedDelay(Rc::clone(&record)));
+    record.take();
+    outside.send(Command::Start);
+    board.step().unwrap();
+    let events = ["csa1", "csb1", "20000 ns", "2000 ns", "convert"];
+    let order: Vec<_> = record.take().into_iter().filter(|event| events.contains(&event.as_str())).collect();
+    assert_eq!(order[..8], ["csa1", "20000 ns", "csb1", "2000 ns", "convert", "csb1", "2000 ns", "convert"]);
 }
 
 #[test]
@@ -223,13 +254,13 @@ fn the_mean_is_rounded_to_the_nearest_and_full_scale_stays_in_range() {
 }
 
 #[test]
-fn the_watchdog_is_fed_at_least_every_256_conversions_of_the_longest_scan() {
+fn the_watchdog_is_fed_before_every_conversion_of_the_longest_scan() {
     let outside = Outside::default();
     let mut board = simple_board(&outside, numbered);
     outside.send(Command::Configure(Settings { average_log2: 8, ..Settings::default() }));
     outside.send(Command::Start);
     scan(&mut board, 2);
     let watchdog = outside.watchdog.get();
-    assert!(watchdog.feeds >= 512);
-    assert!(watchdog.longest_gap_us <= 256 * CONVERSION_US + 20, "{} us", watchdog.longest_gap_us);
+    assert!(watchdog.feeds >= 512 * 256);
+    assert!(watchdog.longest_gap_us <= CONVERSION_US + 20, "{} us", watchdog.longest_gap_us);
 }

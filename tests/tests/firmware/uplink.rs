@@ -1,6 +1,6 @@
 //! The uplink on fast, slow and dead lines.
 
-use tactomo_protocol::{BoardMessage, Command, Fault};
+use tactomo_protocol::{BoardMessage, Command, Fault, Settings};
 
 use super::parts::*;
 
@@ -29,7 +29,7 @@ fn a_line_that_takes_one_byte_at_a_time_carries_whole_frames() {
     let expected: Vec<u16> = (0..256).map(|reading| 4 * reading).collect();
     let frames = frames(&messages);
     assert!(frames.iter().all(|frame| frame.readings[..] == expected));
-    // About 272 bytes leave a scan, one before each conversion and one a step; a frame has 332.
+    // About 272 bytes leave a scan, one before each conversion and one a step; a frame has 334.
     assert!((14..=17).contains(&frames.len()), "{} frames", frames.len());
     assert_eq!(frames.last().unwrap().head.sequence, 19, "the newest frame is the one that is kept");
     let times: Vec<_> = frames.iter().map(|frame| frame.head.time_us / frame_us()).collect();
@@ -149,4 +149,83 @@ fn a_flood_of_questions_is_answered_as_far_as_there_is_room_and_never_cut() {
     let messages = outside.messages();
     assert!((4..100).contains(&hellos(&messages).len()));
     assert_eq!(hellos(&messages).len(), messages.len());
+}
+
+/// Faults whose packets take so many bytes on the wire: text and nine more.
+fn fault(bytes: usize) -> Fault {
+    Fault::Panic("x".repeat(bytes - 9).as_str().try_into().unwrap())
+}
+
+/// The queue holds 512 bytes: the zero and the Hello of the start take the first of them.
+#[test]
+fn the_queue_of_answers_is_filled_to_its_last_byte_and_never_beyond() {
+    for missing in [0, 1] {
+        let outside = Outside::default();
+        outside.set_room(0);
+        let mut board = simple_board(&outside, numbered);
+        let mut probe = simple_board(&Outside::default(), numbered);
+        probe.step().unwrap();
+        let outside_of_hello = Outside::default();
+        simple_board(&outside_of_hello, numbered).step().unwrap();
+        let taken = outside_of_hello.wire.borrow().sent.len();
+        let left = 512 - taken;
+        (0..left / 100 - 1).for_each(|_| board.report(fault(100)));
+        let rest = left % 100 + 100;
+        let (first, second) = (rest / 2, rest - rest / 2);
+        board.report(fault(first));
+        board.report(fault(second + missing));
+        board.report(fault(10));
+        outside.set_room(usize::MAX);
+        step(&mut board, 20);
+        let messages = outside.messages();
+        let faults = faults(&messages);
+        // What does not fit is lost whole; then a shorter one still fits.
+        let last = if missing == 0 { second } else { 10 };
+        assert_eq!(faults.last(), Some(&&fault(last)), "{missing} too many");
+        assert_eq!(faults.len(), left / 100 + 1);
+    }
+}
+
+#[test]
+fn of_frames_that_wait_the_newest_is_kept() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    // One byte of a frame is gone when the line dies, so that frame is kept, and of those behind it the newest.
+    scan(&mut board, 1);
+    outside.set_room(1);
+    board.step().unwrap();
+    outside.set_room(0);
+    scan(&mut board, 10);
+    outside.set_room(usize::MAX);
+    board.step().unwrap();
+    let messages = outside.messages();
+    let numbers: Vec<_> = frames(&messages).iter().map(|frame| frame.head.sequence).collect();
+    assert_eq!(numbers, [0, 10]);
+}
+
+#[test]
+fn the_line_is_looked_after_during_long_waits() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Configure(Settings { settle_us: 10_000, ..Settings::default() }));
+    outside.send(Command::Start);
+    scan(&mut board, 1);
+    outside.messages();
+    outside.set_room(0);
+    scan(&mut board, 1);
+    outside.set_room(4);
+    // A command comes while the board waits: the FIFO of its UART does not hold it for long.
+    outside.send_while_waiting(Command::Hello);
+    let (sent, pulls) = (outside.wire.borrow().sent.len(), outside.wire.borrow().pulls);
+    board.step().unwrap();
+    let pieces = 10_000 / 250 - 1;
+    let pushes = (outside.wire.borrow().sent.len() - sent) / 4;
+    assert_eq!(pushes, pieces + 16 + 1, "a push a piece, a conversion and a step");
+    assert_eq!(outside.wire.borrow().pulls - pulls, pieces + 1);
+    assert!(outside.wire.borrow().to_board.is_empty(), "it was taken out of the FIFO");
+    outside.set_room(usize::MAX);
+    board.step().unwrap();
+    assert_eq!(hellos(&outside.messages()).len(), 1, "and is obeyed after the row");
+    assert!(outside.watchdog.get().longest_gap_us <= 250 + CONVERSION_US);
 }

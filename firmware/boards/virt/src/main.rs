@@ -55,7 +55,7 @@ fn main() -> ! {
         Err(_) => panic!("the board's identity does not fit"),
     };
     match request {
-        Request::Measure => measure(board, &gauge),
+        Request::Measure => measure(&mut board, &gauge),
         _ => serve(&mut board, request),
     }
 }
@@ -83,7 +83,7 @@ fn serve(board: &mut VirtBoard, request: Request) -> ! {
 }
 
 /// Prints what a frame costs, and leaves.
-fn measure(mut board: VirtBoard, gauge: &Gauge) -> ! {
+fn measure(board: &mut VirtBoard, gauge: &Gauge) -> ! {
     while board.step() != Ok(Activity::Frame) {}
     let start = gauge.count();
     let mut frames = 0;
@@ -94,7 +94,7 @@ fn measure(mut board: VirtBoard, gauge: &Gauge) -> ! {
     Report(Uart::new()).line(&[
         ("instructions a frame outside conversions", instructions),
         ("stack bytes", gauge::stack_used_bytes() as u64),
-        ("board bytes", size_of_val(&board) as u64),
+        ("board bytes", size_of_val(board) as u64),
     ]);
     machine::exit()
 }
