@@ -4,7 +4,8 @@
 //! address lines; it keeps what it had once WR or its chip select is high. EN is active low and is latched along with the
 //! address. A change of address breaks before it makes, so two electrodes are never joined. All its times are shorter than
 //! two writes to a GPIO register of the chips used here, so that only [`Latched::select`] needs a wait of its own, for the
-//! analogue side. The ADG732 (one switch, 32 channels, five lines) works as [`Transparent`] does.
+//! analogue side. The ADG732 (one switch, 32 channels, five lines) works as [`Transparent`] does, two of them as [`Latched`] does, and two
+//! ADG726 as [`Paired`] does.
 
 use embedded_hal::digital::OutputPin;
 
@@ -76,10 +77,11 @@ impl<P: OutputPin, const LINES: usize> Mux for Transparent<P, LINES> {
 }
 
 /// Half A (drain DA at 0 V) grounds an electrode, half B (drain DB at the one ADC input) brings an electrode to the converter;
-/// both halves' sources go to the same 16 electrodes.
+/// both halves' sources go to the same 16 electrodes. With five address lines the halves are two ADG732, of 32 electrodes, whose CS are
+/// `csa` and `csb`.
 #[derive(Debug)]
-pub struct Latched<P> {
-    address: Address<P, 4>,
+pub struct Latched<P, const LINES: usize = 4> {
+    address: Address<P, LINES>,
     lines: LatchLines<P>,
 }
 
@@ -88,22 +90,29 @@ pub struct Latched<P> {
 pub struct LatchLines<P> {
     /// Write.
     pub wr: P,
-    /// Chip select of half A.
+    /// Chip select of half A, or of the chip that grounds.
     pub csa: P,
-    /// Chip select of half B.
+    /// Chip select of half B, or of the chip that reads.
     pub csb: P,
 }
 
-impl<P: OutputPin> Latched<P> {
-    /// A multiplexer on the address lines A0 to A3 and the lines of its latches, which are driven high (idle).
+impl<P: OutputPin, const LINES: usize> Latched<P, LINES> {
+    /// A multiplexer on the address lines A0 to A3 (and A4 of two ADG732) and the lines of its latches, which are driven high (idle).
     ///
     /// # Errors
     /// If a pin cannot be driven.
-    pub fn new(address: [P; 4], mut lines: LatchLines<P>) -> Result<Self, P::Error> {
-        lines.wr.set_high()?;
-        lines.csa.set_high()?;
-        lines.csb.set_high()?;
-        Ok(Self { address: Address(address), lines })
+    pub fn new(address: [P; LINES], lines: LatchLines<P>) -> Result<Self, P::Error> {
+        Ok(Self { address: Address(address), lines: lines.idle()? })
+    }
+}
+
+impl<P: OutputPin> LatchLines<P> {
+    /// Drives all of them high.
+    fn idle(mut self) -> Result<Self, P::Error> {
+        self.wr.set_high()?;
+        self.csa.set_high()?;
+        self.csb.set_high()?;
+        Ok(self)
     }
 }
 
@@ -115,7 +124,7 @@ fn latch<P: OutputPin>(wr: &mut P, select: &mut P) -> Result<(), P::Error> {
     select.set_high()
 }
 
-impl<P: OutputPin> Mux for Latched<P> {
+impl<P: OutputPin, const LINES: usize> Mux for Latched<P, LINES> {
     type Error = P::Error;
     /// The ADC input and half B hold about 150 pF, which a pad of up to 1 kilohm charges to half an LSB of 12 bits (9 time
     /// constants) in 1.4 us.
@@ -129,6 +138,75 @@ impl<P: OutputPin> Mux for Latched<P> {
     fn select(&mut self, electrode: u8) -> Result<(), P::Error> {
         self.address.set(electrode)?;
         latch(&mut self.lines.wr, &mut self.lines.csb)
+    }
+}
+
+/// Electrodes of each ADG726 of a pair.
+const PAIRED: u8 = 16;
+
+/// Two ADG726 for 32 electrodes: electrodes 0 to 15 at the first one, 16 to 31 at the second. Address lines, WR, CSA and CSB go to both; each
+/// has its EN to itself, which is the fifth line of the address: as the latches take EN along, the half of the chip that is not meant is latched
+/// off. Both DA are at ground, both DB at the one ADC input.
+#[derive(Debug)]
+pub struct Paired<P> {
+    address: Address<P, 4>,
+    lines: LatchLines<P>,
+    enables: [P; 2],
+    /// Which chip's half A and half B conduct.
+    conducting: [Option<usize>; 2],
+}
+
+/// A half of both chips.
+#[derive(Clone, Copy, Debug)]
+enum Half {
+    A = 0,
+    B = 1,
+}
+
+impl<P: OutputPin> Paired<P> {
+    /// Multiplexers on the address lines A0 to A3, the lines of the latches, and EN of the first and of the second one, which are driven
+    /// high (idle and off).
+    ///
+    /// # Errors
+    /// If a pin cannot be driven.
+    pub fn new(address: [P; 4], lines: LatchLines<P>, mut enables: [P; 2]) -> Result<Self, P::Error> {
+        enables.iter_mut().try_for_each(OutputPin::set_high)?;
+        Ok(Self { address: Address(address), lines: lines.idle()?, enables, conducting: [None; 2] })
+    }
+
+    /// Brings a half to an electrode. A half that changes chips is off in both for a moment, as two chips do not break before they make.
+    fn set(&mut self, half: Half, electrode: u8) -> Result<(), P::Error> {
+        let chip = usize::from(electrode / PAIRED) % self.enables.len();
+        self.address.set(electrode % PAIRED)?;
+        self.enables.iter_mut().try_for_each(OutputPin::set_high)?;
+        if self.conducting[half as usize] != Some(chip) {
+            self.strobe(half)?;
+            self.conducting[half as usize] = Some(chip);
+        }
+        self.enables[chip].set_low()?;
+        self.strobe(half)
+    }
+
+    fn strobe(&mut self, half: Half) -> Result<(), P::Error> {
+        let select = match half {
+            Half::A => &mut self.lines.csa,
+            Half::B => &mut self.lines.csb,
+        };
+        latch(&mut self.lines.wr, select)
+    }
+}
+
+impl<P: OutputPin> Mux for Paired<P> {
+    type Error = P::Error;
+    /// Twice what one chip needs, as two drains are at the ADC input: 300 pF and 1 kilohm, 2.7 us to half an LSB of 12 bits.
+    const SELECT_SETTLE_NS: u32 = 4_000;
+
+    fn ground(&mut self, electrode: u8) -> Result<(), P::Error> {
+        self.set(Half::A, electrode)
+    }
+
+    fn select(&mut self, electrode: u8) -> Result<(), P::Error> {
+        self.set(Half::B, electrode)
     }
 }
 

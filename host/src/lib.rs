@@ -30,6 +30,7 @@ pub use tactomo_study as study;
 pub use tactomo_table as table;
 pub use tactomo_touch::{calibrate, metrics, pointer, schema, solve, vibration};
 
+pub mod check;
 pub mod date;
 pub mod run;
 pub mod sink;

@@ -30,6 +30,7 @@ fn every_command_has_a_help_with_an_example() {
         "stability",
         "study",
         "calibrate",
+        "board",
     ] {
         let output = tactomo(&[command, "--help"]);
         let text = String::from_utf8(output.stdout).unwrap();

@@ -1,6 +1,7 @@
 //! The commands, one file each: its arguments and what it does.
 
 mod as_built;
+mod board;
 mod browser;
 mod calibrate;
 mod choice;
@@ -36,6 +37,7 @@ pub struct Cli {
 enum Command {
     Live(Box<live::Args>),
     Ports(ports::Args),
+    Board(board::Args),
     Record(Box<record::Args>),
     Replay(Box<replay::Args>),
     Detector(detector::Args),
@@ -54,6 +56,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Live(args) => live::run(*args),
         Command::Ports(args) => ports::run(&args),
+        Command::Board(args) => board::run(&args),
         Command::Record(args) => record::run(&args),
         Command::Replay(args) => replay::run(*args),
         Command::Detector(args) => detector::run(args),

@@ -7,4 +7,5 @@ mod parts;
 mod plans;
 mod samplers;
 mod scan;
+mod switches;
 mod uplink;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should")]
 
 mod board;
+mod first_look;
 mod host;
 
 use std::thread;

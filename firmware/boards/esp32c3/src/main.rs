@@ -4,18 +4,14 @@
 #![no_std]
 #![no_main]
 
-mod input;
-mod line;
-
 use esp_hal::clock::CpuClock;
 use esp_hal::gpio::{Level, Output, OutputConfig, OutputPin};
 use esp_hal::timer::timg::TimerGroup;
+use tactomo_board_espressif::one_input::{ELECTRODES, OneInput};
+use tactomo_board_espressif::usb_line::UsbLine;
 use tactomo_board_espressif::{EspChip, boot_fault};
 use tactomo_firmware::mux::{LatchLines, Latched};
 use tactomo_firmware::{Board16, Identity, Parts};
-
-use crate::input::Input;
-use crate::line::UsbLine;
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
@@ -27,15 +23,15 @@ fn main() -> ! {
     let Ok(mux) = Latched::new(address, latches);
     let parts = Parts {
         mux,
-        sampler: Input::new(chip.ADC1, chip.GPIO0),
+        sampler: OneInput::new(chip.ADC1, chip.GPIO0),
         serial: UsbLine::new(chip.USB_DEVICE),
         chip: EspChip::new(TimerGroup::new(chip.TIMG0)),
     };
-    let adc = input::adc();
+    let adc = OneInput::adc();
     let identity = Identity {
         firmware_version: env!("CARGO_PKG_VERSION"),
         board: "esp32c3",
-        electrodes: input::ELECTRODES,
+        electrodes: ELECTRODES,
         adc,
         drive_mv: 2000,
     };

@@ -3,6 +3,10 @@
 
 pub mod analog;
 mod chip;
+#[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
+pub mod one_input;
+#[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
+pub mod usb_line;
 
 use core::panic::PanicInfo;
 
@@ -67,6 +71,20 @@ fn reset_name(reason: SocResetReason) -> Option<&'static str> {
         R::CoreRtcWdt | R::Cpu0RtcWdt | R::SysRtcWdt | R::SysSuperWdt => "RTC watchdog",
         R::CoreSw | R::Cpu0Sw => "software",
         R::SysClkGlitch | R::CorePwrGlitch => "power or clock glitch",
+        _ => "other",
+    })
+}
+
+/// What restarted the chip; `None` after power-on, the reset button, or a reset by the host.
+#[cfg(feature = "esp32c6")]
+fn reset_name(reason: SocResetReason) -> Option<&'static str> {
+    use SocResetReason as R;
+    Some(match reason {
+        R::ChipPowerOn | R::CoreUsbUart | R::CoreUsbJtag => return None,
+        R::SysBrownOut => "brown-out",
+        R::CoreMwdt0 | R::CoreMwdt1 | R::Cpu0Mwdt0 | R::Cpu0Mwdt1 => "watchdog",
+        R::CoreRtcWdt | R::Cpu0RtcWdt | R::SysRtcWdt | R::SysSuperWdt => "RTC watchdog",
+        R::CoreSw | R::Cpu0Sw => "software",
         _ => "other",
     })
 }

@@ -227,6 +227,10 @@ fn exchanged(problem: &Problem, faulty: &FaultyElectrodes, readings: &Readings) 
     let contacts = one_contact(problem, &kept, faulty)?;
     let residual = |order: &[usize]| contacts.left_by_one(&readings.of(order));
     let before = residual(&kept)?;
+    // What is explained to within noise needs no exchange.
+    if before < 1.0 {
+        return None;
+    }
     let pairs = (0..kept.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
     let scored = pairs.filter_map(|(i, j)| {
         let mut order = kept.clone();

@@ -1,0 +1,46 @@
+//! The chip's own USB port, as a serial port.
+
+use static_cell::{ConstStaticCell, StaticCell};
+use stm32f4xx_hal::otg_fs::{USB, UsbBus};
+use tactomo_firmware::Serial;
+use usb_device::bus::UsbBusAllocator;
+use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbVidPid};
+use usbd_serial::{SerialPort, USB_CLASS_CDC};
+
+/// Vendor and product that are shared by serial ports of free designs, which tell themselves apart by their names.
+const IDS: UsbVidPid = UsbVidPid(0x16C0, 0x27DD);
+/// Memory of the endpoints, in words: all that the port has.
+static ENDPOINTS: ConstStaticCell<[u32; 320]> = ConstStaticCell::new([0; 320]);
+static BUS: StaticCell<UsbBusAllocator<UsbBus<USB>>> = StaticCell::new();
+
+/// The USB port as a line that never waits: when no host reads, it takes no bytes.
+pub struct UsbLine {
+    device: UsbDevice<'static, UsbBus<USB>>,
+    port: SerialPort<'static, UsbBus<USB>>,
+}
+
+impl UsbLine {
+    /// Takes the port; `None` if its names do not fit. To be called once.
+    pub fn new(usb: USB) -> Option<Self> {
+        let bus = BUS.init(UsbBus::new(usb, ENDPOINTS.take()));
+        let port = SerialPort::new(bus);
+        let names = StringDescriptors::default().manufacturer("Tactomo").product("Tactomo stm32f405");
+        let device = UsbDeviceBuilder::new(bus, IDS).device_class(USB_CLASS_CDC).strings(&[names]).ok()?.build();
+        Some(Self { device, port })
+    }
+}
+
+impl Serial for UsbLine {
+    /// The host is answered here too: nothing else polls the port while a row is scanned.
+    fn push(&mut self, bytes: &[u8]) -> usize {
+        self.device.poll(&mut [&mut self.port]);
+        self.port.write(bytes).unwrap_or(0)
+    }
+
+    fn pull(&mut self, buffer: &mut [u8]) -> usize {
+        self.device.poll(&mut [&mut self.port]);
+        // What was written last may wait for a full packet.
+        let _ = self.port.flush();
+        self.port.read(buffer).unwrap_or(0)
+    }
+}

@@ -1,0 +1,140 @@
+//! `tactomo board` as a user calls it: a flashing tool that is a script, and checks of the simulated board.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// A folder of its own with a tool that writes down what it is called with, and leaves with such a code.
+struct Tools(PathBuf);
+
+impl Tools {
+    fn new(test: &str, program: &str, code: i32) -> Self {
+        let folder = std::env::temp_dir().join(format!("tactomo-{}-board-{test}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let tool = folder.join(program);
+        let script = format!("#!/bin/sh\necho \"$@\" > \"{}\"\nexit {code}\n", folder.join("called").display());
+        fs::write(&tool, script).unwrap();
+        fs::set_permissions(&tool, fs::Permissions::from_mode(0o755)).unwrap();
+        Self(folder)
+    }
+
+    /// A file beside the tool.
+    fn file(&self, name: &str) -> PathBuf {
+        let path = self.0.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "").unwrap();
+        path
+    }
+
+    /// What the tool was called with.
+    fn called(&self) -> Option<String> {
+        fs::read_to_string(self.0.join("called")).ok().map(|text| text.trim().to_owned())
+    }
+
+    fn flash(&self, args: &[&str], here: &Path) -> (Option<i32>, String) {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tactomo"));
+        command.args(["board", "flash"]).args(args).current_dir(here).env("PATH", &self.0);
+        let output = command.output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    }
+}
+
+impl Drop for Tools {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn an_image_is_handed_to_the_tool_of_its_chip_and_the_command_is_shown() {
+    for (board, program, port, expected) in [
+        ("esp32", "espflash", Some("/dev/ttyUSB7"), "flash --chip esp32 --port /dev/ttyUSB7"),
+        ("esp32c6", "espflash", None, "flash --chip esp32c6"),
+        ("stm32f405", "probe-rs", None, "download --chip STM32F405RG"),
+    ] {
+        let tools = Tools::new(board, program, 0);
+        let image = tools.file("image.elf");
+        let image = image.to_str().unwrap();
+        let mut args = vec![board, "--image", image];
+        args.extend(port.into_iter().flat_map(|port| ["--port", port]));
+        let (code, told) = tools.flash(&args, &tools.0);
+        assert_eq!(code, Some(0), "{told}");
+        let expected = format!("{expected} {image}");
+        assert_eq!(tools.called().as_deref(), Some(&*expected));
+        assert!(told.contains(&format!("{program} {expected}")) && told.contains("board check"), "{told}");
+    }
+}
+
+#[test]
+fn the_image_that_was_built_in_the_repository_is_found_from_any_folder_of_it() {
+    let tools = Tools::new("built", "espflash", 0);
+    tools.file("firmware/boards/Cargo.toml");
+    let below = tools.file("docs/page.md");
+    let here = below.parent().unwrap();
+    let (code, told) = tools.flash(&["esp32c3"], here);
+    assert!(code == Some(1) && tools.called().is_none(), "{told}");
+    assert!(
+        told.contains("not built yet") && told.contains("cd firmware/boards/esp32c3 && cargo build --release"),
+        "{told}"
+    );
+    tools.file("firmware/boards/target/riscv32imc-unknown-none-elf/release/tactomo-esp32c3");
+    let (code, told) = tools.flash(&["esp32c3"], here);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(tools.called().unwrap().ends_with("release/tactomo-esp32c3"));
+}
+
+#[test]
+fn what_is_missing_or_fails_is_told_with_what_to_do() {
+    let other = Tools::new("other", "some-tool", 0);
+    let image = other.file("image.elf");
+    let image = image.to_str().unwrap();
+    let failing = Tools::new("failing", "espflash", 3);
+    for (tools, args, told) in [
+        (&other, &["esp32", "--image", image][..], "cargo install espflash --locked"),
+        (&other, &["stm32f405", "--image", image], "cargo install probe-rs-tools --locked"),
+        (&other, &["esp32", "--image", "no.elf"], "there is no image no.elf"),
+        (&other, &["esp32"], "--image FILE"),
+        (&other, &["stm32f405", "--image", image, "--port", "/dev/ttyACM0"], "leave out --port"),
+        (&failing, &["esp32", "--image", image], "BOOT button"),
+    ] {
+        let (code, message) = tools.flash(args, &other.0);
+        assert!(code == Some(1) && message.contains(told), "{args:?}: {message}");
+    }
+    assert_eq!(other.called(), None);
+}
+
+fn check(args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tactomo"));
+    command.args(["board", "check", "--simulate"]).args(args).output().unwrap()
+}
+
+#[test]
+fn a_sound_board_passes_and_a_faulty_one_fails_with_its_electrodes_named() {
+    let sound = check(&["--json"]);
+    assert_eq!(sound.status.code(), Some(0), "{}", String::from_utf8_lossy(&sound.stderr));
+    let sound: Value = serde_json::from_slice(&sound.stdout).unwrap();
+    assert_eq!((&sound["sound"], &sound["presses"], &sound["dropped"]), (&true.into(), &4.into(), &0.into()));
+
+    let faulty = check(&["--json", "--fault", "short:2,7", "--seed", "3"]);
+    assert_eq!(faulty.status.code(), Some(1));
+    let faulty: Value = serde_json::from_slice(&faulty.stdout).unwrap();
+    let electrodes = faulty["electrodes"].as_array().unwrap();
+    let wrong: Vec<_> = electrodes.iter().filter(|electrode| electrode["state"] != "ok").collect();
+    assert_eq!(wrong.len(), 2);
+    assert_eq!(
+        (&wrong[0]["electrode"], &wrong[0]["state"], &wrong[0]["with"][0]),
+        (&2.into(), &"shorted".into(), &7.into())
+    );
+    assert_eq!(wrong[1]["pins"]["grounded_by"], "S8A");
+
+    let text = check(&["--fault", "open:3"]);
+    let (told, asked) = (String::from_utf8(text.stdout).unwrap(), String::from_utf8(text.stderr).unwrap());
+    assert_eq!(text.status.code(), Some(1));
+    assert!(told.contains(" 3o") && told.contains("electrode 3: It is neither grounded nor read"), "{told}");
+    assert!(asked.contains("Lay a hand") && asked.contains("error: one electrode"), "{asked}");
+}
