@@ -17,6 +17,8 @@ const BITS: u8 = 12;
 const SAMPLE_TIME: u32 = 2;
 /// The reference inside takes 10 us to start: twice that, in cycles of 168 MHz.
 const REFERENCE_CYCLES: u32 = 2 * 10 * 168;
+/// The converter takes 3 us to start: twice that, in cycles of 168 MHz.
+const START_CYCLES: u32 = 2 * 3 * 168;
 /// Looks at the ADC before a conversion is given up: about ten times what a conversion takes, at some 5 cycles of 168 MHz a look.
 const MAX_POLLS: u32 = 600;
 
@@ -104,5 +106,13 @@ impl Sampler for Inputs {
         adc.cr2().modify(|_, w| w.swstart().set_bit());
         (0..MAX_POLLS).find(|_| adc.sr().read().eoc().bit_is_set()).ok_or(TimedOut)?;
         Ok(adc.dr().read().data().bits())
+    }
+
+    /// Switches the converter off and on, which gives up a conversion.
+    fn restart(&mut self) {
+        self.registers.cr2().modify(|_, w| w.adon().clear_bit());
+        self.registers.cr2().modify(|_, w| w.adon().set_bit());
+        cortex_m::asm::delay(START_CYCLES);
+        self.registers.sr().modify(|_, w| w.eoc().clear_bit());
     }
 }

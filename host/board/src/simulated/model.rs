@@ -97,8 +97,8 @@ pub(super) struct InputFigures {
 const BITS: u8 = 12;
 const FULL_SCALE_MV: u16 = 1 << BITS;
 
-/// Standard deviation of one calibrated conversion (mV): nine of 721 mV at a fixed divider, published by a user of an ESP32 with
-/// factory calibration, have 4.9 mV (forum.pycom.io, "ADC woes"). The C3's is not published and taken as the same.
+/// Standard deviation of one conversion (mV): nine of 721 mV behind a divider of 100 and 4.7 kilohm, published by the user of a Pycom board
+/// with an ESP32 ("ADC woes"), have 4.9 mV. The C3's is not published and taken as the same.
 const NOISE_MV: f64 = 5.0;
 /// The firmware's instructions outside conversions and waits, for each of 16 rows (`docs/hardware.md`), and cycles for each.
 const ROW_CYCLES: u64 = 71_261 * 3 / 2 / 16;
