@@ -18,7 +18,7 @@ pub struct Adc {
 }
 
 /// No converter.
-const NO_RANGE: Range = Range { electrodes: 0, floor: 0, ceiling: 0 };
+const NO_RANGE: Range = Range { floor: 0, ceiling: 0, ..Range::of_codes(0, 1) };
 
 impl Adc {
     /// A converter all of whose codes count, for all electrodes.

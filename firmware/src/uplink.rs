@@ -9,9 +9,9 @@ use tactomo_protocol::{BoardMessage, FrameHead, MAX_LOG, Scope, encode_board, en
 use crate::{Chip, Serial};
 
 /// Bytes of answers and faults that can wait: four of the longest.
-const CONTROL_BYTES: usize = 512;
+const CONTROL_BYTES: usize = 704;
 /// Longest answer or fault on the wire.
-const CONTROL_PACKET: usize = 128;
+const CONTROL_PACKET: usize = 176;
 /// Longest packet of log on the wire.
 const LOG_PACKET: usize = wire_bytes(1 + MAX_LOG + 4);
 /// Packets that one [`Uplink::poll`] begins at most, so that it ends on any line.

@@ -11,7 +11,7 @@ use crate::message::{BoardMessage, Hello, Kind, Request};
 use crate::{CRC, CRC_BYTES, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, Scope, VERSION, cobs, v1, wire_bytes};
 
 /// Longest postcard body with room to spare; a [`Fault`](crate::Fault) with the longest text takes 98 bytes, a request 106.
-const MAX_BODY: usize = 128;
+const MAX_BODY: usize = 160;
 
 /// A message that cannot be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

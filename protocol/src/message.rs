@@ -88,12 +88,26 @@ pub struct Range {
     pub floor: u16,
     /// At this code, or above, it says only that the voltage is at least that.
     pub ceiling: u16,
+    /// How far its readings are from the voltages.
+    pub errors: ConverterErrors,
+}
+
+/// How far a converter's readings are from the voltages, as standard deviations; 0 is not known, or little.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ConverterErrors {
+    /// Of one conversion, by noise (uV).
+    pub noise_uv: u16,
+    /// Of its gain, from chip to chip, after calibration (millionths).
+    pub gain_ppm: u16,
+    /// Of its non-linearity, from chip to chip, after calibration: the height of a bow over its range (uV).
+    pub bow_uv: u16,
 }
 
 impl Range {
     /// The range of a converter of `adc_bits` (1 to 16) all of whose codes count.
     pub const fn of_codes(electrodes: u8, adc_bits: u8) -> Self {
-        Self { electrodes, floor: 0, ceiling: ((1u32 << adc_bits) - 1) as u16 }
+        let errors = ConverterErrors { noise_uv: 0, gain_ppm: 0, bow_uv: 0 };
+        Self { electrodes, floor: 0, ceiling: ((1u32 << adc_bits) - 1) as u16, errors }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A detector as a board measures it, and the volts of the board's codes.
 
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{ConverterErrors, Detector};
 #[cfg(doc)]
 use tactomo_physics::readings::Says;
 use tactomo_physics::readings::{Range, Readings};
@@ -34,7 +34,26 @@ pub fn as_measured(detector: &Detector, board: &Hello) -> Result<Detector, Misma
     measured.drive_v = volts(board.drive_mv) - detector.ground_v;
     measured.adc.bits = board.adc_bits;
     measured.adc.full_scale_v = volts(board.adc_full_scale_mv);
+    let noise_uv = board.ranges.iter().map(|range| range.errors.noise_uv).max().unwrap_or_default();
+    if noise_uv > 0 {
+        measured.adc.noise_lsb = 1e-6 * f64::from(noise_uv) / measured.adc.lsb_v();
+    }
+    measured.converters = converters(board, detector.ground_v);
     Ok(measured)
+}
+
+/// What a board tells of its converters' errors; nothing if it knows of none.
+fn converters(board: &Hello, ground_v: f64) -> Vec<ConverterErrors> {
+    let per_code = volts(board.adc_full_scale_mv) / f64::from(1u32 << board.adc_bits.min(31));
+    let of = |range: &tactomo_protocol::Range| ConverterErrors {
+        channels: range.electrodes.into(),
+        gain_share: 1e-6 * f64::from(range.errors.gain_ppm),
+        bow_v: 1e-6 * f64::from(range.errors.bow_uv),
+        range_v: [range.floor, range.ceiling].map(|code| f64::from(code) * per_code - ground_v),
+    };
+    let all: Vec<_> = board.ranges.iter().map(of).collect();
+    let is_known = all.iter().any(|converter| converter.gain_share > 0.0 || converter.bow_v > 0.0);
+    if is_known { all } else { Vec::new() }
 }
 
 /// Volts of whole millivolts: as near as a number gets, so that a board which measures as the description says has its very voltages.
@@ -42,9 +61,9 @@ fn volts(millivolts: u16) -> f64 {
     f64::from(millivolts) / 1000.0
 }
 
-/// Readings this near to an end of a converter's range count as at it (V), or as many codes as that is if it is more. A voltage a little below
-/// an ESP32's floor reads as much above it as noise is, of which two standard deviations are about so much.
-const MARGIN_V: f64 = 0.006;
+/// Readings this near to an end of a converter's range count as at it, in standard deviations of its noise: a voltage a little below a floor
+/// reads as much above it as noise is. Of a converter whose noise is not known, in codes.
+const MARGIN: f64 = 2.0;
 const MARGIN_CODES: f64 = 3.0;
 
 /// Makes volts of a board's codes.
@@ -63,18 +82,23 @@ impl Volts {
     /// For frames of a board.
     pub fn of(board: &Hello) -> Self {
         let per_code = volts(board.adc_full_scale_mv) / f64::from(1u32 << board.adc_bits.min(31));
-        let margin_v = MARGIN_V.max(MARGIN_CODES * per_code);
         let last = (1u32 << board.adc_bits.min(16)) - 1;
         // Where every code counts, noise cut off at zero is the baseline's business, and the last code that of solvers.
-        let range = |range: tactomo_protocol::Range| Range {
-            floor_v: match range.floor {
-                0 => f64::NEG_INFINITY,
-                floor => f64::from(floor) * per_code + margin_v,
-            },
-            ceiling_v: match u32::from(range.ceiling) {
-                ceiling if ceiling >= last => f64::INFINITY,
-                ceiling => f64::from(ceiling) * per_code - margin_v,
-            },
+        let range = |range: tactomo_protocol::Range| {
+            let margin_v = match range.errors.noise_uv {
+                0 => MARGIN_CODES * per_code,
+                noise_uv => MARGIN * 1e-6 * f64::from(noise_uv),
+            };
+            Range {
+                floor_v: match range.floor {
+                    0 => f64::NEG_INFINITY,
+                    floor => f64::from(floor) * per_code + margin_v,
+                },
+                ceiling_v: match u32::from(range.ceiling) {
+                    ceiling if ceiling >= last => f64::INFINITY,
+                    ceiling => f64::from(ceiling) * per_code - margin_v,
+                },
+            }
         };
         let mut ranges: Vec<Range> = (0..board.electrodes).map_while(|e| board.range_of(e)).map(range).collect();
         if ranges.iter().all(|range| range.floor_v.is_infinite() && range.ceiling_v.is_infinite()) {
@@ -170,7 +194,8 @@ mod tests {
 
     #[test]
     fn what_a_converter_cannot_see_is_a_bound() {
-        let range = |electrodes, floor| tactomo_protocol::Range { electrodes, floor, ceiling: 900 };
+        let errors = tactomo_protocol::ConverterErrors { noise_uv: 3000, ..Default::default() };
+        let range = |electrodes, floor| tactomo_protocol::Range { electrodes, floor, ceiling: 900, errors };
         let board = Hello { ranges: [range(6, 142), range(10, 128)].into_iter().collect(), ..hello(16) };
         let scope = Scope::whole(16).unwrap();
         let frame = |code: u16| Frame {

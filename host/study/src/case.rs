@@ -183,6 +183,7 @@ impl File {
                 adc: Adc::default(),
                 // What was solved is what the case describes.
                 tolerances: Tolerances::EXACT,
+                converters: Vec::new(),
                 calibration: None,
                 force: None,
                 correction: None,

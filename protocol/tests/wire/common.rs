@@ -3,7 +3,7 @@
 use heapless::Vec as Fixed;
 use proptest::prelude::*;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, CommandReceiver, Counters, DecodeError, Fault, Frame, FrameHead, Hello, Log,
+    BoardMessage, BoardReceiver, Command, CommandReceiver, ConverterErrors, Counters, DecodeError, Fault, Frame, FrameHead, Hello, Log,
     MAX_COMMAND, MAX_WIRE, Plan, Range, Request, Scope, Settings, Status, VERSION, encode_board, encode_request,
 };
 
@@ -25,13 +25,17 @@ pub fn settings() -> impl Strategy<Value = Settings> {
 fn ranges(electrodes: u8, adc_bits: u8) -> impl Strategy<Value = Fixed<Range, 4>> {
     let largest = ((1u32 << adc_bits) - 1) as u16;
     let cuts = prop::collection::vec(1..electrodes, 0..=3);
-    (cuts, prop::collection::vec((0..largest, 1..=largest), 4)).prop_map(move |(mut cuts, codes)| {
+    let errors = (any::<u16>(), any::<u16>(), any::<u16>());
+    (cuts, prop::collection::vec((0..largest, 1..=largest, errors), 4)).prop_map(move |(mut cuts, codes)| {
         cuts.extend([0, electrodes]);
         cuts.sort_unstable();
         cuts.dedup();
         let runs = cuts.windows(2).map(|cut| cut[1] - cut[0]);
-        let range =
-            |(electrodes, (a, b)): (u8, &(u16, u16))| Range { electrodes, floor: (*a).min(*b - 1), ceiling: *b };
+        let range = |(electrodes, (a, b, errors)): (u8, &(u16, u16, (u16, u16, u16)))| {
+            let (noise_uv, gain_ppm, bow_uv) = *errors;
+            let errors = ConverterErrors { noise_uv, gain_ppm, bow_uv };
+            Range { electrodes, floor: (*a).min(*b - 1), ceiling: *b, errors }
+        };
         runs.zip(&codes).map(range).collect()
     })
 }
@@ -140,8 +144,9 @@ pub fn request() -> impl Strategy<Value = Request> {
 
 /// A Hello as the paper's board sends it, whose two converters see different ranges.
 pub fn hello() -> Hello {
-    let ranges =
-        [Range { electrodes: 6, floor: 142, ceiling: 3100 }, Range { electrodes: 10, floor: 128, ceiling: 3080 }];
+    let errors = ConverterErrors { noise_uv: 5000, gain_ppm: 10_000, bow_uv: 12_000 };
+    let range = |electrodes, floor, ceiling| Range { electrodes, floor, ceiling, errors };
+    let ranges = [range(6, 142, 3100), range(10, 128, 3080)];
     Hello {
         version: VERSION,
         answers: 7,

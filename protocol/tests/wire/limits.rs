@@ -120,7 +120,7 @@ fn a_hello_out_of_range_is_neither_sent_nor_taken() {
         |hello| hello.ranges[1].ceiling = 4096,
         |hello| hello.adc_bits = 11,
         |hello| (hello.ranges[0].electrodes, hello.ranges[1].electrodes) = (0, 16),
-        |hello| hello.ranges.push(Range { electrodes: 1, floor: 0, ceiling: 1 }).unwrap(),
+        |hello| hello.ranges.push(Range { ceiling: 1, ..Range::of_codes(1, 12) }).unwrap(),
     ];
     assert_eq!(board_result(HELLO, &postcard::to_allocvec(&valid).unwrap()), Ok(BoardMessage::Hello(valid.clone())));
     for (number, break_one) in break_it.into_iter().enumerate() {

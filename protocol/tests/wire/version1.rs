@@ -33,7 +33,7 @@ fn old_hello() -> Hello {
         answers: 0,
         adc_full_scale_mv: 3300,
         is_streaming: false,
-        ranges: [Range { electrodes: 16, floor: 0, ceiling: 4095 }].into_iter().collect(),
+        ranges: [Range::of_codes(16, 12)].into_iter().collect(),
         ..hello()
     }
 }

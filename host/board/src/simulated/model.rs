@@ -4,7 +4,7 @@
 
 use tactomo_firmware::Adc as FirmwareAdc;
 use tactomo_physics::detector::Adc;
-use tactomo_protocol::Range;
+use tactomo_protocol::{ConverterErrors, Range};
 
 /// Which board is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -240,6 +240,8 @@ impl ConverterFigures {
     /// What it can see, in codes, which are millivolts.
     fn range(&self) -> Range {
         let [floor, ceiling] = [self.floor_mv, self.ceiling_mv].map(|mv| mv as u16);
-        Range { electrodes: self.electrodes as u8, floor, ceiling }
+        let [noise_uv, bow_uv] = [self.noise_mv, self.bow_mv].map(|mv| (1e3 * mv) as u16);
+        let errors = ConverterErrors { noise_uv, gain_ppm: (1e6 * self.gain_deviation) as u16, bow_uv };
+        Range { electrodes: self.electrodes as u8, floor, ceiling, errors }
     }
 }

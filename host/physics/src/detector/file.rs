@@ -285,6 +285,7 @@ impl Document {
             on_resistance_ohm: self.on_resistance_ohm.unwrap_or(ON_RESISTANCE_OHM),
             adc: self.adc.into_adc(),
             tolerances: self.tolerances,
+            converters: Vec::new(),
             calibration: self.calibration.map(CalibrationTable::into_calibration).transpose()?,
             force: self.force,
             correction: self.correction,

@@ -61,6 +61,10 @@ pub struct Detector {
     pub on_resistance_ohm: f64,
     /// How the voltages become numbers.
     pub adc: Adc,
+    /// What is known of the errors of the converters that the channels share, from channel 0 on, as a board tells it; none is known of a
+    /// description alone.
+    #[serde(skip)]
+    pub converters: Vec<ConverterErrors>,
     /// How far it may be from this description.
     #[serde(default)]
     pub tolerances: Tolerances,
@@ -72,6 +76,28 @@ pub struct Detector {
     /// What is taken off contacts that are found with this description, where known presses have shown errors.
     #[serde(skip)]
     pub correction: Option<Correction>,
+}
+
+/// What a converter's readings may be off by, as standard deviations from chip to chip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConverterErrors {
+    /// Channels on it.
+    pub channels: usize,
+    /// Of its gain, as a share.
+    pub gain_share: f64,
+    /// Of the height of a bow over its range (V).
+    pub bow_v: f64,
+    /// Ends of the range, between which the bow is (V).
+    pub range_v: [f64; 2],
+}
+
+impl ConverterErrors {
+    /// What a gain and a bow of one standard deviation each change in a reading (V).
+    pub fn changes_v(&self, volts: f64) -> [f64; 2] {
+        let [low_v, high_v] = self.range_v;
+        let share = ((volts - low_v) / (high_v - low_v)).clamp(0.0, 1.0);
+        [self.gain_share * volts, self.bow_v * 4.0 * share * (1.0 - share)]
+    }
 }
 
 /// Closed polygons, without repeating the first corner (m).

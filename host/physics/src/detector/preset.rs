@@ -58,6 +58,7 @@ impl Detector {
             on_resistance_ohm: ON_RESISTANCE_OHM,
             adc: Adc::default(),
             tolerances: Tolerances::default(),
+            converters: Vec::new(),
             calibration: None,
             force: None,
             correction: None,

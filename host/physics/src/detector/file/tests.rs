@@ -178,6 +178,7 @@ fn detectors() -> impl Strategy<Value = Detector> {
                 surface: None,
                 unevenness: crate::detector::Unevenness::default(),
                 tolerances: crate::detector::Tolerances::default(),
+                converters: Vec::new(),
                 calibration: None,
                 layers: layers.into_iter().map(layer).collect(),
                 electrodes,

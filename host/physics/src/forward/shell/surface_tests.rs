@@ -29,6 +29,7 @@ fn flat(outline: Outline, electrodes: Vec<Electrode>) -> Detector {
         surface: None,
         unevenness: crate::detector::Unevenness::default(),
         tolerances: crate::detector::Tolerances::default(),
+        converters: Vec::new(),
         calibration: None,
         layers: vec![Layer::uniform(0.001, SHEET_S / 0.001)],
         electrodes,

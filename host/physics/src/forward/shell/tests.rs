@@ -28,6 +28,7 @@ fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
         surface: None,
         unevenness: crate::detector::Unevenness::default(),
         tolerances: crate::detector::Tolerances::default(),
+        converters: Vec::new(),
         calibration: None,
         layers: vec![Layer::uniform(0.01, SHEET_S / 0.01)],
         electrodes,

@@ -179,10 +179,10 @@ impl ContactFinder {
         let nuisance = self.problem.nuisance()?;
         let mut patterns_v = nuisance.patterns_v(contacts, detector).ok()?;
         let made_for = readings_v(&self.problem.model.impedance_ohm(contacts).ok()?, detector);
-        let of_pads = self.errors.pad_patterns_v(&made_for);
-        let (n, columns) = (detector.electrodes.len(), patterns_v.ncols());
-        patterns_v = patterns_v.resize_horizontally(columns + n, 0.0);
-        of_pads.iter().enumerate().for_each(|(row, volts)| patterns_v[(row, columns + row / n)] = *volts);
+        let of_board = self.errors.patterns_v(&made_for);
+        let columns = patterns_v.ncols();
+        patterns_v = patterns_v.resize_horizontally(columns + of_board.ncols(), 0.0);
+        patterns_v.columns_mut(columns, of_board.ncols()).copy_from(&of_board);
         target.mask(&mut patterns_v);
         let least_v = self.errors.least_v(made_for.largest_v());
         let made_for = made_for.volts().to_vec();

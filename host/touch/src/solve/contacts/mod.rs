@@ -173,6 +173,7 @@ impl ContactFinder {
                 pad: settings.pad_error,
                 drive_v: detector.drive_v,
                 full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
+                converters: detector.converters.clone().into(),
             },
             sheet_s: detector.sheet_conductance_s(),
             spacing_m: problem.spacing_m(),

@@ -72,7 +72,7 @@ impl ContactFinder {
         less.volts_mut().iter_mut().zip(off_v).for_each(|(volts, off)| *volts -= off);
         let root_v = (dot(off_v, off_v) / off_v.len() as f64).sqrt();
         let model = self.errors.model.hypot(REMAINS * root_v / rows.largest_v().max(root_v));
-        Target::of_mean(&less, 1, &Errors { model, ..self.errors }, None)
+        Target::of_mean(&less, 1, &Errors { model, ..self.errors.clone() }, None)
     }
 
     /// Brings contacts to rows that come `elapsed_s` (s) after those before.

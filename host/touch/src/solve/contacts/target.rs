@@ -13,10 +13,11 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::approximation::ApproximationError;
+use tactomo_physics::detector::ConverterErrors;
 use tactomo_physics::readings::{Readings, Says};
 
 /// What is known of the errors of readings.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Errors {
     /// Standard deviation by noise (V).
     pub noise_v: f64,
@@ -32,6 +33,8 @@ pub(super) struct Errors {
     pub drive_v: f64,
     /// Readings from here on are saturated and do not count (V).
     pub full_v: f64,
+    /// Errors of the converters, from channel 0 on; none where nothing is known of them.
+    pub converters: Arc<[ConverterErrors]>,
 }
 
 impl Errors {
@@ -39,6 +42,25 @@ impl Errors {
     fn of_mean_v(&self, frames: usize) -> f64 {
         let [all, fixed] = [self.noise_v, self.rounding_v].map(|deviation_v| deviation_v * deviation_v);
         (fixed + (all - fixed).max(0.0) / frames.max(1) as f64).sqrt()
+    }
+
+    /// What readings may be off by, but for noise, on a detector that is as described (V): a column for each ground's pad, and two for each
+    /// converter, its gain and its bow.
+    pub fn patterns_v(&self, readings: &Readings) -> DMatrix<f64> {
+        let n = readings.electrodes();
+        let of_pads = self.pad_patterns_v(readings);
+        let mut patterns_v = DMatrix::zeros(n * n, n + 2 * self.converters.len());
+        of_pads.iter().enumerate().for_each(|(i, volts)| patterns_v[(i, i / n)] = *volts);
+        let mut first = 0;
+        for (index, converter) in self.converters.iter().enumerate() {
+            let channels = first..(first + converter.channels).min(n);
+            first = channels.end;
+            for (g, e) in (0..n).flat_map(|g| channels.clone().map(move |e| (g, e))) {
+                let changes_v = converter.changes_v(readings.touch_v(g, e));
+                (0..2).for_each(|kind| patterns_v[(g * n + e, n + 2 * index + kind)] = changes_v[kind]);
+            }
+        }
+        patterns_v
     }
 
     /// Smallest standard deviation of a mean of frames with such readings (V).
@@ -98,15 +120,22 @@ impl Target {
         let says = readings.all_say().to_vec();
         let unread = says.iter().zip(&mut weights).filter(|(says, _)| **says == Says::Nothing);
         unread.for_each(|(_, weight)| *weight = 0.0);
+        let is_counted = |i: usize| weights[i] > 0.0 && is_voltage(&says, i);
         let of_pads = || {
             let mut patterns_v = errors.pad_patterns_v(readings);
-            let is_counted = |i: usize| weights[i] > 0.0 && is_voltage(&says, i);
             let left_out = patterns_v.iter_mut().enumerate().filter(|(i, _)| !is_counted(*i));
             left_out.for_each(|(_, volts)| *volts = 0.0);
-            Arc::new(ApproximationError::of_rows(&patterns_v, readings.electrodes()))
+            ApproximationError::of_rows(&patterns_v, readings.electrodes())
         };
+        let of_converters = || {
+            let mut patterns_v = errors.patterns_v(readings);
+            let left_out = (0..patterns_v.nrows()).filter(|i| !is_counted(*i));
+            left_out.for_each(|i| patterns_v.row_mut(i).fill(0.0));
+            ApproximationError::of(&patterns_v, 0, Vec::new(), deviation_v)
+        };
+        let of_board = || Arc::new(if errors.converters.is_empty() { of_pads() } else { of_converters() });
         let is_informed = error.is_some();
-        let error = error.map_or_else(of_pads, Arc::clone);
+        let error = error.map_or_else(of_board, Arc::clone);
         let shares = error.shares(deviation_v);
         let volts = readings.volts().to_vec();
         Self { frames, noise_v, volts, weights, says, error, is_informed, is_provisional: false, shares }
@@ -148,7 +177,7 @@ impl Target {
     /// stands for that. One that is alike for all of a detector that is as described.
     pub(super) fn provisional(readings: &Readings, frames: usize, errors: &Errors) -> Self {
         let model = errors.model.hypot(errors.detector.unwrap_or_default());
-        let target = Self::of_mean(readings, frames, &Errors { model, ..*errors }, None);
+        let target = Self::of_mean(readings, frames, &Errors { model, ..errors.clone() }, None);
         Self { is_provisional: errors.detector.is_some(), ..target }
     }
 
