@@ -58,7 +58,9 @@ mod v1;
 pub use decode::{BoardReceiver, CommandReceiver, Counters, DecodeError, Receiver};
 pub use encode::{EncodeError, encode_board, encode_frame, encode_hello, encode_log, encode_request, encode_rows};
 pub use frame::{Frame, FrameHead, Status};
-pub use message::{BoardMessage, Command, ConverterErrors, Fault, Hello, Kind, Log, MAX_LOG, MAX_RANGES, Range, Request, Settings};
+pub use message::{
+    BoardMessage, Command, ConverterErrors, Fault, Hello, Kind, Log, MAX_LOG, MAX_RANGES, Range, Request, Settings,
+};
 pub use scope::{MAX_PLAN_ROWS, MAX_ROWS, Plan, Scope};
 
 /// Version of the protocol that this crate speaks: 1 to 15. Hosts understand boards of version 1 too.

@@ -20,7 +20,7 @@ use super::scene::{self, SceneArgs};
 const MOUSE_FIRMNESS: f64 = 0.3;
 
 /// The board that is simulated unless one is chosen.
-const DEFAULT_BOARD: BoardModel = BoardModel::Ideal;
+const DEFAULT_BOARD: BoardModel = BoardModel::Esp32;
 
 /// A board: on the port that is named, or on whichever USB serial port one is found.
 #[derive(Clone, Debug, clap::Args)]
@@ -32,7 +32,7 @@ pub struct BoardArgs {
     /// Uses the simulated board: the real firmware on simulated pins
     #[arg(long)]
     pub simulate: bool,
-    /// Which board is simulated [default: ideal]
+    /// Which board is simulated [default: esp32; of more than 16 electrodes ideal]
     #[arg(long, value_enum, value_name = "BOARD", requires = "simulate")]
     board: Option<BoardName>,
     /// Baud rate of the serial port

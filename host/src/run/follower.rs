@@ -381,7 +381,7 @@ impl FollowLoop {
             }
         }
         let telling = |count: usize| board.follower.as_ref()?.telling_grounds(count);
-        self.planner.consider(&self.wish, &board.detector, !solution.contacts.is_empty(), telling);
+        self.planner.consider(&self.wish, &board.detector, (!solution.contacts.is_empty(), self.conversions), telling);
         self.found.clone_from(&solution.contacts);
         let pointer = self.pointer.as_ref().map(Pointer::state);
         let shown = solved.frame.snapshot(solution, pointer, board.baseline.state().is_taking());

@@ -330,6 +330,9 @@ impl Reader {
         };
         let place = self.sequence.place(&frame.head);
         self.notice.count(|meter| meter.frame(received, place.dropped));
+        if !frame.scope.is_whole() {
+            self.wish.count(place.dropped);
+        }
         if !self.follows {
             return;
         }

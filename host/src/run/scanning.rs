@@ -6,12 +6,12 @@
 
 use std::fmt;
 use std::str::FromStr;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tactomo_physics::detector::Detector;
-use tactomo_protocol::{MAX_PLAN_ROWS, Plan};
+use tactomo_protocol::{MAX_PLAN_ROWS, Plan, Settings};
 
 /// Rows of a frame of an adaptive plan: 1400 frames/s at 921600 baud, where one row would be 2100 and tell each time of one ground alone.
 const ROWS: usize = 2;
@@ -94,11 +94,22 @@ impl ScanChoice {
     }
 }
 
-/// The plan that is wanted, on its way from the follower to the reader.
+/// Share of the frames that the line has no room for from which each reading is the mean of twice as many conversions: the converters have
+/// time for them. Then as many come, with half the variance.
+const CROWDED: f64 = 0.5;
+/// Frames in which that share is counted.
+const COUNTED: u64 = 400;
+/// Doublings at most.
+const MOST_DOUBLINGS: u8 = 2;
+
+/// The plan that is wanted, on its way from the follower to the reader, and how the line fares with it.
 #[derive(Debug, Default)]
 pub(super) struct PlanWish {
     wanted: Mutex<Option<Plan>>,
     refused: AtomicBool,
+    /// Frames that came, and those that the line had no room for.
+    came: AtomicU64,
+    dropped: AtomicU64,
 }
 
 impl PlanWish {
@@ -109,6 +120,23 @@ impl PlanWish {
     /// The plan that was put since the last call, if one was.
     pub fn take(&self) -> Option<Plan> {
         self.wanted.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// Counts a frame of rows that came after so many were dropped.
+    pub fn count(&self, dropped: u64) {
+        self.came.fetch_add(1, Ordering::Relaxed);
+        self.dropped.fetch_add(dropped, Ordering::Relaxed);
+    }
+
+    /// Whether the line has no room for half of the frames, once enough were counted.
+    fn is_crowded(&self) -> bool {
+        let [came, dropped] = [&self.came, &self.dropped].map(|count| count.load(Ordering::Relaxed));
+        if came + dropped < COUNTED {
+            return false;
+        }
+        self.came.store(0, Ordering::Relaxed);
+        self.dropped.store(0, Ordering::Relaxed);
+        dropped as f64 > CROWDED * (came + dropped) as f64
     }
 
     /// The board takes no plan, or does again.
@@ -122,6 +150,8 @@ pub(super) struct Planner {
     choice: ScanChoice,
     /// The grounds of the last plan, and when it was chosen.
     last: Option<(Focus, Instant)>,
+    /// Doublings of the conversions for a reading.
+    doublings: u8,
 }
 
 /// What a plan is about.
@@ -135,21 +165,21 @@ enum Focus {
 
 impl Planner {
     pub fn new(choice: ScanChoice) -> Self {
-        Self { choice, last: None }
+        Self { choice, last: None, doublings: 0 }
     }
 
     /// Begins anew, as with another board.
     pub fn restart(&mut self) {
-        self.last = None;
+        (self.last, self.doublings) = (None, 0);
     }
 
     /// Wishes a plan, if it is time for another: `telling` are the grounds that tell most, so many as they are asked for, and
-    /// `touches` is whether anything touches.
+    /// `touches` is whether anything touches, `conversions` how many a reading is the mean of by the settings.
     pub fn consider(
         &mut self,
         wish: &PlanWish,
         detector: &Detector,
-        touches: bool,
+        (touches, conversions): (bool, u32),
         telling: impl FnOnce(usize) -> Option<Vec<usize>>,
     ) {
         if self.choice == ScanChoice::Whole || wish.refused.load(Ordering::Relaxed) {
@@ -173,13 +203,18 @@ impl Planner {
                 (Some(grounds), false) => Focus::Rest(sorted(grounds)),
             },
         };
+        let doubles = self.doublings < MOST_DOUBLINGS && wish.is_crowded();
+        self.doublings += u8::from(doubles);
         let is_new = self.last.as_ref().is_none_or(|(last, _)| *last != focus);
-        if is_new {
-            wish.put(match (&self.choice, &focus) {
+        if is_new || doubles {
+            let plan = match (&self.choice, &focus) {
                 (_, Focus::Whole) => Plan::default(),
                 (ScanChoice::Adaptive, Focus::Rest(grounds) | Focus::Touch(grounds)) => adaptive(grounds, electrodes),
                 (_, Focus::Rest(grounds) | Focus::Touch(grounds)) => listed(grounds, electrodes),
-            });
+            };
+            let average_log2 = conversions.max(1).ilog2() as u8 + self.doublings;
+            let average_log2 = if plan.is_whole() { 0 } else { average_log2.min(Settings::MAX_AVERAGE_LOG2) };
+            wish.put(Plan { average_log2, ..plan });
         }
         self.last = Some((focus, now));
     }
@@ -283,27 +318,41 @@ mod tests {
     fn a_plan_is_wished_when_what_touches_has_changed() {
         let (wish, detector) = (PlanWish::default(), detector());
         let mut planner = Planner::new(ScanChoice::Adaptive);
-        planner.consider(&wish, &detector, false, |_| Some(vec![5, 10]));
+        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![5, 10]));
         let at_rest = wish.take().unwrap();
-        planner.consider(&wish, &detector, false, |_| Some(vec![6, 9]));
+        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![6, 9]));
         assert_eq!(wish.take(), None, "too soon");
         std::thread::sleep(SHORT_PAUSE);
-        planner.consider(&wish, &detector, true, |count| Some(vec![1; count]));
+        planner.consider(&wish, &detector, (true, 1), |count| Some(vec![1; count]));
         let touched = wish.take().unwrap();
         assert!(touched != at_rest && touched.grounds[..3] == [1, 1, 1]);
         std::thread::sleep(PAUSE);
-        planner.consider(&wish, &detector, true, |_| None);
+        planner.consider(&wish, &detector, (true, 1), |_| None);
         assert!(wish.take().unwrap().is_whole(), "an image takes whole frames");
         wish.set_refused(true);
         std::thread::sleep(PAUSE);
-        planner.consider(&wish, &detector, false, |_| Some(vec![5, 10]));
+        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![5, 10]));
         assert_eq!(wish.take(), None);
+    }
+
+    #[test]
+    fn a_line_without_room_makes_readings_means_of_more() {
+        let (wish, detector) = (PlanWish::default(), detector());
+        let mut planner = Planner::new(ScanChoice::Adaptive);
+        let mut averages = Vec::new();
+        for dropped in [0, 2, 2, 2, 0] {
+            (0..COUNTED).for_each(|_| wish.count(dropped));
+            planner.consider(&wish, &detector, (true, 1), |_| Some(vec![5, 10]));
+            averages.extend(wish.take().map(|plan| plan.average_log2));
+            std::thread::sleep(PAUSE);
+        }
+        assert_eq!(averages, [0, 1, 2], "no more, and never fewer");
     }
 
     #[test]
     fn whole_frames_are_nothing_to_ask_for() {
         let wish = PlanWish::default();
-        Planner::new(ScanChoice::Whole).consider(&wish, &detector(), true, |_| Some(vec![1, 2]));
+        Planner::new(ScanChoice::Whole).consider(&wish, &detector(), (true, 1), |_| Some(vec![1, 2]));
         assert_eq!(wish.take(), None);
     }
 }

@@ -3,8 +3,9 @@
 use heapless::Vec as Fixed;
 use proptest::prelude::*;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, CommandReceiver, ConverterErrors, Counters, DecodeError, Fault, Frame, FrameHead, Hello, Log,
-    MAX_COMMAND, MAX_WIRE, Plan, Range, Request, Scope, Settings, Status, VERSION, encode_board, encode_request,
+    BoardMessage, BoardReceiver, Command, CommandReceiver, ConverterErrors, Counters, DecodeError, Fault, Frame,
+    FrameHead, Hello, Log, MAX_COMMAND, MAX_WIRE, Plan, Range, Request, Scope, Settings, Status, VERSION, encode_board,
+    encode_request,
 };
 
 /// A text of up to `N` bytes, not all of them ASCII.

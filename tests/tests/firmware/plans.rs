@@ -131,8 +131,11 @@ fn the_largest_frames_of_rows_fit() {
 #[test]
 fn every_electrode_saturates_where_its_own_converter_does() {
     let outside = Outside::default();
-    let ranges =
-        [(6, 142, 3000), (99, 128, 2000)].map(|(electrodes, floor, ceiling)| Range { floor, ceiling, ..Range::of_codes(electrodes, 12) });
+    let ranges = [(6, 142, 3000), (99, 128, 2000)].map(|(electrodes, floor, ceiling)| Range {
+        floor,
+        ceiling,
+        ..Range::of_codes(electrodes, 12)
+    });
     let identity = Identity { adc: Adc::new(12, 4096).with_ranges(&ranges), ..IDENTITY };
     let sample = |number: u64, electrode: u8| {
         Ok(match (number / 256, electrode) {

@@ -45,7 +45,9 @@ impl Round {
             says => (gathered.at(g, e), says),
         };
         let round = Readings::from_fn(n, |g, e| at_rest(g, e).0).saying(|g, e| at_rest(g, e).1);
-        self.before = self.last.replace(round.clone());
+        // What was not read cannot be seen to stand still.
+        self.before = self.last.take().filter(|_| is_whole);
+        self.last = is_whole.then(|| round.clone());
         Some(round)
     }
 

@@ -10,7 +10,7 @@ use super::{ContactFinder, Explanation};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Share of what readings are off by that remains when a contact has moved on.
 const REMAINS: f64 = 0.2;
@@ -27,10 +27,18 @@ const GONE: f64 = 12.0;
 /// Of a contact that has just come.
 const GLIMPSE: Effort = Effort { steps: 4, gain: 1.0, share: 0.05 };
 
+/// So many frames that their noise is nothing.
+const FOREVER: usize = 1 << 30;
+/// Frames after which it is reckoned anew what no averaging takes away.
+const RENEWED: u32 = 32;
+
 /// What is known besides the contacts that are followed.
 #[derive(Clone, Debug)]
 pub(super) struct RowState {
     bank: Bank,
+    /// Covariance of the parameters that stays however many rows come, since the model and the board are off; and frames since it was made.
+    staying: Option<DMatrix<f64>>,
+    since: u32,
     /// What all readings are off by (V); none of a detector that is as described.
     off_v: Vec<f64>,
     /// Frames in a row that do not fit.
@@ -53,7 +61,7 @@ impl RowState {
     /// From an explanation by all readings of `target`.
     pub fn new(found: &Explanation, target: &Target) -> Self {
         let off_v = if target.error().is_some() { target.likely_off_v(&found.fit.volts) } else { Vec::new() };
-        Self { bank: Bank::new(found.fit.normal.clone()), off_v, unfit: 0, gone: 0.0 }
+        Self { bank: Bank::new(found.fit.normal.clone()), staying: None, since: RENEWED, off_v, unfit: 0, gone: 0.0 }
     }
 
     /// What all readings are off by (V); nothing of a detector that is as described.
@@ -90,7 +98,17 @@ impl ContactFinder {
             return Step::Gone;
         }
         let search = state.unfit >= FRAMES;
-        (fit.normal, fit.settled) = (state.bank.information().clone(), true);
+        if state.since >= RENEWED {
+            (state.staying, state.since) = (self.staying(&fit), 0);
+        }
+        state.since += 1;
+        let known = state.bank.information();
+        let told = state
+            .staying
+            .as_ref()
+            .filter(|staying| staying.nrows() == known.nrows())
+            .and_then(|staying| Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + staying)?.inverse()));
+        (fit.normal, fit.settled) = (told.unwrap_or_else(|| known.clone()), true);
         Step::Followed(Explanation { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
     }
 
@@ -101,6 +119,14 @@ impl ContactFinder {
         let first = rough.fit(begun, target, GLIMPSE)?;
         let fit = self.disc_fitter().fit(first.contacts, target, Effort { steps: 1, ..GLIMPSE })?;
         Some(Explanation::of(fit, target))
+    }
+
+    /// Covariance of a fit's parameters by what noise has no part in: the errors of model, pads and converters.
+    fn staying(&self, fit: &DiscFit) -> Option<DMatrix<f64>> {
+        let n = self.network.electrodes();
+        let readings = Readings::from_fn(n, |g, e| fit.volts[g * n + e]);
+        let endless = Target::of_mean(&readings, FOREVER, &self.errors, None);
+        self.disc_fitter().covariance(fit, &endless)
     }
 
     /// Whether what is followed has become so light that it cannot be told from nothing.
