@@ -8,3 +8,4 @@ mod plans;
 mod samplers;
 mod scan;
 mod uplink;
+mod wiring;

@@ -1,8 +1,6 @@
-//! Calibrated conversions that cannot hang.
+//! What the ADCs of Espressif's chips have in common.
 
-use esp_hal::Blocking;
-use esp_hal::analog::adc::{Adc, AdcCalScheme, AdcChannel, AdcConfig, AdcPin, Attenuation, RegisterAccess};
-use tactomo_firmware::TimedOut;
+use esp_hal::analog::adc::{AdcCalScheme, Attenuation};
 use tactomo_protocol::Range;
 
 /// Range of the inputs: up to about 3.1 V (ESP32) or 2.5 V (ESP32-C3), which holds the 2 V of the driving layer.
@@ -11,9 +9,9 @@ pub const ATTENUATION: Attenuation = Attenuation::_11dB;
 /// Bits of a conversion.
 const BITS: u8 = 12;
 /// Largest code of a conversion.
-const MAX_CODE: u16 = (1 << BITS) - 1;
+pub const MAX_CODE: u16 = (1 << BITS) - 1;
 /// Looks at the ADC before a conversion is given up: 0.2 ms at least, some ten times what a conversion takes.
-const MAX_POLLS: u32 = 4_000;
+pub const MAX_POLLS: u32 = 4_000;
 
 /// What calibrated readings mean: they are millivolts, so `2^BITS` of them are full scale, and each ADC sees its range.
 pub fn millivolts(ranges: &[Range]) -> tactomo_firmware::Adc {
@@ -26,25 +24,4 @@ pub fn range<Unit, Calibration: AdcCalScheme<Unit>>(electrodes: u8) -> Range {
     // A calibration that lies outside the scale says nothing of the scale's ends.
     let ceiling = calibration.adc_val(MAX_CODE).clamp(1, MAX_CODE);
     Range { electrodes, floor: calibration.adc_val(0).min(ceiling - 1), ceiling }
-}
-
-/// An ADC.
-pub struct AnalogUnit<'d, Unit>(Adc<'d, Unit, Blocking>);
-
-impl<'d, Unit: RegisterAccess + 'd> AnalogUnit<'d, Unit> {
-    /// Starts the ADC.
-    pub fn new(unit: Unit, config: AdcConfig<Unit>) -> Self {
-        Self(Adc::new(unit, config))
-    }
-
-    /// Converts the voltage at a pin that was enabled in the configuration (mV).
-    ///
-    /// # Errors
-    /// [`TimedOut`] if that took too long. Another pin of the same unit then times out too, until the conversion is done.
-    pub fn convert<Pin: AdcChannel>(
-        &mut self,
-        pin: &mut AdcPin<Pin, Unit, impl AdcCalScheme<Unit>>,
-    ) -> Result<u16, TimedOut> {
-        (0..MAX_POLLS).find_map(|_| self.0.read_oneshot(pin).ok()).ok_or(TimedOut)
-    }
 }

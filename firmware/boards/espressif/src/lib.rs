@@ -2,6 +2,8 @@
 #![no_std]
 
 pub mod analog;
+#[cfg(feature = "esp32")]
+pub mod brown_out;
 mod chip;
 
 use core::panic::PanicInfo;
