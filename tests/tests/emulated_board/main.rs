@@ -8,7 +8,7 @@ mod table;
 use std::sync::OnceLock;
 
 use anyhow::{Context, Result, ensure};
-use tactomo_protocol::{BoardMessage, Command, Fault, Frame, Settings, Status};
+use tactomo_protocol::{BoardMessage, Command, Fault, Frame, Plan, Scope, Settings, Status};
 
 use crate::host::Host;
 use crate::qemu::{Qemu, Request};
@@ -76,6 +76,36 @@ fn frames_arrive_bit_for_bit_and_the_log_with_them() -> Result<()> {
     assert_eq!(host.log(), ["INFO the first of 14 frames is out"]);
     host.send(&Command::Stop)?;
     assert_eq!(board.exit_code()?, 0);
+    Ok(())
+}
+
+#[test]
+fn a_scan_plan_brings_its_rows_and_no_others() -> Result<()> {
+    let Some(elf) = elf()? else { return Ok(()) };
+    let board = Qemu::start(elf, Request::Run)?;
+    let mut host = Host::open(board.pty(), elf)?;
+    host.hello()?;
+    host.send(&Command::Configure(Settings { settle_us: 5, average_log2: 0, max_frames_per_s: 500 }))?;
+    let (grounds, reads) = ([0, 5, 11, 5], 0b1001_0000_0000_0010);
+    let plan = Plan { grounds: grounds.into_iter().collect(), reads, rows_a_frame: 2, average_log2: 1 };
+    host.send(&Command::Scan(plan.clone()))?;
+    host.send(&Command::Start)?;
+    let frames = host.frames(4 * table::FRAMES)?;
+    let sent = |place, scope: &Scope| -> Vec<u16> {
+        let cells = scope.cells().map(|(ground, electrode)| (usize::from(ground), usize::from(electrode)));
+        cells.map(|(ground, electrode)| table::reading(place, ground, electrode) << 1).collect()
+    };
+    for (frame, count) in frames.iter().zip(0..) {
+        ensure!(Some(&frame.scope) == plan.scope(count % 2, 16).as_ref(), "frame {count} has other rows");
+    }
+    // The table goes on whenever electrode 0 is grounded again: two frames of the plan are one of the table's.
+    let follows = |first: &usize| {
+        let places = (0..).map(|count| (first + count / 2) % table::FRAMES);
+        frames.iter().zip(places).all(|(frame, place)| frame.readings[..] == sent(place, &frame.scope)[..])
+    };
+    ensure!((0..table::FRAMES).any(|first| follows(&first)), "the readings are not the table's");
+    host.send(&Command::Scan(Plan { reads: 1 << 16, ..plan }))?;
+    host.wait_for(|message| matches!(message, BoardMessage::Fault(Fault::BadPlan { answers: 1 })).then_some(()))?;
     Ok(())
 }
 

@@ -9,3 +9,4 @@ mod samplers;
 mod scan;
 mod switches;
 mod uplink;
+mod wiring;

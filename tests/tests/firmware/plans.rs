@@ -74,7 +74,7 @@ fn a_plan_begins_at_once_with_its_first_row_and_the_frame_before_has_no_number()
     outside.send(Command::Start);
     scan(&mut board, 1);
     step(&mut board, 5);
-    outside.send(Command::Scan(plan(&[1, 2, 3, 4], 0xFFFF, 2, 0)));
+    outside.send(Command::Scan(plan(&[1, 2, 3, 4, 5, 6], 0xFFFF, 2, 0)));
     scan(&mut board, 1);
     board.step().unwrap();
     // Other settings: the plan stays, and begins anew.

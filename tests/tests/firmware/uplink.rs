@@ -191,7 +191,10 @@ fn of_frames_that_wait_the_newest_is_kept() {
     let outside = Outside::default();
     let mut board = simple_board(&outside, numbered);
     outside.send(Command::Start);
-    // One byte of a frame is gone when the line dies, so that frame is kept, and of those behind it the newest.
+    // Some bytes of a frame are gone when the line dies, so that frame is kept, and of those behind it the newest.
+    board.step().unwrap();
+    outside.messages();
+    outside.set_room(0);
     scan(&mut board, 1);
     outside.set_room(1);
     board.step().unwrap();

@@ -16,15 +16,11 @@ pub const RECORD_BYTES: usize = 4 + 1 + 1 + MAX_TEXT;
 pub struct PanicRecord<'a>(pub &'a mut [u8; RECORD_BYTES]);
 
 impl PanicRecord<'_> {
-    /// Writes down where and why, cut at the longest message.
+    /// Writes down where and why, cut at the longest message: of the path the last two parts, since a crate's folder is long and the same for all
+    /// its files.
     pub fn store(&mut self, panic: &core::panic::PanicInfo) {
-        let mut text = Cut::default();
-        if let Some(place) = panic.location() {
-            // Cannot fail: `Cut` takes any text.
-            let _ = write!(text, "{}:{}: ", place.file(), place.line());
-        }
-        let _ = write!(text, "{}", panic.message());
-        self.store_text(&text.0);
+        let place = panic.location().map(|place| (place.file(), place.line()));
+        self.store_text(&text(place, panic.message()).0);
     }
 
     fn store_text(&mut self, text: &String<MAX_TEXT>) {
@@ -49,6 +45,24 @@ impl PanicRecord<'_> {
         }
         String::try_from(core::str::from_utf8(text).ok()?).ok()
     }
+}
+
+/// What is told of a panic.
+fn text(place: Option<(&str, u32)>, message: impl fmt::Display) -> Cut {
+    let mut text = Cut::default();
+    if let Some((file, line)) = place {
+        // Cannot fail: `Cut` takes any text.
+        let _ = write!(text, "{}:{line}: ", end_of(file));
+    }
+    let _ = write!(text, "{message}");
+    text
+}
+
+/// The last two parts of a path, or the last one if they are longer than a third of what is kept.
+fn end_of(path: &str) -> &str {
+    let mut slashes = path.rmatch_indices('/').map(|(at, _)| &path[at + 1..]);
+    let (last, last_two) = (slashes.next().unwrap_or(path), slashes.next().unwrap_or(path));
+    if last_two.len() <= MAX_TEXT / 3 { last_two } else { last }
 }
 
 /// A checksum that notices memory that decayed while the power was off.
@@ -86,6 +100,19 @@ mod tests {
         record.store_text(&text.0);
         assert_eq!(record.take().as_deref(), Some(&*format!("main.rs:7: {}", &long[..MAX_TEXT - 11])));
         assert_eq!(record.take(), None);
+    }
+
+    #[test]
+    fn the_end_of_the_path_and_the_message_are_kept() {
+        let told = |file: &str, message: &str| text(Some((file, 77)), message).0;
+        assert_eq!(told("src/main.rs", "no"), "src/main.rs:77: no");
+        assert_eq!(told("main.rs", "no"), "main.rs:77: no");
+        let folder = "/home/somebody/.cargo/registry/src/index.crates.io-1949cf8c6b5b557f/esp-hal-1.2.2/src/analog";
+        assert_eq!(told(&format!("{folder}/adc/esp32.rs"), "no"), "adc/esp32.rs:77: no");
+        let long = format!("{folder}/a-folder-with-a-name-of-its-own-that-is-long/esp32.rs");
+        let message = "index out of bounds: the len is 16 but the index is 16";
+        assert_eq!(told(&long, message).as_str(), format!("esp32.rs:77: {message}"));
+        assert_eq!(text(None, "no").0, "no");
     }
 
     #[test]

@@ -3,13 +3,15 @@
 //! esp-hal does not tie a pin to the ADC unit that it is wired to: the wrong unit compiles and reads another pin. So the
 //! table below is the one place that says it, and it is checked against the chip's own map when it compiles.
 
-use esp_hal::analog::adc::{AdcCalLine, AdcConfig, AdcPin};
+use esp_hal::analog::adc::{AdcCalLine, AdcChannel, AdcConfig};
 use esp_hal::peripherals::{
     ADC1, ADC2, GPIO0, GPIO2, GPIO4, GPIO12, GPIO13, GPIO14, GPIO15, GPIO25, GPIO26, GPIO27, GPIO32, GPIO33, GPIO34,
     GPIO35, GPIO36, GPIO39,
 };
-use tactomo_board_espressif::analog::{ATTENUATION, AnalogUnit, millivolts, range};
-use tactomo_firmware::{Adc, Sampler, TimedOut};
+use tactomo_board_espressif::analog::{ATTENUATION, millivolts, range};
+use tactomo_firmware::{Adc, Row, Sampler, TimedOut};
+
+use crate::converters::{Channel, Converters};
 
 /// Electrodes of the board.
 pub const ELECTRODES: u8 = 16;
@@ -29,32 +31,15 @@ macro_rules! inputs {
             $(pub $pin2: $gpio2<'d>,)*
         }
 
-        /// The two ADCs and the sixteen calibrated inputs.
-        pub struct Inputs<'d> {
-            adc1: AnalogUnit<'d, ADC1<'d>>,
-            adc2: AnalogUnit<'d, ADC2<'d>>,
-            $($pin1: AdcPin<$gpio1<'d>, ADC1<'d>, AdcCalLine<ADC1<'d>>>,)*
-            $($pin2: AdcPin<$gpio2<'d>, ADC2<'d>, AdcCalLine<ADC2<'d>>>,)*
-        }
-
         impl<'d> Inputs<'d> {
             /// Takes the ADCs and the pins, and reads the calibration from the chip's fuses.
             pub fn new(adc1: ADC1<'d>, adc2: ADC2<'d>, pins: InputPins<'d>) -> Self {
                 let (mut config1, mut config2) = (AdcConfig::new(), AdcConfig::new());
-                $(let $pin1 = config1.enable_pin_with_cal(pins.$pin1, ATTENUATION);)*
-                $(let $pin2 = config2.enable_pin_with_cal(pins.$pin2, ATTENUATION);)*
-                let (adc1, adc2) = (AnalogUnit::new(adc1, config1), AnalogUnit::new(adc2, config2));
-                Self { adc1, adc2, $($pin1,)* $($pin2,)* }
-            }
-        }
-
-        impl Sampler for Inputs<'_> {
-            fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
-                match electrode {
-                    $($electrode1 => self.adc1.convert(&mut self.$pin1),)*
-                    $($electrode2 => self.adc2.convert(&mut self.$pin2),)*
-                    _ => Err(TimedOut),
-                }
+                let channels = [
+                    $(Channel(config1.enable_pin(pins.$pin1, ATTENUATION).pin.adc_channel()),)*
+                    $(Channel(config2.enable_pin(pins.$pin2, ATTENUATION).pin.adc_channel()),)*
+                ];
+                Self { converters: Converters::new(adc1, config1, adc2, config2), channels }
             }
         }
 
@@ -71,6 +56,59 @@ macro_rules! inputs {
             assert!(electrodes.len() == ELECTRODES as usize);
         };
     };
+}
+
+/// The two ADCs and their sixteen inputs, one for each electrode.
+pub struct Inputs<'d> {
+    converters: Converters<'d>,
+    /// Channel of each electrode at its ADC.
+    channels: [Channel; ELECTRODES as usize],
+}
+
+impl Inputs<'_> {
+    /// Converts an electrode of each ADC, or of one of them, side by side.
+    fn convert(&mut self, pair: [Option<u8>; 2]) -> [Result<u16, TimedOut>; 2] {
+        self.converters.convert(pair.map(|electrode| self.channels.get(usize::from(electrode?)).copied()))
+    }
+}
+
+impl Sampler for Inputs<'_> {
+    fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
+        match electrode {
+            0..ADC1_ELECTRODES => self.convert([Some(electrode), None])[0],
+            _ => self.convert([None, Some(electrode)])[1],
+        }
+    }
+
+    fn restart(&mut self) {
+        self.converters.restart();
+    }
+
+    /// An electrode of ADC1 and one of ADC2 at a time, as long as both have some left: ten slots for sixteen electrodes.
+    fn sample_row<R: Row>(&mut self, row: &mut R) -> Result<(), R::Error> {
+        let electrodes = row.electrodes();
+        let among = |range: core::ops::Range<u8>| range.filter(move |electrode| electrodes >> electrode & 1 == 1);
+        let (mut first, mut second) = (among(0..ADC1_ELECTRODES), among(ADC1_ELECTRODES..ELECTRODES));
+        loop {
+            let mut pair = [first.next(), second.next()];
+            if pair == [None, None] {
+                return Ok(());
+            }
+            for _ in 0..row.conversions() {
+                row.attend();
+                let sampled = self.convert(pair);
+                for (place, sampled) in pair.iter_mut().zip(sampled) {
+                    let Some(electrode) = *place else { continue };
+                    row.take(electrode, sampled);
+                    // The first that times out is an electrode's last.
+                    *place = place.filter(|_| sampled.is_ok());
+                }
+                if sampled.contains(&Err(TimedOut)) {
+                    self.restart();
+                }
+            }
+        }
+    }
 }
 
 // Electrode and pin, in the order of the ADCs' channels.

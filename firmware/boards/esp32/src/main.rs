@@ -4,13 +4,14 @@
 #![no_std]
 #![no_main]
 
+mod converters;
 mod inputs;
 mod line;
 
 use esp_hal::clock::CpuClock;
 use esp_hal::gpio::{Level, Output, OutputConfig, OutputPin};
 use esp_hal::timer::timg::TimerGroup;
-use tactomo_board_espressif::{EspChip, boot_fault};
+use tactomo_board_espressif::{EspChip, boot_fault, brown_out};
 use tactomo_firmware::mux::{Enabled, Transparent};
 use tactomo_firmware::{Board16, Identity, Parts};
 
@@ -22,6 +23,7 @@ esp_bootloader_esp_idf::esp_app_desc!();
 #[esp_hal::main]
 fn main() -> ! {
     let chip = esp_hal::init(esp_hal::Config::default().with_cpu_clock(CpuClock::max()));
+    brown_out::enable();
     let address = [output(chip.GPIO18), output(chip.GPIO19), output(chip.GPIO21), output(chip.GPIO22)];
     let Ok(mux) = Enabled::new(Transparent::new(address), output(chip.GPIO23));
     let pins = InputPins {

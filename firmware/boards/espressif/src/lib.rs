@@ -2,6 +2,8 @@
 #![no_std]
 
 pub mod analog;
+#[cfg(feature = "esp32")]
+pub mod brown_out;
 mod chip;
 #[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
 pub mod one_input;

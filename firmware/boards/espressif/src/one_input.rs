@@ -1,17 +1,18 @@
 //! The one ADC input, at the drain of the multiplexer's half B: GPIO 0 on both chips.
 
-use esp_hal::analog::adc::{AdcCalCurve, AdcConfig, AdcPin};
+use esp_hal::Blocking;
+use esp_hal::analog::adc::{Adc as Driver, AdcCalCurve, AdcConfig, AdcPin, RegisterAccess};
 use esp_hal::peripherals::{ADC1, GPIO0};
 use tactomo_firmware::{Adc, Sampler, TimedOut};
 
-use crate::analog::{ATTENUATION, AnalogUnit, millivolts, range};
+use crate::analog::{ATTENUATION, MAX_POLLS, millivolts, range};
 
 /// Electrodes of the board.
 pub const ELECTRODES: u8 = 16;
 
 /// ADC1 and its calibrated pin.
 pub struct OneInput<'d> {
-    adc: AnalogUnit<'d, ADC1<'d>>,
+    adc: Driver<'d, ADC1<'d>, Blocking>,
     pin: AdcPin<GPIO0<'d>, ADC1<'d>, AdcCalCurve<ADC1<'d>>>,
 }
 
@@ -20,7 +21,7 @@ impl<'d> OneInput<'d> {
     pub fn new(adc: ADC1<'d>, pin: GPIO0<'d>) -> Self {
         let mut config = AdcConfig::new();
         let pin = config.enable_pin_with_cal(pin, ATTENUATION);
-        Self { adc: AnalogUnit::new(adc, config), pin }
+        Self { adc: Driver::new(adc, config), pin }
     }
 
     /// What the readings mean.
@@ -32,6 +33,15 @@ impl<'d> OneInput<'d> {
 impl Sampler for OneInput<'_> {
     /// The multiplexer has brought the electrode to the pin.
     fn sample(&mut self, _electrode: u8) -> Result<u16, TimedOut> {
-        self.adc.convert(&mut self.pin)
+        // Takes back the mark of a conversion that came too late.
+        ADC1::reset();
+        (0..MAX_POLLS).find_map(|_| self.adc.read_oneshot(&mut self.pin).ok()).ok_or(TimedOut)
+    }
+
+    /// Sets the ADC up anew: the driver waits for ever for a conversion that it has begun.
+    fn restart(&mut self) {
+        // SAFETY: in place of the ones that this sampler owns, which go with its old value.
+        let (adc, pin) = unsafe { (ADC1::steal(), GPIO0::steal()) };
+        *self = Self::new(adc, pin);
     }
 }
