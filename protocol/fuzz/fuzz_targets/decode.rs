@@ -3,7 +3,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, CommandReceiver, MAX_COMMAND, MAX_WIRE, VERSION, encode_board, encode_hello, encode_request,
+    BoardMessage, BoardReceiver, CommandReceiver, MAX_COMMAND, MAX_WIRE, VERSION, encode_board, encode_hello,
+    encode_request,
 };
 
 fuzz_target!(|input: &[u8]| {
