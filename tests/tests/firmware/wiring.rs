@@ -10,7 +10,7 @@ const ESP32_MAIN: &str = include_str!("../../../firmware/boards/esp32/src/main.r
 const ESP32_LINE: &str = include_str!("../../../firmware/boards/esp32/src/line.rs");
 const ESP32_CONFIG: &str = include_str!("../../../firmware/boards/esp32/.cargo/config.toml");
 const ESP32C3_MAIN: &str = include_str!("../../../firmware/boards/esp32c3/src/main.rs");
-const ESP32C3_INPUT: &str = include_str!("../../../firmware/boards/esp32c3/src/input.rs");
+const ESP32C3_INPUT: &str = include_str!("../../../firmware/boards/espressif/src/one_input.rs");
 const CHIP: &str = include_str!("../../../firmware/boards/espressif/src/chip.rs");
 
 /// Cells of the page's table rows, without ends and quotes.
