@@ -63,6 +63,15 @@ pub enum CalibrateError {
         /// Those that agree.
         single: usize,
     },
+    /// Of every touch, some electrodes read less than the converter can tell.
+    #[error(
+        "in none of {touched} touched frames do all electrodes read more than the converter's floor: rub firmer, or lift the ground of the \
+         multiplexer (`ground_v` in the detector's file)"
+    )]
+    Light {
+        /// Frames that something touched in.
+        touched: usize,
+    },
     /// Too many electrodes are wrong.
     #[error("electrodes {faulty:?} are broken, shorted or contradict the others: mend their wires before calibrating")]
     Electrodes {
