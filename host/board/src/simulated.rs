@@ -201,7 +201,7 @@ fn firmware(
 ) -> Result<Step, SimulatedBoardError> {
     let figures = options.model.figures();
     let identity = identity(detector, options.model)?;
-    let sampler = SimulatedSampler::new(circuit, physics, figures, detector.adc, options.seed);
+    let sampler = SimulatedSampler::new(circuit, physics, figures, detector, options.seed);
     let serial = BoardEnd::new(line, circuit, figures);
     let chip = SimulatedChip::new(circuit);
     let pin = |line| MuxPin::new(circuit, line);
@@ -251,7 +251,7 @@ fn identity(detector: &Detector, model: BoardModel) -> Result<Identity<'static>,
         board: model.figures().name,
         electrodes: u8::try_from(electrodes).unwrap_or(u8::MAX),
         adc: adc(detector, model)?,
-        drive_mv: millivolts(detector, "drive_v", detector.drive_v)?,
+        drive_mv: millivolts(detector, "drive_v", detector.drive_v + detector.ground_v)?,
     })
 }
 

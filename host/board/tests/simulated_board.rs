@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use tactomo_board::frames::FrameFile;
 use tactomo_board::link::{Control, ControlError, Link, Playing};
+use tactomo_board::measured::{Volts, as_measured};
 use tactomo_board::record::{Header, Recorder};
 use tactomo_board::session::{RequestedSettings, Session, send};
 use tactomo_board::simulated::{BoardModel, Options, SimulatedBoard, SimulatedBoardError};
@@ -308,6 +309,36 @@ fn floors_and_ceilings_show_in_the_readings() {
     assert_eq!(ends(BoardModel::Esp32c3, 2.7), (2500, 2500, 2500, 2500));
     let head = |volts| frames_at(BoardModel::Esp32, volts, 3)[5].head;
     assert_eq!([head(3.3), head(2.0)].map(|head| head.status), [Status::SATURATED, Status::default()]);
+}
+
+#[test]
+fn above_a_lifted_ground_nothing_is_at_the_floor() {
+    let lifted = Detector { drive_v: 1.75, ground_v: 0.25, ..detector() };
+    for board in [BoardModel::Ideal, BoardModel::Esp32] {
+        let scene = Scene::new(SceneName::Rest, &lifted, Hand::relative(&lifted), 1);
+        let simulation = Simulation::new(&lifted, scene, &[], 1).unwrap();
+        let options = Options { seed: 4, model: board };
+        let board = SimulatedBoard::simulate(&lifted, simulation, options).unwrap();
+        let mut host = Host::new(board, RequestedSettings::default());
+        host.frames_more(20);
+        let hello = host.hello.clone().unwrap();
+        assert_eq!(hello.drive_mv, 2000);
+        let measured = as_measured(&lifted, &hello).unwrap();
+        assert_eq!((measured.drive_v, measured.ground_v), (1.75, 0.25));
+        let volts = Volts::of(&hello).above(measured.ground_v);
+        for frame in &host.frames {
+            let readings = volts.readings(frame).unwrap();
+            assert!(readings.all_say().is_empty());
+            // Noise of 5 mV, a gain of 1 % and the bow of a chip.
+            assert!(readings.volts().iter().all(|volts| volts.abs() < 0.04), "{readings:?}");
+        }
+        // On the ground of the converter all the same would be below the floor.
+        let contact = Contact::flat(0.01, 0.005, 0.003, 2e-5);
+        host.board.control(&Control::Press(vec![contact])).unwrap();
+        let largest_v = |host: &Host| volts.readings(host.frames.last().unwrap()).unwrap().largest_v();
+        host.exchange_until("a light press", |host| largest_v(host) > 0.03);
+        assert!(largest_v(&host) < 0.1, "{}", largest_v(&host));
+    }
 }
 
 #[test]

@@ -288,13 +288,19 @@ impl FollowLoop {
         }
     }
 
-    /// Gives the newest frame to the calibration: less the baseline, as the channels read it.
+    /// Gives the newest frame, or the rows that came, to the calibration: less the baseline, as the channels read them.
     fn rub(&mut self, frame: &Taken, found: &[FoundContact]) {
         let (Some(board), Some(desk)) = (&self.board, &mut self.calibration) else { return };
         if board.baseline.state().is_taking() {
             return;
         }
-        desk.take(&board.less_rest(&frame.newest), found);
+        let time_s = |time_us: u64| 1e-6 * time_us as f64;
+        for rows in &frame.rows {
+            desk.take(&board.less_rest(&rows.readings), time_s(rows.time_us), found);
+        }
+        if frame.rows.is_empty() {
+            desk.take(&board.less_rest(&frame.newest), time_s(frame.board_time_us), found);
+        }
         self.show_calibration();
     }
 

@@ -25,6 +25,8 @@ pub(super) struct Moment {
 /// What the physics give, and when they are asked.
 pub(super) struct Pads {
     physics: Box<dyn Physics>,
+    /// Voltage of a grounded electrode's switch (V), above which the physics tell theirs.
+    ground_v: f64,
     /// When the first scan began: the scene begins with it, however long the host took to start the board.
     first_ns: Option<u64>,
     motion: Motion,
@@ -50,17 +52,17 @@ struct Step {
 }
 
 impl Pads {
-    /// A scene that stands still for each scan, or one that `moves`.
-    pub(super) fn new(physics: Box<dyn Physics>, moves: bool) -> Self {
+    /// A scene that stands still for each scan, or one that `moves`, above such a ground (V).
+    pub(super) fn new(physics: Box<dyn Physics>, ground_v: f64, moves: bool) -> Self {
         let motion = if moves { Motion::Steps(None) } else { Motion::Scan(None) };
-        Self { physics, first_ns: None, motion }
+        Self { physics, ground_v, first_ns: None, motion }
     }
 
-    /// Voltage of an electrode's pad (V).
+    /// Voltage of an electrode's pad above the converter's zero (V).
     pub(super) fn at(&mut self, moment: Moment, electrode: u8) -> f64 {
         let first_ns = *self.first_ns.get_or_insert(moment.grounded_ns);
         let (ground, electrode) = (usize::from(moment.ground), usize::from(electrode));
-        match &mut self.motion {
+        let above_ground_v = match &mut self.motion {
             Motion::Scan(still) => still_at(still, &mut *self.physics, first_ns, moment).at(ground, electrode),
             Motion::Steps(step) => {
                 let since_ns = moment.now_ns.saturating_sub(first_ns);
@@ -69,7 +71,8 @@ impl Pads {
                 let [begin_v, end_v] = [begin, end].map(|readings| readings.at(ground, electrode));
                 begin_v + share * (end_v - begin_v)
             }
-        }
+        };
+        self.ground_v + above_ground_v
     }
 }
 
@@ -153,7 +156,7 @@ mod tests {
     #[test]
     fn a_moving_scene_is_asked_once_a_step_and_read_between() {
         let clock = Clock::default();
-        let mut pads = Pads::new(Box::new(clock.clone()), true);
+        let mut pads = Pads::new(Box::new(clock.clone()), 0.0, true);
         for now_us in (0..3000).step_by(100) {
             let read_s = pads.at(moment(now_us as u8 % 4, now_us, 5_000_000 + 1000 * now_us), 0);
             assert!((read_s - now_us as f64 * 1e-6).abs() < 1e-12, "time begins with the first scan");
@@ -164,7 +167,7 @@ mod tests {
     #[test]
     fn a_scene_that_stands_still_is_asked_once_a_scan_whatever_its_rows() {
         let clock = Clock::default();
-        let mut pads = Pads::new(Box::new(clock.clone()), false);
+        let mut pads = Pads::new(Box::new(clock.clone()), 0.0, false);
         let mut read = |grounds: &[u8], begin: u64| {
             let rows = grounds.iter().zip(begin..);
             rows.map(|(ground, row)| (1e6 * pads.at(moment(*ground, row, 1000 * row), 1)).round()).collect::<Vec<f64>>()

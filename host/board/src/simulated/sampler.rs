@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tactomo_firmware::{Row, Sampler, TimedOut};
-use tactomo_physics::detector::Adc;
+use tactomo_physics::detector::{Adc, Detector};
 use tactomo_physics::simulate::{Noise, Physics, code};
 use tactomo_protocol::MAX_ELECTRODES;
 
@@ -33,18 +33,18 @@ enum Front {
 }
 
 impl SimulatedSampler {
-    /// `adc` is for boards without figures of their own. The seed draws the chip's errors and the noise.
+    /// The detector's converter is for boards without figures of their own. The seed draws the chip's errors and the noise.
     pub(super) fn new(
         circuit: &Arc<Circuit>,
         physics: Box<dyn Physics>,
         figures: &'static Figures,
-        adc: Adc,
+        detector: &Detector,
         seed: u64,
     ) -> Self {
         let mut noise = Noise::new(seed);
         let front = match &figures.analog {
             Some(analog) => Front::Real(RealFront::new(analog, figures.wiring, &mut noise)),
-            None => Front::Ideal(adc),
+            None => Front::Ideal(detector.adc),
         };
         let runs = match &figures.analog {
             Some(analog) => analog.converters.iter().map(|converter| converter.electrodes as u8).collect(),
@@ -52,7 +52,7 @@ impl SimulatedSampler {
         };
         Self {
             circuit: Arc::clone(circuit),
-            pads: Pads::new(physics, figures.analog.is_some()),
+            pads: Pads::new(physics, detector.ground_v, figures.analog.is_some()),
             conversion_ns: figures.conversion_ns,
             noise,
             front,
@@ -189,7 +189,6 @@ mod tests {
     use super::*;
     use tactomo_firmware::Mux;
     use tactomo_firmware::mux::Transparent;
-    use tactomo_physics::detector::Detector;
     use tactomo_physics::readings::Readings;
     use tactomo_physics::scene::{Hand, Scene, SceneName};
     use tactomo_physics::simulate::Simulation;
@@ -240,7 +239,7 @@ mod tests {
         let circuit = Arc::new(Circuit::default());
         let mut noise = Noise::new(1);
         let mut front = RealFront::new(analog, Wiring::Transparent, &mut noise);
-        let mut pads = Pads::new(Box::new(Fixed(volts.clone())), true);
+        let mut pads = Pads::new(Box::new(Fixed(volts.clone())), 0.0, true);
         let mut mux = Transparent::new([0, 1, 2, 3].map(|bit| MuxPin::new(&circuit, MuxLine::Address(bit))));
         let mut errors = [0.0; 2];
         for scan in 0..SCANS {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
 use tactomo::board::identity;
-use tactomo::calibrate::{Frame, Rub, RubSettings, rub};
+use tactomo::calibrate::{Frame, Rounds, Rub, RubSettings, rub};
 use tactomo::date::today;
 use tactomo::detector::Detector;
 use tactomo::solve::Method;
@@ -104,7 +104,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
     if let Some(path) = &args.places {
         known.extend(places(path, is_recording)?);
     }
-    let mut frames = Vec::new();
+    let (mut frames, mut rounds) = (Vec::new(), Rounds::new(electrodes));
     let mut used = vec![false; known.len()];
     while let Some(frame) = reader.next_frame()? {
         let at = if is_recording { frame.time_s.unwrap_or(0.0) } else { (frames.len() + 1) as f64 };
@@ -118,7 +118,18 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
         if readings.volts().iter().any(|volts| !volts.is_finite()) {
             bail!("{}: a reading is not a finite number", reader.place());
         }
-        frames.push(Frame { readings, known_m: place });
+        let whole = rounds.add(&readings, frame.time_s.unwrap_or_default());
+        frames.extend(whole.map(|readings| Frame { readings, known_m: place }));
+    }
+    let left_out = rounds.waiting();
+    if left_out as usize > frames.len() {
+        bail!(
+            "{}: {left_out} frames hold some grounds only, and a rub needs all: record it with `--scan whole`",
+            file.display()
+        );
+    }
+    if left_out > 0 {
+        message!("{left_out} frames of some grounds are left out, which make no whole one");
     }
     if let Some(losses) = reader.losses() {
         message!("warning: {losses}");

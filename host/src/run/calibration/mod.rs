@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
+use tactomo_touch::calibrate::Rounds;
 use tactomo_touch::solve::FoundContact;
 
 use self::collected::Collected;
@@ -29,6 +30,8 @@ const PAUSE: Duration = Duration::from_secs(2);
 const WHOLE: f64 = 0.8;
 /// Share of the expected error before by which a fit has to better it for more to be worth it.
 const WORTH: f64 = 0.05;
+/// Frames of rows without a whole one between them from which on the board's plan has none: an adaptive plan of 32 electrodes has one in every 64.
+const NEVER_WHOLE: u64 = 500;
 /// Time between two pictures of how it is: a person sees that at once.
 const SHOWN_EVERY: Duration = Duration::from_millis(80);
 
@@ -98,6 +101,7 @@ pub(super) struct Desk {
     /// Identity of the board.
     board: Option<String>,
     collected: Collected,
+    rounds: Rounds,
     shown: Calibrating,
     cancelled: Arc<AtomicBool>,
     next_fit: Instant,
@@ -121,6 +125,7 @@ impl Desk {
         inbox: Arc<Inbox>,
     ) -> Self {
         let collected = Collected::new(&description);
+        let rounds = Rounds::new(description.electrodes.len());
         let shown = Calibrating {
             stage: Stage::Rubbing,
             coverage: collected.coverage.clone(),
@@ -139,6 +144,7 @@ impl Desk {
             description,
             board,
             collected,
+            rounds,
             shown,
             cancelled: Arc::default(),
             next_fit: Instant::now(),
@@ -165,12 +171,21 @@ impl Desk {
         Some(Arc::new(fit.rub.detector.clone()))
     }
 
-    /// Takes a frame: readings (V) less the baseline, as the channels read them, and the contacts found.
-    pub fn take(&mut self, readings: &Readings, contacts: &[FoundContact]) {
+    /// Takes a frame, or rows of one: readings (V) less the baseline, as the channels read them, their time (s), and the contacts found.
+    pub fn take(&mut self, readings: &Readings, time_s: f64, contacts: &[FoundContact]) {
         if self.shown.stage != Stage::Rubbing {
             return;
         }
-        self.collected.take(readings, contacts, &self.description);
+        let Some(readings) = self.rounds.add(readings, time_s) else {
+            let waiting = self.rounds.waiting();
+            if waiting >= NEVER_WHOLE {
+                self.shown.trouble = Some(format!(
+                    "{waiting} frames of some grounds only are left out: calibrate with whole frames (--scan whole)"
+                ));
+            }
+            return;
+        };
+        self.collected.take(&readings, contacts, &self.description);
         let is_new = self.collected.touched > self.fitted_frames;
         if is_new && !self.shown.fitting && self.collected.filled() >= ENOUGH && Instant::now() >= self.next_fit {
             self.fit(false);

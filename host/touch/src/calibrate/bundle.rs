@@ -11,7 +11,7 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use tactomo_physics::detector::{Detector, Parameter};
 use tactomo_physics::forward::{ForwardError, ForwardModel};
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::scene::Contact;
 
 use super::contact::{Moves, OF_PRESS, Press};
@@ -110,11 +110,16 @@ impl Bundle {
         self.detector_at(&self.steps)
     }
 
+    /// Whether a reading counts. A bound does not: contacts that are found for a press keep it, and then it says nothing.
+    fn counts(&self, readings: &Readings, index: usize) -> bool {
+        let n = readings.electrodes();
+        let (g, e) = (index / n, index % n);
+        g != e && readings.says(g, e) == Says::Voltage && readings.at(g, e) < self.full_v
+    }
+
     /// Readings that count.
     pub fn count(&self, press: &Press) -> usize {
-        let n = press.readings.electrodes();
-        let counts = |index: usize| index / n != index % n && press.readings.volts()[index] < self.full_v;
-        (0..n * n).filter(|index| counts(*index)).count()
+        (0..press.readings.volts().len()).filter(|index| self.counts(&press.readings, *index)).count()
     }
 
     /// Error of the model that is taken for each press, in shares of `Vcc - V`.
@@ -124,10 +129,10 @@ impl Bundle {
 
     /// One over the standard deviation of each reading (1/V), zero of those that do not count.
     fn weights(&self, press: &Press, model_error: f64) -> Vec<f64> {
-        let (n, drive_v) = (press.readings.electrodes(), self.nominal.drive_v);
-        let weight = |(index, volts): (usize, &f64)| match index / n == index % n || *volts >= self.full_v {
-            true => 0.0,
-            false => 1.0 / press.noise_v.hypot(model_error * (drive_v - volts).max(0.0)),
+        let drive_v = self.nominal.drive_v;
+        let weight = |(index, volts): (usize, &f64)| match self.counts(&press.readings, index) {
+            true => 1.0 / press.noise_v.hypot(model_error * (drive_v - volts).max(0.0)),
+            false => 0.0,
         };
         press.readings.volts().iter().enumerate().map(weight).collect()
     }

@@ -12,6 +12,7 @@ pub mod force;
 pub mod known;
 mod posterior;
 mod presses;
+mod rounds;
 mod rub;
 mod slopes;
 #[cfg(test)]
@@ -21,6 +22,7 @@ mod wires;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
+pub use self::rounds::Rounds;
 pub use self::rub::{Rub, RubSettings, rub};
 
 /// A frame of a rub, or a press of a table.
@@ -62,6 +64,15 @@ pub enum CalibrateError {
         touched: usize,
         /// Those that agree.
         single: usize,
+    },
+    /// Of every touch, some electrodes read less than the converter can tell.
+    #[error(
+        "in none of {touched} touched frames do all electrodes read more than the converter's floor: rub firmer, or lift the ground of the \
+         multiplexer (`ground_v` in the detector's file)"
+    )]
+    Light {
+        /// Frames that something touched in.
+        touched: usize,
     },
     /// Too many electrodes are wrong.
     #[error("electrodes {faulty:?} are broken, shorted or contradict the others: mend their wires before calibrating")]

@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 use tactomo_physics::detector::Detector;
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 
-use super::centred::{Agreement, Centred};
+use super::centred::{Agreement, Shown, tells_enough};
 use super::{CalibrateError, Frame};
 use crate::solve::{faulty_electrodes, rounding_v};
 
@@ -27,7 +27,7 @@ pub(super) const FEWEST: usize = 4;
 /// Share of the touched frames that has to be of one contact: below, agreement may be chance.
 const SINGLE: f64 = 0.3;
 
-/// Mean readings of frames that stood still.
+/// Mean readings of frames that stood still, and what each says: a bound in one of them is a bound in the mean.
 #[derive(Clone, Debug)]
 pub(super) struct Mean {
     pub readings: Readings,
@@ -53,7 +53,8 @@ impl Chosen {
     /// Finds them.
     pub fn among(frames: &[Frame], detector: &Detector) -> Result<Self, CalibrateError> {
         let noise_v = detector.adc.deviation_v();
-        let touches = |frame: &&Frame| frame.readings.largest_v() > TOUCHED * noise_v;
+        let touches =
+            |frame: &&Frame| frame.readings.largest_v() > TOUCHED * noise_v && tells_enough(&frame.readings);
         let touched: Vec<_> = frames.iter().filter(touches).collect();
         if touched.is_empty() {
             return Err(CalibrateError::NoPress { frames: frames.len() });
@@ -64,14 +65,10 @@ impl Chosen {
             return Err(CalibrateError::Electrodes { faulty: all.filter(|e| !kept.contains(e)).collect() });
         }
         let means = means(&touched, &kept, detector);
-        let on_share = on_share(&means, detector);
-        let centred: Vec<_> = means
-            .iter()
-            .enumerate()
-            .filter_map(|(index, mean)| {
-                Some((index, Centred::of(&mean.readings, detector.drive_v, on_share, mean.noise_v)?))
-            })
-            .collect();
+        let shown = |(index, mean): (usize, &Mean)| {
+            Some((index, Shown::of(&mean.readings, detector.drive_v, mean.noise_v)?))
+        };
+        let shown: Vec<_> = means.iter().enumerate().filter_map(shown).collect();
         let frames_of = |indices: &[usize]| indices.iter().map(|index| means[*index].frames).sum::<usize>();
         let all: Vec<usize> = (0..means.len()).collect();
         let counted = frames_of(&all);
@@ -79,7 +76,10 @@ impl Chosen {
             broken if broken.is_empty() => CalibrateError::NotSingle { touched: counted, single },
             faulty => CalibrateError::Electrodes { faulty },
         };
-        let agreement = Agreement::among(&centred).ok_or_else(|| not_single(0))?;
+        let agreement = Agreement::among(&shown).ok_or_else(|| match shown.is_empty() {
+            true => not_single(0),
+            false => CalibrateError::Light { touched: counted },
+        })?;
         let single = frames_of(&agreement.agree);
         if agreement.agree.len() < FEWEST || (single as f64) < SINGLE * counted as f64 {
             return Err(not_single(single));
@@ -118,7 +118,7 @@ fn feature(readings: &Readings, detector: &Detector) -> [f64; 3] {
     let n = readings.electrodes();
     let (mut sum, mut at) = (f64::MIN_POSITIVE, [0.0; 2]);
     for e in 0..n {
-        let column = (0..n).map(|g| readings.at(g, e).max(0.0)).sum::<f64>().powi(3);
+        let column = (0..n).map(|g| readings.touch_v(g, e).max(0.0)).sum::<f64>().powi(3);
         sum += column;
         at[0] += column * detector.electrodes[e].x_m;
         at[1] += column * detector.electrodes[e].y_m;
@@ -144,7 +144,7 @@ fn kept(touched: &[&Frame], detector: &Detector, noise_v: f64) -> Vec<usize> {
 fn ungrounded(touched: &[&Frame], detector: &Detector) -> Vec<usize> {
     let n = detector.electrodes.len();
     let rises = |frame: &Frame, g: usize| {
-        let risen = (0..n).filter(|e| *e != g && frame.readings.at(g, *e) > RISEN * detector.drive_v).count();
+        let risen = (0..n).filter(|e| *e != g && frame.readings.touch_v(g, *e) > RISEN * detector.drive_v).count();
         risen as f64 >= RISE_TOGETHER * (n - 1) as f64
     };
     (0..n).filter(|g| 2 * touched.iter().filter(|frame| rises(frame, *g)).count() > touched.len()).collect()
@@ -155,17 +155,13 @@ fn means(touched: &[&Frame], kept: &[usize], detector: &Detector) -> Vec<Mean> {
     let [noise_v, rounding_v] = [detector.adc.deviation_v(), rounding_v(&detector.adc)];
     let of_group = |group: &[&Frame]| {
         let count = group.len() as f64;
-        let readings = Readings::from_fn(kept.len(), |g, e| {
-            group.iter().map(|frame| frame.readings.at(kept[g], kept[e])).sum::<f64>() / count
-        });
+        let readings = mean_of(group).of(kept);
         let random_v2 = (noise_v * noise_v - rounding_v * rounding_v).max(0.0);
         let noise_v = (rounding_v * rounding_v + random_v2 / count).sqrt();
         Mean { readings, frames: group.len(), noise_v, known_m: group[0].known_m }
     };
     let is_same = |a: &Frame, b: &Frame| {
-        let square = a.readings.volts().iter().zip(b.readings.volts()).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        let root = (square / a.readings.volts().len() as f64).sqrt();
-        a.known_m == b.known_m && root < STILL * std::f64::consts::SQRT_2 * noise_v
+        a.known_m == b.known_m && root_off_v(&a.readings, &b.readings) < STILL * std::f64::consts::SQRT_2 * noise_v
     };
     let mut groups: Vec<&[&Frame]> = Vec::new();
     let mut from = 0;
@@ -181,12 +177,51 @@ fn means(touched: &[&Frame], kept: &[usize], detector: &Detector) -> Vec<Mean> {
     groups.iter().enumerate().filter(is_taken).map(|(_, group)| of_group(group)).collect()
 }
 
-/// Share of a load that is the on-resistance, from what a grounded pad reads, or where that is lost in the noise from the description.
-fn on_share(means: &[Mean], detector: &Detector) -> f64 {
-    let firm = means.iter().max_by(|a, b| a.readings.largest_v().total_cmp(&b.readings.largest_v()));
-    let of = |readings: &Readings| {
-        let n = readings.electrodes();
-        (0..n).map(|g| readings.at(g, g)).sum::<f64>() / n as f64 / detector.drive_v
+/// Mean readings (V). A bound stands for what is beyond it, so that the mean of bounds and of voltages is a bound.
+fn mean_of(group: &[&Frame]) -> Readings {
+    let n = group[0].readings.electrodes();
+    let mean_v = |g, e| group.iter().map(|frame| frame.readings.at(g, e)).sum::<f64>() / group.len() as f64;
+    let says = |g, e| {
+        let all = group.iter().map(|frame| frame.readings.says(g, e));
+        all.reduce(|a, b| match (a, b) {
+            (a, b) if a == b => a,
+            (Says::Voltage, bound) | (bound, Says::Voltage) => bound,
+            _ => Says::Nothing,
+        })
     };
-    firm.map_or(0.0, |mean| of(&mean.readings).clamp(0.0, 0.1))
+    Readings::from_fn(n, mean_v).saying(|g, e| says(g, e).unwrap_or_default())
+}
+
+/// Root of the mean square of what the readings of two frames differ by (V), of those that are voltages in either.
+fn root_off_v(a: &Readings, b: &Readings) -> f64 {
+    let n = a.electrodes();
+    let is_told = |index: &usize| [a, b].iter().any(|one| one.says(index / n, index % n) == Says::Voltage);
+    let (sum_v2, count) = (0..n * n).filter(is_told).fold((0.0, 0), |(sum_v2, count), index| {
+        (sum_v2 + (a.volts()[index] - b.volts()[index]).powi(2), count + 1)
+    });
+    (sum_v2 / f64::from(count.max(1))).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_in_one_frame_is_a_bound_in_the_mean() {
+        use Says::{AtLeast, AtMost, Nothing, Voltage};
+        let of = |says: [Says; 4], volts: [f64; 4]| Frame {
+            readings: Readings::from_fn(2, |g, e| volts[2 * g + e]).saying(|g, e| says[2 * g + e]),
+            known_m: None,
+        };
+        let frames = [
+            of([Voltage, AtMost, Voltage, AtLeast], [0.5, 0.25, 1.0, 3.0]),
+            of([Voltage, Voltage, AtLeast, AtMost], [0.75, 0.5, 3.0, 0.25]),
+        ];
+        let mean = mean_of(&frames.iter().collect::<Vec<_>>());
+        assert_eq!(mean.all_say(), [Voltage, AtMost, AtLeast, Nothing]);
+        assert_eq!(mean.volts()[..3], [0.625, 0.375, 2.0]);
+        // Two of a kind are not compared.
+        let [a, b] = [0.0, 1.0].map(|volts| of([Voltage, AtMost, AtMost, AtMost], [0.5 + volts, 0.25, 0.25, 0.25]));
+        assert_eq!(root_off_v(&a.readings, &b.readings), 1.0);
+    }
 }

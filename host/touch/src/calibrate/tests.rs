@@ -3,6 +3,7 @@
 use super::*;
 use crate::solve::{ContactSettings, Contacts, Problem, Solver};
 use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::{Range, Says};
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Measurement, drawn, finer_model};
 
@@ -37,6 +38,51 @@ impl Bench {
         let readings = Readings::from_fn(16, |g, e| read.at(g, e) - self.rest_v[16 * g + e]);
         Frame { readings, known_m: None }
     }
+}
+
+/// The converters of an ESP32, whose lowest codes read 142 and 128 mV: see `Volts` of the package `tactomo-board`, with its margin.
+fn esp32() -> Vec<Range> {
+    (0..16).map(|e| Range { floor_v: if e < 6 { 0.148 } else { 0.134 }, ceiling_v: 3.094 }).collect()
+}
+
+/// Light and firm presses of a rub, as a board reads them less the baseline, and as one with floors reads them, whose baseline is below these.
+fn both_boards(bench: &mut Bench, count: usize) -> Vec<(Contact, [Frame; 2])> {
+    let mut pressed = |_| {
+        let contact = bench.contacts(1)[0];
+        let contact = Contact { conductance_s: 1e-4 * 30f64.powf(bench.random.f64()), ..contact };
+        let whole = bench.frame(&[contact]);
+        let read = Readings::from_fn(16, |g, e| whole.readings.at(g, e) + bench.rest_v[16 * g + e]);
+        (contact, [whole, Frame { readings: read.within(&esp32()), known_m: None }])
+    };
+    (0..count).map(&mut pressed).collect()
+}
+
+#[test]
+fn what_is_below_a_floor_spoils_no_calibration() {
+    let mut bench = Bench::new(5);
+    let presses = both_boards(&mut bench, 80);
+    let bounds = |frame: &Frame| frame.readings.all_say().iter().filter(|says| **says != Says::Voltage).count();
+    let hidden = presses.iter().map(|(_, [_, floored])| bounds(floored)).sum::<usize>();
+    assert!(hidden > 80 * 256 / 10, "{hidden}");
+    let tried = both_boards(&mut bench, 24);
+    // What a channel reads at rest is in the baseline of one board, and in the other's calibration: each is tried by itself.
+    let [whole_m, floored_m] = [0, 1].map(|board| {
+        let of_board = |(contact, frames): &(Contact, [Frame; 2])| (*contact, frames[board].clone());
+        let frames: Vec<_> = presses.iter().map(|press| of_board(press).1).collect();
+        off_m(&rubbed(&frames).unwrap().detector, &tried.iter().map(of_board).collect::<Vec<_>>())
+    });
+    assert!(floored_m < 1.5 * whole_m && floored_m < 0.2e-3, "{whole_m} {floored_m}");
+}
+
+#[test]
+fn two_electrodes_that_are_below_the_floor_in_every_frame_are_told() {
+    let mut bench = Bench::new(5);
+    let hidden = |readings: Readings| {
+        readings.saying(|g, e| if g + e == 1 { Says::AtMost } else { Says::Voltage })
+    };
+    let frame = |(_, [whole, _]): (Contact, [Frame; 2])| Frame { readings: hidden(whole.readings), known_m: None };
+    let frames: Vec<_> = both_boards(&mut bench, 20).into_iter().map(frame).collect();
+    assert_eq!(rubbed(&frames).map(|found| found.single), Err(CalibrateError::Light { touched: 20 }));
 }
 
 fn rubbed(frames: &[Frame]) -> Result<Rub, CalibrateError> {

@@ -137,10 +137,10 @@ fn contradicting(readings: &Readings, mut sound: Vec<usize>, drive_v: f64, noise
 
 /// Logarithms of two electrodes' ratios, and how much they count.
 #[derive(Clone, Copy, Default)]
-struct Pair {
-    log: f64,
+pub(crate) struct Pair {
+    pub log: f64,
     /// One over the square of its deviation; zero where a reading at the drive makes it say nothing.
-    weight: f64,
+    pub weight: f64,
 }
 
 /// Mean square of what the logarithms are off, in what noise makes of them.
@@ -184,7 +184,7 @@ fn pair(readings: &Readings, g: usize, e: usize, drive_v: f64, noise_v: f64) -> 
 
 /// Logarithm of each electrode's load but for a common constant: where all pairs count, means are the least squares; else some sweeps of
 /// means over those that do are near enough.
-fn loads(pairs: &[Pair], n: usize) -> Vec<f64> {
+pub(crate) fn loads(pairs: &[Pair], n: usize) -> Vec<f64> {
     let row = |i: usize| &pairs[i * n..(i + 1) * n];
     let mut loads: Vec<_> = (0..n).map(|i| -row(i).iter().map(|pair| pair.log).sum::<f64>() / n as f64).collect();
     // Those on the diagonal never count.

@@ -41,6 +41,7 @@ pub(crate) use self::correct::Corrector;
 use self::follow::Direct;
 pub use self::follow::{Followed, Follower, Lead, Parts, Searcher};
 pub use self::guard::{Guard, without};
+pub(crate) use self::health::{Pair as PairOfLoads, loads};
 pub use self::health::{ElectrodeFault, faulty_electrodes};
 pub use self::kernel::{Kernel, KernelSolver, Press, Presses, PressesError, Strength, TeachError};
 pub use self::lambda::Lambda;
