@@ -53,8 +53,7 @@ impl Chosen {
     /// Finds them.
     pub fn among(frames: &[Frame], detector: &Detector) -> Result<Self, CalibrateError> {
         let noise_v = detector.adc.deviation_v();
-        let touches =
-            |frame: &&Frame| frame.readings.largest_v() > TOUCHED * noise_v && tells_enough(&frame.readings);
+        let touches = |frame: &&Frame| frame.readings.largest_v() > TOUCHED * noise_v && tells_enough(&frame.readings);
         let touched: Vec<_> = frames.iter().filter(touches).collect();
         if touched.is_empty() {
             return Err(CalibrateError::NoPress { frames: frames.len() });
@@ -65,9 +64,8 @@ impl Chosen {
             return Err(CalibrateError::Electrodes { faulty: all.filter(|e| !kept.contains(e)).collect() });
         }
         let means = means(&touched, &kept, detector);
-        let shown = |(index, mean): (usize, &Mean)| {
-            Some((index, Shown::of(&mean.readings, detector.drive_v, mean.noise_v)?))
-        };
+        let shown =
+            |(index, mean): (usize, &Mean)| Some((index, Shown::of(&mean.readings, detector.drive_v, mean.noise_v)?));
         let shown: Vec<_> = means.iter().enumerate().filter_map(shown).collect();
         let frames_of = |indices: &[usize]| indices.iter().map(|index| means[*index].frames).sum::<usize>();
         let all: Vec<usize> = (0..means.len()).collect();
@@ -196,9 +194,9 @@ fn mean_of(group: &[&Frame]) -> Readings {
 fn root_off_v(a: &Readings, b: &Readings) -> f64 {
     let n = a.electrodes();
     let is_told = |index: &usize| [a, b].iter().any(|one| one.says(index / n, index % n) == Says::Voltage);
-    let (sum_v2, count) = (0..n * n).filter(is_told).fold((0.0, 0), |(sum_v2, count), index| {
-        (sum_v2 + (a.volts()[index] - b.volts()[index]).powi(2), count + 1)
-    });
+    let (sum_v2, count) = (0..n * n)
+        .filter(is_told)
+        .fold((0.0, 0), |(sum_v2, count), index| (sum_v2 + (a.volts()[index] - b.volts()[index]).powi(2), count + 1));
     (sum_v2 / f64::from(count.max(1))).sqrt()
 }
 

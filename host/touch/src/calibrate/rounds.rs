@@ -69,7 +69,10 @@ mod tests {
             (0..9).map(|step| rounds.add(&row([0, 1, 0, 2][step % 4], step as f64), 1e-3 * step as f64)).collect();
         let whole: Vec<_> = frames.iter().flatten().map(|frame| [0, 1, 2].map(|g| frame.at(g, 0))).collect();
         assert_eq!(whole, [[2.0, 1.0, 3.0], [6.0, 5.0, 7.0]]);
-        assert_eq!(frames[3].as_ref().map(|frame| [frame.says(1, 1), frame.says(1, 2)]), Some([Says::AtMost, Says::Voltage]));
+        assert_eq!(
+            frames[3].as_ref().map(|frame| [frame.says(1, 1), frame.says(1, 2)]),
+            Some([Says::AtMost, Says::Voltage])
+        );
         assert_eq!(rounds.waiting(), 1);
     }
 

@@ -77,9 +77,7 @@ fn what_is_below_a_floor_spoils_no_calibration() {
 #[test]
 fn two_electrodes_that_are_below_the_floor_in_every_frame_are_told() {
     let mut bench = Bench::new(5);
-    let hidden = |readings: Readings| {
-        readings.saying(|g, e| if g + e == 1 { Says::AtMost } else { Says::Voltage })
-    };
+    let hidden = |readings: Readings| readings.saying(|g, e| if g + e == 1 { Says::AtMost } else { Says::Voltage });
     let frame = |(_, [whole, _]): (Contact, [Frame; 2])| Frame { readings: hidden(whole.readings), known_m: None };
     let frames: Vec<_> = both_boards(&mut bench, 20).into_iter().map(frame).collect();
     assert_eq!(rubbed(&frames).map(|found| found.single), Err(CalibrateError::Light { touched: 20 }));
