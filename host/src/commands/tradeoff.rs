@@ -17,7 +17,9 @@ const DETECTORS: [&str; 4] = ["square-60", "strip-13x60", "display-140x70", "fin
 const DRAWN: [usize; 2] = [2, 4];
 
 /// Scenes of each number of contacts of --scan: in a quick look, and else.
-const SCENES: [usize; 2] = [2, 12];
+const SCENES: [usize; 2] = [2, 8];
+/// Numbers of contacts of --scan.
+const CONTACTS: [usize; 3] = [1, 2, 3];
 
 /// Charts time per frame against error for every solver, on scenes from no touch to a hand.
 ///
@@ -80,8 +82,8 @@ fn scan(args: &Args) -> anyhow::Result<()> {
     let picture = NewFile::optional(picture.as_ref(), study.overwrite)?;
     let own = if study.quick { SCENES[0] } else { SCENES[1] };
     let [scenes, _] = study.places_and_frames([own, 0]);
-    let detector = choice::detectors(detector, &DETECTORS[..1])?.swap_remove(0);
-    let settings = Settings { detector, scenes, seed: study.seed };
+    let detector = choice::detectors(detector, &DETECTORS[..1])?.into_iter().next().unwrap_or_default();
+    let settings = Settings { detector, contacts: CONTACTS.to_vec(), scenes, seed: study.seed };
     let report = scanning::run(&settings, &output::command_line(), &mut |step| message!("{step}"))?;
     page.map(|page| page.write(scanning::page(&report))).transpose()?;
     picture.map(|picture| picture.write(scanning::picture(&report))).transpose()?;

@@ -28,8 +28,7 @@ pub use self::grounds::Choice;
 pub use self::page::{page, picture};
 pub use self::table::table;
 
-/// Numbers of contacts, and their speeds (m/s): none, a finger that feels its way, and one that wipes.
-const COUNTS: [usize; 3] = [1, 2, 3];
+/// Speeds of contacts (m/s): none, a finger that feels its way, and one that wipes.
 const SPEEDS_M_PER_S: [f64; 3] = [0.0, 0.05, 0.5];
 /// Rows of a frame that is not whole.
 const ROWS: [usize; 5] = [1, 2, 3, 4, 8];
@@ -44,6 +43,8 @@ const BOUND_PLACES: usize = 24;
 pub struct Settings {
     /// The detector, which solvers know exactly.
     pub detector: Detector,
+    /// Numbers of contacts.
+    pub contacts: Vec<usize>,
     /// Scenes of each number of contacts, each at every speed under every plan.
     pub scenes: usize,
     /// Where places and noise start.
@@ -63,7 +64,9 @@ pub struct Report {
     pub detector: String,
     /// Model that was inverted.
     pub model: String,
-    /// Scenes of each number of contacts.
+    /// Numbers of contacts.
+    pub contacts: Vec<usize>,
+    /// Scenes of each of them.
     pub scenes: usize,
     /// What a contact missed or invented counts (m).
     pub reach_m: f64,
@@ -92,6 +95,8 @@ pub struct Point {
     pub middle_m: f64,
     /// Share of answers with as many contacts as there are, all within reach.
     pub count_right: f64,
+    /// Mean error of these alone, against where the contacts are when the frame has arrived (m).
+    pub right_m: Option<f64>,
     /// Cramer-Rao bound of the rows of a frame alone, radii not known (m), at most `reach_m`: root mean square, mean of frames.
     pub bound_rows_m: f64,
     /// The same of all rows that have arrived; of contacts that stand.
@@ -105,12 +110,12 @@ pub struct Point {
 pub fn run(settings: &Settings, command: &str, progress: &mut dyn FnMut(&str)) -> Result<Report, StudyError> {
     let experiment = Experiment::new(&settings.detector)?;
     let mut points = Vec::new();
-    for contacts in COUNTS {
-        progress(&format!("{contacts} of {} contacts: voltages on their ways", COUNTS.len()));
+    for contacts in settings.contacts.iter().copied() {
+        progress(&format!("{contacts} contacts: voltages on their ways"));
         let scenes = scenes(settings, &experiment, contacts)?;
         let mut bench = Bench::new(&experiment)?;
         for speed_m_per_s in SPEEDS_M_PER_S {
-            progress(&format!("{contacts} of {} contacts: {speed_m_per_s} m/s", COUNTS.len()));
+            progress(&format!("{contacts} contacts: {speed_m_per_s} m/s"));
             for plan in plans(settings.detector.electrodes.len()) {
                 points.push(point(&mut bench, &experiment, &scenes, plan, speed_m_per_s)?);
             }
@@ -122,6 +127,7 @@ pub fn run(settings: &Settings, command: &str, progress: &mut dyn FnMut(&str)) -
         seed: settings.seed,
         detector: settings.detector.name.clone(),
         model: experiment.model.clone(),
+        contacts: settings.contacts.clone(),
         scenes: settings.scenes,
         reach_m: experiment.reach_m(),
         points,
@@ -209,6 +215,7 @@ fn point(
         arrived_m: mean(sums.arrived_m),
         middle_m: mean(sums.middle_m),
         count_right: mean(sums.right as f64),
+        right_m: (sums.right > 0).then(|| sums.right_m / sums.right as f64),
         bound_rows_m: mean(sums.bound_rows_m),
         bound_all_m: is_still.then(|| mean(sums.bound_all_m)),
     })
@@ -221,6 +228,7 @@ struct Sums {
     arrived_m: f64,
     middle_m: f64,
     right: usize,
+    right_m: f64,
     bound_rows_m: f64,
     bound_all_m: f64,
 }
@@ -231,7 +239,10 @@ impl Sums {
         self.answers += 1;
         self.arrived_m += arrived.ospa_m(reach_m);
         self.middle_m += middle.ospa_m(reach_m);
-        self.right += usize::from(middle.missed.is_empty() && middle.invented.is_empty());
+        if middle.missed.is_empty() && middle.invented.is_empty() {
+            self.right += 1;
+            self.right_m += arrived.ospa_m(reach_m);
+        }
     }
 }
 
@@ -249,26 +260,23 @@ mod tests {
 
     fn report(seed: u64) -> Report {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
-        run(&Settings { detector, scenes: 1, seed }, "tactomo <tradeoff> --scan", &mut |_| {}).unwrap()
+        let settings = Settings { detector, contacts: vec![1], scenes: 1, seed };
+        run(&settings, "tactomo <tradeoff> --scan", &mut |_| {}).unwrap()
     }
 
-    fn at(report: &Report, contacts: usize, speed_m_per_s: f64, choice: Choice, rows: usize) -> &Point {
-        let is = |point: &&Point| {
-            (point.contacts, point.choice, point.rows) == (contacts, choice, rows)
-                && point.speed_m_per_s == speed_m_per_s
-        };
-        report.points.iter().find(is).unwrap()
+    fn at(report: &Report, speed_m_per_s: f64, choice: Choice, rows: usize) -> &Point {
+        report.of(1, speed_m_per_s).find(|point| (point.choice, point.rows) == (choice, rows)).unwrap()
     }
 
     #[test]
     fn rows_are_nearer_to_a_contact_that_runs_and_every_plan_is_told() {
         let report = report(2);
-        assert_eq!(report.points.len(), 3 * 3 * 15);
-        let whole = at(&report, 1, 0.5, Choice::Whole, 16);
-        let rows = at(&report, 1, 0.5, Choice::Adaptive, 2);
+        assert_eq!(report.points.len(), 3 * 15);
+        let whole = at(&report, 0.5, Choice::Whole, 16);
+        let rows = at(&report, 0.5, Choice::Adaptive, 2);
         assert!(rows.arrived_m < 0.5 * whole.arrived_m, "{rows:?} {whole:?}");
         assert!(whole.middle_m < whole.arrived_m && whole.bound_rows_m < rows.bound_rows_m, "{rows:?} {whole:?}");
-        let still = at(&report, 1, 0.0, Choice::Adaptive, 2);
+        let still = at(&report, 0.0, Choice::Adaptive, 2);
         assert_eq!(still.arrived_m, still.middle_m);
         assert!(still.arrived_m < 2e-4 && still.bound_all_m.unwrap() < 0.5 * still.bound_rows_m, "{still:?}");
         let (page, table) = (page(&report), table(&report));
@@ -276,9 +284,9 @@ mod tests {
             assert!(page.contains(part) && table.contains(part), "{part}");
         }
         assert!(page.contains("tactomo &lt;tradeoff&gt; --scan") && !page.contains("NaN"));
-        assert_eq!(picture(&report).matches("<svg").count(), 9);
+        assert_eq!(picture(&report).matches("<svg").count(), 3);
         let json = serde_json::to_value(&report).unwrap();
-        assert_eq!(json["points"][1]["choice"], "adaptive");
+        assert_eq!((&json["points"][1]["choice"], &json["points"][1]["rows"]), (&"adaptive".into(), &1.into()));
         assert!(json["points"][0]["bound_all_m"].is_f64());
     }
 }

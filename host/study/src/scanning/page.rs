@@ -1,13 +1,15 @@
 //! The report as a page.
 
 use super::table::title;
-use super::{COUNTS, Choice, Point, Report, SPEEDS_M_PER_S};
+use super::{Choice, Point, Report, SPEEDS_M_PER_S};
 use crate::page::{Axis, Chart, Mark, Series, Unit, folded, html, machine, table};
 
 /// Errors below this show there (m).
 const FLOOR_M: f64 = 1e-6;
 /// Width and height of a chart (px).
 const SIZE: [f64; 2] = [430.0, 300.0];
+/// Rows of the frames whose marks are large: those of live's adaptive plans.
+const MAIN_ROWS: usize = 2;
 const CHOICES: [Choice; 4] = [Choice::Whole, Choice::Adaptive, Choice::InTurn, Choice::Corners];
 
 /// What errors are counted from.
@@ -54,20 +56,21 @@ fn legend() -> String {
     let item = |choice: Choice| {
         let what = match choice {
             Choice::Whole => "whole frames",
-            Choice::Adaptive => "1, 2, 3, 4 or 8 rows, of the grounds that tell most",
-            Choice::InTurn => "of all grounds in turn",
-            Choice::Corners => "of the four at the corners",
+            Choice::Adaptive => "8, 4, 3, 2 (large) or 1 row a frame, of the adaptive grounds: those that tell most",
+            Choice::InTurn => "the same of all grounds in turn",
+            Choice::Corners => "of the four corners",
         };
         format!("<li class=\"{}\">{what}</li>", class(choice))
     };
-    let bound = "<li class=\"bound\">no unbiased method is better (Cramér-Rao): of the rows that tell most</li>";
+    let bound = "<li class=\"bound\">Cramér-Rao bound of the rows that tell most: no unbiased method is better</li>";
     format!("<ul class=\"legend\">{}{bound}</ul>", CHOICES.map(item).concat())
 }
 
 /// A row of charts for each speed, a chart for each number of contacts. Charts of a row have the same axes.
 fn rows_of_charts(report: &Report, against: Against) -> String {
     let of = |speed_m_per_s: f64| {
-        let charts = COUNTS.map(|contacts| series(report, contacts, speed_m_per_s, against));
+        let charts = report.contacts.iter().map(|contacts| series(report, *contacts, speed_m_per_s, against));
+        let charts: Vec<Vec<Series>> = charts.collect();
         let marks = || charts.iter().flatten().flat_map(|series| &series.marks);
         let x =
             Axis::over("frames a second", Unit::Plain, report.points.iter().map(|point| point.frames_per_s), 1.0, 1.0);
@@ -79,10 +82,10 @@ fn rows_of_charts(report: &Report, against: Against) -> String {
             y: y.clone(),
             series: series.clone(),
             has_front: false,
-            guide: Some((1e3, "")),
+            guide: None,
             size: SIZE,
         };
-        let charts: String = COUNTS.into_iter().zip(&charts).map(|of| chart(of).svg() + "\n").collect();
+        let charts: String = report.contacts.iter().copied().zip(&charts).map(|of| chart(of).svg() + "\n").collect();
         format!("<div class=\"charts\">{charts}</div>")
     };
     let speeds = SPEEDS_M_PER_S.into_iter().filter(|speed| against == Against::Arrived || *speed > 0.0);
@@ -102,10 +105,11 @@ fn series(report: &Report, contacts: usize, speed_m_per_s: f64, against: Against
     let mark = |point: &Point, y: f64| Mark { x: point.frames_per_s, y, tooltip: tooltip(point) };
     let error_m = |point: &Point| if against == Against::Arrived { point.arrived_m } else { point.middle_m };
     let of = |choice: Choice| Series {
-        name: choice.name().to_owned(),
+        // The legend names the others: labels would be in each other's way.
+        name: if choice == Choice::Whole { choice.name().to_owned() } else { String::new() },
         class: class(choice),
         marks: points(choice).map(|point| mark(point, error_m(point))).collect(),
-        main: 0,
+        main: points(choice).position(|point| point.rows == MAIN_ROWS).unwrap_or(0),
         is_joined: true,
     };
     let bounded = points(Choice::Adaptive).chain(points(Choice::Whole));
@@ -145,6 +149,7 @@ fn figures(report: &Report) -> String {
         "arrived, mm",
         "middle, mm",
         "count right",
+        "arrived of these, mm",
         "bound of rows, mm",
         "of all rows, mm",
     ];
@@ -159,6 +164,7 @@ fn figures(report: &Report) -> String {
             mm(point.arrived_m),
             mm(point.middle_m),
             format!("{:.0} %", 100.0 * point.count_right),
+            point.right_m.map_or_else(|| "-".to_owned(), mm),
             mm(point.bound_rows_m),
             point.bound_all_m.map_or_else(|| "-".to_owned(), mm),
         ]
@@ -170,7 +176,7 @@ fn footer(report: &Report) -> String {
     let text = format!(
         "{} scenes of each number of contacts, on {}, which the solver of contacts knows exactly ({} model); seed {}. All contacts touch at once, and stand or go \
          round together. Readings come from a finer model than the one that is inverted, asked every half millimetre of the way and interpolated by cubics, at the time of each row, with the \
-         converter's noise and steps, less a baseline. A row takes 148 µs, the wire carries 92160 bytes a second, a whole frame has 380 of them; a frame is read while the one before is sent, and the solver's own time does not count. \
+         converter's noise and steps, less a baseline. A row takes 148 µs, the wire carries 92160 bytes a second, a whole frame has 380 of them; a frame is read while the one before is sent, and the solver's own time does not count, but a search is made at most every 4 ms. \
          Grounds that tell most are chosen as in live, at most every 40 ms, for which the board stops for 1.5 ms; every fourth row is one of all in turn. Contacts that stand: the last answer within 50 ms of the touch; that move: all answers \
          from 50 to 120 ms. Error: mean distance of contacts found from those that are there, where one missed or invented counts {:.0} mm (OSPA of order 1). The bound is a root mean square of errors; their mean may be a tenth to a fifth below it.",
         report.scenes,

@@ -1,6 +1,6 @@
 //! The report as a table.
 
-use super::{COUNTS, Point, Report, SPEEDS_M_PER_S};
+use super::{Point, Report, SPEEDS_M_PER_S};
 
 /// Lines for a terminal: a plan each.
 pub fn table(report: &Report) -> String {
@@ -11,11 +11,11 @@ pub fn table(report: &Report) -> String {
         report.scenes,
         report.reach_m * 1e3
     )];
-    for contacts in COUNTS {
+    for contacts in report.contacts.iter().copied() {
         for speed_m_per_s in SPEEDS_M_PER_S {
             lines.push(format!("\n{}", title(contacts, speed_m_per_s)));
             lines.push(format!(
-                "{:<9} {:>5} {:>9} {:>7} {:>11} {:>11} {:>8} {:>11} {:>11}",
+                "{:<9} {:>5} {:>9} {:>7} {:>11} {:>11} {:>8} {:>9} {:>11} {:>11}",
                 "grounds",
                 "rows",
                 "frames/s",
@@ -23,6 +23,7 @@ pub fn table(report: &Report) -> String {
                 "arrived mm",
                 "middle mm",
                 "count %",
+                "right mm",
                 "rows >= mm",
                 "all >= mm"
             ));
@@ -31,7 +32,7 @@ pub fn table(report: &Report) -> String {
     }
     lines.push(
         "\nage: from the middle of a frame's rows to its arrival; arrived, middle: mean error against where contacts are at either; count: answers with \
-         none missed or invented;\nrows, all: Cramer-Rao bound of a frame's rows, and of all rows since the touch, radii not known"
+         none missed or invented, right: arrived of these alone;\nrows, all: Cramer-Rao bound of a frame's rows, and of all rows since the touch, radii not known"
             .to_owned(),
     );
     lines.join("\n")
@@ -57,7 +58,7 @@ impl Report {
 fn line(point: &Point) -> String {
     let mm = |metres: f64| format!("{:.3}", 1e3 * metres);
     format!(
-        "{:<9} {:>5} {:>9.0} {:>7.2} {:>11} {:>11} {:>8.0} {:>11} {:>11}",
+        "{:<9} {:>5} {:>9.0} {:>7.2} {:>11} {:>11} {:>8.0} {:>9} {:>11} {:>11}",
         point.choice.name(),
         point.rows,
         point.frames_per_s,
@@ -65,6 +66,7 @@ fn line(point: &Point) -> String {
         mm(point.arrived_m),
         mm(point.middle_m),
         100.0 * point.count_right,
+        point.right_m.map_or_else(|| "-".to_owned(), mm),
         mm(point.bound_rows_m),
         point.bound_all_m.map_or_else(|| "-".to_owned(), mm)
     )

@@ -4,7 +4,7 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::rest::{Rest, RestSum};
 use tactomo_physics::simulate::{Noise, code};
-use tactomo_touch::solve::{FoundContact, Latest, Method, Parts, Solution, SolveError};
+use tactomo_touch::solve::{Followed, FoundContact, Latest, Method, Parts, Solution, SolveError};
 
 use super::budget::{FrameTimes, frame};
 use super::grounds::{Choice, Grounds};
@@ -14,6 +14,8 @@ use crate::variant::Variation;
 
 /// Time in which a board scans nothing while it takes over another plan (s): a command on the wire, and its answer.
 const TAKEN_OVER_S: f64 = 1.5e-3;
+/// From one search to the next, at least (s): about what a search for one contact takes, which live makes beside.
+const SEARCH_S: f64 = 4e-3;
 /// Frames of the baseline, as in live.
 const REST_FRAMES: usize = 32;
 
@@ -41,6 +43,8 @@ pub(super) struct Answer {
 pub(super) struct Bench<'a> {
     detector: &'a Detector,
     parts: Parts,
+    /// Time since the last search (s).
+    since_search_s: f64,
 }
 
 /// A converter with its noise, less what it reads at rest.
@@ -57,7 +61,7 @@ impl<'a> Bench<'a> {
     /// [`StudyError`] if it cannot be made for the model.
     pub fn new(experiment: &'a Experiment) -> Result<Self, StudyError> {
         let solver = Variation::default_of(Method::Contacts).build(&experiment.problem)?;
-        Ok(Self { detector: &experiment.detector, parts: solver.split() })
+        Ok(Self { detector: &experiment.detector, parts: solver.split(), since_search_s: f64::INFINITY })
     }
 
     /// Answers to the frames that arrive within `until_s` (s) of contacts that touch at 0 s and go at a speed (m/s) from then on.
@@ -77,6 +81,7 @@ impl<'a> Bench<'a> {
         let mut converter = Converter::new(self.detector, seed);
         let mut latest = Latest::new(electrodes);
         self.parts.follower.reset();
+        self.since_search_s = f64::INFINITY;
         let follower = &self.parts.follower;
         let telling = |count: usize| follower.telling_grounds(count).unwrap_or_default();
         let mut grounds = Grounds::new(plan.choice, plan.rows, self.detector, telling);
@@ -86,6 +91,7 @@ impl<'a> Bench<'a> {
             let way_m = |row: usize| speed_m_per_s * (start_s + (row as f64 + 0.5) * times.row_s);
             let readings = converter.frame(path, &rows, way_m);
             latest.add(&readings, elapsed_s, None);
+            self.since_search_s += elapsed_s;
             let solution = match plan.choice {
                 Choice::Whole => self.whole(&readings),
                 _ => self.rows(&readings, &latest.readings(f64::MAX, None), elapsed_s),
@@ -105,17 +111,21 @@ impl<'a> Bench<'a> {
     /// What a whole frame says.
     fn whole(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
         let followed = self.parts.follower.follow(readings)?;
-        if followed.search { self.searched(readings) } else { Ok(followed.solution) }
+        self.thorough(followed, readings)
     }
 
     /// What rows say.
     fn rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
         let followed = self.parts.follower.follow_rows(rows, latest, elapsed_s)?;
-        if followed.search { self.searched(latest) } else { Ok(followed.solution) }
+        self.thorough(followed, latest)
     }
 
-    /// What a search says, at once.
-    fn searched(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
+    /// What a search says, at once, if one is worth it and the last one is over.
+    fn thorough(&mut self, followed: Followed, readings: &Readings) -> Result<Solution, SolveError> {
+        if !followed.search || self.since_search_s < SEARCH_S {
+            return Ok(followed.solution);
+        }
+        self.since_search_s = 0.0;
         let lead = self.parts.follower.lead();
         let lead = match &mut self.parts.searcher {
             Some(searcher) => searcher.search(lead, readings, &mut |_| {})?,
