@@ -17,7 +17,7 @@ const DETECTORS: [&str; 4] = ["square-60", "strip-13x60", "display-140x70", "fin
 const DRAWN: [usize; 2] = [2, 4];
 
 /// Scenes of each number of contacts of --scan: in a quick look, and else.
-const SCENES: [usize; 2] = [2, 8];
+const SCENES: [usize; 2] = [1, 6];
 /// Numbers of contacts of --scan.
 const CONTACTS: [usize; 3] = [1, 2, 3];
 
