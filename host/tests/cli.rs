@@ -65,6 +65,7 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["live", "--time-factor", "10"], "--simulate"),
         (&["live", "--simulate", "--time-factor", "0"], "above 0"),
         (&["study", "contacts", "--scenes", "0"], "--scenes"),
+        (&["tradeoff", "--scan", "--solver", "auto"], "--solver"),
         (&["calibrate", "force", "some.csv", "--out", "cal.toml"], "--newtons <N,N,...>|--forces <FILE>"),
         (&["dance"], "dance"),
     ] {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use tactomo::study::scanning::{self, Settings};
 use tactomo::study::tradeoff::{self, Plan};
 
 use super::choice::{self, Chosen};
@@ -15,6 +16,11 @@ const DETECTORS: [&str; 4] = ["square-60", "strip-13x60", "display-140x70", "fin
 /// Detectors drawn from the tolerances of each: in a quick look, and else.
 const DRAWN: [usize; 2] = [2, 4];
 
+/// Scenes of each number of contacts of --scan: in a quick look, and else.
+const SCENES: [usize; 2] = [1, 6];
+/// Numbers of contacts of --scan.
+const CONTACTS: [usize; 3] = [1, 2, 3];
+
 /// Charts time per frame against error for every solver, on scenes from no touch to a hand.
 ///
 /// Readings are simulated on a finer model than the ones inverted, with the converter's noise
@@ -24,12 +30,16 @@ const DRAWN: [usize; 2] = [2, 4];
 /// Examples:
 ///   tactomo tradeoff --quick --out tradeoff.html
 ///   tactomo tradeoff --detector square-60 --detector my.toml --json
+///   tactomo tradeoff --scan --out scan.html
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
     /// Detector: name of a preset, or a TOML file; give it again for more [default: four presets, with --quick square-60]
     #[arg(long, value_name = "NAME|FILE", value_parser = choice::detector)]
     detector: Vec<Chosen>,
+    /// Charts frames a second against error instead, for the rows that an ESP32 can scan and send: whole frames, or some grounds
+    #[arg(long, conflicts_with_all = ["solver", "frames", "as_built", "calibrate"])]
+    scan: bool,
     #[command(flatten)]
     study: StudyArgs,
     /// Writes a page with the first detector's charts only, for a document
@@ -39,7 +49,10 @@ pub struct Args {
 
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let Args { detector, study, picture } = args;
+    if args.scan {
+        return scan(args);
+    }
+    let Args { detector, study, picture, .. } = args;
     let page = NewFile::optional(study.out.as_ref(), study.overwrite)?;
     let picture = NewFile::optional(picture.as_ref(), study.overwrite)?;
     let [places, frames] = study.places_and_frames(if study.quick { [2, 3] } else { [6, 5] });
@@ -59,4 +72,20 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     page.map(|page| page.write(tradeoff::page(&report))).transpose()?;
     picture.map(|picture| picture.write(tradeoff::picture(&report))).transpose()?;
     Ok(output::print(&if study.json { serde_json::to_string(&report)? } else { tradeoff::table(&report) })?)
+}
+
+/// Runs the study of rows.
+fn scan(args: &Args) -> anyhow::Result<()> {
+    let Args { detector, study, picture, .. } = args;
+    anyhow::ensure!(detector.len() <= 1, "--scan is of one detector: give --detector once");
+    let page = NewFile::optional(study.out.as_ref(), study.overwrite)?;
+    let picture = NewFile::optional(picture.as_ref(), study.overwrite)?;
+    let own = if study.quick { SCENES[0] } else { SCENES[1] };
+    let [scenes, _] = study.places_and_frames([own, 0]);
+    let detector = choice::detectors(detector, &DETECTORS[..1])?.into_iter().next().unwrap_or_default();
+    let settings = Settings { detector, contacts: CONTACTS.to_vec(), scenes, seed: study.seed };
+    let report = scanning::run(&settings, &output::command_line(), &mut |step| message!("{step}"))?;
+    page.map(|page| page.write(scanning::page(&report))).transpose()?;
+    picture.map(|picture| picture.write(scanning::picture(&report))).transpose()?;
+    Ok(output::print(&if study.json { serde_json::to_string(&report)? } else { scanning::table(&report) })?)
 }

@@ -38,22 +38,58 @@ pub fn cramer_rao(
     contacts: &[Contact],
     deviation_v: f64,
 ) -> Result<Option<Vec<Bound>>, ForwardError> {
-    let jacobian_v = derivatives(model, contacts)?;
-    let mut information = jacobian_v.transpose() * jacobian_v / (deviation_v * deviation_v);
-    let known: Vec<_> = (0..UNKNOWNS * contacts.len()).filter(|unknown| unknown % UNKNOWNS < 3).collect();
-    let of_known = information.select_rows(&known).select_columns(&known);
-    (0..contacts.len()).for_each(|k| information[(UNKNOWNS * k + 3, UNKNOWNS * k + 3)] += RADIUS_DEVIATION.powi(-2));
-    let inverse = |information: DMatrix<f64>| information.cholesky().map(|factor| factor.inverse());
-    let (Some(known), Some(any)) = (inverse(of_known), inverse(information)) else { return Ok(None) };
-    let of = |(k, contact): (usize, &Contact)| {
-        let position_m = |all: &DMatrix<f64>, x: usize| contact.radius_m * (all[(x, x)] + all[(x + 1, x + 1)]).sqrt();
-        Bound {
-            position_m: position_m(&known, 3 * k),
-            position_any_radius_m: position_m(&any, UNKNOWNS * k),
-            conductance: known[(3 * k + 2, 3 * k + 2)].sqrt(),
+    let rows = RowInformation::new(model, contacts, deviation_v)?;
+    Ok(rows.bounds(&vec![1.0; model.detector().electrodes.len()]))
+}
+
+/// What the row of each ground tells of some contacts, of which the [bound](cramer_rao) of any rows is made.
+#[derive(Clone, Debug)]
+pub(crate) struct RowInformation {
+    radii_m: Vec<f64>,
+    /// Fisher's information of each ground's row.
+    rows: Vec<DMatrix<f64>>,
+}
+
+impl RowInformation {
+    /// Of contacts under noise of a standard deviation (V).
+    ///
+    /// # Errors
+    /// [`ForwardError`] if a contact, or one a step beside it, is off the detector.
+    pub fn new(model: &dyn ForwardModel, contacts: &[Contact], deviation_v: f64) -> Result<Self, ForwardError> {
+        let electrodes = model.detector().electrodes.len();
+        let jacobian_v = derivatives(model, contacts)?;
+        let of_row = |g: usize| {
+            let row_v = jacobian_v.rows(g * electrodes, electrodes);
+            row_v.transpose() * row_v / (deviation_v * deviation_v)
+        };
+        Ok(Self {
+            radii_m: contacts.iter().map(|contact| contact.radius_m).collect(),
+            rows: (0..electrodes).map(of_row).collect(),
+        })
+    }
+
+    /// The bound of each contact where the row of each ground is read so many times; `None` if that does not separate the unknowns.
+    pub fn bounds(&self, times: &[f64]) -> Option<Vec<Bound>> {
+        let size = UNKNOWNS * self.radii_m.len();
+        let mut information = DMatrix::zeros(size, size);
+        self.rows.iter().zip(times).for_each(|(row, times)| information += row * *times);
+        let known: Vec<_> = (0..size).filter(|unknown| unknown % UNKNOWNS < 3).collect();
+        let of_known = information.select_rows(&known).select_columns(&known);
+        for radius in (UNKNOWNS - 1..size).step_by(UNKNOWNS) {
+            information[(radius, radius)] += RADIUS_DEVIATION.powi(-2);
         }
-    };
-    Ok(Some(contacts.iter().enumerate().map(of).collect()))
+        let inverse = |information: DMatrix<f64>| information.cholesky().map(|factor| factor.inverse());
+        let (known, any) = (inverse(of_known)?, inverse(information)?);
+        let of = |(k, radius_m): (usize, &f64)| {
+            let position_m = |all: &DMatrix<f64>, x: usize| radius_m * (all[(x, x)] + all[(x + 1, x + 1)]).sqrt();
+            Bound {
+                position_m: position_m(&known, 3 * k),
+                position_any_radius_m: position_m(&any, UNKNOWNS * k),
+                conductance: known[(3 * k + 2, 3 * k + 2)].sqrt(),
+            }
+        };
+        Some(self.radii_m.iter().enumerate().map(of).collect())
+    }
 }
 
 /// Derivatives of the readings (V) by x and y in radii and by the logarithms of conductance and radius of each contact: alike in size, so that
@@ -108,6 +144,17 @@ mod tests {
         assert!((noisy.conductance / one.conductance - 2.0).abs() < 1e-9);
         let pair = |apart_m: f64| of(&[firm(0.004, 0.007), firm(0.004 + apart_m, 0.007)], 1e-3).position_m;
         assert!(one.position_m < pair(0.02) && pair(0.02) < pair(0.009) && pair(0.009) < pair(0.004));
+    }
+
+    #[test]
+    fn rows_that_are_read_more_often_tell_more() {
+        let rows = RowInformation::new(&slab(), &[firm(0.004, 0.007)], 1e-3).unwrap();
+        let error_m =
+            |times: &dyn Fn(usize) -> f64| rows.bounds(&(0..16).map(times).collect::<Vec<_>>()).unwrap()[0].position_m;
+        assert!((error_m(&|_| 4.0) / error_m(&|_| 1.0) - 0.5).abs() < 1e-9);
+        let one = error_m(&|g| if g == 5 { 1.0 } else { 0.0 });
+        assert!(one > error_m(&|g| if g == 5 || g == 10 { 1.0 } else { 0.0 }) && one > error_m(&|_| 1.0));
+        assert!(rows.bounds(&[0.0; 16]).is_none());
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod experiment;
 mod machine;
 pub mod page;
 mod presses;
+pub mod scanning;
 mod scenes;
 mod score;
 pub mod stability;
