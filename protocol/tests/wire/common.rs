@@ -27,17 +27,19 @@ fn ranges(electrodes: u8, adc_bits: u8) -> impl Strategy<Value = Fixed<Range, 4>
     let largest = ((1u32 << adc_bits) - 1) as u16;
     let cuts = prop::collection::vec(1..electrodes, 0..=3);
     let errors = (any::<u16>(), any::<u16>(), any::<u16>());
-    (cuts, prop::collection::vec((0..largest, 1..=largest, errors), 4)).prop_map(move |(mut cuts, codes)| {
+    let errors = errors.prop_map(|(noise_uv, gain_ppm, bow_uv)| ConverterErrors { noise_uv, gain_ppm, bow_uv });
+    let sight =
+        (0..largest, 1..=largest, errors).prop_map(|(a, ceiling, errors)| (a.min(ceiling - 1), ceiling, errors));
+    (cuts, prop::collection::vec(sight, 4)).prop_map(move |(mut cuts, sights)| {
         cuts.extend([0, electrodes]);
         cuts.sort_unstable();
         cuts.dedup();
         let runs = cuts.windows(2).map(|cut| cut[1] - cut[0]);
-        let range = |(electrodes, (a, b, errors)): (u8, &(u16, u16, (u16, u16, u16)))| {
-            let (noise_uv, gain_ppm, bow_uv) = *errors;
-            let errors = ConverterErrors { noise_uv, gain_ppm, bow_uv };
-            Range { electrodes, floor: (*a).min(*b - 1), ceiling: *b, errors }
+        let range = |(electrodes, sight): (u8, &(u16, u16, ConverterErrors))| {
+            let (floor, ceiling, errors) = *sight;
+            Range { electrodes, floor, ceiling, errors }
         };
-        runs.zip(&codes).map(range).collect()
+        runs.zip(&sights).map(range).collect()
     })
 }
 

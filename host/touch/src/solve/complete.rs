@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn rows_that_were_not_read_follow_from_four_of_them() {
-        let four = |_: f64, g: usize, _: usize| if g % 5 == 0 { Says::Voltage } else { Says::Nothing };
+        let four = |_: f64, g: usize, _: usize| if g.is_multiple_of(5) { Says::Voltage } else { Says::Nothing };
         // Of the lightest, noise hides a tenth.
         for (conductance_s, most) in [(1e-5, 0.12), (2e-4, 0.05), (5e-3, 0.05)] {
             let found = error(Contact { conductance_s, ..samples::CONTACT }, four, 0.0);

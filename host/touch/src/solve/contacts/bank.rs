@@ -130,11 +130,8 @@ impl Bank {
         for filter in &mut self.filters {
             filter.update(rows)?;
         }
-        let most = |filters: &[Filter]| {
-            let likelihoods = filters.iter().map(|filter| filter.likelihood).enumerate();
-            likelihoods.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(best, _)| best)
-        };
-        self.best = most(&self.filters);
+        let likelihoods = self.filters.iter().map(|filter| filter.likelihood).enumerate();
+        self.best = likelihoods.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(best, _)| best);
         let believed = self.filters[self.best].clone();
         for filter in &mut self.filters {
             if filter.likelihood < believed.likelihood - BEHIND {

@@ -27,24 +27,33 @@ const GONE: f64 = 12.0;
 /// Of a contact that has just come.
 const GLIMPSE: Effort = Effort { steps: 4, gain: 1.0, share: 0.05 };
 
-/// So many frames that their noise is nothing.
-const FOREVER: usize = 1 << 30;
-/// Frames after which it is reckoned anew what no averaging takes away.
-const RENEWED: u32 = 32;
+/// Every so many frames it is reckoned what no averaging takes away, so that each row of a plan of 32 frames has its turn; and what is left
+/// of that after each.
+const LOOKED_AT: u32 = 7;
+const KEPT: f64 = 0.9;
 
 /// What is known besides the contacts that are followed.
 #[derive(Clone, Debug)]
 pub(super) struct RowState {
     bank: Bank,
-    /// Covariance of the parameters that stays however many rows come, since the model and the board are off; and frames since it was made.
-    staying: Option<DMatrix<f64>>,
-    since: u32,
+    /// What model and board are off by goes into the parameters however many rows come.
+    staying: Staying,
     /// What all readings are off by (V); none of a detector that is as described.
     off_v: Vec<f64>,
     /// Frames in a row that do not fit.
     unfit: u32,
     /// Logarithm of the odds for there being nothing, of late.
     gone: f64,
+}
+
+/// What stays of errors that are the same in every frame. With whitened derivatives `J` and patterns `P` of rows of late, the parameters are off
+/// by `B s`, `B = (sum J^T J)^-1 sum J^T P`, where `s` is normal, so by the covariance `B B^T`.
+#[derive(Clone, Debug, Default)]
+struct Staying {
+    information: DMatrix<f64>,
+    pulls: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    frames: u32,
 }
 
 /// What has come of a frame.
@@ -61,7 +70,7 @@ impl RowState {
     /// From an explanation by all readings of `target`.
     pub fn new(found: &Explanation, target: &Target) -> Self {
         let off_v = if target.error().is_some() { target.likely_off_v(&found.fit.volts) } else { Vec::new() };
-        Self { bank: Bank::new(found.fit.normal.clone()), staying: None, since: RENEWED, off_v, unfit: 0, gone: 0.0 }
+        Self { bank: Bank::new(found.fit.normal.clone()), staying: Staying::default(), off_v, unfit: 0, gone: 0.0 }
     }
 
     /// What all readings are off by (V); nothing of a detector that is as described.
@@ -98,17 +107,14 @@ impl ContactFinder {
             return Step::Gone;
         }
         let search = state.unfit >= FRAMES;
-        if state.since >= RENEWED {
-            (state.staying, state.since) = (self.staying(&fit), 0);
+        if state.staying.frames.is_multiple_of(LOOKED_AT) {
+            self.look_at_staying(&mut state.staying, &fit, target);
         }
-        state.since += 1;
+        state.staying.frames += 1;
         let known = state.bank.information();
-        let told = state
-            .staying
-            .as_ref()
-            .filter(|staying| staying.nrows() == known.nrows())
-            .and_then(|staying| Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + staying)?.inverse()));
-        (fit.normal, fit.settled) = (told.unwrap_or_else(|| known.clone()), true);
+        let told =
+            || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + &state.staying.covariance)?.inverse());
+        (fit.normal, fit.settled) = (told().unwrap_or_else(|| known.clone()), true);
         Step::Followed(Explanation { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
     }
 
@@ -121,12 +127,25 @@ impl ContactFinder {
         Some(Explanation::of(fit, target))
     }
 
-    /// Covariance of a fit's parameters by what noise has no part in: the errors of model, pads and converters.
-    fn staying(&self, fit: &DiscFit) -> Option<DMatrix<f64>> {
+    /// Takes the rows of a target into account for what stays of errors.
+    fn look_at_staying(&self, staying: &mut Staying, fit: &DiscFit, target: &Target) {
         let n = self.network.electrodes();
-        let readings = Readings::from_fn(n, |g, e| fit.volts[g * n + e]);
-        let endless = Target::of_mean(&readings, FOREVER, &self.errors, None);
-        self.disc_fitter().covariance(fit, &endless)
+        let active = target.at(&fit.volts);
+        let slopes: Vec<Vec<f64>> = fit.slopes_v().iter().map(|slope| active.whitened(slope)).collect();
+        let patterns_v = self.errors.patterns_v(&Readings::from_fn(n, |g, e| fit.volts[g * n + e]));
+        let patterns: Vec<Vec<f64>> =
+            patterns_v.column_iter().map(|pattern| active.whitened(pattern.as_slice())).collect();
+        let information = DMatrix::from_fn(slopes.len(), slopes.len(), |i, j| dot(&slopes[i], &slopes[j]));
+        let pulls = DMatrix::from_fn(slopes.len(), patterns.len(), |i, j| dot(&slopes[i], &patterns[j]));
+        if staying.information.shape() == information.shape() {
+            staying.information = KEPT * &staying.information + information;
+            staying.pulls = KEPT * &staying.pulls + pulls;
+        } else {
+            (staying.information, staying.pulls) = (information, pulls);
+        }
+        let off = Cholesky::new(staying.information.clone()).map(|factor| factor.solve(&staying.pulls));
+        let none = || DMatrix::zeros(slopes.len(), slopes.len());
+        staying.covariance = off.map_or_else(none, |off| &off * off.transpose());
     }
 
     /// Whether what is followed has become so light that it cannot be told from nothing.
