@@ -1,7 +1,8 @@
 //! The latest of each reading, of scans that read some rows at a time.
 //!
 //! Rows that were read some milliseconds ago are those of contacts that have moved since. What they say of others than the contacts that are
-//! followed is still true: so each reading is kept as what it is beside the model's at that time, and told as the model's now with that.
+//! followed is still true: so each reading is kept as what it is beside the model's at that time, and told as the model's now with that. It is
+//! the motion of contacts that this follows; where a model is exchanged for another one, or does not fit, nothing has moved.
 
 use tactomo_physics::readings::{Readings, Says};
 
@@ -17,16 +18,26 @@ struct Cell {
     /// As read (V).
     volts: f64,
     says: Says,
-    /// What was expected then (V).
-    expected_v: f64,
+    /// What was expected then (V); none where nothing was, or nothing that fits.
+    expected_v: Option<f64>,
     /// Time since (s); infinite if it was never read.
     age_s: f64,
+}
+
+impl Cell {
+    /// What it would read now, where `expected_v` (V) is expected.
+    fn now_v(&self, expected_v: Option<f64>) -> f64 {
+        match (self.says, self.expected_v, expected_v) {
+            (Says::Voltage, Some(then_v), Some(now_v)) => self.volts - then_v + now_v,
+            _ => self.volts,
+        }
+    }
 }
 
 impl Latest {
     /// None was read yet.
     pub fn new(electrodes: usize) -> Self {
-        let never = Cell { volts: 0.0, says: Says::Nothing, expected_v: 0.0, age_s: f64::INFINITY };
+        let never = Cell { volts: 0.0, says: Says::Nothing, expected_v: None, age_s: f64::INFINITY };
         Self { electrodes, cells: vec![never; electrodes * electrodes] }
     }
 
@@ -40,7 +51,7 @@ impl Latest {
             cell.age_s += elapsed_s.max(0.0);
             let says = rows.says(i / n, i % n);
             if says != Says::Nothing {
-                let expected_v = expected_v.map_or(0.0, |all| all[i]);
+                let expected_v = expected_v.map(|all| all[i]);
                 *cell = Cell { volts: rows.volts()[i], says, expected_v, age_s: 0.0 };
             }
         }
@@ -55,16 +66,18 @@ impl Latest {
     /// as they were read.
     pub fn readings(&self, oldest_s: f64, expected_v: Option<&[f64]>) -> Readings {
         let n = self.electrodes;
-        let volts = |i: usize| {
-            let cell = &self.cells[i];
-            match (cell.says, expected_v) {
-                (Says::Voltage, Some(now_v)) => cell.volts - cell.expected_v + now_v[i],
-                _ => cell.volts,
-            }
-        };
+        let volts = |i: usize| self.cells[i].now_v(expected_v.map(|all| all[i]));
         let is_old = |i: usize| self.cells[i].age_s > oldest_s;
         let all = Readings::from_fn(n, |g, e| volts(g * n + e)).saying(|g, e| self.cells[g * n + e].says);
         all.hiding(|g, e| is_old(g * n + e))
+    }
+
+    /// Goes on with a model that expects `after_v` (V) now in place of one that expects `before_v` (V): the readings stay as they are told.
+    pub fn exchange(&mut self, before_v: Option<&[f64]>, after_v: Option<&[f64]>) {
+        for (i, cell) in self.cells.iter_mut().enumerate() {
+            cell.volts = cell.now_v(before_v.map(|all| all[i]));
+            cell.expected_v = after_v.map(|all| all[i]);
+        }
     }
 
     /// Whether every reading was read within `oldest_s` (s).
@@ -99,5 +112,9 @@ mod tests {
         latest.add(&row(2, 0.5), 1e-3, Some(&[0.5; 16]));
         let now = latest.readings(1.0, Some(&[0.7; 16]));
         assert!((now.at(1, 3) - 0.8).abs() < 1e-12 && (now.at(2, 3) - 0.7).abs() < 1e-12);
+        latest.exchange(Some(&[0.7; 16]), Some(&[0.2; 16]));
+        assert!((latest.readings(1.0, Some(&[0.2; 16])).at(1, 3) - 0.8).abs() < 1e-12, "another model moves nothing");
+        assert!((latest.readings(1.0, Some(&[0.3; 16])).at(1, 3) - 0.9).abs() < 1e-12);
+        assert!((latest.readings(1.0, None).at(1, 3) - 0.8).abs() < 1e-12);
     }
 }

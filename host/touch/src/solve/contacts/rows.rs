@@ -73,6 +73,11 @@ impl RowState {
         Self { bank: Bank::new(found.fit.normal.clone()), staying: Staying::default(), off_v, unfit: 0, gone: 0.0 }
     }
 
+    /// Whether what is followed fits the newest rows.
+    pub fn fits(&self) -> bool {
+        self.unfit == 0
+    }
+
     /// What all readings are off by (V); nothing of a detector that is as described.
     pub fn off_v(&self) -> &[f64] {
         &self.off_v

@@ -156,7 +156,7 @@ impl ContactFollower {
             // What presses next begins with its first rows.
             latest.forget();
         }
-        latest.add(rows, elapsed_s, self.predicted_v());
+        latest.add(rows, elapsed_s, self.expected_v());
         let search = search || self.is_glimpsed && latest.is_whole(OLDEST_S);
         self.latest = Some(latest);
         Ok(Followed { solution: self.solution(&target), search })
@@ -177,7 +177,7 @@ impl ContactFollower {
 
     /// The latest readings, told for the contacts as they are now; none while whole frames come.
     pub fn latest(&self) -> Option<Mean> {
-        let readings = self.latest.as_ref()?.readings(OLDEST_S, self.predicted_v());
+        let readings = self.latest.as_ref()?.readings(OLDEST_S, self.expected_v());
         Some(Mean { readings, frames: 1 })
     }
 
@@ -213,15 +213,17 @@ impl ContactFollower {
         }
     }
 
-    /// Readings that what is followed predicts (V).
-    fn predicted_v(&self) -> Option<&[f64]> {
-        self.last.as_ref().map(|last| &last.fit.volts[..])
+    /// Readings that what is followed predicts (V), as long as it fits the rows.
+    fn expected_v(&self) -> Option<&[f64]> {
+        let fits = self.rows.as_ref().is_some_and(|state| state.fits());
+        self.last.as_ref().filter(|_| fits).map(|last| &last.fit.volts[..])
     }
 
     /// Takes what a search has found in the mean of some frames, if it explains this frame better than what is followed; whether the search has to be repeated, because
     /// what it has found does not explain this frame as well as its own.
     pub fn adopt(&mut self, found: Option<Found>, frames: usize, target: &Target) -> bool {
         self.tracker = self.before.clone();
+        let expected_v = self.expected_v().map(<[f64]>::to_vec);
         let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
         let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
         self.last = self.last.take().and_then(|last| self.finder.judged(last, target));
@@ -233,6 +235,10 @@ impl ContactFollower {
             (self.last, self.is_stale) = (caught_up, false);
         }
         self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(last, target)));
+        if let Some(mut latest) = self.latest.take() {
+            latest.exchange(expected_v.as_deref(), self.expected_v());
+            self.latest = Some(latest);
+        }
         let Some(last) = &self.last else { return self.finder.stands_out(target) };
         self.searched =
             Searched { excess: (left.min(last.fit.cost) - self.finder.freedom(&last.fit, target)).max(0.0), frames };
