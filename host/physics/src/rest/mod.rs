@@ -76,7 +76,10 @@ impl RestSum {
     /// few means it is what the converter's description says.
     pub fn rest(&self, adc: &Adc, ground_v: f64, conversions: u32) -> Rest {
         let (mean_v, lsb_v) = (self.mean_v(), adc.lsb_v());
+        // Noise that is cut off shows in some of the readings. Where it shows in none they are below the converter's floor, and nothing is known of them.
+        let is_hidden = ground_v == 0.0 && self.squares_v2.iter().all(|square_v2| *square_v2 == 0.0);
         let clipping = match self.noise_of(&mean_v) {
+            _ if is_hidden => Clipping::new(0.0),
             None => Clipping::new(adc.noise_lsb),
             Some((means_v, variance_v2)) => {
                 let means: Vec<f64> = means_v.iter().map(|volts| (volts + ground_v) / lsb_v).collect();
@@ -188,6 +191,16 @@ mod tests {
             rest.subtract(&all.clone(), &mut all);
         }
         all.iter().sum::<f64>() / 256.0 / 1e-3 - load_lsb
+    }
+
+    #[test]
+    fn of_a_converter_that_sees_nothing_at_rest_nothing_is_taken_off() {
+        let mut sum = RestSum::default();
+        (0..32).for_each(|_| sum.add(&[0.0; 16], 1));
+        let rest = sum.rest(&Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 5.0 }, 0.0, 1);
+        let mut touch_v = [0.0; 16];
+        rest.subtract(&[0.5; 16], &mut touch_v);
+        assert!(touch_v.iter().all(|volts| (volts - 0.5).abs() < 1e-3), "{touch_v:?}");
     }
 
     #[test]
