@@ -36,7 +36,7 @@ pub enum EncodeError {
     /// More than [`MAX_LOG`] bytes of log in one packet.
     #[error("{0} bytes of log do not fit one packet")]
     LogLength(usize),
-    /// A [`Hello`](crate::Hello) that [is not valid](crate::Hello::is_valid).
+    /// A [`Hello`] that [is not valid](Hello::is_valid).
     #[error("a value of Hello is out of range")]
     Hello,
     /// The tag 0, which means that nobody asked.

@@ -124,7 +124,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
     let left_out = rounds.waiting();
     if left_out as usize > frames.len() {
         bail!(
-            "{}: {left_out} frames hold some grounds only, and a rub needs all: record it with `--scan whole`",
+            "{}: {left_out} frames hold some grounds only, and a rub needs all: record whole frames, without `--scan`",
             file.display()
         );
     }

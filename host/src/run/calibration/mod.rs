@@ -180,7 +180,7 @@ impl Desk {
             let waiting = self.rounds.waiting();
             if waiting >= NEVER_WHOLE {
                 self.shown.trouble = Some(format!(
-                    "{waiting} frames of some grounds only are left out: calibrate with whole frames (--scan whole)"
+                    "{waiting} frames of some grounds only are left out: calibrate with whole frames (without --scan)"
                 ));
             }
             return;
