@@ -53,6 +53,7 @@ impl Completer {
             return Cow::Borrowed(readings);
         }
         let n = readings.electrodes();
+        let readings = &grounded(readings);
         let known = self.known_scales(readings);
         let mut scales: Vec<f64> = known.iter().map(|scale| scale.unwrap_or(1.0)).collect();
         let mut volts: Vec<f64> = (0..n * n).map(|i| readings.touch_v(i / n, i % n)).collect();
@@ -110,7 +111,7 @@ impl Completer {
     /// Balanced readings by those that are known, and by the bounds that `before` breaks or is at; `None` where nothing is known.
     fn found(&self, readings: &Readings, before: &[f64], scales: &[f64], is_first: bool) -> Option<DVector<f64>> {
         let n = readings.electrodes();
-        let counts = |i: usize| match readings.all_say()[i] {
+        let counts = |i: usize| match readings.says(i / n, i % n) {
             Says::Voltage => true,
             Says::Nothing => false,
             Says::AtMost => is_first || before[i] >= readings.volts()[i],
@@ -133,6 +134,14 @@ impl Completer {
         }
         Some(&self.units * Cholesky::new(normal)?.solve(&units.tr_mul(&values)))
     }
+}
+
+/// The same with what is known without reading it: a grounded electrode is at ground, but for the few millivolts at the switch.
+fn grounded(readings: &Readings) -> Readings {
+    let is_known = |g: usize, e: usize| g == e && readings.says(g, e) != Says::Voltage;
+    let volts = |g: usize, e: usize| if is_known(g, e) { 0.0 } else { readings.at(g, e) };
+    let says = |g: usize, e: usize| if is_known(g, e) { Says::Voltage } else { readings.says(g, e) };
+    Readings::from_fn(readings.electrodes(), volts).saying(says)
 }
 
 /// A solver that needs every reading.
