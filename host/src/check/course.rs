@@ -116,7 +116,7 @@ impl Check {
         let taken = std::mem::take(&mut self.resting);
         let Some(mean) = taken.readings(readings.electrodes()) else { return };
         self.restless = restless(&mean, self.detector.drive_v);
-        self.baseline.add(mean.volts(), taken.frames(), time_s, &self.restless);
+        self.baseline.add(&mean.touches_v(), taken.frames(), time_s, &self.restless);
         if !self.baseline.state().is_taking() && self.hindrance().is_none() {
             self.rest = Some(mean);
             self.ask = Ask::Hand;
@@ -170,7 +170,7 @@ impl Check {
 /// Inputs that read something at rest that the others do not: none, if they are many.
 fn restless(rest: &Readings, drive_v: f64) -> Vec<usize> {
     let n = rest.electrodes();
-    let level_v = |e: usize| median((0..n).filter(|g| *g != e).map(|g| rest.at(g, e)).collect());
+    let level_v = |e: usize| median((0..n).filter(|g| *g != e).map(|g| rest.touch_v(g, e)).collect());
     let levels_v: Vec<f64> = (0..n).map(level_v).collect();
     let middle_v = median(levels_v.clone());
     let found: Vec<usize> = (0..n).filter(|e| levels_v[*e] - middle_v > RESTLESS * drive_v).collect();

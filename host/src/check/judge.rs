@@ -87,7 +87,7 @@ fn is_read(check: &Check, electrode: usize) -> bool {
 
 /// What an input reads while others are grounded, in the middle (V).
 pub(super) fn column(readings: &Readings, e: usize) -> f64 {
-    median((0..readings.electrodes()).filter(|g| *g != e).map(|g| readings.at(g, e)).collect())
+    median((0..readings.electrodes()).filter(|g| *g != e).map(|g| readings.touch_v(g, e)).collect())
 }
 
 /// The nearest of those that can be trusted.
