@@ -23,7 +23,6 @@ fn the_frequency_of_the_texture_is_found_exact_and_as_built_and_on_another_detec
         let found_hz = summary["vibration"]["frequency_hz"].as_f64().unwrap();
         assert!((found_hz / TEXTURE_HZ - 1.0).abs() < 0.02, "{summary}");
         assert!(summary["vibration"]["amplitude_v"].as_f64() > Some(1e-3), "{summary}");
-        assert_eq!(summary["dropped"], 0, "{summary}");
     }
     assert!(live("rest", &["--seconds", "2"]).get("vibration").is_none(), "nothing swings at rest");
 }

@@ -43,7 +43,7 @@ impl SimulatedSampler {
     ) -> Self {
         let mut noise = Noise::new(seed);
         let front = match &figures.analog {
-            Some(analog) => Front::Real(RealFront::new(analog, figures.wiring, &mut noise)),
+            Some(analog) => Front::Real(RealFront::new(analog, figures.wiring, detector.electrodes.len(), &mut noise)),
             None => Front::Ideal(detector.adc),
         };
         let runs = match &figures.analog {
@@ -132,7 +132,7 @@ struct RealFront {
 }
 
 impl RealFront {
-    fn new(analog: &'static Analog, wiring: Wiring, chip: &mut Noise) -> Self {
+    fn new(analog: &'static Analog, wiring: Wiring, electrodes: usize, chip: &mut Noise) -> Self {
         let converters = analog.converters.iter().map(|figures| Converter::drawn(figures, chip)).collect();
         let (strapping, strapping_input) = &analog.strapping;
         let runs = analog.converters.iter().enumerate();
@@ -142,7 +142,7 @@ impl RealFront {
             (Input::new(*figures), converter, electrode as u8)
         });
         let count = match wiring {
-            Wiring::Transparent => usize::MAX,
+            Wiring::Transparent => electrodes,
             Wiring::Latched => 1,
         };
         Self { converters, inputs: inputs.take(count).collect(), wiring, groundings: 0 }
@@ -238,7 +238,7 @@ mod tests {
         }));
         let circuit = Arc::new(Circuit::default());
         let mut noise = Noise::new(1);
-        let mut front = RealFront::new(analog, Wiring::Transparent, &mut noise);
+        let mut front = RealFront::new(analog, Wiring::Transparent, 16, &mut noise);
         let mut pads = Pads::new(Box::new(Fixed(volts.clone())), 0.0, true);
         let mut mux = Transparent::new([0, 1, 2, 3].map(|bit| MuxPin::new(&circuit, MuxLine::Address(bit))));
         let mut errors = [0.0; 2];
