@@ -8,8 +8,8 @@ use tactomo_protocol::{BoardMessage, FrameHead, MAX_LOG, Scope, encode_board, en
 
 use crate::{Chip, Serial};
 
-/// Bytes of answers and faults that can wait: four of the longest.
-const CONTROL_BYTES: usize = 704;
+/// Bytes of answers and faults that can wait: three of the longest, four of a board with two converters.
+const CONTROL_BYTES: usize = 512;
 /// Longest answer or fault on the wire.
 const CONTROL_PACKET: usize = 176;
 /// Longest packet of log on the wire.

@@ -77,14 +77,14 @@ fn the_esp32_reads_each_electrode_at_the_pin_that_the_page_says() {
 fn the_multiplexer_is_wired_as_the_page_says() {
     let address = row("A0, A1, A2, A3");
     assert_eq!(outputs(between(ESP32_MAIN, "let address = [", "];")), numbers(&address[1]));
-    assert_eq!(outputs(between(ESP32C3_MAIN, "let address = [", "];")), numbers(&address[2]));
+    assert_eq!(outputs(between(ESP32C3_MAIN, "let address = [", "];")), numbers(&address[3]));
     assert_eq!(outputs(between(ESP32_MAIN, "Enabled::new(", ";")), [numbers(&row("EN")[1])[0]]);
     for (pin, field) in [("WR", "wr: "), ("CSA", "csa: "), ("CSB", "csb: ")] {
-        assert_eq!(outputs(between(ESP32C3_MAIN, field, ")")), numbers(&row(pin)[2]), "{pin}");
+        assert_eq!(outputs(between(ESP32C3_MAIN, field, ")")), numbers(&row(pin)[3]), "{pin}");
         assert!(row(pin)[1].starts_with("ground"), "{pin} of the transparent wiring");
     }
     let input = numbers(between(ESP32C3_MAIN, "Input::new(chip.ADC1, chip.GPIO", ")"));
-    assert_eq!(input, [numbers(&row("DB")[2])[0]]);
+    assert_eq!(input, [numbers(&row("DB")[3])[0]]);
     assert!(ESP32C3_INPUT.contains(&format!("AdcPin<GPIO{}<", input[0])));
 }
 
