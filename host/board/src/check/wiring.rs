@@ -22,7 +22,8 @@ pub struct Pins {
 pub fn pins(board: &str, electrode: usize) -> Option<Pins> {
     let source = electrode + 1;
     let pins = |read_by: String| Some(Pins { grounded_by: format!("S{source}A"), read_by });
-    match board {
+    // A simulated board is wired as the real one.
+    match board.strip_suffix(" (simulated)").unwrap_or(board) {
         "esp32" => ESP32.get(electrode).and_then(|gpio| pins(format!("GPIO {gpio}"))),
         "stm32f405" => STM32F405.get(electrode).and_then(|pin| pins((*pin).to_owned())),
         "esp32c3" | "esp32c6" if electrode < 16 => pins(format!("S{source}B")),
