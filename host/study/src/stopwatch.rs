@@ -45,29 +45,26 @@ mod tests {
         assert!(one > Duration::ZERO && (2.0..8.0).contains(&ratio), "{one:?} {four:?}");
     }
 
-    /// Three more threads on each core leave this one a quarter of a core.
+    /// Three more threads on each core leave this one a quarter of a core, and what it is timed to have used is no more than half of what passed.
     #[cfg(any(target_os = "linux", target_os = "macos"))]
     #[test]
     fn load_does_not_count() {
         let cores = std::thread::available_parallelism().map_or(1, |count| count.get());
-        let alone = (0..5).map(|_| timed(work).1).min().unwrap();
-        let until = Instant::now() + Duration::from_millis(600);
+        let begin = Instant::now();
+        let until = begin + Duration::from_millis(600);
         let load = move || {
             while Instant::now() < until {
                 black_box(work());
             }
         };
         let others: Vec<_> = (0..3 * cores).map(|_| std::thread::spawn(load)).collect();
-        let (begin, mut times) = (Instant::now(), Vec::new());
+        let mut counted = Duration::ZERO;
         while Instant::now() < until {
-            times.push(timed(work).1);
+            counted += timed(work).1;
         }
-        let wall = begin.elapsed() / u32::try_from(times.len()).unwrap();
+        let passed = begin.elapsed();
         others.into_iter().for_each(|other| other.join().unwrap());
-        times.sort();
-        let median = times[times.len() / 2];
-        assert!(wall > 2 * alone, "there was no load: {wall:?} {alone:?}");
-        assert!(median < 2 * alone, "{median:?} {alone:?}");
+        assert!(counted < passed / 2, "{counted:?} of {passed:?}");
     }
 
     #[cfg(any(target_os = "linux", target_os = "macos"))]
