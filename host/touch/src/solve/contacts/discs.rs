@@ -140,6 +140,17 @@ impl DiscFit {
         offset.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
+    /// The same of the crowded current alone, if its resistance were `S (1 - ln(r / r0))` in place of `S r0 / r`: of a firm contact little else
+    /// resists. It may be less, so that derivatives serve for steps all the same.
+    fn bend_of_crowding(&self, offset: &[f64]) -> f64 {
+        let of = |(k, exchange): (usize, &f64)| {
+            let (resistance, radius) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
+            let share = exchange / (1.0 + exchange);
+            0.5 * offset[radius] * offset[radius] * share * self.normal[(resistance, resistance)].sqrt()
+        };
+        self.slopes.exchange.iter().enumerate().map(of).fold(0.0, f64::max)
+    }
+
     /// Whether an offset is too far for the derivatives to serve. A light contact that noise moves about is not: what the derivatives are
     /// wrong by is little against its standard error.
     fn is_far(&self, offset: &[f64]) -> bool {
@@ -229,7 +240,7 @@ impl DiscFitter<'_> {
         if fit.is_far(&offset) {
             return self.anew(contacts, target);
         }
-        let volts = match fit.bend(&offset) < LINEAR {
+        let volts = match fit.bend(&offset).max(fit.bend_of_crowding(&offset)) < LINEAR {
             true => {
                 let mut volts = fit.slopes.volts.clone();
                 for (slope, offset) in fit.slopes.by.iter().zip(&offset) {
