@@ -85,12 +85,15 @@ async fn the_board_card_says_which_rows_are_scanned() -> Result<()> {
     in_front_of!(Script::start(), stage, {
         let adaptive = |grounds: Vec<u8>, others| Scan { choice: ScanChoice::Adaptive, grounds, others };
         for (scan, said) in [
-            (Scan::default(), "whole frames, 1,400 frames/s"),
-            (adaptive(vec![5, 6, 10], true), "adaptive: grounds 5, 6, 10 and the others in turn, 1,400 frames/s"),
-            (adaptive(Vec::new(), false), "adaptive: whole frames, 1,400 frames/s"),
+            (Scan::default(), "whole frames, 1\u{2009}400 frames/s"),
+            (
+                adaptive(vec![5, 6, 10], true),
+                "adaptive: grounds 5, 6, 10 and the others in turn, 1\u{2009}400 frames/s",
+            ),
+            (adaptive(Vec::new(), false), "adaptive: whole frames, 1\u{2009}400 frames/s"),
             (
                 Scan { choice: ScanChoice::Grounds(vec![3]), grounds: vec![3], others: false },
-                "ground 3, 1,400 frames/s",
+                "ground 3, 1\u{2009}400 frames/s",
             ),
         ] {
             stage.behind.set(|snapshot| {

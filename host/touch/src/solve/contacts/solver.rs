@@ -48,6 +48,8 @@ pub(in crate::solve) struct ContactFollower {
     is_glimpsed: bool,
     /// Time for which no row has said more than that its readings are below the converter's range (s).
     silent_s: f64,
+    /// Whether it was found when what the readings may be off by together was not known yet.
+    is_provisional: bool,
     /// What a calibration would bring, as all readings told of what is followed.
     calibrated: Option<Calibrated>,
     tracker: Tracker,
@@ -105,6 +107,7 @@ impl ContactFollower {
             latest: None,
             is_glimpsed: false,
             silent_s: 0.0,
+            is_provisional: false,
             calibrated: None,
             before,
             tracker,
@@ -168,7 +171,8 @@ impl ContactFollower {
             latest.forget();
         }
         latest.add(rows, elapsed_s, self.expected_v());
-        let search = search || self.is_glimpsed && latest.is_whole(OLDEST_S);
+        let is_outdated = self.last.is_some() && self.is_provisional && self.finder.knows_unknowns();
+        let search = search || is_outdated || self.is_glimpsed && latest.is_whole(OLDEST_S);
         self.latest = Some(latest);
         let mut solution = self.solution(&target);
         // A few rows do not tell it: what all readings are off by was taken off them.
@@ -200,13 +204,19 @@ impl ContactFollower {
     fn step(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
         self.before = self.tracker.clone();
         let off_v = |state: &Option<Box<RowState>>| state.as_ref().map_or(Vec::new(), |state| state.off_v().to_vec());
-        let target = self.finder.target_of_rows(rows, &off_v(&self.rows));
+        let off_v = off_v(&self.rows);
+        let is_known = self.finder.knows_unknowns() && !(self.is_provisional && self.last.is_some());
+        let target = match off_v.is_empty() && !is_known {
+            true => Target::provisional(rows, 1, &self.finder.errors),
+            false => self.finder.target_of_rows(rows, &off_v),
+        };
         let Some(last) = self.last.take() else {
             self.rows = None;
             let search = self.finder.stands_out(&target);
             // A rough contact is better than none for the time of a search.
             if let Some(begun) = search.then(|| self.finder.glimpsed(&target)).flatten() {
                 self.rows = Some(Box::new(RowState::new(&begun, &target)));
+                self.is_provisional = target.is_provisional();
                 (self.last, self.is_stale, self.is_glimpsed) = (Some(begun), true, true);
             }
             return (target, search);
@@ -254,6 +264,7 @@ impl ContactFollower {
             latest.exchange(expected_v.as_deref(), self.expected_v());
             self.latest = Some(latest);
         }
+        self.is_provisional = target.is_provisional();
         self.calibrated = self.last.as_ref().and_then(|last| self.finder.calibrated(&last.fit, target));
         let Some(last) = &self.last else { return self.finder.stands_out(target) };
         self.searched =
