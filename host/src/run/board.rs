@@ -1,14 +1,21 @@
 //! What belongs to one detector: its baseline, the watch over its electrodes, and what follows touch on it.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use tactomo_board::baseline::Baseline;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, Method, SolveError};
+use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, Latest, Method, SolveError};
 
-use super::inbox::Taken;
+use super::inbox::{Rows, Taken};
 use super::maker::Order;
+
+/// Time for which rows that have waited are followed one after the other. A row of a contact takes 0.1 ms; of one that is as wide as a third of
+/// the detector, whose fields vary over it, 1 ms to 2 ms, which is more than there is from one to the next: 64 had waited then, and answers
+/// were up to 0.9 s old.
+const ROW_BY_ROW: Duration = Duration::from_millis(8);
 
 /// One detector at work.
 pub(super) struct BoardState {
@@ -85,19 +92,58 @@ impl BoardState {
 
     /// The follower's answer to a frame with such readings less the baseline; `None` while there is no follower.
     pub fn follow(&mut self, frame: &Taken, touch: &Readings) -> Result<Option<Followed>, SolveError> {
-        let rows: Vec<(Readings, u64)> =
-            frame.rows.iter().map(|rows| (self.touch(&rows.readings), rows.time_us)).collect();
+        let mut rows: VecDeque<Rows> = frame.rows.iter().cloned().collect();
+        rows.iter_mut().for_each(|rows| rows.readings = self.touch(&rows.readings));
         let Some(follower) = &mut self.follower else { return Ok(None) };
         if rows.is_empty() {
             self.rows_us = None;
             return follower.follow(touch).map(Some);
         }
+        let begun = Instant::now();
         let mut followed = None;
-        for (rows, time_us) in rows {
+        while let Some(Rows { readings, time_us }) = next_rows(&mut rows, begun.elapsed()) {
             let before_us = self.rows_us.replace(time_us).unwrap_or(time_us);
             let elapsed_s = 1e-6 * time_us.saturating_sub(before_us) as f64;
-            followed = Some(follower.follow_rows(&rows, touch, elapsed_s)?);
+            followed = Some(follower.follow_rows(&readings, touch, elapsed_s)?);
         }
         Ok(followed)
+    }
+}
+
+/// The next rows to follow, `spent` after the first of them: where they take too long, all that are left at once.
+fn next_rows(rows: &mut VecDeque<Rows>, spent: Duration) -> Option<Rows> {
+    let first = rows.pop_front()?;
+    if spent < ROW_BY_ROW {
+        return Some(first);
+    }
+    let newest_us = rows.back().map_or(first.time_us, |last| last.time_us);
+    let mut latest = Latest::new(first.readings.electrodes());
+    std::iter::once(first).chain(rows.drain(..)).for_each(|rows| latest.add(&rows.readings, 0.0, None));
+    Some(Rows { readings: latest.readings(f64::MAX, None), time_us: newest_us })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_physics::readings::Says;
+
+    /// Row `ground` of 4 electrodes.
+    fn rows(ground: usize, volts: f64, time_us: u64) -> Rows {
+        let says = |g: usize, _| if g == ground { Says::Voltage } else { Says::Nothing };
+        let readings = Readings::from_fn(4, |_, _| volts).saying(says);
+        Rows { readings, time_us }
+    }
+
+    #[test]
+    fn rows_that_take_too_long_are_followed_at_once_each_as_it_came_last() {
+        let mut waiting = VecDeque::from([rows(0, 0.1, 0), rows(1, 0.2, 700), rows(2, 0.3, 1400), rows(1, 0.4, 2100)]);
+        let first = next_rows(&mut waiting, Duration::ZERO).expect("the first");
+        assert_eq!((first, waiting.len()), (rows(0, 0.1, 0), 3), "one after the other");
+        let rest = next_rows(&mut waiting, ROW_BY_ROW).expect("the others");
+        assert_eq!(rest.time_us, 2100);
+        let said: Vec<_> = (0..4).map(|ground| rest.readings.says(ground, 0)).collect();
+        assert_eq!(said, [Says::Nothing, Says::Voltage, Says::Voltage, Says::Nothing]);
+        assert_eq!([rest.readings.at(1, 3), rest.readings.at(2, 0)], [0.4, 0.3]);
+        assert_eq!(next_rows(&mut waiting, ROW_BY_ROW), None);
     }
 }

@@ -14,6 +14,7 @@ mod maker;
 mod notice;
 pub mod plan;
 mod reader;
+mod scanned;
 pub mod scanning;
 mod searcher;
 mod statistics;
@@ -22,6 +23,7 @@ mod talk;
 pub use self::inbox::Taken;
 pub use self::maker::{Order, SolverState};
 pub use self::reader::run;
+pub use self::scanned::Scan;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -46,6 +48,8 @@ pub struct Snapshot {
     pub hello: Option<Hello>,
     /// The newest frame, if one has come.
     pub frame: Option<FrameSnapshot>,
+    /// Which rows are scanned.
+    pub scan: Scan,
     /// The solver, if there is to be one.
     pub solver: Option<SolverState>,
     /// Counts since the start.

@@ -23,6 +23,7 @@ use super::follower::FollowThread;
 use super::inbox::{Event, Inbox, Rows, Taken};
 use super::notice::NoticeBoard;
 use super::plan::{Ends, LiveError, Plan, Summary};
+use super::scanned::Scanned;
 use super::scanning::{PlanAsk, PlanWish};
 use super::talk::{PATIENCE, Talk};
 use super::{LinkState, Request};
@@ -44,6 +45,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     let listeners = std::mem::take(&mut plan.listeners);
     let folder = plan.folder.clone();
     let (wish, scan) = (Arc::new(PlanWish::default()), plan.scan.clone());
+    let scanned = Scanned::new(scan.clone());
     let start = |solving| FollowThread::start(solving, &inbox, &notice, listeners, folder, (scan, Arc::clone(&wish)));
     let started = solving.map(start).transpose();
     let follower = started.map_err(LiveError::Thread)?;
@@ -68,6 +70,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         closing: Vec::new(),
         lost: None,
         course: course.clone(),
+        scanned,
         latest: None,
         scan: PlanAsk::new(wish),
     };
@@ -127,6 +130,7 @@ struct Reader {
     closing: Vec<Closing>,
     lost: Option<RecordError>,
     course: Course,
+    scanned: Scanned,
     /// The latest of each reading, while the board sends rows.
     latest: Option<Latest>,
     /// The plan that the follower wishes, on its way to the board.
@@ -308,6 +312,7 @@ impl Reader {
         };
         let place = self.sequence.place(&frame.head);
         self.notice.count(|meter| meter.frame(received, place.dropped));
+        self.scanned.add(&frame.scope);
         if !frame.scope.is_whole() {
             self.scan.wish.count(place.dropped);
         }
@@ -416,8 +421,8 @@ impl Reader {
             self.notice.change(|snapshot| snapshot.refused = refusal.map(|refusal| refusal.to_string()));
             talk.refusal = refusal;
         }
-        let playing = link.playing();
-        self.notice.change(|snapshot| snapshot.playing = playing);
+        let (playing, scan) = (link.playing(), self.scanned.scan());
+        self.notice.change(|snapshot| (snapshot.playing, snapshot.scan) = (playing, scan));
         if !self.follows {
             self.notice.keep_fresh();
         }

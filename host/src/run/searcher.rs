@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread::{self, JoinHandle};
+use std::thread;
 
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{Lead, Look, Searcher};
@@ -21,10 +21,10 @@ enum Job {
     Look { order: Order, look: Look, readings: Readings },
 }
 
-/// The searching thread, seen from the follower: it does one thing at a time.
+/// The searching thread, seen from the follower: it does one thing at a time. It ends by itself once this is dropped, and nobody waits for what it still
+/// searches: the first search on a detector of 32 electrodes that is not known exactly takes a minute.
 pub(super) struct SearchThread {
-    jobs: Option<Sender<Job>>,
-    thread: Option<JoinHandle<()>>,
+    jobs: Sender<Job>,
     busy: bool,
     /// Counts what makes running searches useless: another solver, a jump.
     epoch: u64,
@@ -34,8 +34,8 @@ impl SearchThread {
     /// Starts it; what it finds goes to `inbox`.
     pub fn start(inbox: Arc<Inbox>, look: LookAtWires) -> std::io::Result<Self> {
         let (jobs, queue) = channel();
-        let thread = thread::Builder::new().name("searcher".to_owned()).spawn(move || work(&queue, &inbox, &look))?;
-        Ok(Self { jobs: Some(jobs), thread: Some(thread), busy: false, epoch: 0 })
+        thread::Builder::new().name("searcher".to_owned()).spawn(move || work(&queue, &inbox, &look))?;
+        Ok(Self { jobs, busy: false, epoch: 0 })
     }
 
     /// Searches with this half from now on; what is still searched with another is thrown away.
@@ -77,15 +77,7 @@ impl SearchThread {
 
     /// Whether the thread takes it.
     fn send(&self, job: Job) -> bool {
-        self.jobs.as_ref().is_some_and(|jobs| jobs.send(job).is_ok())
-    }
-}
-
-impl Drop for SearchThread {
-    fn drop(&mut self) {
-        drop(self.jobs.take());
-        // A panic of the thread was reported when it happened.
-        let _ = self.thread.take().map(JoinHandle::join);
+        self.jobs.send(job).is_ok()
     }
 }
 

@@ -7,7 +7,8 @@ use fantoccini::Locator;
 use fantoccini::key::Key;
 use tactomo::board::link::{Control, Playing};
 use tactomo::board::session::RequestedSettings;
-use tactomo::run::{LinkState, Request, Snapshot};
+use tactomo::run::scanning::ScanChoice;
+use tactomo::run::{LinkState, Request, Scan, Snapshot};
 use tactomo::scene::{Contact, SceneName};
 use tactomo::simulate::Fault;
 use tactomo::solve::FoundContact;
@@ -76,6 +77,35 @@ async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
         asks(&stage, Request::Settings(settings)).await?;
         stage.browser.click("rezero").await?;
         asks(&stage, Request::Rezero).await
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_board_card_says_which_rows_are_scanned() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let adaptive = |grounds: Vec<u8>, others| Scan { choice: ScanChoice::Adaptive, grounds, others };
+        for (scan, said) in [
+            (Scan::default(), "whole frames, 1\u{2009}400 frames/s"),
+            (
+                adaptive(vec![5, 6, 10], true),
+                "adaptive: grounds 5, 6, 10 and the others in turn, 1\u{2009}400 frames/s",
+            ),
+            (adaptive(Vec::new(), false), "adaptive: whole frames, 1\u{2009}400 frames/s"),
+            (
+                Scan { choice: ScanChoice::Grounds(vec![3]), grounds: vec![3], others: false },
+                "ground 3, 1\u{2009}400 frames/s",
+            ),
+        ] {
+            stage.behind.set(|snapshot| {
+                (snapshot.hello, snapshot.scan) = (Some(hello()), scan);
+                snapshot.statistics.frames_per_s = 1400.0;
+            });
+            status_shown().await;
+            let shown = "return [...document.querySelectorAll('#details dt')].find((term) => term.textContent === 'Scan').nextSibling.textContent";
+            let shown = stage.browser.run(shown).await?;
+            ensure!(shown == said, "{shown}");
+        }
+        Ok(())
     })
 }
 

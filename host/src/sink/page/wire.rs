@@ -15,8 +15,7 @@ use tactomo_protocol::Hello;
 use super::PageSetup;
 use super::calibrating::CalibratingMessage;
 use super::update::LAYOUT;
-use crate::run::SolverState;
-use crate::run::{Latency, LinkState, Snapshot};
+use crate::run::{Latency, LinkState, Scan, Snapshot, SolverState};
 use tactomo_board::link::Playing;
 use tactomo_physics::scene::SceneName;
 use tactomo_touch::solve::Method;
@@ -130,6 +129,7 @@ struct StatusMessage<'a> {
     r#type: &'static str,
     link: LinkMessage<'a>,
     hello: Option<HelloMessage<'a>>,
+    scan: ScanMessage<'a>,
     solver: Option<SolverStateMessage<'a>>,
     statistics: StatisticsMessage,
     vibration: Option<VibrationMessage>,
@@ -177,6 +177,17 @@ struct LinkMessage<'a> {
     reason: Option<&'a str>,
 }
 
+/// Which rows come.
+#[derive(Serialize)]
+struct ScanMessage<'a> {
+    /// As after `--scan`.
+    choice: String,
+    /// Grounds of the rows that come most; none if whole frames come.
+    grounds: &'a [u8],
+    /// Whether others have their turn between these.
+    others: bool,
+}
+
 #[derive(Serialize)]
 struct HelloMessage<'a> {
     board: &'a str,
@@ -215,6 +226,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         r#type: "status",
         link: link(&snapshot.link),
         hello: snapshot.hello.as_ref().map(hello),
+        scan: scan(&snapshot.scan),
         solver: snapshot.solver.as_ref().map(solver_state),
         statistics: StatisticsMessage {
             frames: counts.frames,
@@ -259,6 +271,10 @@ fn playing(playing: &Playing) -> PlayingMessage {
     }
 }
 
+fn scan(scan: &Scan) -> ScanMessage<'_> {
+    ScanMessage { choice: scan.choice.to_string(), grounds: &scan.grounds, others: scan.others }
+}
+
 fn solver_state(state: &SolverState) -> SolverStateMessage<'_> {
     SolverStateMessage {
         name: state.method.name(),
@@ -296,6 +312,7 @@ fn hello(hello: &Hello) -> HelloMessage<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::run::scanning::ScanChoice;
     use tactomo_physics::detector::Detector;
     use tactomo_physics::forward::ImageMesh;
 
@@ -362,6 +379,7 @@ mod tests {
             link: LinkState::Silent("no frames for 2 s".to_owned()),
             playing,
             recording: Some("touch.tactomo".into()),
+            scan: Scan { choice: ScanChoice::Adaptive, grounds: vec![5, 10], others: true },
             baseline: Some("Something pressed at the start.".to_owned()),
             calibration: Some("It was calibrated on another board.".to_owned()),
             ..Snapshot::default()
@@ -376,6 +394,7 @@ mod tests {
             })
         );
         assert_eq!(value["recording"], "touch.tactomo");
+        assert_eq!(value["scan"], serde_json::json!({"choice": "adaptive", "grounds": [5, 10], "others": true}));
         assert_eq!(value["baseline"], "Something pressed at the start.");
         assert_eq!(value["calibration"], "It was calibrated on another board.");
         assert_eq!(value["rezeros"], 3);

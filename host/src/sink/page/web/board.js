@@ -10,6 +10,14 @@ function rowOf([name, value]) {
   return [term, text];
 }
 
+// Which rows come, and how many frames of them: "adaptive: grounds 5, 10 and the others in turn, 1400 frames/s".
+function scanned({ choice, grounds, others }, rate) {
+  const named = choice === "adaptive" || choice === "four" ? `${choice}: ` : "";
+  const turns = others ? " and the others in turn" : "";
+  const rows = grounds.length ? `${grounds.length > 1 ? "grounds" : "ground"} ${grounds.join(", ")}${turns}` : "whole frames";
+  return `${named}${rows}, ${count(rate)} frames/s`;
+}
+
 /** Shows the board and asks it for other settings through `send`. */
 export class Board {
   constructor(setup, send) {
@@ -25,7 +33,7 @@ export class Board {
       send({ settings: this.#asked() });
     };
     this.#showSource();
-    this.show({ hello: null, playing: { kind: "board" } });
+    this.show({ hello: null, scan: null, statistics: null, playing: { kind: "board" } });
   }
 
   #asked() {
@@ -46,7 +54,7 @@ export class Board {
   }
 
   /** Shows a status message. */
-  show({ hello, playing }) {
+  show({ hello, scan, statistics, playing }) {
     const { setup } = this;
     this.form.hidden = !hello || playing.kind === "recording";
     const [width, height] = [0, 1].map((k) => fixed((setup.bounds_m[1][k] - setup.bounds_m[0][k]) * 1e3, 0));
@@ -54,6 +62,7 @@ export class Board {
       ["Source", setup.source],
       ["Board", hello ? `${hello.board}, firmware ${hello.firmware}` : "has not answered yet"],
       ["Converter", hello ? `${hello.adc_bits} bits of ${fixed(hello.full_scale_v, 2)} V; drive ${fixed(hello.drive_v, 2)} V` : ""],
+      ["Scan", hello ? scanned(scan, statistics.frames_per_s) : ""],
       ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes`],
       ["Images", `${count(setup.nodes_m.length)} nodes`],
     ];

@@ -29,6 +29,9 @@ impl ContactFinder {
 
     /// The explanation, or what is left of it without the contacts that may not be there if that is more likely; `None` if nothing is.
     pub(super) fn without_weak(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+        if target.is_silent() {
+            return None;
+        }
         let weak = self.weak(&found.fit);
         if weak.is_empty() && !self.is_misfit(&found.fit, target) {
             return Some(found);

@@ -223,7 +223,12 @@ impl ContactFinder {
 
     /// Whether it is known by now what the readings of a provisional target may be off by together.
     pub fn is_outdated(&self, target: &Target) -> bool {
-        target.is_provisional() && self.problem.made_already().is_some()
+        target.is_provisional() && self.knows_unknowns()
+    }
+
+    /// Whether it is known by now what readings may be off by together.
+    pub fn knows_unknowns(&self) -> bool {
+        self.problem.made_already().is_some()
     }
 
     /// What averages frames that stand still.

@@ -6,6 +6,7 @@ use super::*;
 use crate::solve::{Followed, Parts, Solver};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{Resolution, Slab, readings_v};
+use tactomo_physics::readings::Range;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, measured};
 
@@ -123,4 +124,51 @@ fn a_scene_that_stands_still_is_searched_only_when_its_frames_have_doubled() {
         }
     }
     assert!((6..9).contains(&searched), "{searched}: with 1, 2, 4, 8, 16, 32 frames");
+}
+
+/// An ESP32 reads no lower than about this (V).
+const FLOOR_V: f64 = 0.14;
+
+/// A frame of a board that reads nothing below [`FLOOR_V`].
+fn above_floor(bench: &mut Bench) -> Readings {
+    let n = detector().electrodes.len();
+    let frame = bench.frame();
+    let clipped = Readings::from_fn(n, |g, e| frame.at(g, e).max(FLOOR_V));
+    clipped.within(&vec![Range { floor_v: FLOOR_V, ceiling_v: f64::INFINITY }; n])
+}
+
+/// Sheet conductances of a contact that lifts slowly, as a finger does: below 0.04 it is below the range.
+fn lifting() -> impl Iterator<Item = f64> {
+    (0..150).map(|frame| 0.3 * 0.96f64.powi(frame))
+}
+
+#[test]
+fn a_contact_that_lifts_below_the_converters_range_is_gone() {
+    let mut bench = Bench::new();
+    let mut count = |sheets| {
+        bench.touch(&[contact(0.007, -0.004, sheets)]);
+        let frame = above_floor(&mut bench);
+        bench.solver.solve(&frame).unwrap().contacts.len()
+    };
+    let counts: Vec<_> = lifting().map(&mut count).collect();
+    assert!(
+        counts[..20].iter().all(|count| *count == 1) && counts[120..].iter().all(|count| *count == 0),
+        "{counts:?}"
+    );
+}
+
+#[test]
+fn a_contact_that_lifts_below_the_converters_range_is_gone_in_rows_too() {
+    let mut bench = Bench::new();
+    let mut count = |(index, sheets)| {
+        bench.touch(&[contact(0.007, -0.004, sheets)]);
+        let frame = above_floor(&mut bench);
+        let row = frame.clone().hiding(|ground, _| ground != index % 16);
+        bench.solver.solve_rows(&row, &frame, 2e-3).unwrap().contacts.len()
+    };
+    let counts: Vec<_> = lifting().enumerate().map(&mut count).collect();
+    assert!(
+        counts[..20].iter().all(|count| *count == 1) && counts[120..].iter().all(|count| *count == 0),
+        "{counts:?}"
+    );
 }

@@ -11,7 +11,7 @@ use crate::solve::follow::{Followed, Follower, Lead, Parts, Searcher, follow_and
 use crate::solve::latest::Latest;
 use crate::solve::still::{Mean, Still};
 use crate::solve::track::Tracker;
-use crate::solve::{FoundContact, Problem, Solution, SolveError, Solver};
+use crate::solve::{Calibrated, FoundContact, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
@@ -46,6 +46,12 @@ pub(in crate::solve) struct ContactFollower {
     latest: Option<Latest>,
     /// Whether what is followed was found in some of the rows only.
     is_glimpsed: bool,
+    /// Time for which no row has said more than that its readings are below the converter's range (s).
+    silent_s: f64,
+    /// Whether it was found when what the readings may be off by together was not known yet.
+    is_provisional: bool,
+    /// What a calibration would bring, as all readings told of what is followed.
+    calibrated: Option<Calibrated>,
     tracker: Tracker,
     /// The tracker before this frame: a frame that has several answers is one frame.
     before: Tracker,
@@ -100,6 +106,9 @@ impl ContactFollower {
             rows: None,
             latest: None,
             is_glimpsed: false,
+            silent_s: 0.0,
+            is_provisional: false,
+            calibrated: None,
             before,
             tracker,
         }
@@ -151,15 +160,25 @@ impl ContactFollower {
     pub fn follow_rows(&mut self, rows: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
         self.finder.check(rows)?;
         let (target, search) = self.step(rows, elapsed_s);
+        self.silent_s = if target.is_silent() { self.silent_s + elapsed_s } else { 0.0 };
+        if self.silent_s > OLDEST_S {
+            // The lightest contact that was seen would not be seen any more either.
+            (self.last, self.rows, self.is_stale) = (None, None, false);
+        }
         let mut latest = self.latest.take().unwrap_or_else(|| Latest::new(rows.electrodes()));
         if !search && self.last.is_none() {
             // What presses next begins with its first rows.
             latest.forget();
         }
         latest.add(rows, elapsed_s, self.expected_v());
-        let search = search || self.is_glimpsed && latest.is_whole(OLDEST_S);
+        let is_outdated = self.last.is_some() && self.is_provisional && self.finder.knows_unknowns();
+        let search = search || is_outdated || self.is_glimpsed && latest.is_whole(OLDEST_S);
         self.latest = Some(latest);
-        Ok(Followed { solution: self.solution(&target), search })
+        let mut solution = self.solution(&target);
+        // A few rows do not tell it: what all readings are off by was taken off them.
+        solution.calibrated = self.calibrated.filter(|_| self.last.is_some());
+        solution.flags.calibrate = solution.calibrated.is_some();
+        Ok(Followed { solution, search })
     }
 
     /// Takes note of what a search has looked at.
@@ -185,13 +204,19 @@ impl ContactFollower {
     fn step(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
         self.before = self.tracker.clone();
         let off_v = |state: &Option<Box<RowState>>| state.as_ref().map_or(Vec::new(), |state| state.off_v().to_vec());
-        let target = self.finder.target_of_rows(rows, &off_v(&self.rows));
+        let off_v = off_v(&self.rows);
+        let is_known = self.finder.knows_unknowns() && !(self.is_provisional && self.last.is_some());
+        let target = match off_v.is_empty() && !is_known {
+            true => Target::provisional(rows, 1, &self.finder.errors),
+            false => self.finder.target_of_rows(rows, &off_v),
+        };
         let Some(last) = self.last.take() else {
             self.rows = None;
             let search = self.finder.stands_out(&target);
             // A rough contact is better than none for the time of a search.
             if let Some(begun) = search.then(|| self.finder.glimpsed(&target)).flatten() {
                 self.rows = Some(Box::new(RowState::new(&begun, &target)));
+                self.is_provisional = target.is_provisional();
                 (self.last, self.is_stale, self.is_glimpsed) = (Some(begun), true, true);
             }
             return (target, search);
@@ -239,6 +264,8 @@ impl ContactFollower {
             latest.exchange(expected_v.as_deref(), self.expected_v());
             self.latest = Some(latest);
         }
+        self.is_provisional = target.is_provisional();
+        self.calibrated = self.last.as_ref().and_then(|last| self.finder.calibrated(&last.fit, target));
         let Some(last) = &self.last else { return self.finder.stands_out(target) };
         self.searched =
             Searched { excess: (left.min(last.fit.cost) - self.finder.freedom(&last.fit, target)).max(0.0), frames };

@@ -155,6 +155,14 @@ impl Target {
         Cow::Owned(target)
     }
 
+    /// Whether every reading says no more than that it is below the converter's range, as where nothing touches. A contact that has become lighter
+    /// than the range shows keeps all these bounds too, and would stay for ever at the last conductance at which it did not.
+    pub fn is_silent(&self) -> bool {
+        let is_read = |says: &&Says| **says != Says::Nothing;
+        let mut read = self.says.iter().filter(is_read).peekable();
+        read.peek().is_some() && read.all(|says| *says == Says::AtMost)
+    }
+
     /// How far a reading is from a predicted one (V): of a bound, by as much as that breaks it.
     fn left(&self, i: usize, predicted_v: f64) -> f64 {
         let left = self.volts[i] - predicted_v - self.error.mean_v.get(i).copied().unwrap_or_default();
