@@ -5,8 +5,8 @@
 
 use super::*;
 use crate::solve::follow::follow_rows_and_search;
-use crate::solve::{Parts, Solver};
 use crate::solve::latest::Latest;
+use crate::solve::{Parts, Solver};
 use tactomo_physics::detector::{Adc, ConverterErrors, Detector};
 use tactomo_physics::forward::{Resolution, Slab, readings_v};
 use tactomo_physics::hertz::Hertz;
@@ -265,19 +265,20 @@ impl Coverage {
         self.pairs_m.iter().filter(is_within).count() as f64 / self.pairs_m.len() as f64
     }
 
-    /// What is claimed over what it is, in the root of the mean squares.
-    fn caution(&self) -> f64 {
-        let [off, claimed] = [0, 1].map(|which| self.pairs_m.iter().map(|pair| pair[which].powi(2)).sum::<f64>());
-        (claimed / off).sqrt()
+    /// Root mean squares of the errors and of the standard errors (m).
+    fn roots_m(&self) -> [f64; 2] {
+        let squares_m2 = |which: usize| self.pairs_m.iter().map(|pair| pair[which].powi(2)).sum::<f64>();
+        [0, 1].map(|which| (squares_m2(which) / self.pairs_m.len() as f64).sqrt())
     }
 
     /// Of normal errors 68 and 95 % are within one and two standard errors.
     fn check(&self, what: &str) {
-        let (one, two, caution) = (self.within(1.0), self.within(2.0), self.caution());
-        let told = format!("{what}: {one:.2} {two:.2}, claimed {caution:.2} of true, {} missed", self.missed);
+        let (one, two, [off_m, claimed_m]) = (self.within(1.0), self.within(2.0), self.roots_m());
+        let told =
+            format!("{what}: {one:.2} {two:.2}, off by {off_m:.1e} m of {claimed_m:.1e}, {} missed", self.missed);
         println!("{told}");
         assert!(one > 0.6 && two > 0.9, "{told}");
-        assert!(caution < 3.0, "{told}");
+        assert!(claimed_m < 3.0 * off_m, "{told}");
         assert!(20 * self.missed <= self.answers, "{told}");
     }
 }

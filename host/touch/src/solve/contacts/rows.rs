@@ -56,7 +56,13 @@ impl RowState {
     /// From an explanation by all readings of `target`.
     pub fn new(found: &Explanation, target: &Target) -> Self {
         let off_v = if target.error().is_some() { target.likely_off_v(&found.fit.volts) } else { Vec::new() };
-        Self { bank: Bank::new(found.fit.normal.clone()), staying: Staying::new(&found.fit, target), off_v, unfit: 0, gone: 0.0 }
+        Self {
+            bank: Bank::new(found.fit.normal.clone()),
+            staying: Staying::new(&found.fit, target),
+            off_v,
+            unfit: 0,
+            gone: 0.0,
+        }
     }
 
     /// Whether what is followed fits the newest rows.
@@ -98,7 +104,7 @@ impl ContactFinder {
             return Step::Gone;
         }
         let search = state.unfit >= FRAMES;
-        state.staying.add(&fit, target, &self.errors, self.spacing_m);
+        state.staying.add((&fit, state.bank.is_still()), target, &self.errors, self.spacing_m);
         let known = state.bank.information();
         let stays = state.staying.covariance(&fit);
         let told = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
