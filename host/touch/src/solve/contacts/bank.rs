@@ -89,6 +89,7 @@ impl Bank {
     }
 
     /// Whether the contacts are believed to stand.
+    #[cfg(test)]
     pub fn is_still(&self) -> bool {
         self.best == 0
     }

@@ -104,7 +104,7 @@ impl ContactFinder {
             return Step::Gone;
         }
         let search = state.unfit >= FRAMES;
-        state.staying.add((&fit, state.bank.is_still()), target, &self.errors, self.spacing_m);
+        state.staying.add(&fit, target, &self.errors, self.spacing_m);
         let known = state.bank.information();
         let stays = state.staying.covariance(&fit);
         let told = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());

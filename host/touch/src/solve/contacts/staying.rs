@@ -16,11 +16,10 @@ use super::target::{Errors, Target};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::space::{Place, distance};
 
-/// Every so many frames it is reckoned, so that each row of a plan of 32 frames has its turn; and what is left of that after each: of a still
-/// contact over about the time in which it is averaged, of one that moves over fewer rows, as it is told by fewer.
+/// Every so many frames it is reckoned, so that each row of a plan of 32 frames has its turn; and what is left of that after each: about the
+/// time over which a still contact is averaged.
 const LOOKED_AT: u32 = 7;
 const KEPT: f64 = 0.97;
-const KEPT_MOVING: f64 = 0.8;
 /// Share of a model's own error that each reading has by itself. Of `square-60` the slab that is inverted and the finest are apart by
 /// 0.00002 to 0.00006 of the largest reading, but for pads and contact; taken as 0.0003 for any detector.
 const OWN: f64 = 0.3;
@@ -65,8 +64,8 @@ impl Staying {
         }
     }
 
-    /// Takes the rows of a target into account, of contacts that stand or not, on a detector whose electrodes are `spacing_m` (m) apart.
-    pub fn add(&mut self, (fit, is_still): (&DiscFit, bool), target: &Target, errors: &Errors, spacing_m: f64) {
+    /// Takes the rows of a target into account, on a detector whose electrodes are `spacing_m` (m) apart.
+    pub fn add(&mut self, fit: &DiscFit, target: &Target, errors: &Errors, spacing_m: f64) {
         let is_looked_at = self.frames.is_multiple_of(LOOKED_AT);
         self.frames += 1;
         if !is_looked_at {
@@ -76,9 +75,8 @@ impl Staying {
         let pulls = pulls(fit, target, &units);
         let slopes = DMatrix::from_fn(pulls.ncols(), units.len(), |reading, i| fit.slopes_v()[i][reading] / units[i]);
         let frames = f64::from(LOOKED_AT);
-        let kept = if is_still { KEPT } else { KEPT_MOVING };
-        self.information = kept * &self.information + frames * &pulls * slopes;
-        self.pulls = kept * &self.pulls + frames * pulls;
+        self.information = KEPT * &self.information + frames * &pulls * slopes;
+        self.pulls = KEPT * &self.pulls + frames * pulls;
         if let Some(covariance) = self.reckoned(fit, target, errors, spacing_m) {
             self.covariance = covariance;
         }
