@@ -78,8 +78,8 @@ impl<const WIRE: usize> Default for Uplink<WIRE> {
 }
 
 impl<const WIRE: usize> Uplink<WIRE> {
-    /// Queues an answer or a fault; returns whether there was room. Without it the message is lost: the host has left more than
-    /// four of them unread.
+    /// Queues an answer or a fault; returns whether there was room. Without it the message is lost: the host has left
+    /// several of them unread.
     pub fn message(&mut self, message: &BoardMessage) -> bool {
         let mut packet = [0; CONTROL_PACKET];
         let Ok(length) = encode_board(message, &mut packet) else { return false };

@@ -12,10 +12,10 @@ use tactomo_board::link::{Control, Link, Source};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::{Closing, RecordError, Recorder};
 use tactomo_board::sequence::Sequence;
-use tactomo_board::session::{self, GreetError, PlanState};
+use tactomo_board::session::{self, GreetError};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::SceneName;
-use tactomo_protocol::{self as protocol, BoardMessage, DecodeError, Frame, Hello};
+use tactomo_protocol::{BoardMessage, DecodeError, Frame, Hello};
 use tactomo_touch::solve::Latest;
 
 use super::course::Course;
@@ -23,7 +23,7 @@ use super::follower::FollowThread;
 use super::inbox::{Event, Inbox, Rows, Taken};
 use super::notice::NoticeBoard;
 use super::plan::{Ends, LiveError, Plan, Summary};
-use super::scanning::PlanWish;
+use super::scanning::{PlanAsk, PlanWish};
 use super::talk::{PATIENCE, Talk};
 use super::{LinkState, Request};
 
@@ -69,9 +69,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         lost: None,
         course: course.clone(),
         latest: None,
-        wish,
-        scan: None,
-        is_refused: false,
+        scan: PlanAsk::new(wish),
     };
     reader.show_recording();
     let ended = reader.run(source);
@@ -131,10 +129,8 @@ struct Reader {
     course: Course,
     /// The latest of each reading, while the board sends rows.
     latest: Option<Latest>,
-    /// The plan that the follower wishes, the one that was asked of the board, and whether the board has refused plans.
-    wish: Arc<PlanWish>,
-    scan: Option<protocol::Plan>,
-    is_refused: bool,
+    /// The plan that the follower wishes, on its way to the board.
+    scan: PlanAsk,
 }
 
 /// Who has said Hello, and what its frames mean.
@@ -188,16 +184,14 @@ impl Reader {
     /// Talks with the board on `link` to the end.
     fn talk(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
         let mut talk = Talk::new(self.plan.settings);
-        if let Some(plan) = &self.scan {
-            talk.session.request_plan(Some(plan.clone()));
-        }
+        self.scan.ask_again(&mut talk.session);
         let mut buffer = [0; READ_BYTES];
         self.sequence.restart();
         self.latest = None;
         self.enter(LinkState::Waiting);
         while !self.is_over() {
             self.answer_requests(Some((&mut *link, &mut talk)));
-            self.ask_for_plan(&mut talk);
+            self.scan.ask(&mut talk.session);
             match talk.exchange(link, &mut buffer) {
                 Ok(count) => {
                     if link.jumped() {
@@ -216,22 +210,6 @@ impl Reader {
             self.show_link(link, &mut talk);
         }
         Ok(End::Stopped)
-    }
-
-    /// Asks the board for the rows that are wished, as far as it takes plans at all.
-    fn ask_for_plan(&mut self, talk: &mut Talk) {
-        if let Some(plan) = self.wish.take() {
-            talk.session.request_plan(Some(plan.clone()));
-            self.scan = Some(plan);
-        }
-        let is_refused = self.scan.is_some() && talk.session.plan_state() == PlanState::Refused;
-        if is_refused && !self.is_refused {
-            tracing::warn!(
-                "the board takes no scan plans, so it goes on with whole frames: its firmware is older than this program"
-            );
-        }
-        self.is_refused = is_refused;
-        self.wish.set_refused(is_refused);
     }
 
     /// No board has answered: at the start that is an error, later it may come back.
@@ -331,7 +309,7 @@ impl Reader {
         let place = self.sequence.place(&frame.head);
         self.notice.count(|meter| meter.frame(received, place.dropped));
         if !frame.scope.is_whole() {
-            self.wish.count(place.dropped);
+            self.scan.wish.count(place.dropped);
         }
         if !self.follows {
             return;

@@ -1,13 +1,14 @@
 //! From readings back to touch, and how right that is.
 //!
 //! [`solve`] has the solvers, one file a method, one trait; [`calibrate`] what fits a detector's description to the one that was built;
-//! [`metrics`] the figures that solvers are judged by; [`mod@pointer`] makes motion and clicks of a contact, [`vibration`] spectra of readings; [`schema`] has the names of what leaves the program. None of them knows of boards, ports or
-//! pages.
+//! [`metrics`] the figures that solvers are judged by; [`mod@pointer`] makes motion and clicks of a contact, [`vibration`] spectra of readings;
+//! [`scanning`] chooses which rows to read; [`schema`] has the names of what leaves the program. None of them knows of boards, ports or pages.
 
 pub mod calibrate;
 mod gaussian;
 pub mod metrics;
 pub mod pointer;
+pub mod scanning;
 pub mod schema;
 pub mod solve;
 pub mod student;

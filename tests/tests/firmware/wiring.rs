@@ -10,7 +10,9 @@ const ESP32_MAIN: &str = include_str!("../../../firmware/boards/esp32/src/main.r
 const ESP32_LINE: &str = include_str!("../../../firmware/boards/esp32/src/line.rs");
 const ESP32_CONFIG: &str = include_str!("../../../firmware/boards/esp32/.cargo/config.toml");
 const ESP32C3_MAIN: &str = include_str!("../../../firmware/boards/esp32c3/src/main.rs");
-const ESP32C3_INPUT: &str = include_str!("../../../firmware/boards/espressif/src/one_input.rs");
+const ESP32C6_MAIN: &str = include_str!("../../../firmware/boards/esp32c6/src/main.rs");
+const STM32_MAIN: &str = include_str!("../../../firmware/boards/stm32f405/src/main.rs");
+const ONE_INPUT: &str = include_str!("../../../firmware/boards/espressif/src/one_input.rs");
 const CHIP: &str = include_str!("../../../firmware/boards/espressif/src/chip.rs");
 
 /// Cells of the page's table rows, without ends and quotes.
@@ -77,15 +79,19 @@ fn the_esp32_reads_each_electrode_at_the_pin_that_the_page_says() {
 fn the_multiplexer_is_wired_as_the_page_says() {
     let address = row("A0, A1, A2, A3");
     assert_eq!(outputs(between(ESP32_MAIN, "let address = [", "];")), numbers(&address[1]));
-    assert_eq!(outputs(between(ESP32C3_MAIN, "let address = [", "];")), numbers(&address[3]));
+    let ports = between(STM32_MAIN, "let address = [", "];").split("b.pb").skip(1).map(|pin| numbers(pin)[0]);
+    assert_eq!(ports.collect::<Vec<_>>(), numbers(&address[2]));
     assert_eq!(outputs(between(ESP32_MAIN, "Enabled::new(", ";")), [numbers(&row("EN")[1])[0]]);
-    for (pin, field) in [("WR", "wr: "), ("CSA", "csa: "), ("CSB", "csb: ")] {
-        assert_eq!(outputs(between(ESP32C3_MAIN, field, ")")), numbers(&row(pin)[3]), "{pin}");
-        assert!(row(pin)[1].starts_with("ground"), "{pin} of the transparent wiring");
+    for (main, column) in [(ESP32C3_MAIN, 3), (ESP32C6_MAIN, 4)] {
+        assert_eq!(outputs(between(main, "let address = [", "];")), numbers(&address[column]));
+        for (pin, field) in [("WR", "wr: "), ("CSA", "csa: "), ("CSB", "csb: ")] {
+            assert_eq!(outputs(between(main, field, ")")), numbers(&row(pin)[column]), "{pin}");
+            assert!(row(pin)[1].starts_with("ground"), "{pin} of the transparent wiring");
+        }
+        let input = numbers(between(main, "Input::new(chip.ADC1, chip.GPIO", ")"));
+        assert_eq!(input, [numbers(&row("DB")[column])[0]]);
+        assert!(ONE_INPUT.contains(&format!("AdcPin<GPIO{}<", input[0])));
     }
-    let input = numbers(between(ESP32C3_MAIN, "Input::new(chip.ADC1, chip.GPIO", ")"));
-    assert_eq!(input, [numbers(&row("DB")[3])[0]]);
-    assert!(ESP32C3_INPUT.contains(&format!("AdcPin<GPIO{}<", input[0])));
 }
 
 #[test]

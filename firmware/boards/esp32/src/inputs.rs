@@ -8,13 +8,12 @@ use esp_hal::peripherals::{
     ADC1, ADC2, GPIO0, GPIO2, GPIO4, GPIO12, GPIO13, GPIO14, GPIO15, GPIO25, GPIO26, GPIO27, GPIO32, GPIO33, GPIO34,
     GPIO35, GPIO36, GPIO39,
 };
+use tactomo_board_espressif::ELECTRODES;
 use tactomo_board_espressif::analog::{ATTENUATION, millivolts, range};
 use tactomo_firmware::{Adc, Row, Sampler, TimedOut};
 
 use crate::converters::{Channel, Converters};
 
-/// Electrodes of the board.
-pub const ELECTRODES: u8 = 16;
 /// Electrodes at ADC1, which come first.
 const ADC1_ELECTRODES: u8 = 6;
 /// GPIO of each channel of ADC1 (37 and 38 are not on the module), from the chip's data sheet.

@@ -9,13 +9,12 @@ mod inputs;
 mod line;
 
 use esp_hal::clock::CpuClock;
-use esp_hal::gpio::{Level, Output, OutputConfig, OutputPin};
 use esp_hal::timer::timg::TimerGroup;
-use tactomo_board_espressif::{EspChip, boot_fault, brown_out};
+use tactomo_board_espressif::{EspChip, brown_out, output, run};
+use tactomo_firmware::Parts;
 use tactomo_firmware::mux::{Enabled, Transparent};
-use tactomo_firmware::{Board16, Identity, Parts};
 
-use crate::inputs::{ELECTRODES, InputPins, Inputs};
+use crate::inputs::{InputPins, Inputs};
 use crate::line::UartLine;
 
 esp_bootloader_esp_idf::esp_app_desc!();
@@ -50,26 +49,5 @@ fn main() -> ! {
         serial: UartLine::new(chip.UART0, chip.GPIO1, chip.GPIO3),
         chip: EspChip::new(TimerGroup::new(chip.TIMG0)),
     };
-    let adc = inputs::adc();
-    let identity = Identity {
-        firmware_version: env!("CARGO_PKG_VERSION"),
-        board: "esp32",
-        electrodes: ELECTRODES,
-        adc,
-        drive_mv: 2000,
-    };
-    let mut board = match Board16::new(parts, identity) {
-        Ok(board) => board,
-        Err(_) => panic!("the board's identity does not fit the protocol"),
-    };
-    adc.ranges.iter().filter(|range| range.electrodes > 0).for_each(|range| {
-        defmt::info!("{=u8} electrodes from {=u16} to {=u16} mV", range.electrodes, range.floor, range.ceiling);
-    });
-    boot_fault().into_iter().for_each(|fault| board.report(fault));
-    match board.run() {}
-}
-
-/// An output that is high at first, so that the multiplexer's EN stays off.
-fn output<'d>(pin: impl OutputPin + 'd) -> Output<'d> {
-    Output::new(pin, Level::High, OutputConfig::default())
+    run("esp32", inputs::adc(), parts)
 }

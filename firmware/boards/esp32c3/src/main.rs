@@ -5,13 +5,12 @@
 #![no_main]
 
 use esp_hal::clock::CpuClock;
-use esp_hal::gpio::{Level, Output, OutputConfig, OutputPin};
 use esp_hal::timer::timg::TimerGroup;
-use tactomo_board_espressif::one_input::{ELECTRODES, OneInput};
+use tactomo_board_espressif::one_input::OneInput;
 use tactomo_board_espressif::usb_line::UsbLine;
-use tactomo_board_espressif::{EspChip, boot_fault};
+use tactomo_board_espressif::{EspChip, output, run};
+use tactomo_firmware::Parts;
 use tactomo_firmware::mux::{LatchLines, Latched};
-use tactomo_firmware::{Board16, Identity, Parts};
 
 esp_bootloader_esp_idf::esp_app_desc!();
 
@@ -27,25 +26,5 @@ fn main() -> ! {
         serial: UsbLine::new(chip.USB_DEVICE),
         chip: EspChip::new(TimerGroup::new(chip.TIMG0)),
     };
-    let adc = OneInput::adc();
-    let identity = Identity {
-        firmware_version: env!("CARGO_PKG_VERSION"),
-        board: "esp32c3",
-        electrodes: ELECTRODES,
-        adc,
-        drive_mv: 2000,
-    };
-    let mut board = match Board16::new(parts, identity) {
-        Ok(board) => board,
-        Err(_) => panic!("the board's identity does not fit the protocol"),
-    };
-    let range = adc.ranges[0];
-    defmt::info!("the ADC sees {=u16} to {=u16} mV", range.floor, range.ceiling);
-    boot_fault().into_iter().for_each(|fault| board.report(fault));
-    match board.run() {}
-}
-
-/// An output that is high at first, so that the latches stay closed.
-fn output<'d>(pin: impl OutputPin + 'd) -> Output<'d> {
-    Output::new(pin, Level::High, OutputConfig::default())
+    run("esp32c3", OneInput::adc(), parts)
 }

@@ -10,15 +10,55 @@ pub mod one_input;
 #[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
 pub mod usb_line;
 
+use core::convert::Infallible;
 use core::panic::PanicInfo;
 
+use esp_hal::gpio::{Level, Output, OutputConfig, OutputPin};
 use esp_hal::ram;
 use esp_hal::rtc_cntl::SocResetReason;
 use heapless::String;
 use tactomo_board_common::{PanicRecord, RECORD_BYTES};
+use tactomo_firmware::mux::Mux;
+use tactomo_firmware::{Adc, Board16, Chip, Identity, Parts, Sampler, Serial};
 use tactomo_protocol::Fault;
 
 pub use chip::EspChip;
+
+/// Electrodes of each of these boards.
+pub const ELECTRODES: u8 = 16;
+/// What the pull-ups are driven at: the linear part of the ADC's range.
+const DRIVE_MV: u16 = 2000;
+
+/// Runs a board of that name: tells what led to the last reset, answers and scans, and never returns.
+pub fn run<M, S, L, C>(name: &str, adc: Adc, parts: Parts<M, S, L, C>) -> !
+where
+    M: Mux<Error = Infallible>,
+    S: Sampler,
+    L: Serial,
+    C: Chip,
+{
+    let identity = Identity {
+        firmware_version: env!("CARGO_PKG_VERSION"),
+        board: name,
+        electrodes: ELECTRODES,
+        adc,
+        drive_mv: DRIVE_MV,
+    };
+    let mut board = match Board16::new(parts, identity) {
+        Ok(board) => board,
+        Err(_) => panic!("the board's identity does not fit the protocol"),
+    };
+    adc.ranges.iter().filter(|range| range.electrodes > 0).for_each(|range| {
+        defmt::info!("{=u8} electrodes from {=u16} to {=u16} mV", range.electrodes, range.floor, range.ceiling);
+    });
+    boot_fault().into_iter().for_each(|fault| board.report(fault));
+    match board.run() {}
+}
+
+/// An output that is high at first, so that the multiplexer's enable or latches stay closed.
+pub fn output<'d>(pin: impl OutputPin + 'd) -> Output<'d> {
+    Output::new(pin, Level::High, OutputConfig::default())
+}
 
 /// Memory that every reset but power-on leaves alone.
 #[ram(unstable(rtc_fast, persistent))]
@@ -37,7 +77,7 @@ fn panic(panic: &PanicInfo) -> ! {
 }
 
 /// What went wrong before this boot, if something did.
-pub fn boot_fault() -> Option<Fault> {
+fn boot_fault() -> Option<Fault> {
     if let Some(text) = panic_record().take() {
         return Some(Fault::Panic(text));
     }

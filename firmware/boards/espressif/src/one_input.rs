@@ -5,10 +5,8 @@ use esp_hal::analog::adc::{Adc as Driver, AdcCalCurve, AdcConfig, AdcPin, Regist
 use esp_hal::peripherals::{ADC1, GPIO0};
 use tactomo_firmware::{Adc, Sampler, TimedOut};
 
+use crate::ELECTRODES;
 use crate::analog::{ATTENUATION, MAX_POLLS, millivolts, range};
-
-/// Electrodes of the board.
-pub const ELECTRODES: u8 = 16;
 
 /// ADC1 and its calibrated pin.
 pub struct OneInput<'d> {

@@ -7,7 +7,7 @@
 
 mod follow;
 mod judge;
-mod round;
+mod rest_rounds;
 mod state;
 #[cfg(test)]
 mod tests;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use self::follow::Following;
 use self::judge::{Absolute, Judge};
-use self::round::Round;
+use self::rest_rounds::RestRounds;
 pub use self::state::{BaselineState, LASTING_S};
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::readings::Readings;
@@ -39,7 +39,7 @@ pub struct Baseline {
     /// Whether it was ever taken.
     held: bool,
     /// Rows that have come since all were read.
-    round: Round,
+    rounds: RestRounds,
     /// What knows and follows the detector; nothing where a person has said which frames are the baseline.
     known: Option<Known>,
 }
@@ -87,7 +87,7 @@ impl Baseline {
             taking: (!held).then(|| Taking::new(frames, false)),
             state: if held { BaselineState::Held } else { BaselineState::Starting },
             held,
-            round: Round::new(0),
+            rounds: RestRounds::default(),
             known: None,
         }
     }
@@ -136,13 +136,13 @@ impl Baseline {
     /// Takes rows into account, the others of which say nothing: as a frame, once all were read. Whether the state has changed, and the
     /// frame if there is one.
     pub fn add_rows(&mut self, rows: &Readings, time_s: f64, left_out: &[usize]) -> (bool, Option<Readings>) {
-        let Some(round) = self.round.add(rows, self.rest.mean_v(), time_s) else { return (false, None) };
+        let Some(round) = self.rounds.add(rows, self.rest.mean_v(), time_s) else { return (false, None) };
         (self.add(&round.touches_v(), 1, time_s, left_out), Some(round))
     }
 
     /// Whether the last of such frames differs from the one before by no more than noise of that deviation (V).
     pub fn is_still(&self, noise_v: f64) -> bool {
-        self.round.is_still(noise_v)
+        self.rounds.is_still(noise_v)
     }
 
     /// One step of taking it.

@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
 use tactomo::board::identity;
-use tactomo::calibrate::{Frame, Rounds, Rub, RubSettings, rub};
+use tactomo::calibrate::{Frame, Rub, RubSettings, rub};
 use tactomo::date::today;
 use tactomo::detector::Detector;
+use tactomo::readings::{Readings, Rounds};
 use tactomo::solve::Method;
 
 use super::known::{KnownPlace, check_places, check_used, places};
@@ -104,7 +105,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
     if let Some(path) = &args.places {
         known.extend(places(path, is_recording)?);
     }
-    let (mut frames, mut rounds) = (Vec::new(), Rounds::new(electrodes));
+    let (mut frames, mut rounds) = (Vec::new(), Rounds::default());
     let mut used = vec![false; known.len()];
     while let Some(frame) = reader.next_frame()? {
         let at = if is_recording { frame.time_s.unwrap_or(0.0) } else { (frames.len() + 1) as f64 };
@@ -118,7 +119,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
         if readings.volts().iter().any(|volts| !volts.is_finite()) {
             bail!("{}: a reading is not a finite number", reader.place());
         }
-        let whole = rounds.add(&readings, frame.time_s.unwrap_or_default());
+        let whole = rounds.add(&readings, frame.time_s.unwrap_or_default()).filter(Readings::is_whole);
         frames.extend(whole.map(|readings| Frame { readings, known_m: place }));
     }
     let left_out = rounds.waiting();

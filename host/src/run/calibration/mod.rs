@@ -12,8 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tactomo_physics::detector::Detector;
-use tactomo_physics::readings::Readings;
-use tactomo_touch::calibrate::Rounds;
+use tactomo_physics::readings::{Readings, Rounds};
 use tactomo_touch::solve::FoundContact;
 
 use self::collected::Collected;
@@ -125,7 +124,6 @@ impl Desk {
         inbox: Arc<Inbox>,
     ) -> Self {
         let collected = Collected::new(&description);
-        let rounds = Rounds::new(description.electrodes.len());
         let shown = Calibrating {
             stage: Stage::Rubbing,
             coverage: collected.coverage.clone(),
@@ -144,7 +142,7 @@ impl Desk {
             description,
             board,
             collected,
-            rounds,
+            rounds: Rounds::default(),
             shown,
             cancelled: Arc::default(),
             next_fit: Instant::now(),
@@ -176,7 +174,7 @@ impl Desk {
         if self.shown.stage != Stage::Rubbing {
             return;
         }
-        let Some(readings) = self.rounds.add(readings, time_s) else {
+        let Some(readings) = self.rounds.add(readings, time_s).filter(Readings::is_whole) else {
             let waiting = self.rounds.waiting();
             if waiting >= NEVER_WHOLE {
                 self.shown.trouble = Some(format!(

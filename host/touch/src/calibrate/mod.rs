@@ -12,7 +12,6 @@ pub mod force;
 pub mod known;
 mod posterior;
 mod presses;
-mod rounds;
 mod rub;
 mod slopes;
 #[cfg(test)]
@@ -22,7 +21,6 @@ mod wires;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
-pub use self::rounds::Rounds;
 pub use self::rub::{Rub, RubSettings, rub};
 
 /// A frame of a rub, or a press of a table.

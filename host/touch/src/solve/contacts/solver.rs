@@ -13,7 +13,7 @@ use crate::solve::still::{Mean, Still};
 use crate::solve::track::Tracker;
 use crate::solve::{FoundContact, Problem, Solution, SolveError, Solver};
 use tactomo_physics::forward::ForwardError;
-use tactomo_physics::readings::{Readings, Says};
+use tactomo_physics::readings::Readings;
 
 /// The sum of squares may be this times what the last search would leave of as many frames.
 const WORSE: f64 = 1.3;
@@ -164,7 +164,7 @@ impl ContactFollower {
 
     /// Takes note of what a search has looked at.
     pub fn searched_in(&mut self, mean: Option<&Mean>) {
-        self.is_glimpsed = mean.is_some_and(|mean| mean.readings.all_say().contains(&Says::Nothing));
+        self.is_glimpsed = mean.is_some_and(|mean| !mean.readings.is_whole());
     }
 
     /// The grounds whose rows tell most of what is followed, so many of them; of nothing, those that see a contact come.

@@ -1,7 +1,10 @@
 //! The readings of one frame, in volts, and what each of them says.
 
+mod rounds;
+
 use std::borrow::Cow;
 
+pub use self::rounds::Rounds;
 use crate::detector::{Detector, Electrode};
 
 /// What the number of a reading says of the pad's voltage.
@@ -165,6 +168,11 @@ impl Readings {
         }
         let n = self.electrodes;
         Cow::Owned((0..n * n).map(|i| self.touch_v(i / n, i % n)).collect())
+    }
+
+    /// Whether every one was read.
+    pub fn is_whole(&self) -> bool {
+        !self.says.contains(&Says::Nothing)
     }
 
     /// The largest that is above the converter's floor (V); zero if there are none.

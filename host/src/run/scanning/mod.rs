@@ -1,0 +1,184 @@
+//! Which rows the board is asked to scan: whole frames, some grounds, or those that tell most of what touches at the moment.
+//!
+//! A wire carries so many rows a second, whatever they are. While nothing touches two grounds see a touch come, wherever it is; then the
+//! grounds that tell most of the contacts that are there are scanned most, and all others in turn, for what is new. Where the answer is
+//! no contact, but a line, a ring or an image, whole frames are scanned.
+
+mod choice;
+mod wish;
+
+use std::time::Instant;
+
+use tactomo_physics::detector::Detector;
+use tactomo_protocol::{MAX_PLAN_ROWS, Plan, Settings};
+use tactomo_touch::scanning::{Attention, FOCUS, spread, with_others};
+
+pub use self::choice::ScanChoice;
+pub(super) use self::wish::{PlanAsk, PlanWish};
+
+/// Rows of a frame of an adaptive plan: 1400 frames/s at 921600 baud, where one row would be 2100 and tell each time of one ground alone.
+const ROWS: usize = 2;
+/// Rows of a frame of a list, at most.
+const LIST_ROWS: usize = 8;
+/// How often conversions are doubled at most.
+const MOST_DOUBLINGS: u8 = 2;
+
+/// Chooses plans.
+pub(super) struct Planner {
+    choice: ScanChoice,
+    begun: Instant,
+    attention: Attention,
+    /// Whether the plan of a choice that is not adaptive was wished.
+    is_wished: bool,
+    /// Doublings of the conversions for a reading.
+    doublings: u8,
+}
+
+impl Planner {
+    pub fn new(choice: ScanChoice) -> Self {
+        Self { choice, begun: Instant::now(), attention: Attention::new(FOCUS), is_wished: false, doublings: 0 }
+    }
+
+    /// Begins anew, as with another board.
+    pub fn restart(&mut self) {
+        *self = Self::new(self.choice.clone());
+    }
+
+    /// Wishes a plan, if it is time for another: `telling` are the grounds that tell most, so many as they are asked for, and
+    /// `touches` is whether anything touches, `conversions` how many a reading is the mean of by the settings.
+    pub fn consider(
+        &mut self,
+        wish: &PlanWish,
+        detector: &Detector,
+        (touches, conversions): (bool, u32),
+        telling: impl FnOnce(usize) -> Option<Vec<usize>>,
+    ) {
+        if self.choice == ScanChoice::Whole || wish.is_refused() {
+            return;
+        }
+        let is_new = match self.choice {
+            ScanChoice::Adaptive => self.attention.consider(self.begun.elapsed().as_secs_f64(), touches, telling),
+            _ => !std::mem::replace(&mut self.is_wished, true),
+        };
+        let doubles = self.doublings < MOST_DOUBLINGS && wish.is_crowded();
+        self.doublings += u8::from(doubles);
+        if is_new || doubles {
+            let plan = self.plan(detector);
+            let average_log2 = conversions.max(1).ilog2() as u8 + self.doublings;
+            let average_log2 = if plan.is_whole() { 0 } else { average_log2.min(Settings::MAX_AVERAGE_LOG2) };
+            wish.put(Plan { average_log2, ..plan });
+        }
+    }
+
+    fn plan(&self, detector: &Detector) -> Plan {
+        let electrodes = detector.electrodes.len();
+        match &self.choice {
+            ScanChoice::Whole => Plan::default(),
+            ScanChoice::Four => listed(&spread(detector, 4), electrodes),
+            ScanChoice::Grounds(grounds) => {
+                let grounds: Vec<usize> = grounds.iter().map(|ground| usize::from(*ground)).collect();
+                listed(&grounds, electrodes)
+            }
+            ScanChoice::Adaptive => {
+                self.attention.grounds().map_or_else(Plan::default, |grounds| adaptive(grounds, electrodes))
+            }
+        }
+    }
+}
+
+/// A plan of these grounds, round and round.
+fn listed(grounds: &[usize], electrodes: usize) -> Plan {
+    let rows_a_frame =
+        (1..=LIST_ROWS.min(electrodes)).rev().find(|rows| grounds.len().is_multiple_of(*rows)).unwrap_or(1);
+    plan(grounds.iter().copied(), rows_a_frame, electrodes)
+}
+
+/// A plan of these grounds, and all others in turn.
+fn adaptive(focus: &[usize], electrodes: usize) -> Plan {
+    let rows = with_others(focus, electrodes, MAX_PLAN_ROWS);
+    let rows_a_frame = if rows.len().is_multiple_of(ROWS) { ROWS } else { 1 };
+    plan(rows.into_iter(), rows_a_frame, electrodes)
+}
+
+fn plan(grounds: impl Iterator<Item = usize>, rows_a_frame: usize, electrodes: usize) -> Plan {
+    Plan {
+        grounds: grounds.take(MAX_PLAN_ROWS).filter_map(|ground| u8::try_from(ground).ok()).collect(),
+        reads: u32::MAX >> (u32::BITS as usize - electrodes.clamp(1, u32::BITS as usize)),
+        rows_a_frame: rows_a_frame as u8,
+        average_log2: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::wish::COUNTED;
+    use super::*;
+    use tactomo_touch::scanning::{PAUSE_S, SHORT_PAUSE_S};
+
+    fn pause(pause_s: f64) {
+        std::thread::sleep(Duration::from_secs_f64(pause_s));
+    }
+
+    fn detector() -> Detector {
+        Detector::preset(Detector::DEFAULT).unwrap()
+    }
+
+    #[test]
+    fn plans_are_those_that_boards_take() {
+        for electrodes in [4, 9, 16, 25, 32] {
+            for focus in [vec![1, 2], vec![0, 1, 3]] {
+                let plan = adaptive(&focus, electrodes);
+                assert!(plan.is_valid(electrodes as u8), "{electrodes}: {plan:?}");
+                let all = (0..electrodes as u8).all(|ground| plan.grounds.contains(&ground));
+                assert!(all, "{electrodes}: every ground has its turn");
+            }
+            assert!(listed(&[0, 3, 1], electrodes).is_valid(electrodes as u8));
+        }
+        let of_16 = adaptive(&[5, 10], 16);
+        assert_eq!((&of_16.grounds[..8], of_16.rows_a_frame), (&[5, 10, 5, 0, 10, 5, 10, 1][..], 2));
+    }
+
+    #[test]
+    fn a_plan_is_wished_when_what_touches_has_changed() {
+        let (wish, detector) = (PlanWish::default(), detector());
+        let mut planner = Planner::new(ScanChoice::Adaptive);
+        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![5, 10]));
+        let at_rest = wish.take().unwrap();
+        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![6, 9]));
+        assert_eq!(wish.take(), None, "too soon");
+        pause(SHORT_PAUSE_S);
+        planner.consider(&wish, &detector, (true, 1), |count| Some(vec![1; count]));
+        let touched = wish.take().unwrap();
+        assert!(touched != at_rest && touched.grounds[..3] == [1, 1, 1]);
+        pause(PAUSE_S);
+        planner.consider(&wish, &detector, (true, 1), |_| None);
+        assert!(wish.take().unwrap().is_whole(), "an image takes whole frames");
+        wish.set_refused(true);
+        pause(PAUSE_S);
+        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![5, 10]));
+        assert_eq!(wish.take(), None);
+    }
+
+    #[test]
+    fn a_line_without_room_makes_readings_means_of_more() {
+        let (wish, detector) = (PlanWish::default(), detector());
+        let mut planner = Planner::new(ScanChoice::Adaptive);
+        let mut averages = Vec::new();
+        for dropped in [0, 2, 2, 2, 0] {
+            (0..COUNTED).for_each(|_| wish.count(dropped));
+            planner.consider(&wish, &detector, (true, 1), |_| Some(vec![5, 10]));
+            averages.extend(wish.take().map(|plan| plan.average_log2));
+            pause(PAUSE_S);
+        }
+        assert_eq!(averages, [0, 1, 2], "no more, and never fewer");
+    }
+
+    #[test]
+    fn whole_frames_are_nothing_to_ask_for() {
+        let wish = PlanWish::default();
+        Planner::new(ScanChoice::Whole).consider(&wish, &detector(), (true, 1), |_| Some(vec![1, 2]));
+        assert_eq!(wish.take(), None);
+    }
+}
