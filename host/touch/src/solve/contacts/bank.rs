@@ -13,7 +13,8 @@
 //! second, one that runs is taken from the newest rows alone, and no speed has to be told. A filter that was less likely by far goes on from
 //! the one that is believed.
 //!
-//! Limits: the model's own error counts as noise of each row, although it stays the same from row to row.
+//! Limits: what is the same in every frame counts as noise of each row; what it adds to the covariance is told elsewhere
+//! (`contacts::staying`).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -28,9 +29,14 @@ struct Motion {
     radius_per_s: f64,
 }
 
-/// From still to as fast as hands are. That of a still contact forgets within a fifth of a second.
-const MOTIONS: [Motion; 4] = [
+/// From still to as fast as hands are, and each speed with a force that hardly changes and with one that does: a contact that moves at one
+/// force is taken for slower than it is where its resistance would have to run along. That of a still contact forgets within a fifth of a
+/// second.
+const MOTIONS: [Motion; 7] = [
     Motion { speed_m_per_s: 5e-4, resistance_per_s: 0.05, radius_per_s: 0.02 },
+    Motion { speed_m_per_s: 0.05, resistance_per_s: 0.3, radius_per_s: 0.1 },
+    Motion { speed_m_per_s: 0.2, resistance_per_s: 1.0, radius_per_s: 0.3 },
+    Motion { speed_m_per_s: 1.0, resistance_per_s: 10.0, radius_per_s: 2.0 },
     Motion { speed_m_per_s: 0.02, resistance_per_s: 3.0, radius_per_s: 0.5 },
     Motion { speed_m_per_s: 0.15, resistance_per_s: 20.0, radius_per_s: 3.0 },
     Motion { speed_m_per_s: 1.0, resistance_per_s: 150.0, radius_per_s: 10.0 },

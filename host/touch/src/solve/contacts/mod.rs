@@ -6,6 +6,8 @@
 
 mod approximation;
 mod bank;
+#[cfg(test)]
+mod coverage_tests;
 mod discs;
 mod evidence;
 mod exchange;
@@ -21,6 +23,7 @@ mod rows;
 mod scan;
 mod search;
 mod solver;
+mod staying;
 mod target;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@
 
 use super::bank::{Bank, Rows};
 use super::discs::{DiscFit, DiscFitter, Effort};
+use super::staying::Staying;
 use super::target::{Errors, Target, dot};
 use super::{ContactFinder, Explanation};
 use tactomo_physics::readings::Readings;
@@ -27,11 +28,6 @@ const GONE: f64 = 12.0;
 /// Of a contact that has just come.
 const GLIMPSE: Effort = Effort { steps: 4, gain: 1.0, share: 0.05 };
 
-/// Every so many frames it is reckoned what no averaging takes away, so that each row of a plan of 32 frames has its turn; and what is left
-/// of that after each.
-const LOOKED_AT: u32 = 7;
-const KEPT: f64 = 0.9;
-
 /// What is known besides the contacts that are followed.
 #[derive(Clone, Debug)]
 pub(super) struct RowState {
@@ -44,16 +40,6 @@ pub(super) struct RowState {
     unfit: u32,
     /// Logarithm of the odds for there being nothing, of late.
     gone: f64,
-}
-
-/// What stays of errors that are the same in every frame. With whitened derivatives `J` and patterns `P` of rows of late, the parameters are off
-/// by `B s`, `B = (sum J^T J)^-1 sum J^T P`, where `s` is normal, so by the covariance `B B^T`.
-#[derive(Clone, Debug, Default)]
-struct Staying {
-    information: DMatrix<f64>,
-    pulls: DMatrix<f64>,
-    covariance: DMatrix<f64>,
-    frames: u32,
 }
 
 /// What has come of a frame.
@@ -70,7 +56,13 @@ impl RowState {
     /// From an explanation by all readings of `target`.
     pub fn new(found: &Explanation, target: &Target) -> Self {
         let off_v = if target.error().is_some() { target.likely_off_v(&found.fit.volts) } else { Vec::new() };
-        Self { bank: Bank::new(found.fit.normal.clone()), staying: Staying::default(), off_v, unfit: 0, gone: 0.0 }
+        Self {
+            bank: Bank::new(found.fit.normal.clone()),
+            staying: Staying::new(&found.fit, target),
+            off_v,
+            unfit: 0,
+            gone: 0.0,
+        }
     }
 
     /// Whether what is followed fits the newest rows.
@@ -85,10 +77,10 @@ impl RowState {
 }
 
 impl ContactFinder {
-    /// What rows are fitted as, less what all readings are off by.
+    /// What rows are fitted as, less what all readings are off by; where that is not known yet of a detector, each by itself may be.
     pub(super) fn target_of_rows(&self, rows: &Readings, off_v: &[f64]) -> Target {
         if off_v.is_empty() {
-            return Target::of_mean(rows, 1, &self.errors, None);
+            return Target::provisional(rows, 1, &self.errors);
         }
         let mut less = rows.clone();
         less.volts_mut().iter_mut().zip(off_v).for_each(|(volts, off)| *volts -= off);
@@ -112,13 +104,10 @@ impl ContactFinder {
             return Step::Gone;
         }
         let search = state.unfit >= FRAMES;
-        if state.staying.frames.is_multiple_of(LOOKED_AT) {
-            self.look_at_staying(&mut state.staying, &fit, target);
-        }
-        state.staying.frames += 1;
+        state.staying.add(&fit, target, &self.errors, self.spacing_m);
         let known = state.bank.information();
-        let told =
-            || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + &state.staying.covariance)?.inverse());
+        let stays = state.staying.covariance(&fit);
+        let told = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
         (fit.normal, fit.settled) = (told().unwrap_or_else(|| known.clone()), true);
         Step::Followed(Explanation { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
     }
@@ -130,27 +119,6 @@ impl ContactFinder {
         let first = rough.fit(begun, target, GLIMPSE)?;
         let fit = self.disc_fitter().fit(first.contacts, target, Effort { steps: 1, ..GLIMPSE })?;
         Some(Explanation::of(fit, target))
-    }
-
-    /// Takes the rows of a target into account for what stays of errors.
-    fn look_at_staying(&self, staying: &mut Staying, fit: &DiscFit, target: &Target) {
-        let n = self.network.electrodes();
-        let active = target.at(&fit.volts);
-        let slopes: Vec<Vec<f64>> = fit.slopes_v().iter().map(|slope| active.whitened(slope)).collect();
-        let patterns_v = self.errors.patterns_v(&Readings::from_fn(n, |g, e| fit.volts[g * n + e]));
-        let patterns: Vec<Vec<f64>> =
-            patterns_v.column_iter().map(|pattern| active.whitened(pattern.as_slice())).collect();
-        let information = DMatrix::from_fn(slopes.len(), slopes.len(), |i, j| dot(&slopes[i], &slopes[j]));
-        let pulls = DMatrix::from_fn(slopes.len(), patterns.len(), |i, j| dot(&slopes[i], &patterns[j]));
-        if staying.information.shape() == information.shape() {
-            staying.information = KEPT * &staying.information + information;
-            staying.pulls = KEPT * &staying.pulls + pulls;
-        } else {
-            (staying.information, staying.pulls) = (information, pulls);
-        }
-        let off = Cholesky::new(staying.information.clone()).map(|factor| factor.solve(&staying.pulls));
-        let none = || DMatrix::zeros(slopes.len(), slopes.len());
-        staying.covariance = off.map_or_else(none, |off| &off * off.transpose());
     }
 
     /// Whether what is followed has become so light that it cannot be told from nothing.

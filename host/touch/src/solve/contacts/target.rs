@@ -89,6 +89,8 @@ pub(in crate::solve) struct Target {
     pub(super) frames: usize,
     /// Standard deviation of the readings by noise (V).
     pub noise_v: f64,
+    /// Standard deviation of what each reading by itself is off by in every frame alike (V).
+    fixed_v: f64,
     /// Readings, less what spots cannot say (V).
     pub(super) volts: Vec<f64>,
     /// One over the standard deviation of each (1/V); zero leaves a reading out.
@@ -138,7 +140,8 @@ impl Target {
         let error = error.map_or_else(of_board, Arc::clone);
         let shares = error.shares(deviation_v);
         let volts = readings.volts().to_vec();
-        Self { frames, noise_v, volts, weights, says, error, is_informed, is_provisional: false, shares }
+        let fixed_v = errors.least_v(readings.largest_v());
+        Self { frames, noise_v, fixed_v, volts, weights, says, error, is_informed, is_provisional: false, shares }
     }
 
     /// The same where a model predicts `volts` (V): bounds that it keeps are left out. Derivatives are whitened by this one.
@@ -296,6 +299,11 @@ impl Target {
     /// Standard deviation of a reading that counts (V).
     pub fn deviation_v(&self) -> f64 {
         1.0 / self.weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// Standard deviation of what each reading by itself is off by in every frame alike (V).
+    pub fn fixed_v(&self) -> f64 {
+        self.fixed_v
     }
 
     /// Readings that count, but for those that are bounds.
