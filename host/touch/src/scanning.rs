@@ -14,6 +14,9 @@ const OTHERS: usize = 4;
 pub const PAUSE_S: f64 = 0.04;
 /// The same where a touch comes or goes.
 pub const SHORT_PAUSE_S: f64 = 0.005;
+/// Time for which whole frames are scanned at least (s), where they were needed while something touches: where rows do not tell it now, they
+/// hardly will at once.
+pub const WHOLE_S: f64 = 0.5;
 
 /// What is attended to, chosen anew from time to time.
 #[derive(Clone, Debug)]
@@ -41,7 +44,11 @@ impl Attention {
     /// whole frames are needed, and `touches` is whether anything touches. Whether the choice is another one.
     pub fn consider(&mut self, now_s: f64, touches: bool, telling: impl FnOnce(usize) -> Option<Vec<usize>>) -> bool {
         let is_due = |last: &Last| {
-            let pause_s = if last.touches == touches { PAUSE_S } else { SHORT_PAUSE_S };
+            let pause_s = match (&last.grounds, last.touches == touches) {
+                (None, true) => WHOLE_S,
+                (_, true) => PAUSE_S,
+                (_, false) => SHORT_PAUSE_S,
+            };
             now_s - last.at_s >= pause_s
         };
         if !self.last.as_ref().is_none_or(is_due) {
@@ -105,7 +112,8 @@ mod tests {
         assert!(attention.consider(0.096, false, |_| Some(vec![5, 10])));
         assert!(attention.consider(0.14, false, |_| None));
         assert_eq!(attention.grounds(), None, "whole frames");
-        assert!(!attention.consider(0.2, false, |_| None));
+        assert!(!attention.consider(0.6, false, |_| unreachable!("too soon for rows again")));
+        assert!(!attention.consider(0.65, false, |_| None));
     }
 
     #[test]

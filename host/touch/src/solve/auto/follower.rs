@@ -273,7 +273,7 @@ impl Follower for AutoFollower {
 
     fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
         let contacts = self.contacts.as_ref().filter(|_| matches!(self.answer, Answer::Contacts))?;
-        Some(contacts.telling_grounds(count))
+        contacts.telling_grounds(count)
     }
 
     fn lead(&self) -> Lead {

@@ -128,6 +128,12 @@ impl DiscFit {
         self.slopes.at.iter().map(|contact| contact.radius_m).collect()
     }
 
+    /// How far other contacts are from these, in the parameters.
+    pub fn way_to(&self, contacts: &[Contact]) -> Vec<f64> {
+        let (from, to) = (self.slopes.offset(&self.contacts), self.slopes.offset(contacts));
+        to.iter().zip(from).map(|(to, from)| to - from).collect()
+    }
+
     /// Derivatives of the readings by all parameters (V).
     pub fn slopes_v(&self) -> &[Vec<f64>] {
         &self.slopes.by

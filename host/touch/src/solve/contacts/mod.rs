@@ -9,6 +9,7 @@ mod bank;
 #[cfg(test)]
 mod coverage_tests;
 mod discs;
+mod doubt;
 mod evidence;
 mod exchange;
 mod focus;

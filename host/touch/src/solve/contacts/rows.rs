@@ -136,13 +136,16 @@ impl ContactFinder {
             let way = tried.update(&rows_of(&fit, target))?;
             let contacts: Vec<Contact> = fitter.moved(&fit, way.as_slice());
             let next = fitter.next(&fit, contacts, target)?;
+            // A step that was too long or led beyond what makes sense was cut: the filters know what is left of it.
+            let gone = DVector::from_vec(fit.way_to(&next.contacts));
             if step + 1 == STEPS || way.amax() < SMALL {
+                tried.shift(&(&gone - way));
                 tried.rescale(&units_m, &next.units_m());
                 *bank = tried;
                 return Some(next);
             }
             // A long way: once more from there, where the readings are linear.
-            bank.shift(&way);
+            bank.shift(&gone);
             bank.rescale(&units_m, &next.units_m());
             fit = next;
         }

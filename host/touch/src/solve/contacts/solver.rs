@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use super::discs::DiscFit;
+use super::doubt::Doubt;
 use super::rows::{RowState, Step};
 use super::{ApproximationError, ContactFinder, ContactSettings, Explanation, Found, Target};
 use crate::solve::evidence::Evidence;
@@ -46,6 +47,7 @@ pub(in crate::solve) struct ContactFollower {
     latest: Option<Latest>,
     /// Whether what is followed was found in some of the rows only.
     is_glimpsed: bool,
+    doubt: Doubt,
     /// Time for which no row has said more than that its readings are below the converter's range (s).
     silent_s: f64,
     /// Whether it was found when what the readings may be off by together was not known yet.
@@ -106,6 +108,7 @@ impl ContactFollower {
             rows: None,
             latest: None,
             is_glimpsed: false,
+            doubt: Doubt::default(),
             silent_s: 0.0,
             is_provisional: false,
             calibrated: None,
@@ -136,6 +139,13 @@ impl ContactFollower {
 
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
+        let search = self.step_frame(target);
+        let fits = |last: &Explanation| !self.finder.is_misfit(&last.fit, target);
+        self.doubt.whole(!self.is_stale && self.last.as_ref().map_or(!search, fits));
+        search
+    }
+
+    fn step_frame(&mut self, target: &Target) -> bool {
         self.before = self.tracker.clone();
         (self.rows, self.latest) = (None, None);
         let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
@@ -160,6 +170,8 @@ impl ContactFollower {
     pub fn follow_rows(&mut self, rows: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
         self.finder.check(rows)?;
         let (target, search) = self.step(rows, elapsed_s);
+        let fits = self.rows.as_ref().map_or(!search, |state| state.fits());
+        self.doubt.rows(fits, elapsed_s);
         self.silent_s = if target.is_silent() { self.silent_s + elapsed_s } else { 0.0 };
         if self.silent_s > OLDEST_S {
             // The lightest contact that was seen would not be seen any more either.
@@ -186,11 +198,13 @@ impl ContactFollower {
         self.is_glimpsed = mean.is_some_and(|mean| !mean.readings.is_whole());
     }
 
-    /// The grounds whose rows tell most of what is followed, so many of them; of nothing, those that see a contact come.
-    pub fn telling_grounds(&self, count: usize) -> Vec<usize> {
+    /// The grounds whose rows tell most of what is followed, so many of them; of nothing, those that see a contact come. None where rows do not
+    /// tell it.
+    pub fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
         match &self.last {
-            Some(last) => self.finder.telling_grounds(&last.fit, count),
-            None => self.finder.watching_grounds(),
+            _ if self.doubt.needs_whole() => None,
+            Some(last) => Some(self.finder.telling_grounds(&last.fit, count)),
+            None => Some(self.finder.watching_grounds()),
         }
     }
 
@@ -302,6 +316,7 @@ impl ContactFollower {
     /// Follows nothing for a time, and keeps the numbers of contacts.
     pub fn let_go(&mut self) {
         (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
+        self.doubt = Doubt::default();
         self.rows = None;
     }
 
@@ -349,7 +364,7 @@ impl Follower for FrameFollower {
     }
 
     fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
-        Some(self.contacts.telling_grounds(count))
+        self.contacts.telling_grounds(count)
     }
 
     fn lead(&self) -> Lead {
