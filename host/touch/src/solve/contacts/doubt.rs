@@ -18,7 +18,7 @@ impl Doubt {
     /// Rows that come `elapsed_s` (s) after those before fit what is followed, or do not.
     pub fn rows(&mut self, fit: bool, elapsed_s: f64) {
         let change_s = if fit { -elapsed_s } else { WEIGHT * elapsed_s };
-        self.0 = (self.0 + change_s).clamp(0.0, ENOUGH_S);
+        self.0 = (self.0 + change_s).clamp(0.0, 2.0 * ENOUGH_S);
     }
 
     /// A whole frame fits, or does not.
@@ -42,7 +42,7 @@ mod tests {
         (0..50).for_each(|_| doubt.rows(false, 1e-3));
         (0..100).for_each(|_| doubt.rows(true, 1e-3));
         assert!(!doubt.needs_whole());
-        (0..300).for_each(|step| doubt.rows(step % 4 > 0, 1e-3));
+        (0..300).for_each(|step| doubt.rows(step % 4 == 0, 1e-3));
         assert!(doubt.needs_whole());
         doubt.whole(false);
         assert!(doubt.needs_whole());
