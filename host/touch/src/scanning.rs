@@ -54,10 +54,15 @@ impl Attention {
         if !self.last.as_ref().is_none_or(is_due) {
             return false;
         }
-        let mut grounds = telling(self.count);
+        let grounds = telling(self.count);
         // The same grounds in another order are the same choice.
-        grounds.iter_mut().for_each(|grounds| grounds.sort_unstable());
-        let is_new = self.last.as_ref().is_none_or(|last| last.grounds != grounds);
+        let sorted = |grounds: &Option<Vec<usize>>| {
+            let mut grounds = grounds.clone();
+            grounds.iter_mut().for_each(|grounds| grounds.sort_unstable());
+            grounds
+        };
+        let is_new = self.last.as_ref().is_none_or(|last| sorted(&last.grounds) != sorted(&grounds));
+        let grounds = if is_new { grounds } else { self.last.take().and_then(|last| last.grounds) };
         self.last = Some(Last { grounds, touches, at_s: now_s });
         is_new
     }
@@ -71,6 +76,9 @@ impl Attention {
 /// One round of rows of a detector of so many electrodes: `focus` again and again, and after each few one of all, in turn, in `longest` rows at
 /// most if that can be.
 pub fn with_others(focus: &[usize], electrodes: usize, longest: usize) -> Vec<usize> {
+    if focus.len() >= electrodes {
+        return focus.to_vec();
+    }
     let between = OTHERS.min(longest / electrodes.max(1)).max(2);
     let mut next = focus.iter().copied().cycle();
     let row = |row: usize| match row % between {

@@ -53,6 +53,8 @@ const LONGEST_S: f64 = 0.1;
 pub(super) struct Bank {
     filters: [Filter; MOTIONS.len()],
     best: usize,
+    /// Time since it began (s).
+    age_s: f64,
 }
 
 /// What one of them knows.
@@ -80,7 +82,7 @@ impl Bank {
     /// Begins with what a fit knows: the information on the parameters of its contacts.
     pub fn new(information: DMatrix<f64>) -> Self {
         let filter = Filter { mean: DVector::zeros(information.nrows()), information, likelihood: 0.0 };
-        Self { filters: std::array::from_fn(|_| filter.clone()), best: MOTIONS.len() - 1 }
+        Self { filters: std::array::from_fn(|_| filter.clone()), best: MOTIONS.len() - 1, age_s: 0.0 }
     }
 
     /// Information on the parameters by the filter that is believed.
@@ -92,6 +94,11 @@ impl Bank {
     #[cfg(test)]
     pub fn is_still(&self) -> bool {
         self.best == 0
+    }
+
+    /// Whether the contacts are believed to move, after two memories in which that could be seen.
+    pub fn moves(&self) -> bool {
+        self.best > 0 && self.age_s > 2.0 * MEMORY_S
     }
 
     /// Tells what is known from other contacts, so far away in the parameters.
@@ -117,6 +124,7 @@ impl Bank {
     /// Lets time (s) pass; `unit_m` are the units of the places' parameters (m). `None` where nothing is determined.
     pub fn predict(&mut self, elapsed_s: f64, unit_m: &[f64]) -> Option<()> {
         let elapsed_s = elapsed_s.clamp(0.0, LONGEST_S);
+        self.age_s += elapsed_s;
         for (filter, motion) in self.filters.iter_mut().zip(&MOTIONS) {
             let step = |i: usize| match i % PARAMETERS {
                 0 | 1 => motion.speed_m_per_s * elapsed_s / unit_m[i / PARAMETERS],

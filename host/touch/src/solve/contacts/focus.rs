@@ -10,6 +10,7 @@ use nalgebra::{Cholesky, DMatrix};
 use super::ContactFinder;
 use super::discs::{DiscFit, PARAMETERS};
 use super::target::{Target, dot};
+use crate::scanning::spread;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::readings::Readings;
 
@@ -51,6 +52,11 @@ impl ContactFinder {
             chosen.push(best);
         }
         chosen
+    }
+
+    /// All grounds, those that follow each other far apart.
+    pub(super) fn all_grounds(&self) -> Vec<usize> {
+        spread(self.problem.detector(), self.network.electrodes())
     }
 
     /// Two grounds that see a light contact wherever it comes: those for which it is largest where it is smallest.

@@ -70,6 +70,11 @@ impl RowState {
         self.unfit == 0
     }
 
+    /// Whether what is followed is believed to move.
+    pub fn moves(&self) -> bool {
+        self.bank.moves()
+    }
+
     /// What all readings are off by (V); nothing of a detector that is as described.
     pub fn off_v(&self) -> &[f64] {
         &self.off_v

@@ -198,12 +198,15 @@ impl ContactFollower {
         self.is_glimpsed = mean.is_some_and(|mean| !mean.readings.is_whole());
     }
 
-    /// The grounds whose rows tell most of what is followed, so many of them; of nothing, those that see a contact come. None where rows do not
-    /// tell it.
+    /// The grounds whose rows tell most of what moves, so many of them; of what stands or has just come, all: no number of rows takes away what the
+    /// model of a reading is off by, and a new contact is seen by all. Of nothing, those that see a contact come. None where rows do not tell it.
     pub fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
         match &self.last {
             _ if self.doubt.needs_whole() => None,
-            Some(last) => Some(self.finder.telling_grounds(&last.fit, count)),
+            Some(last) if self.rows.as_ref().is_some_and(|rows| rows.moves()) => {
+                Some(self.finder.telling_grounds(&last.fit, count))
+            }
+            Some(_) => Some(self.finder.all_grounds()),
             None => Some(self.finder.watching_grounds()),
         }
     }
