@@ -14,9 +14,9 @@ const OTHERS: usize = 4;
 pub const PAUSE_S: f64 = 0.04;
 /// The same where a touch comes or goes.
 pub const SHORT_PAUSE_S: f64 = 0.005;
-/// Time for which whole frames are scanned at least (s), where they were needed while something touches: where rows do not tell it now, they
-/// hardly will at once.
-pub const WHOLE_S: f64 = 0.5;
+/// Time for which whole frames are scanned at least (s) where rows do not tell what touches. It doubles up to the longest each time that rows, tried
+/// again, do not tell it soon after.
+pub const WHOLE_S: [f64; 2] = [0.5, 4.0];
 
 /// What is attended to, chosen anew from time to time.
 #[derive(Clone, Debug)]
@@ -24,6 +24,7 @@ pub struct Attention {
     /// Grounds that are told apart.
     count: usize,
     last: Option<Last>,
+    whole: Whole,
 }
 
 #[derive(Clone, Debug)]
@@ -34,34 +35,47 @@ struct Last {
     at_s: f64,
 }
 
+/// When rows did not tell what touches.
+#[derive(Clone, Copy, Debug)]
+struct Whole {
+    /// Until when they are not tried again, and how long that was (s).
+    until_s: f64,
+    time_s: f64,
+}
+
+impl Whole {
+    /// Rows do not tell it (s).
+    fn ask(&mut self, now_s: f64) {
+        let is_soon = now_s - self.until_s < self.time_s;
+        self.time_s = if is_soon { (2.0 * self.time_s).min(WHOLE_S[1]) } else { WHOLE_S[0] };
+        self.until_s = now_s + self.time_s;
+    }
+}
+
 impl Attention {
     /// To so many grounds at a time; [`FOCUS`] for frames of up to four rows.
     pub fn new(count: usize) -> Self {
-        Self { count, last: None }
+        Self { count, last: None, whole: Whole { until_s: f64::NEG_INFINITY, time_s: 0.0 } }
     }
 
     /// Chooses anew, if it is time for that at `now_s` (s): `telling` gives the grounds that tell most, so many as it is asked for, or none where
     /// whole frames are needed, and `touches` is whether anything touches. Whether the choice is another one.
     pub fn consider(&mut self, now_s: f64, touches: bool, telling: impl FnOnce(usize) -> Option<Vec<usize>>) -> bool {
         let is_due = |last: &Last| {
-            let pause_s = match (&last.grounds, last.touches == touches) {
-                (None, true) => WHOLE_S,
-                (_, true) => PAUSE_S,
-                (_, false) => SHORT_PAUSE_S,
-            };
+            let pause_s = if last.touches == touches { PAUSE_S } else { SHORT_PAUSE_S };
             now_s - last.at_s >= pause_s
         };
         if !self.last.as_ref().is_none_or(is_due) {
             return false;
         }
-        let grounds = telling(self.count);
-        // The same grounds in another order are the same choice.
-        let sorted = |grounds: &Option<Vec<usize>>| {
-            let mut grounds = grounds.clone();
-            grounds.iter_mut().for_each(|grounds| grounds.sort_unstable());
-            grounds
-        };
-        let is_new = self.last.as_ref().is_none_or(|last| sorted(&last.grounds) != sorted(&grounds));
+        let mut grounds = None;
+        if !touches || now_s >= self.whole.until_s {
+            grounds = telling(self.count);
+            if touches && grounds.is_none() {
+                self.whole.ask(now_s);
+            }
+        }
+        let is_new = self.last.as_ref().is_none_or(|last| !are_same(&last.grounds, &grounds));
         let grounds = if is_new { grounds } else { self.last.take().and_then(|last| last.grounds) };
         self.last = Some(Last { grounds, touches, at_s: now_s });
         is_new
@@ -71,6 +85,16 @@ impl Attention {
     pub fn grounds(&self) -> Option<&[usize]> {
         self.last.as_ref()?.grounds.as_deref()
     }
+}
+
+/// The same grounds in another order are the same choice.
+fn are_same(some: &Option<Vec<usize>>, others: &Option<Vec<usize>>) -> bool {
+    let sorted = |grounds: &Option<Vec<usize>>| {
+        let mut grounds = grounds.clone();
+        grounds.iter_mut().for_each(|grounds| grounds.sort_unstable());
+        grounds
+    };
+    sorted(some) == sorted(others)
 }
 
 /// One round of rows of a detector of so many electrodes: `focus` again and again, and after each few one of all, in turn, in `longest` rows at
@@ -118,14 +142,35 @@ mod tests {
         assert!(!attention.consider(0.09, true, |_| Some(vec![2, 3, 1])), "the same");
         assert!(!attention.consider(0.094, false, |_| unreachable!("too soon for a touch that goes")));
         assert!(attention.consider(0.096, false, |_| Some(vec![5, 10])));
-        assert!(attention.consider(0.14, false, |_| None));
-        assert_eq!(attention.grounds(), None, "whole frames");
-        assert!(!attention.consider(0.6, false, |_| unreachable!("too soon for rows again")));
-        assert!(!attention.consider(0.65, false, |_| None));
+    }
+
+    #[test]
+    fn rows_that_do_not_tell_what_touches_are_tried_again_later_and_later() {
+        let mut attention = Attention::new(FOCUS);
+        let (mut tried_s, mut now_s) = (Vec::new(), 0.0);
+        let some = |_| Some(vec![1, 2, 3]);
+        while now_s < 20.0 {
+            let mut none = |_| {
+                tried_s.push(now_s);
+                None
+            };
+            // Nothing touches now and then, which is told by rows all the same.
+            match (now_s % 0.3) < 0.05 {
+                true => _ = attention.consider(now_s, false, some),
+                false => _ = attention.consider(now_s, true, &mut none),
+            }
+            now_s += 0.01;
+        }
+        let apart_s: Vec<_> = tried_s.windows(2).map(|pair| (pair[1] - pair[0]).round()).collect();
+        assert_eq!(apart_s, [1.0, 1.0, 2.0, 4.0, 4.0, 4.0, 4.0], "{tried_s:?}");
+        assert!(attention.consider(30.0, true, some), "and then they do");
+        assert_eq!(attention.grounds(), Some(&[1, 2, 3][..]));
+        assert!(attention.consider(40.0, true, |_| None) && attention.consider(40.6, true, some), "anew");
     }
 
     #[test]
     fn all_others_have_their_turn_between_those_that_are_attended_to() {
+        assert_eq!(with_others(&[2, 0, 1], 3, 64), [2, 0, 1], "there are no others");
         assert_eq!(with_others(&[5, 10], 16, 64)[..8], [5, 10, 5, 0, 10, 5, 10, 1]);
         for (electrodes, longest) in [(4, 64), (9, 64), (16, 64), (25, 64), (32, 64), (32, 1)] {
             let rows = with_others(&[0, 1, 3], electrodes, longest);

@@ -90,6 +90,7 @@ async fn the_board_card_says_which_rows_are_scanned() -> Result<()> {
                 adaptive(vec![5, 6, 10], true),
                 "adaptive: grounds 5, 6, 10 and the others in turn, 1\u{2009}400 frames/s",
             ),
+            (adaptive((0..16).collect(), false), "adaptive: all grounds in turn, 1\u{2009}400 frames/s"),
             (adaptive(Vec::new(), false), "adaptive: whole frames, 1\u{2009}400 frames/s"),
             (
                 Scan { choice: ScanChoice::Grounds(vec![3]), grounds: vec![3], others: false },

@@ -11,10 +11,11 @@ function rowOf([name, value]) {
 }
 
 // Which rows come, and how many frames of them: "adaptive: grounds 5, 10 and the others in turn, 1400 frames/s".
-function scanned({ choice, grounds, others }, rate) {
+function scanned({ choice, grounds, others }, electrodes, rate) {
   const named = choice === "adaptive" || choice === "four" ? `${choice}: ` : "";
   const turns = others ? " and the others in turn" : "";
-  const rows = grounds.length ? `${grounds.length > 1 ? "grounds" : "ground"} ${grounds.join(", ")}${turns}` : "whole frames";
+  const some = `${grounds.length > 1 ? "grounds" : "ground"} ${grounds.join(", ")}${turns}`;
+  const rows = grounds.length === electrodes ? "all grounds in turn" : grounds.length ? some : "whole frames";
   return `${named}${rows}, ${count(rate)} frames/s`;
 }
 
@@ -62,7 +63,7 @@ export class Board {
       ["Source", setup.source],
       ["Board", hello ? `${hello.board}, firmware ${hello.firmware}` : "has not answered yet"],
       ["Converter", hello ? `${hello.adc_bits} bits of ${fixed(hello.full_scale_v, 2)} V; drive ${fixed(hello.drive_v, 2)} V` : ""],
-      ["Scan", hello ? scanned(scan, statistics.frames_per_s) : ""],
+      ["Scan", hello ? scanned(scan, setup.electrodes.length, statistics.frames_per_s) : ""],
       ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes`],
       ["Images", `${count(setup.nodes_m.length)} nodes`],
     ];
