@@ -39,7 +39,7 @@ const REQUESTS: usize = 64;
 ///   tactomo live --simulate --board esp32           at the pace and with the ADCs of the paper's board
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
-///   tactomo live --simulate --scan adaptive         the rows that tell most, as they come
+///   tactomo live --simulate --scan adaptive         the rows that a scene needs, as they come
 ///   tactomo live --replay touch.tactomo --speed 0.25
 ///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network
 #[derive(Debug, clap::Args)]
@@ -55,8 +55,8 @@ pub struct Args {
     pub speed: f64,
     #[command(flatten)]
     pub picture: PictureArgs,
-    /// Which rows the board scans: `whole` frames; `four` grounds far apart; `adaptive`, those that tell most of what touches at the moment,
-    /// which gives some thousand answers a second where a slow line carries 230 whole frames; or a list of electrodes to ground, such as
+    /// Which rows the board scans: `whole` frames; `four` grounds far apart; `adaptive`, those that what touches at the moment needs, which
+    /// gives some thousand answers a second where a slow line carries 230 whole frames; or a list of electrodes to ground, such as
     /// 0,5,10,15
     #[arg(long, value_name = "PLAN", default_value_t = ScanChoice::Whole, conflicts_with = "replay")]
     pub scan: ScanChoice,

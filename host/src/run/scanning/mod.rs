@@ -1,8 +1,8 @@
-//! Which rows the board is asked to scan: whole frames, some grounds, or those that tell most of what touches at the moment.
+//! Which rows the board is asked to scan: whole frames, some grounds, or those that what touches at the moment needs.
 //!
-//! A wire carries so many rows a second, whatever they are. While nothing touches two grounds see a touch come, wherever it is; then the
-//! grounds that tell most of the contacts that are there are scanned most, and all others in turn, for what is new. Where the answer is
-//! no contact, but a line, a ring or an image, whole frames are scanned.
+//! A wire carries so many rows a second, whatever they are. While nothing touches two grounds see a touch come, wherever it is. What
+//! stands is read under all grounds in turn; of what moves those grounds that tell most of it are scanned most, and all others in turn, for what is
+//! new. Where the answer is a line, a ring or an image, or rows do not fit, whole frames are scanned.
 
 mod choice;
 mod wish;

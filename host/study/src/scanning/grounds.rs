@@ -9,7 +9,7 @@ use tactomo_touch::scanning::{Attention, FOCUS, spread, with_others};
 pub enum Choice {
     /// All of them, in frames that are whole.
     Whole,
-    /// Those that tell most of what touches, and every fourth row one of all in turn, as in live.
+    /// As in live: all in turn for what stands; those that tell most of what moves, and every fourth row one of all in turn.
     Adaptive,
     /// All of them in turn, of which those that follow each other are apart.
     InTurn,

@@ -56,7 +56,9 @@ fn legend() -> String {
     let item = |choice: Choice| {
         let what = match choice {
             Choice::Whole => "whole frames",
-            Choice::Adaptive => "8, 4, 3, 2 (large) or 1 row a frame, of the adaptive grounds: those that tell most",
+            Choice::Adaptive => {
+                "8, 4, 3, 2 (large) or 1 row a frame, of the adaptive grounds: all in turn for what stands, for what moves those that tell most"
+            }
             Choice::InTurn => "the same of all grounds in turn",
             Choice::Corners => "of the four corners",
         };
@@ -177,7 +179,7 @@ fn footer(report: &Report) -> String {
         "{} scenes of each number of contacts, on {}, which the solver of contacts knows exactly ({} model); seed {}. All contacts touch at once, and stand or go \
          round together. Readings come from a finer model than the one that is inverted, asked every half millimetre of the way and interpolated by cubics, at the time of each row, with the \
          converter's noise and steps, less a baseline. A row takes 148 µs, the wire carries 92160 bytes a second, a whole frame has 380 of them; a frame is read while the one before is sent, and the solver's own time does not count, but a search is made at most every 4 ms. \
-         Grounds that tell most are chosen as in live, at most every 40 ms, for which the board stops for 1.5 ms; every fourth row is one of all in turn. Contacts that stand: the last answer within 50 ms of the touch; that move: all answers \
+         Adaptive grounds are chosen as in live, at most every 40 ms, for which the board stops for 1.5 ms: all in turn for what stands or has just come, and for what moves those that tell most of it, with every fourth row one of all in turn. Contacts that stand: the last answer within 50 ms of the touch; that move: all answers \
          from 50 to 120 ms. Error: mean distance of contacts found from those that are there, where one missed or invented counts {:.0} mm (OSPA of order 1). The bound is a root mean square of errors; their mean may be a tenth to a fifth below it.",
         report.scenes,
         report.detector,
