@@ -306,8 +306,12 @@ fn standard_errors_of_contacts_that_move_are_true_by_an_ideal_converter() {
 #[test]
 fn standard_errors_on_detectors_as_built_are_true() {
     for board in BOARDS {
-        let bench = Bench::as_built(board, 30..38);
-        let light = bench.coverage(0.05, 0.0, 3000..3012);
-        light.and(bench.coverage(3.0, 0.0, 3012..3024)).check(&format!("{board:?} as built"));
+        // The presses on a detector are off alike: eight detectors alone were 54 to 62 %, twelve others 63 to 70 %.
+        let all = [(30..38, 3000), (50..62, 5000)].map(|(detectors, seed)| {
+            let bench = Bench::as_built(board, detectors);
+            bench.coverage(0.05, 0.0, seed..seed + 24).and(bench.coverage(3.0, 0.0, seed + 24..seed + 48))
+        });
+        let [some, others] = all;
+        some.and(others).check(&format!("{board:?} as built"));
     }
 }
