@@ -170,8 +170,12 @@ impl ContactFollower {
     pub fn follow_rows(&mut self, rows: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
         self.finder.check(rows)?;
         let (target, search) = self.step(rows, elapsed_s);
-        let fits = self.rows.as_ref().map_or(!search, |state| state.fits());
-        self.doubt.rows(fits, elapsed_s);
+        match &self.rows {
+            Some(state) => self.doubt.rows(state.fits(), elapsed_s),
+            // Of nothing there is no doubt, however it was with what has gone.
+            None if !search => self.doubt = Doubt::default(),
+            None => self.doubt.rows(false, elapsed_s),
+        }
         self.silent_s = if target.is_silent() { self.silent_s + elapsed_s } else { 0.0 };
         if self.silent_s > OLDEST_S {
             // The lightest contact that was seen would not be seen any more either.
