@@ -55,7 +55,7 @@ pub struct Args {
     pub speed: f64,
     #[command(flatten)]
     pub picture: PictureArgs,
-    /// Which rows the board scans: `whole` frames; `four` grounds far apart; `adaptive`, those that what touches at the moment needs, which
+    /// Which rows the board scans: `whole` frames; `four` grounds far apart; `adaptive`, what the scene needs at the moment, which
     /// gives some thousand answers a second where a slow line carries 230 whole frames; or a list of electrodes to ground, such as
     /// 0,5,10,15
     #[arg(long, value_name = "PLAN", default_value_t = ScanChoice::Whole, conflicts_with = "replay")]

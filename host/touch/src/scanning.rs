@@ -16,7 +16,7 @@ pub const PAUSE_S: f64 = 0.04;
 pub const SHORT_PAUSE_S: f64 = 0.005;
 /// Time for which whole frames are scanned at least (s) where rows do not tell what touches. It doubles up to the longest each time that rows, tried
 /// again, do not tell it soon after.
-pub const WHOLE_S: [f64; 2] = [0.5, 4.0];
+const WHOLE_S: [f64; 2] = [0.5, 4.0];
 
 /// What is attended to, chosen anew from time to time.
 #[derive(Clone, Debug)]
@@ -98,7 +98,7 @@ fn are_same(some: &Option<Vec<usize>>, others: &Option<Vec<usize>>) -> bool {
 }
 
 /// One round of rows of a detector of so many electrodes: `focus` again and again, and after each few one of all, in turn, in `longest` rows at
-/// most if that can be.
+/// most if that can be. Without any `focus` all have their turn alone.
 pub fn with_others(focus: &[usize], electrodes: usize, longest: usize) -> Vec<usize> {
     if focus.len() >= electrodes {
         return focus.to_vec();

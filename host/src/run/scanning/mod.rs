@@ -1,4 +1,4 @@
-//! Which rows the board is asked to scan: whole frames, some grounds, or those that what touches at the moment needs.
+//! Which rows the board is asked to scan: whole frames, some grounds, or what the scene needs at the moment.
 //!
 //! A wire carries so many rows a second, whatever they are. While nothing touches two grounds see a touch come, wherever it is. What
 //! stands is read under all grounds in turn; of what moves those grounds that tell most of it are scanned most, and all others in turn, for what is
