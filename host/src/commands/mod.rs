@@ -19,6 +19,7 @@ mod replay;
 mod scene;
 mod source;
 mod stability;
+mod streams;
 mod study;
 mod tradeoff;
 mod validate;

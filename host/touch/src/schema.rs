@@ -205,13 +205,16 @@ pub struct FrameReport<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<&'a FoundShape>,
     /// Root mean square of what the answer leaves of the readings, in standard deviations of the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub residual: Option<f64>,
     /// Probability that as many contacts touch as were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certainty: Option<f64>,
     /// What to know before this is believed.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub flags: Option<&'a Flags>,
     /// What was chosen and why.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub choice: Option<&'a Choice>,
     /// The image, if it is wanted: contact conductance per area at each node (S/m2).
     #[serde(skip_serializing_if = "Option::is_none")]
