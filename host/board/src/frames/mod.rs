@@ -204,7 +204,7 @@ impl Rows {
 
 fn is_recording(path: &Path) -> bool {
     let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(record::MAGIC.len() as u64).read_to_end(&mut start));
+    let read = File::open(path).and_then(|file| file.take(record::START_BYTES as u64).read_to_end(&mut start));
     read.is_ok() && record::is_recording(&start)
 }
 
