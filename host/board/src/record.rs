@@ -21,6 +21,7 @@
 //! Version 1, which is still read, had one header (two bytes of length, JSON, CRC-32 of version, length and JSON) and chunks without the
 //! four bytes at their front.
 
+pub mod edit;
 mod format;
 mod header;
 mod loss;

@@ -36,6 +36,8 @@ pub struct Rows {
 pub struct FileFrame {
     /// Board time since the first frame (s), if that is known.
     pub time_s: Option<f64>,
+    /// When its last byte came (s since the recording's start), if the file tells.
+    pub arrived_s: Option<f64>,
     /// The board's number of the scan, if the file tells.
     pub sequence: Option<u64>,
     /// Scans that are missing since the frame before: lost on the way, or damaged in the file.
@@ -194,6 +196,7 @@ impl Rows {
         let volts: Vec<f64> = self.rows.by_ref().take(self.channels).collect();
         (volts.len() == self.channels).then_some(FileFrame {
             time_s: None,
+            arrived_s: None,
             sequence: None,
             lost_before: 0,
             volts,

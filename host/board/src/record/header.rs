@@ -71,11 +71,7 @@ impl Header {
     }
 
     fn started_at(self, since_1970: Duration) -> Self {
-        Self {
-            started_unix_s: since_1970.as_secs(),
-            started_unix_us: Some(since_1970.as_micros() as u64),
-            ..self
-        }
+        Self { started_unix_s: since_1970.as_secs(), started_unix_us: Some(since_1970.as_micros() as u64), ..self }
     }
 
     /// The detector that the recording was taken from; `None` if the header does not hold it. `path` is the recording, for errors.

@@ -59,8 +59,7 @@ impl Note {
     /// [`RecordError::Detector`] if it holds something that is no detector.
     pub fn detector(&self, path: &Path) -> Result<Option<Detector>, RecordError> {
         let Self::Detector { detector, detector_toml, surface_obj } = self.clone() else { return Ok(None) };
-        let header =
-            Header { detector, detector_toml: Some(detector_toml), surface_obj, ..Header::default() };
+        let header = Header { detector, detector_toml: Some(detector_toml), surface_obj, ..Header::default() };
         header.detector(path)
     }
 }

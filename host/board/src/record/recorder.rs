@@ -328,7 +328,8 @@ mod tests {
         let entries: Vec<_> = std::iter::from_fn(|| reader.next_entry(&mut bytes).unwrap()).collect();
         let notes: Vec<_> = entries.iter().map(|entry| (entry.time_us, entry.note.clone())).collect();
         let mark = Some(Note::mark("slipped"));
-        let expected = [(0, None), (1000, mark), (2000, None), (3000, Some(found.clone())), (4000, None), (4000, Some(found))];
+        let expected =
+            [(0, None), (1000, mark), (2000, None), (3000, Some(found.clone())), (4000, None), (4000, Some(found))];
         assert_eq!(notes, expected);
         assert_eq!((chunks(&path).len(), reader.loss().is_any()), (3, false));
         std::fs::remove_file(path).unwrap();
