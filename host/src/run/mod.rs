@@ -8,6 +8,7 @@
 mod board;
 pub mod calibration;
 pub mod course;
+mod event;
 mod follower;
 mod inbox;
 mod keeping;
@@ -21,14 +22,14 @@ mod searcher;
 mod statistics;
 mod talk;
 
-pub use self::inbox::Taken;
+pub use self::event::{Listener, TouchEvent};
 pub use self::maker::{Order, SolverState};
 pub use self::reader::run;
 pub use self::scanned::Scan;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use tactomo_board::link::{Control, Playing};
 use tactomo_board::session::RequestedSettings;
@@ -38,7 +39,7 @@ use self::calibration::{Calibrate, Calibrating};
 use self::course::Course;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::pointer::{PointerEvent, PointerState};
+use tactomo_touch::pointer::PointerState;
 use tactomo_touch::solve::{Method, Solution};
 
 /// What there is to show at a moment.
@@ -113,19 +114,6 @@ pub struct FrameSnapshot {
     pub pointer: Option<PointerState>,
     /// Whether the baseline is being taken.
     pub rezeroing: bool,
-}
-
-/// An answer, for those who take each.
-#[derive(Clone, Copy, Debug)]
-pub struct SolvedFrame<'a> {
-    /// Its frame.
-    pub frame: &'a Taken,
-    /// The answer.
-    pub solution: &'a Solution,
-    /// Since the frame's last byte came.
-    pub age: Duration,
-    /// What the pointer does with it, if a contact is one.
-    pub events: &'a [PointerEvent],
 }
 
 /// Counts since the start.

@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 use super::scanning::ScanChoice;
-use super::{Latency, Order, Request, Snapshot, SolvedFrame};
+use super::{Latency, Listener, Order, Request, Snapshot};
 use tactomo_board::baseline::Baseline;
 use tactomo_board::board_log::BoardLog;
 use tactomo_board::link::SourceError;
@@ -83,12 +83,6 @@ impl Plan {
             seconds: None,
         }
     }
-}
-
-/// Who takes each answer. It must not wait: the follower does while it works.
-pub trait Listener: Send {
-    /// Takes an answer.
-    fn solved(&mut self, solved: &SolvedFrame<'_>);
 }
 
 /// What reads the touch.

@@ -66,6 +66,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         notice: Arc::clone(&notice),
         follows: follower.is_some(),
         sequence: Sequence::default(),
+        frames_lost: 0,
         board: None,
         greeted: None,
         course: course.clone(),
@@ -121,6 +122,8 @@ struct Reader {
     /// Whether anybody takes the frames.
     follows: bool,
     sequence: Sequence,
+    /// Frames lost on the way since the run began.
+    frames_lost: u64,
     board: Option<Board>,
     /// When the first board said Hello.
     greeted: Option<Instant>,
@@ -303,6 +306,7 @@ impl Reader {
             return self.notice.count(|meter| meter.corrupt(1));
         };
         let place = self.sequence.place(&frame.head);
+        self.frames_lost += place.dropped;
         self.notice.count(|meter| meter.frame(received, place.dropped));
         self.scanned.add(&frame.scope);
         if !frame.scope.is_whole() {
@@ -330,6 +334,7 @@ impl Reader {
             rows,
             averaged: 1,
             came: 1,
+            lost: self.frames_lost,
             sequence: place.sequence,
             board_time_us: place.time_us,
             arrived: received,

@@ -3,14 +3,14 @@
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use tactomo_touch::schema::FrameReport;
 
-use crate::run::SolvedFrame;
-use crate::run::plan::Listener;
+use crate::run::{Listener, TouchEvent};
 
 /// Lines that may wait for whoever reads them; more are lost and counted, so that a slow reader never slows touch: 3 s at 1200 frames/s.
 const QUEUE: usize = 4096;
@@ -62,15 +62,9 @@ impl Stream {
 }
 
 impl Listener for Stream {
-    fn solved(&mut self, solved: &SolvedFrame<'_>) {
-        let SolvedFrame { frame, solution, age, events } = solved;
-        let line = FrameReport {
-            time_s: Some(frame.board_time_us as f64 * 1e-6),
-            sequence: Some(frame.sequence),
-            age_us: Some(age.as_secs_f64() * 1e6),
-            events,
-            ..FrameReport::of(solution)
-        };
+    fn touched(&mut self, event: &Arc<TouchEvent>) {
+        let line =
+            FrameReport { image_s_per_m2: None, readings_v: None, touch_v: None, averaged: None, ..event.report() };
         let sent = serde_json::to_string(&line).ok().zip(self.lines.as_ref()).map(|(line, lines)| lines.try_send(line));
         self.lost += u64::from(!matches!(sent, Some(Ok(()))));
     }
@@ -117,11 +111,9 @@ fn write(lines: &Receiver<String>, mut out: BufWriter<Box<dyn Write + Send>>) ->
 
 #[cfg(test)]
 mod tests {
-    use std::sync::{Arc, Mutex};
+    use std::sync::Mutex;
 
     use super::*;
-    use crate::run::Taken;
-    use tactomo_physics::readings::Readings;
     use tactomo_touch::pointer::PointerEvent;
     use tactomo_touch::solve::{FoundContact, Solution};
 
@@ -143,23 +135,12 @@ mod tests {
     fn answers_are_lines_that_do_not_wait_while_more_come() {
         let out = Shared::default();
         let mut stream = Stream::start(Box::new(out.clone())).unwrap();
-        let readings = Readings::from_fn(4, |_, _| 0.0);
         let solution = Solution { contacts: vec![FoundContact::flat(0.01, 0.0, 1e-3)], ..Solution::default() };
         for sequence in 0..20 {
-            let frame = Taken {
-                newest: readings.clone(),
-                rows: Vec::new(),
-                mean: readings.clone(),
-                averaged: 1,
-                came: 1,
-                sequence,
-                board_time_us: 1000 * sequence,
-                arrived: Instant::now(),
-                status: Default::default(),
-            };
-            let events = if sequence == 7 { &[PointerEvent::Press][..] } else { &[] };
+            let pointer_events = if sequence == 7 { vec![PointerEvent::Press] } else { Vec::new() };
             let age = Duration::from_micros(50);
-            stream.solved(&SolvedFrame { frame: &frame, solution: &solution, age, events });
+            let of = TouchEvent::of(sequence, solution.clone());
+            stream.touched(&Arc::new(TouchEvent { age, pointer_events, ..of }));
             thread::sleep(Duration::from_millis(5));
         }
         assert!(!out.0.lock().unwrap().is_empty(), "lines wait at most {FLUSH_EVERY:?}");
