@@ -1,6 +1,7 @@
 //! Frames of readings in files: recordings of this program, and tables of any other.
 
 mod recorded;
+mod survey;
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use tactomo_protocol::Hello;
 
 pub use self::recorded::{Recorded, RecordingLoss};
+pub use self::survey::Survey;
 use crate::record::{self, RecordError};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_table::{Array, Table, TableError};

@@ -79,6 +79,11 @@ impl RecordingLoss {
     pub fn is_any(&self) -> bool {
         *self != Self::default()
     }
+
+    /// Whether the file or its bytes are damaged; frames may be missing without, where the board or its line dropped them.
+    pub fn is_damage(&self) -> bool {
+        self.file.is_any() || self.corrupt > 0
+    }
 }
 
 impl fmt::Display for RecordingLoss {
