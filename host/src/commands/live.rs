@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use tactomo::board::link::Source;
+use tactomo::board::record::Header;
 use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
@@ -24,7 +25,7 @@ use super::choice::{DetectorArgs, Model};
 use super::output::message;
 use super::source::{self, BoardArgs};
 use super::streams::StreamArgs;
-use super::{browser, interrupt, output, recording};
+use super::{browser, interrupt, keep, output};
 
 /// Requests of pages that may wait.
 const REQUESTS: usize = 64;
@@ -192,11 +193,11 @@ fn plan(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) 
         settings: show.settings,
         scan: show.scan.clone(),
         solving: Some(Solving::new(show.picture.solver, problem)),
-        recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
-        begin_recording: Some(recording::on_request(detector.clone(), show.source.name())),
+        recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
+        begin_recording: Some(keep::on_request(detector.clone(), show.source.name())),
         listeners: listener.into_iter().collect(),
         pointer: show.picture.pointer,
-        board_log: recording::board_log(show.elf.as_deref())?,
+        board_log: keep::board_log(show.elf.as_deref())?,
         seconds: show.seconds,
         ..Plan::new(detector)
     })

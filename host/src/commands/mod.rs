@@ -9,6 +9,7 @@ mod design;
 mod detector;
 mod forward;
 mod interrupt;
+mod keep;
 mod live;
 pub mod output;
 mod ports;
@@ -40,6 +41,7 @@ enum Command {
     Ports(ports::Args),
     Board(board::Args),
     Record(Box<record::Args>),
+    Recording(recording::Args),
     Replay(Box<replay::Args>),
     Detector(detector::Args),
     Forward(Box<forward::Args>),
@@ -58,7 +60,8 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Live(args) => live::run(*args),
         Command::Ports(args) => ports::run(&args),
         Command::Board(args) => board::run(&args),
-        Command::Record(args) => record::run(&args),
+        Command::Record(args) => record::run(*args),
+        Command::Recording(args) => recording::run(&args),
         Command::Replay(args) => replay::run(*args),
         Command::Detector(args) => detector::run(args),
         Command::Forward(args) => forward::run(&args),
