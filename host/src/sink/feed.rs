@@ -75,6 +75,14 @@ pub struct Delivery {
     pub pointer_events: Vec<PointerEvent>,
 }
 
+/// An event that nobody had to wait for, and before which nothing was missed.
+impl From<TouchEvent> for Delivery {
+    fn from(event: TouchEvent) -> Self {
+        let (lost_before, pointer_events) = (event.lost_before, event.pointer_events.clone());
+        Self { event: Arc::new(event), lost_before, missed_before: 0, pointer_events }
+    }
+}
+
 /// What comes next.
 #[derive(Debug)]
 pub enum Next {

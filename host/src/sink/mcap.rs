@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -22,8 +22,8 @@ const CHUNK_LASTS: Duration = Duration::from_millis(500);
 const CHUNK_BYTES: u64 = 4 << 20;
 
 /// An MCAP file that is being written.
-pub struct McapFile {
-    writer: Writer<NoSeek<BufWriter<File>>>,
+pub struct McapFile<W: Write> {
+    writer: Writer<NoSeek<W>>,
     messages: Messages,
     /// Number of each channel in the file.
     channels: [u16; Channel::ALL.len()],
@@ -32,19 +32,19 @@ pub struct McapFile {
     flushed: Instant,
 }
 
-impl McapFile {
+impl<W: Write> McapFile<W> {
     /// Begins a file, with what is to be known of it, such as the detector.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn new(file: File, messages: Messages, about: BTreeMap<String, String>) -> io::Result<Self> {
+    pub fn new(out: W, messages: Messages, about: BTreeMap<String, String>) -> io::Result<Self> {
         // A chunk is written once it is whole: a file that ends early ends after a chunk.
         let options = WriteOptions::new()
             .compression(Some(Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))
             .library(concat!("tactomo ", env!("CARGO_PKG_VERSION")))
             .disable_seeking(true);
-        let mut writer = options.create(NoSeek::new(BufWriter::new(file))).map_err(as_io)?;
+        let mut writer = options.create(NoSeek::new(out)).map_err(as_io)?;
         writer.write_metadata(&Metadata { name: "tactomo".to_owned(), metadata: about }).map_err(as_io)?;
         let mut channels = [0; Channel::ALL.len()];
         for (number, channel) in channels.iter_mut().zip(Channel::ALL) {
@@ -96,7 +96,7 @@ impl McapFile {
     }
 }
 
-impl Sink for McapFile {
+impl<W: Write + Send + 'static> Sink for McapFile<W> {
     fn take(&mut self, delivery: &Delivery, _: bool) -> io::Result<()> {
         self.write(delivery)?;
         self.keep_safe()
@@ -124,7 +124,7 @@ impl Sinks {
     ) -> Result<(), StreamError> {
         let failed = |source| StreamError::Mcap { path: PathBuf::from(path), source };
         let file = File::create_new(path).map_err(failed)?;
-        let file = McapFile::new(file, messages, about).map_err(failed)?;
+        let file = McapFile::new(BufWriter::new(file), messages, about).map_err(failed)?;
         let name = format!("{}", path.display());
         self.run(name.clone(), (Keeps::All, None), DISK_PATIENCE, file).map_err(StreamError::thread(&name))
     }

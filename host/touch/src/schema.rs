@@ -7,7 +7,7 @@
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use tactomo_physics::readings::{Readings, Says};
+use tactomo_physics::readings::Readings;
 
 use crate::pointer::PointerEvent;
 use crate::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
@@ -239,12 +239,8 @@ fn is_false(value: &bool) -> bool {
 
 /// Voltages row by row; what was not read is unknown.
 fn volts<S: Serializer>(readings: &Option<&Readings>, serializer: S) -> Result<S::Ok, S::Error> {
-    let n = readings.map_or(0, Readings::electrodes);
-    let value = |index: usize| {
-        let readings = readings.filter(|readings| readings.says(index / n, index % n) != Says::Nothing)?;
-        Some(readings.volts()[index])
-    };
-    serializer.collect_seq((0..n * n).map(value))
+    // What is not a number is null in JSON.
+    serializer.collect_seq(readings.iter().flat_map(|readings| readings.read_v()))
 }
 
 fn is_none_or_zero(count: &Option<u64>) -> bool {

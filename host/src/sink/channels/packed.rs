@@ -4,7 +4,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 use tactomo_physics::forward::ImageMesh;
-use tactomo_physics::readings::{Readings, Says};
+use tactomo_physics::readings::Readings;
 
 use super::{FRAME, Pose, Stamp};
 
@@ -77,11 +77,7 @@ pub(super) fn readings(
 ) -> Grid {
     let n = readings.electrodes();
     let cell_m = (high_m - low_m) / n.max(1) as f64;
-    let volts = |readings: &Readings, i: usize| match readings.says(i / n, i % n) {
-        Says::Nothing => f64::NAN,
-        _ => readings.volts()[i],
-    };
-    let cells = (0..n * n).flat_map(|i| [volts(readings, i), volts(touch, i)]);
+    let cells = readings.read_v().zip(touch.read_v()).flat_map(|(reading_v, touch_v)| [reading_v, touch_v]);
     let data: Vec<u8> = cells.flat_map(f64::to_le_bytes).collect();
     let field = |name, offset| Field { name, offset, r#type: FLOAT64 };
     let cell_stride = 2 * size_of::<f64>();
