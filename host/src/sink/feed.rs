@@ -159,6 +159,17 @@ impl Tail {
         self.thin.is_on() || self.events.is_empty()
     }
 
+    /// Waits for what may take long: writing to a reader that stalls. What is lost meanwhile is counted, and said, while it is.
+    pub async fn wait_for<T>(&mut self, slow: impl Future<Output = T>) -> T {
+        let mut slow = std::pin::pin!(slow);
+        loop {
+            match timeout(QUIET, &mut slow).await {
+                Ok(done) => return done,
+                Err(_) => self.catch_up(),
+            }
+        }
+    }
+
     /// Goes on from the newest, if it is too far behind for one that wants to know what is now.
     fn catch_up(&mut self) {
         let behind = self.events.len();
@@ -232,6 +243,18 @@ mod tests {
             assert_eq!(all.iter().map(|delivery| delivery.lost_before).sum::<u64>(), 9);
             assert_eq!((all[10].lost_before, all[11].lost_before), (1, 0));
         }
+    }
+
+    #[test]
+    fn what_is_lost_during_a_long_wait_is_counted() {
+        let mut feed = Feed::default();
+        let mut tail = feed.taps().open("stalled", Keeps::Newest, None).unwrap();
+        (0..1000).for_each(|sequence| feed.touched(&event(sequence, 0)));
+        block_on(tail.wait_for(tokio::time::sleep(2 * QUIET)));
+        feed.touched(&event(1000, 0));
+        drop(feed);
+        let all = deliveries(tail);
+        assert_eq!((all[0].event.sequence, all[0].missed_before, all.len()), (1000, 1000, 1));
     }
 
     #[test]

@@ -82,16 +82,16 @@ async fn write(mut stream: TcpStream, mut tail: Tail, fields: Fields) -> io::Res
                     fields.line(&delivery, &mut line)?;
                     lines.extend_from_slice(&line);
                     if tail.is_drained() || lines.len() > 1 << 16 {
-                        stream.write_all(&lines).await?;
+                        tail.wait_for(stream.write_all(&lines)).await?;
                         lines.clear();
                     }
                 }
                 Next::Quiet => {
-                    stream.write_all(&lines).await?;
+                    tail.wait_for(stream.write_all(&lines)).await?;
                     lines.clear();
                 }
                 Next::End => {
-                    stream.write_all(&lines).await?;
+                    tail.wait_for(stream.write_all(&lines)).await?;
                     return stream.shutdown().await;
                 }
             },

@@ -17,7 +17,7 @@ from mcap.reader import NonSeekingReader, make_reader
 with open(sys.argv[1], "rb") as file:
     reader = make_reader(file) if sys.argv[2] == "whole" else NonSeekingReader(file)
     try:
-        for schema, channel, message in reader.iter_messages():
+        for schema, channel, message in reader.iter_messages(log_time_order=sys.argv[2] == "whole"):
             data = json.loads(message.data)
             print(json.dumps([channel.topic, message.log_time, schema.name, schema.encoding, data]))
     except McapError:

@@ -80,11 +80,12 @@ impl App<'_> {
     }
 
     async fn send(&mut self, socket: &mut WebSocket, delivery: &Delivery) -> Result<(), axum::Error> {
-        for (id, channel) in &self.subscriptions {
-            protocol::begin_data(*id, delivery.event.arrived_unix_ns, &mut self.out);
-            if self.shared.messages.write(*channel, delivery, &mut self.out).map_err(axum::Error::new)? {
+        let Self { shared, subscriptions, tail: Some(tail), out } = self else { return Ok(()) };
+        for (id, channel) in subscriptions {
+            protocol::begin_data(*id, delivery.event.arrived_unix_ns, out);
+            if shared.messages.write(*channel, delivery, out).map_err(axum::Error::new)? {
                 // Waits here while the app does not read; nobody else waits for it.
-                socket.send(Message::binary(self.out.clone())).await?;
+                tail.wait_for(socket.send(Message::binary(out.clone()))).await?;
             }
         }
         Ok(())
