@@ -86,7 +86,7 @@ impl TouchEvent {
 
     /// Board time at the start of the scan (s).
     pub fn time_s(&self) -> f64 {
-        1e-6 * self.board_time_us as f64
+        self.board_time_us as f64 / 1e6
     }
 }
 
