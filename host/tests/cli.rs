@@ -23,6 +23,7 @@ fn every_command_has_a_help_with_an_example() {
         "record",
         "recording",
         "replay",
+        "export",
         "forward",
         "validate",
         "reconstruct",

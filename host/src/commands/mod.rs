@@ -7,6 +7,7 @@ mod calibrate;
 mod choice;
 mod design;
 mod detector;
+mod export;
 mod forward;
 mod interrupt;
 mod keep;
@@ -20,6 +21,7 @@ mod replay;
 mod scene;
 mod source;
 mod stability;
+mod streams;
 mod study;
 mod tradeoff;
 mod validate;
@@ -42,6 +44,7 @@ enum Command {
     Record(Box<record::Args>),
     Recording(recording::Args),
     Replay(Box<replay::Args>),
+    Export(Box<export::Args>),
     Detector(detector::Args),
     Forward(Box<forward::Args>),
     Validate(validate::Args),
@@ -62,6 +65,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Record(args) => record::run(*args),
         Command::Recording(args) => recording::run(&args),
         Command::Replay(args) => replay::run(*args),
+        Command::Export(args) => export::run(&args),
         Command::Detector(args) => detector::run(args),
         Command::Forward(args) => forward::run(&args),
         Command::Validate(args) => validate::run(&args),

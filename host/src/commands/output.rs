@@ -83,6 +83,13 @@ impl NewFile {
         Self::new(path, false)
     }
 
+    /// The same for a file that is made from `input`, which it must not replace.
+    pub fn beside(input: &Path, path: &Path, overwrite: bool) -> anyhow::Result<Self> {
+        let is_same = matches!((input.canonicalize(), path.canonicalize()), (Ok(one), Ok(other)) if one == other);
+        ensure!(!is_same, "{} is the file that is read: give --out another name", path.display());
+        Self::new(path, overwrite)
+    }
+
     /// The same for a file that may be wanted.
     pub fn optional(path: Option<&PathBuf>, overwrite: bool) -> anyhow::Result<Option<Self>> {
         path.map(|path| Self::new(path, overwrite)).transpose()
