@@ -62,8 +62,8 @@ impl ParquetWriter {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn new(out: BufWriter<File>, about: &[(&str, String)]) -> Result<Self, ParquetError> {
-        let about = about.iter().map(|(key, value)| KeyValue::new((*key).to_owned(), value.clone())).collect();
+    pub fn new(out: BufWriter<File>, about: impl IntoIterator<Item = (String, String)>) -> Result<Self, ParquetError> {
+        let about = about.into_iter().map(|(key, value)| KeyValue::new(key, value)).collect();
         let properties =
             WriterProperties::builder().set_compression(Compression::UNCOMPRESSED).set_key_value_metadata(Some(about));
         let message = Arc::new(parse_message_type(&message())?);
@@ -182,7 +182,8 @@ mod tests {
     fn frames_come_back_with_their_contacts_and_every_bit_of_their_readings() {
         let path = std::env::temp_dir().join(format!("tactomo-{}.parquet", std::process::id()));
         let mut writer =
-            ParquetWriter::new(BufWriter::new(File::create(&path).unwrap()), &[("schema", "1".into())]).unwrap();
+            ParquetWriter::new(BufWriter::new(File::create(&path).unwrap()), [("schema".to_owned(), "1".to_owned())])
+                .unwrap();
         let readings = |frame: usize| {
             Readings::from_fn(4, |g, e| 0.1 / (1 + frame + 4 * g + e) as f64)
                 .saying(|g, _| if g == 2 { Says::Nothing } else { Says::Voltage })
