@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use tactomo::board::frames::{FileFrame, Survey};
 use tactomo::readings::Readings;
 use tactomo::run::TouchEvent;
@@ -15,17 +15,15 @@ use tactomo::sink::Delivery;
 use tactomo::sink::channels::Messages;
 use tactomo::sink::lines::Fields;
 use tactomo::sink::mcap::McapFile;
+use tactomo::sink::parquet::ParquetWriter;
 use tactomo::solve::{Lambda, Method, Solution};
 
 use super::choice::{self, DetectorArgs, Model};
 use super::interrupt;
-use super::output::{NewFile, message};
+use super::output::{NewFile, ProgressBar, message};
 use super::reconstruct::reader::{Input, Reader};
 use super::reconstruct::writer::{FileForm, Writer};
 use super::streams;
-
-/// How often it is told how far the export is.
-const TOLD_EVERY: Duration = Duration::from_secs(1);
 
 /// Solves a recording and writes answers and readings for other programs.
 ///
@@ -34,6 +32,7 @@ const TOLD_EVERY: Duration = Duration::from_secs(1);
 /// Examples:
 ///   tactomo export touch.tactomo --to mcap --out touch.mcap
 ///   tactomo export touch.tactomo --to npz --fields all --out touch.npz
+///   tactomo export touch.tactomo --to parquet --out touch.parquet
 ///   tactomo export touch.tactomo --to csv --solver contacts --detector calibrated.toml --out touch.csv
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -62,8 +61,8 @@ pub struct Args {
     /// Frames at the start whose mean is the baseline, and which are not solved [default: the baseline that live takes]
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     rest: Option<u32>,
-    /// What jsonl and npz have: only `contacts`; also what to know of the `answer`; its `image`; the `readings`; or `all`. An MCAP file
-    /// has all [default: answer]
+    /// What jsonl and npz have: only `contacts`; also what to know of the `answer`; its `image`; the `readings`; or `all`. An MCAP file and a
+    /// Parquet file have all [default: answer]
     #[arg(long, value_name = "FIELDS")]
     fields: Option<Fields>,
     /// Replaces the file if it exists
@@ -82,35 +81,44 @@ enum Form {
     Csv,
     /// JSON Lines: an object a frame, as live --stream writes them
     Jsonl,
+    /// A table with a frame a row, contacts and readings as lists, for pandas, Polars or DuckDB
+    Parquet,
+}
+
+impl Form {
+    /// What it is called where it has fields of its own; `None` where they are chosen.
+    fn with_fields_of_its_own(self) -> Option<&'static str> {
+        match self {
+            Self::Mcap => Some("an MCAP file"),
+            Self::Csv => Some("a CSV table"),
+            Self::Parquet => Some("a Parquet file"),
+            Self::Npz | Self::Jsonl => None,
+        }
+    }
 }
 
 /// What is written to.
 enum Out {
     Mcap(Box<McapFile<BufWriter<File>>>, NewFile),
+    Parquet(Box<ParquetWriter>, NewFile),
     Table(Writer),
 }
 
-/// How far it is, for who waits.
-struct Told {
-    all: u64,
-    begun: Instant,
-    last: Instant,
-}
+/// What a Parquet file has.
+const ALL: Fields = Fields { answer: true, image: true, readings: true };
 
 /// Solves and writes all frames.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let stop = interrupt::flag()?;
-    ensure!(
-        args.fields.is_none() || args.to != Form::Mcap && args.to != Form::Csv,
-        "leave out --fields: {} has its own",
-        if args.to == Form::Mcap { "an MCAP file" } else { "a CSV table" }
-    );
+    if let Some((form, _)) = args.to.with_fields_of_its_own().zip(args.fields) {
+        bail!("leave out --fields: {form} has its own");
+    }
     let file = NewFile::beside(&args.file, &args.out, args.overwrite)?;
     let survey = Survey::of(&args.file)?;
     let mut reader = Reader::open(&args.input())?;
     let mut out = Out::begin(args.to, file, &reader, &survey.header.source)?;
     let fields = args.fields.unwrap_or_default();
-    let mut told = Told { all: survey.frames, begun: Instant::now(), last: Instant::now() };
+    let mut bar = ProgressBar::new("frames", survey.frames);
     let (mut lost, mut solved) = (0, 0_u64);
     while let Some(frame) = reader.next_frame()? {
         if stop.load(Ordering::Relaxed) {
@@ -121,8 +129,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let event = event(&reader, &frame, solution, (survey.header.started(), lost))?;
         out.write(&event.into(), fields, reader.frame() as u64)?;
         solved += 1;
-        told.say(reader.count() as u64);
+        bar.tell(reader.count() as u64);
     }
+    bar.end();
     out.finish(&reader)?;
     message!("{}: {solved} frames in {}", reader.name(), args.out.display());
     reader.notice().iter().for_each(|notice| message!("{notice}"));
@@ -158,10 +167,11 @@ fn event(
     let measured = Readings::new(electrodes, reader.measured_v().to_vec());
     let (measured, touch) = measured.zip(reader.touch(frame)).with_context(|| reader.place())?;
     let time_s = frame.time_s.unwrap_or_default().max(0.0);
+    let arrived_s = frame.arrived_s.unwrap_or(time_s).max(0.0);
     Ok(TouchEvent {
         sequence: frame.sequence.unwrap_or_default(),
         board_time_us: (time_s * 1e6).round() as u64,
-        arrived_unix_ns: (started + Duration::from_secs_f64(time_s)).as_nanos() as u64,
+        arrived_unix_ns: (started + Duration::from_secs_f64(arrived_s)).as_nanos() as u64,
         age: None,
         status: Default::default(),
         readings: measured.saying(|g, e| touch.says(g, e)),
@@ -182,6 +192,12 @@ impl Out {
             Form::Npz => FileForm::Npz,
             Form::Csv => FileForm::Csv,
             Form::Jsonl => FileForm::JsonLines,
+            Form::Parquet => {
+                let detector = reader.measured().context("a Parquet file needs a detector")?;
+                let about: Vec<_> = streams::about(detector, source).into_iter().collect();
+                let writer = ParquetWriter::new(file.create()?, about).context("cannot begin the Parquet file")?;
+                return Ok(Self::Parquet(Box::new(writer), file));
+            }
             Form::Mcap => {
                 let (detector, mesh) = reader.measured().zip(reader.mesh()).context("an MCAP file needs a detector")?;
                 let messages = Messages::new(detector, mesh.clone(), reader.usual_radius_m());
@@ -195,6 +211,10 @@ impl Out {
     fn write(&mut self, delivery: &Delivery, fields: Fields, number: u64) -> anyhow::Result<()> {
         match self {
             Self::Mcap(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
+            Self::Parquet(parquet, _) => {
+                let report = FrameReport { frame: Some(number), ..ALL.of(delivery) };
+                parquet.write(&report).context("cannot write the Parquet file")
+            }
             Self::Table(writer) => {
                 let report = FrameReport { frame: Some(number), ..fields.of(delivery) };
                 writer.write(&report).map(drop)
@@ -208,18 +228,11 @@ impl Out {
                 mcap.finish().context("cannot write the MCAP file")?;
                 file.finish()
             }
+            Self::Parquet(parquet, file) => {
+                parquet.finish().context("cannot write the Parquet file")?;
+                file.finish()
+            }
             Self::Table(writer) => writer.finish(reader.mesh()),
         }
-    }
-}
-
-impl Told {
-    fn say(&mut self, done: u64) {
-        if self.last.elapsed() < TOLD_EVERY {
-            return;
-        }
-        self.last = Instant::now();
-        let left = self.begun.elapsed().mul_f64(self.all.saturating_sub(done) as f64 / done.max(1) as f64);
-        message!("{done} of {} frames, about {:.0} s left", self.all, left.as_secs_f64().ceil());
     }
 }
