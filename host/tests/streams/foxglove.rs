@@ -10,9 +10,10 @@ use tungstenite::{Message, WebSocket, client};
 use crate::program::Live;
 
 type Socket = WebSocket<TcpStream>;
+type Answer = Response<Option<Vec<u8>>>;
 
 /// Connects and offers a subprotocol.
-fn connect(at: &str, subprotocol: &str) -> Result<(Socket, Response<Option<Vec<u8>>>), String> {
+fn connect(at: &str, subprotocol: &str) -> Result<(Socket, Answer), String> {
     let mut request = format!("ws://{at}").into_client_request().unwrap();
     request.headers_mut().insert("sec-websocket-protocol", subprotocol.parse().unwrap());
     client(request, TcpStream::connect(at).unwrap()).map_err(|error| error.to_string())
