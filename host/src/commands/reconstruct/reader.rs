@@ -137,26 +137,17 @@ impl Reader {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
             if self.given == 0 {
-                self.note_rest(&frame);
-                let volts = frame.volts.clone();
-                self.baseline.subtract(&volts, &mut frame.volts);
+                frame.note_rest(&mut self.baseline);
+                frame.subtract(&self.baseline);
                 return Ok(Some(frame));
             }
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
                 bail!("{}: the baseline needs finite readings, but some of these are not", self.place());
             }
-            self.note_rest(&frame);
+            frame.note_rest(&mut self.baseline);
             self.given -= 1;
         }
         Ok(None)
-    }
-
-    fn note_rest(&mut self, frame: &FileFrame) {
-        let time_s = frame.time_s.unwrap_or_default();
-        match frame.rows() {
-            Some(rows) => _ = self.baseline.add_rows(&rows, time_s, &[]),
-            None => _ = self.baseline.add(&frame.touches_v(), 1, time_s, &[]),
-        }
     }
 
     /// What is missing in the file, in words; `None` if nothing is.
