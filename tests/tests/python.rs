@@ -64,5 +64,6 @@ fn the_wheel_installs_and_passes_its_own_tests() -> Result<()> {
     run(Command::new(&python).args(pip).arg(&wheel))?;
     // Not in the package's folder, where its sources would be imported in place of what is installed.
     let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
-    run(Command::new(&python).args(pytest).arg(package.join("tests")).current_dir(env!("CARGO_TARGET_TMPDIR")))
+    let tests = ["tests", "adapters"].map(|folder| package.join(folder));
+    run(Command::new(&python).args(pytest).args(tests).current_dir(env!("CARGO_TARGET_TMPDIR")))
 }

@@ -27,7 +27,7 @@ class TouchEnv(gymnasium.Env):
     def __init__(self, detector="square-60", pixels=16, render_mode=None):
         self.render_mode = render_mode
         self.described = tactomo.Detector(detector)
-        self.solver = tactomo.Solver("tikhonov", self.described)
+        self.solver = tactomo.Solver("nonlinear", self.described)
         self.raster = self.solver.mesh.raster(pixels, pixels)
         self.reach_m = 0.85 * np.array(self.described.size_m) / 2
         self.action_space = spaces.Box(-1, 1, (3,), np.float32)

@@ -37,7 +37,7 @@ def features(readings):
     return np.hstack([flat / strength, np.log(strength)])
 
 
-grid = {"kernelridge__gamma": [1e-4, 1e-3, 1e-2], "kernelridge__alpha": [1e-5, 1e-3, 1e-1]}
+grid = {"kernelridge__gamma": [1e-6, 1e-5, 1e-4, 1e-3], "kernelridge__alpha": [1e-9, 1e-7, 1e-5, 1e-3]}
 learner = GridSearchCV(make_pipeline(StandardScaler(), KernelRidge(kernel="rbf")), grid, cv=3)
 learner.fit(features(readings), places_m * 1e3)
 print("chosen:", learner.best_params_)
