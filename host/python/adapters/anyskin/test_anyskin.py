@@ -40,7 +40,7 @@ def test_contacts_are_the_firmest_first_and_zeros_where_there_is_none():
     reader.start()
     try:
         for _ in range(2000):
-            contacts = reader.get_data(1)[0][1:].reshape(6, 3)
+            contacts = reader.get_data(2)[1][1:].reshape(6, 3)
             if contacts[0, 2] > 0:
                 break
         assert contacts[0, 2] > 0 and (np.diff(contacts[:, 2]) <= 0).all() and not contacts[5].any()
