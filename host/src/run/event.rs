@@ -23,8 +23,8 @@ pub struct TouchEvent {
     pub board_time_us: u64,
     /// When the frame's last byte came, by this machine's clock: nanoseconds since 1970 (ns).
     pub arrived_unix_ns: u64,
-    /// Age of the answer when it was ready: since the frame's last byte came.
-    pub age: Duration,
+    /// Age of the answer when it was ready: since the frame's last byte came; none of a frame from a file.
+    pub age: Option<Duration>,
     /// What happened during the scan.
     pub status: Status,
     /// Readings as measured (V), of this frame; of rows the latest of each.
@@ -56,7 +56,7 @@ impl TouchEvent {
             time_s: Some(self.time_s()),
             arrived_unix_s: Some(self.arrived_unix_ns as f64 * 1e-9),
             lost_before: Some(self.lost_before),
-            age_us: Some(self.age.as_secs_f64() * 1e6),
+            age_us: self.age.map(|age| age.as_secs_f64() * 1e6),
             revised: self.is_revision,
             rezeroing: self.is_taking_baseline,
             image_s_per_m2: self.solution.image_s_per_m2.as_deref(),
@@ -86,7 +86,7 @@ impl TouchEvent {
 
     /// Board time at the start of the scan (s).
     pub fn time_s(&self) -> f64 {
-        1e-6 * self.board_time_us as f64
+        self.board_time_us as f64 / 1e6
     }
 }
 
@@ -139,7 +139,7 @@ impl Listeners {
             sequence: frame.sequence,
             board_time_us: frame.board_time_us,
             arrived_unix_ns: unix_ns(frame.arrived),
-            age: answer.ready - frame.arrived,
+            age: Some(answer.ready - frame.arrived),
             status: frame.status,
             readings: frame.newest.clone(),
             touch: answer.touch.clone(),

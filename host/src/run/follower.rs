@@ -267,6 +267,7 @@ impl FollowLoop {
                     // Wires that it knows to be exchanged are none any more.
                     board.watch = ElectrodeWatch::new(&found);
                     board.detector = Arc::clone(&found);
+                    self.notice.change(|snapshot| snapshot.calibrated = Some(Arc::clone(&found)));
                     self.calibrated = Some(found);
                     self.order(self.maker.method());
                 }

@@ -11,6 +11,7 @@ pub mod course;
 mod event;
 mod follower;
 mod inbox;
+mod keeping;
 mod maker;
 mod notice;
 pub mod plan;
@@ -36,6 +37,7 @@ use tactomo_protocol::{Hello, Status};
 
 use self::calibration::{Calibrate, Calibrating};
 use self::course::Course;
+use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::pointer::PointerState;
 use tactomo_touch::solve::{Method, Solution};
@@ -61,6 +63,10 @@ pub struct Snapshot {
     pub playing: Playing,
     /// The recording that is being kept, if one is.
     pub recording: Option<PathBuf>,
+    /// Marks set in it.
+    pub marks: u64,
+    /// The detector that a calibration has found and that is in use.
+    pub calibrated: Option<Arc<Detector>>,
     /// What was asked for last and cannot be, for the person who asked.
     pub refused: Option<String>,
     /// What to know of the baseline, as one sentence for a person; none if all is well.
@@ -155,6 +161,8 @@ pub enum Request {
     Settings(RequestedSettings),
     /// Begins to keep a recording in a new file, or ends it.
     Record(bool),
+    /// Sets a mark in the recording, with what is said of it.
+    Mark(String),
     /// Asks something of a simulated detector or a recording.
     Control(Control),
     /// Asks something of the calibration by rubbing.

@@ -7,7 +7,7 @@
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use tactomo_physics::readings::{Readings, Says};
+use tactomo_physics::readings::Readings;
 
 use crate::pointer::PointerEvent;
 use crate::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
@@ -205,13 +205,16 @@ pub struct FrameReport<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<&'a FoundShape>,
     /// Root mean square of what the answer leaves of the readings, in standard deviations of the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub residual: Option<f64>,
     /// Probability that as many contacts touch as were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certainty: Option<f64>,
     /// What to know before this is believed.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub flags: Option<&'a Flags>,
     /// What was chosen and why.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub choice: Option<&'a Choice>,
     /// The image, if it is wanted: contact conductance per area at each node (S/m2).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -236,12 +239,8 @@ fn is_false(value: &bool) -> bool {
 
 /// Voltages row by row; what was not read is unknown.
 fn volts<S: Serializer>(readings: &Option<&Readings>, serializer: S) -> Result<S::Ok, S::Error> {
-    let n = readings.map_or(0, Readings::electrodes);
-    let value = |index: usize| {
-        let readings = readings.filter(|readings| readings.says(index / n, index % n) != Says::Nothing)?;
-        Some(readings.volts()[index])
-    };
-    serializer.collect_seq((0..n * n).map(value))
+    // What is not a number is null in JSON.
+    serializer.collect_seq(readings.iter().flat_map(|readings| readings.read_v()))
 }
 
 fn is_none_or_zero(count: &Option<u64>) -> bool {

@@ -44,10 +44,10 @@ impl TouchEvent {
         self.0.arrived_unix_ns as f64 * 1e-9
     }
 
-    /// Age of the answer when it was ready: since the frame's last byte came (us).
+    /// Age of the answer when it was ready: since the frame's last byte came (us); `None` of a frame from a file.
     #[getter]
-    fn age_us(&self) -> f64 {
-        self.0.age.as_secs_f64() * 1e6
+    fn age_us(&self) -> Option<f64> {
+        self.0.age.map(|age| age.as_secs_f64() * 1e6)
     }
 
     /// Frames that the link or the board lost since the event before.
