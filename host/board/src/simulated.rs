@@ -23,8 +23,8 @@ use tactomo_firmware::{Activity, Adc, Board32, Identity, Mux, NewBoardError, Par
 
 use self::circuit::{Circuit, MuxLine, MuxPin, SimulatedChip};
 use self::line::{BoardEnd, Line};
-pub use self::model::BoardModel;
 use self::model::Wiring;
+pub use self::model::{BoardModel, UnknownBoard};
 use self::sampler::SimulatedSampler;
 use crate::link::{Control, ControlError, Link, Playing};
 use tactomo_physics::detector::Detector;

@@ -3,11 +3,9 @@
 
 use std::borrow::Cow;
 
-use anyhow::{Context, ensure};
-use tactomo::detector::Detector;
+use anyhow::ensure;
+use tactomo::detector::{Chosen, Detector};
 use tactomo::simulate;
-
-use super::choice::{self, Chosen};
 
 /// Whether the simulated detector is the one described.
 #[derive(Clone, Debug, clap::Args)]
@@ -35,7 +33,7 @@ impl AsBuiltArgs {
     pub fn of<'a>(&self, described: &'a Detector) -> anyhow::Result<Cow<'a, Detector>> {
         match &self.as_built {
             None => Ok(Cow::Borrowed(described)),
-            Some(AsBuilt::Seed(seed)) => drawn(described, *seed).map(Cow::Owned),
+            Some(AsBuilt::Seed(seed)) => Ok(Cow::Owned(simulate::try_drawn(described, *seed)?)),
             Some(AsBuilt::Told(chosen)) => told(described, chosen).map(Cow::Owned),
         }
     }
@@ -44,24 +42,6 @@ impl AsBuiltArgs {
     pub fn is_given(&self) -> bool {
         self.as_built.is_some()
     }
-}
-
-fn drawn(described: &Detector, seed: u64) -> anyhow::Result<Detector> {
-    let name = &described.name;
-    ensure!(
-        described.calibration.is_none(),
-        "{name} is calibrated, so what was built is not drawn around it but around the description that it was calibrated from: give that \
-         one's `detector show DESCRIPTION --as-built {seed}` as a file, --as-built FILE"
-    );
-    ensure!(
-        !described.tolerances.is_exact(),
-        "{name} has tolerances of nothing, so there is nothing to draw: see [tolerances]"
-    );
-    let built = simulate::drawn(described, seed);
-    built.check().with_context(|| {
-        format!("{name} as built with seed {seed} is no detector: narrow its [tolerances] or give another seed")
-    })?;
-    Ok(built)
 }
 
 fn told(described: &Detector, chosen: &Chosen) -> anyhow::Result<Detector> {
@@ -80,7 +60,7 @@ fn told(described: &Detector, chosen: &Chosen) -> anyhow::Result<Detector> {
 fn as_built(text: &str) -> Result<AsBuilt, String> {
     match text.parse() {
         Ok(seed) => Ok(AsBuilt::Seed(seed)),
-        Err(_) => choice::detector(text).map(AsBuilt::Told).map_err(|error| format!("a seed, or a detector: {error}")),
+        Err(_) => text.parse().map(AsBuilt::Told).map_err(|error| format!("a seed, or a detector: {error}")),
     }
 }
 

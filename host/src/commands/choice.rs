@@ -1,11 +1,11 @@
 //! Arguments that several commands share: detector, model, contacts.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Context;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tactomo::board::record::{Header, RecordError, RecordReader};
-use tactomo::detector::{Detector, Stack};
+use tactomo::detector::{Chosen, Detector, Stack};
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{Auto, DrivingLayer, ForwardError, ForwardModel, Resolution, Slab};
 use tactomo::scene::Contact;
@@ -56,37 +56,18 @@ impl Model {
 #[derive(Clone, Debug, clap::Args)]
 pub struct DetectorArgs {
     /// Detector: name of a preset, or a TOML file; unless given, that of the recording that is read, or square-60
-    #[arg(long, value_name = "NAME|FILE", value_parser = detector)]
+    #[arg(long, value_name = "NAME|FILE")]
     pub detector: Option<Chosen>,
     /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC or, joined by dots of glue, BB-5x5
     #[arg(long, value_name = "A..D|STACK")]
     pub material: Option<Stack>,
 }
 
-/// A preset, or a file that is still to be read.
-#[derive(Clone, Debug)]
-pub enum Chosen {
-    /// A preset.
-    Preset(Box<Detector>),
-    /// A TOML file.
-    File(PathBuf),
-}
-
-impl Chosen {
-    /// The detector.
-    pub fn get(&self) -> anyhow::Result<Detector> {
-        match self {
-            Self::Preset(detector) => Ok((**detector).clone()),
-            Self::File(path) => Ok(Detector::read(path)?),
-        }
-    }
-}
-
 /// The detectors that were chosen, or the presets of such names.
 pub fn detectors(chosen: &[Chosen], otherwise: &[&str]) -> anyhow::Result<Vec<Detector>> {
     match chosen {
         [] => Ok(otherwise.iter().filter_map(|name| Detector::preset(name)).collect()),
-        _ => chosen.iter().map(Chosen::get).collect(),
+        _ => chosen.iter().map(|chosen| Ok(chosen.get()?)).collect(),
     }
 }
 
@@ -112,8 +93,11 @@ impl DetectorArgs {
 
     /// The detector, or the preset `otherwise`, in the material that is asked for.
     pub fn get_or(&self, otherwise: &str) -> anyhow::Result<Detector> {
-        let preset = || Detector::preset(otherwise).with_context(|| format!("{otherwise} is no preset"));
-        self.in_material(self.detector.as_ref().map_or_else(preset, Chosen::get)?)
+        let detector = match &self.detector {
+            Some(chosen) => chosen.get()?,
+            None => Detector::preset(otherwise).with_context(|| format!("{otherwise} is no preset"))?,
+        };
+        self.in_material(detector)
     }
 
     /// The detector for the recording `path` with such a header: its own, unless another one or another material is given. A line on stderr
@@ -177,19 +161,6 @@ fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
     Ok(preset)
 }
 
-/// A preset by its name, or a file.
-pub fn detector(name: &str) -> Result<Chosen, String> {
-    if let Some(preset) = Detector::preset(name) {
-        return Ok(Chosen::Preset(Box::new(preset)));
-    }
-    let path = PathBuf::from(name);
-    if path.extension().is_some() || path.is_file() {
-        return Ok(Chosen::File(path));
-    }
-    let names = Detector::preset_names().collect::<Vec<_>>().join(", ");
-    Err(format!("there is no preset of that name; choose one of {names}, or a file such as my.toml"))
-}
-
 /// A contact from `x_mm,y_mm,radius_mm,conductance_s`, with `z_mm` after `y_mm` on a curved detector.
 pub fn contact(text: &str) -> Result<Contact, String> {
     let ([x_m, y_m, z_m], [radius_mm, conductance_s]) = place_and(text, "radius_mm,conductance_s")?;
@@ -230,9 +201,8 @@ mod tests {
     }
 
     #[test]
-    fn wrong_contacts_and_detectors_say_what_is_allowed() {
+    fn wrong_contacts_say_what_is_allowed() {
         assert!(contact("1,2,3").is_err_and(|error| error.contains("x_mm,y_mm,radius_mm,conductance_s")));
         assert!(contact("1,2,3,much").is_err_and(|error| error.contains("`much` is not a number")));
-        assert!(detector("round").is_err_and(|error| error.contains("square-60, square-50")));
     }
 }

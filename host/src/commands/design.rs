@@ -5,10 +5,9 @@ use std::str::FromStr;
 
 use anyhow::Context;
 use tactomo::design::search::{self, Material, Plan, Wishes};
-use tactomo::detector::Stack;
+use tactomo::detector::{Chosen, Stack};
 use tactomo::hertz::Skin;
 
-use super::choice::{self, Chosen};
 use super::output::{self, NewFile, message};
 use super::study::watched;
 
@@ -56,7 +55,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     foams: Option<PathBuf>,
     /// A detector to compare with what is found: a preset, or a TOML file
-    #[arg(long, value_name = "NAME|FILE", value_parser = choice::detector)]
+    #[arg(long, value_name = "NAME|FILE")]
     compare: Option<Chosen>,
     /// What that is made of: foam, or stack with the upper one first
     #[arg(long, value_name = "A..D|STACK", default_value = "A", requires = "compare")]

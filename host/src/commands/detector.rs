@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use tactomo::detector::{Detector, FOAMS, Foam, Stack, short};
+use tactomo::detector::{Chosen, Detector, FOAMS, Foam, Stack, short};
 
 use super::as_built::AsBuiltArgs;
-use super::choice::{self, Chosen, DetectorArgs};
+use super::choice::DetectorArgs;
 use super::output::{self, NewFile, message};
 
 /// Lists, shows and checks detectors.
@@ -45,7 +45,7 @@ enum Action {
 #[derive(Debug, clap::Args)]
 struct ShowArgs {
     /// Name of a preset, or a TOML file
-    #[arg(value_name = "NAME|FILE", value_parser = choice::detector, default_value = Detector::DEFAULT)]
+    #[arg(value_name = "NAME|FILE", default_value = Detector::DEFAULT)]
     detector: Chosen,
     /// Foam of the detector, A to D, or a stack of foams with the upper one first, such as BC or, joined by dots of glue, BB-5x5
     #[arg(long, value_name = "A..D|STACK")]

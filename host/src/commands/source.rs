@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{ArgGroup, ValueEnum};
+use clap::ArgGroup;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::link::{AnyBoard, NamedPort, Opened, Recording, Source};
 use tactomo::board::record::RecordReader;
@@ -19,9 +20,6 @@ use super::scene::{self, SceneArgs};
 /// How firmly the mouse presses on the simulated detector, from 0 to 1.
 const MOUSE_FIRMNESS: f64 = 0.3;
 
-/// The board that is simulated unless one is chosen.
-const DEFAULT_BOARD: BoardModel = BoardModel::Esp32;
-
 /// A board: on the port that is named, or on whichever USB serial port one is found.
 #[derive(Clone, Debug, clap::Args)]
 #[command(group(ArgGroup::new("simulated").args(SceneArgs::NAMES).multiple(true).requires("simulate")))]
@@ -33,8 +31,8 @@ pub struct BoardArgs {
     #[arg(long)]
     pub simulate: bool,
     /// Which board is simulated [default: esp32; of more than 16 electrodes ideal]
-    #[arg(long, value_enum, value_name = "BOARD", requires = "simulate")]
-    board: Option<BoardName>,
+    #[arg(long, value_name = "BOARD", requires = "simulate", value_parser = board_model())]
+    board: Option<BoardModel>,
     /// Baud rate of the serial port
     #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     pub baud: u32,
@@ -45,17 +43,6 @@ pub struct BoardArgs {
     /// How many times faster than the simulated board its scene plays and its foam creeps and drifts: a day in 86 seconds with 1000
     #[arg(long, value_name = "FACTOR", default_value = "1", requires = "simulate", value_parser = scene::positive)]
     pub time_factor: f64,
-}
-
-/// Boards that can be simulated.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum BoardName {
-    /// The converter of the detector's description, at 2 us a conversion, on a line without end
-    Ideal,
-    /// ESP-WROOM-32: two ADCs with a floor at 0.14 V, 921600 baud
-    Esp32,
-    /// ESP32-C3: one ADC behind the multiplexer, USB
-    Esp32c3,
 }
 
 /// Settings of the scan; what is not given stays as the board has it.
@@ -72,22 +59,10 @@ pub struct SettingsArgs {
     max_fps: Option<u16>,
 }
 
-impl From<BoardName> for BoardModel {
-    fn from(name: BoardName) -> Self {
-        match name {
-            BoardName::Ideal => Self::Ideal,
-            BoardName::Esp32 => Self::Esp32,
-            BoardName::Esp32c3 => Self::Esp32c3,
-        }
-    }
-}
-
 impl BoardArgs {
     /// The board to simulate: one that was chosen, or the default where it has inputs for the detector.
     fn model(&self, detector: &Detector) -> BoardModel {
-        let fits = detector.electrodes.len() <= DEFAULT_BOARD.most_electrodes();
-        let default = if fits { DEFAULT_BOARD } else { BoardModel::Ideal };
-        self.board.map_or(default, BoardModel::from)
+        self.board.unwrap_or_else(|| BoardModel::usual(detector))
     }
 
     /// The board on a serial port.
@@ -112,9 +87,7 @@ pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
     if !args.simulate {
         return detector;
     }
-    let adc = args.model(&detector).adc(detector.adc);
-    let detector = Detector { adc, ..detector };
-    if args.scene.as_built.is_given() { detector } else { detector.taken_as_exact() }
+    args.model(&detector).told(detector, args.scene.as_built.is_given())
 }
 
 /// The board that is chosen, and what the mouse presses with on a simulated one.
@@ -143,6 +116,12 @@ pub fn recording(path: PathBuf, speed: f64, is_watched: bool) -> Box<dyn Source>
 /// The detector that is chosen; unless one is given, that of a recording.
 pub fn recorded_detector(chosen: &DetectorArgs, path: &Path) -> anyhow::Result<Detector> {
     chosen.of_recording(path, RecordReader::open(path)?.header())
+}
+
+/// Parses the name of a board to simulate.
+fn board_model() -> impl TypedValueParser<Value = BoardModel> {
+    let values = BoardModel::ALL.map(|model| PossibleValue::new(model.name()).help(model.explanation()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<BoardModel>())
 }
 
 /// A speed above zero, or `max`.

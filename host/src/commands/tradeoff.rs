@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use tactomo::detector::Chosen;
 use tactomo::study::scanning::{self, Settings};
 use tactomo::study::tradeoff::{self, Plan};
 
-use super::choice::{self, Chosen};
+use super::choice;
 use super::output::{self, NewFile, message};
 use super::study::StudyArgs;
 use crate::heap::HEAP;
@@ -35,7 +36,7 @@ const CONTACTS: [usize; 3] = [1, 2, 3];
 #[command(verbatim_doc_comment)]
 pub struct Args {
     /// Detector: name of a preset, or a TOML file; give it again for more [default: four presets, with --quick square-60]
-    #[arg(long, value_name = "NAME|FILE", value_parser = choice::detector)]
+    #[arg(long, value_name = "NAME|FILE")]
     detector: Vec<Chosen>,
     /// Charts frames a second against error instead, for the rows that an ESP32 can scan and send: whole frames, or some grounds
     #[arg(long, conflicts_with_all = ["solver", "frames", "as_built", "calibrate"])]

@@ -12,6 +12,7 @@ use tactomo_protocol::Hello;
 
 pub use self::recorded::{Recorded, RecordingLoss};
 pub use self::survey::Survey;
+use crate::baseline::Baseline;
 use crate::record::{self, RecordError};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_table::{Array, Table, TableError};
@@ -61,6 +62,21 @@ impl FileFrame {
     /// The same if some were not read: rows of a scan; `None` of a whole frame.
     pub fn rows(&self) -> Option<Readings> {
         self.says.contains(&Says::Nothing).then(|| self.readings()).flatten()
+    }
+
+    /// Takes it into account for the baseline.
+    pub fn note_rest(&self, baseline: &mut Baseline) {
+        let time_s = self.time_s.unwrap_or_default();
+        match self.rows() {
+            Some(rows) => _ = baseline.add_rows(&rows, time_s, &[]),
+            None => _ = baseline.add(&self.touches_v(), 1, time_s, &[]),
+        }
+    }
+
+    /// Takes the baseline off its readings.
+    pub fn subtract(&mut self, baseline: &Baseline) {
+        let volts = self.volts.clone();
+        baseline.subtract(&volts, &mut self.volts);
     }
 
     /// Readings as [`Readings::touch_v`] has them (V).

@@ -2,8 +2,10 @@
 //!
 //! None of them was measured on a board of ours: they are of data sheets, of Espressif's own pages, and of what users published.
 
+use std::str::FromStr;
+
 use tactomo_firmware::Adc as FirmwareAdc;
-use tactomo_physics::detector::Adc;
+use tactomo_physics::detector::{Adc, Detector};
 use tactomo_protocol::{ConverterErrors, Range};
 
 /// Which board is simulated.
@@ -16,6 +18,19 @@ pub enum BoardModel {
     Esp32,
     /// An ESP32-C3: one ADC behind the multiplexer's second half, USB.
     Esp32c3,
+}
+
+/// A name that no simulated board has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no simulated board `{0}`; there are {names}", names = BoardModel::ALL.map(BoardModel::name).join(", "))]
+pub struct UnknownBoard(String);
+
+impl FromStr for BoardModel {
+    type Err = UnknownBoard;
+
+    fn from_str(name: &str) -> Result<Self, UnknownBoard> {
+        Self::ALL.into_iter().find(|model| model.name() == name).ok_or_else(|| UnknownBoard(name.to_owned()))
+    }
 }
 
 /// How electrodes reach ground and converter.
@@ -214,6 +229,36 @@ impl BoardModel {
             Some(analog) => analog.converters.iter().map(|converter| converter.electrodes).sum(),
             None => tactomo_protocol::MAX_ELECTRODES,
         }
+    }
+
+    /// The one that is simulated for a detector unless another is chosen: the paper's, where it has inputs for all electrodes.
+    pub fn usual(detector: &Detector) -> Self {
+        let fits = detector.electrodes.len() <= Self::Esp32.most_electrodes();
+        if fits { Self::Esp32 } else { Self::Ideal }
+    }
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ideal => "ideal",
+            Self::Esp32 => "esp32",
+            Self::Esp32c3 => "esp32c3",
+        }
+    }
+
+    /// What it is, in a line.
+    pub fn explanation(self) -> &'static str {
+        match self {
+            Self::Ideal => "The converter of the detector's description, at 2 us a conversion, on a line without end",
+            Self::Esp32 => "ESP-WROOM-32: two ADCs with a floor at 0.14 V, 921600 baud",
+            Self::Esp32c3 => "ESP32-C3: one ADC behind the multiplexer's second half, USB",
+        }
+    }
+
+    /// What is told of a detector that this board simulates: with its converter, and exact unless it is one as built.
+    pub fn told(self, detector: Detector, is_as_built: bool) -> Detector {
+        let detector = Detector { adc: self.adc(detector.adc), ..detector };
+        if is_as_built { detector } else { detector.taken_as_exact() }
     }
 
     /// The converter of a detector on this board: the board's own, where it has one.

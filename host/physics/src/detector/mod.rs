@@ -3,6 +3,7 @@
 mod bond;
 mod calibration;
 mod check;
+mod chosen;
 mod correction;
 mod file;
 mod force;
@@ -17,6 +18,7 @@ mod uneven;
 pub use self::bond::Bond;
 pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
 pub use self::check::{ELECTRODES, Problem};
+pub use self::chosen::{Chosen, UnknownDetector};
 pub use self::correction::{ConductanceErrors, Correction, PlaceErrors};
 pub use self::file::{FileError, TomlError};
 pub use self::force::{FARTHEST, ForceLaw, Newtons};

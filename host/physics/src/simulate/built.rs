@@ -2,7 +2,7 @@
 
 use super::Fault;
 use super::noise::{Noise, Stream};
-use crate::detector::{Detector, Parameter, Tolerances};
+use crate::detector::{Detector, Parameter, Problem, Tolerances};
 
 /// Halvings of the way from a pad's place as drawn to the one described, after which they are one.
 const HALVINGS: usize = 60;
@@ -33,6 +33,54 @@ pub fn drawn(detector: &Detector, seed: u64) -> Detector {
         pad.offset_v += detector.tolerances.offset_lsb * code_v * noise.normal();
     }
     Detector { calibration: None, correction: None, tolerances: Tolerances::EXACT, ..built }
+}
+
+/// Why no detector as built can be drawn.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CannotDraw {
+    /// What is left unknown of a calibrated detector is less than its tolerances.
+    #[error(
+        "{detector} is calibrated, so what was built is not drawn around it but around the description that it was calibrated from: give that \
+         one's `detector show DESCRIPTION --as-built {seed}` as a file, --as-built FILE"
+    )]
+    Calibrated {
+        /// Its name.
+        detector: String,
+        /// The seed that was asked for.
+        seed: u64,
+    },
+    /// It is as it is described.
+    #[error("{0} has tolerances of nothing, so there is nothing to draw: see [tolerances]")]
+    Exact(String),
+    /// What was drawn is no detector.
+    #[error("{detector} as built with seed {seed} is no detector: narrow its [tolerances] or give another seed")]
+    Wrong {
+        /// Its name.
+        detector: String,
+        /// The seed that was asked for.
+        seed: u64,
+        /// What is wrong.
+        source: Problem,
+    },
+}
+
+/// The detector that [`drawn`] gives, where there is one.
+///
+/// # Errors
+/// [`CannotDraw`], which says what to do.
+pub fn try_drawn(detector: &Detector, seed: u64) -> Result<Detector, CannotDraw> {
+    let name = || detector.name.clone();
+    if detector.calibration.is_some() {
+        return Err(CannotDraw::Calibrated { detector: name(), seed });
+    }
+    if detector.tolerances.is_exact() {
+        return Err(CannotDraw::Exact(name()));
+    }
+    let built = drawn(detector, seed);
+    match built.check() {
+        Ok(()) => Ok(built),
+        Err(source) => Err(CannotDraw::Wrong { detector: name(), seed, source }),
+    }
 }
 
 /// A step of every parameter but the offsets, which are the board's.

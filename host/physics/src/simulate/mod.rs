@@ -16,7 +16,7 @@ mod noise;
 use crate::readings::Readings;
 
 pub use board::{Simulation, SimulationError, driving_layer, finer_model};
-pub use built::{as_built, drawn};
+pub use built::{CannotDraw, as_built, drawn, try_drawn};
 pub use controls::Controls;
 pub use fault::{Fault, FaultError};
 pub use foam::{Foam, Pressed};

@@ -147,7 +147,7 @@ impl Reader {
         while let Some(mut frame) = self.frames.next()? {
             self.count += 1;
             if self.given == 0 {
-                self.note_rest(&frame);
+                frame.note_rest(&mut self.baseline);
                 self.measured_v.clone_from(&frame.volts);
                 self.baseline.subtract(&self.measured_v, &mut frame.volts);
                 return Ok(Some(frame));
@@ -155,18 +155,10 @@ impl Reader {
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
                 bail!("{}: the baseline needs finite readings, but some of these are not", self.place());
             }
-            self.note_rest(&frame);
+            frame.note_rest(&mut self.baseline);
             self.given -= 1;
         }
         Ok(None)
-    }
-
-    fn note_rest(&mut self, frame: &FileFrame) {
-        let time_s = frame.time_s.unwrap_or_default();
-        match frame.rows() {
-            Some(rows) => _ = self.baseline.add_rows(&rows, time_s, &[]),
-            None => _ = self.baseline.add(&frame.touches_v(), 1, time_s, &[]),
-        }
     }
 
     /// What is missing in the file, in words; `None` if nothing is.

@@ -1,9 +1,10 @@
 //! `tactomo study contacts`: contacts of any size, strength and number.
 
+use tactomo::detector::Chosen;
 use tactomo::solve::Method;
 use tactomo::study::contacts::{self, Plan};
 
-use crate::commands::choice::{self, Chosen};
+use crate::commands::choice;
 use crate::commands::output::{self, message};
 
 /// Tries a solver on random contacts, one to five, each scene from a cold start.
@@ -23,7 +24,7 @@ pub struct Args {
     solver: Method,
     /// Detector: name of a preset, or a TOML file; give it again for more [default: square-60, the same with foam
     /// that conducts ten times better at the bottom than at the top, and display-140x70]
-    #[arg(long, value_name = "NAME|FILE", value_parser = choice::detector)]
+    #[arg(long, value_name = "NAME|FILE")]
     detector: Vec<Chosen>,
     /// How many scenes
     #[arg(long, default_value_t = 180, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]

@@ -43,6 +43,7 @@ pub use self::follow::{Followed, Follower, Lead, Parts, Searcher};
 pub use self::guard::{Guard, without};
 pub use self::health::{ElectrodeFault, faulty_electrodes};
 pub(crate) use self::health::{Pair as PairOfLoads, loads};
+pub use self::interpolate::Interpolation;
 pub use self::kernel::{Kernel, KernelSolver, Press, Presses, PressesError, Strength, TeachError};
 pub use self::lambda::Lambda;
 use self::lambda::Spectrum;

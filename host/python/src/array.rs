@@ -1,0 +1,61 @@
+//! Arrays on their way in and out.
+
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+use tactomo::readings::Readings;
+
+use crate::error::refused;
+use crate::live::TouchEvent;
+use crate::recording::Frame;
+
+/// Readings of a frame: an array `(n, n)` or `(n * n,)` of whatever numbers (V), or a frame or an event that has some.
+pub fn readings(given: &Bound<'_, PyAny>) -> PyResult<Readings> {
+    if let Ok(array) = given.cast::<PyArrayDyn<f64>>() {
+        return of_array(&array.try_readonly()?);
+    }
+    if let Ok(frame) = given.cast::<Frame>() {
+        return Ok(frame.get().readings().clone());
+    }
+    if let Ok(event) = given.cast::<TouchEvent>() {
+        return Ok(event.get().touch().clone());
+    }
+    let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = given.extract()?;
+    of_array(&array)
+}
+
+/// Frames of readings: an array `(frames, n, n)`, `(frames, n * n)`, or a list of what [`readings`] takes.
+pub fn frames(given: &Bound<'_, PyAny>) -> PyResult<Vec<Readings>> {
+    given.try_iter()?.map(|frame| readings(&frame?)).collect()
+}
+
+fn of_array(array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Readings> {
+    let view = array.as_array();
+    // Of the view: numpy's own slice is in the order of the memory, which may be by columns.
+    let volts = view.as_slice().map_or_else(|| view.iter().copied().collect(), <[f64]>::to_vec);
+    let electrodes = match *view.shape() {
+        [grounded, read] if grounded == read => grounded,
+        [count] => count.isqrt(),
+        _ => 0,
+    };
+    let shape = || view.shape().iter().map(usize::to_string).collect::<Vec<_>>().join(" x ");
+    Readings::new(electrodes, volts).ok_or_else(|| {
+        refused(format!(
+            "an array of {} is no frame: `electrodes x electrodes` readings (V) are needed, a row for each grounded electrode",
+            shape()
+        ))
+    })
+}
+
+/// Numbers as an array `(rows, columns)`, without a copy of them; `columns` divides their number.
+pub fn square<T: numpy::Element>(py: Python<'_>, values: Vec<T>, columns: usize) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let rows = values.len().checked_div(columns).unwrap_or_default();
+    PyArray1::from_vec(py, values).reshape([rows, columns])
+}
+
+/// Places (m) as an array `(places, N)`.
+pub fn places<const N: usize>(
+    py: Python<'_>,
+    places_m: impl IntoIterator<Item = [f64; N]>,
+) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    square(py, places_m.into_iter().flatten().collect(), N)
+}

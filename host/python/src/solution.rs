@@ -1,0 +1,223 @@
+//! `Solution` and what it is made of; names are those of the one schema, [`tactomo::schema`].
+
+use numpy::{PyArray1, PyArrayDescr, PyUntypedArray};
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyAttributeError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyList;
+use tactomo::schema::{CONTACT_COLUMNS, FrameReport, SHAPE_COLUMNS};
+use tactomo::solve::{Calibrated, FoundContact as FoundDisc, FoundShape, Solution as Answer};
+
+use crate::error::raised;
+
+/// What a solver found in a frame.
+#[pyclass(frozen, module = "tactomo")]
+pub struct Solution {
+    /// Without its image, which is an array of its own.
+    answer: Answer,
+    image: Option<Py<PyArray1<f32>>>,
+}
+
+impl Solution {
+    /// An answer whose image, if it has one, becomes an array without a copy.
+    pub fn new(py: Python<'_>, mut answer: Answer) -> Self {
+        let image = answer.image_s_per_m2.take().map(|image| PyArray1::from_vec(py, image).unbind());
+        Self { answer, image }
+    }
+}
+
+#[pymethods]
+impl Solution {
+    /// The contacts found; where a shape or an image is the answer, the contacts that would explain the readings best beside it.
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        contacts(py, &self.answer.contacts)
+    }
+
+    /// The same as a structured array, a row each; its fields are those of a contact, all float64, NaN where not known.
+    #[getter]
+    fn array<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        contact_array(py, &self.answer.contacts)
+    }
+
+    /// Contact conductance per area at each node of the solver's mesh (S/m2), `(nodes,)`, float32; `None` of a method without images.
+    #[getter]
+    fn image<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f32>>> {
+        self.image.as_ref().map(|image| image.bind(py).clone())
+    }
+
+    /// The one line or ring that explains the readings; `None` unless a solver that knows shapes chose one.
+    #[getter]
+    fn shape(&self) -> Option<Shape> {
+        self.answer.shape.map(Shape)
+    }
+
+    /// Whether the contacts are the answer, not beside it: no shape and no image.
+    #[getter]
+    fn is_contacts(&self) -> bool {
+        self.image.is_none() && self.answer.is_contacts()
+    }
+
+    /// How far the readings are from those of what was found: root mean square, in standard deviations of the noise; `None` of a method
+    /// that predicts none.
+    #[getter]
+    fn residual(&self) -> Option<f64> {
+        self.answer.residual
+    }
+
+    /// Probability that as many contacts touch as were found; of a method that weighs them.
+    #[getter]
+    fn certainty(&self) -> Option<f64> {
+        self.answer.certainty
+    }
+
+    /// What to know before this is believed.
+    #[getter]
+    fn flags(&self) -> Flags {
+        Flags::from(&self.answer.flags)
+    }
+
+    /// What was chosen, such as `2 contacts`, `line` or `image`, and why; of a solver that chooses.
+    #[getter]
+    fn choice(&self) -> Option<(String, String)> {
+        self.answer.choice.as_ref().map(|choice| (choice.what.clone(), choice.why.clone()))
+    }
+
+    /// Standard errors of the least known contact's place (m) as it is now and after a calibration; where `flags.calibrate` asks for one.
+    #[getter]
+    fn calibrated_m(&self) -> Option<(f64, f64)> {
+        self.answer.calibrated.map(|Calibrated { now_m, calibrated_m }| (now_m, calibrated_m))
+    }
+
+    /// This as the line of JSON that the program writes, without the image.
+    fn to_json(&self) -> PyResult<String> {
+        serde_json::to_string(&FrameReport::of(&self.answer)).map_err(raised)
+    }
+
+    fn __repr__(&self) -> String {
+        match &self.answer.choice {
+            Some(choice) => format!("Solution({})", choice.what),
+            None => format!("Solution({} contacts)", self.answer.contacts.len()),
+        }
+    }
+}
+
+/// Contacts as a list.
+pub fn contacts<'py>(py: Python<'py>, found: &[FoundDisc]) -> PyResult<Bound<'py, PyList>> {
+    PyList::new(py, found.iter().map(|contact| FoundContact(*contact)))
+}
+
+/// Contacts as a structured array.
+pub fn contact_array<'py>(py: Python<'py>, found: &[FoundDisc]) -> PyResult<Bound<'py, PyAny>> {
+    static DTYPE: PyOnceLock<Py<PyArrayDescr>> = PyOnceLock::new();
+    let named = || {
+        let fields: Vec<_> = CONTACT_COLUMNS.iter().map(|column| (column.name, "f8")).collect();
+        PyArrayDescr::new(py, fields).map(Bound::unbind)
+    };
+    let values = found.iter().flat_map(|contact| CONTACT_COLUMNS.iter().map(|column| column.value(contact)));
+    let values: Vec<f64> = values.map(|value| value.unwrap_or(f64::NAN)).collect();
+    let array: Bound<'_, PyUntypedArray> = PyArray1::from_vec(py, values).cast_into()?;
+    array.call_method1("view", (DTYPE.get_or_try_init(py, named)?.bind(py),))
+}
+
+/// A contact that was found. Its attributes are the fields of `tactomo.CONTACT_FIELDS`; `None` where not known.
+#[pyclass(frozen, module = "tactomo")]
+pub struct FoundContact(FoundDisc);
+
+#[pymethods]
+impl FoundContact {
+    fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let column = CONTACT_COLUMNS.iter().find(|column| column.name == name);
+        let column = column.ok_or_else(|| no_attribute("FoundContact", name))?;
+        match name {
+            "id" => self.0.id.into_bound_py_any(py),
+            "force_beyond_maximum" => self.0.force_beyond_maximum.into_bound_py_any(py),
+            _ => column.value(&self.0).into_bound_py_any(py),
+        }
+    }
+
+    fn __dir__(&self) -> Vec<&'static str> {
+        CONTACT_COLUMNS.iter().map(|column| column.name).collect()
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        Ok(format!("FoundContact({})", serde_json::to_string(&self.0).map_err(raised)?))
+    }
+}
+
+/// A line or a ring that was found. Beside `kind`, its attributes are `from_x_m`, `from_y_m`, `to_x_m`, `to_y_m` of a line, `x_m`, `y_m`,
+/// `radius_m` of a ring, `width_m` and `conductance_s` of both, and `sigma_` with each name for its standard error; `None` where not known.
+#[pyclass(frozen, module = "tactomo")]
+pub struct Shape(pub FoundShape);
+
+#[pymethods]
+impl Shape {
+    /// `line` or `ring`.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.0.name()
+    }
+
+    fn __getattr__(&self, name: &str) -> PyResult<Option<f64>> {
+        let column = SHAPE_COLUMNS.iter().find(|column| column.name.trim_start_matches("shape_") == name);
+        Ok(column.ok_or_else(|| no_attribute("Shape", name))?.value(&self.0))
+    }
+
+    fn __dir__(&self) -> Vec<&'static str> {
+        let columns = SHAPE_COLUMNS.iter().map(|column| column.name.trim_start_matches("shape_"));
+        ["kind"].into_iter().chain(columns).collect()
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        Ok(format!("Shape({})", serde_json::to_string(&self.0).map_err(raised)?))
+    }
+}
+
+fn no_attribute(class: &str, name: &str) -> PyErr {
+    PyAttributeError::new_err(format!("'{class}' object has no attribute '{name}'"))
+}
+
+/// What to know before a solution is believed.
+#[pyclass(frozen, get_all, module = "tactomo")]
+pub struct Flags {
+    /// Readings are at an end of the converter's range, or contacts conduct so well that more would change nothing.
+    saturated: bool,
+    /// The readings are not what the model can give for what was found.
+    misfit: bool,
+    /// The method stopped before its end.
+    unfinished: bool,
+    /// The readings are those of a detector that differs from the one described: a calibration would tell more.
+    calibrate: bool,
+    /// Electrodes that were left out.
+    excluded: Vec<usize>,
+}
+
+impl From<&tactomo::solve::Flags> for Flags {
+    fn from(flags: &tactomo::solve::Flags) -> Self {
+        let tactomo::solve::Flags { saturated, misfit, unfinished, calibrate, excluded } = flags;
+        Self {
+            saturated: *saturated,
+            misfit: *misfit,
+            unfinished: *unfinished,
+            calibrate: *calibrate,
+            excluded: excluded.clone(),
+        }
+    }
+}
+
+#[pymethods]
+impl Flags {
+    fn __repr__(&self) -> String {
+        let set = [
+            (self.saturated, "saturated"),
+            (self.misfit, "misfit"),
+            (self.unfinished, "unfinished"),
+            (self.calibrate, "calibrate"),
+        ];
+        let mut set: Vec<String> =
+            set.iter().filter(|(is_set, _)| *is_set).map(|(_, name)| (*name).to_owned()).collect();
+        set.extend((!self.excluded.is_empty()).then(|| format!("excluded {:?}", self.excluded)));
+        format!("Flags({})", set.join(", "))
+    }
+}
