@@ -67,9 +67,9 @@ fn datagrams_are_lines_and_fewer_come_where_fewer_are_wanted() {
         assert!(line["flags"].is_object() && line.get("readings_v").is_none(), "{line}");
         times_s.push(line["time_s"].as_f64().unwrap());
     }
-    // A line is the newest of its 50 ms, so that two are 50 ms apart to within a frame of 5 ms and what waits at the start.
+    // In board time lines are never closer than 50 ms, but for a frame of 5 ms at either end; further apart where answers were skipped.
     let apart_s = (times_s[19] - times_s[4]) / 15.0;
-    assert!((apart_s - 0.05).abs() < 0.002, "{times_s:?}");
+    assert!(apart_s > 0.05 - 2.0 * 0.005 / 15.0 && apart_s < 0.1, "{times_s:?}");
     assert_eq!(live.end().0, Some(0));
 }
 
