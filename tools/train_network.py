@@ -320,6 +320,8 @@ def main():
     args = parser.parse_args()
     begin = time.time()
     data, held = Data(args.train), Data(args.limits)
+    if len(data) < args.batch:
+        parser.error(f"{args.train} has {len(data)} frames, but a batch takes {args.batch}: simulate more, or give a smaller --batch")
     if args.start:
         weights, mean, deviation = load(args.start)
     else:

@@ -109,8 +109,8 @@ fn other_detectors_are_refused_with_what_differs_and_what_to_do() {
     };
     for (detector, what) in [
         (Detector::preset("display-140x70").unwrap(), "32 electrodes, not 16"),
-        (Detector::preset("square-150").unwrap(), "no rectangle of 60 mm x 60 mm"),
-        (thicker, "10 mm thick, not 5 mm"),
+        (Detector::preset("square-150").unwrap(), "no rectangle of 60.0 mm x 60.0 mm"),
+        (thicker, "10.0 mm thick, not 5.0 mm"),
         (moved, "electrode 2 is elsewhere"),
     ] {
         let error = network.check(&detector).unwrap_err().to_string();
