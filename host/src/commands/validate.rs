@@ -11,7 +11,7 @@ use tactomo::study::case::Case;
 use tactomo::study::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
 
 use super::choice::{self, Model};
-use super::output;
+use super::output::{self, message};
 
 /// Compares models and solvers with reference cases.
 ///
@@ -80,10 +80,15 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
     let lambda = args.lambda.map(|share| Parameter::Lambda(Lambda::Relative(share)));
     let trials = Trials { noise_lsb: args.noise_lsb, seed: args.seed, count: args.trials as usize };
     let problem = Problem::new(model);
-    let solvers = Method::ALL.iter().filter(|m| args.solver.is_empty() || args.solver.contains(m));
-    let solvers = solvers
-        .map(|method| Ok(try_solver(case, &mut *method.build_with(&problem, lambda)?, &trials)?))
-        .collect::<anyhow::Result<Vec<_>>>()?;
+    let mut solvers = Vec::new();
+    for method in Method::ALL.iter().filter(|method| args.solver.is_empty() || args.solver.contains(method)) {
+        match method.build_with(&problem, lambda) {
+            Ok(mut solver) => solvers.push(try_solver(case, &mut *solver, &trials)?),
+            // Of all solvers, those that there are for this detector.
+            Err(error) if args.solver.is_empty() => message!("{}: not tried: {error}", method.name()),
+            Err(error) => return Err(error.into()),
+        }
+    }
     Ok(CaseReport {
         case: case.detector.name.clone(),
         model: problem.model.name().to_owned(),

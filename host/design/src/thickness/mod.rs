@@ -40,9 +40,10 @@ pub struct Plan {
     pub seed: u64,
 }
 
-/// Solvers that are tried unless others are asked for: all but [`Method::Auto`], which makes of single contacts what [`Method::Contacts`] does.
+/// Solvers that are tried unless others are asked for: all but [`Method::Auto`], which makes of single contacts what [`Method::Contacts`] does, and
+/// [`Method::Network`], which is trained for one thickness.
 pub fn methods() -> Vec<Method> {
-    Method::ALL.into_iter().filter(|method| *method != Method::Auto).collect()
+    Method::ALL.into_iter().filter(|method| !matches!(method, Method::Auto | Method::Network)).collect()
 }
 
 /// Models compared at one thickness.

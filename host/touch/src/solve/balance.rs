@@ -10,17 +10,18 @@ const SMALLEST: f64 = 1e-3;
 /// `r[g][e] D[g] = r[e][g] D[e]`, and hence all `D` but for a common factor: their logarithms are means over electrodes of
 /// those of `r[e][g] / r[g][e]` (least squares). Rows times `D[g]`, scaled to a geometric mean of 1, are what the linear
 /// theory says exactly for one contact, however firm, of conductance `1 / mean D`; for several it is nearer than before.
-/// In the limit of light contacts nothing changes.
-pub fn balance(volts: &mut [f64], electrodes: usize, drive_v: f64) {
+/// In the limit of light contacts nothing changes. Returns the rows' scales.
+pub fn balance(volts: &mut [f64], electrodes: usize, drive_v: f64) -> Vec<f64> {
     let ratio = |volts: &[f64], g: usize, e: usize| (1.0 - volts[g * electrodes + e] / drive_v).max(SMALLEST);
     let mut scales = vec![1.0; electrodes];
     for (g, scale) in scales.iter_mut().enumerate() {
         let product: f64 = (0..electrodes).map(|e| ratio(volts, e, g) / ratio(volts, g, e)).product();
         *scale = product.powf(1.0 / electrodes as f64);
     }
-    for (row, scale) in volts.chunks_exact_mut(electrodes).zip(scales) {
+    for (row, scale) in volts.chunks_exact_mut(electrodes).zip(&scales) {
         row.iter_mut().for_each(|volts| *volts *= scale);
     }
+    scales
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use nalgebra::DMatrix;
 
 use super::balance;
 use super::{Flags, SolveError, Spectrum};
+use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::readings::Readings;
 
@@ -114,6 +115,11 @@ const OUTSIDE: f64 = 0.08;
 /// It counts where it is above so many deviations of noise.
 const OUTSIDE_NOISE: f64 = 3.0;
 
+/// Smallest reading (V) that says nothing.
+pub(super) fn full_v(detector: &Detector) -> f64 {
+    FULL * detector.adc.full_scale_v.min(detector.drive_v)
+}
+
 /// Singular images that are added together: a pass over the image costs more than its sums.
 const TOGETHER: usize = 4;
 
@@ -155,7 +161,7 @@ impl LinearImage {
             electrodes: jacobian.electrodes(),
             drive_v: jacobian.detector.drive_v,
             noise_v: jacobian.detector.adc.deviation_v(),
-            full_v: FULL * jacobian.detector.adc.full_scale_v.min(jacobian.detector.drive_v),
+            full_v: full_v(&jacobian.detector),
             singular_values,
             to_coefficients: single(&readings),
             nodes,

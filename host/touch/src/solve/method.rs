@@ -4,8 +4,8 @@ use std::fmt;
 
 use super::complete::Completing;
 use super::{
-    Auto, Bsbl, ContactSettings, Contacts, KernelSolver, Lambda, Nonlinear, NonlinearSettings, Nonnegative, Problem,
-    Solver, Tikhonov, Tsvd, Tv, Variant, correct, newtons,
+    Auto, Bsbl, ContactSettings, Contacts, KernelSolver, Lambda, Network, NetworkError, NetworkSolver, Nonlinear,
+    NonlinearSettings, Nonnegative, Problem, Solver, Tikhonov, Tsvd, Tv, Variant, correct, newtons,
 };
 use tactomo_physics::forward::ForwardError;
 
@@ -34,6 +34,8 @@ pub enum Method {
     Tsvd,
     /// Regression from presses at known places.
     Kernel,
+    /// Image and contacts by a network trained on simulated detectors as built.
+    Network,
     /// The paper's linear image.
     TikhonovPaper,
 }
@@ -155,7 +157,7 @@ struct Row {
 }
 
 /// The methods, those that most people look for first.
-const TABLE: [Row; 12] = [
+const TABLE: [Row; 13] = [
     Row {
         method: Method::Auto,
         name: "auto",
@@ -263,6 +265,21 @@ const TABLE: [Row; 12] = [
         family: Family::Learned,
         parameter: None,
         build: |problem, _| Ok(Box::new(KernelSolver::new(problem)?)),
+    },
+    Row {
+        method: Method::Network,
+        name: "network",
+        explanation: "for detectors that nobody calibrated: image and contacts by a network, trained on simulated ones as built",
+        family: Family::Learned,
+        parameter: None,
+        build: |problem, _| {
+            let named = |error: NetworkError| ForwardError::Detector {
+                detector: problem.detector().name.clone(),
+                what: error.to_string(),
+            };
+            let solver = Network::shipped().and_then(|network| NetworkSolver::new(problem, network)).map_err(named)?;
+            Ok(Box::new(solver))
+        },
     },
     Row {
         method: Method::TikhonovPaper,

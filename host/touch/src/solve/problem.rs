@@ -109,7 +109,7 @@ impl Problem {
 
     /// Readings that are all voltages: those that were not read, or reached an end of the converter's range, as the linear theory has them
     /// from the others.
-    pub(super) fn completed<'a>(&self, readings: &'a Readings) -> Cow<'a, Readings> {
+    pub fn completed<'a>(&self, readings: &'a Readings) -> Cow<'a, Readings> {
         if readings.all_say().is_empty() {
             return Cow::Borrowed(readings);
         }

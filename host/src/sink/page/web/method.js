@@ -8,7 +8,7 @@ const PURPOSE = {
   auto: "contacts, shape or image, as needed", contacts: "fingers and points", nonlinear: "any shape, most exact",
   tikhonov: "quick image, any shape", "tikhonov-paper": "as in the paper", tsvd: "quick image, smoothest", noser: "quick image, even",
   laplace: "quick image, smooth", nonnegative: "image, never negative", tv: "image with sharp edges", bsbl: "image of few patches",
-  kernel: "one contact, learned",
+  kernel: "one contact, learned", network: "learned, uncalibrated",
 };
 
 /** The select of solvers; calls `ask(request)` when another is chosen. */
