@@ -113,7 +113,7 @@ fn flagged(experiments: &[(u64, Experiment)], method: Method) -> Result<String, 
     let mut shares = Vec::new();
     for fault in FAULTS {
         let fault: Fault = fault.parse()?;
-        let share = share(experiments, method, |experiment, seed| experiment.with_faults(&[fault.clone()], seed))?;
+        let share = share(experiments, method, |experiment, seed| experiment.with_faults(&[fault], seed))?;
         shares.push(format!("{fault} {share:.2}"));
     }
     let loaded = share(experiments, method, |experiment, _| experiment.with_baseline(&[LOADED]))?;
