@@ -9,6 +9,7 @@ mod design;
 mod detector;
 mod forward;
 mod interrupt;
+mod learn;
 mod live;
 pub mod output;
 mod ports;
@@ -17,6 +18,7 @@ mod record;
 mod recording;
 mod replay;
 mod scene;
+mod score;
 mod source;
 mod stability;
 mod study;
@@ -48,6 +50,8 @@ enum Command {
     Study(study::Args),
     Design(Box<design::Args>),
     Reconstruct(reconstruct::Args),
+    Learn(learn::Args),
+    Score(score::Args),
     Calibrate(calibrate::Args),
 }
 
@@ -67,6 +71,8 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Study(args) => study::run(&args),
         Command::Design(args) => design::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
+        Command::Learn(args) => learn::run(&args),
+        Command::Score(args) => score::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
     }
 }

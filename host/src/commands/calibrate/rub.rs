@@ -92,7 +92,7 @@ fn frames(args: &Args, file: &std::path::Path) -> anyhow::Result<(Detector, Opti
         model: Model::Auto,
         solver: Method::Tikhonov,
         lambda: None,
-        presses: None,
+        taught: None,
         rest: args.reading.rest,
         unit: args.reading.unit,
         force: None,

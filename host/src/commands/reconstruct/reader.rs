@@ -10,6 +10,7 @@ use tactomo::board::{identity, measured};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
 use tactomo::forward::jacobian::Jacobian;
+use tactomo::learned::Learned;
 use tactomo::solve::{
     Guard, Kernel, Lambda, Latest, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver,
 };
@@ -18,6 +19,7 @@ use tactomo_protocol::Hello;
 
 use super::units::{self, Unit};
 use crate::commands::choice::{DetectorArgs, Model};
+use crate::commands::learn;
 use crate::commands::output::message;
 
 /// What is read, and what solves it.
@@ -32,8 +34,8 @@ pub struct Input<'a> {
     pub solver: Method,
     /// Its lambda, if that is not the default.
     pub lambda: Option<Lambda>,
-    /// Presses that it learns from, instead of a detector.
-    pub presses: Option<&'a Path>,
+    /// What teaches it, instead of a detector.
+    pub taught: Option<Taught<'a>>,
     /// Frames at the start that are the baseline, if that is said.
     pub rest: Option<u32>,
     /// Unit of a table, if that is said.
@@ -42,6 +44,15 @@ pub struct Input<'a> {
     pub force: Option<ForceLaw>,
     /// Leaves out what the detector's known presses correct.
     pub uncorrected: bool,
+}
+
+/// What teaches a solver, on whatever that is.
+#[derive(Clone, Copy)]
+pub enum Taught<'a> {
+    /// A file of presses.
+    Presses(&'a Path),
+    /// A file of `tactomo learn`.
+    Learned(&'a Path),
 }
 
 /// Frames and what solves them.
@@ -70,8 +81,8 @@ enum Frames {
 enum Touch {
     /// A solver for a detector, as the file's board measures it, and the places of its images.
     Solver { solver: Box<dyn Solver>, detector: Box<Detector>, mesh: ImageMesh, rows: Option<Box<RowsBefore>> },
-    /// A kernel that has learned from presses in a file, on whatever they were made.
-    Kernel(Box<Kernel>),
+    /// A kernel that has learned from presses, on whatever they were made.
+    Kernel(Arc<Kernel>),
 }
 
 /// What came before rows of readings.
@@ -84,8 +95,8 @@ struct RowsBefore {
 impl Reader {
     /// Opens the file and makes what solves it.
     pub fn open(input: &Input) -> anyhow::Result<Self> {
-        let Opened { file, touch, jacobian, chosen } = match input.presses {
-            Some(presses) => learned(input, Presses::read(presses)?)?,
+        let Opened { file, touch, jacobian, chosen } = match input.taught {
+            Some(taught) => learned(input, taught)?,
             None => solved(input)?,
         };
         // That of a recording is taken as live takes it, while its frames are solved.
@@ -282,19 +293,16 @@ struct Opened {
 }
 
 /// A kernel that has learned from presses.
-fn learned(input: &Input, presses: Presses) -> anyhow::Result<Opened> {
+fn learned(input: &Input, taught: Taught) -> anyhow::Result<Opened> {
+    let Learned::Kernel(kernel) = match taught {
+        Taught::Presses(path) => Kernel::train(&Presses::read(path, &[])?)?.into(),
+        Taught::Learned(path) => Learned::read(path)?,
+    };
     if input.solver != Method::Kernel {
-        bail!("only the solver kernel learns from presses, not {}: give --solver kernel", input.solver.name());
+        bail!("only the solver kernel learns from presses, not {}: leave out --solver", input.solver.name());
     }
-    let kernel = Kernel::train(&presses)?;
-    message!(
-        "learned from {} presses on {} channels; a press left out of the training is found within {:.2} mm and {:.0} % of its strength",
-        presses.count(),
-        kernel.channels(),
-        kernel.left_out_m() * 1e3,
-        kernel.left_out_strength() * 100.0
-    );
-    let file = FrameFile::open(input.file, Some(kernel.channels()))?;
+    message!("{}", learn::sentence(&kernel));
+    let file = FrameFile::open_by(input.file, Some(kernel.channels()), |table| kernel.readings_of(table))?;
     if file.channels() != kernel.channels() {
         bail!(
             "{} has {} readings a frame, but the presses have {} channels",
@@ -303,7 +311,7 @@ fn learned(input: &Input, presses: Presses) -> anyhow::Result<Opened> {
             kernel.channels()
         );
     }
-    Ok(Opened { file, touch: Touch::Kernel(Box::new(kernel)), jacobian: None, chosen: None })
+    Ok(Opened { file, touch: Touch::Kernel(kernel), jacobian: None, chosen: None })
 }
 
 /// A solver for the detector.

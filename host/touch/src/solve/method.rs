@@ -333,6 +333,10 @@ impl Method {
     /// [`ForwardError`] if the model cannot give what the solver needs.
     pub fn build_with(self, problem: &Problem, parameter: Option<Parameter>) -> Result<Box<dyn Solver>, ForwardError> {
         let solver = (self.row().build)(problem, parameter)?;
+        // What was taught on the sensor itself says where and how hard by itself.
+        if problem.is_learned(self) {
+            return Ok(Box::new(Completing::new(problem, solver)));
+        }
         // These take what each reading says into account by themselves.
         let solver = match self {
             Self::Auto | Self::Contacts | Self::Nonlinear => solver,

@@ -32,7 +32,7 @@ pub fn gather(args: &Args, known: &Known) -> anyhow::Result<Gathered> {
         model: Model::Auto,
         solver: Method::Contacts,
         lambda: None,
-        presses: None,
+        taught: None,
         rest: args.reading.rest,
         unit: args.reading.unit,
         force: Some(ForceLaw::siemens()),

@@ -76,7 +76,7 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
         model: Model::Auto,
         solver: Method::Contacts,
         lambda: None,
-        presses: None,
+        taught: None,
         rest: args.reading.rest,
         unit: args.reading.unit,
         // Conductances with their constriction, as laws of force have them.
