@@ -9,8 +9,7 @@ equal to one made from an inverse of readings x readings, H = W^-1 J' (J W^-1 J'
 lemma), which pyEIT does not use; that is checked here to rounding and timed too: what an algorithm costs that is as good as it can be.
 
 Set-ups are made several times on both sides and their medians compared; frames are timed in turns. Times are those of the processor
-(`time.process_time`; of tactomo, which runs as a child, its own clock for a frame, and the child's CPU time over that of a run without set-ups
-for a set-up), so that other load counts for little.
+(`time.process_time`, and the same clock of the thread in `speed`), so that other load counts for little. One thread each.
 
     python3 -m venv .venv && .venv/bin/pip install pyeit==1.2.4
     .venv/bin/python tools/compare_pyeit.py [SIZE [PROGRAM]]
@@ -20,7 +19,6 @@ SIZE is pyEIT's mesh size (0.06 makes about 1900 elements), PROGRAM the example 
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import time

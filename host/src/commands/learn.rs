@@ -1,13 +1,13 @@
 //! `tactomo learn`: places and strengths of presses, learned from presses at known places.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use anyhow::{Context, ensure};
 use serde::Serialize;
 use tactomo::detector::Detector;
 use tactomo::learned::Learned;
 use tactomo::solve::{Kernel, Presses, Strength};
+use tactomo::study::stopwatch::timed;
 
 use super::choice::{self, Chosen};
 use super::output::{self, NewFile, message};
@@ -62,12 +62,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(chosen) = &args.detector {
         presses.drive_v = Some(drive_v(&chosen.get()?, presses.channels)?);
     }
-    let begin = Instant::now();
-    let kernel = Kernel::train(&presses).with_context(|| args.presses.display().to_string())?;
-    let seconds = begin.elapsed().as_secs_f64();
+    let (kernel, taken) = timed(|| Kernel::train(&presses));
+    let (kernel, seconds) = (kernel.with_context(|| args.presses.display().to_string())?, taken.as_secs_f64());
     out.write(Learned::from(kernel.clone()).bytes()?)?;
     message!("{}", sentence(&kernel));
-    message!("{} written in {seconds:.1} s", args.out.display());
+    message!("{} written, after {seconds:.1} s of processor time", args.out.display());
     if args.json {
         output::print(&serde_json::to_string(&Report {
             presses: kernel.presses(),

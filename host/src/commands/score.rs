@@ -4,12 +4,12 @@ mod map;
 mod report;
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use anyhow::{Context, anyhow, ensure};
 use tactomo::learned::Learned;
 use tactomo::solve::{Kernel, Press, Presses};
 use tactomo::study::page;
+use tactomo::study::stopwatch::timed;
 
 use self::map::Map;
 use self::report::{Report, Scored};
@@ -94,12 +94,11 @@ fn scored<'a>(kernel: &Kernel, presses: &'a Presses) -> anyhow::Result<Scored<'a
     if presses.strength != kernel.strength() && kernel.strength().is_some() {
         message!("warning: the strength was not measured as it was taught, so that it is not scored");
     }
-    let begin = Instant::now();
-    let read = presses.readings().enumerate().map(|(index, readings_v)| {
+    let all = presses.readings().enumerate().map(|(index, readings_v)| {
         kernel.press(readings_v).map_err(|channel| anyhow!("press {index}: channel {channel:?} is not a finite number"))
     });
-    let read = read.collect::<anyhow::Result<Vec<Option<Press>>>>()?;
-    let press_us = begin.elapsed().as_secs_f64() * 1e6 / presses.count().max(1) as f64;
+    let (read, taken) = timed(|| all.collect::<anyhow::Result<Vec<Option<Press>>>>());
+    let press_us = taken.as_secs_f64() * 1e6 / presses.count().max(1) as f64;
     let strength = kernel.strength().filter(|strength| presses.strength == Some(*strength));
-    Ok(Scored { presses, read, press_us, strength })
+    Ok(Scored { presses, read: read?, press_us, strength })
 }

@@ -11,7 +11,7 @@ pub struct Scored<'a> {
     pub presses: &'a Presses,
     /// What was read; `None` where nothing was felt.
     pub read: Vec<Option<Press>>,
-    /// Mean time of one (us).
+    /// Mean processor time of one (us).
     pub press_us: f64,
     /// How strengths were measured, if they can be compared.
     pub strength: Option<Strength>,

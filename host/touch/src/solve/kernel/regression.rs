@@ -19,9 +19,10 @@ const COMPONENTS: [usize; 5] = [12, 24, 48, 96, usize::MAX];
 const WIDTHS: [f64; 6] = [0.15, 0.3, 0.6, 1.2, 2.4, 4.8];
 /// Ridges that are tried.
 const RIDGES: [f64; 7] = [1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1];
-/// How many presses parameters are tried on, and how many of the best go on to more presses. The best on all are chosen: to try everything on 1800
-/// presses would take a minute.
-const ROUNDS: [(usize, usize); 3] = [(200, 20), (500, 5), (usize::MAX, 1)];
+/// How many presses parameters are tried on, and how many of the best go on to the next round: to try everything on 1800 presses would take a minute.
+const ROUNDS: [(usize, usize); 2] = [(200, 20), (500, 1)];
+/// From the best of the last round, neighbours are tried on all presses, as long as one is better: so many at most.
+const MOST_NEIGHBOURS: usize = 10;
 /// Smallest and largest ridge of a press, in that of all.
 const DOUBTS: [f64; 2] = [0.03, 30.0];
 
@@ -40,11 +41,45 @@ pub struct Regression {
     pub left_out: Vec<f64>,
 }
 
-/// Parameters to try.
-#[derive(Clone, Copy, Debug)]
-struct Choice {
-    likeness: Likeness,
-    ridge: f64,
+/// Parameters to try: where they are in [`COMPONENTS`], [`WIDTHS`] and [`RIDGES`].
+type Choice = [usize; 3];
+
+/// What a choice stands for.
+#[derive(Clone, Debug)]
+struct Grid {
+    /// Numbers of coordinates that there are.
+    components: Vec<usize>,
+    /// Median distance of points in each.
+    medians: Vec<f64>,
+    size_weight: f64,
+}
+
+impl Grid {
+    fn likeness(&self, [components, width, _]: Choice) -> Likeness {
+        let width = WIDTHS[width] * self.medians[components];
+        Likeness { components: self.components[components], size_weight: self.size_weight, width }
+    }
+
+    fn all(&self) -> Vec<Choice> {
+        let widths = (0..self.components.len()).flat_map(|number| (0..WIDTHS.len()).map(move |width| (number, width)));
+        widths.flat_map(|(number, width)| (0..RIDGES.len()).map(move |ridge| [number, width, ridge])).collect()
+    }
+
+    /// Those that differ by a step in one parameter.
+    fn neighbours(&self, choice: Choice) -> Vec<Choice> {
+        let lengths = [self.components.len(), WIDTHS.len(), RIDGES.len()];
+        // Ridges first: that is what more presses change most.
+        let steps = [2, 1, 0].into_iter().flat_map(|axis: usize| {
+            let at = choice[axis];
+            [at.checked_sub(1), Some(at + 1).filter(|next| *next < lengths[axis])].map(|next| (axis, next))
+        });
+        let moved = |(axis, next): (usize, Option<usize>)| {
+            let mut moved = choice;
+            moved[axis] = next?;
+            Some(moved)
+        };
+        steps.filter_map(moved).collect()
+    }
 }
 
 /// What is learned from.
@@ -80,12 +115,12 @@ impl Regression {
     /// Learns; `None` if the presses are all alike, or no parameters serve.
     pub fn learn(lesson: &Lesson<'_>) -> Option<Self> {
         let means = lesson.means();
-        let chosen = lesson.choose(&means)?;
+        let (likeness, ridge) = lesson.choose(&means)?;
         let all: Vec<usize> = (0..lesson.points.count()).collect();
-        let kernel = lesson.kernel(&lesson.squares(&all, chosen.likeness.components), &all, chosen.likeness);
-        let Solved { weights, missed } = lesson.solve(&kernel, &all, chosen.ridge, &means)?;
+        let kernel = lesson.kernel(&lesson.squares(&all, likeness.components), &all, likeness);
+        let Solved { weights, missed } = lesson.solve(&kernel, &all, ridge, &means)?;
         let left_out = missed.iter().map(|square| square.sqrt()).collect();
-        Some(Self { likeness: chosen.likeness, ridge: chosen.ridge, means, weights, left_out })
+        Some(Self { likeness, ridge, means, weights, left_out })
     }
 
     /// The targets of readings whose directions have such squares of the distance to those of the presses, and of such a size.
@@ -106,43 +141,55 @@ impl Lesson<'_> {
         (0..self.count).map(|target| self.targets.iter().skip(target).step_by(self.count).sum::<f64>() / rows).collect()
     }
 
-    /// The parameters that miss least: the sum of squares over all targets, in their own unit, so that one that hardly varies counts for little.
-    fn choose(&self, means: &[f64]) -> Option<Choice> {
+    /// The likeness and the ridge that miss least: the sum of squares over all targets, in their own unit, so that one that hardly varies counts
+    /// for little.
+    fn choose(&self, means: &[f64]) -> Option<(Likeness, f64)> {
         // In a fixed random order, for presses are often made along rows.
         let mut order: Vec<usize> = (0..self.points.count()).collect();
         fastrand::Rng::with_seed(1).shuffle(&mut order);
-        let mut tried = self.all_choices(&order)?;
+        let grid = self.grid(&order)?;
+        let mut tried = grid.all();
         for (most, kept) in ROUNDS {
             let part = &order[..most.min(order.len())];
-            tried.sort_by(|a, b| {
-                let key = |choice: &Choice| (choice.likeness.components, choice.likeness.width.to_bits());
-                key(a).cmp(&key(b))
-            });
-            let mut judged = self.judge(part, &tried, means);
+            tried.sort_unstable();
+            let mut judged = self.judge(part, &grid, &tried, means);
             judged.sort_by(|a, b| a.0.total_cmp(&b.0));
             tried = judged.into_iter().map(|(_, choice)| choice).take(kept).collect();
             if part.len() == order.len() {
                 break;
             }
         }
-        tried.first().copied()
+        let chosen = self.climb(&order, &grid, *tried.first()?, means);
+        Some((grid.likeness(chosen), RIDGES[chosen[2]]))
     }
 
-    fn all_choices(&self, order: &[usize]) -> Option<Vec<Choice>> {
-        let mut numbers = COMPONENTS.map(|components| self.points.used(components)).to_vec();
-        numbers.dedup();
-        let mut all = Vec::new();
-        for components in numbers {
-            let median = self.median_distance(order, components)?;
-            for width in WIDTHS.map(|share| share * median) {
-                let likeness = Likeness { components, size_weight: self.size_weight, width };
-                all.extend(RIDGES.map(|ridge| Choice { likeness, ridge }));
+    /// The best on all presses that steps from a choice lead to.
+    fn climb(&self, order: &[usize], grid: &Grid, from: Choice, means: &[f64]) -> Choice {
+        let judged = |choice: Choice| self.judge(order, grid, &[choice], means).first().map_or(f64::INFINITY, |(missed, _)| *missed);
+        let (mut best, mut tried) = ((judged(from), from), vec![from]);
+        while let Some(next) = grid.neighbours(best.1).into_iter().find(|next| !tried.contains(next)) {
+            if tried.len() > MOST_NEIGHBOURS {
+                break;
+            }
+            tried.push(next);
+            let missed = judged(next);
+            if missed < best.0 {
+                best = (missed, next);
             }
         }
-        Some(all)
+        best.1
     }
 
-    /// Of neighbours in a random order; `None` if most points are the same.
+    /// `None` if most points are the same.
+    fn grid(&self, order: &[usize]) -> Option<Grid> {
+        let mut components = COMPONENTS.map(|components| self.points.used(components)).to_vec();
+        components.dedup();
+        let medians = components.iter().map(|components| self.median_distance(order, *components));
+        let medians = medians.collect::<Option<Vec<f64>>>()?;
+        Some(Grid { components, medians, size_weight: self.size_weight })
+    }
+
+    /// Of neighbours in a random order.
     fn median_distance(&self, order: &[usize], components: usize) -> Option<f64> {
         let distance = |pair: &[usize]| {
             let [a, b] = [pair[0], pair[1]];
@@ -155,19 +202,19 @@ impl Lesson<'_> {
         distances.get(distances.len() / 2).copied().filter(|distance| *distance > 0.0)
     }
 
-    /// What leaving one of some presses out says of each choice that can be used; these are in the order of their number of coordinates and width.
-    fn judge(&self, part: &[usize], tried: &[Choice], means: &[f64]) -> Vec<(f64, Choice)> {
+    /// What leaving one of some presses out says of each choice that can be used; choices rise.
+    fn judge(&self, part: &[usize], grid: &Grid, tried: &[Choice], means: &[f64]) -> Vec<(f64, Choice)> {
         let mut judged = Vec::with_capacity(tried.len());
         let (mut squares, mut summed) = (Mat::zeros(part.len(), part.len()), 0);
-        for alike in tried.chunk_by(|a, b| a.likeness == b.likeness) {
-            let likeness = alike[0].likeness;
+        for alike in tried.chunk_by(|a, b| a[..2] == b[..2]) {
+            let likeness = grid.likeness(alike[0]);
             if likeness.components > summed {
                 self.points.add_squares(&mut squares, part, summed..likeness.components);
                 summed = likeness.components;
             }
             let kernel = self.kernel(&squares, part, likeness);
             for choice in alike {
-                let solved = self.solve(&kernel, part, choice.ridge, means);
+                let solved = self.solve(&kernel, part, RIDGES[choice[2]], means);
                 let missed = solved.map(|solved| solved.missed.iter().sum::<f64>());
                 judged.extend(missed.filter(|missed| missed.is_finite()).map(|missed| (missed, *choice)));
             }
