@@ -43,7 +43,8 @@ fn what_is_learned_is_kept_scored_and_used() {
     let unseen = folder.with("unseen.csv", csv(150..210, [2, 0, 1]));
     let page = folder.path("score.html");
     let scored = json(&["score", &model, &unseen, "--json", "--out", &page]);
-    let [left_out_m, off_m] = [&learned["left_out_m"], &scored["root_mean_square_m"]].map(|error| error.as_f64().unwrap());
+    let [left_out_m, off_m] =
+        [&learned["left_out_m"], &scored["root_mean_square_m"]].map(|error| error.as_f64().unwrap());
     assert!(left_out_m < 0.05 && off_m < 2.0 * left_out_m + 0.005, "{learned} {scored}");
     assert_eq!(scored["presses"], 60);
     assert!(std::fs::read_to_string(&page).unwrap().contains("Mean error by place"));
@@ -70,11 +71,16 @@ fn what_cannot_be_is_told() {
     assert!(refused(&["score", &model, &other]).contains("are missing: b"));
     assert!(refused(&["reconstruct", &other, "--learned", &model]).contains("are missing: b"));
     assert!(refused(&["score", &presses, &presses]).contains("no safetensors file"));
-    assert!(refused(&["live", "--simulate", "--seconds", "1", "--json", "--learned", &model]).contains("of another sensor"));
+    assert!(
+        refused(&["live", "--simulate", "--seconds", "1", "--json", "--learned", &model]).contains("of another sensor")
+    );
     let few = folder.with("few.csv", csv(0..5, [0, 1, 2]));
     let nothing = folder.path("nothing.safetensors");
     assert!(refused(&["learn", &few, "--out", &nothing]).contains("5 presses, but 10 at least"));
-    assert!(refused(&["learn", &presses, "--detector", "square-60", "--out", &nothing]).contains("3 channels, but the detector square-60"));
+    assert!(
+        refused(&["learn", &presses, "--detector", "square-60", "--out", &nothing])
+            .contains("3 channels, but the detector square-60")
+    );
     assert!(!std::path::Path::new(&nothing).exists());
     assert!(refused(&["score", &model, &presses, "--out", &folder.path("map.png")]).contains(".html or .svg"));
 }

@@ -183,7 +183,7 @@ mod tests {
     fn arrays_that_are_kept_column_by_column_are_read() {
         // numpy.asfortranarray(numpy.arange(n).reshape(shape)) has these numbers one after the other.
         for (shape, kept) in [
-            ("(2, 3)", &[0.0, 3.0, 1.0, 4.0, 2.0, 5.0][..]),
+            ("(2, 3)", &[0.0_f64, 3.0, 1.0, 4.0, 2.0, 5.0][..]),
             ("(2, 1, 2)", &[0.0, 2.0, 1.0, 3.0]),
             ("(1, 2, 3)", &[0.0, 3.0, 1.0, 4.0, 2.0, 5.0]),
             ("(3,)", &[0.0, 1.0, 2.0]),

@@ -175,11 +175,11 @@ fn grounded(_: &mut Noise) -> Skin {
         let mut readings = Vec::with_capacity(192);
         for g in 0..16 {
             let ground = electrode(g);
-            let resistance = 6.0 / press.force_n + potential(at_m, at_m) + potential(ground, ground)
-                - 2.0 * potential(ground, at_m);
+            let resistance =
+                6.0 / press.force_n + potential(at_m, at_m) + potential(ground, ground) - 2.0 * potential(ground, at_m);
             for e in (2..14).map(|away| electrode(g + away)) {
-                let transfer = potential(e, at_m) - potential(e, ground) - potential(ground, at_m)
-                    + potential(ground, ground);
+                let transfer =
+                    potential(e, at_m) - potential(e, ground) - potential(ground, at_m) + potential(ground, ground);
                 let step_v = 3.3 / 4096.0;
                 let volts = 2.0 * transfer / resistance + 1.5 * step_v * noise.normal();
                 readings.push((volts / step_v).round() * step_v);

@@ -123,7 +123,9 @@ impl Map {
     fn axes(&self, [width, height]: [f64; 2], svg: &mut String) {
         let [low, high] = self.corners_m;
         let (bottom, middle) = (ROOM[1] + height, ROOM[0] + 0.5 * width);
-        for (share, x_m, y_m) in [(0.0, low[0], low[1]), (0.5, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])), (1.0, high[0], high[1])] {
+        for (share, x_m, y_m) in
+            [(0.0, low[0], low[1]), (0.5, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])), (1.0, high[0], high[1])]
+        {
             let (x, y) = (ROOM[0] + share * width, bottom - share * height);
             _ = writeln!(
                 svg,
@@ -176,7 +178,9 @@ mod tests {
 
     #[test]
     fn errors_are_averaged_where_they_are() {
-        let missed: Vec<Missed> = (0..100).map(|i| ([f64::from(i % 10) * 1e-3, f64::from(i / 10) * 1e-3], if i % 10 < 5 { 1e-3 } else { 3e-3 })).collect();
+        let missed: Vec<Missed> = (0..100)
+            .map(|i| ([f64::from(i % 10) * 1e-3, f64::from(i / 10) * 1e-3], if i % 10 < 5 { 1e-3 } else { 3e-3 }))
+            .collect();
         let map = Map::of(&missed);
         assert_eq!(map.cells.iter().map(|cell| cell.presses).sum::<usize>(), 100);
         let left = map.cells.iter().find(|cell| cell.x_m < 2e-3).unwrap();

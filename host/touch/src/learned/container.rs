@@ -19,7 +19,9 @@ pub enum ContainerError {
     #[error("this is no safetensors file, or it is damaged ({0}): make one with `tactomo learn`")]
     Format(String),
     /// It is of another kind, or of another version of this program.
-    #[error("a `{kind}` of version {version} is not known to this program: learn it anew, or use the program that made it")]
+    #[error(
+        "a `{kind}` of version {version} is not known to this program: learn it anew, or use the program that made it"
+    )]
     Unknown {
         /// Its kind.
         kind: String,
@@ -59,10 +61,8 @@ impl Container {
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(format)?;
         let tensors = SafeTensors::deserialize(bytes).map_err(format)?;
         let texts = metadata.metadata().iter().flatten();
-        let mut container = Self {
-            texts: texts.map(|(name, text)| (name.clone(), text.clone())).collect(),
-            arrays: BTreeMap::new(),
-        };
+        let mut container =
+            Self { texts: texts.map(|(name, text)| (name.clone(), text.clone())).collect(), arrays: BTreeMap::new() };
         for (name, tensor) in tensors.iter() {
             container.arrays.insert(name.to_owned(), (tensor.shape().to_vec(), numbers(name, &tensor)?));
         }
@@ -182,7 +182,11 @@ fn numbers(name: &str, tensor: &TensorView<'_>) -> Result<Vec<f64>, ContainerErr
         Dtype::F32 => tensor.data().as_chunks().0.iter().map(|bytes| f64::from(f32::from_le_bytes(*bytes))).collect(),
         other => {
             let needed = "F32 or F64".to_owned();
-            return Err(ContainerError::Shape { name: name.to_owned(), found: format!("numbers of {other:?}"), needed });
+            return Err(ContainerError::Shape {
+                name: name.to_owned(),
+                found: format!("numbers of {other:?}"),
+                needed,
+            });
         }
     };
     match values.iter().all(|value| value.is_finite()) {

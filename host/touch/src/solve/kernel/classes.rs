@@ -55,7 +55,8 @@ mod tests {
     #[test]
     fn limits_are_those_of_presses_of_the_same_size() {
         let sizes_v: Vec<f64> = (0..400).map(|i| f64::from(i % 200)).collect();
-        let values: Vec<f64> = sizes_v.iter().enumerate().map(|(i, v)| if *v < 100.0 { 5.0 } else { i as f64 % 3.0 }).collect();
+        let values: Vec<f64> =
+            sizes_v.iter().enumerate().map(|(i, v)| if *v < 100.0 { 5.0 } else { i as f64 % 3.0 }).collect();
         let classes = Classes::of(&sizes_v);
         let limits = classes.limits(&sizes_v, &values);
         assert_eq!((classes.count(), classes.class(-1.0), classes.class(1e9)), (6, 0, 5));

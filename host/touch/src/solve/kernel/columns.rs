@@ -130,8 +130,23 @@ mod tests {
     #[test]
     fn what_counts_is_timed_or_has_another_unit_is_no_channel() {
         for name in [
-            "", "id", "ID", "press_id", "Unnamed: 0", "index", "time", "time_s", "time(s)", "t_ms", "Timestamp", "x_m", "depth_m",
-            "robot_x_mm", "torque_n", "frame", "press number",
+            "",
+            "id",
+            "ID",
+            "press_id",
+            "Unnamed: 0",
+            "index",
+            "time",
+            "time_s",
+            "time(s)",
+            "t_ms",
+            "Timestamp",
+            "x_m",
+            "depth_m",
+            "robot_x_mm",
+            "torque_n",
+            "frame",
+            "press number",
         ] {
             assert!(!is_channel(name), "{name}");
         }

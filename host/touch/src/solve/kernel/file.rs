@@ -149,7 +149,9 @@ fn read_regression(
         ridge: from.number(&format!("{name}_ridge"), |ridge| ridge >= 0.0, "a ridge of 0 or more")?,
         means: from.array(&format!("{name}_means"), &[targets])?.to_vec(),
         weights: from.array(&format!("{name}_weights"), &[points.count(), targets])?.to_vec(),
-        left_out: from.checked(&format!("{name}_left_out"), &[targets], |error| error >= 0.0, "no negative error")?.to_vec(),
+        left_out: from
+            .checked(&format!("{name}_left_out"), &[targets], |error| error >= 0.0, "no negative error")?
+            .to_vec(),
     })
 }
 

@@ -39,15 +39,20 @@ impl LeftOver {
         let sizes_v: Vec<f64> = described.iter().map(|described| described.size_v).collect();
         let mut this = Self { dimensions, deviations: Vec::new(), lengths: Vec::new(), channels: Vec::new() };
         for class in 0..classes.count() {
-            let of_class: Vec<&Vec<f64>> =
-                left.iter().zip(&sizes_v).filter(|(_, size_v)| classes.class(**size_v) == class).map(|(left, _)| left).collect();
+            let of_class: Vec<&Vec<f64>> = left
+                .iter()
+                .zip(&sizes_v)
+                .filter(|(_, size_v)| classes.class(**size_v) == class)
+                .map(|(left, _)| left)
+                .collect();
             let mean_square =
                 |channel: usize| of_class.iter().map(|left| left[channel].powi(2)).sum::<f64>() / of_class.len() as f64;
             this.deviations.extend((0..channels).map(|channel| mean_square(channel).sqrt().max(SMALLEST)));
         }
         let figures: Vec<[f64; 2]> =
             left.iter().zip(&sizes_v).map(|(left, size_v)| this.figures(left, classes.class(*size_v))).collect();
-        let limits = |which: usize| classes.limits(&sizes_v, &figures.iter().map(|figures| figures[which]).collect::<Vec<_>>());
+        let limits =
+            |which: usize| classes.limits(&sizes_v, &figures.iter().map(|figures| figures[which]).collect::<Vec<_>>());
         (this.lengths, this.channels) = (limits(0), limits(1));
         this
     }

@@ -50,7 +50,8 @@ impl Novelty {
     /// The variance by all presses but one.
     fn variance(&self, points: &Points, squares: &[f64], log_size: f64, but: Option<usize>) -> f64 {
         let kernel = |press: usize| self.likeness.of(squares[press], log_size - points.log_sizes[press]);
-        let mut near: Vec<(f64, usize)> = squares.iter().copied().zip(0..).filter(|(_, press)| Some(*press) != but).collect();
+        let mut near: Vec<(f64, usize)> =
+            squares.iter().copied().zip(0..).filter(|(_, press)| Some(*press) != but).collect();
         if near.len() > NEIGHBOURS {
             near.select_nth_unstable_by(NEIGHBOURS, |a, b| a.0.total_cmp(&b.0));
             near.truncate(NEIGHBOURS);
@@ -62,7 +63,8 @@ impl Novelty {
             among[(column, column)] = 1.0 + self.ridges[at];
             for row in column + 1..count {
                 let other = near[row].1;
-                let square = square(&points.at(at)[..self.likeness.components], &points.at(other)[..self.likeness.components]);
+                let square =
+                    square(&points.at(at)[..self.likeness.components], &points.at(other)[..self.likeness.components]);
                 among[(row, column)] = self.likeness.of(square, points.log_sizes[at] - points.log_sizes[other]);
             }
         }

@@ -8,15 +8,18 @@ use faer::{Accum, Par};
 const LANES: usize = 8;
 
 /// Sum of products; the shorter slice decides.
+#[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum(a, b, |a, b| a * b)
 }
 
 /// Square of a distance.
+#[inline(always)]
 pub fn square(a: &[f64], b: &[f64]) -> f64 {
     sum(a, b, |a, b| (a - b) * (a - b))
 }
 
+#[inline(always)]
 fn sum(a: &[f64], b: &[f64], of: impl Fn(f64, f64) -> f64) -> f64 {
     let length = a.len().min(b.len());
     let (a_lanes, a_rest) = a[..length].as_chunks::<LANES>();
@@ -86,6 +89,14 @@ impl Points {
 
     /// Squares of the distances of a direction to all points, in the first `few` and in the first `many` coordinates.
     pub fn squares_to(&self, direction: &[f64], few: usize, many: usize) -> [Vec<f64>; 2] {
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || self.each_square(direction, few, many),
+        )
+    }
+
+    #[inline(always)]
+    fn each_square(&self, direction: &[f64], few: usize, many: usize) -> [Vec<f64>; 2] {
         let (few, many) = (self.used(few), self.used(many).max(self.used(few)));
         let mut squares = [(); 2].map(|()| Vec::with_capacity(self.count()));
         for known in self.coordinates.chunks_exact(self.dimensions) {

@@ -22,7 +22,7 @@ const RIDGES: [f64; 7] = [1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1];
 /// How many presses parameters are tried on, and how many of the best go on to the next round: to try everything on 1800 presses would take a minute.
 const ROUNDS: [(usize, usize); 2] = [(200, 20), (500, 1)];
 /// From the best of the last round, neighbours are tried on all presses, as long as one is better: so many at most.
-const MOST_NEIGHBOURS: usize = 10;
+const MOST_NEIGHBOURS: usize = 6;
 /// Smallest and largest ridge of a press, in that of all.
 const DOUBTS: [f64; 2] = [0.03, 30.0];
 
@@ -165,7 +165,9 @@ impl Lesson<'_> {
 
     /// The best on all presses that steps from a choice lead to.
     fn climb(&self, order: &[usize], grid: &Grid, from: Choice, means: &[f64]) -> Choice {
-        let judged = |choice: Choice| self.judge(order, grid, &[choice], means).first().map_or(f64::INFINITY, |(missed, _)| *missed);
+        let judged = |choice: Choice| {
+            self.judge(order, grid, &[choice], means).first().map_or(f64::INFINITY, |(missed, _)| *missed)
+        };
         let (mut best, mut tried) = ((judged(from), from), vec![from]);
         while let Some(next) = grid.neighbours(best.1).into_iter().find(|next| !tried.contains(next)) {
             if tried.len() > MOST_NEIGHBOURS {
@@ -269,7 +271,8 @@ mod tests {
     fn points(dimensions: usize) -> Points {
         let even = |i: u32| [0.754_877_666, 0.569_840_291].map(|step| (f64::from(i) * step).fract());
         // Further coordinates are noise.
-        let noise = |i: u32| (2..dimensions as u32).map(move |axis| 0.3 * (f64::from(i * i * axis) * 0.618_034).fract());
+        let noise =
+            |i: u32| (2..dimensions as u32).map(move |axis| 0.3 * (f64::from(i * i * axis) * 0.618_034).fract());
         let coordinates = (0..60).flat_map(|i| even(i).into_iter().chain(noise(i))).collect();
         Points { dimensions, coordinates, log_sizes: (0..60).map(|i| f64::from(i % 7) * 0.1).collect() }
     }
@@ -348,7 +351,8 @@ mod tests {
     fn a_target_that_hardly_varies_does_not_choose_for_the_others() {
         let points = points(2);
         let even = targets(&points, 0.0);
-        let with_noise: Vec<f64> = even.chunks_exact(2).enumerate().flat_map(|(i, pair)| [pair[0], 1e-6 * ((i * i) % 13) as f64]).collect();
+        let with_noise: Vec<f64> =
+            even.chunks_exact(2).enumerate().flat_map(|(i, pair)| [pair[0], 1e-6 * ((i * i) % 13) as f64]).collect();
         let alone: Vec<f64> = even.iter().step_by(2).flat_map(|value| [*value, 0.0]).collect();
         let [noisy, alone] = [with_noise, alone].map(|targets| Regression::learn(&lesson(&points, &targets)).unwrap());
         assert_eq!((noisy.likeness, noisy.ridge), (alone.likeness, alone.ridge));

@@ -70,7 +70,6 @@ impl Solver for KernelSolver {
     }
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;

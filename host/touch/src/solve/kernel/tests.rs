@@ -10,7 +10,15 @@ fn five_channels(count: usize) -> Presses {
         ears.map(|ear| force / (1.0 + 200.0 * ((place[0] - ear[0]).powi(2) + (place[1] - ear[1]).powi(2))))
     };
     let readings_v = places_m.iter().zip(&strengths).flat_map(|(place, force)| heard(place, *force)).collect();
-    Presses { channels: 5, readings_v, places_m, strengths, strength: Some(Strength::Force), names: Vec::new(), drive_v: None }
+    Presses {
+        channels: 5,
+        readings_v,
+        places_m,
+        strengths,
+        strength: Some(Strength::Force),
+        names: Vec::new(),
+        drive_v: None,
+    }
 }
 
 #[test]
@@ -110,8 +118,12 @@ fn what_was_never_taught_is_flagged_and_single_presses_are_not() {
         };
         let pairs = all().map(|i| [i, (i + 57) % 400]).filter(apart);
         let two = flagged(&kernel, pairs.map(|[a, b]| one(a).iter().zip(one(b)).map(|(a, b)| a + b).collect()));
-        let rates = format!("{seed}: single {single} permuted {permuted} noise {noisy} dead {dead} rail {railed} two {two}");
-        assert!(single <= 3.0 && permuted >= 98.0 && noisy >= 99.0 && dead >= 95.0 && railed >= 98.0 && two >= 90.0, "{rates}");
+        let rates =
+            format!("{seed}: single {single} permuted {permuted} noise {noisy} dead {dead} rail {railed} two {two}");
+        assert!(
+            single <= 3.0 && permuted >= 98.0 && noisy >= 99.0 && dead >= 95.0 && railed >= 98.0 && two >= 90.0,
+            "{rates}"
+        );
     }
 }
 
