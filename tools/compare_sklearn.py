@@ -3,7 +3,7 @@
 The presses are those of the example `skins`: 1800 taught, 400 unseen. KernelRidge has a Gaussian kernel, whose width and ridge are searched
 by cross-validation in three folds (least squares over x, y and z in metres), on each of two descriptions: the standardised channels,
 as one would begin with, and the direction and the logarithm of the size of the readings, from which `tactomo` begins too. Both are judged
-by the root mean square distance on the unseen presses.
+by the root mean square distance on the unseen presses. A second table says how many readings `tactomo` flags that no press can give.
 
     python3 -m venv .venv && .venv/bin/pip install numpy scikit-learn
     cargo build --release --package tactomo
@@ -90,6 +90,50 @@ def tactomo_mm(program, folder, kind, seed):
     return learned, scored, cpu_s
 
 
+def unlike_presses(taught, unseen, places, random):
+    """Readings that were never taught, by what is wrong with them."""
+    count, channels = unseen.shape
+    rows = np.arange(count)
+
+    def with_value(columns, value):
+        changed = unseen.copy()
+        changed[rows, columns] = value
+        return changed
+
+    other = random.permutation(count)
+    is_apart = np.linalg.norm(places - places[other], axis=1) > 0.02
+    loud = np.argsort(-np.abs(unseen), axis=1)[rows, random.integers(10, size=count)]
+    return {
+        "single presses": unseen,
+        "noise": random.normal(size=unseen.shape) * unseen.std(),
+        "channels permuted": unseen[:, random.permutation(channels)],
+        "a channel at its rail": with_value(random.integers(channels, size=count), np.abs(taught).max()),
+        "one of the ten loudest dead": with_value(loud, 0.0),
+        "two presses, 2 cm apart": (unseen + unseen[other])[is_apart],
+    }
+
+
+def flagged(program, folder, seed):
+    shares = {}
+    for kind in KINDS:
+        taught, _ = presses(folder, kind, seed, "taught")
+        unseen, places = presses(folder, kind, seed, "unseen")
+        with tempfile.TemporaryDirectory() as temporary:
+            model, table = pathlib.Path(temporary) / "model.safetensors", pathlib.Path(temporary) / "readings.npz"
+            words = [program, "learn", str(folder / f"{kind}-{seed}-taught.npz"), "--out", str(model)]
+            subprocess.run(words, check=True, capture_output=True)
+            for name, readings in unlike_presses(taught, unseen, places, np.random.default_rng(int(seed))).items():
+                x_m, y_m, z_m = places[: len(readings)].T
+                np.savez(table, readings_v=readings, x_m=x_m, y_m=y_m, z_m=z_m)
+                done = subprocess.run([program, "score", str(model), str(table), "--json"], check=True, capture_output=True)
+                scored = json.loads(done.stdout)
+                shares.setdefault(name, []).append(100 * scored["flagged"] / scored["presses"])
+    print("\n| flagged, % | " + " | ".join(f"`{kind}`" for kind in KINDS) + " |")
+    print("|---" * (len(KINDS) + 1) + "|")
+    for name, of_kinds in shares.items():
+        print(f"| {name} | " + " | ".join(f"{share:.1f}" for share in of_kinds) + " |")
+
+
 def main():
     folder, seed = pathlib.Path(sys.argv[1]), sys.argv[2]
     program = sys.argv[3] if len(sys.argv) > 3 else "target/release/tactomo"
@@ -105,6 +149,7 @@ def main():
             f"| {learned['components']} | {cpu_s:.1f} s | {scored['press_us']:.0f} us | {scored['flagged']} of {scored['presses']} |",
             flush=True,
         )
+    flagged(program, folder, seed)
 
 
 if __name__ == "__main__":

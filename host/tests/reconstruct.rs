@@ -290,10 +290,10 @@ fn a_recording_is_read_with_its_board() {
 #[test]
 fn a_kernel_learns_from_presses_on_any_channels() {
     let heard = |x: f64, y: f64, force: f64| {
-        [0.2, 0.5, 0.9].map(|ear| force / (0.2 + (x - ear).powi(2) + (y - ear * ear).powi(2)))
+        [[0.0, 0.0], [1.0, 0.1], [0.4, 1.0]].map(|[a, b]: [f64; 2]| force / (0.2 + (x - a).powi(2) + (y - b).powi(2)))
     };
     let press = |i: usize| {
-        let [x, y, z] = [0.7549, 0.5698, 0.3247].map(|step| (step * (i + 1) as f64).fract());
+        let [x, y, z] = [0.8191, 0.6710, 0.5497].map(|step| (step * (i + 1) as f64).fract());
         (x, y, 1.0 + z)
     };
     let taught: String = (0..120)
