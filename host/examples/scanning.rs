@@ -18,9 +18,9 @@ use tactomo::board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo::detector::Detector;
 use tactomo::forward::readings_v;
 use tactomo::readings::Readings;
-use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
+use tactomo::run::plan::{Ends, Plan, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::{Snapshot, SolvedFrame};
+use tactomo::run::{Listener, Snapshot, TouchEvent};
 use tactomo::scene::Contact;
 use tactomo::simulate::{Physics, finer_model};
 use tactomo::solve::{Method, Problem};
@@ -107,9 +107,9 @@ struct Keeper {
 }
 
 impl Listener for Keeper {
-    fn solved(&mut self, solved: &SolvedFrame<'_>) {
-        let places_m = solved.solution.contacts.iter().map(|contact| [contact.x_m, contact.y_m]).collect();
-        let frame_s = 1e-6 * solved.frame.board_time_us as f64;
+    fn touched(&mut self, event: &Arc<TouchEvent>) {
+        let places_m = event.solution.contacts.iter().map(|contact| [contact.x_m, contact.y_m]).collect();
+        let frame_s = event.time_s();
         let answer = Answer { frame_s, ready_s: self.begun.elapsed().as_secs_f64(), places_m };
         if let Ok(mut kept) = self.kept.lock() {
             kept.push(answer);

@@ -1,10 +1,18 @@
-//! The day on which a file is made.
+//! The day on which a file is made, and the time.
 
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 /// Today, in UTC, as a date of ISO 8601.
 pub fn today() -> String {
     date(SystemTime::now())
+}
+
+/// So long after 1970, in UTC, as date and time of ISO 8601 to the millisecond.
+pub fn date_time(since_1970: Duration) -> String {
+    let (seconds, millis) = (since_1970.as_secs() % 86_400, since_1970.subsec_millis());
+    let [hours, minutes, seconds] = [seconds / 3600, seconds / 60 % 60, seconds % 60];
+    let date = date(SystemTime::UNIX_EPOCH + since_1970);
+    format!("{date}T{hours:02}:{minutes:02}:{seconds:02}.{millis:03}Z")
 }
 
 /// A day of the Gregorian calendar, in UTC (days from civil, after H. Hinnant's algorithm for the proleptic calendar).
@@ -22,13 +30,12 @@ fn date(now: SystemTime) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
 
     #[test]
     fn days_are_those_of_the_calendar() {
         let at = |days: u64| date(SystemTime::UNIX_EPOCH + Duration::from_secs(86_400 * days + 5));
         assert_eq!([at(0), at(59), at(11_016), at(20_778)], ["1970-01-01", "1970-03-01", "2000-02-29", "2026-11-21"]);
+        assert_eq!(date_time(Duration::from_millis(1_763_733_909_042)), "2025-11-21T14:05:09.042Z");
     }
 }

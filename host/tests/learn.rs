@@ -1,5 +1,8 @@
 //! `learn`, `score`, and `reconstruct` and `live` with what was learned.
 
+#![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
+
+#[allow(dead_code, reason = "tables and recordings are for other tests")]
 mod samples;
 
 use samples::{Folder, tactomo};

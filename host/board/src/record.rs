@@ -8,23 +8,29 @@
 //! | 1 | version of the format: 2 |
 //! | n | [header](Header): a chunk of the kind `H` at time 0, whose bytes are JSON in UTF-8 (at most 16 MiB) |
 //! | n | the same once more: one of them survives any single damage |
-//! | ... | chunks of the kind `D`, to the end of the file; their times never fall |
+//! | ... | chunks of the kind `D` (bytes of the board) and `N` ([notes](Note), as JSON), to the end of the file; their times never fall |
 //!
-//! A chunk: `A5 54 63` and its kind, `H` or `D`; time since the start of the recording in microseconds and number of bytes (at most
-//! 65536), both as LEB128; the bytes; CRC-32 (as in zlib) of the version and all of these, little-endian.
+//! A chunk: `A5 54 63` and its kind, `H`, `D` or `N`; time since the start of the recording in microseconds and number of bytes (at most
+//! 65536 in a `D`), both as LEB128; the bytes; CRC-32 (as in zlib) of the version and all of these, little-endian.
 //!
 //! A file that was cut off loses the chunk that was cut, no more. A damaged chunk costs itself alone: the reader goes on at the next
 //! one whose CRC is right, and [counts](Loss) what is damaged and what it left out. Where only bytes within a chunk are damaged, they are handed
-//! out all the same: packets of the protocol have checksums of their own, and those beside the damage are whole.
+//! out all the same: packets of the protocol have checksums of their own, and those beside the damage are whole. Up to 64 KiB before the
+//! magic that are none of the recording are passed over.
 //!
 //! Version 1, which is still read, had one header (two bytes of length, JSON, CRC-32 of version, length and JSON) and chunks without the
 //! four bytes at their front.
 
+pub mod edit;
 mod format;
 mod header;
 mod loss;
+mod note;
 mod reader;
 mod recorder;
+mod ring;
+mod scan;
+mod start;
 #[cfg(test)]
 mod tests;
 mod window;
@@ -32,8 +38,10 @@ mod writer;
 
 pub use header::Header;
 pub use loss::{HeaderDamage, Loss};
-pub use reader::RecordReader;
+pub use note::Note;
+pub use reader::{Entry, RecordReader};
 pub use recorder::{Closing, Recorder};
+pub use ring::{Ring, Trigger};
 pub use writer::RecordWriter;
 
 use std::io;
@@ -104,8 +112,11 @@ pub enum RecordError {
     },
 }
 
-/// Whether a file that begins with `start` may be a recording: one damaged byte does not make another file of it.
+/// Bytes of a file that tell whether it is a recording.
+pub const START_BYTES: usize = start::MOST_JUNK + MAGIC.len();
+
+/// Whether a file whose first [`START_BYTES`] are `start` may be a recording: one damaged byte does not make another file of it, nor
+/// does what was put before it.
 pub fn is_recording(start: &[u8]) -> bool {
-    let same = start.iter().zip(&MAGIC).filter(|(ours, theirs)| ours == theirs).count();
-    start.len() >= MAGIC.len() && same >= MAGIC.len() - 1
+    start::find_magic(start).is_some()
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use tactomo::board::record::Header;
+use tactomo::board::record::{Header, RecordError, RecordReader};
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::shell::Shell;
 use tactomo::forward::{Auto, DrivingLayer, ForwardError, ForwardModel, Resolution, Slab};
@@ -152,6 +152,13 @@ impl DetectorArgs {
 
 /// The detector that a recording was taken from; of an old one, which has only its name, the preset of that name.
 fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
+    let open = |source| RecordError::Open { path: path.to_owned(), source };
+    if let Some(found) = RecordReader::open(path)?.detector_found().map_err(open)?
+        && let Some(detector) = found.detector(path)?
+    {
+        message!("{}: its detector was calibrated while it was recorded, and is read so", path.display());
+        return Ok(detector);
+    }
     if let Some(detector) = header.detector(path)? {
         return Ok(detector);
     }

@@ -7,25 +7,26 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{Context, anyhow};
 use tactomo::board::link::Source;
+use tactomo::board::record::Header;
 use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
-use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
+use tactomo::run::plan::{Ends, Plan, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::{Request, Snapshot};
+use tactomo::run::{Listener, Request, Snapshot};
 use tactomo::scene::SceneName;
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
-use tactomo::sink::stream::Stream;
 use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
 
 use super::choice::{DetectorArgs, Model};
 use super::output::message;
 use super::source::{self, BoardArgs};
-use super::{browser, interrupt, output, recording};
+use super::streams::StreamArgs;
+use super::{browser, interrupt, keep, output};
 
 /// Requests of pages that may wait.
 const REQUESTS: usize = 64;
@@ -44,6 +45,8 @@ const REQUESTS: usize = 64;
 ///   tactomo live --simulate --scan adaptive         the rows that a scene needs, as they come
 ///   tactomo live --replay touch.tactomo --speed 0.25
 ///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network
+///   tactomo live --stream - --stream-hz 100 | python robot.py
+///   tactomo live --foxglove --mcap touch.mcap       for Foxglove, live and afterwards
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -68,10 +71,8 @@ pub struct Args {
     /// Keeps all bytes that come in a new file
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Writes each answer as a line of JSON to a new file, or to stdout with `-`: `{time_s, sequence, contacts, shape?, choice,
-    /// flags, age_us, events?}`
-    #[arg(long, value_name = "FILE|-")]
-    pub stream: Option<PathBuf>,
+    #[command(flatten)]
+    pub streams: StreamArgs,
     /// ELF file of the board's firmware, to print its log
     #[arg(long, value_name = "FILE")]
     pub elf: Option<PathBuf>,
@@ -130,8 +131,8 @@ pub struct Show {
     pub seconds: Option<Duration>,
     /// Where all bytes are kept.
     pub record: Option<PathBuf>,
-    /// Where each answer is written.
-    pub stream: Option<PathBuf>,
+    /// Where answers go besides the page.
+    pub streams: StreamArgs,
     /// ELF file of the board's firmware.
     pub elf: Option<PathBuf>,
 }
@@ -149,10 +150,10 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     };
     let settings = args.board.settings.requested();
     let is_pointer = args.board.scene.scene == Some(SceneName::Pointer);
-    let Args { mut picture, scan, seconds, record, stream, elf, .. } = args;
+    let Args { mut picture, scan, seconds, record, streams, elf, .. } = args;
     scan.check(detector.electrodes.len()).map_err(|what| anyhow!("--scan {scan}: {what}"))?;
     picture.pointer |= is_pointer;
-    show(Show { source, finger, settings, scan, detector, picture, seconds, record, stream, elf })
+    show(Show { source, finger, settings, scan, detector, picture, seconds, record, streams, elf })
 }
 
 /// Serves the page, or only counts, until the end.
@@ -161,17 +162,21 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
     let stop = interrupt::flag()?;
     let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
     let (request, requests) = mpsc::sync_channel(REQUESTS);
-    ensure!(
-        !(show.picture.json && show.stream.as_deref().is_some_and(|path| path.as_os_str() == "-")),
-        "--json and --stream - would both write to stdout: give the stream a file"
-    );
     // Whatever cannot be is said before a page opens.
-    let plan = plan(&mut show, problem.clone())?;
+    show.streams.check(show.picture.json)?;
+    let mut sinks = show.streams.begin(&problem, &show.source.name(), Arc::clone(&stop))?;
+    let plan = plan(&mut show, problem.clone(), sinks.listener())?;
     let server = serve(&show, &problem, shown, request)?;
     // The page may outlive the pipeline, so the snapshots have a sender here too.
     let ends = Ends { snapshots: snapshots.clone(), requests, stop: Arc::clone(&stop) };
     let summary = tactomo::run::run(&mut *show.source, plan, ends)?;
+    if sinks.reader_is_gone() {
+        // As quietly as `head` ends.
+        return Ok(sinks.finish()?);
+    }
+    let ended = sinks.finish();
     report(&summary, show.picture.json)?;
+    ended?;
     if server.is_some() && show.seconds.is_none() {
         wait(&stop);
     }
@@ -195,18 +200,17 @@ fn method(args: &PictureArgs, problem: &Problem) -> Method {
     args.solver.or(problem.learned().map(Learned::method)).unwrap_or(Method::Auto)
 }
 
-fn plan(show: &mut Show, problem: Problem) -> anyhow::Result<Plan> {
+fn plan(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) -> anyhow::Result<Plan> {
     let detector = show.detector.clone();
-    let stream = show.stream.as_deref().map(Stream::create).transpose()?;
     Ok(Plan {
         settings: show.settings,
         scan: show.scan.clone(),
         solving: Some(Solving::new(method(&show.picture, &problem), problem)),
-        recorder: recording::begin(show.record.as_deref(), &detector, show.source.name())?,
-        begin_recording: Some(recording::on_request(detector.clone(), show.source.name())),
-        listeners: stream.into_iter().map(|stream| Box::new(stream) as Box<dyn Listener>).collect(),
+        recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
+        begin_recording: Some(keep::on_request(detector.clone(), show.source.name())),
+        listeners: listener.into_iter().collect(),
         pointer: show.picture.pointer,
-        board_log: recording::board_log(show.elf.as_deref())?,
+        board_log: keep::board_log(show.elf.as_deref())?,
         seconds: show.seconds,
         ..Plan::new(detector)
     })

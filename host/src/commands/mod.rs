@@ -7,8 +7,10 @@ mod calibrate;
 mod choice;
 mod design;
 mod detector;
+mod export;
 mod forward;
 mod interrupt;
+mod keep;
 mod learn;
 mod live;
 pub mod output;
@@ -21,6 +23,7 @@ mod scene;
 mod score;
 mod source;
 mod stability;
+mod streams;
 mod study;
 mod tradeoff;
 mod validate;
@@ -41,7 +44,9 @@ enum Command {
     Ports(ports::Args),
     Board(board::Args),
     Record(Box<record::Args>),
+    Recording(recording::Args),
     Replay(Box<replay::Args>),
+    Export(Box<export::Args>),
     Detector(detector::Args),
     Forward(Box<forward::Args>),
     Validate(validate::Args),
@@ -61,8 +66,10 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Live(args) => live::run(*args),
         Command::Ports(args) => ports::run(&args),
         Command::Board(args) => board::run(&args),
-        Command::Record(args) => record::run(&args),
+        Command::Record(args) => record::run(*args),
+        Command::Recording(args) => recording::run(&args),
         Command::Replay(args) => replay::run(*args),
+        Command::Export(args) => export::run(&args),
         Command::Detector(args) => detector::run(args),
         Command::Forward(args) => forward::run(&args),
         Command::Validate(args) => validate::run(&args),

@@ -5,8 +5,9 @@
 
 use std::fmt::Arguments;
 use std::fs::File;
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail, ensure};
 
@@ -48,6 +49,59 @@ impl Write for Stderr {
     }
 }
 
+/// How often it is told how far something is, where that is not a terminal.
+const TOLD_EVERY: Duration = Duration::from_secs(5);
+/// How often a terminal's bar is drawn.
+const DRAWN_EVERY: Duration = Duration::from_millis(100);
+/// Width of the bar.
+const BAR: usize = 30;
+
+/// How far something is and how long it will take, on stderr: a bar in a terminal, a line now and then elsewhere.
+pub struct ProgressBar {
+    what: &'static str,
+    all: u64,
+    begun: Instant,
+    told: Instant,
+    is_terminal: bool,
+}
+
+impl ProgressBar {
+    /// Of so many things of a kind.
+    pub fn new(what: &'static str, all: u64) -> Self {
+        let now = Instant::now();
+        Self { what, all, begun: now, told: now, is_terminal: io::stderr().is_terminal() }
+    }
+
+    /// Tells that so many are done, if that is due.
+    pub fn tell(&mut self, done: u64) {
+        if self.told.elapsed() < if self.is_terminal { DRAWN_EVERY } else { TOLD_EVERY } {
+            return;
+        }
+        self.told = Instant::now();
+        let line = bar(self.what, done, self.all, self.begun.elapsed());
+        if self.is_terminal {
+            drop(write!(io::stderr(), "\r\x1b[2K{line}"));
+        } else {
+            message!("{line}");
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn end(self) {
+        if self.is_terminal {
+            drop(write!(io::stderr(), "\r\x1b[2K"));
+        }
+    }
+}
+
+fn bar(what: &str, done: u64, all: u64, elapsed: Duration) -> String {
+    let share = done as f64 / all.max(1) as f64;
+    let filled = ((share.min(1.0) * BAR as f64) as usize).min(BAR);
+    let left = elapsed.mul_f64(all.saturating_sub(done) as f64 / done.max(1) as f64);
+    let (full, empty) = ("#".repeat(filled), "-".repeat(BAR - filled));
+    format!("[{full}{empty}] {done} of {all} {what}, about {:.0} s left", left.as_secs_f64().ceil())
+}
+
 /// A file to write. It has its name only once it is complete, and replaces another one only if that is wanted.
 #[derive(Debug)]
 pub struct NewFile {
@@ -81,6 +135,13 @@ impl NewFile {
     pub fn never_replacing(path: &Path) -> anyhow::Result<Self> {
         ensure!(!path.exists(), "{} exists already, and is not replaced: give another name", path.display());
         Self::new(path, false)
+    }
+
+    /// The same for a file that is made from `input`, which it must not replace.
+    pub fn beside(input: &Path, path: &Path, overwrite: bool) -> anyhow::Result<Self> {
+        let is_same = matches!((input.canonicalize(), path.canonicalize()), (Ok(one), Ok(other)) if one == other);
+        ensure!(!is_same, "{} is the file that is read: give --out another name", path.display());
+        Self::new(path, overwrite)
     }
 
     /// The same for a file that may be wanted.
@@ -140,6 +201,13 @@ mod tests {
 
     fn path(name: &str) -> PathBuf {
         std::env::temp_dir().join(format!("tactomo-{}-output-{name}", std::process::id()))
+    }
+
+    #[test]
+    fn a_bar_says_how_long_it_will_take() {
+        let line = bar("frames", 250, 1000, Duration::from_secs(4));
+        assert_eq!(line, "[#######-----------------------] 250 of 1000 frames, about 12 s left");
+        assert!(bar("frames", 1003, 1000, Duration::from_secs(4)).starts_with(&format!("[{}] 1003", "#".repeat(30))));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 pub mod reader;
 pub mod units;
-mod writer;
+pub mod writer;
 
 use std::path::PathBuf;
 use std::time::Instant;

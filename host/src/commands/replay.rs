@@ -7,6 +7,7 @@ use tactomo::run::scanning::ScanChoice;
 
 use super::live::{self, PictureArgs, Show};
 use super::source;
+use super::streams::StreamArgs;
 
 /// Plays a recording, on the detector that it was taken from: the same as `live --replay`.
 ///
@@ -25,9 +26,8 @@ pub struct Args {
     speed: f64,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Writes each answer as a line of JSON to a new file, or to stdout with `-`
-    #[arg(long, value_name = "FILE|-")]
-    stream: Option<PathBuf>,
+    #[command(flatten)]
+    streams: StreamArgs,
     /// ELF file of the board's firmware, to print its log
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
@@ -44,7 +44,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         settings: RequestedSettings::default(),
         seconds: None,
         record: None,
-        stream: args.stream,
+        streams: args.streams,
         elf: args.elf,
     })
 }

@@ -12,13 +12,14 @@ use tactomo_touch::solve::{ElectrodeWatch, Followed, FoundContact, Method, Parts
 
 use super::board::BoardState;
 use super::calibration::{Calibrate, Desk};
+use super::event::{Answer, Listeners};
 use super::inbox::{Event, Inbox, Searched, Taken};
 use super::maker::{Made, Maker};
 use super::notice::NoticeBoard;
-use super::plan::{BeginBaseline, Listener, LiveError, Solving};
+use super::plan::{BeginBaseline, LiveError, Solving};
 use super::scanning::{PlanWish, Planner, ScanChoice};
 use super::searcher::SearchThread;
-use super::{FrameSnapshot, SolvedFrame};
+use super::{FrameSnapshot, Listener};
 
 /// Longest wait for a frame: then the rate shown falls.
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -51,7 +52,7 @@ impl FollowThread {
             notice,
             maker,
             search,
-            listeners,
+            listeners: Listeners::new(listeners),
             begin_baseline,
             conversions: 1,
             board: None,
@@ -87,7 +88,7 @@ struct FollowLoop {
     notice: Arc<NoticeBoard>,
     maker: Maker,
     search: SearchThread,
-    listeners: Vec<Box<dyn Listener>>,
+    listeners: Listeners,
     begin_baseline: BeginBaseline,
     /// Conversions that a reading is the mean of.
     conversions: u32,
@@ -266,6 +267,7 @@ impl FollowLoop {
                     // Wires that it knows to be exchanged are none any more.
                     board.watch = ElectrodeWatch::new(&found);
                     board.detector = Arc::clone(&found);
+                    self.notice.change(|snapshot| snapshot.calibrated = Some(Arc::clone(&found)));
                     self.calibrated = Some(found);
                     self.order(self.maker.method());
                 }
@@ -372,10 +374,18 @@ impl FollowLoop {
             meter.solved(came, now - solved.frame.arrived, now - begun);
         });
         let time_s = 1e-6 * solved.frame.board_time_us as f64;
-        let events = self.pointer.as_mut().map(|pointer| pointer.take(time_s, &solution.contacts)).unwrap_or_default();
-        let age = now - solved.frame.arrived;
-        let answered = SolvedFrame { frame: &solved.frame, solution: &solution, age, events: &events };
-        self.listeners.iter_mut().for_each(|listener| listener.solved(&answered));
+        let take = |pointer: &mut Pointer| pointer.take(time_s, &solution.contacts);
+        let pointer_events = self.pointer.as_mut().map(take).unwrap_or_default();
+        let is_taking_baseline = board.baseline.state().is_taking();
+        let answer = Answer {
+            touch: &solved.touch,
+            solution: &solution,
+            ready: now,
+            is_revision: !is_new,
+            is_taking_baseline,
+            pointer_events,
+        };
+        self.listeners.tell(&solved.frame, answer);
         if !self.search.is_busy() {
             if let Some(look) = board.watch.look(&solution) {
                 self.search.look(board.order(self.maker.method()), look, solved.touch.clone());
@@ -390,7 +400,7 @@ impl FollowLoop {
         self.planner.consider(&self.wish, &board.detector, (!solution.contacts.is_empty(), self.conversions), telling);
         self.found.clone_from(&solution.contacts);
         let pointer = self.pointer.as_ref().map(Pointer::state);
-        let shown = solved.frame.snapshot(solution, pointer, board.baseline.state().is_taking());
+        let shown = solved.frame.snapshot(solution, pointer, is_taking_baseline);
         if self.notice.is_due() {
             self.unshown = None;
             self.notice.publish(|snapshot| snapshot.frame = Some(shown));

@@ -41,6 +41,8 @@ pub struct Taken {
     pub averaged: u32,
     /// Frames that came since the last one was taken, this one included.
     pub came: u32,
+    /// Frames lost on the way since the run began, up to this one.
+    pub lost: u64,
     /// Number of the newest frame since the board started, unwrapped.
     pub sequence: u64,
     /// Board time at its start, unwrapped, in microseconds (us).
@@ -49,6 +51,25 @@ pub struct Taken {
     pub arrived: Instant,
     /// What happened while it was scanned.
     pub status: Status,
+}
+
+#[cfg(test)]
+impl Taken {
+    /// A frame of such readings (V) that comes now, the first of all.
+    pub fn of(readings: Readings) -> Self {
+        Self {
+            newest: readings.clone(),
+            rows: Vec::new(),
+            mean: readings,
+            averaged: 1,
+            came: 1,
+            lost: 0,
+            sequence: 0,
+            board_time_us: 0,
+            arrived: Instant::now(),
+            status: Status::default(),
+        }
+    }
 }
 
 /// What wakes the follower.
@@ -240,18 +261,7 @@ mod tests {
     use super::*;
 
     fn frame(volts: f64, sequence: u64) -> Taken {
-        let readings = Readings::from_fn(4, |_, _| volts);
-        Taken {
-            newest: readings.clone(),
-            rows: Vec::new(),
-            mean: readings,
-            averaged: 1,
-            came: 1,
-            sequence,
-            board_time_us: 0,
-            arrived: Instant::now(),
-            status: Status::default(),
-        }
+        Taken { sequence, ..Taken::of(Readings::from_fn(4, |_, _| volts)) }
     }
 
     fn taken(inbox: &Inbox) -> Option<Taken> {

@@ -8,8 +8,10 @@
 mod board;
 pub mod calibration;
 pub mod course;
+mod event;
 mod follower;
 mod inbox;
+mod keeping;
 mod maker;
 mod notice;
 pub mod plan;
@@ -20,14 +22,14 @@ mod searcher;
 mod statistics;
 mod talk;
 
-pub use self::inbox::Taken;
+pub use self::event::{Listener, TouchEvent};
 pub use self::maker::{Order, SolverState};
 pub use self::reader::run;
 pub use self::scanned::Scan;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use tactomo_board::link::{Control, Playing};
 use tactomo_board::session::RequestedSettings;
@@ -35,8 +37,9 @@ use tactomo_protocol::{Hello, Status};
 
 use self::calibration::{Calibrate, Calibrating};
 use self::course::Course;
+use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::pointer::{PointerEvent, PointerState};
+use tactomo_touch::pointer::PointerState;
 use tactomo_touch::solve::{Method, Solution};
 
 /// What there is to show at a moment.
@@ -60,6 +63,10 @@ pub struct Snapshot {
     pub playing: Playing,
     /// The recording that is being kept, if one is.
     pub recording: Option<PathBuf>,
+    /// Marks set in it.
+    pub marks: u64,
+    /// The detector that a calibration has found and that is in use.
+    pub calibrated: Option<Arc<Detector>>,
     /// What was asked for last and cannot be, for the person who asked.
     pub refused: Option<String>,
     /// What to know of the baseline, as one sentence for a person; none if all is well.
@@ -109,19 +116,6 @@ pub struct FrameSnapshot {
     pub rezeroing: bool,
 }
 
-/// An answer, for those who take each.
-#[derive(Clone, Copy, Debug)]
-pub struct SolvedFrame<'a> {
-    /// Its frame.
-    pub frame: &'a Taken,
-    /// The answer.
-    pub solution: &'a Solution,
-    /// Since the frame's last byte came.
-    pub age: Duration,
-    /// What the pointer does with it, if a contact is one.
-    pub events: &'a [PointerEvent],
-}
-
 /// Counts since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
@@ -167,6 +161,8 @@ pub enum Request {
     Settings(RequestedSettings),
     /// Begins to keep a recording in a new file, or ends it.
     Record(bool),
+    /// Sets a mark in the recording, with what is said of it.
+    Mark(String),
     /// Asks something of a simulated detector or a recording.
     Control(Control),
     /// Asks something of the calibration by rubbing.

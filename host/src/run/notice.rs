@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use tactomo_physics::detector::Detector;
 use tokio::sync::watch;
 
 use super::statistics::Meter;
@@ -57,6 +58,11 @@ impl NoticeBoard {
     /// Name of the solver in use; `none` if there is none.
     pub fn solver_name(&self) -> &'static str {
         self.lock().snapshot.solver.as_ref().map_or("none", |solver| solver.method.name())
+    }
+
+    /// The detector that a calibration has found and that is in use.
+    pub fn calibrated(&self) -> Option<Arc<Detector>> {
+        self.lock().snapshot.calibrated.clone()
     }
 
     /// Whether a screen could show something newer than the last snapshot, and anybody looks.

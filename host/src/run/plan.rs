@@ -10,12 +10,12 @@ use std::time::Duration;
 use tokio::sync::watch;
 
 use super::scanning::ScanChoice;
-use super::{Latency, Order, Request, Snapshot, SolvedFrame};
+use super::{Latency, Listener, Order, Request, Snapshot};
 use tactomo_board::baseline::Baseline;
 use tactomo_board::board_log::BoardLog;
 use tactomo_board::link::SourceError;
 use tactomo_board::measured::Mismatch;
-use tactomo_board::record::{RecordError, Recorder};
+use tactomo_board::record::{RecordError, Recorder, Ring};
 use tactomo_board::session::{GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ForwardError;
@@ -32,8 +32,8 @@ pub type MakeSolver = Arc<dyn Fn(&Order) -> Result<Box<dyn Solver>, BoxError> + 
 pub type LookAtWires = Arc<dyn Fn(&Order, Look, &Readings) -> Option<[usize; 2]> + Send + Sync>;
 /// Begins the baseline of a detector as measured, whose readings are means of so many conversions each.
 pub type BeginBaseline = Arc<dyn Fn(&Detector, u32) -> Baseline + Send + Sync>;
-/// Begins a recording in a new file, of a board that has said Hello.
-pub type BeginRecording = Box<dyn FnMut(&Hello) -> Result<Recorder, RecordError> + Send>;
+/// Begins a recording in a new file, of a board that has said Hello, and of the detector that a calibration has found, if one has.
+pub type BeginRecording = Box<dyn FnMut(&Hello, Option<&Detector>) -> Result<Recorder, RecordError> + Send>;
 /// Any error.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 
@@ -49,6 +49,8 @@ pub struct Plan {
     pub solving: Option<Solving>,
     /// Keeps the bytes.
     pub recorder: Option<Recorder>,
+    /// Keeps the last seconds of them, and saves them when it is told to.
+    pub ring: Option<Ring>,
     /// Where the board's log goes.
     pub board_log: BoardLog,
     /// Begins a recording when a page asks for one.
@@ -72,6 +74,7 @@ impl Plan {
             scan: ScanChoice::default(),
             solving: None,
             recorder: None,
+            ring: None,
             begin_recording: None,
             listeners: Vec::new(),
             board_log: BoardLog::unread(),
@@ -80,12 +83,6 @@ impl Plan {
             seconds: None,
         }
     }
-}
-
-/// Who takes each answer. It must not wait: the follower does while it works.
-pub trait Listener: Send {
-    /// Takes an answer.
-    fn solved(&mut self, solved: &SolvedFrame<'_>);
 }
 
 /// What reads the touch.

@@ -10,7 +10,6 @@ use std::time::{Duration, Instant};
 use tactomo_board::identity;
 use tactomo_board::link::{Control, Link, Source};
 use tactomo_board::measured::{self, Volts};
-use tactomo_board::record::{Closing, RecordError, Recorder};
 use tactomo_board::sequence::Sequence;
 use tactomo_board::session::{self, GreetError};
 use tactomo_physics::detector::Detector;
@@ -21,6 +20,7 @@ use tactomo_touch::solve::Latest;
 use super::course::Course;
 use super::follower::FollowThread;
 use super::inbox::{Event, Inbox, Rows, Taken};
+use super::keeping::Keeping;
 use super::notice::NoticeBoard;
 use super::plan::{Ends, LiveError, Plan, Summary};
 use super::scanned::Scanned;
@@ -58,6 +58,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     let course = Course::default();
     notice.change(|snapshot| snapshot.course = course.clone());
     let mut reader = Reader {
+        keeping: Keeping::of(&mut plan, Arc::clone(&notice)),
         plan,
         requests,
         stop,
@@ -65,21 +66,19 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         notice: Arc::clone(&notice),
         follows: follower.is_some(),
         sequence: Sequence::default(),
+        frames_lost: 0,
         board: None,
         greeted: None,
-        closing: Vec::new(),
-        lost: None,
         course: course.clone(),
         scanned,
         latest: None,
         scan: PlanAsk::new(wish),
     };
-    reader.show_recording();
     let ended = reader.run(source);
     inbox.close();
     let solved = follower.map_or(Ok(()), FollowThread::join);
     // What ended the solving also ended the reading; a failure to keep the recording counts for more than either.
-    let ended = reader.finish_recordings().and(solved).and(ended);
+    let ended = reader.keeping.finish().and(solved).and(ended);
     if let Err(error) = &ended {
         notice.publish(|snapshot| snapshot.link = LinkState::Ended(error.to_string()));
     }
@@ -123,12 +122,12 @@ struct Reader {
     /// Whether anybody takes the frames.
     follows: bool,
     sequence: Sequence,
+    /// Frames lost on the way since the run began.
+    frames_lost: u64,
     board: Option<Board>,
     /// When the first board said Hello.
     greeted: Option<Instant>,
-    /// Recordings that were ended and are still written, and why one failed.
-    closing: Vec<Closing>,
-    lost: Option<RecordError>,
+    keeping: Keeping,
     course: Course,
     scanned: Scanned,
     /// The latest of each reading, while the board sends rows.
@@ -255,25 +254,21 @@ impl Reader {
         Ok(())
     }
 
-    /// Hands bytes to the recording. Where that fails, the picture goes on; without one there is nothing else to do.
+    /// Keeps the bytes. Where that fails, the picture goes on; without one there is nothing else to do.
     fn keep(&mut self, bytes: &[u8], received: Instant) -> Result<(), LiveError> {
-        let Some(recorder) = &mut self.plan.recorder else { return Ok(()) };
-        let Err(error) = recorder.push(bytes, received) else { return Ok(()) };
-        if !self.follows {
-            return Err(error.into());
+        match self.keeping.push(bytes, received) {
+            Err(error) if !self.follows => Err(error.into()),
+            Err(error) => {
+                self.keeping.give_up(error);
+                Ok(())
+            }
+            Ok(()) => Ok(()),
         }
-        tracing::error!("{error}");
-        self.plan.recorder = None;
-        self.notice.change(|snapshot| {
-            snapshot.recording = None;
-            snapshot.refused = Some(error.to_string());
-        });
-        self.lost.get_or_insert(error);
-        Ok(())
     }
 
     fn hello(&mut self, talk: &mut Talk, hello: Hello, now: Instant) -> Result<(), LiveError> {
         talk.session.hello(&hello, now);
+        self.keeping.hello(&hello);
         talk.junk.get_or_insert(talk.receiver.counters().corrupt);
         self.greeted.get_or_insert(now);
         let known = self.board.as_ref();
@@ -311,6 +306,7 @@ impl Reader {
             return self.notice.count(|meter| meter.corrupt(1));
         };
         let place = self.sequence.place(&frame.head);
+        self.frames_lost += place.dropped;
         self.notice.count(|meter| meter.frame(received, place.dropped));
         self.scanned.add(&frame.scope);
         if !frame.scope.is_whole() {
@@ -338,6 +334,7 @@ impl Reader {
             rows,
             averaged: 1,
             came: 1,
+            lost: self.frames_lost,
             sequence: place.sequence,
             board_time_us: place.time_us,
             arrived: received,
@@ -362,8 +359,13 @@ impl Reader {
                         talk.session.request(settings);
                     }
                 }
-                Request::Record(true) => self.begin_recording(),
-                Request::Record(false) => self.end_recording(),
+                Request::Record(true) => {
+                    if let Some(board) = &self.board {
+                        self.keeping.begin(&board.hello);
+                    }
+                }
+                Request::Record(false) => self.keeping.end(),
+                Request::Mark(text) => self.keeping.mark(text),
                 Request::Calibrate(ask) => {
                     let board = self.board.as_ref().map(|board| identity::identity(&board.hello));
                     self.inbox.put(Event::Calibrate(ask, board));
@@ -377,36 +379,6 @@ impl Reader {
                 }
             }
         }
-    }
-
-    fn begin_recording(&mut self) {
-        let (None, Some(begin)) = (&self.plan.recorder, &mut self.plan.begin_recording) else { return };
-        let Some(board) = &self.board else { return };
-        let begun = begin(&board.hello);
-        self.notice.change(|snapshot| {
-            snapshot.refused = begun.as_ref().err().map(ToString::to_string);
-            snapshot.recording = begun.as_ref().ok().map(|recorder| recorder.path().to_owned());
-        });
-        self.plan.recorder = begun.ok();
-    }
-
-    fn end_recording(&mut self) {
-        let Some(recorder) = self.plan.recorder.take() else { return };
-        self.closing.push(recorder.close());
-        self.notice.change(|snapshot| (snapshot.recording, snapshot.refused) = (None, None));
-    }
-
-    fn show_recording(&self) {
-        let path = self.plan.recorder.as_ref().map(|recorder| recorder.path().to_owned());
-        self.notice.change(|snapshot| snapshot.recording = path);
-    }
-
-    /// Writes what is left of all recordings.
-    fn finish_recordings(&mut self) -> Result<(), LiveError> {
-        let last = self.plan.recorder.take().map(Recorder::close);
-        let finished: Vec<_> = self.closing.drain(..).chain(last).map(Closing::wait).collect();
-        let lost = self.lost.take().map_or(Ok(()), Err);
-        Ok(finished.into_iter().fold(lost, Result::and)?)
     }
 
     /// Shows how the link fares.
@@ -423,6 +395,7 @@ impl Reader {
         }
         let (playing, scan) = (link.playing(), self.scanned.scan());
         self.notice.change(|snapshot| (snapshot.playing, snapshot.scan) = (playing, scan));
+        self.keeping.found(self.notice.calibrated());
         if !self.follows {
             self.notice.keep_fresh();
         }

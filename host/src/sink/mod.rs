@@ -1,4 +1,19 @@
-//! Where touch goes: the page in the browser, and lines of JSON.
+//! Where touch goes: the page in the browser; and each answer to streams, files and apps, as many as are wanted, none of which slows the
+//! others or the board.
 
+pub mod address;
+pub mod channels;
+mod feed;
+pub mod foxglove;
+pub mod lines;
+pub mod mcap;
 pub mod page;
+pub mod parquet;
+mod running;
 pub mod stream;
+mod tcp;
+mod thin;
+mod udp;
+
+pub use self::feed::Delivery;
+pub use self::running::{SinkError, Sinks};

@@ -1,117 +1,197 @@
-//! Answers as JSON Lines: an object for each solved frame, for programs that go on with touch.
+//! Streams of JSON Lines: to a file, to stdout, to whoever connects, or in datagrams.
 
+use std::fmt;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
-use std::thread::{self, JoinHandle};
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-use tactomo_touch::schema::FrameReport;
+use super::address::Address;
+use super::feed::{Delivery, Keeps};
+use super::lines::Fields;
+use super::running::{PATIENCE, Sink, Sinks};
+use super::{tcp, udp};
 
-use crate::run::SolvedFrame;
-use crate::run::plan::Listener;
-
-/// Lines that may wait for whoever reads them; more are lost and counted, so that a slow reader never slows touch: 3 s at 1200 frames/s.
-const QUEUE: usize = 4096;
-/// Longest that a line waits in the buffer.
+/// Longest that a line waits in the buffer of a file.
 const FLUSH_EVERY: Duration = Duration::from_millis(20);
-/// Longest wait for a reader at the end.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Longest wait for a disk at the end.
+pub(super) const DISK_PATIENCE: Duration = Duration::from_secs(10);
+
+/// Where a stream goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// To stdout.
+    Stdout,
+    /// Into a new file.
+    File(PathBuf),
+    /// To all who connect to this port.
+    Tcp(Address),
+    /// To an address, each line as a datagram.
+    Udp(Address),
+}
+
+/// `-`, `tcp:PORT`, `tcp:ADDRESS:PORT`, `udp:ADDRESS:PORT`, or else a file.
+impl FromStr for Target {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':') {
+            _ if text == "-" => Ok(Self::Stdout),
+            Some(("tcp", address)) => address.parse().map(Self::Tcp),
+            Some(("udp", address)) => address.parse().map(Self::Udp),
+            _ => Ok(Self::File(text.into())),
+        }
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Stdout => write!(f, "stdout"),
+            Self::File(path) => write!(f, "{}", path.display()),
+            Self::Tcp(address) => write!(f, "tcp:{address}"),
+            Self::Udp(address) => write!(f, "udp:{address}"),
+        }
+    }
+}
+
+/// What a stream carries.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Form {
+    /// Fields of a line.
+    pub fields: Fields,
+    /// Lines a second at most; all of them if that is not said.
+    pub most_per_s: Option<f64>,
+}
 
 /// Why there is no stream.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
     /// The file cannot be made, or is there already.
-    #[error("cannot write the stream {path}; it has to be a new file, or `-` for stdout")]
+    #[error("cannot write the stream {path}: {source}; it has to be a new file, or `-` for stdout")]
     Create {
         /// The file.
         path: PathBuf,
         /// What the system says.
         source: io::Error,
     },
+    /// The same of an MCAP file.
+    #[error("cannot write {path}: {source}; an MCAP file has to be a new one")]
+    Mcap {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Another program listens there.
+    #[error("port {address} for {what} is busy: give it another port, or end the program that listens there")]
+    Busy {
+        /// What was to listen: a stream, Foxglove.
+        what: &'static str,
+        /// Where.
+        address: Address,
+    },
+    /// An address that this machine does not have, or that nobody has.
+    #[error(
+        "cannot use {address} for {what}: {source}; give it an address that this machine can reach, or only a port"
+    )]
+    Address {
+        /// What was to use it.
+        what: &'static str,
+        /// Where.
+        address: Address,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// No thread.
+    #[error("cannot start a thread for {name}")]
+    Thread {
+        /// The stream.
+        name: String,
+        /// What the system says.
+        source: io::Error,
+    },
 }
 
-/// Writes answers, in a thread of its own.
-pub struct Stream {
-    lines: Option<SyncSender<String>>,
-    writer: Option<JoinHandle<io::Result<()>>>,
-    lost: u64,
+impl StreamError {
+    pub(super) fn address(what: &'static str, address: &Address) -> impl Fn(io::Error) -> Self {
+        let address = address.clone();
+        move |source| match source.kind() {
+            io::ErrorKind::AddrInUse => Self::Busy { what, address: address.clone() },
+            _ => Self::Address { what, address: address.clone(), source },
+        }
+    }
+
+    pub(super) fn thread(name: &str) -> impl Fn(io::Error) -> Self {
+        let name = name.to_owned();
+        move |source| Self::Thread { name: name.clone(), source }
+    }
 }
 
-impl Stream {
-    /// Writes to a new file, or to stdout if it is called `-`.
+impl Sinks {
+    /// Adds a stream; one that listens says where, since it may have been given any port.
     ///
     /// # Errors
-    /// [`StreamError`] if the file is there already or cannot be made.
-    pub fn create(path: &Path) -> Result<Self, StreamError> {
-        let failed = |source| StreamError::Create { path: path.to_owned(), source };
-        let out: Box<dyn Write + Send> = match path.as_os_str() == "-" {
-            true => Box::new(io::stdout()),
-            false => Box::new(File::create_new(path).map_err(failed)?),
-        };
-        Self::start(out).map_err(failed)
-    }
-
-    fn start(out: Box<dyn Write + Send>) -> io::Result<Self> {
-        let (lines, queue) = sync_channel(QUEUE);
-        let writer =
-            thread::Builder::new().name("stream".to_owned()).spawn(move || write(&queue, BufWriter::new(out)))?;
-        Ok(Self { lines: Some(lines), writer: Some(writer), lost: 0 })
-    }
-}
-
-impl Listener for Stream {
-    fn solved(&mut self, solved: &SolvedFrame<'_>) {
-        let SolvedFrame { frame, solution, age, events } = solved;
-        let line = FrameReport {
-            time_s: Some(frame.board_time_us as f64 * 1e-6),
-            sequence: Some(frame.sequence),
-            age_us: Some(age.as_secs_f64() * 1e6),
-            events,
-            ..FrameReport::of(solution)
-        };
-        let sent = serde_json::to_string(&line).ok().zip(self.lines.as_ref()).map(|(line, lines)| lines.try_send(line));
-        self.lost += u64::from(!matches!(sent, Some(Ok(()))));
-    }
-}
-
-impl Drop for Stream {
-    fn drop(&mut self) {
-        self.lines = None;
-        // A reader that is there and does not read would be waited for for ever.
-        let end = Instant::now() + PATIENCE;
-        while self.writer.as_ref().is_some_and(|writer| !writer.is_finished()) {
-            if Instant::now() > end {
-                tracing::warn!("the stream's reader does not read: the last lines are lost");
-                return;
+    /// [`StreamError`] if the file is there already, the port is busy, or the address is nobody's.
+    pub fn add_stream(&mut self, target: &Target, form: Form) -> Result<Option<std::net::SocketAddr>, StreamError> {
+        let name = format!("the stream {target}");
+        let pace = |keeps| (keeps, form.most_per_s);
+        let started = match target {
+            Target::Stdout => {
+                let lines = Lines::new(io::stdout(), form.fields, Duration::ZERO);
+                self.run(name.clone(), pace(Keeps::Newest), PATIENCE, lines)
             }
-            thread::sleep(Duration::from_millis(5));
-        }
-        match self.writer.take().map(JoinHandle::join) {
-            // Whoever reads has enough.
-            Some(Ok(Err(error))) if error.kind() == io::ErrorKind::BrokenPipe => return,
-            Some(Ok(Err(error))) => tracing::error!("the stream ended early: {error}"),
-            _ => {}
-        }
-        if self.lost > 0 {
-            tracing::warn!("{} lines of the stream were lost: its reader is too slow", self.lost);
-        }
+            Target::File(path) => {
+                let lines = Lines::new(create(path)?, form.fields, FLUSH_EVERY);
+                self.run(name.clone(), pace(Keeps::All), DISK_PATIENCE, lines)
+            }
+            Target::Tcp(address) => return tcp::serve(self, address, form).map(Some),
+            Target::Udp(address) => {
+                let datagrams = udp::Datagrams::to(address, name.clone(), form.fields)?;
+                self.run(name.clone(), pace(Keeps::Newest), PATIENCE, datagrams)
+            }
+        };
+        started.map(|()| None).map_err(StreamError::thread(&name))
     }
 }
 
-fn write(lines: &Receiver<String>, mut out: BufWriter<Box<dyn Write + Send>>) -> io::Result<()> {
-    let mut flushed = Instant::now();
-    loop {
-        match lines.recv_timeout(FLUSH_EVERY) {
-            Ok(line) => writeln!(out, "{line}")?,
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return out.flush(),
+fn create(path: &Path) -> Result<File, StreamError> {
+    File::create_new(path).map_err(|source| StreamError::Create { path: path.to_owned(), source })
+}
+
+/// Lines to whatever bytes are written to.
+struct Lines<W: Write> {
+    out: BufWriter<W>,
+    fields: Fields,
+    line: Vec<u8>,
+    flush_every: Duration,
+    flushed: Instant,
+}
+
+impl<W: Write> Lines<W> {
+    fn new(out: W, fields: Fields, flush_every: Duration) -> Self {
+        Self { out: BufWriter::new(out), fields, line: Vec::new(), flush_every, flushed: Instant::now() }
+    }
+}
+
+impl<W: Write + Send + 'static> Sink for Lines<W> {
+    fn take(&mut self, delivery: &Delivery, is_last: bool) -> io::Result<()> {
+        self.fields.line(delivery, &mut self.line)?;
+        self.out.write_all(&self.line)?;
+        if is_last && self.flushed.elapsed() >= self.flush_every {
+            self.rest()?;
         }
-        if flushed.elapsed() >= FLUSH_EVERY {
-            out.flush()?;
-            flushed = Instant::now();
-        }
+        Ok(())
+    }
+
+    fn rest(&mut self) -> io::Result<()> {
+        self.flushed = Instant::now();
+        self.out.flush()
+    }
+
+    fn finish(&mut self) -> io::Result<()> {
+        self.out.flush()
     }
 }
 
@@ -119,11 +199,10 @@ fn write(lines: &Receiver<String>, mut out: BufWriter<Box<dyn Write + Send>>) ->
 mod tests {
     use std::sync::{Arc, Mutex};
 
+    use tactomo_touch::solve::Solution;
+
     use super::*;
-    use crate::run::Taken;
-    use tactomo_physics::readings::Readings;
-    use tactomo_touch::pointer::PointerEvent;
-    use tactomo_touch::solve::{FoundContact, Solution};
+    use crate::run::TouchEvent;
 
     #[derive(Clone, Default)]
     struct Shared(Arc<Mutex<Vec<u8>>>);
@@ -139,36 +218,43 @@ mod tests {
         }
     }
 
+    fn delivery(sequence: u64) -> Delivery {
+        let event = Arc::new(TouchEvent::of(sequence, Solution::default()));
+        Delivery { event, lost_before: 0, missed_before: 0, pointer_events: Vec::new() }
+    }
+
     #[test]
-    fn answers_are_lines_that_do_not_wait_while_more_come() {
+    fn targets_are_files_unless_they_say_otherwise() {
+        let target = |text: &str| text.parse::<Target>();
+        assert_eq!(target("-"), Ok(Target::Stdout));
+        assert_eq!(target("touch.jsonl"), Ok(Target::File("touch.jsonl".into())));
+        assert_eq!(target("tcp:9000"), Ok(Target::Tcp(Address::local(9000))));
+        assert_eq!(target("udp:10.0.0.2:9000").map(|target| target.to_string()), Ok("udp:10.0.0.2:9000".to_owned()));
+        assert!(target("tcp:nowhere").is_err() && target("udp:").is_err());
+    }
+
+    #[test]
+    fn lines_go_out_when_nothing_waits_behind_them() {
         let out = Shared::default();
-        let mut stream = Stream::start(Box::new(out.clone())).unwrap();
-        let readings = Readings::from_fn(4, |_, _| 0.0);
-        let solution = Solution { contacts: vec![FoundContact::flat(0.01, 0.0, 1e-3)], ..Solution::default() };
-        for sequence in 0..20 {
-            let frame = Taken {
-                newest: readings.clone(),
-                rows: Vec::new(),
-                mean: readings.clone(),
-                averaged: 1,
-                came: 1,
-                sequence,
-                board_time_us: 1000 * sequence,
-                arrived: Instant::now(),
-                status: Default::default(),
-            };
-            let events = if sequence == 7 { &[PointerEvent::Press][..] } else { &[] };
-            let age = Duration::from_micros(50);
-            stream.solved(&SolvedFrame { frame: &frame, solution: &solution, age, events });
-            thread::sleep(Duration::from_millis(5));
-        }
-        assert!(!out.0.lock().unwrap().is_empty(), "lines wait at most {FLUSH_EVERY:?}");
-        drop(stream);
+        let mut lines = Lines::new(out.clone(), Fields::default(), Duration::ZERO);
+        lines.take(&delivery(1), false).unwrap();
+        assert!(out.0.lock().unwrap().is_empty(), "more comes at once");
+        lines.take(&delivery(2), true).unwrap();
         let text = String::from_utf8(out.0.lock().unwrap().clone()).unwrap();
-        let lines: Vec<serde_json::Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-        assert_eq!((lines.len(), &lines[19]["sequence"]), (20, &19.into()));
-        assert_eq!((&lines[3]["contacts"][0]["x_m"], &lines[3]["time_s"]), (&0.01.into(), &0.003.into()));
-        assert_eq!((&lines[7]["events"][0]["kind"], lines[8].get("events")), (&"press".into(), None));
-        assert!((lines[0]["age_us"].as_f64().unwrap() - 50.0).abs() < 1e-9);
+        let sequences: Vec<_> = text
+            .lines()
+            .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()["sequence"].as_u64())
+            .collect();
+        assert_eq!(sequences, [Some(1), Some(2)]);
+    }
+
+    #[test]
+    fn a_file_is_never_replaced() {
+        let path = std::env::temp_dir().join(format!("tactomo-{}-stream.jsonl", std::process::id()));
+        std::fs::write(&path, "kept").unwrap();
+        let refused = Sinks::default().add_stream(&Target::File(path.clone()), Form::default()).unwrap_err();
+        assert!(refused.to_string().contains("has to be a new file"), "{refused}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "kept");
+        std::fs::remove_file(&path).unwrap();
     }
 }

@@ -7,8 +7,8 @@ use std::time::Duration;
 use tactomo::board::link::Opened;
 use tactomo::board::record::{Header, Recorder};
 use tactomo::board::simulated::{Options, SimulatedBoard};
-use tactomo::run::plan::{Ends, Listener, Plan, Solving, Summary};
-use tactomo::run::{Snapshot, SolvedFrame};
+use tactomo::run::plan::{Ends, Plan, Solving, Summary};
+use tactomo::run::{Listener, Snapshot, TouchEvent};
 use tactomo::scene::{Hand, Scene, SceneName, Touch};
 use tactomo::simulate::Simulation;
 use tactomo::solve::{Method, Problem, Solution};
@@ -41,8 +41,8 @@ pub struct Live {
 struct Keeper(Arc<Mutex<Vec<(u64, u64, Solution)>>>);
 
 impl Listener for Keeper {
-    fn solved(&mut self, solved: &SolvedFrame<'_>) {
-        self.0.lock().unwrap().push((solved.frame.sequence, solved.frame.board_time_us, solved.solution.clone()));
+    fn touched(&mut self, event: &Arc<TouchEvent>) {
+        self.0.lock().unwrap().push((event.sequence, event.board_time_us, event.solution.clone()));
     }
 }
 

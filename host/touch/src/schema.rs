@@ -2,10 +2,12 @@
 //!
 //! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of its contacts [`CONTACT_COLUMNS`], those of its shape
 //! [`SHAPE_COLUMNS`]; a column that is added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
-//! newtons, `_us` microseconds. `sigma_` is a standard error, and `force_deviation_n` that of the force. What is not known is absent in JSON, empty in CSV and NaN elsewhere.
+//! newtons, `_v` volts, `_us` microseconds. `sigma_` is a standard error, and `force_deviation_n` that of the force. What is not known is absent in JSON, empty in CSV and NaN elsewhere.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
+
+use tactomo_physics::readings::Readings;
 
 use crate::pointer::PointerEvent;
 use crate::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
@@ -150,9 +152,24 @@ impl Serialize for FoundShape {
     }
 }
 
+/// Version of a frame's JSON: it changes where a field goes or means something else, and stays where one is added.
+pub const SCHEMA: u32 = 1;
+
+/// [`SCHEMA`], as a field.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SchemaVersion;
+
+impl Serialize for SchemaVersion {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_u32(SCHEMA)
+    }
+}
+
 /// A solved frame as it leaves the program: a line of JSON.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameReport<'a> {
+    /// Version of these fields.
+    pub schema: SchemaVersion,
     /// Number of the frame in its file, from 0; of frames from a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame: Option<u64>,
@@ -162,9 +179,21 @@ pub struct FrameReport<'a> {
     /// Board time (s): since the first frame in a file, since the board's start in a stream.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
+    /// When the frame's last byte came, by the clock of the machine: seconds since 1970 (s), within half a microsecond.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arrived_unix_s: Option<f64>,
     /// Frames lost or damaged since the one before.
     #[serde(skip_serializing_if = "is_none_or_zero")]
     pub lost_before: Option<u64>,
+    /// Answers before this one that the stream lost, because whoever reads it was too slow.
+    #[serde(skip_serializing_if = "is_none_or_zero")]
+    pub missed_before: Option<u64>,
+    /// Whether this is a better answer to the frame of the one before.
+    #[serde(skip_serializing_if = "is_false")]
+    pub revised: bool,
+    /// Whether the baseline is being taken, so that less is known.
+    #[serde(skip_serializing_if = "is_false")]
+    pub rezeroing: bool,
     /// Time that the solver took (us).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame_us: Option<f64>,
@@ -177,20 +206,42 @@ pub struct FrameReport<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<&'a FoundShape>,
     /// Root mean square of what the answer leaves of the readings, in standard deviations of the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub residual: Option<f64>,
     /// Probability that as many contacts touch as were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certainty: Option<f64>,
     /// What to know before this is believed.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub flags: Option<&'a Flags>,
     /// What was chosen and why.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub choice: Option<&'a Choice>,
     /// The image, if it is wanted: contact conductance per area at each node (S/m2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_s_per_m2: Option<&'a [f32]>,
+    /// Readings as measured (V), if they are wanted: electrode `e` while `g` is grounded at `g n + e`; `null` where nothing was read.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "volts")]
+    pub readings_v: Option<&'a Readings>,
+    /// What the solver got (V), in that order: the mean of the last frames as far as they stood still, less the baseline.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "volts")]
+    pub touch_v: Option<&'a Readings>,
+    /// How many frames that is the mean of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub averaged: Option<u32>,
     /// What the pointer did since the frame before; in JSON alone, of a live stream with a pointer.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     pub events: &'a [PointerEvent],
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// Voltages row by row; what was not read is unknown.
+fn volts<S: Serializer>(readings: &Option<&Readings>, serializer: S) -> Result<S::Ok, S::Error> {
+    // What is not a number is null in JSON.
+    serializer.collect_seq(readings.iter().flat_map(|readings| readings.read_v()))
 }
 
 fn is_none_or_zero(count: &Option<u64>) -> bool {

@@ -1,6 +1,7 @@
 //! Frames of readings in files: recordings of this program, and tables of any other.
 
 mod recorded;
+mod survey;
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use tactomo_protocol::Hello;
 
 pub use self::recorded::{Recorded, RecordingLoss};
+pub use self::survey::Survey;
 use crate::record::{self, RecordError};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_table::{Array, Table, TableError};
@@ -36,6 +38,8 @@ pub struct Rows {
 pub struct FileFrame {
     /// Board time since the first frame (s), if that is known.
     pub time_s: Option<f64>,
+    /// When its last byte came (s since the recording's start), if the file tells.
+    pub arrived_s: Option<f64>,
     /// The board's number of the scan, if the file tells.
     pub sequence: Option<u64>,
     /// Scans that are missing since the frame before: lost on the way, or damaged in the file.
@@ -206,6 +210,7 @@ impl Rows {
         let volts: Vec<f64> = self.rows.by_ref().take(self.channels).collect();
         (volts.len() == self.channels).then_some(FileFrame {
             time_s: None,
+            arrived_s: None,
             sequence: None,
             lost_before: 0,
             volts,
@@ -216,7 +221,7 @@ impl Rows {
 
 fn is_recording(path: &Path) -> bool {
     let mut start = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(record::MAGIC.len() as u64).read_to_end(&mut start));
+    let read = File::open(path).and_then(|file| file.take(record::START_BYTES as u64).read_to_end(&mut start));
     read.is_ok() && record::is_recording(&start)
 }
 

@@ -9,7 +9,7 @@ use tactomo_protocol::{BoardMessage, BoardReceiver, Frame, Hello};
 
 use super::{FileFrame, FramesError};
 use crate::measured::Volts;
-use crate::record::{Header, Loss, RecordReader};
+use crate::record::{Entry, Header, Loss, Note, RecordReader};
 use crate::sequence::Sequence;
 
 /// A recording.
@@ -23,10 +23,40 @@ pub struct Recorded {
     sequence: Sequence,
     /// Stretches of junk before the board said Hello, which are no loss.
     junk: u64,
+    /// Messages that were corrupt in recordings before the one under way.
+    corrupt_before: u64,
     lost: RecordingLoss,
-    /// Board time of the first frame (us).
-    first_us: Option<u64>,
+    times: Times,
+    notes: Vec<(f64, Note)>,
     frames: VecDeque<FileFrame>,
+}
+
+/// From board times to seconds since the first frame. Where the board begins to count anew, or another recording was joined on, times go on by
+/// when the frames came.
+#[derive(Debug, Default)]
+struct Times {
+    /// When the chunk under way came (us since the recording's start).
+    arrived_us: u64,
+    first_arrived_us: Option<u64>,
+    /// A board time (us), and the seconds that it stands for.
+    base: Option<(u64, f64)>,
+    last: Option<(u64, f64)>,
+}
+
+impl Times {
+    /// The time of a frame (s).
+    fn place(&mut self, board_us: u64) -> f64 {
+        let first_us = *self.first_arrived_us.get_or_insert(self.arrived_us);
+        if self.last.is_some_and(|(last_us, _)| board_us < last_us) {
+            self.base = None;
+        }
+        let arrived_s = self.arrived_us.saturating_sub(first_us) as f64 * 1e-6;
+        let after_last_s = self.last.map_or(0.0, |(_, last_s)| arrived_s.max(last_s));
+        let (base_us, base_s) = *self.base.get_or_insert((board_us, after_last_s));
+        let time_s = base_s + board_us.saturating_sub(base_us) as f64 * 1e-6;
+        self.last = Some((board_us, time_s));
+        time_s
+    }
 }
 
 /// What is damaged or missing in a recording, as far as it was read.
@@ -38,6 +68,8 @@ pub struct RecordingLoss {
     pub corrupt: u64,
     /// Frames that are missing by their numbers: lost in the file, on the line, or by the board.
     pub missing_frames: u64,
+    /// Time that they would have taken, by the board's clock (us).
+    pub missing_us: u64,
     /// Frames of a board with another number of electrodes than the first one, which are left out.
     pub other_frames: u64,
 }
@@ -47,6 +79,11 @@ impl RecordingLoss {
     pub fn is_any(&self) -> bool {
         *self != Self::default()
     }
+
+    /// Whether the file or its bytes are damaged; frames may be missing without, where the board or its line dropped them.
+    pub fn is_damage(&self) -> bool {
+        self.file.is_any() || self.corrupt > 0
+    }
 }
 
 impl fmt::Display for RecordingLoss {
@@ -55,7 +92,8 @@ impl fmt::Display for RecordingLoss {
             (count > 0).then(|| format!("{count} {}", if count == 1 { one } else { many }))
         };
         let parts = [
-            count(self.missing_frames, "frame is missing", "frames are missing"),
+            count(self.missing_frames, "frame is missing", "frames are missing")
+                .map(|frames| format!("{frames} ({:.3} s)", self.missing_us as f64 * 1e-6)),
             self.file.is_any().then(|| self.file.to_string()),
             count(self.corrupt, "message is corrupt", "messages are corrupt"),
             count(self.other_frames, "frame is of another board", "frames are of another board"),
@@ -69,10 +107,16 @@ impl Recorded {
     /// Reads up to where the board says who it is.
     pub(super) fn open(path: &Path) -> Result<Self, FramesError> {
         let mut reader = RecordReader::open(path)?;
-        let (mut receiver, mut chunk) = (BoardReceiver::default(), Vec::new());
+        let (mut receiver, mut chunk, mut notes) = (BoardReceiver::default(), Vec::new(), Vec::new());
         loop {
-            if !read(&mut reader, &mut chunk, path)? {
-                return Err(FramesError::NoHello { path: path.to_owned() });
+            let mut times = Times::default();
+            match read(&mut reader, &mut chunk, path)? {
+                None => return Err(FramesError::NoHello { path: path.to_owned() }),
+                Some(entry) if entry.note.is_some() => {
+                    notes.push((entry.time_us as f64 * 1e-6, entry.note.unwrap_or(Note::Unknown)));
+                    continue;
+                }
+                Some(entry) => times.arrived_us = entry.time_us,
             }
             let mut input = &chunk[..];
             while let Some(message) = receiver.receive(&mut input) {
@@ -82,13 +126,15 @@ impl Recorded {
                     path: path.to_owned(),
                     reader,
                     junk: receiver.counters().corrupt,
+                    corrupt_before: 0,
                     receiver,
                     chunk: rest,
                     volts: Volts::of(&board),
                     board,
                     lost: RecordingLoss::default(),
                     sequence: Sequence::default(),
-                    first_us: None,
+                    times,
+                    notes,
                     frames: VecDeque::new(),
                 };
                 recorded.decode();
@@ -100,6 +146,11 @@ impl Recorded {
     /// What the recording says about itself.
     pub fn header(&self) -> &Header {
         self.reader.header()
+    }
+
+    /// Notes that were passed, with their times (s since the recording's start).
+    pub fn notes(&self) -> &[(f64, Note)] {
+        &self.notes
     }
 
     /// Tells readings that are still to come above a ground that is lifted by so much (V).
@@ -117,7 +168,7 @@ impl Recorded {
 
     /// What is damaged or missing, as far as it was read.
     pub fn loss(&self) -> RecordingLoss {
-        let corrupt = self.receiver.counters().corrupt - self.junk;
+        let corrupt = self.corrupt_before + self.receiver.counters().corrupt - self.junk;
         RecordingLoss { file: self.reader.loss(), corrupt, ..self.lost }
     }
 
@@ -126,11 +177,28 @@ impl Recorded {
             if let Some(frame) = self.frames.pop_front() {
                 return Ok(Some(frame));
             }
-            if !read(&mut self.reader, &mut self.chunk, &self.path)? {
-                return Ok(None);
+            let Some(entry) = read(&mut self.reader, &mut self.chunk, &self.path)? else { return Ok(None) };
+            match entry.note {
+                None => {
+                    self.times.arrived_us = entry.time_us;
+                    self.decode();
+                }
+                Some(note) => {
+                    if matches!(note, Note::Joined { .. }) {
+                        self.begin_another();
+                    }
+                    self.notes.push((entry.time_us as f64 * 1e-6, note));
+                }
             }
-            self.decode();
         }
+    }
+
+    /// What follows is of another recording, whose board counts anew.
+    fn begin_another(&mut self) {
+        self.corrupt_before += self.receiver.counters().corrupt - self.junk;
+        (self.receiver, self.junk) = (BoardReceiver::default(), 0);
+        self.sequence.restart();
+        self.times.base = None;
     }
 
     /// Takes the frames out of a chunk. Those of another board than the first one say nothing of its detector.
@@ -152,11 +220,14 @@ impl Recorded {
     fn in_volts(&mut self, frame: &Frame) -> Option<FileFrame> {
         let readings = self.volts.readings(frame)?;
         let place = self.sequence.place(&frame.head);
+        if let Some((last_us, _)) = self.times.last.filter(|_| place.dropped > 0) {
+            let gap_us = place.time_us.saturating_sub(last_us);
+            self.lost.missing_us += gap_us / (place.dropped + 1) * place.dropped;
+        }
         self.lost.missing_frames += place.dropped;
-        let first_us = *self.first_us.get_or_insert(place.time_us);
-        let time_s = Some(place.time_us.saturating_sub(first_us) as f64 * 1e-6);
         Some(FileFrame {
-            time_s,
+            time_s: Some(self.times.place(place.time_us)),
+            arrived_s: Some(self.times.arrived_us as f64 * 1e-6),
             sequence: Some(place.sequence),
             lost_before: place.dropped,
             volts: readings.volts().to_vec(),
@@ -165,10 +236,9 @@ impl Recorded {
     }
 }
 
-/// The next chunk; `false` at the end.
-fn read(reader: &mut RecordReader<File>, chunk: &mut Vec<u8>, path: &Path) -> Result<bool, FramesError> {
-    let read = reader.next_into(chunk).map_err(|source| FramesError::Read { path: path.to_owned(), source })?;
-    Ok(read.is_some())
+/// The next chunk or note; `None` at the end.
+fn read(reader: &mut RecordReader<File>, chunk: &mut Vec<u8>, path: &Path) -> Result<Option<Entry>, FramesError> {
+    reader.next_entry(chunk).map_err(|source| FramesError::Read { path: path.to_owned(), source })
 }
 
 #[cfg(test)]
@@ -216,7 +286,7 @@ mod tests {
         assert_eq!(frames.len(), 3);
         let loss = file.loss().unwrap();
         assert_eq!((loss.missing_frames, loss.corrupt, loss.other_frames), (4, 1, 0));
-        assert_eq!(loss.to_string(), "4 frames are missing; 1 message is corrupt");
+        assert_eq!(loss.to_string(), "4 frames are missing (0.004 s); 1 message is corrupt");
         let expected = [(0.0, 3, 0, 0.05), (0.001, 4, 0, 0.02), (0.006, 9, 4, 0.0)];
         for (found, (time_s, sequence, lost_before, volts)) in frames.iter().zip(expected) {
             assert!((found.time_s.unwrap() - time_s).abs() < 1e-12, "{found:?}");

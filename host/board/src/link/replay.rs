@@ -12,7 +12,7 @@ use tactomo_protocol::{BoardMessage, BoardReceiver};
 
 use self::player::Clock;
 use super::{Control, ControlError, Link, Playing};
-use crate::record::{RecordError, RecordReader};
+use crate::record::{Note, RecordError, RecordReader};
 
 /// Longest that a read waits.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
@@ -105,9 +105,21 @@ impl ReplayLink {
     fn next_chunk(&mut self) -> io::Result<bool> {
         self.chunk.given = 0;
         self.chunk.bytes.clear();
-        let time_us = self.reader.next_into(&mut self.chunk.bytes)?;
-        self.chunk.time_us = time_us.unwrap_or(self.chunk.time_us);
-        Ok(time_us.is_some())
+        while let Some(entry) = self.reader.next_entry(&mut self.chunk.bytes)? {
+            match entry.note {
+                None => {
+                    self.chunk.time_us = entry.time_us;
+                    return Ok(true);
+                }
+                Some(Note::Joined { .. }) => {
+                    // Another recording follows, whose board counts anew.
+                    self.jumped = true;
+                    self.stage = Stage::Between;
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(false)
     }
 
     /// Makes sure that there are bytes to give; whether there are, or the recording has ended.

@@ -21,6 +21,7 @@ pub(super) static CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Tabl
 pub(super) enum Kind {
     Header,
     Data,
+    Note,
 }
 
 impl Kind {
@@ -28,13 +29,15 @@ impl Kind {
         match self {
             Self::Header => b'H',
             Self::Data => b'D',
+            Self::Note => b'N',
         }
     }
 
     /// Most bytes that a chunk of this kind holds.
     fn longest(self) -> usize {
         match self {
-            Self::Header => MAX_HEADER,
+            // A note may hold a detector, as the header does.
+            Self::Header | Self::Note => MAX_HEADER,
             Self::Data => MAX_CHUNK,
         }
     }
@@ -107,7 +110,7 @@ impl Version {
             Self::One => Some(Kind::Data),
             Self::Two => {
                 let letter = bytes.strip_prefix(&MARK)?.first()?;
-                [Kind::Header, Kind::Data].into_iter().find(|kind| kind.letter() == *letter)
+                [Kind::Header, Kind::Data, Kind::Note].into_iter().find(|kind| kind.letter() == *letter)
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use tactomo_physics::detector::Detector;
@@ -24,6 +24,9 @@ pub struct Header {
     pub source: String,
     /// Seconds since 1970 at its start (s).
     pub started_unix_s: u64,
+    /// The same in microseconds (us), to line recordings up with others; older ones do not have it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub started_unix_us: Option<u64>,
     /// Whatever else a person wants to remember.
     #[serde(default)]
     pub notes: String,
@@ -38,14 +41,37 @@ impl Header {
             surface_obj: detector.surface.as_ref().map(|surface| surface.to_obj()),
             source,
             started_unix_s,
+            started_unix_us: None,
             notes: String::new(),
         }
     }
 
     /// The same for a recording that begins now.
     pub fn now(detector: &Detector, source: String) -> Self {
-        let started_unix_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-        Self::of(detector, source, started_unix_s)
+        Self::of(detector, source, 0).started_ago(Duration::ZERO)
+    }
+
+    /// The same for a recording that began so long ago.
+    pub fn started_ago(self, ago: Duration) -> Self {
+        let started = SystemTime::now().checked_sub(ago).and_then(|start| start.duration_since(UNIX_EPOCH).ok());
+        self.started_at(started.unwrap_or_default())
+    }
+
+    /// The same for a recording that begins so much later.
+    pub fn started_later(self, by: Duration) -> Self {
+        let started = self.started();
+        let had_micros = self.started_unix_us.is_some();
+        let later = self.started_at(started + by);
+        Self { started_unix_us: later.started_unix_us.filter(|_| had_micros), ..later }
+    }
+
+    /// Time from 1970 to its start.
+    pub fn started(&self) -> Duration {
+        self.started_unix_us.map_or(Duration::from_secs(self.started_unix_s), Duration::from_micros)
+    }
+
+    fn started_at(self, since_1970: Duration) -> Self {
+        Self { started_unix_s: since_1970.as_secs(), started_unix_us: Some(since_1970.as_micros() as u64), ..self }
     }
 
     /// The detector that the recording was taken from; `None` if the header does not hold it. `path` is the recording, for errors.

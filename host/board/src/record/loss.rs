@@ -11,6 +11,8 @@ pub struct Loss {
     pub damaged_places: u64,
     /// Bytes of the file that were left out because of that. Those of damaged chunks that were handed out all the same are not among them.
     pub left_out_bytes: u64,
+    /// Bytes before the recording that are not its own.
+    pub junk_bytes: u64,
     /// Bytes at the end that are no whole chunk: the recording was cut off there.
     pub tail_bytes: u64,
 }
@@ -37,6 +39,9 @@ impl Loss {
 impl fmt::Display for Loss {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let mut parts = Vec::new();
+        if self.junk_bytes > 0 {
+            parts.push(format!("{} bytes before its start are none of it", self.junk_bytes));
+        }
         match self.header {
             HeaderDamage::None => {}
             HeaderDamage::Repaired => parts.push("its header is damaged, but nothing of it is lost".to_owned()),

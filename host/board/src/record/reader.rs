@@ -5,12 +5,12 @@ use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
-use super::format::{CRC, Chunk, Kind, MAX_CHUNK, MAX_HEADER, MAX_OVERHEAD, Parsed, Version};
+use super::format::{Kind, MAX_CHUNK, MAX_OVERHEAD, Parsed, Version};
+use super::scan::{find_whole, is_one_chunk, parse};
+use super::start::{Opened, Refused};
 use super::window::Window;
-use super::{Header, HeaderDamage, Loss, RecordError, VERSION, is_recording};
+use super::{Header, Loss, Note, RecordError};
 
-/// Bytes before the first header: magic and version.
-const START: usize = super::MAGIC.len() + 1;
 /// Bytes at the end in which the last chunk is looked for first: four of the longest.
 const LAST_BYTES: u64 = 4 * (MAX_CHUNK + MAX_OVERHEAD) as u64;
 
@@ -27,6 +27,15 @@ pub struct RecordReader<R: Read> {
     counted: BTreeSet<u64>,
     /// Time of the last chunk (us).
     time_us: u64,
+}
+
+/// What follows in a recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Time since the start of the recording (us): when the bytes came, or the note was made.
+    pub time_us: u64,
+    /// The note; `None` for bytes of the board.
+    pub note: Option<Note>,
 }
 
 impl RecordReader<File> {
@@ -46,22 +55,15 @@ impl<R: Read> RecordReader<R> {
     /// # Errors
     /// [`RecordError`] if it is no recording that this program reads.
     pub fn new(input: R, path: &Path) -> Result<Self, RecordError> {
-        let open = |source| RecordError::Open { path: path.to_owned(), source };
-        let not_a_recording = || RecordError::NotARecording { path: path.to_owned() };
         let mut window = Window::new(input);
-        let start = window.ahead(START).map_err(open)?;
-        let Some(&found) = start.get(START - 1).filter(|_| is_recording(start)) else { return Err(not_a_recording()) };
-        let magic_is_whole = start.starts_with(&super::MAGIC);
-        window.skip(START);
-        let opened = Opened::read(&mut window, found).map_err(open)?;
-        let Some(Opened { version, header, damage }) = opened else {
-            return Err(match found {
-                1 | VERSION => not_a_recording(),
-                found => RecordError::Version { path: path.to_owned(), found },
-            });
-        };
-        let header_damage = if magic_is_whole { damage } else { damage.max(HeaderDamage::Repaired) };
-        let loss = Loss { header: header_damage, ..Loss::default() };
+        let path = || path.to_owned();
+        let Opened { version, header, damage, junk_bytes } =
+            Opened::new(&mut window).map_err(|refused| match refused {
+                Refused::NotARecording => RecordError::NotARecording { path: path() },
+                Refused::Version(found) => RecordError::Version { path: path(), found },
+                Refused::Io(source) => RecordError::Open { path: path(), source },
+            })?;
+        let loss = Loss { header: damage, junk_bytes, ..Loss::default() };
         let first = window.offset();
         Ok(Self { window, version, header, loss, first, counted: BTreeSet::new(), time_us: 0 })
     }
@@ -77,11 +79,25 @@ impl<R: Read> RecordReader<R> {
     }
 
     /// Puts the bytes of the next chunk in place of what `bytes` holds; returns the time at which they came (us), or `None`
-    /// at the end. Bytes of a chunk in which only these are damaged come all the same.
+    /// at the end. Bytes of a chunk in which only these are damaged come all the same. Notes are passed over.
     ///
     /// # Errors
     /// If the file cannot be read.
     pub fn next_into(&mut self, bytes: &mut Vec<u8>) -> io::Result<Option<u64>> {
+        loop {
+            match self.next_entry(bytes)? {
+                Some(Entry { time_us, note: None }) => return Ok(Some(time_us)),
+                Some(_) => {}
+                None => return Ok(None),
+            }
+        }
+    }
+
+    /// The same for the next chunk or note, whichever comes first.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn next_entry(&mut self, bytes: &mut Vec<u8>) -> io::Result<Option<Entry>> {
         loop {
             let begin = self.window.offset();
             let (chunk, is_whole) = match parse(&mut self.window, self.version)? {
@@ -97,15 +113,24 @@ impl<R: Read> RecordReader<R> {
                     continue;
                 }
             };
-            if chunk.kind == Kind::Data {
-                bytes.clear();
-                bytes.extend_from_slice(&self.window.held()[chunk.bytes.clone()]);
-                // The time of a damaged chunk may be what is damaged.
-                self.time_us = if is_whole { chunk.time_us } else { self.time_us };
-            }
+            // The time of a damaged chunk may be what is damaged.
+            self.time_us = if is_whole && chunk.kind != Kind::Header { chunk.time_us } else { self.time_us };
+            let content = &self.window.held()[chunk.bytes.clone()];
+            let entry = match chunk.kind {
+                Kind::Data => {
+                    bytes.clear();
+                    bytes.extend_from_slice(content);
+                    Some(Entry { time_us: self.time_us, note: None })
+                }
+                Kind::Note if is_whole => {
+                    let note = serde_json::from_slice(content).unwrap_or(Note::Unknown);
+                    Some(Entry { time_us: self.time_us, note: Some(note) })
+                }
+                Kind::Note | Kind::Header => None,
+            };
             self.window.skip(chunk.length);
-            if chunk.kind == Kind::Data {
-                return Ok(Some(self.time_us));
+            if entry.is_some() {
+                return Ok(entry);
             }
         }
     }
@@ -156,6 +181,28 @@ impl<R: Read + Seek> RecordReader<R> {
         Ok(last)
     }
 
+    /// The detector that a calibration found while this was recorded, as the end of the recording tells it; `None` if there is none.
+    /// Goes on where it was.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn detector_found(&mut self) -> io::Result<Option<Note>> {
+        let here = self.window.offset();
+        let length = self.window.file_length()?;
+        // Behind the headers, which are two and as long as the note is, there is at most the chunk under way.
+        self.window.go_to(length.saturating_sub(LAST_BYTES + self.first).max(self.first))?;
+        let mut found = None;
+        while let Some(chunk) = find_whole(&mut self.window, self.version)? {
+            if chunk.kind == Kind::Note {
+                let note = serde_json::from_slice(&self.window.held()[chunk.bytes.clone()]).ok();
+                found = note.filter(|note| matches!(note, Note::Detector { .. })).or(found);
+            }
+            self.window.skip(chunk.length);
+        }
+        self.window.go_to(here)?;
+        Ok(found)
+    }
+
     /// Time of the last whole chunk behind a place of the file.
     fn last_from(&mut self, from: u64) -> io::Result<Option<u64>> {
         let mut last = None;
@@ -199,156 +246,5 @@ impl<R: Read + Seek> RecordReader<R> {
     pub fn rewind(&mut self) -> io::Result<()> {
         self.time_us = 0;
         self.window.go_to(self.first)
-    }
-}
-
-/// What the start of a file says.
-struct Opened {
-    version: Version,
-    header: Header,
-    damage: HeaderDamage,
-}
-
-impl Opened {
-    /// Reads the header behind a version, and goes on to the first chunk; `None` if this is no version that is known, or there is
-    /// neither a header nor a chunk.
-    fn read<R: Read>(window: &mut Window<R>, found: u8) -> io::Result<Option<Self>> {
-        let version_damage = |right| if found == right { HeaderDamage::None } else { HeaderDamage::Repaired };
-        if found != 1
-            && let Some((header, damage)) = two_headers(window)?
-        {
-            let damage = damage.max(version_damage(VERSION));
-            return Ok(Some(Self { version: Version::Two, header, damage }));
-        }
-        if let Some((header, length)) = one_header(window)? {
-            window.skip(length);
-            return Ok(Some(Self { version: Version::One, header, damage: version_damage(1) }));
-        }
-        let version = match found {
-            1 => Version::One,
-            VERSION => Version::Two,
-            _ => return Ok(None),
-        };
-        let found = find_whole(window, version)?;
-        Ok(found.map(|_| Self { version, header: Header::default(), damage: HeaderDamage::Lost }))
-    }
-}
-
-/// The two headers of version 2, of which one may be damaged; goes on behind them. `None` if both are, or it is another version.
-fn two_headers<R: Read>(window: &mut Window<R>) -> io::Result<Option<(Header, HeaderDamage)>> {
-    let first = parse(window, Version::Two)?;
-    if let Parsed::Whole(chunk) = &first {
-        let Some(header) = header_in(window, chunk) else { return Ok(None) };
-        window.skip(chunk.length);
-        return Ok(Some((header, skip_copy(window, chunk.length)?)));
-    }
-    // The second one is as long as the first, so it is not far if it is there.
-    let begin = window.ahead(2 * (MAX_HEADER + MAX_OVERHEAD))?;
-    let mut at = 0;
-    while at < begin.len() {
-        at += Version::Two.skip(&begin[at..]);
-        match Version::Two.parse(begin.get(at..).unwrap_or_default()) {
-            Parsed::Whole(chunk) if chunk.kind == Kind::Header => {
-                window.skip(at);
-                let header = header_in(window, &chunk);
-                window.skip(chunk.length);
-                return Ok(header.map(|header| (header, HeaderDamage::Repaired)));
-            }
-            Parsed::Whole(_) => return Ok(None),
-            _ => {}
-        }
-    }
-    Ok(None)
-}
-
-/// Goes on behind the second header, which is as long as the first.
-fn skip_copy<R: Read>(window: &mut Window<R>, length: usize) -> io::Result<HeaderDamage> {
-    match parse(window, Version::Two)? {
-        Parsed::Whole(chunk) if chunk.kind == Kind::Header => {
-            window.skip(chunk.length);
-            Ok(HeaderDamage::None)
-        }
-        Parsed::Whole(_) => Ok(HeaderDamage::Repaired),
-        // A file that was cut in it has no chunk, and says so when it is read.
-        _ if window.ahead(length)?.len() < length => Ok(HeaderDamage::None),
-        _ => {
-            window.skip(length);
-            Ok(HeaderDamage::Repaired)
-        }
-    }
-}
-
-fn header_in<R: Read>(window: &Window<R>, chunk: &Chunk) -> Option<Header> {
-    (chunk.kind == Kind::Header).then(|| serde_json::from_slice(&window.held()[chunk.bytes.clone()]).ok())?
-}
-
-/// The header of version 1 and its length in the file, if its checksum is right.
-fn one_header<R: Read>(window: &mut Window<R>) -> io::Result<Option<(Header, usize)>> {
-    let Some(&[low, high]) = window.ahead(2)?.first_chunk() else { return Ok(None) };
-    let end = 2 + usize::from(u16::from_le_bytes([low, high]));
-    let bytes = window.ahead(end + 4)?;
-    let Some(crc) = bytes.get(end..end + 4) else { return Ok(None) };
-    let mut digest = CRC.digest();
-    digest.update(&[1]);
-    digest.update(&bytes[..end]);
-    let is_whole = digest.finalize().to_le_bytes() == crc;
-    let header = if is_whole { serde_json::from_slice(&bytes[2..end]).ok() } else { None };
-    Ok(header.map(|header| (header, end + 4)))
-}
-
-/// What is at the front of the window.
-fn parse<R: Read>(window: &mut Window<R>, version: Version) -> io::Result<Parsed> {
-    let mut wanted = MAX_OVERHEAD;
-    loop {
-        let bytes = window.ahead(wanted)?;
-        match version.parse(bytes) {
-            Parsed::Short(more) if bytes.len() >= wanted => wanted = more.max(wanted + 1),
-            parsed => return Ok(parsed),
-        }
-    }
-}
-
-/// Whether a damaged chunk is so long as it claims: a chunk or the end of the file follows, and it swallows no whole one.
-fn is_one_chunk<R: Read>(window: &mut Window<R>, version: Version, length: usize) -> io::Result<bool> {
-    if !follows(window, version, length)? {
-        return Ok(false);
-    }
-    let bytes = &window.held()[..length];
-    let mut at = version.skip(bytes);
-    while at < length {
-        if matches!(version.parse(&bytes[at..]), Parsed::Whole(_)) {
-            return Ok(false);
-        }
-        at += version.skip(&bytes[at..]);
-    }
-    Ok(true)
-}
-
-/// Whether a chunk, or the end of the file, follows `length` bytes ahead.
-fn follows<R: Read>(window: &mut Window<R>, version: Version, length: usize) -> io::Result<bool> {
-    let mut wanted = length + MAX_OVERHEAD;
-    loop {
-        let bytes = window.ahead(wanted)?;
-        let is_end = bytes.len() == length;
-        match version.parse(bytes.get(length..).unwrap_or_default()) {
-            Parsed::Short(more) if bytes.len() >= wanted => wanted = (length + more).max(wanted + 1),
-            // A mark tells enough.
-            Parsed::Damaged(_) if version == Version::Two => return Ok(true),
-            parsed => return Ok(is_end || matches!(parsed, Parsed::Whole(_))),
-        }
-    }
-}
-
-/// Goes on to the next chunk whose checksum is right, this one included; `None` at the end of the file.
-fn find_whole<R: Read>(window: &mut Window<R>, version: Version) -> io::Result<Option<Chunk>> {
-    loop {
-        match parse(window, version)? {
-            Parsed::Whole(chunk) => return Ok(Some(chunk)),
-            _ if window.ahead(1)?.is_empty() => return Ok(None),
-            _ => {
-                let skipped = version.skip(window.held());
-                window.skip(skipped);
-            }
-        }
     }
 }

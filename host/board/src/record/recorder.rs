@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use tactomo_protocol::{Hello, MAX_WIRE, encode_hello};
 
-use super::{Header, RecordError, RecordWriter};
+use super::{Header, Note, RecordError, RecordWriter};
 
 /// What is not yet with the system is lost when the program is killed: at most this much.
 const FLUSH_EVERY: Duration = Duration::from_millis(200);
@@ -20,8 +20,25 @@ const FLUSH_EVERY: Duration = Duration::from_millis(200);
 /// that is not broken. More would only take the memory of a machine that cannot keep up.
 const MAX_WAITING: usize = 256 << 20;
 
-/// Bytes, and when they came (us from the start).
-type Chunk = (u64, Vec<u8>);
+/// What is to be written, and its time (us from the start).
+type Entry = (u64, What);
+
+/// What is to be written.
+#[derive(Debug)]
+enum What {
+    Bytes(Vec<u8>),
+    Note(Note),
+}
+
+impl What {
+    /// Its size in memory, about.
+    fn len(&self) -> usize {
+        match self {
+            Self::Bytes(bytes) => bytes.len(),
+            Self::Note(_) => size_of::<Note>(),
+        }
+    }
+}
 
 /// Writes what it is given to a file, in a thread of its own: nothing here waits for the disk but [`finish`](Self::finish) and dropping it.
 #[derive(Debug)]
@@ -33,7 +50,9 @@ pub struct Recorder {
     /// Whether bytes up to the end of a packet are still to be left out.
     in_packet: bool,
     /// `None` once no more is taken.
-    chunks: Option<Sender<Chunk>>,
+    entries: Option<Sender<Entry>>,
+    /// What a calibration found meanwhile, written once more at the end.
+    found: Option<Note>,
     /// Bytes that wait for the disk.
     waiting: Arc<AtomicUsize>,
     most_waiting: usize,
@@ -67,7 +86,13 @@ impl Recorder {
     /// # Errors
     /// [`RecordError`] as of [`create`](Self::create).
     pub fn create_with_hello(path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
+        Self::since(Instant::now(), path, header, hello)
+    }
+
+    /// The same for bytes of which the first came at `began`, some time ago.
+    pub(super) fn since(began: Instant, path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
         let mut recorder = Self::create(path, header)?;
+        recorder.began = began;
         let mut wire = [0; MAX_WIRE];
         let length = encode_hello(hello, &mut wire).map_err(|error| RecordError::Write {
             path: path.to_owned(),
@@ -86,7 +111,7 @@ impl Recorder {
         sync: impl FnOnce(&W) -> io::Result<()> + Send + 'static,
         most_waiting: usize,
     ) -> io::Result<Self> {
-        let (chunks, queue) = channel();
+        let (entries, queue) = channel();
         let waiting = Arc::new(AtomicUsize::new(0));
         let left = Arc::clone(&waiting);
         let writer =
@@ -96,7 +121,8 @@ impl Recorder {
             began: Instant::now(),
             last_us: 0,
             in_packet: false,
-            chunks: Some(chunks),
+            entries: Some(entries),
+            found: None,
             waiting,
             most_waiting,
             writer: Some(writer),
@@ -118,21 +144,37 @@ impl Recorder {
         if bytes.is_empty() {
             return Ok(());
         }
-        if self.chunks.is_some() && self.waiting.load(Relaxed) + bytes.len() > self.most_waiting {
-            self.chunks = None;
+        self.send(What::Bytes(bytes.to_vec()), arrived)
+    }
+
+    /// Sets down a note at `made`; never waits.
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push).
+    pub fn note(&mut self, note: Note, made: Instant) -> Result<(), RecordError> {
+        if matches!(note, Note::Detector { .. }) {
+            self.found = Some(note.clone());
+        }
+        self.send(What::Note(note), made)
+    }
+
+    fn send(&mut self, what: What, at: Instant) -> Result<(), RecordError> {
+        let length = what.len();
+        if self.entries.is_some() && self.waiting.load(Relaxed) + length > self.most_waiting {
+            self.entries = None;
             return Err(RecordError::TooSlow {
                 path: self.path.clone(),
                 waiting_mb: self.most_waiting >> 20,
                 seconds: self.last_us as f64 * 1e-6,
             });
         }
-        self.last_us = self.last_us.max(arrived.saturating_duration_since(self.began).as_micros() as u64);
-        self.waiting.fetch_add(bytes.len(), Relaxed);
-        let is_taken = self.chunks.as_ref().is_some_and(|chunks| chunks.send((self.last_us, bytes.to_vec())).is_ok());
+        self.last_us = self.last_us.max(at.saturating_duration_since(self.began).as_micros() as u64);
+        self.waiting.fetch_add(length, Relaxed);
+        let is_taken = self.entries.as_ref().is_some_and(|entries| entries.send((self.last_us, what)).is_ok());
         if is_taken {
             return Ok(());
         }
-        self.chunks = None;
+        self.entries = None;
         // It has ended by itself, so this does not wait.
         outcome(&self.path, self.writer.take().filter(JoinHandle::is_finished))
     }
@@ -149,8 +191,16 @@ impl Recorder {
 
     /// Takes no more; the rest is written while the caller goes on.
     pub fn close(mut self) -> Closing {
-        self.chunks = None;
+        self.end();
         Closing { path: self.path.clone(), writer: self.writer.take() }
+    }
+
+    fn end(&mut self) {
+        if let Some((found, entries)) = self.found.take().zip(self.entries.as_ref()) {
+            // A writer that is gone has said why, or will.
+            let _ = entries.send((self.last_us, What::Note(found)));
+        }
+        self.entries = None;
     }
 
     /// Writes what is left and closes the file.
@@ -165,7 +215,7 @@ impl Recorder {
 impl Drop for Recorder {
     /// Writes what is left.
     fn drop(&mut self) {
-        self.chunks = None;
+        self.end();
         if let Some(Err(error)) = self.writer.take().map(|writer| outcome(&self.path, Some(writer))) {
             tracing::warn!("{error}");
         }
@@ -200,16 +250,20 @@ fn outcome(path: &Path, writer: Option<JoinHandle<io::Result<()>>>) -> Result<()
 /// Writes the queue until it closes.
 fn keep<W: Write>(
     mut writer: RecordWriter<W>,
-    queue: &Receiver<Chunk>,
+    queue: &Receiver<Entry>,
     waiting: &AtomicUsize,
     sync: impl FnOnce(&W) -> io::Result<()>,
 ) -> io::Result<()> {
     let mut flushed = Instant::now();
     loop {
         match queue.recv_timeout(FLUSH_EVERY) {
-            Ok((time_us, bytes)) => {
-                writer.write(time_us, &bytes)?;
-                waiting.fetch_sub(bytes.len(), Relaxed);
+            Ok((time_us, what)) => {
+                match &what {
+                    What::Bytes(bytes) => writer.write(time_us, bytes)?,
+                    What::Note(note) => writer.note(time_us, note)?,
+                }
+                // `end` does not count what it adds.
+                let _ = waiting.fetch_update(Relaxed, Relaxed, |left| Some(left.saturating_sub(what.len())));
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => break,
@@ -228,12 +282,13 @@ mod tests {
     use super::*;
     use crate::record::RecordReader;
     use std::sync::mpsc;
+    use tactomo_physics::detector::Detector;
 
     fn path(name: &str) -> PathBuf {
         std::env::temp_dir().join(format!("tactomo-{}-{name}", std::process::id()))
     }
 
-    fn chunks(path: &Path) -> Vec<Chunk> {
+    fn chunks(path: &Path) -> Vec<(u64, Vec<u8>)> {
         let mut reader = RecordReader::open(path).unwrap();
         let mut bytes = Vec::new();
         std::iter::from_fn(|| reader.next_into(&mut bytes).unwrap().map(|time_us| (time_us, bytes.clone()))).collect()
@@ -250,6 +305,33 @@ mod tests {
         assert_eq!(chunks(&path), [(1500, b"one".to_vec()), (1500, b"two".to_vec())], "times never fall");
         let again = Recorder::create(&path, &Header::default());
         assert!(matches!(again, Err(RecordError::Open { .. })));
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn notes_stand_where_they_were_made_and_a_detector_that_was_found_at_the_end_too() {
+        let path = path("notes");
+        let mut recorder = Recorder::create(&path, &Header::default()).unwrap();
+        let times: Vec<Instant> = (0..5).map(|ms| recorder.began + Duration::from_millis(ms)).collect();
+        let detector = Detector::preset("strip-13x60").unwrap();
+        let found = Note::detector_found(&detector);
+        recorder.push(b"one", times[0]).unwrap();
+        recorder.note(Note::mark("slipped"), times[1]).unwrap();
+        recorder.push(b"two", times[2]).unwrap();
+        recorder.note(found.clone(), times[3]).unwrap();
+        recorder.push(b"three", times[4]).unwrap();
+        recorder.finish().unwrap();
+        let mut reader = RecordReader::open(&path).unwrap();
+        assert_eq!(reader.detector_found().unwrap().as_ref(), Some(&found));
+        assert_eq!(found.detector(&path).unwrap(), Some(detector));
+        let mut bytes = Vec::new();
+        let entries: Vec<_> = std::iter::from_fn(|| reader.next_entry(&mut bytes).unwrap()).collect();
+        let notes: Vec<_> = entries.iter().map(|entry| (entry.time_us, entry.note.clone())).collect();
+        let mark = Some(Note::mark("slipped"));
+        let expected =
+            [(0, None), (1000, mark), (2000, None), (3000, Some(found.clone())), (4000, None), (4000, Some(found))];
+        assert_eq!(notes, expected);
+        assert_eq!((chunks(&path).len(), reader.loss().is_any()), (3, false));
         std::fs::remove_file(path).unwrap();
     }
 

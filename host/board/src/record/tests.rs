@@ -239,6 +239,22 @@ proptest! {
     }
 
     #[test]
+    fn what_stands_before_a_recording_is_passed_over_and_counted(
+        chunks in any_chunks(0..5),
+        junk in prop::collection::vec(any::<u8>(), 1..3000),
+    ) {
+        for file in [written(&chunks).0, written_in_version_1(&chunks).0] {
+            let before = [&junk[..], &file].concat();
+            prop_assert!(is_recording(&before));
+            let loss = Loss { junk_bytes: junk.len() as u64, ..Loss::default() };
+            prop_assert_eq!(read(&before), Some((chunks.clone(), loss)));
+            let mut reader = open(&before).unwrap();
+            reader.seek(0).unwrap();
+            prop_assert_eq!(rest(&mut reader), chunks.clone());
+        }
+    }
+
+    #[test]
     fn any_bytes_are_read_without_panic(tail in prop::collection::vec(any::<u8>(), 0..2000), to_us in any::<u64>()) {
         prop_assert!(read(&tail).is_none());
         for mut file in [written(&Vec::new()).0, written_in_version_1(&Vec::new()).0] {

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::format::{Kind, MAX_CHUNK, MAX_HEADER, put_chunk};
-use super::{Header, MAGIC, VERSION};
+use super::{Header, MAGIC, Note, VERSION};
 
 /// Writes a recording.
 #[derive(Debug)]
@@ -43,6 +43,20 @@ impl<W: Write> RecordWriter<W> {
             self.out.write_all(&self.chunk)?;
         }
         Ok(())
+    }
+
+    /// Adds a note of `time_us` after the start (us), not before what is written already.
+    ///
+    /// # Errors
+    /// If `out` takes no bytes, or the note is longer than 16 MiB.
+    pub fn note(&mut self, time_us: u64, note: &Note) -> io::Result<()> {
+        let json = serde_json::to_vec(note)?;
+        if json.len() > MAX_HEADER {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "a note is too long for a recording"));
+        }
+        self.chunk.clear();
+        put_chunk(Kind::Note, time_us, &json, &mut self.chunk);
+        self.out.write_all(&self.chunk)
     }
 
     /// Hands everything to the system.

@@ -103,6 +103,12 @@ impl Readings {
         self.says.get(g * self.electrodes + e).copied().unwrap_or_default()
     }
 
+    /// The voltages row by row (V), for who keeps them: not a number where nothing was read.
+    pub fn read_v(&self) -> impl Iterator<Item = f64> {
+        let is_unread = |i: usize| self.says.get(i) == Some(&Says::Nothing);
+        self.volts.iter().enumerate().map(move |(i, &volts)| if is_unread(i) { f64::NAN } else { volts })
+    }
+
     /// What each says, row by row; empty where all are voltages.
     pub fn all_say(&self) -> &[Says] {
         &self.says

@@ -11,8 +11,10 @@ use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
+use tactomo::readings::Readings;
 use tactomo::solve::{
-    Guard, Kernel, Lambda, Latest, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver,
+    ContactSettings, Guard, Kernel, Lambda, Latest, Method, Parameter, ParameterKind, Presses, Problem, Solution,
+    Solver,
 };
 
 use tactomo_protocol::Hello;
@@ -65,6 +67,8 @@ pub struct Reader {
     /// Frames still to come that are the baseline and nothing else, because the user said so.
     given: u32,
     touch: Touch,
+    /// Readings of the newest frame as measured (V).
+    measured_v: Vec<f64>,
     /// The detector as it was chosen, of a solver for a detector.
     detector: Option<Detector>,
 }
@@ -80,7 +84,13 @@ enum Frames {
 /// What solves frames.
 enum Touch {
     /// A solver for a detector, as the file's board measures it, and the places of its images.
-    Solver { solver: Box<dyn Solver>, detector: Box<Detector>, mesh: ImageMesh, rows: Option<Box<RowsBefore>> },
+    Solver {
+        solver: Box<dyn Solver>,
+        detector: Box<Detector>,
+        mesh: ImageMesh,
+        usual_radius_m: f64,
+        rows: Option<Box<RowsBefore>>,
+    },
     /// A kernel that has learned from presses, on whatever they were made.
     Kernel(Arc<Kernel>),
 }
@@ -106,7 +116,7 @@ impl Reader {
         };
         let frames = Frames::of(file, input, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
         let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));
-        Ok(Self { path, frames, baseline, count: 0, given, touch, detector: chosen })
+        Ok(Self { path, frames, baseline, count: 0, given, touch, measured_v: Vec::new(), detector: chosen })
     }
 
     /// The detector as it was chosen, before its board was asked; `None` where presses were learned from.
@@ -149,8 +159,8 @@ impl Reader {
             self.count += 1;
             if self.given == 0 {
                 self.note_rest(&frame);
-                let volts = frame.volts.clone();
-                self.baseline.subtract(&volts, &mut frame.volts);
+                self.measured_v.clone_from(&frame.volts);
+                self.baseline.subtract(&self.measured_v, &mut frame.volts);
                 return Ok(Some(frame));
             }
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
@@ -181,13 +191,38 @@ impl Reader {
         self.baseline.state().notice()
     }
 
+    /// Readings of the newest frame as measured, before the baseline was taken off (V).
+    pub fn measured_v(&self) -> &[f64] {
+        &self.measured_v
+    }
+
+    /// What the solver gets of a frame (less the baseline): as no channel differs from others; `None` of a frame of another length.
+    pub fn touch(&self, frame: &FileFrame) -> Option<Readings> {
+        let Touch::Solver { detector, .. } = &self.touch else { return frame.readings() };
+        let mut readings = frame.readings().filter(|readings| readings.electrodes() == detector.electrodes.len())?;
+        readings.correct_channels(detector);
+        Some(readings)
+    }
+
+    /// Whether the baseline is being taken.
+    pub fn is_taking_baseline(&self) -> bool {
+        self.baseline.state().is_taking()
+    }
+
+    /// Radius that contacts have where it is not known (m).
+    pub fn usual_radius_m(&self) -> f64 {
+        match &self.touch {
+            Touch::Solver { usual_radius_m, .. } => *usual_radius_m,
+            Touch::Kernel(_) => 0.0,
+        }
+    }
+
     /// What a frame's readings (less the baseline) say.
     pub fn solve(&mut self, frame: &FileFrame) -> anyhow::Result<Solution> {
+        let touch = self.touch(frame);
         match &mut self.touch {
-            Touch::Solver { solver, detector, rows, .. } => {
-                let readings = frame.readings().filter(|readings| readings.electrodes() == detector.electrodes.len());
-                let mut readings = readings.context("a frame of another length")?;
-                readings.correct_channels(detector);
+            Touch::Solver { solver, rows, .. } => {
+                let readings = touch.context("a frame of another length")?;
                 if frame.rows().is_none() {
                     return Ok(solver.solve(&readings)?);
                 }
@@ -350,7 +385,8 @@ fn solved(input: &Input) -> anyhow::Result<Opened> {
     let problem = Problem::new(input.model.build(&detector, None)?);
     let solver = solver(input.solver, input.lambda, &problem)?;
     let mesh = problem.jacobian.image_mesh.clone();
-    let touch = Touch::Solver { solver, detector: Box::new(detector), mesh, rows: None };
+    let usual_radius_m = ContactSettings::of(&problem).radius_m;
+    let touch = Touch::Solver { solver, detector: Box::new(detector), mesh, usual_radius_m, rows: None };
     Ok(Opened { file, touch, jacobian: Some(problem.jacobian), chosen: Some(chosen) })
 }
 

@@ -2,9 +2,8 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use tactomo::detector::short;
 use tactomo::forward::ImageMesh;
 use tactomo::schema::{self, CONTACT_COLUMNS, FRAME_COLUMNS, FrameReport, SHAPE_COLUMNS};
@@ -18,6 +17,17 @@ use super::{Args, Reader};
 pub struct Writer {
     form: Form,
     file: Option<NewFile>,
+}
+
+/// Forms of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileForm {
+    /// One contact a row.
+    Csv,
+    /// Arrays.
+    Npz,
+    /// One frame a line.
+    JsonLines,
 }
 
 enum Form {
@@ -39,6 +49,10 @@ struct Arrays {
     /// Number of the frame of each image: a solver need not make one of every frame.
     image_frames: Vec<f64>,
     images: Vec<f64>,
+    /// Of each frame, if they are wanted: electrodes, and readings as measured and as the solver got them (V).
+    electrodes: usize,
+    readings: Vec<f64>,
+    touch: Vec<f64>,
 }
 
 impl Writer {
@@ -52,16 +66,24 @@ impl Writer {
         if !["csv", "npz", "json", "jsonl"].contains(&extension) {
             bail!("{}: a name that ends in .csv, .npz, .json or .jsonl is needed", path.display());
         }
-        ensure!(!is_same(path, reader.path()), "{} is the file that is read: give --out another name", path.display());
-        let file = NewFile::new(path, args.overwrite)?;
         let form = match extension {
-            "npz" => Form::Npz(Box::default()),
-            "csv" => {
+            "npz" => FileForm::Npz,
+            "csv" => FileForm::Csv,
+            _ => FileForm::JsonLines,
+        };
+        Self::to_file(form, NewFile::beside(reader.path(), path, args.overwrite)?)
+    }
+
+    /// To a file of such a form.
+    pub fn to_file(form: FileForm, file: NewFile) -> anyhow::Result<Self> {
+        let form = match form {
+            FileForm::Npz => Form::Npz(Box::default()),
+            FileForm::Csv => {
                 let mut table = CsvWriter::new(file.create()?);
                 table.row(schema::csv_heads())?;
                 Form::Csv(Box::new(table))
             }
-            _ => Form::Json(Box::new(file.create()?)),
+            FileForm::JsonLines => Form::Json(Box::new(file.create()?)),
         };
         Ok(Self { form, file: Some(file) })
     }
@@ -91,10 +113,6 @@ impl Writer {
         unless_closed(written).context("cannot write what was found")?;
         self.file.map_or(Ok(()), NewFile::finish)
     }
-}
-
-fn is_same(one: &Path, other: &Path) -> bool {
-    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
 /// A frame for people.
@@ -158,6 +176,11 @@ impl Arrays {
             self.image_frames.push(number);
             self.images.extend(image.iter().map(|&value| f64::from(value)));
         }
+        if let Some((readings, touch)) = frame.readings_v.zip(frame.touch_v) {
+            self.electrodes = readings.electrodes();
+            self.readings.extend(readings.read_v());
+            self.touch.extend(touch.read_v());
+        }
     }
 
     fn write(&self, out: BufWriter<File>, mesh: Option<&ImageMesh>) -> io::Result<()> {
@@ -179,6 +202,12 @@ impl Arrays {
             let places: Vec<f64> = (0..nodes).flat_map(|node| mesh.place_m(node)).collect();
             writer.add("node_x_y_z_m", &[nodes, 3], &places)?;
             writer.add("image_s_per_m2", &[self.image_frames.len(), nodes], &self.images)?;
+        }
+        if self.electrodes > 0 {
+            let n = self.electrodes;
+            let shape = [self.readings.len() / (n * n), n, n];
+            writer.add("readings_v", &shape, &self.readings)?;
+            writer.add("touch_v", &shape, &self.touch)?;
         }
         writer.finish()
     }

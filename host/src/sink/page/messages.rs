@@ -22,6 +22,9 @@ const MAX_FAULTS: usize = 16;
 /// Most conversions averaged, as a base-2 logarithm: what the protocol carries.
 const MAX_AVERAGE_LOG2: u8 = 8;
 
+/// Most bytes of a mark.
+const MAX_MARK: usize = 1000;
+
 /// Slowest and fastest play of a recording, beside as fast as it can be read.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
@@ -39,6 +42,8 @@ pub(super) enum PageMessage {
     Press(Vec<Place>),
     /// Begins a recording, or ends it.
     Record(bool),
+    /// Sets a mark in the recording, with what is said of it.
+    Mark(String),
     /// Asks the board for other settings.
     Settings(Settings),
     /// Plays another scene on the simulated detector.
@@ -103,6 +108,8 @@ impl PageMessage {
             Self::Solver(method) => Request::Solver(method),
             Self::Calibrate(ask) => Request::Calibrate(ask),
             Self::Record(on) => Request::Record(on),
+            Self::Mark(text) if text.len() > MAX_MARK => return Err("a mark is too long"),
+            Self::Mark(text) => Request::Mark(text),
             Self::Settings(settings) => Request::Settings(settings.requested()?),
             Self::Press(places) => match press(&places, setup)? {
                 Some(contacts) => Request::Control(Control::Press(contacts)),
@@ -198,6 +205,8 @@ mod tests {
         assert_eq!(asks(r#""rezero""#), Ok(Some(Request::Rezero)));
         assert_eq!(asks(r#"{"solver":"noser"}"#), Ok(Some(Request::Solver(Method::Noser))));
         assert_eq!(asks(r#"{"record":true}"#), Ok(Some(Request::Record(true))));
+        assert_eq!(asks(r#"{"mark":"slipped"}"#), Ok(Some(Request::Mark("slipped".into()))));
+        assert!(asks(&format!(r#"{{"mark":"{}"}}"#, "x".repeat(1001))).is_err());
         assert_eq!(asks(r#"{"calibrate":"begin"}"#), Ok(Some(Request::Calibrate(Calibrate::Begin))));
         let finger = |x, y| Contact::flat(x, y, 0.003, 1e-4);
         assert_eq!(

@@ -145,6 +145,7 @@ listenForActions({
   "save-picture": () => parts && savePicture(parts.picture.layers(), parts.picture.colours.card),
   "save-data": () => shown && saveData(shown),
   record: () => recordButton.toggle(),
+  mark: () => recordButton.mark(),
   rescale: () => {
     parts?.picture.fit(performance.now());
     parts?.readings.fit(performance.now());

@@ -5,7 +5,7 @@ const REZERO_SHOWN_MS = 1500;
 /** Calls what is pressed: `actions` by the names of the buttons. */
 export function listenForActions(actions) {
   const KEYS = {
-    p: actions.pause, s: actions["save-picture"], c: actions["save-data"], r: actions.record, a: actions.rescale, z: actions.rezero,
+    p: actions.pause, s: actions["save-picture"], c: actions["save-data"], r: actions.record, m: actions.mark, a: actions.rescale, z: actions.rezero,
     k: actions.calibrate, f: actions.full, 3: actions.view, t: () => document.getElementById("theme").click(),
   };
   for (const [name, act] of Object.entries(actions)) {
@@ -18,18 +18,24 @@ export function listenForActions(actions) {
   });
 }
 
-/** The record button; asks through `send`. */
+/** The record button, and the one that sets marks meanwhile; they ask through `send`. */
 export class RecordButton {
   constructor(send) {
     this.send = send;
     this.button = document.getElementById("record");
+    this.markButton = document.getElementById("mark");
   }
 
   toggle() { if (!this.button.disabled) this.send({ record: !this.recording }); }
 
+  /** Sets a mark in the recording. */
+  mark() { if (!this.markButton.hidden) this.send({ mark: "" }); }
+
   /** Shows a status message. */
-  show({ recording, playing }) {
+  show({ recording, marks, playing }) {
     this.recording = Boolean(recording);
+    this.markButton.hidden = !recording;
+    this.markButton.textContent = marks ? `Mark (${marks})` : "Mark";
     this.button.hidden = playing.kind === "recording";
     this.button.setAttribute("aria-pressed", String(this.recording));
     this.button.textContent = recording ? "Stop recording" : "Record";

@@ -279,7 +279,7 @@ mod tests {
 
     fn targets(points: &Points, noise: f64) -> Vec<f64> {
         let of = |index: usize| {
-            let (point, wiggle) = (points.at(index), noise * if index % 2 == 0 { 1.0 } else { -1.0 });
+            let (point, wiggle) = (points.at(index), noise * if index.is_multiple_of(2) { 1.0 } else { -1.0 });
             [(3.0 * point[0]).sin() + point[1] + wiggle, point[0] * point[1]]
         };
         (0..points.count()).flat_map(of).collect()

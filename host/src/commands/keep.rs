@@ -8,14 +8,15 @@ use tactomo::detector::Detector;
 use tactomo::run::plan::BeginRecording;
 
 /// Begins a recording in a new file, if one is wanted.
-pub fn begin(file: Option<&Path>, detector: &Detector, source: String) -> Result<Option<Recorder>, RecordError> {
-    file.map(|file| Recorder::create(file, &Header::now(detector, source))).transpose()
+pub fn begin(file: Option<&Path>, header: &Header) -> Result<Option<Recorder>, RecordError> {
+    file.map(|file| Recorder::create(file, header)).transpose()
 }
 
-/// Begins recordings in new files of the working directory, named by the time, as often as a page asks for one.
+/// Begins recordings in new files of the working directory, named by the time, as often as a page asks for one. They carry the detector as
+/// a calibration has found it, if one has.
 pub fn on_request(detector: Detector, source: String) -> BeginRecording {
-    Box::new(move |hello| {
-        let header = Header::now(&detector, source.clone());
+    Box::new(move |hello, calibrated| {
+        let header = Header::now(calibrated.unwrap_or(&detector), source.clone());
         let name = format!("touch-{}.tactomo", header.started_unix_s);
         Recorder::create_with_hello(Path::new(&name), &header, hello)
     })

@@ -1,0 +1,238 @@
+//! `tactomo export`: a recording, solved, in a form that other programs read.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use tactomo::board::frames::{FileFrame, Survey};
+use tactomo::readings::Readings;
+use tactomo::run::TouchEvent;
+use tactomo::schema::FrameReport;
+use tactomo::sink::Delivery;
+use tactomo::sink::channels::Messages;
+use tactomo::sink::lines::Fields;
+use tactomo::sink::mcap::McapFile;
+use tactomo::sink::parquet::ParquetWriter;
+use tactomo::solve::{Lambda, Method, Solution};
+
+use super::choice::{self, DetectorArgs, Model};
+use super::interrupt;
+use super::output::{NewFile, ProgressBar, message};
+use super::reconstruct::reader::{Input, Reader};
+use super::reconstruct::writer::{FileForm, Writer};
+use super::streams;
+
+/// Solves a recording and writes answers and readings for other programs.
+///
+/// The detector is the recording's own, with its calibration, unless another one is given.
+///
+/// Examples:
+///   tactomo export touch.tactomo --to mcap --out touch.mcap
+///   tactomo export touch.tactomo --to npz --fields all --out touch.npz
+///   tactomo export touch.tactomo --to parquet --out touch.parquet
+///   tactomo export touch.tactomo --to csv --solver contacts --detector calibrated.toml --out touch.csv
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// The recording
+    #[arg(value_name = "RECORDING")]
+    file: PathBuf,
+    /// Form of the file
+    #[arg(long, value_enum, value_name = "FORM")]
+    to: Form,
+    /// The file
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    #[command(flatten)]
+    detector: DetectorArgs,
+    /// Forward model
+    #[arg(long, value_enum, default_value = "auto")]
+    model: Model,
+    /// Solver
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = choice::method())]
+    solver: Method,
+    /// Lambda of tikhonov, tikhonov-paper, noser or laplace: a share of the largest singular value, or a rule that chooses it for
+    /// each frame
+    #[arg(long, value_name = "SHARE|discrepancy|l-curve|gcv")]
+    lambda: Option<Lambda>,
+    /// Frames at the start whose mean is the baseline, and which are not solved [default: the baseline that live takes]
+    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    rest: Option<u32>,
+    /// What jsonl and npz have: only `contacts`; also what to know of the `answer`; its `image`; the `readings`; or `all`. An MCAP file and a
+    /// Parquet file have all [default: answer]
+    #[arg(long, value_name = "FIELDS")]
+    fields: Option<Fields>,
+    /// Replaces the file if it exists
+    #[arg(long, visible_alias = "force")]
+    overwrite: bool,
+}
+
+/// Forms of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Form {
+    /// Channels for Foxglove and the Python package `mcap`
+    Mcap,
+    /// Arrays for NumPy, gathered in memory: a frame with its readings takes 4 kB
+    Npz,
+    /// A table with a contact a row
+    Csv,
+    /// JSON Lines: an object a frame, as live --stream writes them
+    Jsonl,
+    /// A table with a frame a row, contacts and readings as lists, for pandas, Polars or DuckDB
+    Parquet,
+}
+
+impl Form {
+    /// What it is called where it has fields of its own; `None` where they are chosen.
+    fn with_fields_of_its_own(self) -> Option<&'static str> {
+        match self {
+            Self::Mcap => Some("an MCAP file"),
+            Self::Csv => Some("a CSV table"),
+            Self::Parquet => Some("a Parquet file"),
+            Self::Npz | Self::Jsonl => None,
+        }
+    }
+}
+
+/// What is written to.
+enum Out {
+    Mcap(Box<McapFile<BufWriter<File>>>, NewFile),
+    Parquet(Box<ParquetWriter>, NewFile),
+    Table(Writer),
+}
+
+/// What a Parquet file has.
+const ALL: Fields = Fields { answer: true, image: true, readings: true };
+
+/// Solves and writes all frames.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let stop = interrupt::flag()?;
+    if let Some((form, _)) = args.to.with_fields_of_its_own().zip(args.fields) {
+        bail!("leave out --fields: {form} has its own");
+    }
+    let file = NewFile::beside(&args.file, &args.out, args.overwrite)?;
+    let survey = Survey::of(&args.file)?;
+    let mut reader = Reader::open(&args.input())?;
+    let mut out = Out::begin(args.to, file, &reader, &survey.header.source)?;
+    let fields = args.fields.unwrap_or_default();
+    let mut bar = ProgressBar::new("frames", survey.frames);
+    let (mut lost, mut solved) = (0, 0_u64);
+    while let Some(frame) = reader.next_frame()? {
+        if stop.load(Ordering::Relaxed) {
+            bail!("ended before {} was complete: nothing is written", args.out.display());
+        }
+        let solution = reader.solve(&frame).with_context(|| reader.place())?;
+        lost += frame.lost_before;
+        let event = event(&reader, &frame, solution, (survey.header.started(), lost))?;
+        out.write(&event.into(), fields, reader.frame() as u64)?;
+        solved += 1;
+        bar.tell(reader.count() as u64);
+    }
+    bar.end();
+    out.finish(&reader)?;
+    message!("{}: {solved} frames in {}", reader.name(), args.out.display());
+    reader.notice().iter().for_each(|notice| message!("{notice}"));
+    reader.losses().iter().for_each(|losses| message!("warning: {losses}"));
+    Ok(())
+}
+
+impl Args {
+    fn input(&self) -> Input<'_> {
+        Input {
+            file: &self.file,
+            detector: &self.detector,
+            model: self.model,
+            solver: self.solver,
+            lambda: self.lambda,
+            taught: None,
+            rest: self.rest,
+            unit: None,
+            force: None,
+            uncorrected: false,
+        }
+    }
+}
+
+/// What a frame gave; `lost` frames so far of a recording that was `started` at that time since 1970.
+fn event(
+    reader: &Reader,
+    frame: &FileFrame,
+    solution: Solution,
+    (started, lost): (Duration, u64),
+) -> anyhow::Result<TouchEvent> {
+    let electrodes = frame.volts.len().isqrt();
+    let measured = Readings::new(electrodes, reader.measured_v().to_vec());
+    let (measured, touch) = measured.zip(reader.touch(frame)).with_context(|| reader.place())?;
+    let time_s = frame.time_s.unwrap_or_default().max(0.0);
+    let arrived_s = frame.arrived_s.unwrap_or(time_s).max(0.0);
+    Ok(TouchEvent {
+        sequence: frame.sequence.unwrap_or_default(),
+        board_time_us: (time_s * 1e6).round() as u64,
+        arrived_unix_ns: (started + Duration::from_secs_f64(arrived_s)).as_nanos() as u64,
+        age: None,
+        status: Default::default(),
+        readings: measured.saying(|g, e| touch.says(g, e)),
+        touch,
+        averaged: 1,
+        lost,
+        lost_before: frame.lost_before,
+        is_revision: false,
+        is_taking_baseline: reader.is_taking_baseline(),
+        solution,
+        pointer_events: Vec::new(),
+    })
+}
+
+impl Out {
+    fn begin(form: Form, file: NewFile, reader: &Reader, source: &str) -> anyhow::Result<Self> {
+        let form = match form {
+            Form::Npz => FileForm::Npz,
+            Form::Csv => FileForm::Csv,
+            Form::Jsonl => FileForm::JsonLines,
+            Form::Parquet => {
+                let detector = reader.measured().context("a Parquet file needs a detector")?;
+                let about: Vec<_> = streams::about(detector, source).into_iter().collect();
+                let writer = ParquetWriter::new(file.create()?, about).context("cannot begin the Parquet file")?;
+                return Ok(Self::Parquet(Box::new(writer), file));
+            }
+            Form::Mcap => {
+                let (detector, mesh) = reader.measured().zip(reader.mesh()).context("an MCAP file needs a detector")?;
+                let messages = Messages::new(detector, mesh.clone(), reader.usual_radius_m());
+                let mcap = McapFile::new(file.create()?, messages, streams::about(detector, source))?;
+                return Ok(Self::Mcap(Box::new(mcap), file));
+            }
+        };
+        Ok(Self::Table(Writer::to_file(form, file)?))
+    }
+
+    fn write(&mut self, delivery: &Delivery, fields: Fields, number: u64) -> anyhow::Result<()> {
+        match self {
+            Self::Mcap(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
+            Self::Parquet(parquet, _) => {
+                let report = FrameReport { frame: Some(number), ..ALL.of(delivery) };
+                parquet.write(&report).context("cannot write the Parquet file")
+            }
+            Self::Table(writer) => {
+                let report = FrameReport { frame: Some(number), ..fields.of(delivery) };
+                writer.write(&report).map(drop)
+            }
+        }
+    }
+
+    fn finish(self, reader: &Reader) -> anyhow::Result<()> {
+        match self {
+            Self::Mcap(mcap, file) => {
+                mcap.finish().context("cannot write the MCAP file")?;
+                file.finish()
+            }
+            Self::Parquet(parquet, file) => {
+                parquet.finish().context("cannot write the Parquet file")?;
+                file.finish()
+            }
+            Self::Table(writer) => writer.finish(reader.mesh()),
+        }
+    }
+}

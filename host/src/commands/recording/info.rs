@@ -1,0 +1,143 @@
+//! What is in a recording, in words and as JSON.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use serde::Serialize;
+use tactomo::board::frames::{RecordingLoss, Survey};
+use tactomo::board::record::Note;
+use tactomo::date::date_time;
+
+use crate::commands::output;
+
+/// What is in a recording, as JSON has it.
+#[derive(Serialize)]
+struct Info<'a> {
+    file: String,
+    detector: &'a str,
+    source: &'a str,
+    started_unix_s: f64,
+    notes: &'a str,
+    board: &'a str,
+    electrodes: u8,
+    frames: u64,
+    seconds: f64,
+    frames_per_s: f64,
+    longest_pause_s: f64,
+    missing_frames: u64,
+    missing_s: f64,
+    corrupt: u64,
+    is_damaged: bool,
+    loss: String,
+    marks: Vec<Mark<'a>>,
+    joined_at_s: Vec<f64>,
+}
+
+#[derive(Serialize)]
+struct Mark<'a> {
+    time_s: f64,
+    text: &'a str,
+}
+
+impl<'a> Info<'a> {
+    fn of(file: &Path, survey: &'a Survey) -> Self {
+        let Survey { header, board, loss, .. } = survey;
+        let joined = survey.notes.iter().filter(|(_, note)| matches!(note, Note::Joined { .. }));
+        Self {
+            file: file.display().to_string(),
+            detector: &header.detector,
+            source: &header.source,
+            started_unix_s: header.started().as_secs_f64(),
+            notes: &header.notes,
+            board: &board.board,
+            electrodes: board.electrodes,
+            frames: survey.frames,
+            seconds: survey.seconds,
+            frames_per_s: survey.frames_per_s(),
+            longest_pause_s: survey.longest_pause_s,
+            missing_frames: loss.missing_frames,
+            missing_s: loss.missing_us as f64 * 1e-6,
+            corrupt: loss.corrupt,
+            is_damaged: loss.is_damage(),
+            loss: lost(loss),
+            marks: survey.marks().map(|(time_s, text)| Mark { time_s, text }).collect(),
+            joined_at_s: joined.map(|(time_s, _)| *time_s).collect(),
+        }
+    }
+}
+
+/// Prints what is in a recording.
+pub fn print(file: &Path, json: bool) -> anyhow::Result<()> {
+    let survey = Survey::of(file)?;
+    let info = Info::of(file, &survey);
+    let text = if json { serde_json::to_string(&info)? } else { in_words(&info, &survey) };
+    Ok(output::print(&text)?)
+}
+
+/// A recording in a line.
+pub fn line(file: &Path) -> anyhow::Result<String> {
+    Ok(sum(file, &Survey::of(file)?))
+}
+
+fn sum(file: &Path, survey: &Survey) -> String {
+    format!("{}: {} frames in {:.3} s; {}", file.display(), survey.frames, survey.seconds, lost(&survey.loss))
+}
+
+/// What is lost, and where frames were lost that are missing in a file that is whole.
+fn lost(loss: &RecordingLoss) -> String {
+    let before = loss.missing_frames > 0 && !loss.is_damage();
+    format!("{loss}{}", if before { ", dropped by the board or its line; the file is whole" } else { "" })
+}
+
+fn in_words(info: &Info, survey: &Survey) -> String {
+    let Info { file, detector, source, notes, board, electrodes, frames, seconds, frames_per_s, .. } = info;
+    let calibrated = survey.notes.iter().any(|(_, note)| matches!(note, Note::Detector { .. }));
+    let calibrated = if calibrated { ", calibrated while it was recorded" } else { "" };
+    let mut lines = vec![
+        file.clone(),
+        format!("  detector   {detector}{calibrated}"),
+        format!("  source     {source}; board {board}, {electrodes} electrodes"),
+        format!("  started    {}", date_time(survey.header.started())),
+        format!(
+            "  frames     {frames} in {seconds:.3} s, {frames_per_s:.0} a second; longest pause {:.4} s",
+            info.longest_pause_s
+        ),
+        format!("  loss       {}", info.loss),
+    ];
+    if !notes.is_empty() {
+        lines.push(format!("  notes      {notes}"));
+    }
+    lines.extend(info.joined_at_s.iter().map(|time_s| format!("  joined     another recording at {time_s:.3} s")));
+    lines.extend(
+        info.marks
+            .iter()
+            .map(|Mark { time_s, text }| format!("  mark       {time_s:.3} s  {text}").trim_end().to_owned()),
+    );
+    lines.join("\n")
+}
+
+/// Prints what is damaged in each recording.
+///
+/// # Errors
+/// How many are damaged, if any is, or cannot be read.
+pub fn check(files: &[PathBuf]) -> anyhow::Result<()> {
+    let mut damaged = 0;
+    for file in files {
+        let line = match Survey::of(file) {
+            Ok(survey) => {
+                damaged += usize::from(survey.loss.is_damage());
+                sum(file, &survey)
+            }
+            Err(error) => {
+                damaged += 1;
+                format!("{:#}", anyhow::Error::new(error))
+            }
+        };
+        output::print(&line)?;
+    }
+    match damaged {
+        0 => Ok(()),
+        1 => bail!("one of {} recordings is damaged", files.len()),
+        _ => bail!("{damaged} of {} recordings are damaged", files.len()),
+    }
+}

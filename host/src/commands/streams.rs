@@ -1,0 +1,90 @@
+//! Where answers go besides the page: streams, Foxglove, MCAP files.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::ensure;
+use tactomo::detector::Detector;
+use tactomo::schema::SCHEMA;
+use tactomo::sink::Sinks;
+use tactomo::sink::address::Address;
+use tactomo::sink::channels::Messages;
+use tactomo::sink::foxglove;
+use tactomo::sink::lines::Fields;
+use tactomo::sink::stream::{Form, Target};
+use tactomo::solve::{ContactSettings, Problem};
+
+use super::output::message;
+use super::scene;
+
+/// Where answers go besides the page.
+#[derive(Debug, clap::Args)]
+pub struct StreamArgs {
+    /// Writes each answer as a line of JSON: to a new file, to stdout with `-`, to all who connect to `tcp:PORT` (of this machine; of
+    /// others with `tcp:ADDRESS:PORT`), or as a datagram to `udp:ADDRESS:PORT`. May be given several times. docs/streams.md says what is
+    /// in a line
+    #[arg(long, value_name = "FILE|-|tcp:PORT|udp:ADDRESS:PORT")]
+    stream: Vec<Target>,
+    /// Lines of streams a second at most: the newest answers
+    #[arg(long, value_name = "LINES", requires = "stream", value_parser = scene::positive)]
+    stream_hz: Option<f64>,
+    /// What lines of streams have: only `contacts`; also what to know of the `answer`; its `image`; the `readings`; or `all`. A list, such
+    /// as contacts,image [default: answer]
+    #[arg(long, value_name = "FIELDS", requires = "stream")]
+    stream_fields: Option<Fields>,
+    /// Serves Foxglove's app: open ws://127.0.0.1:8765 in it. Who can reach the address can read what is touched
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1)]
+    foxglove: Option<Option<Address>>,
+    /// Keeps all answers and readings in a new MCAP file, for Foxglove and Python
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
+}
+
+impl StreamArgs {
+    /// Checks what can be checked before anything begins; `json` is what `--json` says.
+    pub fn check(&self, json: bool) -> anyhow::Result<()> {
+        let on_stdout = self.stream.iter().filter(|target| **target == Target::Stdout).count();
+        ensure!(on_stdout == 0 || !json, "--json and --stream - would both write to stdout: give the stream a file");
+        ensure!(on_stdout < 2, "--stream - is given twice: there is only one stdout");
+        Ok(())
+    }
+
+    /// Begins all of them. `stop` is set when whoever reads stdout has gone; `source` is where the bytes come from.
+    pub fn begin(&self, problem: &Problem, source: &str, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
+        let mut sinks = Sinks::new(stop);
+        let form = Form { fields: self.stream_fields.unwrap_or_default(), most_per_s: self.stream_hz };
+        for target in &self.stream {
+            if let Some(at) = sinks.add_stream(target, form)? {
+                message!("stream: tcp:{at}");
+            }
+        }
+        if let Some(address) = &self.foxglove {
+            let address = address.clone().unwrap_or(Address::local(foxglove::DEFAULT_PORT));
+            let at = sinks.add_foxglove(&address, messages(problem))?;
+            message!("Foxglove: open ws://{at} in the app");
+        }
+        if let Some(path) = &self.mcap {
+            sinks.add_mcap(path, messages(problem), about(problem.detector(), source))?;
+        }
+        Ok(sinks)
+    }
+}
+
+/// What makes the messages of Foxglove and MCAP files.
+pub fn messages(problem: &Problem) -> Messages {
+    let radius_m = ContactSettings::of(problem).radius_m;
+    Messages::new(problem.detector(), problem.jacobian.image_mesh.clone(), radius_m)
+}
+
+/// What an MCAP file says of itself.
+pub fn about(detector: &Detector, source: &str) -> BTreeMap<String, String> {
+    let about = [
+        ("schema", SCHEMA.to_string()),
+        ("detector", detector.name.clone()),
+        ("detector_toml", detector.to_toml()),
+        ("source", source.to_owned()),
+    ];
+    about.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}

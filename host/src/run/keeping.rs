@@ -1,0 +1,141 @@
+//! What becomes of the bytes besides the picture: the recording, the ring of the last seconds, and what is set down in them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use tactomo_board::record::{Closing, Note, RecordError, Recorder, Ring};
+use tactomo_physics::detector::Detector;
+use tactomo_protocol::Hello;
+
+use super::notice::NoticeBoard;
+use super::plan::{BeginRecording, LiveError, Plan};
+
+/// What is kept of a run.
+pub(super) struct Keeping {
+    recorder: Option<Recorder>,
+    ring: Option<Ring>,
+    begin: Option<BeginRecording>,
+    notice: Arc<NoticeBoard>,
+    /// Recordings that were ended and are still written, and why one failed.
+    closing: Vec<Closing>,
+    lost: Option<RecordError>,
+    /// The detector that a calibration has found.
+    found: Option<Arc<Detector>>,
+    /// Marks in the recording under way.
+    marks: u64,
+}
+
+impl Keeping {
+    /// What a plan wants to be kept.
+    pub fn of(plan: &mut Plan, notice: Arc<NoticeBoard>) -> Self {
+        let keeping = Self {
+            recorder: plan.recorder.take(),
+            ring: plan.ring.take(),
+            begin: plan.begin_recording.take(),
+            notice,
+            closing: Vec::new(),
+            lost: None,
+            found: None,
+            marks: 0,
+        };
+        keeping.show();
+        keeping
+    }
+
+    /// Takes bytes as they came.
+    ///
+    /// # Errors
+    /// [`RecordError`] if they cannot be kept; then that recording is over.
+    pub fn push(&mut self, bytes: &[u8], received: Instant) -> Result<(), RecordError> {
+        if let Some(ring) = &mut self.ring {
+            match ring.push(bytes, received) {
+                Ok(None) => {}
+                Ok(Some(path)) => tracing::info!("saving to {}", path.display()),
+                Err(error) => {
+                    self.ring = None;
+                    return Err(error);
+                }
+            }
+        }
+        let Some(recorder) = &mut self.recorder else { return Ok(()) };
+        recorder.push(bytes, received).inspect_err(|_| self.recorder = None)
+    }
+
+    /// Goes on without a recording that failed; it is told at the end too.
+    pub fn give_up(&mut self, error: RecordError) {
+        tracing::error!("{error}");
+        let refused = Some(error.to_string());
+        self.notice.change(|snapshot| (snapshot.recording, snapshot.refused) = (None, refused));
+        self.lost.get_or_insert(error);
+    }
+
+    /// Takes what the board says of itself.
+    pub fn hello(&mut self, hello: &Hello) {
+        if let Some(ring) = &mut self.ring {
+            ring.hello(hello);
+        }
+    }
+
+    /// Sets a mark.
+    pub fn mark(&mut self, text: String) {
+        let refused = match &mut self.recorder {
+            None => Some("a mark is set in a recording: begin one first (key R)".to_owned()),
+            Some(recorder) => {
+                self.marks += 1;
+                recorder.note(Note::Mark { text }, Instant::now()).err().map(|error| error.to_string())
+            }
+        };
+        let marks = self.marks;
+        self.notice.change(|snapshot| (snapshot.refused, snapshot.marks) = (refused, marks));
+    }
+
+    /// Sets down what a calibration has found, in this recording and those to come.
+    pub fn found(&mut self, detector: Option<Arc<Detector>>) {
+        let (Some(detector), known) = (detector, &self.found) else { return };
+        if known.as_ref().is_some_and(|known| Arc::ptr_eq(known, &detector)) {
+            return;
+        }
+        if let Some(recorder) = &mut self.recorder {
+            // What cannot be written is told with the next bytes.
+            let _ = recorder.note(Note::detector_found(&detector), Instant::now());
+        }
+        self.found = Some(detector);
+    }
+
+    /// Begins a recording of a board in a new file, if none is being kept.
+    pub fn begin(&mut self, hello: &Hello) {
+        let (None, Some(begin)) = (&self.recorder, &mut self.begin) else { return };
+        let begun = begin(hello, self.found.as_deref());
+        let refused = begun.as_ref().err().map(ToString::to_string);
+        self.notice.change(|snapshot| snapshot.refused = refused);
+        (self.recorder, self.marks) = (begun.ok(), 0);
+        self.show();
+    }
+
+    /// Ends the recording; what is left is written meanwhile.
+    pub fn end(&mut self) {
+        let Some(recorder) = self.recorder.take() else { return };
+        self.closing.push(recorder.close());
+        self.notice.change(|snapshot| snapshot.refused = None);
+        self.show();
+    }
+
+    /// Writes what is left of all recordings.
+    ///
+    /// # Errors
+    /// The first that could not be kept.
+    pub fn finish(&mut self) -> Result<(), LiveError> {
+        let last = self.recorder.take().map(Recorder::close);
+        let finished: Vec<_> = self.closing.drain(..).chain(last).map(Closing::wait).collect();
+        let ring = self.ring.take().map_or(Ok(()), Ring::finish);
+        let lost = self.lost.take().map_or(Ok(()), Err);
+        Ok(finished.into_iter().chain([ring]).fold(lost, Result::and)?)
+    }
+
+    fn show(&self) {
+        let path: Option<PathBuf> = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
+        let marks = self.marks;
+        self.notice.change(|snapshot| (snapshot.recording, snapshot.marks) = (path, marks));
+    }
+}

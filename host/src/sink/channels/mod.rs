@@ -1,0 +1,266 @@
+//! What Foxglove and MCAP files get: four channels of JSON, made from an event.
+//!
+//! | topic | schema | what |
+//! |---|---|---|
+//! | `/tactomo/touch` | `tactomo.Touch` | the event, as a line of `--stream` |
+//! | `/tactomo/contacts` | `foxglove.SceneUpdate` | contacts as discs, a shape as a line or a ring |
+//! | `/tactomo/image` | `foxglove.PointCloud` | the image: a point at each node, if the answer has one |
+//! | `/tactomo/readings` | `foxglove.Grid` | the readings as measured and as the solver got them, 64 bits each |
+//!
+//! The schemas of Foxglove are those of its documentation (<https://docs.foxglove.dev/docs/sdk/schemas>), in JSON, where bytes are base64.
+
+mod packed;
+mod scene;
+mod schemas;
+
+use std::io;
+
+use serde::Serialize;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::ImageMesh;
+
+use super::feed::Delivery;
+use super::lines::Fields;
+
+/// What all places are relative to: the detector, with x and y from its middle.
+const FRAME: &str = "tactomo";
+
+/// A channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// The event.
+    Touch,
+    /// Contacts and shape.
+    Contacts,
+    /// The image.
+    Image,
+    /// The readings.
+    Readings,
+}
+
+impl Channel {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Touch, Self::Contacts, Self::Image, Self::Readings];
+
+    /// Its topic.
+    pub fn topic(self) -> &'static str {
+        match self {
+            Self::Touch => "/tactomo/touch",
+            Self::Contacts => "/tactomo/contacts",
+            Self::Image => "/tactomo/image",
+            Self::Readings => "/tactomo/readings",
+        }
+    }
+
+    /// Name of its schema.
+    pub fn schema_name(self) -> &'static str {
+        match self {
+            Self::Touch => "tactomo.Touch",
+            Self::Contacts => "foxglove.SceneUpdate",
+            Self::Image => "foxglove.PointCloud",
+            Self::Readings => "foxglove.Grid",
+        }
+    }
+
+    /// Its schema, as JSON Schema.
+    pub fn schema(self) -> String {
+        let schema = match self {
+            Self::Touch => schemas::touch(),
+            Self::Contacts => schemas::scene_update(),
+            Self::Image => schemas::point_cloud(),
+            Self::Readings => schemas::grid(),
+        };
+        schema.to_string()
+    }
+}
+
+/// Makes the messages of all channels.
+#[derive(Clone, Debug)]
+pub struct Messages {
+    mesh: ImageMesh,
+    usual_radius_m: f64,
+    /// Corners of what the detector takes up (m).
+    bounds_m: [[f64; 2]; 2],
+}
+
+impl Messages {
+    /// For a detector with images on such a mesh; contacts whose radius is not known are drawn with the usual one (m).
+    pub fn new(detector: &Detector, mesh: ImageMesh, usual_radius_m: f64) -> Self {
+        Self { mesh, usual_radius_m, bounds_m: detector.outline.bounds() }
+    }
+
+    /// Writes the message of a channel; `false` if the event has nothing for it.
+    ///
+    /// # Errors
+    /// If memory ends, which `serde_json` cannot tell from anything else.
+    pub fn write(&self, channel: Channel, delivery: &Delivery, out: &mut Vec<u8>) -> io::Result<bool> {
+        let event = &*delivery.event;
+        let at = Stamp::of(event.arrived_unix_ns);
+        match channel {
+            Channel::Touch => put(&Fields::default().of(delivery), out),
+            Channel::Contacts => put(&scene::update(&event.solution, self.usual_radius_m, at), out),
+            Channel::Image => match &event.solution.image_s_per_m2 {
+                Some(image) if image.len() == self.mesh.nodes_m.len() => {
+                    put(&packed::image(image, &self.mesh, at), out)
+                }
+                _ => return Ok(false),
+            },
+            Channel::Readings => put(&packed::readings(&event.readings, &event.touch, self.bounds_m, at), out),
+        }?;
+        Ok(true)
+    }
+}
+
+fn put(message: &impl Serialize, out: &mut Vec<u8>) -> io::Result<()> {
+    Ok(serde_json::to_writer(out, message)?)
+}
+
+/// A time, as Foxglove has it.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Stamp {
+    sec: u64,
+    nsec: u64,
+}
+
+impl Stamp {
+    /// From nanoseconds since 1970 (ns).
+    fn of(unix_ns: u64) -> Self {
+        Self { sec: unix_ns / 1_000_000_000, nsec: unix_ns % 1_000_000_000 }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Vector3 {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+impl From<[f64; 3]> for Vector3 {
+    fn from([x, y, z]: [f64; 3]) -> Self {
+        Self { x, y, z }
+    }
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Quaternion {
+    x: f64,
+    y: f64,
+    z: f64,
+    w: f64,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Pose {
+    position: Vector3,
+    orientation: Quaternion,
+}
+
+impl Pose {
+    /// At a place (m), not turned.
+    fn at(place_m: [f64; 3]) -> Self {
+        Self { position: place_m.into(), orientation: Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use base64::Engine;
+    use base64::engine::general_purpose::STANDARD;
+    use serde_json::Value;
+    use tactomo_physics::readings::{Readings, Says};
+    use tactomo_touch::solve::{FoundContact, FoundRing, FoundShape, Solution};
+
+    use super::*;
+    use crate::run::TouchEvent;
+
+    fn messages() -> Messages {
+        let mesh = ImageMesh { nodes_m: vec![[0.01, 0.02], [-0.01, 0.0]], ..ImageMesh::default() };
+        Messages::new(&Detector::default(), mesh, 2e-3)
+    }
+
+    fn message(channel: Channel, event: TouchEvent) -> Option<Value> {
+        let event = Arc::new(TouchEvent { arrived_unix_ns: 1_700_000_000_123_456_789, ..event });
+        let delivery = Delivery { event, lost_before: 0, missed_before: 0, pointer_events: Vec::new() };
+        let mut out = Vec::new();
+        messages().write(channel, &delivery, &mut out).unwrap().then(|| serde_json::from_slice(&out).unwrap())
+    }
+
+    /// Whether a value has what a schema says it has, all that it requires, and nothing that is not in it.
+    fn check(value: &Value, schema: &Value, at: &str) {
+        match (schema["type"].as_str().unwrap_or_else(|| panic!("{at} has a type")), value) {
+            ("object", Value::Object(fields)) => {
+                for (name, value) in fields {
+                    check(value, &schema["properties"][name], &format!("{at}.{name}"));
+                }
+                for name in schema["required"].as_array().into_iter().flatten() {
+                    assert!(value.get(name.as_str().unwrap()).is_some(), "{at} has {name}");
+                }
+            }
+            ("array", Value::Array(items)) => {
+                items.iter().enumerate().for_each(|(i, item)| check(item, &schema["items"], &format!("{at}[{i}]")));
+            }
+            ("integer", Value::Number(number)) => assert!(number.is_u64(), "{at}: {number}"),
+            ("number", Value::Number(_)) | ("string", Value::String(_)) | ("boolean", Value::Bool(_)) => {}
+            (kind, other) => panic!("{at} is {kind}, not {other}"),
+        }
+    }
+
+    #[test]
+    fn messages_are_what_their_schemas_say() {
+        let ring =
+            FoundRing { centre_m: [0.0; 2], radius_m: 0.01, width_m: 1e-3, conductance_s: 1.0, uncertainty: None };
+        let contact = FoundContact { id: Some(3), force_n: Some(1.5), ..FoundContact::flat(0.01, 0.0, 1e-3) };
+        let solution = Solution {
+            contacts: vec![contact, FoundContact::flat(0.0, 0.0, 1e-3)],
+            image_s_per_m2: Some(vec![0.5, 1.5]),
+            residual: Some(1.0),
+            certainty: Some(0.5),
+            ..Solution::default()
+        };
+        let shaped = Solution { shape: Some(FoundShape::Ring(ring)), ..solution.clone() };
+        for channel in Channel::ALL {
+            let schema: Value = serde_json::from_str(&channel.schema()).unwrap();
+            assert_eq!(schema["title"], channel.schema_name());
+            for solution in [&solution, &shaped] {
+                let message = message(channel, TouchEvent::of(9, solution.clone())).unwrap();
+                check(&message, &schema, channel.topic());
+            }
+        }
+    }
+
+    #[test]
+    fn readings_are_bit_for_bit_and_what_was_not_read_is_no_number() {
+        let volts = |g: usize, e: usize| 0.1 + (g * 4 + e) as f64 / 3.0;
+        let says = |g: usize, e: usize| if (g, e) == (1, 2) { Says::Nothing } else { Says::Voltage };
+        let readings = Readings::from_fn(4, volts).saying(says);
+        let touch = Readings::from_fn(4, |g, e| volts(g, e) / 7.0);
+        let event = TouchEvent { readings, touch, ..TouchEvent::of(0, Solution::default()) };
+        let grid = message(Channel::Readings, event).unwrap();
+        let (columns, stride) = (grid["column_count"].as_u64().unwrap(), grid["cell_stride"].as_u64().unwrap());
+        assert_eq!((columns, stride, grid["row_stride"].as_u64()), (4, 16, Some(64)));
+        let data = STANDARD.decode(grid["data"].as_str().unwrap()).unwrap();
+        let found: Vec<f64> = data.chunks(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap())).collect();
+        for (i, pair) in found.chunks(2).enumerate() {
+            let (g, e) = (i / 4, i % 4);
+            let is_same = if (g, e) == (1, 2) { pair[0].is_nan() } else { pair[0] == volts(g, e) };
+            assert!(is_same && pair[1] == volts(g, e) / 7.0, "{g} {e}: {pair:?}");
+        }
+        assert_eq!(
+            (&grid["timestamp"]["sec"], &grid["timestamp"]["nsec"]),
+            (&1_700_000_000.into(), &123_456_789.into())
+        );
+    }
+
+    #[test]
+    fn an_image_has_its_nodes_places_and_what_has_none_sends_nothing() {
+        let solution = Solution { image_s_per_m2: Some(vec![0.5, 1.5]), ..Solution::default() };
+        let cloud = message(Channel::Image, TouchEvent::of(0, solution)).unwrap();
+        let data = STANDARD.decode(cloud["data"].as_str().unwrap()).unwrap();
+        let found: Vec<f32> = data.chunks(4).map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap())).collect();
+        assert_eq!(found, [0.01, 0.02, 0.0, 0.5, -0.01, 0.0, 0.0, 1.5]);
+        assert!(message(Channel::Image, TouchEvent::of(0, Solution::default())).is_none());
+    }
+}

@@ -1,0 +1,95 @@
+//! Numbers as bytes: images as point clouds, readings as grids.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
+use tactomo_physics::forward::ImageMesh;
+use tactomo_physics::readings::Readings;
+
+use super::{FRAME, Pose, Stamp};
+
+/// Number types, as `foxglove.PackedElementField` counts them.
+const FLOAT32: u8 = 7;
+const FLOAT64: u8 = 8;
+
+/// A `foxglove.PointCloud`.
+#[derive(Debug, Serialize)]
+pub(super) struct PointCloud {
+    timestamp: Stamp,
+    frame_id: &'static str,
+    pose: Pose,
+    point_stride: usize,
+    fields: [Field; 4],
+    data: String,
+}
+
+/// A `foxglove.Grid`.
+#[derive(Debug, Serialize)]
+pub(super) struct Grid {
+    timestamp: Stamp,
+    frame_id: &'static str,
+    pose: Pose,
+    column_count: usize,
+    cell_size: Vector2,
+    row_stride: usize,
+    cell_stride: usize,
+    fields: [Field; 2],
+    data: String,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Vector2 {
+    x: f64,
+    y: f64,
+}
+
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Field {
+    name: &'static str,
+    offset: u8,
+    r#type: u8,
+}
+
+/// An image (S/m2): x, y, z (m) and value of each node.
+pub(super) fn image(image_s_per_m2: &[f32], mesh: &ImageMesh, timestamp: Stamp) -> PointCloud {
+    let field = |name, offset| Field { name, offset, r#type: FLOAT32 };
+    let points = image_s_per_m2.iter().enumerate().flat_map(|(node, &value)| {
+        let [x, y, z] = mesh.place_m(node).map(|metres| metres as f32);
+        [x, y, z, value]
+    });
+    let data: Vec<u8> = points.flat_map(f32::to_le_bytes).collect();
+    PointCloud {
+        timestamp,
+        frame_id: FRAME,
+        pose: Pose::at([0.0; 3]),
+        point_stride: 4 * size_of::<f32>(),
+        fields: [field("x", 0), field("y", 4), field("z", 8), field("conductance_s_per_m2", 12)],
+        data: STANDARD.encode(data),
+    }
+}
+
+/// Readings (V), as measured and as the solver got them: a row a ground, a column an electrode, beside the detector and as high as it is.
+pub(super) fn readings(
+    readings: &Readings,
+    touch: &Readings,
+    [[_, low_m], [right_m, high_m]]: [[f64; 2]; 2],
+    timestamp: Stamp,
+) -> Grid {
+    let n = readings.electrodes();
+    let cell_m = (high_m - low_m) / n.max(1) as f64;
+    let cells = readings.read_v().zip(touch.read_v()).flat_map(|(reading_v, touch_v)| [reading_v, touch_v]);
+    let data: Vec<u8> = cells.flat_map(f64::to_le_bytes).collect();
+    let field = |name, offset| Field { name, offset, r#type: FLOAT64 };
+    let cell_stride = 2 * size_of::<f64>();
+    Grid {
+        timestamp,
+        frame_id: FRAME,
+        pose: Pose::at([right_m + cell_m, low_m, 0.0]),
+        column_count: n,
+        cell_size: Vector2 { x: cell_m, y: cell_m },
+        row_stride: n * cell_stride,
+        cell_stride,
+        fields: [field("readings_v", 0), field("touch_v", 8)],
+        data: STANDARD.encode(data),
+    }
+}

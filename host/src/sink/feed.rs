@@ -1,0 +1,279 @@
+//! Events on their way from the follower to whoever takes them: streams, files, apps.
+//!
+//! The follower puts each event in once, and never waits. Each taker has a [`Tail`]: its own place in the same bounded queue. One that falls
+//! behind loses events, its own and nobody else's; it counts them, and says so when it begins and at the end.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tactomo_touch::pointer::PointerEvent;
+use tokio::sync::{broadcast, watch};
+use tokio::time::timeout;
+
+use super::thin::Thin;
+use crate::run::{Listener, TouchEvent};
+
+/// Events that may wait for a file: 3.4 s at 1200 a second; of 12 kB each at most, with an image of a thousand nodes.
+const QUEUE: usize = 4096;
+/// Events that may wait for a reader that wants to know what is now: 0.4 s at 1200 a second. One that is further behind goes on from the
+/// newest.
+const MOST_BEHIND: usize = 512;
+/// Time without an event after which a taker is told that nothing comes.
+const QUIET: Duration = Duration::from_millis(100);
+
+/// Where the follower puts events. The tails end once it is dropped and they have taken what is left.
+pub struct Feed {
+    events: broadcast::Sender<Arc<TouchEvent>>,
+    alive: watch::Sender<()>,
+}
+
+/// What opens [`Tail`]s while the [`Feed`] lasts.
+#[derive(Clone)]
+pub struct Taps {
+    events: broadcast::WeakSender<Arc<TouchEvent>>,
+    alive: watch::Receiver<()>,
+}
+
+/// How far a taker may fall behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeps {
+    /// As far as there is room: a file, which wants all of them.
+    All,
+    /// Not far: who wants to know what is now.
+    Newest,
+}
+
+/// A taker's place in the queue.
+pub struct Tail {
+    events: broadcast::Receiver<Arc<TouchEvent>>,
+    keeps: Keeps,
+    thin: Thin,
+    losses: Losses,
+    /// Frames lost by the link or the board until the event that was delivered last, if one was.
+    lost: Option<u64>,
+}
+
+/// What a taker has lost, since it was too slow.
+#[derive(Debug)]
+struct Losses {
+    name: String,
+    /// Since the event that was delivered last, and of all.
+    before: u64,
+    all: u64,
+}
+
+/// An event, as a taker gets it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Delivery {
+    /// What the frame gave.
+    pub event: Arc<TouchEvent>,
+    /// Frames that the link or the board have lost since the delivery before.
+    pub lost_before: u64,
+    /// Events since the delivery before that this taker has lost, since it was too slow.
+    pub missed_before: u64,
+    /// What the pointer has done since the delivery before.
+    pub pointer_events: Vec<PointerEvent>,
+}
+
+/// An event that nobody had to wait for, and before which nothing was missed.
+impl From<TouchEvent> for Delivery {
+    fn from(event: TouchEvent) -> Self {
+        let (lost_before, pointer_events) = (event.lost_before, event.pointer_events.clone());
+        Self { event: Arc::new(event), lost_before, missed_before: 0, pointer_events }
+    }
+}
+
+/// What comes next.
+#[derive(Debug)]
+pub enum Next {
+    /// An event.
+    Event(Delivery),
+    /// Nothing for a while.
+    Quiet,
+    /// Nothing more.
+    End,
+}
+
+impl Default for Feed {
+    fn default() -> Self {
+        Self { events: broadcast::Sender::new(QUEUE), alive: watch::Sender::new(()) }
+    }
+}
+
+impl Feed {
+    /// What opens tails.
+    pub fn taps(&self) -> Taps {
+        Taps { events: self.events.downgrade(), alive: self.alive.subscribe() }
+    }
+}
+
+impl Listener for Feed {
+    fn touched(&mut self, event: &Arc<TouchEvent>) {
+        // It fails where nobody takes events at the moment.
+        let _ = self.events.send(Arc::clone(event));
+    }
+}
+
+impl Taps {
+    /// A tail from now on, of a taker of such a name; `None` if there is nothing more to come.
+    pub fn open(&self, name: &str, keeps: Keeps, most_per_s: Option<f64>) -> Option<Tail> {
+        let events = self.events.upgrade()?.subscribe();
+        let losses = Losses { name: name.to_owned(), before: 0, all: 0 };
+        Some(Tail { events, keeps, thin: Thin::new(most_per_s), losses, lost: None })
+    }
+
+    /// Waits until there is nothing more to come.
+    pub async fn ended(&mut self) {
+        while self.alive.changed().await.is_ok() {}
+    }
+}
+
+impl Tail {
+    /// The next event that is due. May be dropped while it waits: nothing is lost.
+    pub async fn next(&mut self) -> Next {
+        loop {
+            self.catch_up();
+            let due = match timeout(QUIET, self.events.recv()).await {
+                Ok(Ok(event)) => self.thin.take(event),
+                Ok(Err(broadcast::error::RecvError::Lagged(count))) => {
+                    self.losses.add(count);
+                    None
+                }
+                Ok(Err(broadcast::error::RecvError::Closed)) => match self.thin.held() {
+                    Some(last) => Some(last),
+                    None => return Next::End,
+                },
+                Err(_) => match self.thin.held() {
+                    Some(newest) => Some(newest),
+                    None => return Next::Quiet,
+                },
+            };
+            if let Some((event, pointer_events)) = due {
+                return Next::Event(self.deliver(event, pointer_events));
+            }
+        }
+    }
+
+    /// Whether nothing waits, or what waits need not come soon.
+    pub fn is_drained(&self) -> bool {
+        self.thin.is_on() || self.events.is_empty()
+    }
+
+    /// Waits for what may take long: writing to a reader that stalls. What is lost meanwhile is counted, and said, while it is.
+    pub async fn wait_for<T>(&mut self, slow: impl Future<Output = T>) -> T {
+        let mut slow = std::pin::pin!(slow);
+        loop {
+            match timeout(QUIET, &mut slow).await {
+                Ok(done) => return done,
+                Err(_) => self.catch_up(),
+            }
+        }
+    }
+
+    /// Goes on from the newest, if it is too far behind for one that wants to know what is now.
+    fn catch_up(&mut self) {
+        if self.keeps == Keeps::All || self.events.len() <= MOST_BEHIND {
+            return;
+        }
+        let mut skipped = 0;
+        while self.events.len() > 1 {
+            skipped += match self.events.try_recv() {
+                Ok(_) => 1,
+                Err(broadcast::error::TryRecvError::Lagged(count)) => count,
+                Err(_) => break,
+            };
+        }
+        self.losses.add(skipped);
+    }
+
+    fn deliver(&mut self, event: Arc<TouchEvent>, pointer_events: Vec<PointerEvent>) -> Delivery {
+        // What was lost before the first is no matter of this taker's.
+        let before = self.lost.replace(event.lost).unwrap_or(event.lost.saturating_sub(event.lost_before));
+        let lost_before = event.lost.saturating_sub(before);
+        Delivery { event, lost_before, missed_before: std::mem::take(&mut self.losses.before), pointer_events }
+    }
+}
+
+impl Losses {
+    fn add(&mut self, count: u64) {
+        if self.all == 0 {
+            tracing::warn!("{} is too slow: it loses answers", self.name);
+        }
+        self.before += count;
+        self.all += count;
+    }
+}
+
+impl Drop for Losses {
+    fn drop(&mut self) {
+        if self.all > 0 {
+            tracing::warn!("{} has lost {} answers: it was too slow", self.name, self.all);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tactomo_touch::solve::Solution;
+
+    use super::*;
+
+    fn block_on<T>(future: impl Future<Output = T>) -> T {
+        tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(future)
+    }
+
+    fn event(sequence: u64, lost: u64) -> Arc<TouchEvent> {
+        Arc::new(TouchEvent { lost, ..TouchEvent::of(sequence, Solution::default()) })
+    }
+
+    fn deliveries(mut tail: Tail) -> Vec<Delivery> {
+        block_on(async {
+            let mut all = Vec::new();
+            while let Next::Event(delivery) = tail.next().await {
+                all.push(delivery);
+            }
+            all
+        })
+    }
+
+    #[test]
+    fn everybody_gets_every_event_and_then_the_end() {
+        let mut feed = Feed::default();
+        let taps = feed.taps();
+        let tails = [Keeps::All, Keeps::Newest].map(|keeps| taps.open("test", keeps, None).unwrap());
+        let events: Vec<_> = (0..100).map(|sequence| event(sequence, sequence / 10)).collect();
+        events.iter().for_each(|event| feed.touched(event));
+        drop(feed);
+        assert!(taps.open("late", Keeps::All, None).is_none());
+        for all in tails.map(deliveries) {
+            assert!(all.iter().map(|delivery| &delivery.event).eq(&events));
+            assert_eq!(all.iter().map(|delivery| delivery.lost_before).sum::<u64>(), 9);
+            assert_eq!((all[10].lost_before, all[11].lost_before), (1, 0));
+        }
+    }
+
+    #[test]
+    fn what_is_lost_during_a_long_wait_is_counted() {
+        let mut feed = Feed::default();
+        let mut tail = feed.taps().open("stalled", Keeps::Newest, None).unwrap();
+        (0..1000).for_each(|sequence| feed.touched(&event(sequence, 0)));
+        block_on(async { tail.wait_for(tokio::time::sleep(2 * QUIET)).await });
+        feed.touched(&event(1000, 0));
+        drop(feed);
+        let all = deliveries(tail);
+        assert_eq!((all[0].event.sequence, all[0].missed_before, all.len()), (999, 999, 2));
+    }
+
+    #[test]
+    fn who_is_too_slow_loses_the_oldest_and_is_told_how_many() {
+        let mut feed = Feed::default();
+        let [file, live] = [Keeps::All, Keeps::Newest].map(|keeps| feed.taps().open("slow", keeps, None).unwrap());
+        let count = QUEUE as u64 + 1000;
+        (0..count).for_each(|sequence| feed.touched(&event(sequence, 0)));
+        drop(feed);
+        let all = deliveries(file);
+        assert_eq!((all[0].event.sequence, all[0].missed_before, all.len()), (1000, 1000, QUEUE));
+        let newest = deliveries(live);
+        assert_eq!((newest[0].event.sequence, newest[0].missed_before, newest.len()), (count - 1, count - 1, 1));
+    }
+}

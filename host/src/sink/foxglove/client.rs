@@ -1,0 +1,101 @@
+//! One app's connection.
+
+use axum::extract::ws::{Message, WebSocket};
+
+use super::Shared;
+use super::protocol::{self, Asked, Subscription};
+use crate::sink::channels::Channel;
+use crate::sink::feed::{Delivery, Keeps, Next, Tail};
+
+/// Talks to an app until it leaves or nothing more comes.
+pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
+    let mut app = App { shared, subscriptions: Vec::new(), tail: None, out: Vec::new() };
+    // It fails when the app has gone, which is its business.
+    let _ = app.talk(&mut socket).await;
+    let _ = socket.send(Message::Close(None)).await;
+}
+
+struct App<'a> {
+    shared: &'a Shared,
+    subscriptions: Vec<(u32, Channel)>,
+    /// While something is subscribed to.
+    tail: Option<Tail>,
+    out: Vec<u8>,
+}
+
+impl App<'_> {
+    async fn talk(&mut self, socket: &mut WebSocket) -> Result<(), axum::Error> {
+        socket.send(Message::text(protocol::server_info(&self.shared.session))).await?;
+        socket.send(Message::text(protocol::advertise())).await?;
+        let mut alive = self.shared.taps.clone();
+        loop {
+            tokio::select! {
+                heard = socket.recv() => match heard {
+                    Some(Ok(Message::Text(text))) => for warning in self.hear(&text) {
+                        socket.send(Message::text(protocol::warning(&warning))).await?;
+                    },
+                    Some(Ok(Message::Close(_))) | None => return Ok(()),
+                    Some(Err(error)) => return Err(error),
+                    // Nothing that an app sends in bytes is for a server that offers nothing of the kind.
+                    Some(Ok(Message::Binary(_) | Message::Ping(_) | Message::Pong(_))) => {}
+                },
+                next = next(&mut self.tail), if self.tail.is_some() => match next {
+                    Next::Event(delivery) => self.send(socket, &delivery).await?,
+                    Next::Quiet => {}
+                    Next::End => return Ok(()),
+                },
+                () = alive.ended(), if self.tail.is_none() => return Ok(()),
+            }
+        }
+    }
+
+    /// Does what the app asks; gives warnings for whoever sits there.
+    fn hear(&mut self, text: &str) -> Vec<String> {
+        let mut warnings = Vec::new();
+        match serde_json::from_str(text) {
+            Ok(Asked::Subscribe { subscriptions }) => {
+                warnings.extend(subscriptions.into_iter().filter_map(|asked| self.subscribe(asked).err()));
+            }
+            Ok(Asked::Unsubscribe { subscription_ids }) => {
+                self.subscriptions.retain(|(id, _)| !subscription_ids.contains(id));
+            }
+            Ok(Asked::Other) => {}
+            Err(error) => warnings.push(format!("a message was not understood: {error}")),
+        }
+        if self.subscriptions.is_empty() {
+            self.tail = None;
+        } else if self.tail.is_none() {
+            self.tail = self.shared.taps.open("Foxglove", Keeps::Newest, None);
+        }
+        warnings
+    }
+
+    fn subscribe(&mut self, asked: Subscription) -> Result<(), String> {
+        let channel = asked.channel().ok_or_else(|| format!("there is no channel {}", asked.channel_id))?;
+        if self.subscriptions.iter().any(|(id, known)| *id == asked.id || *known == channel) {
+            return Err(format!("subscription {} to channel {} is there already", asked.id, asked.channel_id));
+        }
+        self.subscriptions.push((asked.id, channel));
+        Ok(())
+    }
+
+    async fn send(&mut self, socket: &mut WebSocket, delivery: &Delivery) -> Result<(), axum::Error> {
+        let Self { shared, subscriptions, tail: Some(tail), out } = self else { return Ok(()) };
+        for (id, channel) in subscriptions {
+            protocol::begin_data(*id, delivery.event.arrived_unix_ns, out);
+            if shared.messages.write(*channel, delivery, out).map_err(axum::Error::new)? {
+                // Waits here while the app does not read; nobody else waits for it.
+                tail.wait_for(socket.send(Message::binary(out.clone()))).await?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The next event of a tail; nothing ever without one.
+async fn next(tail: &mut Option<Tail>) -> Next {
+    match tail {
+        Some(tail) => tail.next().await,
+        None => std::future::pending().await,
+    }
+}

@@ -1,0 +1,104 @@
+//! A live connection for Foxglove's app: a server that speaks its WebSocket protocol, version 1
+//! (<https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>).
+//!
+//! It only sends: nothing can be asked of the board through it. Who can reach the address can read what is touched.
+
+mod client;
+mod protocol;
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use axum::Router;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
+use axum::extract::{State, WebSocketUpgrade};
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
+use tokio::time::timeout;
+
+use super::address::Address;
+use super::channels::Messages;
+use super::feed::Taps;
+use super::running::{PATIENCE, Sinks};
+use super::stream::StreamError;
+
+/// The port that Foxglove's app proposes.
+pub const DEFAULT_PORT: u16 = 8765;
+
+/// Apps at a time.
+const MOST_APPS: u32 = 16;
+/// Largest message that an app may send, in bytes: a list of a few subscriptions.
+const LONGEST_ASKED: usize = 1 << 16;
+/// The protocol by both its names: apps of 2025 and later offer the second too, for the same messages.
+const SUBPROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
+
+/// What all connections share.
+struct Shared {
+    taps: Taps,
+    messages: Messages,
+    /// Tells an app that connects again whether it is the same run.
+    session: String,
+    room: Arc<Semaphore>,
+}
+
+impl Sinks {
+    /// Serves Foxglove's app, and says where.
+    ///
+    /// # Errors
+    /// [`StreamError`] if the port is busy or the address not this machine's.
+    pub fn add_foxglove(&mut self, address: &Address, messages: Messages) -> Result<SocketAddr, StreamError> {
+        let refused = StreamError::address("Foxglove", address);
+        let listener = address.resolve().and_then(std::net::TcpListener::bind).map_err(&refused)?;
+        let at = listener.local_addr().map_err(&refused)?;
+        listener.set_nonblocking(true).map_err(&refused)?;
+        let session = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis().to_string();
+        let room = Arc::new(Semaphore::new(MOST_APPS as usize));
+        let shared = Arc::new(Shared { taps: self.taps(), messages, session, room });
+        let name = format!("Foxglove at ws://{at}");
+        let work = move |runtime: tokio::runtime::Runtime| {
+            if let Err(error) = runtime.block_on(serve(listener, shared)) {
+                tracing::error!("Foxglove is no longer served at ws://{at}: {error}");
+            }
+        };
+        self.thread(name.clone(), 2 * PATIENCE, work).map_err(StreamError::thread(&name))?;
+        Ok(at)
+    }
+}
+
+async fn serve(listener: std::net::TcpListener, shared: Arc<Shared>) -> io::Result<()> {
+    let listener = TcpListener::from_std(listener)?;
+    let mut alive = shared.taps.clone();
+    let router = Router::new().fallback(connect).with_state(Arc::clone(&shared));
+    tokio::select! {
+        served = axum::serve(listener, router) => return served,
+        () = alive.ended() => {}
+    }
+    // What is left is for those who read; a stalled one is not waited for.
+    let _ = timeout(PATIENCE, shared.room.acquire_many(MOST_APPS)).await;
+    Ok(())
+}
+
+async fn connect(
+    State(shared): State<Arc<Shared>>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Response {
+    let Ok(upgrade) = upgrade else {
+        return (StatusCode::UPGRADE_REQUIRED, "Open this address in Foxglove, as a WebSocket.\n").into_response();
+    };
+    let upgrade = upgrade.protocols(SUBPROTOCOLS).max_message_size(LONGEST_ASKED).max_frame_size(LONGEST_ASKED);
+    if upgrade.selected_protocol().is_none() {
+        let offered = "This server speaks the subprotocol foxglove.websocket.v1, which was not offered.\n";
+        return (StatusCode::BAD_REQUEST, offered).into_response();
+    }
+    let Ok(place) = Arc::clone(&shared.room).try_acquire_owned() else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "Too many apps are connected.\n").into_response();
+    };
+    upgrade.on_upgrade(async move |socket| {
+        client::serve(socket, &shared).await;
+        drop(place);
+    })
+}

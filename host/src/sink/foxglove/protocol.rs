@@ -1,0 +1,109 @@
+//! The messages of the protocol: JSON both ways, and bytes for data.
+
+use serde::Deserialize;
+use serde_json::json;
+
+use crate::sink::channels::Channel;
+
+/// First byte of a message with data.
+const MESSAGE_DATA: u8 = 1;
+
+/// What an app asks. What this server has nothing to do with is left out.
+#[derive(Debug, Deserialize, PartialEq)]
+#[serde(tag = "op", rename_all = "camelCase")]
+pub(super) enum Asked {
+    /// To get messages of channels.
+    Subscribe {
+        /// Of which.
+        subscriptions: Vec<Subscription>,
+    },
+    /// To get them no more.
+    #[serde(rename_all = "camelCase")]
+    Unsubscribe {
+        /// Numbers that the app gave them.
+        subscription_ids: Vec<u32>,
+    },
+    /// Something else.
+    #[serde(other)]
+    Other,
+}
+
+/// A subscription.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Subscription {
+    /// Number that the app gives it.
+    pub id: u32,
+    /// Number of the channel, as advertised.
+    pub channel_id: u64,
+}
+
+impl Subscription {
+    /// Its channel, if there is one of that number.
+    pub fn channel(self) -> Option<Channel> {
+        let index = usize::try_from(self.channel_id.checked_sub(1)?).ok()?;
+        Channel::ALL.get(index).copied()
+    }
+}
+
+/// What is said first.
+pub(super) fn server_info(session: &str) -> String {
+    json!({ "op": "serverInfo", "name": "tactomo", "capabilities": [], "sessionId": session }).to_string()
+}
+
+/// All channels, numbered from 1.
+pub(super) fn advertise() -> String {
+    let channels: Vec<_> = Channel::ALL
+        .into_iter()
+        .zip(1..)
+        .map(|(channel, id)| {
+            json!({
+                "id": id,
+                "topic": channel.topic(),
+                "encoding": "json",
+                "schemaName": channel.schema_name(),
+                "schema": channel.schema(),
+                "schemaEncoding": "jsonschema",
+            })
+        })
+        .collect();
+    json!({ "op": "advertise", "channels": channels }).to_string()
+}
+
+/// A warning for the person at the app.
+pub(super) fn warning(text: &str) -> String {
+    json!({ "op": "status", "level": 1, "message": text }).to_string()
+}
+
+/// Begins a message for a subscription, logged at that time (ns since 1970): opcode, subscription and time, then come the data.
+pub(super) fn begin_data(subscription: u32, log_time_ns: u64, out: &mut Vec<u8>) {
+    out.clear();
+    out.push(MESSAGE_DATA);
+    out.extend_from_slice(&subscription.to_le_bytes());
+    out.extend_from_slice(&log_time_ns.to_le_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_an_app_asks_is_understood() {
+        let asked = |text| serde_json::from_str::<Asked>(text).ok();
+        let subscriptions = vec![Subscription { id: 0, channel_id: 3 }, Subscription { id: 7, channel_id: 5 }];
+        assert_eq!([subscriptions[0].channel(), subscriptions[1].channel()], [Some(Channel::Image), None]);
+        let text = r#"{"op":"subscribe","subscriptions":[{"id":0,"channelId":3},{"id":7,"channelId":5}]}"#;
+        assert_eq!(asked(text), Some(Asked::Subscribe { subscriptions }));
+        let text = r#"{"op":"unsubscribe","subscriptionIds":[0,1]}"#;
+        assert_eq!(asked(text), Some(Asked::Unsubscribe { subscription_ids: vec![0, 1] }));
+        assert_eq!(asked(r#"{"op":"getParameters","parameterNames":[]}"#), Some(Asked::Other));
+        assert_eq!(asked(r#"{"op":"subscribe"}"#), None);
+    }
+
+    #[test]
+    fn data_has_the_head_of_the_protocol() {
+        let mut out = vec![9; 40];
+        begin_data(0x0102_0304, 0x1112_1314_1516_1718, &mut out);
+        assert_eq!(out, [1, 4, 3, 2, 1, 0x18, 0x17, 0x16, 0x15, 0x14, 0x13, 0x12, 0x11]);
+    }
+}

@@ -1,0 +1,138 @@
+//! MCAP files (<https://mcap.dev>), for Foxglove's app and everything that reads them: the [channels](super::channels) in compressed chunks with
+//! an index.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{Compression, McapError, WriteOptions, Writer};
+
+use super::channels::{Channel, Messages};
+use super::feed::{Delivery, Keeps};
+use super::running::{Sink, Sinks};
+use super::stream::{DISK_PATIENCE, StreamError};
+
+/// Longest that answers wait in memory: what a kill costs at most.
+const CHUNK_LASTS: Duration = Duration::from_millis(500);
+/// Size of a chunk before it is compressed, in bytes: half a second at 1200 answers a second without images is 4 MB.
+const CHUNK_BYTES: u64 = 4 << 20;
+
+/// An MCAP file that is being written.
+pub struct McapFile<W: Write> {
+    writer: Writer<NoSeek<W>>,
+    messages: Messages,
+    /// Number of each channel in the file.
+    channels: [u16; Channel::ALL.len()],
+    sequence: u32,
+    out: Vec<u8>,
+    flushed: Instant,
+}
+
+impl<W: Write> McapFile<W> {
+    /// Begins a file, with what is to be known of it, such as the detector.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn new(out: W, messages: Messages, about: BTreeMap<String, String>) -> io::Result<Self> {
+        // A chunk is written once it is whole: a file that ends early ends after a chunk.
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Lz4))
+            .chunk_size(Some(CHUNK_BYTES))
+            .library(concat!("tactomo ", env!("CARGO_PKG_VERSION")))
+            .disable_seeking(true);
+        let mut writer = options.create(NoSeek::new(out)).map_err(as_io)?;
+        writer.write_metadata(&Metadata { name: "tactomo".to_owned(), metadata: about }).map_err(as_io)?;
+        let mut channels = [0; Channel::ALL.len()];
+        for (number, channel) in channels.iter_mut().zip(Channel::ALL) {
+            let schema = channel.schema();
+            let schema = writer.add_schema(channel.schema_name(), "jsonschema", schema.as_bytes()).map_err(as_io)?;
+            *number = writer.add_channel(schema, channel.topic(), "json", &BTreeMap::new()).map_err(as_io)?;
+        }
+        Ok(Self { writer, messages, channels, sequence: 0, out: Vec::new(), flushed: Instant::now() })
+    }
+
+    /// Writes an event.
+    ///
+    /// # Errors
+    /// If that fails: then nothing more can be written.
+    pub fn write(&mut self, delivery: &Delivery) -> io::Result<()> {
+        let time_ns = delivery.event.arrived_unix_ns;
+        for (channel, number) in Channel::ALL.into_iter().zip(self.channels) {
+            self.out.clear();
+            if !self.messages.write(channel, delivery, &mut self.out)? {
+                continue;
+            }
+            let header =
+                MessageHeader { channel_id: number, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
+            self.writer.write_to_known_channel(&header, &self.out).map_err(as_io)?;
+        }
+        self.sequence = self.sequence.wrapping_add(1);
+        Ok(())
+    }
+
+    /// Writes the index: the file is complete.
+    ///
+    /// # Errors
+    /// If that fails.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.end()
+    }
+
+    fn end(&mut self) -> io::Result<()> {
+        self.writer.finish().map(drop).map_err(as_io)
+    }
+
+    /// Ends the chunk, if it has lasted long enough.
+    fn keep_safe(&mut self) -> io::Result<()> {
+        if self.flushed.elapsed() < CHUNK_LASTS {
+            return Ok(());
+        }
+        self.flushed = Instant::now();
+        self.writer.flush().map_err(as_io)
+    }
+}
+
+impl<W: Write + Send + 'static> Sink for McapFile<W> {
+    fn take(&mut self, delivery: &Delivery, _: bool) -> io::Result<()> {
+        self.write(delivery)?;
+        self.keep_safe()
+    }
+
+    fn rest(&mut self) -> io::Result<()> {
+        self.keep_safe()
+    }
+
+    fn finish(&mut self) -> io::Result<()> {
+        self.end()
+    }
+}
+
+impl Sinks {
+    /// Adds an MCAP file, which has to be a new one.
+    ///
+    /// # Errors
+    /// [`StreamError`] if the file is there already or cannot be made.
+    pub fn add_mcap(
+        &mut self,
+        path: &Path,
+        messages: Messages,
+        about: BTreeMap<String, String>,
+    ) -> Result<(), StreamError> {
+        let failed = |source| StreamError::Mcap { path: PathBuf::from(path), source };
+        let file = File::create_new(path).map_err(failed)?;
+        let file = McapFile::new(BufWriter::new(file), messages, about).map_err(failed)?;
+        let name = format!("{}", path.display());
+        self.run(name.clone(), (Keeps::All, None), DISK_PATIENCE, file).map_err(StreamError::thread(&name))
+    }
+}
+
+fn as_io(error: McapError) -> io::Error {
+    match error {
+        McapError::Io(error) => error,
+        other => io::Error::other(other),
+    }
+}

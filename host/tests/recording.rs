@@ -1,0 +1,170 @@
+//! Recordings as a person makes them: killed, on a full disk, cut, joined, and kept in a ring.
+#![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+/// Longest wait for a program that has begun.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A new folder, gone with its test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("tactomo-{}-recording-{name}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        drop(std::fs::remove_dir_all(&self.0));
+    }
+}
+
+fn tactomo() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_tactomo"))
+}
+
+fn run(args: &[&str], files: &[&Path]) -> Output {
+    tactomo().args(args).args(files).output().unwrap()
+}
+
+fn info(file: &Path) -> Value {
+    let output = run(&["recording", "info", "--json"], &[file]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn seconds(info: &Value) -> f64 {
+    info["seconds"].as_f64().unwrap()
+}
+
+fn record(file: &Path, more: &[&str]) -> Child {
+    let mut command = tactomo();
+    command.arg("record").arg(file).args(["--simulate", "--board", "ideal"]).args(more);
+    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// A recording of so many seconds.
+fn recorded(file: &Path, seconds: &str) {
+    assert!(record(file, &["--seconds", seconds, "--notes", "new foam"]).wait().unwrap().success());
+}
+
+fn wait_for(what: impl Fn() -> bool) {
+    let begin = Instant::now();
+    while !what() {
+        assert!(begin.elapsed() < PATIENCE, "nothing has come for a minute");
+        sleep(Duration::from_millis(5));
+    }
+}
+
+fn length(file: &Path) -> u64 {
+    std::fs::metadata(file).map_or(0, |file| file.len())
+}
+
+#[test]
+fn a_program_that_is_killed_loses_a_second_at_most() {
+    let folder = Folder::new("killed");
+    let file = folder.file("killed.tactomo");
+    let mut program = record(&file, &[]);
+    let header = {
+        wait_for(|| length(&file) > 0);
+        length(&file)
+    };
+    // The first frames are in the file, so they came before this.
+    wait_for(|| length(&file) > header + 1000);
+    let begin = Instant::now();
+    sleep(Duration::from_millis(2500));
+    let recorded_s = begin.elapsed().as_secs_f64();
+    program.kill().unwrap();
+    program.wait().unwrap();
+    let info = info(&file);
+    assert!(seconds(&info) > recorded_s - 1.0, "{recorded_s} s: {info}");
+    // A chunk that was cut is all that may be missing.
+    assert!(info["corrupt"] == 0 && info["missing_frames"] == 0, "{info}");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_full_disk_ends_the_recording_with_a_word_and_keeps_what_came_before() {
+    let folder = Folder::new("full");
+    let file = folder.file("full.tactomo");
+    // No file may be longer than 300 blocks: what a full disk does to the program, without one.
+    let script = "trap '' XFSZ; ulimit -f 300; exec \"$0\" record \"$1\" --simulate --board ideal --seconds 60";
+    let output = Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_tactomo")]).arg(&file).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("what came before is kept") && said.contains("full.tactomo"), "{said}");
+    assert!(info(&file)["frames"].as_u64().unwrap() > 100);
+}
+
+#[test]
+fn pieces_are_cut_joined_checked_and_solved() {
+    let folder = Folder::new("cut");
+    let [whole, piece, sum] = ["whole.tactomo", "piece.tactomo", "sum.tactomo"].map(|name| folder.file(name));
+    recorded(&whole, "2");
+    let out = piece.to_str().unwrap();
+    assert!(run(&["recording", "cut", "--from", "0.5", "--to", "1.5", "--out", out], &[&whole]).status.success());
+    let (long, short) = (info(&whole), info(&piece));
+    assert!((seconds(&short) - 1.0).abs() < 0.1, "{short}");
+    assert_eq!((&short["notes"], &short["is_damaged"]), (&"new foam".into(), &false.into()));
+    assert!((short["started_unix_s"].as_f64().unwrap() - long["started_unix_s"].as_f64().unwrap() - 0.5).abs() < 1e-5);
+
+    let out = sum.to_str().unwrap();
+    assert!(run(&["recording", "merge", "--out", out], &[&whole, &piece]).status.success());
+    let joined = info(&sum);
+    let frames = |info: &Value| info["frames"].as_u64().unwrap();
+    assert_eq!(frames(&joined), frames(&long) + frames(&short));
+    assert_eq!((joined["joined_at_s"].as_array().map(Vec::len), &joined["missing_frames"]), (Some(1), &0.into()));
+    assert_eq!(run(&["recording", "check"], &[&whole, &piece, &sum]).status.code(), Some(0));
+    let solved = run(&["reconstruct", "--json"], &[&sum]);
+    assert!(solved.status.success(), "{}", String::from_utf8_lossy(&solved.stderr));
+
+    let again = run(&["recording", "cut", "--out", out], &[&whole]);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("sum.tactomo exists already"));
+
+    let mut bytes = std::fs::read(&whole).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    let damaged = folder.file("damaged.tactomo");
+    std::fs::write(&damaged, [b"a line of a log\n", &bytes[..]].concat()).unwrap();
+    let checked = run(&["recording", "check"], &[&whole, &damaged]);
+    assert_eq!(checked.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&checked.stdout);
+    assert!(said.contains("damaged in 1 place") && said.contains("16 bytes before its start"), "{said}");
+}
+
+#[test]
+fn the_last_seconds_are_saved_when_a_line_comes_and_when_something_touches() {
+    let folder = Folder::new("ring");
+    let mut program = record(
+        &folder.file("line.tactomo"),
+        &["--last", "1", "--after", "0.5", "--save-on", "enter", "--seconds", "3.5"],
+    );
+    sleep(Duration::from_millis(1500));
+    program.stdin.as_mut().unwrap().write_all(b"\n").unwrap();
+    assert!(program.wait().unwrap().success());
+    let saved = info(&folder.file("line-1.tactomo"));
+    // However late the line was read, there is nothing before the second, and half a second after it.
+    assert!((0.5..=1.6).contains(&seconds(&saved)), "{saved}");
+    assert_eq!(saved["marks"].as_array().map(Vec::len), Some(1));
+    assert!(!folder.file("line-2.tactomo").exists() && !folder.file("line.tactomo").exists());
+
+    let on_touch = ["--scene", "pointer", "--last", "1", "--save-on", "touch", "--seconds", "4"];
+    assert!(record(&folder.file("touch.tactomo"), &on_touch).wait().unwrap().success());
+    let saved = info(&folder.file("touch-1.tactomo"));
+    assert!(!saved["marks"].as_array().unwrap().is_empty(), "{saved}");
+}

@@ -1,0 +1,107 @@
+//! A client that follows the published protocol: <https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>.
+
+use std::net::TcpStream;
+
+use serde_json::{Value, json};
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::Response;
+use tungstenite::{Message, WebSocket, client};
+
+use crate::program::Live;
+
+type Socket = WebSocket<TcpStream>;
+
+/// Connects and offers a subprotocol.
+fn connect(at: &str, subprotocol: &str) -> Result<(Socket, Response<Option<Vec<u8>>>), String> {
+    let mut request = format!("ws://{at}").into_client_request().unwrap();
+    request.headers_mut().insert("sec-websocket-protocol", subprotocol.parse().unwrap());
+    client(request, TcpStream::connect(at).unwrap()).map_err(|error| error.to_string())
+}
+
+fn json(socket: &mut Socket) -> Value {
+    loop {
+        if let Message::Text(text) = socket.read().unwrap() {
+            return serde_json::from_str(&text).unwrap();
+        }
+    }
+}
+
+/// Subscription, log time (ns) and data of the next message.
+fn data(socket: &mut Socket) -> (u32, u64, Value) {
+    loop {
+        if let Message::Binary(bytes) = socket.read().unwrap() {
+            assert_eq!(bytes[0], 1, "message data");
+            let subscription = u32::from_le_bytes(bytes[1..5].try_into().unwrap());
+            let log_time_ns = u64::from_le_bytes(bytes[5..13].try_into().unwrap());
+            return (subscription, log_time_ns, serde_json::from_slice(&bytes[13..]).unwrap());
+        }
+    }
+}
+
+fn say(socket: &mut Socket, message: &Value) {
+    socket.send(Message::text(message.to_string())).unwrap();
+}
+
+#[test]
+fn an_app_sees_the_channels_and_gets_those_that_it_subscribes_to() {
+    let mut live = Live::start(&["--json", "--solver", "tikhonov", "--foxglove", "0", "--seconds", "60"]);
+    let at = live.told("open ws://");
+    let (mut socket, response) = connect(&at, "foxglove.sdk.v1, foxglove.websocket.v1").unwrap();
+    assert_eq!(response.headers()["sec-websocket-protocol"], "foxglove.websocket.v1");
+    let info = json(&mut socket);
+    assert!(info["op"] == "serverInfo" && info["capabilities"] == json!([]), "{info}");
+    let advertised = json(&mut socket);
+    assert_eq!(advertised["op"], "advertise");
+    let channels = advertised["channels"].as_array().unwrap();
+    let topics: Vec<_> = channels.iter().map(|channel| channel["topic"].as_str().unwrap()).collect();
+    assert_eq!(topics, ["/tactomo/touch", "/tactomo/contacts", "/tactomo/image", "/tactomo/readings"]);
+    for channel in channels {
+        let schema: Value = serde_json::from_str(channel["schema"].as_str().unwrap()).unwrap();
+        assert_eq!((&channel["encoding"], &channel["schemaEncoding"]), (&json!("json"), &json!("jsonschema")));
+        assert_eq!(schema["title"], channel["schemaName"]);
+    }
+    // All channels, by numbers of the app's own.
+    let subscriptions: Vec<_> =
+        channels.iter().zip(70..).map(|(c, id)| json!({"id": id, "channelId": c["id"]})).collect();
+    say(&mut socket, &json!({"op": "subscribe", "subscriptions": subscriptions}));
+    let messages: Vec<_> = (0..40).map(|_| data(&mut socket)).collect();
+    for (subscription, log_time_ns, message) in &messages {
+        let stamp = match subscription {
+            70 => {
+                let arrived_ns = message["arrived_unix_s"].as_f64().unwrap() * 1e9;
+                assert!((arrived_ns - *log_time_ns as f64).abs() < 1000.0, "{message}");
+                continue;
+            }
+            71 => &message["deletions"][0]["timestamp"],
+            72 | 73 => &message["timestamp"],
+            other => panic!("nobody asked for {other}"),
+        };
+        assert_eq!(stamp["sec"].as_u64().unwrap() * 1_000_000_000 + stamp["nsec"].as_u64().unwrap(), *log_time_ns);
+    }
+    for wanted in 70..74 {
+        assert!(messages.iter().any(|(subscription, ..)| *subscription == wanted), "{wanted}");
+    }
+    // Less from now on; what was on its way may still come.
+    say(&mut socket, &json!({"op": "unsubscribe", "subscriptionIds": [70, 71, 72]}));
+    let last: Vec<_> = (0..2000).map(|_| data(&mut socket).0).collect();
+    assert!(last[1900..].iter().all(|subscription| *subscription == 73), "{last:?}");
+    // What there is not is said, and ends nothing.
+    say(&mut socket, &json!({"op": "unsubscribe", "subscriptionIds": [73]}));
+    say(&mut socket, &json!({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 99}]}));
+    let status = json(&mut socket);
+    assert!(status["op"] == "status" && status["message"].as_str().unwrap().contains("99"), "{status}");
+    live.child.kill().unwrap();
+    live.end();
+}
+
+#[test]
+fn other_subprotocols_are_refused_and_the_end_is_told() {
+    let mut live = Live::start(&["--json", "--foxglove", "0", "--seconds", "4"]);
+    let at = live.told("open ws://");
+    let refused = connect(&at, "chat").unwrap_err();
+    assert!(refused.contains("400"), "{refused}");
+    let (mut socket, _) = connect(&at, "foxglove.websocket.v1").unwrap();
+    let is_closed = |message| matches!(message, Ok(Message::Close(_)));
+    while !is_closed(socket.read()) {}
+    assert_eq!(live.end().0, Some(0));
+}

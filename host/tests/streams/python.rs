@@ -1,0 +1,147 @@
+//! MCAP files as the Python package `mcap` reads them, and NPZ files as this program does.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use tactomo::board::frames::{FileFrame, FrameFile};
+
+use crate::program::{Live, path, tactomo};
+
+/// Prints each message as JSON: topic, log time, schema, and its data; of a file that ends early those before.
+const READ: &str = r#"
+import json, sys
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader, make_reader
+with open(sys.argv[1], "rb") as file:
+    reader = make_reader(file) if sys.argv[2] == "whole" else NonSeekingReader(file)
+    try:
+        for schema, channel, message in reader.iter_messages(log_time_order=sys.argv[2] == "whole"):
+            data = json.loads(message.data)
+            print(json.dumps([channel.topic, message.log_time, schema.name, schema.encoding, data]))
+    except McapError:
+        if sys.argv[2] == "whole":
+            raise
+    if sys.argv[2] == "whole":
+        statistics = reader.get_summary().statistics
+        print(json.dumps(["count", statistics.message_count, "", "", next(reader.iter_metadata()).metadata]))
+"#;
+
+/// A Python with the package, made once; `None` with a line on stderr where there is no Python or no network.
+fn python() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-mcap");
+    let python = folder.join("bin/python");
+    let has_package = |python: &Path| {
+        Command::new(python).args(["-c", "import mcap.reader"]).output().is_ok_and(|output| output.status.success())
+    };
+    if has_package(&python) {
+        return Some(python);
+    }
+    let made = |command: &mut Command| command.output().is_ok_and(|output| output.status.success());
+    let is_made = made(Command::new("python3").arg("-m").arg("venv").arg(&folder))
+        && made(Command::new(&python).args(["-m", "pip", "install", "--quiet", "mcap"]));
+    if is_made && has_package(&python) {
+        return Some(python);
+    }
+    let line = "skipped: the MCAP test needs python3 with venv and pip, which can install the package mcap";
+    assert!(std::env::var_os("TACTOMO_SKIP_NOTHING").is_none(), "{line}");
+    // Past the test harness, which keeps the output of tests that pass to itself.
+    writeln!(std::io::stderr(), "{line}").unwrap();
+    None
+}
+
+/// What Python finds in a file, `whole` or `broken`.
+fn read(python: &Path, file: &Path, state: &str) -> Vec<Value> {
+    let output = Command::new(python).args(["-c", READ]).arg(file).arg(state).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn done(args: &[&str]) -> String {
+    let output = tactomo(args).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{args:?}: {said}");
+    said
+}
+
+/// Numbers of the field of a grid that is `offset` bytes after the first.
+fn grid(message: &Value, offset: usize) -> Vec<f64> {
+    use base64::Engine;
+    let data = base64::engine::general_purpose::STANDARD.decode(message["data"].as_str().unwrap()).unwrap();
+    let cells = data.chunks(message["cell_stride"].as_u64().unwrap() as usize);
+    cells.map(|cell| f64::from_le_bytes(cell[offset..offset + 8].try_into().unwrap())).collect()
+}
+
+fn frames(file: &Path) -> Vec<FileFrame> {
+    let mut file = FrameFile::open(file, None).unwrap();
+    std::iter::from_fn(|| file.next_frame().unwrap()).collect()
+}
+
+#[test]
+fn an_exported_recording_is_read_back_bit_for_bit() {
+    let [recording, mcap, npz, lines] = ["touch.tactomo", "touch.mcap", "touch.npz", "touch.jsonl"].map(path);
+    let [recording_name, mcap_name, npz_name, lines_name] =
+        [&recording, &mcap, &npz, &lines].map(|path| path.to_str().unwrap());
+    done(&["record", recording_name, "--simulate", "--scene", "five-fingers", "--seconds", "2"]);
+    done(&["export", recording_name, "--to", "npz", "--fields", "readings", "--out", npz_name]);
+    done(&["export", recording_name, "--to", "jsonl", "--fields", "all", "--out", lines_name]);
+    let said = done(&["export", recording_name, "--to", "mcap", "--out", mcap_name]);
+    let measured = frames(&recording);
+    assert!(measured.len() > 100 && said.contains(&format!("{} frames", measured.len())), "{said}");
+
+    let kept = frames(&npz);
+    assert!(kept.iter().map(|frame| &frame.volts).eq(measured.iter().map(|frame| &frame.volts)));
+    let text = std::fs::read_to_string(&lines).unwrap();
+    assert_eq!(text.lines().count(), measured.len());
+
+    let refused = tactomo(&["export", recording_name, "--to", "mcap", "--out", mcap_name]).output().unwrap();
+    assert_eq!(refused.status.code(), Some(1), "what is there is not replaced");
+    done(&["export", recording_name, "--to", "mcap", "--out", mcap_name, "--force"]);
+
+    if let Some(python) = python() {
+        let mut messages = read(&python, &mcap, "whole");
+        let about = messages.pop().unwrap();
+        assert_eq!(about[1].as_u64(), Some(messages.len() as u64));
+        assert!(about[4]["detector_toml"].as_str().unwrap().contains("electrode"), "{about}");
+        let of = |topic: &str| messages.iter().filter(|message| message[0] == topic).map(|m| &m[4]).collect::<Vec<_>>();
+        let (touches, readings) = (of("/tactomo/touch"), of("/tactomo/readings"));
+        assert_eq!((touches.len(), readings.len()), (measured.len(), measured.len()));
+        for ((line, touch), (grids, frame)) in text.lines().zip(&touches).zip(readings.iter().zip(&measured)) {
+            let line: Value = serde_json::from_str(line).unwrap();
+            for field in ["schema", "sequence", "time_s", "contacts", "flags", "choice"] {
+                assert_eq!(line[field], touch[field], "{field}");
+            }
+            assert_eq!(grid(grids, 0), frame.volts, "bit for bit");
+            let solved: Vec<_> = line["touch_v"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+            // Parsed here to the last bit but one: serde_json rounds the rest unless it is told to take its time.
+            let is_near = |(one, other): (&f64, &f64)| (one - other).abs() <= 1e-15 * other.abs().max(1e-3);
+            assert!(grid(grids, 8).iter().zip(&solved).all(is_near));
+        }
+    }
+    [recording, mcap, npz, lines].iter().for_each(|file| std::fs::remove_file(file).unwrap());
+}
+
+#[test]
+fn a_file_of_a_program_that_was_killed_is_read_up_to_its_last_chunk() {
+    let Some(python) = python() else { return };
+    let file = path("killed.mcap");
+    let mut live = Live::start(&["--http-port", "0", "--mcap", file.to_str().unwrap(), "--stream", "-"]);
+    let mut last = Value::Null;
+    let stdout = live.stdout();
+    // Three seconds of board time.
+    for line in std::io::BufRead::lines(stdout) {
+        last = serde_json::from_str(&line.unwrap()).unwrap();
+        if last["time_s"].as_f64().unwrap() > 3.0 {
+            break;
+        }
+    }
+    live.child.kill().unwrap();
+    live.end();
+    let messages = read(&python, &file, "broken");
+    let newest = messages.iter().rev().find(|message| message[0] == "/tactomo/touch").unwrap();
+    let lost_s = last["time_s"].as_f64().unwrap() - newest[4]["time_s"].as_f64().unwrap();
+    assert!(lost_s < 1.0, "{lost_s} s are lost");
+    std::fs::remove_file(file).unwrap();
+}
