@@ -1,11 +1,10 @@
 //! How fast the linear image is: `cargo run --release --package tactomo --example speed -- [NODES]`.
 //!
 //! Makes the thin shell of `square-60` on about so many nodes and the linear image for it, and images a frame many times, on one core.
-//! Prints `{nodes, set_up_ms, frame_us}`: medians, from the detector to the first frame, and for each frame after.
+//! Prints `{nodes, set_up_s, frame_us}`: medians of processor time, from the detector to the first frame, and for each frame after.
 //! `tools/compare_pyeit.py` sets it against pyEIT.
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use anyhow::{Context, Result};
 use tactomo::detector::Detector;
@@ -14,6 +13,7 @@ use tactomo::forward::shell::Shell;
 use tactomo::forward::{ForwardModel, readings_v};
 use tactomo::scene::Contact;
 use tactomo::solve::{Lambda, Tikhonov, Variant};
+use tactomo::study::stopwatch::timed;
 
 const SET_UPS: usize = 15;
 const FRAMES: usize = 2000;
@@ -36,16 +36,16 @@ fn main() -> Result<()> {
         Ok(())
     })?;
     let nodes = shell.image_mesh().nodes_m.len();
-    println!("{{\"nodes\": {nodes}, \"set_up_ms\": {:.3}, \"frame_us\": {frame_us:.3}}}", set_up_us * 1e-3);
+    println!("{{\"nodes\": {nodes}, \"set_up_s\": {:.6}, \"frame_us\": {frame_us:.3}}}", set_up_us * 1e-6);
     Ok(())
 }
 
 fn median_us(times: usize, mut run: impl FnMut() -> Result<()>) -> Result<f64> {
-    let timed = |_| {
-        let begin = Instant::now();
-        run().map(|()| begin.elapsed().as_secs_f64() * 1e6)
+    let one = |_| {
+        let (done, taken) = timed(&mut run);
+        done.map(|()| taken.as_secs_f64() * 1e6)
     };
-    let mut all = (0..times).map(timed).collect::<Result<Vec<_>>>()?;
+    let mut all = (0..times).map(one).collect::<Result<Vec<_>>>()?;
     all.sort_by(f64::total_cmp);
     Ok(all[times / 2])
 }

@@ -28,7 +28,7 @@ pub use tactomo_design as design;
 pub use tactomo_physics::{detector, forward, hertz, readings, rest, scene, simulate};
 pub use tactomo_study as study;
 pub use tactomo_table as table;
-pub use tactomo_touch::{calibrate, metrics, pointer, schema, solve, vibration};
+pub use tactomo_touch::{calibrate, learned, metrics, pointer, schema, solve, vibration};
 
 pub mod check;
 pub mod date;

@@ -7,12 +7,13 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
-use anyhow::anyhow;
+use anyhow::{Context, anyhow};
 use tactomo::board::link::Source;
 use tactomo::board::record::Header;
 use tactomo::board::session::RequestedSettings;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
+use tactomo::learned::Learned;
 use tactomo::run::plan::{Ends, Plan, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Listener, Request, Snapshot};
@@ -40,6 +41,7 @@ const REQUESTS: usize = 64;
 ///   tactomo live --simulate --board esp32           at the pace and with the ADCs of the paper's board
 ///   tactomo live --simulate --as-built 7            a detector that is not quite the one described
 ///   tactomo live --port /dev/ttyUSB0 --seconds 10 --json
+///   tactomo live --learned mine.safetensors         by what presses on this sensor have taught
 ///   tactomo live --simulate --scan adaptive         the rows that a scene needs, as they come
 ///   tactomo live --replay touch.tactomo --speed 0.25
 ///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network
@@ -81,9 +83,12 @@ pub struct Args {
 pub struct PictureArgs {
     #[command(flatten)]
     pub detector: DetectorArgs,
-    /// Solver that reads the touch; on the page another can be chosen
-    #[arg(long, value_name = "NAME", default_value = "auto")]
-    pub solver: Method,
+    /// Solver that reads the touch; on the page another can be chosen [default: auto; with --learned, what that teaches]
+    #[arg(long, value_name = "NAME")]
+    pub solver: Option<Method>,
+    /// What `tactomo learn` has learned on this sensor: its solver takes that in place of presses simulated on the model
+    #[arg(long, value_name = "MODEL")]
+    pub learned: Option<PathBuf>,
     /// Jacobian from `forward --save-jacobian`, instead of computing it
     #[arg(long, value_name = "FILE")]
     pub jacobian: Option<PathBuf>,
@@ -181,10 +186,18 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
 fn problem(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Problem> {
     let loaded = args.jacobian.as_ref().map(|path| Jacobian::load(path, detector)).transpose()?;
     let problem = Problem::new(Model::Auto.build(detector, None)?);
-    Ok(match loaded {
+    let problem = match loaded {
         Some(jacobian) => problem.with_jacobian(jacobian),
         None => problem,
-    })
+    };
+    let Some(path) = &args.learned else { return Ok(problem) };
+    let learned = Learned::read(path)?;
+    problem.with_learned(learned).with_context(|| format!("{} is of another sensor", path.display()))
+}
+
+/// The method to begin with.
+fn method(args: &PictureArgs, problem: &Problem) -> Method {
+    args.solver.or(problem.learned().map(Learned::method)).unwrap_or(Method::Auto)
 }
 
 fn plan(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) -> anyhow::Result<Plan> {
@@ -192,7 +205,7 @@ fn plan(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) 
     Ok(Plan {
         settings: show.settings,
         scan: show.scan.clone(),
-        solving: Some(Solving::new(show.picture.solver, problem)),
+        solving: Some(Solving::new(method(&show.picture, &problem), problem)),
         recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
         begin_recording: Some(keep::on_request(detector.clone(), show.source.name())),
         listeners: listener.into_iter().collect(),

@@ -11,6 +11,7 @@ mod export;
 mod forward;
 mod interrupt;
 mod keep;
+mod learn;
 mod live;
 pub mod output;
 mod ports;
@@ -19,6 +20,7 @@ mod record;
 mod recording;
 mod replay;
 mod scene;
+mod score;
 mod source;
 mod stability;
 mod streams;
@@ -53,6 +55,8 @@ enum Command {
     Study(study::Args),
     Design(Box<design::Args>),
     Reconstruct(reconstruct::Args),
+    Learn(learn::Args),
+    Score(score::Args),
     Calibrate(calibrate::Args),
 }
 
@@ -74,6 +78,8 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Study(args) => study::run(&args),
         Command::Design(args) => design::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
+        Command::Learn(args) => learn::run(&args),
+        Command::Score(args) => score::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
     }
 }

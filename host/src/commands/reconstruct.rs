@@ -11,7 +11,7 @@ use anyhow::Context;
 use tactomo::schema::FrameReport;
 use tactomo::solve::{Lambda, Method};
 
-use self::reader::{Input, Reader};
+use self::reader::{Input, Reader, Taught};
 use self::units::Unit;
 use self::writer::Writer;
 use super::choice::{self, DetectorArgs, Model};
@@ -29,7 +29,7 @@ use super::output::message;
 ///   tactomo reconstruct readings.csv --unit mV --detector square-60 --solver tikhonov --lambda gcv
 ///   tactomo reconstruct readings.npz --rest 10 --out contacts.csv
 ///   tactomo reconstruct touch.tactomo --images --out images.npz
-///   tactomo reconstruct skin.csv --solver kernel --presses presses.csv --json
+///   tactomo reconstruct skin.csv --learned skin.safetensors --json
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -41,17 +41,19 @@ pub struct Args {
     /// Forward model
     #[arg(long, value_enum, default_value = "auto")]
     model: Model,
-    /// Solver
-    #[arg(long, value_name = "NAME", default_value = "tikhonov", value_parser = choice::method())]
-    solver: Method,
+    /// Solver [default: tikhonov; with --presses or --learned, what they teach]
+    #[arg(long, value_name = "NAME", value_parser = choice::method())]
+    solver: Option<Method>,
     /// Lambda of tikhonov, tikhonov-paper, noser or laplace: a share of the largest singular value, or a rule that chooses it for
     /// each frame
     #[arg(long, value_name = "SHARE|discrepancy|l-curve|gcv")]
     lambda: Option<Lambda>,
-    /// Presses at known places for the solver kernel to learn from, instead of simulated ones: CSV with columns named x_m, y_m,
-    /// and force_n or conductance_s, and one for each channel; or NPZ with arrays of these names and readings_v
+    /// Presses at known places to learn from first, of any sensor: a file as `tactomo learn` takes it
     #[arg(long, value_name = "FILE", conflicts_with_all = ["detector", "material", "model", "lambda", "images"])]
     presses: Option<PathBuf>,
+    /// What `tactomo learn` has learned, of any sensor, or a network that was trained for the detector
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["presses", "lambda"])]
+    learned: Option<PathBuf>,
     /// Frames at the start whose mean is the baseline, whatever they are, and which are not solved [default: of a recording, the baseline that live takes; of a
     /// table, none]
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
@@ -75,13 +77,15 @@ pub struct Args {
 
 impl Args {
     fn input(&self) -> Input<'_> {
+        let presses = self.presses.as_deref().map(Taught::Presses);
+        let taught = presses.or(self.learned.as_deref().map(Taught::Learned));
         Input {
             file: &self.file,
             detector: &self.detector,
             model: self.model,
             solver: self.solver,
             lambda: self.lambda,
-            presses: self.presses.as_deref(),
+            taught,
             rest: self.rest,
             unit: self.unit,
             force: None,

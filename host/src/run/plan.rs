@@ -137,9 +137,20 @@ impl Problems {
         }
         let mut other = self.other.lock().unwrap_or_else(PoisonError::into_inner);
         let known = other.take().filter(is_of);
-        let problem = known.map_or_else(|| Problem::of(detector), Ok)?;
+        let problem = known.map_or_else(|| self.another(detector), Ok)?;
         *other = Some(problem.clone());
         Ok(problem.measured_as(detector))
+    }
+}
+
+impl Problems {
+    /// That of another detector; what was learned on the sensor holds for it too, if it has as many electrodes.
+    fn another(&self, detector: &Detector) -> Result<Problem, ForwardError> {
+        let problem = Problem::of(detector)?;
+        Ok(match self.described.learned() {
+            Some(learned) => problem.clone().with_learned(learned.clone()).unwrap_or(problem),
+            None => problem,
+        })
     }
 }
 

@@ -15,7 +15,7 @@ pub mod scanning;
 mod scenes;
 mod score;
 pub mod stability;
-mod stopwatch;
+pub mod stopwatch;
 pub mod tradeoff;
 pub mod validate;
 mod variant;

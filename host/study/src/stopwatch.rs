@@ -7,7 +7,7 @@ use std::time::Duration;
 /// By the thread's own processor time where the system counts it (Linux, macOS), else by the wall clock. On an idle machine both are
 /// the same, as solvers neither wait nor start threads. On a busy one the wall clock also counts the time in which others have the processor:
 /// 10 ms at once, as much as a thousand frames of a linear image, so that harmless frames looked slow. Two calls of the clock take 0.3 us.
-pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let begin = now();
     let result = work();
     (result, now().saturating_sub(begin))

@@ -1,11 +1,13 @@
 //! From readings back to touch, and how right that is.
 //!
 //! [`solve`] has the solvers, one file a method, one trait; [`calibrate`] what fits a detector's description to the one that was built;
+//! [`learned`] opens files of what solvers have learned;
 //! [`metrics`] the figures that solvers are judged by; [`mod@pointer`] makes motion and clicks of a contact, [`vibration`] spectra of readings;
 //! [`scanning`] chooses which rows to read; [`schema`] has the names of what leaves the program. None of them knows of boards, ports or pages.
 
 pub mod calibrate;
 mod gaussian;
+pub mod learned;
 pub mod metrics;
 pub mod pointer;
 pub mod scanning;

@@ -20,7 +20,7 @@ pub struct ContactColumn {
 }
 
 /// The numbers of a contact, in the order of every format.
-pub const CONTACT_COLUMNS: [ContactColumn; 14] = [
+pub const CONTACT_COLUMNS: [ContactColumn; 15] = [
     ContactColumn { name: "id", of: |contact| contact.id.map(f64::from) },
     ContactColumn { name: "x_m", of: |contact| Some(contact.x_m) },
     ContactColumn { name: "y_m", of: |contact| Some(contact.y_m) },
@@ -35,6 +35,7 @@ pub const CONTACT_COLUMNS: [ContactColumn; 14] = [
     ContactColumn { name: "sigma_y_m", of: |contact| error(contact, |errors| errors.y_m) },
     ContactColumn { name: "correlation", of: |contact| error(contact, |errors| errors.correlation) },
     ContactColumn { name: "sigma_conductance_s", of: |contact| error(contact, |errors| errors.conductance_s) },
+    ContactColumn { name: "depth_m", of: |contact| contact.depth_m },
 ];
 
 fn error(contact: &FoundContact, of: fn(&Uncertainty) -> f64) -> Option<f64> {
@@ -54,7 +55,7 @@ pub fn contact_values(contact: &FoundContact) -> [f32; CONTACT_COLUMNS.len() - 1
     std::array::from_fn(|index| CONTACT_COLUMNS[index + 1].value(contact).map_or(f32::NAN, |value| value as f32))
 }
 
-/// `{id?, x_m, y_m, z_m?, conductance_s, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ...}`; z is left out on a flat detector.
+/// `{id?, x_m, y_m, z_m?, conductance_s, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ..., depth_m?}`; z is left out on a flat detector.
 impl Serialize for FoundContact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;

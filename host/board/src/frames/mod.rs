@@ -132,11 +132,23 @@ impl FrameFile {
     /// # Errors
     /// [`FramesError`], which says what is wrong with the file.
     pub fn open(path: &Path, expected: Option<usize>) -> Result<Self, FramesError> {
+        Self::open_by(path, expected, |table| table.array(&READINGS))
+    }
+
+    /// The same with another rule which readings of a table are meant.
+    ///
+    /// # Errors
+    /// [`FramesError`], which says what is wrong with the file; also as `readings` does.
+    pub fn open_by(
+        path: &Path,
+        expected: Option<usize>,
+        readings: impl FnOnce(Table) -> Result<Array, String>,
+    ) -> Result<Self, FramesError> {
         if is_recording(path) {
             return Ok(Self::Recording(Box::new(Recorded::open(path)?)));
         }
         let shape = |what| FramesError::Shape { path: path.to_owned(), what };
-        let array = Table::read(path)?.array(&READINGS).map_err(shape)?;
+        let array = readings(Table::read(path)?).map_err(shape)?;
         Rows::of(array, expected).map(Self::Table).map_err(shape)
     }
 

@@ -46,8 +46,11 @@ fn record(name: &str, preset: &str, numbers: std::ops::Range<u16>) -> PathBuf {
     path
 }
 
-/// First reading of each frame with its time (ms), and what was noted.
-fn read(path: &Path) -> (Vec<(u64, u16)>, Vec<(f64, Note)>) {
+/// Times (ms) and numbers of frames.
+type Frames = Vec<(u64, u16)>;
+
+/// The frames of a recording, and what was noted in it.
+fn read(path: &Path) -> (Frames, Vec<(f64, Note)>) {
     let mut file = FrameFile::open(path, None).unwrap();
     let frames = std::iter::from_fn(|| file.next_frame().unwrap())
         .map(|frame| ((frame.time_s.unwrap() * 1e3).round() as u64, frame.sequence.unwrap() as u16))

@@ -10,6 +10,7 @@ use tactomo::board::{identity, measured};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::forward::ImageMesh;
 use tactomo::forward::jacobian::Jacobian;
+use tactomo::learned::Learned;
 use tactomo::readings::Readings;
 use tactomo::solve::{
     ContactSettings, Guard, Kernel, Lambda, Latest, Method, Parameter, ParameterKind, Presses, Problem, Solution,
@@ -20,6 +21,7 @@ use tactomo_protocol::Hello;
 
 use super::units::{self, Unit};
 use crate::commands::choice::{DetectorArgs, Model};
+use crate::commands::learn;
 use crate::commands::output::message;
 
 /// What is read, and what solves it.
@@ -30,12 +32,12 @@ pub struct Input<'a> {
     pub detector: &'a DetectorArgs,
     /// Forward model.
     pub model: Model,
-    /// Solver.
-    pub solver: Method,
+    /// Solver; unless given that of what is taught, or tikhonov.
+    pub solver: Option<Method>,
     /// Its lambda, if that is not the default.
     pub lambda: Option<Lambda>,
-    /// Presses that it learns from, instead of a detector.
-    pub presses: Option<&'a Path>,
+    /// What teaches it, instead of a detector.
+    pub taught: Option<Taught<'a>>,
     /// Frames at the start that are the baseline, if that is said.
     pub rest: Option<u32>,
     /// Unit of a table, if that is said.
@@ -44,6 +46,24 @@ pub struct Input<'a> {
     pub force: Option<ForceLaw>,
     /// Leaves out what the detector's known presses correct.
     pub uncorrected: bool,
+}
+
+/// What teaches a solver, on whatever that is.
+#[derive(Clone, Copy)]
+pub enum Taught<'a> {
+    /// A file of presses.
+    Presses(&'a Path),
+    /// A file of `tactomo learn`.
+    Learned(&'a Path),
+}
+
+impl Taught<'_> {
+    fn get(self) -> anyhow::Result<Learned> {
+        Ok(match self {
+            Self::Presses(path) => Kernel::train(&Presses::read(path, &[])?)?.into(),
+            Self::Learned(path) => Learned::read(path)?,
+        })
+    }
 }
 
 /// Frames and what solves them.
@@ -80,8 +100,8 @@ enum Touch {
         usual_radius_m: f64,
         rows: Option<Box<RowsBefore>>,
     },
-    /// A kernel that has learned from presses in a file, on whatever they were made.
-    Kernel(Box<Kernel>),
+    /// A kernel that has learned from presses, on whatever they were made.
+    Kernel(Arc<Kernel>),
 }
 
 /// What came before rows of readings.
@@ -94,9 +114,14 @@ struct RowsBefore {
 impl Reader {
     /// Opens the file and makes what solves it.
     pub fn open(input: &Input) -> anyhow::Result<Self> {
-        let Opened { file, touch, jacobian, chosen } = match input.presses {
-            Some(presses) => learned(input, Presses::read(presses)?)?,
-            None => solved(input)?,
+        let taught = input.taught.map(Taught::get).transpose()?;
+        let solver = input.solver.or(taught.as_ref().map(Learned::method)).unwrap_or(Method::Tikhonov);
+        if let Some(taught) = taught.as_ref().map(Learned::method).filter(|taught| *taught != solver) {
+            bail!("what was learned is for the solver {}, not {}: leave out --solver", taught.name(), solver.name());
+        }
+        let Opened { file, touch, jacobian, chosen } = match taught {
+            Some(Learned::Kernel(kernel)) => learned(input, kernel)?,
+            other => solved(input, solver, other)?,
         };
         // That of a recording is taken as live takes it, while its frames are solved.
         let baseline = match (&jacobian, input.rest, file.board()) {
@@ -309,19 +334,12 @@ struct Opened {
 }
 
 /// A kernel that has learned from presses.
-fn learned(input: &Input, presses: Presses) -> anyhow::Result<Opened> {
-    if input.solver != Method::Kernel {
-        bail!("only the solver kernel learns from presses, not {}: give --solver kernel", input.solver.name());
+fn learned(input: &Input, kernel: Arc<Kernel>) -> anyhow::Result<Opened> {
+    if input.detector.detector.is_some() || input.detector.material.is_some() {
+        bail!("what was learned from presses needs no detector: leave out --detector and --material");
     }
-    let kernel = Kernel::train(&presses)?;
-    message!(
-        "learned from {} presses on {} channels; a press left out of the training is found within {:.2} mm and {:.0} % of its strength",
-        presses.count(),
-        kernel.channels(),
-        kernel.left_out_m() * 1e3,
-        kernel.left_out_strength() * 100.0
-    );
-    let file = FrameFile::open(input.file, Some(kernel.channels()))?;
+    message!("{}", learn::sentence(&kernel));
+    let file = FrameFile::open_by(input.file, Some(kernel.channels()), |table| kernel.readings_of(table))?;
     if file.channels() != kernel.channels() {
         bail!(
             "{} has {} readings a frame, but the presses have {} channels",
@@ -330,11 +348,11 @@ fn learned(input: &Input, presses: Presses) -> anyhow::Result<Opened> {
             kernel.channels()
         );
     }
-    Ok(Opened { file, touch: Touch::Kernel(Box::new(kernel)), jacobian: None, chosen: None })
+    Ok(Opened { file, touch: Touch::Kernel(kernel), jacobian: None, chosen: None })
 }
 
 /// A solver for the detector.
-fn solved(input: &Input) -> anyhow::Result<Opened> {
+fn solved(input: &Input, method: Method, learned: Option<Learned>) -> anyhow::Result<Opened> {
     // That of a recording is in its header, unless another one is given.
     let given = input.detector.get()?.electrodes.len();
     let mut file = FrameFile::open(input.file, Some(given * given))?;
@@ -367,7 +385,11 @@ fn solved(input: &Input) -> anyhow::Result<Opened> {
         );
     }
     let problem = Problem::new(input.model.build(&detector, None)?);
-    let solver = solver(input.solver, input.lambda, &problem)?;
+    let problem = match learned {
+        Some(learned) => problem.with_learned(learned)?,
+        None => problem,
+    };
+    let solver = solver(method, input.lambda, &problem)?;
     let mesh = problem.jacobian.image_mesh.clone();
     let usual_radius_m = ContactSettings::of(&problem).radius_m;
     let touch = Touch::Solver { solver, detector: Box::new(detector), mesh, usual_radius_m, rows: None };

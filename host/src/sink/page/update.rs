@@ -11,7 +11,7 @@
 //! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
 //! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
 //! | s x f32 | points of the course of the readings (V) since the update before, 4 ms each |
-//! | k x (u32, 15 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
+//! | k x (u32, 16 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
 //! | 18 x f32 | with a shape: its [columns](tactomo_touch::schema::SHAPE_COLUMNS); then the contacts are beside it |
 //! | the rest | UTF-8: what was chosen, a line feed, why; nothing if the solver does not choose |
 

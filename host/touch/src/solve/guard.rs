@@ -92,7 +92,8 @@ impl Solver for Guard {
 /// # Errors
 /// [`ForwardError`] if the solver cannot be made.
 pub fn without(method: Method, problem: &Problem, faulty: &FaultyElectrodes) -> Result<Box<dyn Solver>, ForwardError> {
-    if faulty.faults.is_empty() {
+    // What was taught by all electrodes needs all of them: what is wrong with one is beside what it was taught, and flagged.
+    if faulty.faults.is_empty() || problem.is_learned(method) {
         return method.build(problem);
     }
     let electrodes = problem.detector().electrodes.len();

@@ -1,12 +1,14 @@
 //! The solvers by their names: one table, a row each.
 
 use std::fmt;
+use std::sync::Arc;
 
 use super::complete::Completing;
 use super::{
     Auto, Bsbl, ContactSettings, Contacts, KernelSolver, Lambda, Network, NetworkError, NetworkSolver, Nonlinear,
     NonlinearSettings, Nonnegative, Problem, Solver, Tikhonov, Tsvd, Tv, Variant, correct, newtons,
 };
+use crate::learned::Learned;
 use tactomo_physics::forward::ForwardError;
 
 /// A solver by its name; the order is that of the [table](Method::ALL).
@@ -277,7 +279,11 @@ const TABLE: [Row; 13] = [
                 detector: problem.detector().name.clone(),
                 what: error.to_string(),
             };
-            let solver = Network::shipped().and_then(|network| NetworkSolver::new(problem, network)).map_err(named)?;
+            let network = match problem.learned() {
+                Some(Learned::Network(network)) => Ok(Arc::clone(network)),
+                _ => Network::shipped().map(Arc::new),
+            };
+            let solver = network.and_then(|network| NetworkSolver::new(problem, network)).map_err(named)?;
             Ok(Box::new(solver))
         },
     },
@@ -350,6 +356,10 @@ impl Method {
     /// [`ForwardError`] if the model cannot give what the solver needs.
     pub fn build_with(self, problem: &Problem, parameter: Option<Parameter>) -> Result<Box<dyn Solver>, ForwardError> {
         let solver = (self.row().build)(problem, parameter)?;
+        // What was taught on the sensor itself says where and how hard by itself.
+        if self == Self::Kernel && problem.is_learned(self) {
+            return Ok(Box::new(Completing::new(problem, solver)));
+        }
         // These take what each reading says into account by themselves.
         let solver = match self {
             Self::Auto | Self::Contacts | Self::Nonlinear => solver,

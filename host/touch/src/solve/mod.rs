@@ -53,7 +53,7 @@ pub use self::method::{Family, Method, Parameter, ParameterKind};
 pub use self::network::{Network, NetworkError, NetworkSolver};
 pub use self::nonlinear::{Nonlinear, NonlinearSettings};
 pub use self::nonnegative::Nonnegative;
-pub use self::problem::Problem;
+pub use self::problem::{LearnedElsewhere, Problem};
 pub use self::shapes::{FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty};
 pub use self::still::Still;
 pub(crate) use self::still::rounding_v;
@@ -175,6 +175,8 @@ pub struct FoundContact {
     pub radius_m: Option<f64>,
     /// Force (N): on a detector with a law of force, or of a solver that was taught forces.
     pub force_n: Option<f64>,
+    /// Depth (m) that it is pressed in: of a solver that was taught depths.
+    pub depth_m: Option<f64>,
     /// Standard error of the force (N), of a law of force.
     pub force_deviation_n: Option<f64>,
     /// Whether the force is beyond the largest that the law of force can tell: then it may be more.

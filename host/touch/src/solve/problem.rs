@@ -11,7 +11,9 @@ use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Join
 use tactomo_physics::readings::Readings;
 use tactomo_physics::threads;
 
+use super::Method;
 use super::complete::Completer;
+use crate::learned::Learned;
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -23,6 +25,16 @@ pub struct Problem {
     nuisance: Arc<Unknown>,
     /// Made when readings are not whole for the first time.
     completer: Arc<OnceLock<Completer>>,
+    /// What was learned on the sensor itself.
+    learned: Option<Learned>,
+}
+
+/// Why something learned does not serve a problem.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("it learned from {channels} readings a press, but a detector with {electrodes} electrodes gives {}", electrodes * electrodes)]
+pub struct LearnedElsewhere {
+    channels: usize,
+    electrodes: usize,
 }
 
 /// What is not known of the detector; made when it is asked for first.
@@ -46,12 +58,34 @@ impl Problem {
     pub fn new(model: impl Into<Arc<dyn ForwardModel>>) -> Self {
         let model = model.into();
         let jacobian = Arc::new(Jacobian::of(&*model));
-        Self { model, jacobian, nuisance: Arc::default(), completer: Arc::default() }
+        Self { model, jacobian, nuisance: Arc::default(), completer: Arc::default(), learned: None }
     }
 
     /// The same with another linear theory, on a mesh of its own.
     pub fn with_jacobian(self, jacobian: Jacobian) -> Self {
         Self { jacobian: Arc::new(jacobian), completer: Arc::default(), ..self }
+    }
+
+    /// The same with what was learned on the sensor itself: its method takes that, in place of what it would make of the model.
+    ///
+    /// # Errors
+    /// [`LearnedElsewhere`] if it needs other readings.
+    pub fn with_learned(self, learned: Learned) -> Result<Self, LearnedElsewhere> {
+        let (channels, electrodes) = (learned.channels(), self.detector().electrodes.len());
+        match channels == electrodes * electrodes {
+            true => Ok(Self { learned: Some(learned), ..self }),
+            false => Err(LearnedElsewhere { channels, electrodes }),
+        }
+    }
+
+    /// What was learned on the sensor itself.
+    pub fn learned(&self) -> Option<&Learned> {
+        self.learned.as_ref()
+    }
+
+    /// Whether a method takes what was learned on the sensor itself.
+    pub fn is_learned(&self, method: Method) -> bool {
+        self.learned().is_some_and(|learned| learned.method() == method)
     }
 
     /// The same with drive voltage, multiplexer and converter of `detector`, and with what is not known of it.
@@ -136,6 +170,6 @@ impl Problem {
         };
         let model = Through::new(Arc::clone(&self.model), kept.to_vec(), joints.to_vec());
         let (model, jacobian) = (Arc::new(model), Arc::new(jacobian));
-        Self { model, jacobian, nuisance: Arc::default(), completer: Arc::default() }
+        Self { model, jacobian, nuisance: Arc::default(), completer: Arc::default(), learned: None }
     }
 }

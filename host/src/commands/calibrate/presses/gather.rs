@@ -74,9 +74,9 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
         file,
         detector: &args.source.detector,
         model: Model::Auto,
-        solver: Method::Contacts,
+        solver: Some(Method::Contacts),
         lambda: None,
-        presses: None,
+        taught: None,
         rest: args.reading.rest,
         unit: args.reading.unit,
         // Conductances with their constriction, as laws of force have them.

@@ -36,12 +36,12 @@ class Taker {
 
 function contact(taker) {
   const id = taker.word() || null;
-  const [x, y, z, conductanceS, ...others] = taker.floats(15);
-  const [apparentS, radiusM, forceN, forceErrorN, beyond, xErrorM, yErrorM, correlation, errorS] = others.slice(0, 9).map(known);
-  const [xM, yM] = others.slice(9);
+  const [x, y, z, conductanceS, ...others] = taker.floats(16);
+  const [apparentS, radiusM, forceN, forceErrorN, beyond, xErrorM, yErrorM, correlation, errorS, depthM] = others.slice(0, 10).map(known);
+  const [xM, yM] = others.slice(10);
   return {
     id, xM, yM, conductanceS, apparentS, radiusM, forceN, forceErrorN, beyondMaximum: beyond === 1, xErrorM, yErrorM, correlation, errorS,
-    place: [x, y, z],
+    depthM, place: [x, y, z],
   };
 }
 

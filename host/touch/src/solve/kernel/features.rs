@@ -1,50 +1,41 @@
-//! What of readings tells the place of a press: their direction, in the few dimensions that presses take up, and their size.
+//! What of readings tells the place of a press: their direction, in the dimensions that presses take up, and their size.
 
 use faer::Mat;
 
+use super::points::{Points, dot};
 use super::presses::Presses;
 use crate::solve::balance::balance;
 
-/// Most dimensions that directions are described in.
-const MOST_DIMENSIONS: usize = 24;
 /// Dimensions that hold less of the directions' variance than this share are left out.
 const LEAST_SHARE: f64 = 1e-7;
-
 /// Variance that rounding makes of directions that are all alike.
 const ROUNDING: f64 = 1e-28;
 
 /// From readings to features.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Features {
     /// Drive voltage (V), if readings are those of a detector, out of which the force is taken.
-    drive_v: Option<f64>,
-    mean: Vec<f64>,
-    /// Dimensions of directions, one after the other.
-    axes: Vec<Vec<f64>>,
+    pub drive_v: Option<f64>,
+    /// Mean direction, a number a channel.
+    pub mean: Vec<f64>,
+    /// Dimensions of directions, one after the other, a number a channel each; those in which presses differ most first.
+    pub axes: Vec<f64>,
 }
 
 /// Features of readings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Described {
-    /// Coordinates of the direction.
+    /// The direction less the mean one, a number a channel.
+    pub from_mean: Vec<f64>,
+    /// The same in the dimensions that presses take up.
     pub direction: Vec<f64>,
     /// Root of the sum of squares of the readings (V).
     pub size_v: f64,
-    /// How far the direction is from all directions that were taught: 0 to about 1.
-    pub beside: f64,
-}
-
-impl Described {
-    /// The direction, and the size's logarithm times a weight: how far apart readings are whose sizes differ by a factor e.
-    pub fn point(&self, size_weight: f64) -> Vec<f64> {
-        let size = size_weight * self.size_v.ln();
-        self.direction.iter().copied().chain([size]).collect()
-    }
 }
 
 impl Features {
-    /// Those in which presses differ; `None` if they do not.
-    pub fn of(presses: &Presses) -> Option<Self> {
+    /// Those in which presses differ, with each press; `None` if they do not.
+    pub fn of(presses: &Presses) -> Option<(Self, Vec<Described>)> {
         let drive_v = presses.drive_v;
         let directions: Vec<Vec<f64>> = presses.readings().map(|readings_v| direction(readings_v, drive_v)).collect();
         let count = directions.len();
@@ -56,18 +47,51 @@ impl Features {
         let decomposed = centred.thin_svd().ok()?;
         let squares: Vec<f64> = decomposed.S().column_vector().iter().map(|value| value * value).collect();
         let least = (LEAST_SHARE * squares.iter().sum::<f64>()).max(ROUNDING * count as f64);
-        let kept = squares.iter().take_while(|square| **square > least).count().min(MOST_DIMENSIONS);
-        let axes = (0..kept).map(|axis| decomposed.V().col(axis).iter().copied().collect()).collect();
-        (kept > 0).then_some(Self { drive_v, mean, axes })
+        let kept = squares.iter().take_while(|square| **square > least).count();
+        let axes = (0..kept).flat_map(|axis| decomposed.V().col(axis).iter().copied().collect::<Vec<_>>()).collect();
+        let features = Self { drive_v, mean, axes };
+        let described = presses.readings().map(|readings_v| features.describe(readings_v)).collect();
+        (kept > 0).then_some((features, described))
+    }
+
+    /// Number of dimensions.
+    pub fn dimensions(&self) -> usize {
+        self.axes.len() / self.mean.len().max(1)
+    }
+
+    /// The same with no more dimensions than are used.
+    pub fn keeping(mut self, dimensions: usize) -> Self {
+        self.axes.truncate(dimensions * self.mean.len());
+        self
     }
 
     /// Describes readings (V), not all of them zero.
     pub fn describe(&self, readings_v: &[f64]) -> Described {
         let mut from_mean = direction(readings_v, self.drive_v);
         from_mean.iter_mut().zip(&self.mean).for_each(|(value, mean)| *value -= mean);
-        let direction: Vec<f64> = self.axes.iter().map(|axis| dot(axis, &from_mean)).collect();
-        let beside = (dot(&from_mean, &from_mean) - dot(&direction, &direction)).max(0.0).sqrt();
-        Described { direction, size_v: size(readings_v), beside }
+        let direction = self.axes.chunks_exact(self.mean.len()).map(|axis| dot(axis, &from_mean)).collect();
+        Described { from_mean, direction, size_v: size(readings_v) }
+    }
+
+    /// What of a direction is in none of the first dimensions, a number a channel.
+    pub fn left_over(&self, described: &Described, dimensions: usize) -> Vec<f64> {
+        let mut left = described.from_mean.clone();
+        let axes = self.axes.chunks_exact(self.mean.len()).take(dimensions);
+        for (axis, along) in axes.zip(&described.direction) {
+            left.iter_mut().zip(axis).for_each(|(left, axis)| *left -= along * axis);
+        }
+        left
+    }
+}
+
+impl Points {
+    /// Of presses.
+    pub fn of(described: &[Described]) -> Self {
+        Self {
+            dimensions: described.first().map_or(0, |described| described.direction.len()),
+            coordinates: described.iter().flat_map(|described| described.direction.iter().copied()).collect(),
+            log_sizes: described.iter().map(|described| described.size_v.ln()).collect(),
+        }
     }
 }
 
@@ -85,8 +109,4 @@ fn direction(readings_v: &[f64], drive_v: Option<f64>) -> Vec<f64> {
 /// Root of the sum of squares; above zero.
 fn size(readings_v: &[f64]) -> f64 {
     dot(readings_v, readings_v).sqrt().max(f64::MIN_POSITIVE)
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use super::columns::Columns;
 use crate::solve::Problem;
 use tactomo_physics::forward::readings_v;
 use tactomo_physics::geometry::is_inside;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::Noise;
-use tactomo_table::{Array, Table, TableError};
+use tactomo_table::{Table, TableError};
 
 /// Fewest presses that anything is learned from.
 const FEWEST: usize = 10;
@@ -25,14 +26,16 @@ const EVEN_STEPS: [f64; 4] =
 pub struct Presses {
     /// Readings in each press.
     pub channels: usize,
+    /// Their names, in their order; none if the file has no names for them.
+    pub names: Vec<String>,
     /// `presses x channels` (V), less those at rest.
     pub readings_v: Vec<f64>,
     /// Middle of each contact (m).
     pub places_m: Vec<[f64; 3]>,
-    /// How hard each was, in the unit of `strength`; above zero.
+    /// How hard each was, in the unit of `strength`; above zero. None if that was not measured.
     pub strengths: Vec<f64>,
-    /// What was measured of it.
-    pub strength: Strength,
+    /// What was measured of it, if anything was.
+    pub strength: Option<Strength>,
     /// Drive voltage (V), if the channels are the readings of a detector, row by row; else nothing is taken for granted.
     pub drive_v: Option<f64>,
 }
@@ -42,8 +45,24 @@ pub struct Presses {
 pub enum Strength {
     /// Force (N).
     Force,
+    /// Depth (m) that the sensor is pressed in.
+    Depth,
     /// Contact conductance (S).
     Conductance,
+}
+
+impl Strength {
+    /// All of them, the first of which counts where a file has several.
+    pub const ALL: [Self; 3] = [Self::Force, Self::Depth, Self::Conductance];
+
+    /// Name of its column, with the unit.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Force => "force_n",
+            Self::Depth => "depth_m",
+            Self::Conductance => "conductance_s",
+        }
+    }
 }
 
 /// Why presses teach nothing.
@@ -63,37 +82,47 @@ pub enum PressesError {
 }
 
 impl Presses {
-    /// Reads a file. CSV: columns named `x_m`, `y_m`, perhaps `z_m`, and `force_n` or `conductance_s`; all others are channels, in
-    /// their order (V, less those at rest). NPZ: arrays of these names, of a number a press, and `readings_v`, of a row a press.
+    /// Reads a file. CSV: columns named `x_m`, `y_m`, perhaps `z_m`, and perhaps `force_n`, `depth_m` or `conductance_s`; which of the others are
+    /// channels (V, less those at rest) is said [there](super::columns). NPZ: arrays of these names, of a number a press, and `readings_v`, of a
+    /// row a press. With the names of a kernel's channels, these are read, in their order.
     ///
     /// # Errors
     /// [`PressesError`], which says what is missing or wrong, and where.
-    pub fn read(path: &Path) -> Result<Self, PressesError> {
+    pub fn read(path: &Path, names: &[String]) -> Result<Self, PressesError> {
         let table = Table::read(path)?;
-        Self::of(table).map_err(|what| PressesError::Content { path: path.to_owned(), what })
+        Self::of(table, names).map_err(|what| PressesError::Content { path: path.to_owned(), what })
     }
 
-    fn of(table: Table) -> Result<Self, String> {
-        let (mut known, channels, readings_v) = match table {
-            Table::Columns { names, rows } => columns(&names, &rows)?,
-            Table::Arrays(arrays) => self::arrays(arrays)?,
-        };
+    fn of(table: Table, names: &[String]) -> Result<Self, String> {
+        if matches!(&table, Table::Columns { names, .. } if names.is_empty()) {
+            return Err("the first line must name the columns: x_m, y_m, perhaps force_n, and the channels".to_owned());
+        }
+        let Columns { mut known, names, readings } = Columns::of(table, names)?;
         let mut take = |name: &str| {
             let index = known.iter().position(|(known, _)| known == name)?;
             Some(known.swap_remove(index).1)
         };
-        let needed = || "columns or arrays x_m and y_m, and force_n or conductance_s, are needed".to_owned();
+        let needed = || "columns or arrays x_m and y_m are needed: where each press is".to_owned();
         let (Some(x_m), Some(y_m)) = (take("x_m"), take("y_m")) else { return Err(needed()) };
         let z_m = take("z_m").unwrap_or_else(|| vec![0.0; x_m.len()]);
-        let force = take("force_n").map(|strengths| (Strength::Force, strengths));
-        let measured = force.or_else(|| Some((Strength::Conductance, take("conductance_s")?)));
-        let (strength, strengths) = measured.ok_or_else(needed)?;
-        if [&y_m, &z_m, &strengths].iter().any(|column| column.len() != x_m.len()) {
+        let strength = Strength::ALL.into_iter().find_map(|strength| Some((strength, take(strength.name())?)));
+        let lengths = [Some(&y_m), Some(&z_m), strength.as_ref().map(|(_, strengths)| strengths)];
+        if lengths.into_iter().flatten().any(|column| column.len() != x_m.len()) {
             return Err("x_m, y_m, z_m and the strength have different lengths".to_owned());
         }
-        let places_m = (0..x_m.len()).map(|i| [x_m[i], y_m[i], z_m[i]]).collect();
-        let presses = Self { channels, readings_v, places_m, strengths, strength, drive_v: None };
-        presses.check()?;
+        if readings.rows() != x_m.len() {
+            return Err(format!("{} places, but {} rows of readings", x_m.len(), readings.rows()));
+        }
+        let presses = Self {
+            channels: readings.columns(),
+            names,
+            readings_v: readings.values,
+            places_m: (0..x_m.len()).map(|i| [x_m[i], y_m[i], z_m[i]]).collect(),
+            strength: strength.as_ref().map(|(strength, _)| *strength),
+            strengths: strength.map_or_else(Vec::new, |(_, strengths)| strengths),
+            drive_v: None,
+        };
+        presses.check_each()?;
         Ok(presses)
     }
 
@@ -116,11 +145,20 @@ impl Presses {
         if count < FEWEST {
             return Err(format!("{count} presses, but {FEWEST} at least are needed; some hundreds are good"));
         }
+        self.check_each()
+    }
+
+    /// Whether each of them can be read.
+    fn check_each(&self) -> Result<(), String> {
+        let count = self.count();
         if self.drive_v.is_some() && self.channels.isqrt().pow(2) != self.channels {
             return Err(format!("{} channels are not the readings of a detector", self.channels));
         }
-        if self.channels == 0 || self.readings_v.len() != count * self.channels || self.strengths.len() != count {
-            return Err(format!("{count} places, but readings or strengths are not as many"));
+        if self.channels == 0 || self.readings_v.len() != count * self.channels {
+            return Err(format!("{count} places, but readings are not as many"));
+        }
+        if self.strengths.len() != self.strength.map_or(0, |_| count) {
+            return Err(format!("{count} places, but {} strengths", self.strengths.len()));
         }
         for (press, readings) in self.readings().enumerate() {
             if let Some(channel) = readings.iter().position(|volts| !volts.is_finite()) {
@@ -129,8 +167,8 @@ impl Presses {
             if readings.iter().all(|volts| *volts == 0.0) {
                 return Err(format!("press {press}: all readings are zero"));
             }
-            let (place_m, strength) = (self.places_m[press], self.strengths[press]);
-            if !(place_m.iter().all(|at| at.is_finite()) && strength.is_finite() && strength > 0.0) {
+            let is_strong = self.strengths.get(press).is_none_or(|strength| strength.is_finite() && *strength > 0.0);
+            if !(self.places_m[press].iter().all(|at| at.is_finite()) && is_strong) {
                 return Err(format!("press {press}: a finite place and a strength above zero are needed"));
             }
         }
@@ -143,10 +181,11 @@ impl Presses {
         let mut noise = Noise::new(1);
         let mut presses = Self {
             channels: detector.electrodes.len().pow(2),
+            names: Vec::new(),
             readings_v: Vec::new(),
             places_m: Vec::new(),
             strengths: Vec::new(),
-            strength: Strength::Conductance,
+            strength: Some(Strength::Conductance),
             drive_v: Some(detector.drive_v),
         };
         // Most outlines fill more than a quarter of their bounding boxes.
@@ -181,42 +220,10 @@ fn simulated_contact(problem: &Problem, index: usize) -> Option<Contact> {
     Some(Contact { z_m, ..Contact::flat(x_m, y_m, radius_m, conductance_s) })
 }
 
-/// Columns by their names, the number of channels, and the readings.
-type Parts = (Vec<(String, Vec<f64>)>, usize, Vec<f64>);
-
-/// Names of columns that are no channels.
-const KNOWN: [&str; 5] = ["x_m", "y_m", "z_m", "force_n", "conductance_s"];
-
-fn columns(names: &[String], rows: &Array) -> Result<Parts, String> {
-    if names.is_empty() {
-        return Err(
-            "the first line must name the columns: x_m, y_m, force_n or conductance_s, and the channels".to_owned()
-        );
-    }
-    let is_known = |index: &usize| KNOWN.contains(&names[*index].as_str());
-    let (known, channels): (Vec<usize>, Vec<usize>) = (0..names.len()).partition(is_known);
-    let column = |&index: &usize| rows.values.chunks_exact(names.len()).map(move |row| row[index]).collect();
-    let readings_v = rows.values.chunks_exact(names.len()).flat_map(|row| channels.iter().map(|&index| row[index]));
-    let named = known.iter().map(|index| (names[*index].clone(), column(index))).collect();
-    Ok((named, channels.len(), readings_v.collect()))
-}
-
-fn arrays(arrays: Vec<(String, Array)>) -> Result<Parts, String> {
-    let (mut known, mut readings) = (Vec::new(), None);
-    for (name, array) in arrays {
-        match name.as_str() {
-            "readings_v" => readings = Some(array),
-            known_name if KNOWN.contains(&known_name) => known.push((name, array.values)),
-            _ => {}
-        }
-    }
-    let readings = readings.ok_or("an array readings_v, a row a press, is needed")?;
-    Ok((known, readings.columns(), readings.values))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tactomo_table::Array;
 
     fn text(rows: usize) -> String {
         let row = |i: usize| format!("{i}e-3,{},-0.001,0.5,{i}\n", i + 1);
@@ -224,13 +231,13 @@ mod tests {
     }
 
     fn parsed(text: &str) -> Result<Presses, String> {
-        Presses::of(Table::parse(text.as_bytes())?)
+        Presses::of(Table::parse(text.as_bytes())?, &[])
     }
 
     #[test]
     fn columns_are_found_by_their_names() {
         let presses = parsed(&text(12)).unwrap();
-        assert_eq!((presses.count(), presses.channels, presses.strength), (12, 2, Strength::Force));
+        assert_eq!((presses.count(), presses.channels, presses.strength), (12, 2, Some(Strength::Force)));
         assert_eq!(presses.readings().nth(3), Some(&[4.0, 3.0][..]));
         assert_eq!(presses.places_m[3], [0.003, -0.001, 0.0]);
     }
@@ -240,17 +247,16 @@ mod tests {
         let column = |name: &str, value: f64| (name.to_owned(), Array::flat(vec![value; 10]));
         let readings = ("readings_v".to_owned(), Array { shape: vec![10, 2, 2], values: vec![0.1; 40] });
         let arrays = vec![column("y_m", 1.0), column("conductance_s", 2e-4), readings, column("x_m", 0.5)];
-        let presses = Presses::of(Table::Arrays(arrays.clone())).unwrap();
-        assert_eq!((presses.channels, presses.strength), (4, Strength::Conductance));
+        let presses = Presses::of(Table::Arrays(arrays.clone()), &[]).unwrap();
+        assert_eq!((presses.channels, presses.strength), (4, Some(Strength::Conductance)));
         assert_eq!(presses.places_m[9], [0.5, 1.0, 0.0]);
-        let without = Presses::of(Table::Arrays(arrays[1..].to_vec())).unwrap_err();
+        let without = Presses::of(Table::Arrays(arrays[1..].to_vec()), &[]).unwrap_err();
         assert!(without.contains("x_m and y_m"), "{without}");
     }
 
     #[test]
     fn what_teaches_nothing_is_told() {
         for (text, told) in [
-            (text(9), "9 presses, but 10 at least"),
             ("1,2,3\n4,5,6".to_owned(), "first line must name the columns"),
             (text(12).replace("x_m", "x_mm"), "x_m and y_m"),
             (text(12).replace(",0.5,", ",0,"), "press 0: a finite place and a strength above zero"),

@@ -1,165 +1,266 @@
-//! Regression with a Gaussian kernel, its width and its ridge chosen by leaving one out.
+//! Regression with a Gaussian kernel, its parameters chosen by leaving one out.
 //!
-//! With `K[i][j] = exp(-|p_i - p_j|^2 / (2 w^2))` between points and the ridge `m`, a value at `p` is
-//! `mean + sum_i K(p, p_i) a_i`, `a = (K + m)^-1 (y - mean)`. Left out, point `i` is missed by `a_i / ((K + m)^-1)_ii`: in closed form, so
-//! that parameters are judged without fitting anew (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006, eq. 5.12).
+//! With `K[i][j]` the kernel of two presses, `M` the diagonal matrix of ridges, a value is `mean + sum_i K(p, p_i) a_i`, `a = (K + M)^-1 (y - mean)`. Left
+//! out, press `i` is missed by `a_i / ((K + M)^-1)_ii`: in closed form, so that parameters are judged without fitting anew (Rasmussen and
+//! Williams, "Gaussian Processes for Machine Learning", 2006, eq. 5.12). With the Cholesky factor `K + M = L L'`, the diagonal is the sum of
+//! squares of the columns of `L^-1`.
+//!
+//! Noise is the same in all readings, so that it turns the direction of light presses more than that of firm ones: by its share of their size.
+//! The ridge, which stands for the variance of noise, of a press is that of all over the square of its size in medians.
 
-use faer::linalg::solvers::DenseSolveCore;
-use faer::{Mat, Side};
+use faer::linalg::triangular_inverse::invert_lower_triangular;
+use faer::{Mat, Par, Side};
 
+use super::points::{Likeness, Points};
+
+/// Numbers of coordinates that are tried: on five public skins of 192 channels, each of these was the best of one.
+const COMPONENTS: [usize; 5] = [12, 24, 48, 96, usize::MAX];
 /// Widths that are tried, in medians of the distance between points.
-const WIDTHS: [f64; 5] = [0.15, 0.3, 0.6, 1.2, 2.4];
+const WIDTHS: [f64; 6] = [0.15, 0.3, 0.6, 1.2, 2.4, 4.8];
 /// Ridges that are tried.
-const RIDGES: [f64; 6] = [1e-8, 1e-6, 1e-5, 1e-4, 1e-2, 0.1];
-/// Ridge with which widths are compared.
-const USUAL_RIDGE: f64 = 1e-3;
-/// Points of a space of some dimensions, one after the other.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Points {
-    /// Coordinates of each.
-    pub dimensions: usize,
-    /// All of them.
-    pub values: Vec<f64>,
-}
-
-impl Points {
-    /// One after the other.
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = &[f64]> {
-        self.values.chunks_exact(self.dimensions)
-    }
-
-    /// Number of points.
-    pub fn count(&self) -> usize {
-        self.iter().len()
-    }
-}
-
-fn square(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
-}
+const RIDGES: [f64; 7] = [1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1];
+/// How many presses parameters are tried on, and how many of the best go on to the next round: to try everything on 1800 presses would take a minute.
+const ROUNDS: [(usize, usize); 2] = [(200, 20), (500, 1)];
+/// From the best of the last round, neighbours are tried on all presses, as long as one is better: so many at most.
+const MOST_NEIGHBOURS: usize = 6;
+/// Smallest and largest ridge of a press, in that of all.
+const DOUBTS: [f64; 2] = [0.03, 30.0];
 
 /// A regression that has learned.
-#[derive(Clone, Debug)]
-pub struct Regression {
-    /// What it has learned from.
-    pub points: Points,
-    /// `1 / (2 w^2)`.
-    narrowness: f64,
-    /// Means of the targets.
-    means: Vec<f64>,
-    /// `points x targets`, row by row.
-    weights: Vec<f64>,
-    /// What was chosen, and how good it is.
-    pub chosen: Chosen,
-}
-
-/// Parameters, and what leaving one out says of them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Chosen {
-    /// Width of the kernel.
-    pub width: f64,
-    /// Ridge.
+pub struct Regression {
+    /// Which presses are alike.
+    pub likeness: Likeness,
+    /// Ridge of a press of median size.
     pub ridge: f64,
+    /// Means of the targets.
+    pub means: Vec<f64>,
+    /// `points x targets`, row by row.
+    pub weights: Vec<f64>,
     /// Root mean square of what is missed when a point is left out, for each target.
     pub left_out: Vec<f64>,
-    /// Mean over the targets of its square in variances.
-    score: f64,
+}
+
+/// Parameters to try: where they are in [`COMPONENTS`], [`WIDTHS`] and [`RIDGES`].
+type Choice = [usize; 3];
+
+/// What a choice stands for.
+#[derive(Clone, Debug)]
+struct Grid {
+    /// Numbers of coordinates that there are.
+    components: Vec<usize>,
+    /// Median distance of points in each.
+    medians: Vec<f64>,
+    size_weight: f64,
+}
+
+impl Grid {
+    fn likeness(&self, [components, width, _]: Choice) -> Likeness {
+        let width = WIDTHS[width] * self.medians[components];
+        Likeness { components: self.components[components], size_weight: self.size_weight, width }
+    }
+
+    fn all(&self) -> Vec<Choice> {
+        let widths = (0..self.components.len()).flat_map(|number| (0..WIDTHS.len()).map(move |width| (number, width)));
+        widths.flat_map(|(number, width)| (0..RIDGES.len()).map(move |ridge| [number, width, ridge])).collect()
+    }
+
+    /// Those that differ by a step in one parameter.
+    fn neighbours(&self, choice: Choice) -> Vec<Choice> {
+        let lengths = [self.components.len(), WIDTHS.len(), RIDGES.len()];
+        // Ridges first: that is what more presses change most.
+        let steps = [2, 1, 0].into_iter().flat_map(|axis: usize| {
+            let at = choice[axis];
+            [at.checked_sub(1), Some(at + 1).filter(|next| *next < lengths[axis])].map(|next| (axis, next))
+        });
+        let moved = |(axis, next): (usize, Option<usize>)| {
+            let mut moved = choice;
+            moved[axis] = next?;
+            Some(moved)
+        };
+        steps.filter_map(moved).collect()
+    }
 }
 
 /// What is learned from.
-struct Lesson<'a> {
-    points: &'a Points,
-    squares: Mat<f64>,
-    /// `points x targets`, less their means.
-    targets: Mat<f64>,
-    variances: Vec<f64>,
+pub struct Lesson<'a> {
+    /// The presses.
+    pub points: &'a Points,
+    /// `points x count`, row by row.
+    pub targets: &'a [f64],
+    /// Targets of each press.
+    pub count: usize,
+    /// What a factor e in size counts for.
+    pub size_weight: f64,
+}
+
+/// What solving for the weights gives.
+struct Solved {
+    /// `presses x targets`, row by row.
+    weights: Vec<f64>,
+    /// Mean square of what is missed of each target when a press is left out.
+    missed: Vec<f64>,
+}
+
+/// Ridge of each press over that of a press of median size.
+pub fn doubts(points: &Points) -> Vec<f64> {
+    let mut sorted = points.log_sizes.clone();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted.get(sorted.len() / 2).copied().unwrap_or_default();
+    let doubt = |log_size: &f64| (2.0 * (median - log_size)).exp().clamp(DOUBTS[0], DOUBTS[1]);
+    points.log_sizes.iter().map(doubt).collect()
 }
 
 impl Regression {
-    /// Learns targets (`points x targets`, row by row) at points; `None` if these are all alike, or no parameters serve.
-    pub fn learn(points: Points, targets: &[f64], count: usize) -> Option<Self> {
-        let rows = points.count();
-        let mean = |target: usize| (0..rows).map(|row| targets[row * count + target]).sum::<f64>() / rows as f64;
-        let means: Vec<f64> = (0..count).map(mean).collect();
-        let targets = Mat::from_fn(rows, count, |row, target| targets[row * count + target] - means[target]);
-        let lesson = Lesson::new(&points, targets);
-        let chosen = lesson.choose()?;
-        let (weights, _) = lesson.weights(chosen.width, chosen.ridge)?;
-        let weights = (0..rows * count).map(|index| weights[(index / count, index % count)]).collect();
-        Some(Self { narrowness: 0.5 / chosen.width.powi(2), points, means, weights, chosen })
+    /// Learns; `None` if the presses are all alike, or no parameters serve.
+    pub fn learn(lesson: &Lesson<'_>) -> Option<Self> {
+        let means = lesson.means();
+        let (likeness, ridge) = lesson.choose(&means)?;
+        let all: Vec<usize> = (0..lesson.points.count()).collect();
+        let kernel = lesson.kernel(&lesson.squares(&all, likeness.components), &all, likeness);
+        let Solved { weights, missed } = lesson.solve(&kernel, &all, ridge, &means)?;
+        let left_out = missed.iter().map(|square| square.sqrt()).collect();
+        Some(Self { likeness, ridge, means, weights, left_out })
     }
 
-    /// Kernels of a point with all that were learned from.
-    pub fn kernels(&self, point: &[f64]) -> Vec<f64> {
-        self.points.iter().map(|known| (-self.narrowness * square(known, point)).exp()).collect()
-    }
-
-    /// The targets at a point of such kernels.
-    pub fn values(&self, kernels: &[f64]) -> Vec<f64> {
+    /// The targets of readings whose directions have such squares of the distance to those of the presses, and of such a size.
+    pub fn values(&self, points: &Points, squares: &[f64], log_size: f64) -> Vec<f64> {
         let mut values = self.means.clone();
-        for (kernel, weights) in kernels.iter().zip(self.weights.chunks_exact(self.means.len())) {
+        let known = squares.iter().zip(&points.log_sizes).zip(self.weights.chunks_exact(self.means.len()));
+        for ((square, known_log_size), weights) in known {
+            let kernel = self.likeness.of(*square, log_size - known_log_size);
             values.iter_mut().zip(weights).for_each(|(value, weight)| *value += kernel * weight);
         }
         values
     }
 }
 
-impl<'a> Lesson<'a> {
-    fn new(points: &'a Points, targets: Mat<f64>) -> Self {
-        let all: Vec<&[f64]> = points.iter().collect();
-        let squares = Mat::from_fn(all.len(), all.len(), |i, j| square(all[i], all[j]));
-        let variance =
-            |target: usize| targets.col(target).iter().map(|value| value * value).sum::<f64>() / all.len() as f64;
-        let variances = (0..targets.ncols()).map(variance).collect();
-        Self { points, squares, targets, variances }
+impl Lesson<'_> {
+    fn means(&self) -> Vec<f64> {
+        let rows = self.points.count() as f64;
+        (0..self.count).map(|target| self.targets.iter().skip(target).step_by(self.count).sum::<f64>() / rows).collect()
     }
 
-    /// The best width with the usual ridge, then the best ridge with it.
-    fn choose(&self) -> Option<Chosen> {
-        let median = self.median_distance()?;
-        let best = |tried: Vec<Chosen>| tried.into_iter().min_by(|a, b| a.score.total_cmp(&b.score));
-        let widths = WIDTHS.iter().filter_map(|share| self.judge(share * median, USUAL_RIDGE)).collect();
-        let with_width = best(widths)?;
-        let ridges = RIDGES.iter().filter_map(|&ridge| self.judge(with_width.width, ridge));
-        best(ridges.chain([with_width.clone()]).collect())
+    /// The likeness and the ridge that miss least: the sum of squares over all targets, in their own unit, so that one that hardly varies counts
+    /// for little.
+    fn choose(&self, means: &[f64]) -> Option<(Likeness, f64)> {
+        // In a fixed random order, for presses are often made along rows.
+        let mut order: Vec<usize> = (0..self.points.count()).collect();
+        fastrand::Rng::with_seed(1).shuffle(&mut order);
+        let grid = self.grid(&order)?;
+        let mut tried = grid.all();
+        for (most, kept) in ROUNDS {
+            let part = &order[..most.min(order.len())];
+            tried.sort_unstable();
+            let mut judged = self.judge(part, &grid, &tried, means);
+            judged.sort_by(|a, b| a.0.total_cmp(&b.0));
+            tried = judged.into_iter().map(|(_, choice)| choice).take(kept).collect();
+            if part.len() == order.len() {
+                break;
+            }
+        }
+        let chosen = self.climb(&order, &grid, *tried.first()?, means);
+        Some((grid.likeness(chosen), RIDGES[chosen[2]]))
     }
 
-    fn median_distance(&self) -> Option<f64> {
-        let rows = self.points.count();
-        let mut squares: Vec<f64> = (1..rows).map(|row| self.squares[(row, row / 2)]).collect();
-        squares.sort_by(f64::total_cmp);
-        squares.get(rows / 2).map(|square| square.sqrt()).filter(|distance| *distance > 0.0)
-    }
-
-    /// What leaving one out says of parameters; `None` if they cannot be used.
-    fn judge(&self, width: f64, ridge: f64) -> Option<Chosen> {
-        let (weights, diagonal) = self.weights(width, ridge)?;
-        let rows = diagonal.len();
-        let missed = |target: usize| {
-            let square: f64 = (0..rows).map(|row| (weights[(row, target)] / diagonal[row]).powi(2)).sum();
-            square / rows as f64
+    /// The best on all presses that steps from a choice lead to.
+    fn climb(&self, order: &[usize], grid: &Grid, from: Choice, means: &[f64]) -> Choice {
+        let judged = |choice: Choice| {
+            self.judge(order, grid, &[choice], means).first().map_or(f64::INFINITY, |(missed, _)| *missed)
         };
-        let squares: Vec<f64> = (0..self.targets.ncols()).map(missed).collect();
-        let shares =
-            squares.iter().zip(&self.variances).map(|(square, variance)| square / variance.max(f64::MIN_POSITIVE));
-        let score = shares.sum::<f64>() / squares.len() as f64;
-        let left_out = squares.iter().map(|square| square.sqrt()).collect();
-        score.is_finite().then_some(Chosen { width, ridge, left_out, score })
+        let (mut best, mut tried) = ((judged(from), from), vec![from]);
+        while let Some(next) = grid.neighbours(best.1).into_iter().find(|next| !tried.contains(next)) {
+            if tried.len() > MOST_NEIGHBOURS {
+                break;
+            }
+            tried.push(next);
+            let missed = judged(next);
+            if missed < best.0 {
+                best = (missed, next);
+            }
+        }
+        best.1
     }
 
-    fn kernel(&self, width: f64, ridge: f64) -> Mat<f64> {
-        let narrowness = 0.5 / (width * width);
-        let rows = self.squares.nrows();
-        Mat::from_fn(rows, rows, |i, j| (-narrowness * self.squares[(i, j)]).exp() + if i == j { ridge } else { 0.0 })
+    /// `None` if most points are the same.
+    fn grid(&self, order: &[usize]) -> Option<Grid> {
+        let mut components = COMPONENTS.map(|components| self.points.used(components)).to_vec();
+        components.dedup();
+        let medians = components.iter().map(|components| self.median_distance(order, *components));
+        let medians = medians.collect::<Option<Vec<f64>>>()?;
+        Some(Grid { components, medians, size_weight: self.size_weight })
     }
 
-    /// `(K + m)^-1` times the targets, and its diagonal; `None` if it is singular to rounding.
-    fn weights(&self, width: f64, ridge: f64) -> Option<(Mat<f64>, Vec<f64>)> {
-        let inverse = self.kernel(width, ridge).llt(Side::Lower).ok()?.inverse();
-        let rows = inverse.nrows();
-        let diagonal: Vec<f64> = (0..rows).map(|row| inverse[(row, row)]).collect();
-        let usable = diagonal.iter().all(|value| value.is_finite() && *value > 0.0);
-        usable.then(|| (&inverse * &self.targets, diagonal))
+    /// Of neighbours in a random order.
+    fn median_distance(&self, order: &[usize], components: usize) -> Option<f64> {
+        let distance = |pair: &[usize]| {
+            let [a, b] = [pair[0], pair[1]];
+            let sizes = self.size_weight * (self.points.log_sizes[a] - self.points.log_sizes[b]);
+            let square = super::points::square(&self.points.at(a)[..components], &self.points.at(b)[..components]);
+            (square + sizes * sizes).sqrt()
+        };
+        let mut distances: Vec<f64> = order.windows(2).map(distance).collect();
+        distances.sort_by(f64::total_cmp);
+        distances.get(distances.len() / 2).copied().filter(|distance| *distance > 0.0)
+    }
+
+    /// What leaving one of some presses out says of each choice that can be used; choices rise.
+    fn judge(&self, part: &[usize], grid: &Grid, tried: &[Choice], means: &[f64]) -> Vec<(f64, Choice)> {
+        let mut judged = Vec::with_capacity(tried.len());
+        let (mut squares, mut summed) = (Mat::zeros(part.len(), part.len()), 0);
+        for alike in tried.chunk_by(|a, b| a[..2] == b[..2]) {
+            let likeness = grid.likeness(alike[0]);
+            if likeness.components > summed {
+                self.points.add_squares(&mut squares, part, summed..likeness.components);
+                summed = likeness.components;
+            }
+            let kernel = self.kernel(&squares, part, likeness);
+            for choice in alike {
+                let solved = self.solve(&kernel, part, RIDGES[choice[2]], means);
+                let missed = solved.map(|solved| solved.missed.iter().sum::<f64>());
+                judged.extend(missed.filter(|missed| missed.is_finite()).map(|missed| (missed, *choice)));
+            }
+        }
+        judged
+    }
+
+    fn squares(&self, part: &[usize], components: usize) -> Mat<f64> {
+        let mut squares = Mat::zeros(part.len(), part.len());
+        self.points.add_squares(&mut squares, part, 0..components);
+        squares
+    }
+
+    /// The lower half of the kernel's matrix.
+    fn kernel(&self, squares: &Mat<f64>, part: &[usize], likeness: Likeness) -> Mat<f64> {
+        let log_sizes: Vec<f64> = part.iter().map(|&press| self.points.log_sizes[press]).collect();
+        Mat::from_fn(part.len(), part.len(), |row, column| {
+            if row < column {
+                return 0.0;
+            }
+            likeness.of(squares[(row, column)].max(0.0), log_sizes[row] - log_sizes[column])
+        })
+    }
+
+    /// Weights, and what is missed of a press that is left out; `None` if the matrix is singular to rounding.
+    fn solve(&self, kernel: &Mat<f64>, part: &[usize], ridge: f64, means: &[f64]) -> Option<Solved> {
+        let (rows, doubts) = (part.len(), doubts(self.points));
+        let mut matrix = kernel.clone();
+        part.iter().enumerate().for_each(|(row, &press)| matrix[(row, row)] += ridge * doubts[press]);
+        let factor = matrix.llt(Side::Lower).ok()?;
+        let mut inverse = Mat::zeros(rows, rows);
+        invert_lower_triangular(inverse.as_mut(), factor.L(), Par::Seq);
+        let target = |row: usize, target: usize| self.targets[part[row] * self.count + target] - means[target];
+        let weights = inverse.transpose() * (&inverse * Mat::from_fn(rows, self.count, target));
+        let mut missed = vec![0.0; self.count];
+        for row in 0..rows {
+            let diagonal = inverse.col(row).squared_norm_l2();
+            missed.iter_mut().enumerate().for_each(|(target, missed)| {
+                *missed += (weights[(row, target)] / diagonal).powi(2) / rows as f64;
+            });
+        }
+        let weights: Vec<f64> =
+            (0..rows).flat_map(|row| weights.row(row).iter().copied().collect::<Vec<_>>()).collect();
+        weights.iter().all(|weight| weight.is_finite()).then_some(Solved { weights, missed })
     }
 }
 
@@ -167,65 +268,99 @@ impl<'a> Lesson<'a> {
 mod tests {
     use super::*;
 
-    fn points() -> Points {
+    fn points(dimensions: usize) -> Points {
         let even = |i: u32| [0.754_877_666, 0.569_840_291].map(|step| (f64::from(i) * step).fract());
-        Points { dimensions: 2, values: (0..60).flat_map(even).collect() }
+        // Further coordinates are noise.
+        let noise =
+            |i: u32| (2..dimensions as u32).map(move |axis| 0.3 * (f64::from(i * i * axis) * 0.618_034).fract());
+        let coordinates = (0..60).flat_map(|i| even(i).into_iter().chain(noise(i))).collect();
+        Points { dimensions, coordinates, log_sizes: (0..60).map(|i| f64::from(i % 7) * 0.1).collect() }
     }
 
     fn targets(points: &Points, noise: f64) -> Vec<f64> {
-        let of = |(index, point): (usize, &[f64])| {
-            let wiggle = noise * if index % 2 == 0 { 1.0 } else { -1.0 };
+        let of = |index: usize| {
+            let (point, wiggle) = (points.at(index), noise * if index.is_multiple_of(2) { 1.0 } else { -1.0 });
             [(3.0 * point[0]).sin() + point[1] + wiggle, point[0] * point[1]]
         };
-        points.iter().enumerate().flat_map(of).collect()
+        (0..points.count()).flat_map(of).collect()
+    }
+
+    fn lesson<'a>(points: &'a Points, targets: &'a [f64]) -> Lesson<'a> {
+        Lesson { points, targets, count: 2, size_weight: 0.0 }
     }
 
     #[test]
     fn a_smooth_function_is_learned() {
-        let points = points();
-        let regression = Regression::learn(points.clone(), &targets(&points, 0.0), 2).unwrap();
-        let values = regression.values(&regression.kernels(&[0.4, 0.55]));
+        let points = points(2);
+        let regression = Regression::learn(&lesson(&points, &targets(&points, 0.0))).unwrap();
+        let [squares, _] = points.squares_to(&[0.4, 0.55], 2, 2);
+        let values = regression.values(&points, &squares, 0.0);
         assert!((values[0] - (1.2f64.sin() + 0.55)).abs() < 0.01 && (values[1] - 0.22).abs() < 0.01, "{values:?}");
     }
 
     #[test]
     fn leaving_one_out_in_closed_form_is_leaving_one_out() {
-        let points = points();
+        let points = points(2);
         let all = targets(&points, 0.05);
-        let lesson = |points: &Points, targets: &[f64]| {
-            let rows = points.count();
-            let targets = Mat::from_fn(rows, 2, |row, target| targets[row * 2 + target]);
-            let (weights, diagonal) = Lesson::new(points, targets).weights(0.4, 1e-3).unwrap();
-            (weights, diagonal)
+        let lesson = lesson(&points, &all);
+        let likeness = Likeness { components: 2, size_weight: 0.0, width: 0.4 };
+        let solved = |part: &[usize]| {
+            lesson.solve(&lesson.kernel(&lesson.squares(part, 2), part, likeness), part, 1e-3, &[0.0; 2]).unwrap()
         };
-        let (weights, diagonal) = lesson(&points, &all);
-        for left_out in [0, 7, 29] {
-            let others = |values: &[f64]| {
-                let rows = values.chunks_exact(2).enumerate().filter(|(row, _)| *row != left_out);
-                rows.flat_map(|(_, values)| values.to_vec()).collect::<Vec<f64>>()
-            };
-            let rest = Points { dimensions: 2, values: others(&points.values) };
-            let (fewer, _) = lesson(&rest, &others(&all));
-            let at = &points.values[2 * left_out..][..2];
-            let predicted: f64 =
-                rest.iter().enumerate().map(|(i, point)| (-square(point, at) / 0.32).exp() * fewer[(i, 0)]).sum();
-            let missed = all[2 * left_out] - predicted;
-            assert!((missed - weights[(left_out, 0)] / diagonal[left_out]).abs() < 1e-8, "{left_out}");
+        let presses: Vec<usize> = (0..points.count()).collect();
+        let mut missed = [0.0; 2];
+        for left_out in 0..points.count() {
+            let rest: Vec<usize> = presses.iter().copied().filter(|press| *press != left_out).collect();
+            let fewer = solved(&rest).weights;
+            for (target, missed) in missed.iter_mut().enumerate() {
+                let one = |(row, &press): (usize, &usize)| {
+                    likeness.of(super::super::points::square(points.at(press), points.at(left_out)), 0.0)
+                        * fewer[2 * row + target]
+                };
+                let predicted: f64 = rest.iter().enumerate().map(one).sum();
+                *missed += (all[2 * left_out + target] - predicted).powi(2) / points.count() as f64;
+            }
         }
+        let closed = solved(&presses).missed;
+        assert!(closed.iter().zip(missed).all(|(a, b)| (a / b - 1.0).abs() < 1e-6), "{closed:?} {missed:?}");
     }
 
     #[test]
-    fn noise_asks_for_a_ridge_and_what_is_left_out_tells_of_it() {
-        let points = points();
-        let chosen = |noise| Regression::learn(points.clone(), &targets(&points, noise), 2).unwrap().chosen;
-        let (clean, noisy) = (chosen(0.0), chosen(0.2));
-        assert!(noisy.ridge > clean.ridge, "{noisy:?} {clean:?}");
-        assert!(clean.left_out[0] < 0.02 && noisy.left_out[0] > 0.1, "{noisy:?} {clean:?}");
+    fn noise_is_not_learned_and_what_is_left_out_tells_of_it() {
+        let points = points(2);
+        let noisy = targets(&points, 0.2);
+        let learned = |targets: &[f64]| Regression::learn(&lesson(&points, targets)).unwrap();
+        let (clean, of_noise) = (learned(&targets(&points, 0.0)), learned(&noisy));
+        assert!(clean.left_out[0] < 0.02 && of_noise.left_out[0] > 0.1, "{:?} {:?}", clean.left_out, of_noise.left_out);
+        let beside = |press: usize| {
+            let [squares, _] = points.squares_to(points.at(press), 2, 2);
+            (of_noise.values(&points, &squares, points.log_sizes[press])[0] - noisy[2 * press]).powi(2)
+        };
+        let square = (0..points.count()).map(beside).sum::<f64>() / points.count() as f64;
+        assert!(square.sqrt() > 0.1, "it goes through the noise: {square}");
+    }
+
+    #[test]
+    fn coordinates_that_tell_nothing_are_left_out() {
+        let points = points(60);
+        let regression = Regression::learn(&lesson(&points, &targets(&points, 0.0))).unwrap();
+        assert_eq!(regression.likeness.components, 12, "{regression:?}");
+    }
+
+    #[test]
+    fn a_target_that_hardly_varies_does_not_choose_for_the_others() {
+        let points = points(2);
+        let even = targets(&points, 0.0);
+        let with_noise: Vec<f64> =
+            even.chunks_exact(2).enumerate().flat_map(|(i, pair)| [pair[0], 1e-6 * ((i * i) % 13) as f64]).collect();
+        let alone: Vec<f64> = even.iter().step_by(2).flat_map(|value| [*value, 0.0]).collect();
+        let [noisy, alone] = [with_noise, alone].map(|targets| Regression::learn(&lesson(&points, &targets)).unwrap());
+        assert_eq!((noisy.likeness, noisy.ridge), (alone.likeness, alone.ridge));
     }
 
     #[test]
     fn points_that_are_all_alike_teach_nothing() {
-        let points = Points { dimensions: 1, values: vec![0.5; 20] };
-        assert!(Regression::learn(points, &[1.0; 20], 1).is_none());
+        let points = Points { dimensions: 1, coordinates: vec![0.5; 20], log_sizes: vec![0.0; 20] };
+        assert!(Regression::learn(&lesson(&points, &[1.0; 40])).is_none());
     }
 }

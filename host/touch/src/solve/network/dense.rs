@@ -4,7 +4,7 @@
 const TOGETHER: usize = 4;
 
 /// Weights and biases of a layer.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Dense {
     outputs: usize,
     /// `inputs x outputs`, an input's row after the other.

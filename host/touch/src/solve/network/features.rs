@@ -10,7 +10,7 @@ use tactomo_physics::readings::Readings;
 const SMALLEST: f64 = 1e-6;
 
 /// Means and deviations that features are standardised with.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Features {
     mean: Vec<f32>,
     deviation: Vec<f32>,

@@ -113,7 +113,7 @@ fn format(error: safetensors::SafeTensorError) -> NetworkError {
 fn metadata(bytes: &[u8]) -> Result<String, NetworkError> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(format)?;
     let field = |field: &str| metadata.metadata().as_ref().and_then(|fields| fields.get(field).cloned());
-    for (name, expected) in [("tactomo", "network"), ("version", VERSION)] {
+    for (name, expected) in [("tactomo", Network::KIND), ("version", VERSION)] {
         let found = field(name);
         if found.as_deref() != Some(expected) {
             let found = found.map_or("missing".to_owned(), |found| format!("`{}`", found.escape_debug()));

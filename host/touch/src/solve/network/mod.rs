@@ -10,6 +10,8 @@ mod file;
 mod grid;
 mod peaks;
 
+use std::sync::Arc;
+
 use self::dense::Dense;
 use self::features::Features;
 pub use self::file::NetworkError;
@@ -37,7 +39,7 @@ const SIZES_BEYOND: f32 = 0.7;
 const TOTALS: [f32; 2] = [-7.0, 4.0];
 
 /// A trained network.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Network {
     detector: String,
     electrodes_m: Vec<[f64; 2]>,
@@ -55,6 +57,9 @@ pub struct Network {
 }
 
 impl Network {
+    /// What `tactomo` is in the metadata of its file.
+    pub(crate) const KIND: &str = "network";
+
     /// Reads a network as `tools/train_network.py` writes it: `safetensors`, with `tactomo: network` in its metadata. Nothing in it is trusted.
     ///
     /// # Errors
@@ -69,6 +74,11 @@ impl Network {
     /// [`NetworkError`] if it is damaged.
     pub fn shipped() -> Result<Self, NetworkError> {
         Self::from_bytes(SQUARE_60)
+    }
+
+    /// Electrodes of the detector that it was trained for.
+    pub fn electrodes(&self) -> usize {
+        self.electrodes_m.len()
     }
 
     /// Name of the detector that it was trained for.
@@ -158,7 +168,7 @@ impl Network {
 
 /// `network`: a network, on the image of a problem.
 pub struct NetworkSolver {
-    network: Network,
+    network: Arc<Network>,
     electrodes: usize,
     drive_v: f64,
     full_v: f64,
@@ -175,7 +185,7 @@ impl NetworkSolver {
     ///
     /// # Errors
     /// [`NetworkError::Detector`] if it was trained for another one.
-    pub fn new(problem: &Problem, network: Network) -> Result<Self, NetworkError> {
+    pub fn new(problem: &Problem, network: Arc<Network>) -> Result<Self, NetworkError> {
         let detector = problem.detector();
         network.check(detector)?;
         let grid = Grid::new(network.image.outputs(), network.size_m);

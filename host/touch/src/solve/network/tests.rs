@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use super::*;
 use crate::solve::Method;
 use tactomo_physics::detector::Tolerances;
@@ -7,7 +9,7 @@ use tactomo_physics::simulate::{Measurement, drawn, finer_model};
 
 fn solver() -> NetworkSolver {
     let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&Detector::default()).unwrap());
-    NetworkSolver::new(&Problem::new(slab), Network::shipped().unwrap()).unwrap()
+    NetworkSolver::new(&Problem::new(slab), Arc::new(Network::shipped().unwrap())).unwrap()
 }
 
 /// Readings of a detector as built with a seed, which training does not use, under contacts of some sheet conductances, with faults of its wires.
@@ -86,8 +88,11 @@ fn readings_scale_with_the_drive_and_conductances_with_the_sheet() {
         let slab: Box<dyn ForwardModel> = Box::new(Slab::new(detector).unwrap());
         let contact = Contact { conductance_s: factor * contact.conductance_s, ..contact };
         let readings = readings_v(&slab.impedance_ohm(&[contact]).unwrap(), detector);
-        NetworkSolver::new(&Problem::new(slab), Network::shipped().unwrap()).unwrap().solve(&readings).unwrap().contacts
-            [0]
+        NetworkSolver::new(&Problem::new(slab), Arc::new(Network::shipped().unwrap()))
+            .unwrap()
+            .solve(&readings)
+            .unwrap()
+            .contacts[0]
     };
     let (one, other) = (found(&detector, 1.0), found(&twice, 2.0));
     assert!((one.x_m - other.x_m).hypot(one.y_m - other.y_m) < 1e-6, "{one:?} {other:?}");

@@ -1,0 +1,110 @@
+//! `tactomo learn`: places and strengths of presses, learned from presses at known places.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, ensure};
+use serde::Serialize;
+use tactomo::detector::{Chosen, Detector};
+use tactomo::learned::Learned;
+use tactomo::solve::{Kernel, Presses, Strength};
+use tactomo::study::stopwatch::timed;
+
+use super::output::{self, NewFile, message};
+
+/// Learns where and how hard something presses, from presses at known places: on any sensor, with any number of channels and any
+/// pattern of drive and read.
+///
+/// PRESSES is CSV with named columns: `x_m`, `y_m`, perhaps `z_m`, and perhaps `force_n`, `depth_m` or
+/// `conductance_s`, the first of which is learned too. All other columns are channels (V, less
+/// those at rest), but for those that count or tell the time (`id`, `index`, `frame`, `time_s`)
+/// and those in another unit (`..._mm`, `..._deg`). Or NPZ, with arrays of these names, a number a
+/// press, and `readings_v`, a row a press. Some hundreds of presses are good.
+///
+/// What is learned is told with its error on presses that are left out one after the other.
+///
+/// Examples:
+///   tactomo learn presses.csv --out skin.safetensors
+///   tactomo learn presses.npz --detector my-cal.toml --out mine.safetensors --json
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// Presses at known places
+    #[arg(value_name = "PRESSES")]
+    presses: PathBuf,
+    /// The file to write, for --learned and `score`; a file that exists is not replaced
+    #[arg(long, value_name = "MODEL")]
+    out: PathBuf,
+    /// The detector, if the channels are its readings, row by row: then the force is taken out of them before places are learned
+    #[arg(long, value_name = "NAME|FILE")]
+    detector: Option<Chosen>,
+    /// Prints `{presses, channels, components, left_out_m, strength, left_out_strength_share, seconds, out}` as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    presses: usize,
+    channels: usize,
+    components: usize,
+    left_out_m: f64,
+    strength: Option<&'static str>,
+    left_out_strength_share: Option<f64>,
+    seconds: f64,
+    out: PathBuf,
+}
+
+/// Learns, and writes what was learned.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let out = NewFile::never_replacing(&args.out)?;
+    let mut presses = Presses::read(&args.presses, &[])?;
+    if let Some(chosen) = &args.detector {
+        presses.drive_v = Some(drive_v(&chosen.get()?, presses.channels)?);
+    }
+    let (kernel, taken) = timed(|| Kernel::train(&presses));
+    let (kernel, seconds) = (kernel.with_context(|| args.presses.display().to_string())?, taken.as_secs_f64());
+    out.write(Learned::bytes_of(&kernel)?)?;
+    message!("{}", sentence(&kernel));
+    message!("{} written, after {seconds:.1} s of processor time", args.out.display());
+    if args.json {
+        output::print(&serde_json::to_string(&Report {
+            presses: kernel.presses(),
+            channels: kernel.channels(),
+            components: kernel.components(),
+            left_out_m: kernel.left_out_m(),
+            strength: kernel.strength().map(Strength::name),
+            left_out_strength_share: kernel.left_out_strength(),
+            seconds,
+            out: args.out.clone(),
+        })?)?;
+    }
+    Ok(())
+}
+
+/// Drive voltage of a detector with so many readings (V).
+fn drive_v(detector: &Detector, channels: usize) -> anyhow::Result<f64> {
+    let electrodes = detector.electrodes.len();
+    ensure!(
+        channels == electrodes * electrodes,
+        "the presses have {channels} channels, but the detector {} with its {electrodes} electrodes gives {} readings: leave out --detector, \
+         or give all of them",
+        detector.name,
+        electrodes * electrodes
+    );
+    Ok(detector.drive_v)
+}
+
+/// What was learned, for people.
+pub fn sentence(kernel: &Kernel) -> String {
+    let strength = kernel
+        .strength()
+        .zip(kernel.left_out_strength())
+        .map_or_else(String::new, |(strength, share)| format!(", {} within {:.0} %", strength.name(), share * 100.0));
+    format!(
+        "learned from {} presses on {} channels, in {} dimensions; a press that is left out is found within {:.2} mm{strength} (root mean square)",
+        kernel.presses(),
+        kernel.channels(),
+        kernel.components(),
+        kernel.left_out_m() * 1e3
+    )
+}

@@ -1,0 +1,146 @@
+use super::*;
+
+/// Presses on a sensor of five channels that is no detector of ours: each hears the force by its distance.
+fn five_channels(count: usize) -> Presses {
+    let even = |step: f64, i: usize| (step * (i + 1) as f64).fract();
+    let places_m: Vec<_> = (0..count).map(|i| [0.1 * even(0.7549, i), 0.1 * even(0.5698, i), 0.0]).collect();
+    let strengths: Vec<f64> = (0..count).map(|i| 0.5 + 5.0 * even(0.3247, i)).collect();
+    let heard = |place: &[f64; 3], force: f64| {
+        let ears = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.1], [0.1, 0.1], [0.05, 0.05]];
+        ears.map(|ear| force / (1.0 + 200.0 * ((place[0] - ear[0]).powi(2) + (place[1] - ear[1]).powi(2))))
+    };
+    let readings_v = places_m.iter().zip(&strengths).flat_map(|(place, force)| heard(place, *force)).collect();
+    Presses {
+        channels: 5,
+        readings_v,
+        places_m,
+        strengths,
+        strength: Some(Strength::Force),
+        names: Vec::new(),
+        drive_v: None,
+    }
+}
+
+#[test]
+fn any_number_of_channels_is_learned_from() {
+    let kernel = Kernel::train(&five_channels(200)).unwrap();
+    assert!(
+        kernel.left_out_m() < 0.002 && kernel.left_out_strength().unwrap() < 0.05,
+        "{} {:?}",
+        kernel.left_out_m(),
+        kernel.left_out_strength()
+    );
+    let unseen = five_channels(230);
+    for index in 200..230 {
+        let readings = &unseen.readings_v[5 * index..][..5];
+        let press = kernel.press(readings).unwrap().unwrap();
+        let place = unseen.places_m[index];
+        assert!((press.place_m[0] - place[0]).hypot(press.place_m[1] - place[1]) < 0.004, "{press:?} {place:?}");
+        assert!((press.strength.unwrap() / unseen.strengths[index] - 1.0).abs() < 0.1, "{press:?}");
+    }
+    assert_eq!(kernel.press(&[0.1; 4]), Err(None));
+    assert_eq!(kernel.press(&[0.1, 0.1, f64::NAN, 0.1, 0.1]), Err(Some(2)));
+    assert_eq!(kernel.press(&[1e-6; 5]), Ok(None));
+    assert!(kernel.press(&[1.0, -1.0, 1.0, -1.0, 1.0]).unwrap().unwrap().is_outside);
+}
+
+#[test]
+fn presses_that_are_alike_teach_nothing() {
+    let mut presses = five_channels(20);
+    presses.readings_v.fill(0.5);
+    assert!(Kernel::train(&presses).is_err());
+    assert!(Kernel::train(&five_channels(5)).unwrap_err().to_string().contains("5 presses, but 10"));
+}
+
+/// Presses on 48 cells in six rows that feel pressure, with noise of their own.
+fn cells(count: usize, seed: u64) -> Presses {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut noise = tactomo_physics::simulate::Noise::new(seed);
+    let mut presses = Presses {
+        channels: 48,
+        names: Vec::new(),
+        readings_v: Vec::new(),
+        places_m: Vec::new(),
+        strengths: Vec::new(),
+        strength: Some(Strength::Force),
+        drive_v: None,
+    };
+    for _ in 0..count {
+        let (x, y, force) = (0.08 * random.f64(), 0.06 * random.f64(), 0.5 * 10f64.powf(random.f64()));
+        let cell = |index: usize| {
+            let [column, row] = [index % 8, index / 8].map(|i| 0.08 / 7.0 * i as f64);
+            let felt = force * (-((x - column).powi(2) + (y - row).powi(2)) / (2.0 * 0.012 * 0.012)).exp();
+            felt.powf(0.8) + 0.01 * noise.normal()
+        };
+        presses.readings_v.extend((0..48).map(cell));
+        presses.places_m.push([x, y, 0.0]);
+        presses.strengths.push(force);
+    }
+    presses
+}
+
+/// Share of readings that are flagged (%).
+fn flagged(kernel: &Kernel, all: impl Iterator<Item = Vec<f64>>) -> f64 {
+    let flags: Vec<bool> =
+        all.map(|readings| kernel.press(&readings).unwrap().is_some_and(|press| press.is_outside)).collect();
+    100.0 * flags.iter().filter(|is_outside| **is_outside).count() as f64 / flags.len() as f64
+}
+
+/// The channel that hears most.
+fn loudest(readings: &[f64]) -> usize {
+    (0..readings.len()).max_by(|a, b| readings[*a].total_cmp(&readings[*b])).unwrap()
+}
+
+#[test]
+fn what_was_never_taught_is_flagged_and_single_presses_are_not() {
+    for seed in [11, 12, 13] {
+        let kernel = Kernel::train(&cells(500, seed)).unwrap();
+        let unseen = cells(400, 100 + seed);
+        let one = |index: usize| unseen.readings_v[48 * index..][..48].to_vec();
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut order: Vec<usize> = (0..48).collect();
+        random.shuffle(&mut order);
+        let with = |index: usize, at: usize, value: f64| {
+            let mut readings = one(index);
+            readings[at] = value;
+            readings
+        };
+        let all = || 0..400;
+        let single = flagged(&kernel, all().map(one));
+        let permuted = flagged(&kernel, all().map(|i| order.iter().map(|&at| one(i)[at]).collect()));
+        let mut noise = tactomo_physics::simulate::Noise::new(seed);
+        let noisy = flagged(&kernel, all().map(|_| (0..48).map(|_| noise.normal()).collect()));
+        let dead = flagged(&kernel, all().map(|i| with(i, loudest(&one(i)), 0.0)));
+        let railed = flagged(&kernel, all().map(|i| with(i, random.usize(..48), 5.0)));
+        let apart = |pair: &[usize; 2]| {
+            let [a, b] = pair.map(|index| unseen.places_m[index]);
+            (a[0] - b[0]).hypot(a[1] - b[1]) > 0.03
+        };
+        let pairs = all().map(|i| [i, (i + 57) % 400]).filter(apart);
+        let two = flagged(&kernel, pairs.map(|[a, b]| one(a).iter().zip(one(b)).map(|(a, b)| a + b).collect()));
+        let rates =
+            format!("{seed}: single {single} permuted {permuted} noise {noisy} dead {dead} rail {railed} two {two}");
+        assert!(
+            single <= 3.0 && permuted >= 98.0 && noisy >= 99.0 && dead >= 95.0 && railed >= 98.0 && two >= 90.0,
+            "{rates}"
+        );
+    }
+}
+
+#[test]
+fn a_height_that_is_noise_does_not_change_places() {
+    let flat = cells(300, 5);
+    let mut noise = tactomo_physics::simulate::Noise::new(6);
+    let places_m = flat.places_m.iter().map(|[x, y, _]| [*x, *y, 1e-6 * noise.normal()]).collect();
+    let [flat, noisy] = [flat.clone(), Presses { places_m, ..flat }].map(|presses| Kernel::train(&presses).unwrap());
+    assert!(noisy.left_out_m() < 1.001 * flat.left_out_m(), "{} {}", noisy.left_out_m(), flat.left_out_m());
+}
+
+#[test]
+fn places_alone_are_learned() {
+    let presses = Presses { strengths: Vec::new(), strength: None, ..cells(200, 7) };
+    let kernel = Kernel::train(&presses).unwrap();
+    let press = kernel.press(&presses.readings_v[..48]).unwrap().unwrap();
+    assert_eq!((kernel.strength(), kernel.left_out_strength(), press.strength), (None, None, None));
+    assert!((press.place_m[0] - presses.places_m[0][0]).abs() < 0.002, "{press:?}");
+}
