@@ -1,6 +1,6 @@
 //! Solved frames as a Parquet file: a row a frame, for pandas, Polars, DuckDB and whatever else reads tables.
 //!
-//! Columns are those of [`schema`](tactomo_touch::schema), each an optional double; `contact_*` are lists, of a number for each contact (NaN where
+//! Columns are those of [`schema`], each an optional double; `contact_*` are lists, of a number for each contact (NaN where
 //! it is not known), `readings_v`, `touch_v` and `image_s_per_m2` lists too; `excluded` and `choice` are text. Readings are the doubles that were solved, bit for
 //! bit; where nothing was read they are NaN.
 
