@@ -83,7 +83,7 @@ pub enum PressesError {
 
 impl Presses {
     /// Reads a file. CSV: columns named `x_m`, `y_m`, perhaps `z_m`, and perhaps `force_n`, `depth_m` or `conductance_s`; which of the others are
-    /// channels (V, less those at rest) is said [there](super::columns). NPZ: arrays of these names, of a number a press, and `readings_v`, of a
+    /// channels (V, less those at rest) is said in `docs/solvers.md`. NPZ: arrays of these names, of a number a press, and `readings_v`, of a
     /// row a press. With the names of a kernel's channels, these are read, in their order.
     ///
     /// # Errors
