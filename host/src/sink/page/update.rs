@@ -22,7 +22,7 @@ use tactomo_touch::schema::{CONTACT_COLUMNS, contact_values, shape_values};
 use tactomo_touch::solve::{Flags, FoundContact, FoundShape};
 
 /// Version of the layout; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 7;
+pub(super) const LAYOUT: u32 = 8;
 
 /// Numbers of a contact: the columns after its id, and its place on the map.
 const CONTACT_FLOATS: usize = CONTACT_COLUMNS.len() - 1 + 2;
@@ -128,6 +128,7 @@ mod tests {
             force_deviation_n: Some(0.75),
             force_beyond_maximum: Some(true),
             uncertainty: Some(errors),
+            depth_m: Some(0.125),
             ..FoundContact::flat(0.25, -0.5, 2.0)
         };
         let bytes = bytes_of(Solution {
@@ -147,13 +148,13 @@ mod tests {
         assert_eq!(head[2..6], [0.5, -0.25, 1.0, 3.0], "the pointer");
         assert_eq!(head[6..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
         assert_eq!(words(&bytes[100..104]), [6]);
-        let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.25, -0.5];
-        assert_eq!(floats(&bytes[104..164]), known);
-        assert_eq!(words(&bytes[164..168]), [0]);
-        assert_eq!(floats(&bytes[168..184]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[184..220]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[220..228]), [1.0, 2.0]);
-        assert_eq!(&bytes[228..], "2 contacts\nµ".as_bytes());
+        let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.125, 0.25, -0.5];
+        assert_eq!(floats(&bytes[104..168]), known);
+        assert_eq!(words(&bytes[168..172]), [0]);
+        assert_eq!(floats(&bytes[172..188]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[188..228]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[228..236]), [1.0, 2.0]);
+        assert_eq!(&bytes[236..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -166,7 +167,7 @@ mod tests {
             ..Solution::default()
         });
         assert_eq!(words(&bytes[20..28]), [1, 2]);
-        let shape = floats(&bytes[64 + 4 * 6 + 64..]);
+        let shape = floats(&bytes[64 + 4 * 6 + 68..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }

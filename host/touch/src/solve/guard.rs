@@ -98,9 +98,11 @@ pub fn without(method: Method, problem: &Problem, faulty: &FaultyElectrodes) -> 
     }
     let electrodes = problem.detector().electrodes.len();
     let kept = faulty.kept(electrodes);
-    let solver = method.build(&problem.through(&kept, &faulty.joints))?;
     let excluded = faulty.faults.iter().map(|(electrode, _)| *electrode).collect();
-    Ok(Box::new(Without { solver, lens: Lens { electrodes, kept, excluded } }))
+    // A network was trained for all electrodes: to it, the readings of these were not taken, and are completed as those of a shorter scan.
+    let hides = method == Method::Network;
+    let solver = if hides { method.build(problem)? } else { method.build(&problem.through(&kept, &faulty.joints))? };
+    Ok(Box::new(Without { solver, lens: Lens { electrodes, kept, excluded, hides } }))
 }
 
 /// Sees some electrodes of readings.
@@ -109,11 +111,16 @@ struct Lens {
     electrodes: usize,
     kept: Vec<usize>,
     excluded: Vec<usize>,
+    /// Whether the others are there and say nothing, instead of being left out.
+    hides: bool,
 }
 
 impl Lens {
     fn readings(&self, all: &Readings) -> Result<Readings, SolveError> {
         super::check_count(all, self.electrodes)?;
+        if self.hides {
+            return Ok(all.clone().hiding(|g, e| self.excluded.contains(&g) || self.excluded.contains(&e)));
+        }
         Ok(all.of(&self.kept))
     }
 

@@ -2,7 +2,7 @@
 // the same.
 
 /** Version of the layout below; the setup carries the program's. */
-export const LAYOUT = 7;
+export const LAYOUT = 8;
 
 const HEAD_WORDS = 10;
 // From the lowest bit on.

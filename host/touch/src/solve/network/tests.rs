@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::solve::Method;
+use crate::solve::{Guard, Method};
 use tactomo_physics::detector::Tolerances;
 use tactomo_physics::forward::{ForwardModel, Slab, readings_v};
 use tactomo_physics::scene::Contact;
@@ -66,6 +66,23 @@ fn what_it_never_saw_is_flagged() {
     let mut random = fastrand::Rng::with_seed(3);
     let noise = Readings::from_fn(16, |_, _| random.f64());
     assert!(solver.solve(&noise).unwrap().flags.misfit);
+}
+
+#[test]
+fn without_a_broken_electrode_it_goes_on_with_the_others() {
+    let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&Detector::default()).unwrap());
+    let mut guard = Guard::new(Method::Network, &Problem::new(slab)).unwrap();
+    let mut missed_m = Vec::new();
+    for (index, place) in PLACES.into_iter().enumerate() {
+        let readings = read(2030 + index as u64, &[place], &["open:5"]);
+        let mut last = Solution::default();
+        (0..100).for_each(|_| last = guard.solve(&readings).unwrap());
+        assert_eq!(last.flags.excluded, [5]);
+        let [found] = last.contacts[..] else { panic!("{index}: {last:?}") };
+        missed_m.push((found.x_m - place.0).hypot(found.y_m - place.1));
+        guard.reset();
+    }
+    assert!(missed_m.iter().sum::<f64>() < 3e-3 * missed_m.len() as f64, "{missed_m:?}");
 }
 
 #[test]
