@@ -117,7 +117,7 @@ fn a_foreign_page_cannot_open_the_socket() -> Result<()> {
 fn a_message_is_sent_when_the_last_was_taken() -> Result<()> {
     let rig = Rig::start(None)?;
     let mut page = RawPage::open(rig.server.port())?;
-    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"setup","layout":7,"#)));
+    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"setup","layout":8,"#)));
     assert!(page.is_silent_for(Duration::from_millis(400))?, "the setup was not taken");
     page.take()?;
     assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"status","#)));
