@@ -346,6 +346,7 @@ mod tests {
             force_n: Some(3.0),
             force_deviation_n: Some(0.375),
             force_beyond_maximum: Some(true),
+            depth_m: Some(0.0625),
             uncertainty: Some(Uncertainty { x_m: 0.125, y_m: 0.75, correlation: -0.5, conductance_s: 4.0 }),
             ..FoundContact::flat(1.0, 2.0, 8.0)
         }
