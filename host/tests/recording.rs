@@ -144,7 +144,7 @@ fn pieces_are_cut_joined_checked_and_solved() {
     let checked = run(&["recording", "check"], &[&whole, &damaged]);
     assert_eq!(checked.status.code(), Some(1));
     let said = String::from_utf8_lossy(&checked.stdout);
-    assert!(said.contains("damaged in 1 place") && said.contains("16 bytes before its start"), "{said}");
+    assert!(said.contains("damaged in 1 place") && said.contains("16 bytes before its start do not belong"), "{said}");
 }
 
 #[test]

@@ -26,6 +26,7 @@ mod format;
 mod header;
 mod loss;
 mod note;
+mod packets;
 mod reader;
 mod recorder;
 mod ring;

@@ -7,7 +7,8 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use tactomo::board::frames::{FileFrame, Survey};
+use tactomo::board::frames::FileFrame;
+use tactomo::board::record::{RecordError, RecordReader};
 use tactomo::readings::Readings;
 use tactomo::run::TouchEvent;
 use tactomo::schema::FrameReport;
@@ -114,11 +115,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         bail!("leave out --fields: {form} has its own");
     }
     let file = NewFile::beside(&args.file, &args.out, args.overwrite)?;
-    let survey = Survey::of(&args.file)?;
+    let open = |source| RecordError::Open { path: args.file.clone(), source };
+    let mut recording = RecordReader::open(&args.file)?;
+    let (header, last_us) = (recording.header().clone(), recording.last_time_us().map_err(open)?.unwrap_or_default());
     let mut reader = Reader::open(&args.input())?;
-    let mut out = Out::begin(args.to, file, &reader, &survey.header.source)?;
+    let mut out = Out::begin(args.to, file, &reader, &header.source)?;
     let fields = args.fields.unwrap_or_default();
-    let mut bar = ProgressBar::new("frames", survey.frames);
+    let mut bar = ProgressBar::new("s recorded", last_us / 1_000_000);
     let (mut lost, mut solved) = (0, 0_u64);
     while let Some(frame) = reader.next_frame()? {
         if stop.load(Ordering::Relaxed) {
@@ -126,10 +129,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
         let solution = reader.solve(&frame).with_context(|| reader.place())?;
         lost += frame.lost_before;
-        let event = event(&reader, &frame, solution, (survey.header.started(), lost))?;
+        let arrived_s = frame.arrived_s.unwrap_or_default();
+        let event = event(&reader, &frame, solution, (header.started(), lost))?;
         out.write(&event.into(), fields, reader.frame() as u64)?;
         solved += 1;
-        bar.tell(reader.count() as u64);
+        bar.tell(arrived_s as u64);
     }
     bar.end();
     out.finish(&reader)?;

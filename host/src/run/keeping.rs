@@ -48,25 +48,24 @@ impl Keeping {
     /// # Errors
     /// [`RecordError`] if they cannot be kept; then that recording is over.
     pub fn push(&mut self, bytes: &[u8], received: Instant) -> Result<(), RecordError> {
-        if let Some(ring) = &mut self.ring {
-            match ring.push(bytes, received) {
-                Ok(None) => {}
-                Ok(Some(path)) => tracing::info!("saving to {}", path.display()),
-                Err(error) => {
-                    self.ring = None;
-                    return Err(error);
-                }
-            }
+        let kept = match &mut self.recorder {
+            Some(recorder) => recorder.push(bytes, received).inspect_err(|_| self.recorder = None),
+            None => Ok(()),
+        };
+        let Some(ring) = &mut self.ring else { return kept };
+        let saved = ring.push(bytes, received).inspect_err(|_| self.ring = None);
+        if let Ok(Some(path)) = &saved {
+            tracing::info!("saving to {}", path.display());
         }
-        let Some(recorder) = &mut self.recorder else { return Ok(()) };
-        recorder.push(bytes, received).inspect_err(|_| self.recorder = None)
+        kept.and(saved.map(drop))
     }
 
     /// Goes on without a recording that failed; it is told at the end too.
     pub fn give_up(&mut self, error: RecordError) {
         tracing::error!("{error}");
         let refused = Some(error.to_string());
-        self.notice.change(|snapshot| (snapshot.recording, snapshot.refused) = (None, refused));
+        self.notice.change(|snapshot| snapshot.refused = refused);
+        self.show();
         self.lost.get_or_insert(error);
     }
 

@@ -6,8 +6,9 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use tactomo_protocol::{BoardMessage, BoardReceiver, Hello, MAX_WIRE, encode_hello};
+use tactomo_protocol::{BoardMessage, BoardReceiver, Hello};
 
+use super::packets::FirstPacket;
 use super::{Header, Note, RecordError, RecordReader, RecordWriter};
 
 /// Time between the end of a recording and the start of the one that is joined on (us).
@@ -81,15 +82,6 @@ impl Output {
         self.writer.note(time_us, note).map_err(self.failed())
     }
 
-    /// The board's Hello, twice, so that damage to one does not cost the meaning of all frames.
-    fn hello(&mut self, hello: &Hello) -> Result<(), EditError> {
-        let mut wire = [0; MAX_WIRE];
-        let length = encode_hello(hello, &mut wire)
-            .map_err(|error| self.failed()(io::Error::new(io::ErrorKind::InvalidInput, error)))?;
-        self.write(0, &wire[..length])?;
-        self.write(0, &wire[..length])
-    }
-
     fn finish(mut self) -> Result<(), EditError> {
         let done = self.writer.flush().and_then(|()| self.writer.get_ref().get_ref().sync_all());
         done.map_err(self.failed())?;
@@ -136,7 +128,7 @@ pub fn cut(recording: &Path, span_s: RangeInclusive<f64>, out: &Path) -> Result<
             }
             (Some(_), _) => {}
             (None, false) => {
-                let kept = before.whole_packets(&bytes);
+                let kept = before.first.rest(&bytes);
                 let output = open_at(&mut output, &reader, from_us, out, &before)?;
                 output.write(entry.time_us - from_us, kept)?;
             }
@@ -167,7 +159,7 @@ fn open_at<'a>(
             let header = reader.header().clone().started_later(Duration::from_micros(from_us));
             let mut made = Output::create(out, &header)?;
             if let Some(hello) = &before.hello {
-                made.hello(hello)?;
+                made.writer.hello(hello).map_err(made.failed())?;
             }
             made
         }
@@ -181,27 +173,17 @@ struct Before {
     receiver: BoardReceiver,
     /// The last thing that the board said of itself.
     hello: Option<Hello>,
-    in_packet: bool,
+    first: FirstPacket,
 }
 
 impl Before {
     fn pass(&mut self, mut bytes: &[u8]) {
-        self.in_packet = bytes.last().is_some_and(|last| *last != 0);
+        self.first.pass(bytes);
         while let Some(message) = self.receiver.receive(&mut bytes) {
             if let Ok(BoardMessage::Hello(hello)) = message {
                 self.hello = Some(hello);
             }
         }
-    }
-
-    /// `bytes` without the rest of a packet that began before.
-    fn whole_packets<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
-        if !self.in_packet {
-            return bytes;
-        }
-        let Some(end) = bytes.iter().position(|byte| *byte == 0) else { return &[] };
-        self.in_packet = false;
-        &bytes[end + 1..]
     }
 }
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::frames::FrameFile;
 use tactomo_physics::detector::Detector;
-use tactomo_protocol::{FrameHead, encode_frame};
+use tactomo_protocol::{FrameHead, MAX_WIRE, encode_frame, encode_hello};
 
 fn path(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("tactomo-{}-edit-{name}", std::process::id()))

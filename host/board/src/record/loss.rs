@@ -40,7 +40,7 @@ impl fmt::Display for Loss {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let mut parts = Vec::new();
         if self.junk_bytes > 0 {
-            parts.push(format!("{} bytes before its start are none of it", self.junk_bytes));
+            parts.push(format!("{} bytes before its start do not belong to it", self.junk_bytes));
         }
         match self.header {
             HeaderDamage::None => {}

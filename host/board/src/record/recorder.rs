@@ -9,8 +9,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tactomo_protocol::{Hello, MAX_WIRE, encode_hello};
+use tactomo_protocol::Hello;
 
+use super::packets::FirstPacket;
 use super::{Header, Note, RecordError, RecordWriter};
 
 /// What is not yet with the system is lost when the program is killed: at most this much.
@@ -47,8 +48,7 @@ pub struct Recorder {
     began: Instant,
     /// Time of what was pushed last (us): times never fall.
     last_us: u64,
-    /// Whether bytes up to the end of a packet are still to be left out.
-    in_packet: bool,
+    first: FirstPacket,
     /// `None` once no more is taken.
     entries: Option<Sender<Entry>>,
     /// What a calibration found meanwhile, written once more at the end.
@@ -74,10 +74,15 @@ impl Recorder {
     /// [`RecordError`] if the file cannot be written, or is there already: no recording is overwritten.
     pub fn create(path: &Path, header: &Header) -> Result<Self, RecordError> {
         let open = |source| RecordError::Open { path: path.to_owned(), source };
-        let file = BufWriter::new(File::create_new(path).map_err(open)?);
-        let mut writer = RecordWriter::new(file, header).map_err(open)?;
-        writer.flush().map_err(open)?;
+        let writer = Self::file(path, header).map_err(open)?;
         Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)
+    }
+
+    /// A new file with its header.
+    fn file(path: &Path, header: &Header) -> io::Result<RecordWriter<BufWriter<File>>> {
+        let mut writer = RecordWriter::new(BufWriter::new(File::create_new(path)?), header)?;
+        writer.flush()?;
+        Ok(writer)
     }
 
     /// Begins a recording in a new file while frames come from a board that has said `hello`. The recording begins with that, twice, so
@@ -91,17 +96,11 @@ impl Recorder {
 
     /// The same for bytes of which the first came at `began`, some time ago.
     pub(super) fn since(began: Instant, path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
-        let mut recorder = Self::create(path, header)?;
-        recorder.began = began;
-        let mut wire = [0; MAX_WIRE];
-        let length = encode_hello(hello, &mut wire).map_err(|error| RecordError::Write {
-            path: path.to_owned(),
-            source: io::Error::new(io::ErrorKind::InvalidInput, error),
-        })?;
-        for _ in 0..2 {
-            recorder.push(&wire[..length], recorder.began)?;
-        }
-        recorder.in_packet = true;
+        let open = |source| RecordError::Open { path: path.to_owned(), source };
+        let mut writer = Self::file(path, header).map_err(open)?;
+        writer.hello(hello).map_err(open)?;
+        let mut recorder = Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)?;
+        (recorder.began, recorder.first) = (began, FirstPacket::within());
         Ok(recorder)
     }
 
@@ -120,7 +119,7 @@ impl Recorder {
             path: path.to_owned(),
             began: Instant::now(),
             last_us: 0,
-            in_packet: false,
+            first: FirstPacket::default(),
             entries: Some(entries),
             found: None,
             waiting,
@@ -140,7 +139,7 @@ impl Recorder {
     /// [`RecordError::Write`] if the file takes no more, [`RecordError::TooSlow`] if 256 MB wait for the disk. What came before is
     /// kept; nothing more is taken.
     pub fn push(&mut self, bytes: &[u8], arrived: Instant) -> Result<(), RecordError> {
-        let bytes = self.without_first_packet(bytes);
+        let bytes = self.first.rest(bytes);
         if bytes.is_empty() {
             return Ok(());
         }
@@ -177,16 +176,6 @@ impl Recorder {
         self.entries = None;
         // It has ended by itself, so this does not wait.
         outcome(&self.path, self.writer.take().filter(JoinHandle::is_finished))
-    }
-
-    /// `bytes` without those of a packet that began before the recording did.
-    fn without_first_packet<'a>(&mut self, bytes: &'a [u8]) -> &'a [u8] {
-        if !self.in_packet {
-            return bytes;
-        }
-        let Some(end) = bytes.iter().position(|byte| *byte == 0) else { return &[] };
-        self.in_packet = false;
-        &bytes[end + 1..]
     }
 
     /// Takes no more; the rest is written while the caller goes on.

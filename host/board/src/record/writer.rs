@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use tactomo_protocol::{Hello, MAX_WIRE, encode_hello};
+
 use super::format::{Kind, MAX_CHUNK, MAX_HEADER, put_chunk};
 use super::{Header, MAGIC, Note, VERSION};
 
@@ -57,6 +59,18 @@ impl<W: Write> RecordWriter<W> {
         self.chunk.clear();
         put_chunk(Kind::Note, time_us, &json, &mut self.chunk);
         self.out.write_all(&self.chunk)
+    }
+
+    /// Adds what a board says of itself, at the start and twice, so that damage to one does not cost the meaning of all frames.
+    ///
+    /// # Errors
+    /// If `out` takes no bytes.
+    pub fn hello(&mut self, hello: &Hello) -> io::Result<()> {
+        let mut wire = [0; MAX_WIRE];
+        let length =
+            encode_hello(hello, &mut wire).map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
+        self.write(0, &wire[..length])?;
+        self.write(0, &wire[..length])
     }
 
     /// Hands everything to the system.

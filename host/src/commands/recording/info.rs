@@ -137,6 +137,7 @@ pub fn check(files: &[PathBuf]) -> anyhow::Result<()> {
     }
     match damaged {
         0 => Ok(()),
+        1 if files.len() == 1 => bail!("the recording is damaged"),
         1 => bail!("one of {} recordings is damaged", files.len()),
         _ => bail!("{damaged} of {} recordings are damaged", files.len()),
     }
