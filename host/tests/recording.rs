@@ -1,6 +1,9 @@
 //! Recordings as a person makes them: killed, on a full disk, cut, joined, and kept in a ring.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
+#[allow(dead_code, reason = "tables are for other tests")]
+mod samples;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -9,28 +12,13 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
+use self::samples::Folder;
+
 /// Longest wait for a program that has begun.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A new folder, gone with its test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("tactomo-{}-recording-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    fn file(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        drop(std::fs::remove_dir_all(&self.0));
-    }
+fn file(folder: &Folder, name: &str) -> PathBuf {
+    folder.path(name).into()
 }
 
 fn tactomo() -> Command {
@@ -77,20 +65,20 @@ fn length(file: &Path) -> u64 {
 #[test]
 fn a_program_that_is_killed_loses_a_second_at_most() {
     let folder = Folder::new("killed");
-    let file = folder.file("killed.tactomo");
-    let mut program = record(&file, &[]);
+    let recording = file(&folder, "killed.tactomo");
+    let mut program = record(&recording, &[]);
     let header = {
-        wait_for(|| length(&file) > 0);
-        length(&file)
+        wait_for(|| length(&recording) > 0);
+        length(&recording)
     };
     // The first frames are in the file, so they came before this.
-    wait_for(|| length(&file) > header + 1000);
+    wait_for(|| length(&recording) > header + 1000);
     let begin = Instant::now();
     sleep(Duration::from_millis(2500));
     let recorded_s = begin.elapsed().as_secs_f64();
     program.kill().unwrap();
     program.wait().unwrap();
-    let info = info(&file);
+    let info = info(&recording);
     assert!(seconds(&info) > recorded_s - 1.0, "{recorded_s} s: {info}");
     // A chunk that was cut is all that may be missing.
     assert!(info["corrupt"] == 0 && info["missing_frames"] == 0, "{info}");
@@ -100,20 +88,21 @@ fn a_program_that_is_killed_loses_a_second_at_most() {
 #[cfg(unix)]
 fn a_full_disk_ends_the_recording_with_a_word_and_keeps_what_came_before() {
     let folder = Folder::new("full");
-    let file = folder.file("full.tactomo");
+    let recording = file(&folder, "full.tactomo");
     // No file may be longer than 300 blocks: what a full disk does to the program, without one.
     let script = "trap '' XFSZ; ulimit -f 300; exec \"$0\" record \"$1\" --simulate --board ideal --seconds 60";
-    let output = Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_tactomo")]).arg(&file).output().unwrap();
+    let output =
+        Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_tactomo")]).arg(&recording).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("what came before is kept") && said.contains("full.tactomo"), "{said}");
-    assert!(info(&file)["frames"].as_u64().unwrap() > 100);
+    assert!(info(&recording)["frames"].as_u64().unwrap() > 100);
 }
 
 #[test]
 fn pieces_are_cut_joined_checked_and_solved() {
     let folder = Folder::new("cut");
-    let [whole, piece, sum] = ["whole.tactomo", "piece.tactomo", "sum.tactomo"].map(|name| folder.file(name));
+    let [whole, piece, sum] = ["whole.tactomo", "piece.tactomo", "sum.tactomo"].map(|name| file(&folder, name));
     recorded(&whole, "2");
     let out = piece.to_str().unwrap();
     assert!(run(&["recording", "cut", "--from", "0.5", "--to", "1.5", "--out", out], &[&whole]).status.success());
@@ -139,7 +128,7 @@ fn pieces_are_cut_joined_checked_and_solved() {
     let mut bytes = std::fs::read(&whole).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
-    let damaged = folder.file("damaged.tactomo");
+    let damaged = file(&folder, "damaged.tactomo");
     std::fs::write(&damaged, [b"a line of a log\n", &bytes[..]].concat()).unwrap();
     let checked = run(&["recording", "check"], &[&whole, &damaged]);
     assert_eq!(checked.status.code(), Some(1));
@@ -151,20 +140,20 @@ fn pieces_are_cut_joined_checked_and_solved() {
 fn the_last_seconds_are_saved_when_a_line_comes_and_when_something_touches() {
     let folder = Folder::new("ring");
     let mut program = record(
-        &folder.file("line.tactomo"),
+        &file(&folder, "line.tactomo"),
         &["--last", "1", "--after", "0.5", "--save-on", "enter", "--seconds", "3.5"],
     );
     sleep(Duration::from_millis(1500));
     program.stdin.as_mut().unwrap().write_all(b"\n").unwrap();
     assert!(program.wait().unwrap().success());
-    let saved = info(&folder.file("line-1.tactomo"));
+    let saved = info(&file(&folder, "line-1.tactomo"));
     // However late the board came, there is half a second after the line, to a chunk, and no more than a second before it.
     assert!((0.4..=1.6).contains(&seconds(&saved)), "{saved}");
     assert_eq!(saved["marks"].as_array().map(Vec::len), Some(1));
-    assert!(!folder.file("line-2.tactomo").exists() && !folder.file("line.tactomo").exists());
+    assert!(!file(&folder, "line-2.tactomo").exists() && !file(&folder, "line.tactomo").exists());
 
     let on_touch = ["--scene", "pointer", "--last", "1", "--save-on", "touch", "--seconds", "4"];
-    assert!(record(&folder.file("touch.tactomo"), &on_touch).wait().unwrap().success());
-    let saved = info(&folder.file("touch-1.tactomo"));
+    assert!(record(&file(&folder, "touch.tactomo"), &on_touch).wait().unwrap().success());
+    let saved = info(&file(&folder, "touch-1.tactomo"));
     assert!(!saved["marks"].as_array().unwrap().is_empty(), "{saved}");
 }
