@@ -7,7 +7,7 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
 use tactomo_physics::geometry::Point;
 use tactomo_physics::scene::Contact;
-use tactomo_study::cramer_rao;
+use tactomo_study::{Bound, cramer_rao};
 
 use super::press::{MIDDLE, Press, nine_places};
 
@@ -66,18 +66,11 @@ impl Limit {
     ) -> Result<Self, ForwardError> {
         let detector = model.detector();
         let noise_v = detector.adc.deviation_v();
-        let bounds = nine_places(detector).map(|place| {
-            let bound = cramer_rao(model, &[press.at(place, strength)], noise_v)?;
-            Ok(bound.and_then(|bounds| bounds.first().copied()).filter(|bound| bound.position_m.is_finite()))
-        });
-        let bounds = bounds.into_iter().collect::<Result<Option<Vec<_>>, ForwardError>>()?;
+        let bounds = at_nine_places(model, press, strength, noise_v)?;
         let largest_v = readings_v(&model.impedance_ohm(&[press.at(MIDDLE, strength)])?, detector).largest_v();
-        let mean_square = |bounds: &Vec<tactomo_study::Bound>| {
-            bounds.iter().map(|bound| bound.position_any_radius_m.powi(2)).sum::<f64>() / bounds.len() as f64
-        };
         Ok(Self {
             signal_to_noise_db: 20.0 * (largest_v / noise_v).log10(),
-            place_m: bounds.as_ref().map(|bounds| mean_square(bounds).sqrt()),
+            place_m: bounds.as_deref().map(rms_m),
             worst_place_m: bounds
                 .as_ref()
                 .map(|bounds| bounds.iter().map(|bound| bound.position_any_radius_m).fold(0.0, f64::max)),
@@ -88,27 +81,78 @@ impl Limit {
     }
 }
 
-/// Root mean square over so many places all over the surface of the standard error of a place (m); `None` if it is not told at one of them.
+/// Bounds of a press at each of the nine places; `None` if the readings do not tell one of them.
+fn at_nine_places(
+    model: &dyn ForwardModel,
+    press: &Press,
+    strength: f64,
+    noise_v: f64,
+) -> Result<Option<Vec<Bound>>, ForwardError> {
+    let of = |place: Point| {
+        let bound = cramer_rao(model, &[press.at(place, strength)], noise_v)?;
+        Ok(bound.and_then(|bounds| bounds.first().copied()).filter(|bound| bound.position_m.is_finite()))
+    };
+    nine_places(model.detector()).into_iter().map(of).collect()
+}
+
+/// Root mean square of their standard errors (m).
+fn rms_m(bounds: &[Bound]) -> f64 {
+    (bounds.iter().map(|bound| bound.position_any_radius_m.powi(2)).sum::<f64>() / bounds.len() as f64).sqrt()
+}
+
+/// [`Limit::place_m`] alone.
+pub(crate) fn place_m(model: &dyn ForwardModel, press: &Press, strength: f64) -> Result<Option<f64>, ForwardError> {
+    let noise_v = model.detector().adc.deviation_v();
+    Ok(at_nine_places(model, press, strength, noise_v)?.as_deref().map(rms_m))
+}
+
+/// Standard errors of places over a surface.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Spread {
+    /// Half of the places are told better (m).
+    pub median_m: f64,
+    /// Nine tenths are (m).
+    pub p90_m: f64,
+    /// Root mean square (m): the few worst places rule it.
+    pub rms_m: f64,
+}
+
+impl Spread {
+    /// Of standard errors (m); `None` of none.
+    fn of(mut errors_m: Vec<f64>) -> Option<Self> {
+        errors_m.sort_by(f64::total_cmp);
+        let last = errors_m.len().checked_sub(1)? as f64;
+        // Between the two nearest ranks, as most programs do.
+        let quantile = |share: f64| {
+            let (below, rest) = ((share * last).floor() as usize, (share * last).fract());
+            errors_m[below] + rest * (errors_m.get(below + 1).unwrap_or(&errors_m[below]) - errors_m[below])
+        };
+        let squares_m2: Vec<f64> = errors_m.iter().map(|error_m| error_m.powi(2)).collect();
+        Some(Self { median_m: quantile(0.5), p90_m: quantile(0.9), rms_m: super::metrics::mean(&squares_m2)?.sqrt() })
+    }
+}
+
+/// Standard errors of a place over so many places all over the surface; `None` if it is not told at one of them.
 ///
 /// # Errors
 /// [`ForwardError`] if the model cannot have the contact.
-pub fn place_everywhere_m(
+pub fn places_everywhere(
     model: &dyn ForwardModel,
     press: &Press,
     strength: f64,
     noise_v: f64,
     places: usize,
-) -> Result<Option<f64>, ForwardError> {
+) -> Result<Option<Spread>, ForwardError> {
     let sides_m = model.detector().outline.size_m();
-    let mut squares_m2 = Vec::with_capacity(places);
+    let mut errors_m = Vec::with_capacity(places);
     for index in 0..places {
         let share = |axis: usize| (0.5 + STEPS[axis] * index as f64).fract() * (1.0 - 2.0 * MARGIN) + MARGIN - 0.5;
         let place = [0, 1].map(|axis| share(axis) * sides_m[axis]);
         let bounds = cramer_rao(model, &[press.at(place, strength)], noise_v)?;
         let Some(bound) = bounds.and_then(|bounds| bounds.first().copied()) else { return Ok(None) };
-        squares_m2.push(bound.position_any_radius_m.powi(2));
+        errors_m.push(bound.position_any_radius_m);
     }
-    Ok(super::metrics::mean(&squares_m2).map(f64::sqrt).filter(|place_m| place_m.is_finite()))
+    Ok(Spread::of(errors_m).filter(|spread| spread.rms_m.is_finite()))
 }
 
 /// Least distance of two contacts of a strength, side by side about the middle, that can be told apart (m) where a reading has noise of such a standard
@@ -177,8 +221,18 @@ fn lightest(
 
 /// The strength at which a contact in the middle saturates.
 fn hardest(model: &dyn ForwardModel, press: &Press, [low, high]: [f64; 2]) -> Result<Option<f64>, ForwardError> {
-    let saturated = |strength: f64| Ok(of_drive(model, &press.at(MIDDLE, strength))? >= SATURATED);
-    least([low * LIGHTEST, high * HARDEST], STRENGTH_HALVINGS, saturated)
+    at_share_of_drive(model, press, [low, high], SATURATED)
+}
+
+/// The strength at which a contact in the middle is at a share of the drive; `None` where that is beyond all that is looked at.
+pub(crate) fn at_share_of_drive(
+    model: &dyn ForwardModel,
+    press: &Press,
+    [low, high]: [f64; 2],
+    share: f64,
+) -> Result<Option<f64>, ForwardError> {
+    let is_there = |strength: f64| Ok(of_drive(model, &press.at(MIDDLE, strength))? >= share);
+    least([low * LIGHTEST, high * HARDEST], STRENGTH_HALVINGS, is_there)
 }
 
 /// Potential of a contact that is alone as a share of the drive, mean over the grounds: eq. (4). All current passes the contact.
@@ -243,6 +297,19 @@ mod tests {
         let ball = Press::indenter(&detector, Foam::of('A').unwrap().into()).unwrap();
         let newtons = Limit::of(&slab, &ball, 1.0, [0.01, 5.0]).unwrap().range[1].unwrap();
         assert!((newtons - 2.1).abs() < 0.05, "{newtons}");
+    }
+
+    #[test]
+    fn a_spread_tells_the_few_worst_places_from_the_others() {
+        let mut errors_m = vec![1e-5; 20];
+        errors_m[7] = 1e-3;
+        let spread = Spread::of(errors_m).unwrap();
+        assert_eq!((spread.median_m, spread.p90_m), (1e-5, 1e-5));
+        assert!((spread.rms_m / (1e-3 / 20f64.sqrt()) - 1.0).abs() < 1e-2, "{spread:?}");
+        // 1 to 11: the median is the sixth, nine tenths of the way is the tenth.
+        let even = Spread::of((1..=11).map(f64::from).collect()).unwrap();
+        assert_eq!((even.median_m, even.p90_m), (6.0, 10.0));
+        assert_eq!(Spread::of(Vec::new()), None);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The paper's four metrics of a detector, with its own solver.
+//! The paper's four metrics of a detector: SENS and FMAX of the largest reading, as it defines them, SR and PA with its solver.
 
 use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
 use tactomo_physics::readings::Readings;
@@ -6,6 +6,7 @@ use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, measured};
 
 use super::curve::{self, Fit};
+use super::imaging::{Images, Imaging};
 use super::paper::PaperSolver;
 use super::press::{MIDDLE, Press, nine_places};
 
@@ -20,10 +21,9 @@ pub struct Metrics {
     pub curve: Option<Fit>,
     /// FMAX as eq. (8) is printed, where FMAX is determined.
     pub printed_maximum: Option<f64>,
-    /// SR (9) of a contact in the middle; `None` if its image is nowhere above zero.
-    pub spatial_resolution: Option<f64>,
-    /// PA (10), mean over the nine places.
-    pub position_accuracy: Option<f64>,
+    /// SR and PA.
+    #[serde(flatten)]
+    pub imaging: Imaging,
 }
 
 impl Metrics {
@@ -83,15 +83,11 @@ impl Sweep {
 
     fn over(&self, solver: &PaperSolver, frames: usize, read: &mut dyn FnMut(&Readings) -> Readings) -> Metrics {
         let mut points = Vec::with_capacity(frames * self.curve.len());
-        let (mut resolutions, mut accuracies) = (Vec::new(), Vec::new());
+        let mut images = Images::new(solver);
         for _ in 0..frames {
             points.extend(self.curve.iter().map(|(strength, readings)| [*strength, read(readings).largest_v()]));
-            for (index, (contact, readings)) in self.places.iter().enumerate() {
-                let Some(imaged) = solver.imaged(&read(readings), contact) else { continue };
-                accuracies.push(imaged.figures.position_accuracy);
-                if index == self.places.len() / 2 {
-                    resolutions.push(imaged.figures.spatial_resolution);
-                }
+            for (contact, readings) in &self.places {
+                images.add(&read(readings), contact);
             }
         }
         let curve = curve::fit(&points);
@@ -99,8 +95,7 @@ impl Sweep {
         Metrics {
             curve,
             printed_maximum: determined.map(|fit| fit.curve.printed_maximum_force()),
-            spatial_resolution: mean(&resolutions),
-            position_accuracy: mean(&accuracies),
+            imaging: images.figures(),
         }
     }
 }
@@ -127,7 +122,7 @@ mod tests {
         let noisy = sweep.noisy_metrics(&solver, &mut Noise::new(3));
         assert_eq!(noisy, sweep.noisy_metrics(&solver, &mut Noise::new(3)));
         assert_ne!(noisy, sweep.noisy_metrics(&solver, &mut Noise::new(4)));
-        let [a, b] = [&exact, &noisy].map(|metrics| metrics.position_accuracy.unwrap());
+        let [a, b] = [&exact, &noisy].map(|metrics| metrics.imaging.accuracy().unwrap());
         assert!((a - b).abs() < 0.01 && a > 0.5 && a < 1.0, "{a} {b}");
         let [a, b] = [&exact, &noisy].map(|metrics| metrics.sensitivity().unwrap());
         assert!((a / b - 1.0).abs() < 0.2, "{a} {b}");

@@ -1,7 +1,8 @@
-//! The paper's solver and its metrics: thin shell, uniform conductivity, Tikhonov with lambda^2 = 5000.
+//! The paper's solver: thin shell, Tikhonov with lambda^2 = 5000, and its image of one contact.
 //!
-//! The shell's Jacobian does not depend on the conductivity ([`Lambda::Paper`] says how 5000 is mapped), so that one solver serves all
-//! detectors of the same outline and electrodes, as in the paper.
+//! It is what [`Method::TikhonovPaper`](tactomo_touch::solve::Method::TikhonovPaper) is on a thin shell. Where conductivity, pads, switch and contacts
+//! conduct more by one factor, readings stay as they are; so its images, over the sheet's conductance, do not depend on that factor, and one solver
+//! serves all materials of the same outline and electrodes, as in the paper.
 
 use tactomo_physics::detector::{Detector, Layer};
 use tactomo_physics::forward::jacobian::Jacobian;
@@ -13,18 +14,14 @@ use tactomo_physics::scene::Contact;
 use tactomo_touch::metrics::{PaperFigures, centroid_m};
 use tactomo_touch::solve::{Lambda, Tikhonov, Variant};
 
-/// `lambda^2` (V2/S2), section II.C.
-const LAMBDA_2: f64 = 5000.0;
-/// Nodes of the mesh, and drive (V), there.
-const NODES: usize = 2000;
-const DRIVE_V: f64 = 2.0;
-/// Thickness of the shell that stands for the detector (m), with 1 S/m as there: any does.
+/// Thickness of the shell that stands for the detector (m): only the sheet's conductance counts.
 const THICKNESS_M: f64 = 1.0;
 
 /// The paper's solver for detectors of one outline and one set of electrodes.
 pub struct PaperSolver {
     tikhonov: Tikhonov,
     mesh: ImageMesh,
+    sheet_s: f64,
     width_m: f64,
 }
 
@@ -40,18 +37,16 @@ pub struct Imaged {
 }
 
 impl PaperSolver {
-    /// For the outline and the electrodes of a detector.
+    /// For the outline and the electrodes of a detector. Layers are taken for one sheet, also where they are joined by dots.
     ///
     /// # Errors
     /// [`ForwardError`] if there is no thin shell of it.
     pub fn new(detector: &Detector) -> Result<Self, ForwardError> {
-        let shell = Shell::with_nodes(
-            &Detector { layers: vec![Layer::uniform(THICKNESS_M, 1.0)], drive_v: DRIVE_V, ..detector.taken_as_exact() },
-            NODES,
-        )?;
-        let jacobian = Jacobian::of(&shell);
-        let tikhonov = Tikhonov::new(&jacobian, Lambda::Paper(LAMBDA_2), Variant::Paper);
-        Ok(Self { tikhonov, mesh: jacobian.image_mesh, width_m: detector.outline.size_m()[0] })
+        let sheet_s = detector.sheet_conductance_s();
+        let layers = vec![Layer::uniform(THICKNESS_M, sheet_s / THICKNESS_M)];
+        let jacobian = Jacobian::of(&Shell::new(&Detector { layers, ..detector.taken_as_exact() })?);
+        let tikhonov = Tikhonov::new(&jacobian, Lambda::PAPER, Variant::Paper);
+        Ok(Self { tikhonov, mesh: jacobian.image_mesh, sheet_s, width_m: detector.outline.size_m()[0] })
     }
 
     /// The image of readings (V) of one contact; `None` if it is nowhere above zero.
@@ -62,7 +57,12 @@ impl PaperSolver {
         Some(Imaged { figures, centroid_m, output: value_at(&self.mesh, &image, centroid_m)? })
     }
 
-    /// The image along a line through a point (S/m2): from side to side, at so many places.
+    /// The detector's width (m), which SR and PA are shares of.
+    pub fn width_m(&self) -> f64 {
+        self.width_m
+    }
+
+    /// The image along a line through a point (S/m2 of a sheet of 1 S): from side to side, at so many places.
     pub fn profile(&self, readings: &Readings, through_m: Point, places: usize) -> Option<Vec<[f64; 2]>> {
         let image = self.image_s_per_m2(readings)?;
         let step_m = self.width_m / places as f64;
@@ -70,8 +70,10 @@ impl PaperSolver {
         (0..places).map(|index| Some([x_m(index), value_at(&self.mesh, &image, [x_m(index), through_m[1]])?])).collect()
     }
 
+    /// The image (S/m2 of a sheet of 1 S).
     fn image_s_per_m2(&self, readings: &Readings) -> Option<Vec<f32>> {
-        self.tikhonov.image_s_per_m2(readings).ok()
+        let image = self.tikhonov.image_s_per_m2(readings).ok()?;
+        Some(image.into_iter().map(|value| (f64::from(value) / self.sheet_s) as f32).collect())
     }
 }
 
@@ -97,6 +99,7 @@ fn value_at(mesh: &ImageMesh, image: &[f32], at_m: Point) -> Option<f64> {
 mod tests {
     use super::*;
     use tactomo_physics::forward::{ForwardModel, Slab, readings_v};
+    use tactomo_touch::solve::{Method, Problem};
 
     #[test]
     fn it_sees_a_contact_pulled_to_the_middle_and_its_output_grows_with_the_contact() {
@@ -118,6 +121,58 @@ mod tests {
             let error_m = 0.06 * (1.0 - found.figures.position_accuracy);
             assert!((geometry::distance(found.centroid_m, [0.02, 0.0]) - error_m).abs() < 1e-9);
         }
+    }
+
+    fn readings(detector: &Detector, contact: &Contact) -> Readings {
+        readings_v(&Slab::new(detector).unwrap().impedance_ohm(&[*contact]).unwrap(), detector)
+    }
+
+    /// What `reconstruct --solver tikhonov-paper --model shell` finds in readings.
+    fn reconstructed_m(detector: &Detector, readings: &Readings) -> Point {
+        let problem = Problem::new(Box::new(Shell::new(detector).unwrap()) as Box<dyn ForwardModel>);
+        let found = Method::TikhonovPaper.build(&problem).unwrap().solve(readings).unwrap();
+        let [contact] = found.contacts[..] else { panic!("{:?}", found.contacts) };
+        [contact.x_m, contact.y_m]
+    }
+
+    #[test]
+    fn it_sees_what_reconstruct_sees_in_the_same_readings() {
+        for name in ["square-60", "strip-13x60"] {
+            let detector = Detector { drive_v: 2.4, ..Detector::preset(name).unwrap().taken_as_exact() };
+            let [width_m, height_m] = detector.outline.size_m();
+            let contact = Contact::flat(width_m / 3.0, height_m / 3.0, 0.002, 0.0251);
+            let readings = readings(&detector, &contact);
+            let found_m = PaperSolver::new(&detector).unwrap().imaged(&readings, &contact).unwrap().centroid_m;
+            let expected_m = reconstructed_m(&detector, &readings);
+            assert!(geometry::distance(found_m, expected_m) < 1e-6, "{name}: {found_m:?} {expected_m:?}");
+        }
+    }
+
+    #[test]
+    fn a_firm_contact_at_a_third_of_the_sides_is_pulled_nearly_to_the_middle() {
+        let detector = Detector::preset("square-60").unwrap().taken_as_exact();
+        let contact = Contact::flat(0.02, 0.02, 0.002, 0.0251);
+        let solver = PaperSolver::new(&detector).unwrap();
+        let [x_m, y_m] = solver.imaged(&readings(&detector, &contact), &contact).unwrap().centroid_m;
+        assert!((0.004..0.006).contains(&x_m) && (x_m - y_m).abs() < 1e-4, "{x_m} {y_m}");
+    }
+
+    #[test]
+    fn what_conducts_more_by_one_factor_everywhere_looks_the_same() {
+        let detector = Detector::preset("square-60").unwrap().taken_as_exact();
+        let factor = 880.0;
+        let mut better = detector.clone();
+        for layer in &mut better.layers {
+            (layer.bottom_s_per_m, layer.top_s_per_m) = (layer.bottom_s_per_m * factor, layer.top_s_per_m * factor);
+        }
+        better.contact_impedance_ohm_m2 /= factor;
+        better.on_resistance_ohm /= factor;
+        let contact = Contact::flat(0.015, -0.01, 0.002, 1e-3);
+        let readings = readings(&detector, &contact);
+        let [a, b] = [&detector, &better]
+            .map(|detector| PaperSolver::new(detector).unwrap().imaged(&readings, &contact).unwrap());
+        assert!(geometry::distance(a.centroid_m, b.centroid_m) < 1e-7, "{a:?} {b:?}");
+        assert!((a.output / b.output - 1.0).abs() < 1e-4, "{a:?} {b:?}");
     }
 
     #[test]

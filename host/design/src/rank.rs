@@ -1,4 +1,9 @@
-//! Rank correlation.
+//! Rank correlation, and how often chance alone gives one.
+
+/// Random orders that a correlation is compared with.
+const SHUFFLES: u32 = 20_000;
+/// Seed of these orders: a test gives the same answer each time.
+const SEED: u64 = 1;
 
 /// Spearman's rank correlation of pairs, with mean ranks for equals: -1 to 1; `None` of fewer than three pairs, or where one side is
 /// all equal.
@@ -11,6 +16,36 @@ pub fn spearman(pairs: &[[f64; 2]]) -> Option<f64> {
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>();
     let scale = (product(&a, &a) * product(&b, &b)).sqrt();
     (scale > 0.0).then(|| product(&a, &b) / scale)
+}
+
+/// Probability that pairs without any connection are correlated so strongly, in either direction: the share of random orders of one side that are
+/// (a permutation test); `None` where there is no correlation.
+pub fn chance(pairs: &[[f64; 2]]) -> Option<f64> {
+    let found = spearman(pairs)?.abs();
+    let mut random = fastrand::Rng::with_seed(SEED);
+    let mut shuffled = pairs.to_vec();
+    let mut as_strong = 0;
+    for _ in 0..SHUFFLES {
+        for last in (1..shuffled.len()).rev() {
+            let other = random.usize(..=last);
+            let value = shuffled[last][1];
+            shuffled[last][1] = std::mem::replace(&mut shuffled[other][1], value);
+        }
+        // Sums of the same ranks in another order differ in their last digits.
+        as_strong += u32::from(spearman(&shuffled).is_some_and(|other| other.abs() >= found - 1e-9));
+    }
+    Some(f64::from(as_strong + 1) / f64::from(SHUFFLES + 1))
+}
+
+/// Which of a family of tests, by their probabilities under chance alone, hold so that one false one among all is less likely than `level`: Holm, "A simple
+/// sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 6 (1979). A test that could not be made takes part, and fails.
+pub fn holm(chances: &[Option<f64>], level: f64) -> Vec<bool> {
+    let of = |index: usize| chances[index].unwrap_or(1.0);
+    let mut order: Vec<usize> = (0..chances.len()).collect();
+    order.sort_by(|a, b| of(*a).total_cmp(&of(*b)));
+    let passes = |(place, index): &(usize, usize)| of(*index) <= level / (chances.len() - place) as f64;
+    let passed: Vec<usize> = order.into_iter().enumerate().take_while(passes).map(|(_, index)| index).collect();
+    (0..chances.len()).map(|index| passed.contains(&index)).collect()
 }
 
 /// Rank of each value from 0; equals share their mean.
@@ -36,6 +71,26 @@ mod tests {
         // By hand: ranks 0 1 2 3 and 1 0 3 2; sum of squared differences 4; 1 - 6 x 4 / (4 x 15) = 0.6.
         let mixed = [[1.0, 2.0], [2.0, 1.0], [3.0, 4.0], [4.0, 3.0]];
         assert!((spearman(&mixed).unwrap() - 0.6).abs() < 1e-12);
+    }
+
+    #[test]
+    fn chance_gives_an_order_as_often_as_counting_says() {
+        // Of the 120 orders of five, the rising and the falling one are as strong as the rising one.
+        let rising: Vec<[f64; 2]> = (0..5).map(|k| [f64::from(k), f64::from(k)]).collect();
+        assert!((chance(&rising).unwrap() - 2.0 / 120.0).abs() < 0.004, "{:?}", chance(&rising));
+        assert_eq!(chance(&rising), chance(&rising));
+        let mixed = [[1.0, 2.0], [2.0, 1.0], [3.0, 4.0], [4.0, 3.0]];
+        assert!(chance(&mixed).unwrap() > 0.3);
+        assert_eq!(chance(&rising[..2]), None);
+    }
+
+    #[test]
+    fn of_many_tests_each_needs_more() {
+        // Alone all of 5 % would hold; of four, the least needs 1.25 %, the next 1.67 %, and what follows a failure fails.
+        assert_eq!(holm(&[Some(0.04), Some(0.01), Some(0.015), None], 0.05), [false, true, true, false]);
+        assert_eq!(holm(&[Some(0.02), Some(0.02), Some(0.02)], 0.05), [false; 3]);
+        assert_eq!(holm(&[Some(0.04)], 0.05), [true]);
+        assert_eq!(holm(&[], 0.05), [] as [bool; 0]);
     }
 
     #[test]

@@ -3,8 +3,10 @@
 //! Two layers of sample B, 60 x 60 mm and 5 mm each, 5 x 5 or 7 x 7 dots. The paper's glue conducts along itself far better than foam, so that a dot is an equipotential;
 //! beside it stands a glue that conducts only across, which shows what of the effect that is.
 
+mod bar;
 mod claims;
 mod page;
+mod section;
 mod table;
 
 use std::time::Instant;
@@ -12,16 +14,18 @@ use std::time::Instant;
 use tactomo_physics::detector::{Bond, Detector, Stack};
 use tactomo_physics::forward::{ForwardError, Slab};
 
+pub use self::bar::Bar;
 use super::metrics::Sweep;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, MIDDLE};
-use super::{Claim, Course, DesignError, Heading, Limit, PaperSolver, Press, Progress};
+use super::{Claim, Course, DesignError, Heading, Imaging, Limit, PaperSolver, Press, Progress};
 
 /// What is stacked.
 const MATERIAL: &str = "BB";
 /// Dots along a side.
 const GRIDS: [usize; 2] = [5, 7];
-/// Diameters, as shares of the pitch.
-const DIAMETERS: [f64; 10] = [0.08, 0.16, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.88, 1.0];
+/// Diameters, as shares of the pitch, and how many.
+const COUNT: usize = 10;
+const DIAMETERS: [f64; COUNT] = [0.08, 0.16, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.88, 1.0];
 /// Sheet conductance of a glue that conducts only across (S): the least that a bond may have.
 const ACROSS_ONLY_S: f64 = 1e-9;
 /// The electrode that is grounded while the currents through the dots are looked at: one of the four around the middle.
@@ -48,8 +52,9 @@ pub struct Row {
     pub diameter_m: Option<f64>,
     /// Error of the paper's solver (m): mean over nine places, without noise.
     pub position_error_m: Option<f64>,
-    /// SR (9) of a contact in the middle, with it.
-    pub spatial_resolution: Option<f64>,
+    /// SR and PA with it.
+    #[serde(flatten)]
+    pub imaging: Imaging,
     /// What the sensor itself can tell.
     pub limit: Limit,
     /// Current of a contact in the middle through each dot, while an electrode beside the middle is grounded: place (m), mean density (A/m2).
@@ -72,6 +77,8 @@ pub struct Current {
 pub struct Report {
     /// Each glue and grid, by diameter; the layers that touch all over first.
     pub rows: Vec<Row>,
+    /// Bars of conductor that a dot of each diameter joins.
+    pub bars: Vec<Bar>,
     /// What was concluded, and how the study went.
     #[serde(flatten)]
     pub course: Course,
@@ -97,8 +104,19 @@ pub fn run(progress: Progress) -> Result<Report, DesignError> {
     let computed = progress.map("bonds", &tasks, |bond| row(&touching, *bond, &solver));
     let is_stopped = computed.iter().any(Option::is_none);
     let rows: Vec<Row> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
+    let bars = bars(&touching);
     let course = Course::since(start, is_stopped, claims::of(&rows));
-    Ok(Report { rows, course })
+    Ok(Report { rows, bars, course })
+}
+
+/// A dot of each diameter in a bar of two layers of a detector.
+fn bars(touching: &Detector) -> Vec<Bar> {
+    let layer_m = touching.layers.first().map_or(0.0, |layer| layer.thickness_m);
+    let of = |dots: usize| {
+        let pitch_m = touching.outline.size_m()[0] / dots as f64;
+        DIAMETERS.map(|share| Bar::of(pitch_m, layer_m, share * pitch_m))
+    };
+    GRIDS.into_iter().flat_map(of).collect()
 }
 
 fn row(touching: &Detector, bond: Option<(Glue, usize, f64)>, solver: &PaperSolver) -> Result<Row, DesignError> {
@@ -111,14 +129,14 @@ fn row(touching: &Detector, bond: Option<(Glue, usize, f64)>, solver: &PaperSolv
         });
     }
     let slab = Slab::new(&detector)?;
-    let metrics = Sweep::of(&slab, &Press::PAPER, &[], COMPARED_S_PER_M)?.metrics(solver);
+    let imaging = Sweep::of(&slab, &Press::PAPER, &[], COMPARED_S_PER_M)?.metrics(solver).imaging;
     let width_m = detector.outline.size_m()[0];
     Ok(Row {
         dots: bond.map_or(0, |(_, dots, _)| dots),
         glue: bond.map(|(glue, ..)| glue),
         diameter_m: bond.map(|(.., diameter_m)| diameter_m),
-        position_error_m: metrics.position_accuracy.map(|accuracy| (1.0 - accuracy) * width_m),
-        spatial_resolution: metrics.spatial_resolution,
+        position_error_m: imaging.position_accuracy.map(|accuracy| (1.0 - accuracy) * width_m),
+        imaging,
         limit: Limit::of(&slab, &Press::PAPER, COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M)?,
         currents: currents(&slab)?,
     })

@@ -6,8 +6,9 @@ use tactomo_study::page::{Axis, Chart, Mark, Series, Unit, colour, escaped, tabl
 
 use super::super::text::number;
 use super::claims::series;
+use super::section;
 use super::table::figures;
-use super::{GRIDS, Glue, Report, Row};
+use super::{Bar, GRIDS, Glue, Report, Row};
 
 /// Errors below this show there (m).
 const FLOOR_M: f64 = 1e-6;
@@ -37,8 +38,51 @@ pub(super) fn parts(report: &Report) -> Vec<String> {
          more. Hover for the values.</p>"
             .to_owned(),
         format!("<div class=\"maps\">{drawings}</div>"),
+        "<h3>A bar with 1 V from top to bottom</h3><p class=\"quiet\">Two halves of a conductor of 1 S/m that one dot of glue joins: a dot's share of the bond, as a cylinder. Wider dots let more current through \
+         the bond, and less through each square metre of dot. Lines are 0.05 V apart.</p>"
+            .to_owned(),
+        format!("<div class=\"charts small\">{}{}</div>", density(report).svg(), bars(report)),
         all(report),
     ]
+}
+
+/// Current density over the dots' diameter: over the bond, and over the dot.
+fn density(report: &Report) -> Chart {
+    let per_grid = report.bars.len() / GRIDS.len();
+    let of = |grid: usize, what: &str, class: &'static str, value: fn(&Bar) -> f64| {
+        let mark = |bar: &Bar| Mark {
+            x: bar.dot_diameter_m,
+            y: value(bar),
+            tooltip: format!("{}, {what}: {}", Unit::Metres.text(bar.dot_diameter_m), number(Some(value(bar)), 1.0)),
+        };
+        let marks: Vec<_> = report.bars.iter().skip(grid * per_grid).take(per_grid).map(mark).collect();
+        let name = format!("{0} x {0}, {what}", GRIDS[grid]);
+        Series { name, class, main: marks.len() / 2, marks, is_joined: true }
+    };
+    let series = vec![
+        of(0, "bond", "paper", |bar| bar.over_bond_a_per_m2),
+        of(1, "bond", "contacts", |bar| bar.over_bond_a_per_m2),
+        of(0, "dot", "bound", |bar| bar.over_dot_a_per_m2),
+        of(1, "dot", "linear", |bar| bar.over_dot_a_per_m2),
+    ];
+    let values = |of: fn(&Mark) -> f64| series.iter().flat_map(|line| &line.marks).map(of).collect::<Vec<_>>();
+    Chart {
+        title: "Mean current density, A/m2".to_owned(),
+        subtitle: "over the bond, and over the dot".to_owned(),
+        x: Axis::over("diameter of a dot", Unit::Metres, values(|mark| mark.x), FLOOR_M, 0.6),
+        y: Axis::over("", Unit::Plain, values(|mark| mark.y), FLOOR_M, 0.4),
+        series,
+        has_front: false,
+        guide: None,
+        level: None,
+        size: [400.0, 330.0],
+    }
+}
+
+/// Potentials in sections through three bars of the first grid, and their scale.
+fn bars(report: &Report) -> String {
+    let drawn: String = DRAWN.into_iter().filter_map(|index| report.bars.get(index)).map(section::section).collect();
+    format!("<div class=\"maps\">{drawn}</div>")
 }
 
 fn chart(report: &Report, title: &str, unit: Unit, value: fn(&Row) -> Option<f64>) -> Chart {
@@ -70,6 +114,7 @@ fn chart(report: &Report, title: &str, unit: Unit, value: fn(&Row) -> Option<f64
         series: lines,
         has_front: false,
         guide: None,
+        level: None,
         size: [400.0, 330.0],
     }
 }

@@ -26,7 +26,7 @@ pub(super) fn table(report: &Report) -> String {
             number(row.position_error_m, 1e3),
             number(row.limit.place_m, 1e3),
             number(row.limit.two_points_m, 1e3),
-            number(row.spatial_resolution, 1.0),
+            number(row.imaging.spatial_resolution, 1.0),
             number(row.largest_density_a_per_m2(), 1.0)
         );
     }
@@ -37,7 +37,7 @@ pub(super) fn figures(row: &Row) -> [Option<f64>; 7] {
     [
         row.diameter_m,
         row.position_error_m,
-        row.spatial_resolution,
+        row.imaging.spatial_resolution,
         row.limit.place_m,
         row.limit.two_points_m,
         Some(row.limit.signal_to_noise_db),

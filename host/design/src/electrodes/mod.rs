@@ -11,7 +11,7 @@ use std::time::Instant;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::Slab;
 
-use super::limit::place_everywhere_m;
+use super::limit::{Spread, places_everywhere};
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, nine_places};
 use super::reached::by_auto;
 use super::{Course, DesignError, Heading, Layout, Limit, Press, Progress, Reached};
@@ -45,10 +45,10 @@ pub struct Row {
     pub conversions: usize,
     /// What the sensor itself can tell.
     pub limit: Limit,
-    /// Root mean square of the standard error of a place over the whole surface (m); `None` if somewhere it is not told.
-    pub place_everywhere_m: Option<f64>,
-    /// The same if as many frames are averaged as are read in the time of one of 16 electrodes (m).
-    pub place_in_same_time_m: Option<f64>,
+    /// Standard errors of a place over the whole surface; `None` if somewhere it is not told.
+    pub everywhere: Option<Spread>,
+    /// Their median if as many frames are averaged as are read in the time of one of 16 electrodes (m).
+    pub median_in_same_time_m: Option<f64>,
     /// What `auto` makes of contacts at the nine places.
     pub reached: Reached,
 }
@@ -140,7 +140,7 @@ fn row(group: Group, layout: Layout, diameter_m: f64, seed: u64) -> Result<Row, 
     let slab = Slab::new(&detector)?;
     let conversions = layout.count().pow(2);
     let noise_v = detector.adc.deviation_v();
-    let place_everywhere_m = place_everywhere_m(&slab, &Press::PAPER, COMPARED_S_PER_M, noise_v, PLACES)?;
+    let everywhere = places_everywhere(&slab, &Press::PAPER, COMPARED_S_PER_M, noise_v, PLACES)?;
     let contacts = nine_places(&detector).map(|place| Press::PAPER.at(place, COMPARED_S_PER_M));
     let name = match group {
         Group::Diameter => format!("{:.0} mm", diameter_m * 1e3),
@@ -160,9 +160,9 @@ fn row(group: Group, layout: Layout, diameter_m: f64, seed: u64) -> Result<Row, 
         diameter_m,
         conversions,
         limit: Limit::of(&slab, &Press::PAPER, COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M)?,
-        place_everywhere_m,
-        place_in_same_time_m: place_everywhere_m
-            .map(|place_m| place_m * (conversions as f64 / USUAL_CONVERSIONS).sqrt()),
+        everywhere,
+        median_in_same_time_m: everywhere
+            .map(|spread| spread.median_m * (conversions as f64 / USUAL_CONVERSIONS).sqrt()),
         reached: by_auto(&detector, &contacts, seed)?,
     })
 }
@@ -206,7 +206,11 @@ mod tests {
     fn more_electrodes_tell_more_and_all_layouts_are_detectors() {
         let of = |layout| row(Group::Number, layout, DIAMETER_M, 1).unwrap();
         let [few, many] = [Layout::grid(3, 3), Layout::grid(5, 5)].map(of);
-        assert!(many.place_everywhere_m.unwrap() < few.place_everywhere_m.unwrap());
+        let [few_places, many_places] = [&few, &many].map(|row| row.everywhere.unwrap());
+        assert!(many_places.rms_m < few_places.rms_m && many_places.median_m < few_places.median_m);
+        for spread in [few_places, many_places] {
+            assert!(spread.median_m < spread.p90_m && spread.median_m < spread.rms_m, "{spread:?}");
+        }
         assert_eq!((few.conversions, many.conversions), (81, 625));
         for (layout, diameter_m) in Group::ALL.into_iter().flat_map(Group::layouts) {
             let base = Detector::default();

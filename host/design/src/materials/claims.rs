@@ -1,6 +1,6 @@
 //! What the paper concludes from its maps, on ours.
 
-use super::super::claim::{Trend, Verdict};
+use super::super::claim::{Basis, Trend, Verdict};
 use super::super::rank::spearman;
 use super::{Claim, Condition, short};
 
@@ -14,14 +14,46 @@ const BEST_SHARE: f64 = 0.1;
 /// Touch of several newtons (N): a light press, and a firm one below what the paper measured as the maximum of its sample A, 2.8 N.
 const TOUCH_N: [f64; 2] = [0.05, 2.5];
 
-/// A figure of a condition: larger is better.
+/// A figure of a condition: larger is better. Images that have collapsed have none.
 type Figure = fn(&Condition) -> Option<f64>;
 
-/// With the paper's solver, and the sensor's own of the same meaning.
+/// By the paper's definition, and the sensor's own of the same meaning.
 const SENSITIVITY: [Figure; 2] = [|c| c.exact.sensitivity(), |c| Some(c.limit.signal_to_noise_db)];
 const MAXIMUM: [Figure; 2] = [|c| c.exact.maximum(), |c| c.limit.range[1]];
-const RESOLUTION: [Figure; 2] = [|c| c.exact.spatial_resolution, |c| c.limit.two_points_m.map(|m| -m)];
-const ACCURACY: [Figure; 2] = [|c| c.exact.position_accuracy, |c| c.limit.place_m.map(|m| -m)];
+/// With the paper's solver, and the sensor's own: each at a contact of 1 S/m, and where the contact is at half of the drive.
+const RESOLUTION: [[Figure; 2]; 2] = [
+    [|c| c.exact.imaging.sharpness(), |c| c.at_half.as_ref()?.imaging.sharpness()],
+    [|c| c.limit.two_points_m.map(|m| -m), |c| c.at_half.as_ref()?.two_points_m.map(|m| -m)],
+];
+const ACCURACY: [[Figure; 2]; 2] = [
+    [|c| c.exact.imaging.accuracy(), |c| c.at_half.as_ref()?.imaging.accuracy()],
+    [|c| c.limit.place_m.map(|m| -m), |c| c.at_half.as_ref()?.place_m.map(|m| -m)],
+];
+const AT: [&str; 2] = ["contact of 1 S/m", "contact at half of the drive"];
+
+/// Whether something holds at both strengths, and what was found at each.
+#[derive(Clone, Debug)]
+struct Found {
+    holds: Option<bool>,
+    text: String,
+}
+
+impl Found {
+    /// Of a test of each of two figures, which says whether it holds and what it found.
+    fn at_both(figures: [Figure; 2], what: &str, test: impl Fn(Figure) -> (Option<bool>, String)) -> Self {
+        let [one, half] = figures.map(test);
+        Self {
+            holds: one.0.zip(half.0).map(|(one, half)| one && half),
+            text: format!("{what}: {}, {}; {}, {}", AT[0], one.1, AT[1], half.1),
+        }
+    }
+}
+
+/// A claim on what was found with the paper's solver, and of the sensor.
+fn at_both(claim: &'static str, [paper, sensor]: [Found; 2]) -> Claim {
+    let verdict = Verdict::of(paper.holds, sensor.holds);
+    Claim { claim, basis: Basis::Solver, verdict, paper: paper.text, sensor: sensor.text }
+}
 
 /// All claims of section III.B.
 pub(super) fn of(conditions: &[Condition], conductivities_s_per_m: &[f64]) -> Vec<Claim> {
@@ -30,15 +62,12 @@ pub(super) fn of(conditions: &[Condition], conductivities_s_per_m: &[f64]) -> Ve
         map.suited(),
         Claim::of_trends(
             "sensitivity rises with the conductivity of the top",
-            map.trend("SENS with top", SENSITIVITY[0], |c| c.top_s_per_m, 1.0),
-            map.trend("signal to noise with top", SENSITIVITY[1], |c| c.top_s_per_m, 1.0),
+            Basis::Definition,
+            &map.trend("SENS with top", SENSITIVITY[0], |c| c.top_s_per_m),
+            &map.trend("signal to noise with top", SENSITIVITY[1], |c| c.top_s_per_m),
         ),
         map.most_sensitive(),
-        Claim::of_trends(
-            "a low conductivity of the bottom sharpens the image",
-            map.trend("SR with bottom, reversed", RESOLUTION[0], |c| c.bottom_s_per_m, -1.0),
-            map.trend("two points told apart with bottom, reversed", RESOLUTION[1], |c| c.bottom_s_per_m, -1.0),
-        ),
+        map.sharpened_by_a_poor_bottom(),
         map.high_and_even(),
         map.bottom_above_top(),
         map.peak(),
@@ -52,9 +81,9 @@ struct Map<'a> {
 }
 
 impl<'a> Map<'a> {
-    fn trend(&self, of: &'static str, figure: Figure, by: fn(&Condition) -> f64, sign: f64) -> Trend {
-        let pairs: Vec<_> = self.conditions.iter().filter_map(|c| Some([sign * by(c), figure(c)?])).collect();
-        Trend { of, correlation: spearman(&pairs) }
+    fn trend(&self, of: &str, figure: Figure, by: fn(&Condition) -> f64) -> Trend {
+        let pairs: Vec<_> = self.conditions.iter().filter_map(|c| Some([by(c), figure(c)?])).collect();
+        Trend::of(of, &pairs)
     }
 
     /// Conditions of the same conductivity at top and bottom.
@@ -62,11 +91,25 @@ impl<'a> Map<'a> {
         self.conditions.iter().filter(|c| c.bottom_s_per_m == c.top_s_per_m)
     }
 
+    fn sharpened_by_a_poor_bottom(&self) -> Claim {
+        let found = |figures: [Figure; 2], what: &str| {
+            Found::at_both(figures, &format!("{what} with bottom, reversed"), |figure| {
+                let trend = self.trend("", figure, |c| -c.bottom_s_per_m);
+                (trend.confirms(), trend.value_text())
+            })
+        };
+        at_both(
+            "a low conductivity of the bottom sharpens the image",
+            [found(RESOLUTION[0], "SR"), found(RESOLUTION[1], "two points told apart")],
+        )
+    }
+
     /// About 0.2 S/m for several newtons: with the solver, the uniform material whose least normalised metric is the largest; of the sensor, those that
     /// see a light press and do not saturate under a firm one.
     fn suited(&self) -> Claim {
-        let normalised = [(SENSITIVITY[0], true), (MAXIMUM[0], true), (RESOLUTION[0], false), (ACCURACY[0], false)]
-            .map(|(figure, is_log)| self.normalised(figure, is_log));
+        let normalised =
+            [(SENSITIVITY[0], true), (MAXIMUM[0], true), (RESOLUTION[0][0], false), (ACCURACY[0][0], false)]
+                .map(|(figure, is_log)| self.normalised(figure, is_log));
         let balance = |c: &Condition| {
             normalised.iter().map(|share| share(c)).try_fold(f64::INFINITY, |least, share| Some(least.min(share?)))
         };
@@ -77,10 +120,17 @@ impl<'a> Map<'a> {
         let is_only = suited.iter().any(|found| is_about(*found)) && suited.iter().all(|found| is_about(*found));
         Claim {
             claim: "about 0.2 S/m suits touch of several newtons",
+            basis: Basis::Metrics,
             verdict: Verdict::of(balanced.map(|c| is_about(c.bottom_s_per_m)), self.uniform().next().map(|_| is_only)),
-            solver: said(balanced, |c| {
-                format!("the least of the four normalised metrics is best at {} S/m, uniform", short(c.bottom_s_per_m))
-            }),
+            paper: balanced.map_or_else(
+                || "no uniform material has all four figures: images have collapsed".to_owned(),
+                |c| {
+                    format!(
+                        "the least of the four normalised metrics is best at {} S/m, uniform",
+                        short(c.bottom_s_per_m)
+                    )
+                },
+            ),
             sensor: match (suited.first(), suited.last()) {
                 (Some(low), Some(high)) => format!(
                     "{} to {} N is within the range of every uniform foam from {} to {} S/m that is as soft as sample A",
@@ -102,11 +152,12 @@ impl<'a> Map<'a> {
         let place = |c: &Condition| c.title();
         Claim {
             claim: "the most sensitive is a conductive top (0.5 S/m) on a poor bottom (0.001 S/m)",
+            basis: Basis::Definition,
             verdict: Verdict::of(
                 solver.or(at_half).map(|c| is_there(c) || at_half.is_some_and(is_there)),
                 sensor.map(is_there),
             ),
-            solver: format!(
+            paper: format!(
                 "SENS is highest at {}; at half of FMAX instead of half of what is applied, at {}",
                 said(solver, place),
                 said(at_half, place)
@@ -126,61 +177,63 @@ impl<'a> Map<'a> {
         };
         let found = MAXIMUM.map(|figure| {
             let pairs: Vec<_> = self.uniform().filter_map(|c| Some([c.bottom_s_per_m, figure(c)?])).collect();
-            [spearman(&pairs), self.share_of_pairs(figure, is_even_of)]
+            [spearman(&pairs), self.share_of_pairs(figure, is_even_of).map(|(share, _)| share)]
         });
         let holds = found.map(|[rises, even]| Some(rises? > 0.5 && even? > 0.5));
         Claim {
             claim: "the maximum force is largest for high and even conductivity",
+            basis: Basis::Definition,
             verdict: Verdict::of(holds[0], holds[1]),
-            solver: text(found[0]),
+            paper: text(found[0]),
             sensor: text(found[1]),
         }
     }
 
     fn bottom_above_top(&self) -> Claim {
-        let shares = ACCURACY.map(|figure| self.share_of_pairs(figure, is_mirrored_with_better_bottom));
-        let text = |what: &str, share: Option<f64>| match share {
-            Some(share) => format!("{what} is better so than the other way round in {:.0} % of pairs", 100.0 * share),
-            None => NOT_COMPUTED.to_owned(),
+        let found = |figures: [Figure; 2], what: &str| {
+            Found::at_both(figures, &format!("{what} is better so than the other way round"), |figure| {
+                let share = self.share_of_pairs(figure, is_mirrored_with_better_bottom);
+                let text = |(share, pairs): (f64, u32)| format!("in {:.0} % of {pairs} pairs", 100.0 * share);
+                (share.map(|(share, _)| share > 0.5), share.map_or(NOT_COMPUTED.to_owned(), text))
+            })
         };
-        let holds = shares.map(|share| share.map(|share| share > 0.5));
-        Claim {
-            claim: "accuracy wants the bottom more conductive than the top",
-            verdict: Verdict::of(holds[0], holds[1]),
-            solver: text("PA", shares[0]),
-            sensor: text("the standard error of places", shares[1]),
-        }
+        at_both(
+            "accuracy wants the bottom more conductive than the top",
+            [found(ACCURACY[0], "PA"), found(ACCURACY[1], "the standard error of places")],
+        )
     }
 
-    /// The conductivity of the bottom with the best accuracy, mean over tops.
+    /// The conductivity of the bottom with the best accuracy, mean over tops: of those of which at least half of the tops have a figure.
     fn peak(&self) -> Claim {
-        let [solver, sensor] = ACCURACY.map(|figure| {
+        let best_at = |figure: Figure| {
             let mean = |bottom: &f64| {
                 let row = self.conditions.iter().filter(|c| c.bottom_s_per_m == *bottom);
                 // Errors of places spread over decades: their logarithms are averaged.
                 let values: Vec<f64> =
                     row.filter_map(figure).map(|value| if value < 0.0 { -(-value).ln() } else { value }).collect();
-                super::super::metrics::mean(&values).map(|mean| (*bottom, mean))
+                let is_enough = 2 * values.len() >= self.conductivities_s_per_m.len();
+                super::super::metrics::mean(&values).filter(|_| is_enough).map(|mean| (*bottom, mean))
             };
             let means = self.conductivities_s_per_m.iter().filter_map(mean);
             means.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(bottom, _)| bottom)
-        });
-        let is_there = |found: Option<f64>| found.map(|found| (1.0 / ABOUT..=ABOUT).contains(&(found / PEAK_S_PER_M)));
-        let text = |what: &str, found: Option<f64>| {
-            found.map_or(NOT_COMPUTED.to_owned(), |found| format!("{what} is best at {} S/m", short(found)))
         };
-        Claim {
-            claim: "accuracy peaks near 1 S/m at the bottom",
-            verdict: Verdict::of(is_there(solver), is_there(sensor)),
-            solver: text("mean PA", solver),
-            sensor: text("the mean standard error of places", sensor),
-        }
+        let found = |figures: [Figure; 2], what: &str| {
+            Found::at_both(figures, &format!("{what} is best at a bottom of"), |figure| {
+                let at = best_at(figure);
+                let is_there = at.map(|at| (1.0 / ABOUT..=ABOUT).contains(&(at / PEAK_S_PER_M)));
+                (is_there, at.map_or(NOT_COMPUTED.to_owned(), |at| format!("{} S/m", short(at))))
+            })
+        };
+        at_both(
+            "accuracy peaks near 1 S/m at the bottom",
+            [found(ACCURACY[0], "mean PA"), found(ACCURACY[1], "the mean standard error of places")],
+        )
     }
 
     /// No condition is among the best tenth of all four.
     fn best_in_all(&self) -> Claim {
         let found = [0, 1].map(|side| {
-            let figures = [SENSITIVITY, MAXIMUM, RESOLUTION, ACCURACY].map(|figures| figures[side]);
+            let figures = [SENSITIVITY[side], MAXIMUM[side], RESOLUTION[side][0], ACCURACY[side][0]];
             let levels: Option<Vec<f64>> = figures.iter().map(|figure| self.level(*figure)).collect();
             let levels = levels?;
             let among = |c: &&Condition| {
@@ -189,20 +242,21 @@ impl<'a> Map<'a> {
             Some(self.conditions.iter().filter(among).collect::<Vec<_>>())
         });
         let text = |best: &Option<Vec<&Condition>>| match best.as_deref() {
-            None => NOT_COMPUTED.to_owned(),
+            None => "fewer than a tenth of the conditions have a figure: images have collapsed".to_owned(),
             Some([]) => "no condition is in the best tenth of all four figures".to_owned(),
             Some([first, ..]) => format!("{} is in the best tenth of all four figures", first.title()),
         };
         Claim {
             claim: "no condition is best in all four",
+            basis: Basis::Metrics,
             verdict: Verdict::of(found[0].as_ref().map(Vec::is_empty), found[1].as_ref().map(Vec::is_empty)),
-            solver: text(&found[0]),
+            paper: text(&found[0]),
             sensor: text(&found[1]),
         }
     }
 
-    /// Of pairs of conditions that belong together, the share of those of which the first has more of a figure.
-    fn share_of_pairs(&self, figure: Figure, together: fn(&Condition, &Condition) -> bool) -> Option<f64> {
+    /// Of pairs of conditions that belong together, the share of those of which the first has more of a figure, and how many pairs there are.
+    fn share_of_pairs(&self, figure: Figure, together: fn(&Condition, &Condition) -> bool) -> Option<(f64, u32)> {
         let mut counts = [0u32; 2];
         for first in self.conditions {
             for second in self.conditions.iter().filter(|second| together(first, second)) {
@@ -212,7 +266,7 @@ impl<'a> Map<'a> {
             }
         }
         let all = counts[0] + counts[1];
-        (all > 0).then(|| f64::from(counts[1]) / f64::from(all))
+        (all > 0).then(|| (f64::from(counts[1]) / f64::from(all), all))
     }
 
     /// From 0 for the worst condition to 1 for the best, even in the logarithm for what spans decades.
@@ -230,7 +284,7 @@ impl<'a> Map<'a> {
     }
 }
 
-const NOT_COMPUTED: &str = "not computed";
+const NOT_COMPUTED: &str = "too few conditions";
 
 /// Smallest and largest.
 pub(super) fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {

@@ -5,6 +5,7 @@
 //! the foams of table I and stacks of two of them are put among them.
 
 mod claims;
+mod half;
 mod page;
 mod table;
 
@@ -15,6 +16,8 @@ use tactomo_physics::forward::Slab;
 use tactomo_physics::hertz::Skin;
 use tactomo_physics::simulate::Noise;
 
+pub use self::half::AtHalf;
+use super::imaging::accuracy_of_the_middle;
 use super::limit::range;
 use super::metrics::Sweep;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, FORCES_N, in_decades, nine_places};
@@ -56,6 +59,9 @@ pub struct Condition {
     pub noisy: Metrics,
     /// What the sensor itself can tell of such a contact of 1 S/m; strengths are conductivities (S/m).
     pub limit: Limit,
+    /// The same comparisons where the contact in the middle is at half of the drive: on every material as firm, as far from saturation. `None` where no
+    /// contact is.
+    pub at_half: Option<AtHalf>,
     /// Forces (N) under the paper's indenter from noise to nine tenths of the drive, for a foam as soft as this sample, or as sample A.
     pub force_range_n: [Option<f64>; 2],
     /// What `auto` makes of such contacts at the nine places, one noisy frame of each; if it was tried.
@@ -71,6 +77,8 @@ pub struct Report {
     pub conditions: Vec<Condition>,
     /// Foams and stacks.
     pub samples: Vec<Condition>,
+    /// PA of answering "the middle", whatever is read.
+    pub accuracy_of_the_middle: f64,
     /// Seed of the noise.
     pub seed: u64,
     /// What was concluded, and how the study went.
@@ -101,7 +109,14 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
     let all: Vec<Condition> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
     let (samples, conditions): (Vec<_>, Vec<_>) = all.into_iter().partition(|condition| condition.name.is_some());
     let course = Course::since(start, is_stopped, claims::of(&conditions, &conductivities_s_per_m));
-    Ok(Report { conductivities_s_per_m, conditions, samples, seed: plan.seed, course })
+    Ok(Report {
+        conductivities_s_per_m,
+        conditions,
+        samples,
+        accuracy_of_the_middle: accuracy_of_the_middle(&base),
+        seed: plan.seed,
+        course,
+    })
 }
 
 /// The samples, for a picture needs them, and then the map.
@@ -144,6 +159,7 @@ fn condition(base: &Detector, task: &Task, solver: &PaperSolver, reached: bool) 
         exact: sweep.metrics(solver),
         noisy: sweep.noisy_metrics(solver, &mut Noise::new(task.seed)),
         limit: Limit::of(&slab, &Press::PAPER, COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M)?,
+        at_half: AtHalf::of(&slab, &Press::PAPER, CONDUCTIVITIES_S_PER_M, solver)?,
         force_range_n: range(&slab, &Press::indenter(&detector, task.skin)?, FORCES_N, detector.adc.deviation_v())?,
         reached,
     })
@@ -170,8 +186,8 @@ impl super::Report for Report {
         Heading {
             name: "materials",
             title: "Which material",
-            lead_in: "What the conductivities of bottom and top do to a tomographic tactile sensor: the four metrics of the paper with its solver, and beside \
-         them what the sensor itself can tell, whatever the solver.",
+            lead_in: "What the conductivities of bottom and top do to a tomographic tactile sensor: the four metrics of the paper, two by their definition and two \
+         with its solver, and beside them what the sensor itself can tell, whatever the solver.",
         }
     }
 

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::super::claim;
+use super::super::imaging::figure;
 use super::super::text::{cells, number};
 use super::{Condition, Report};
 
@@ -17,25 +18,25 @@ pub(super) fn table(report: &Report) -> String {
         if report.course.is_stopped { ", stopped before the end" } else { "" }
     );
     text += &claim::table(&report.course.claims);
-    text += "\n          paper's solver                                the sensor itself, contact of 1 S/m\n\
-             sample    SENS       FMAX     SR     PA    PA noisy     place   auto    two points  S/N   from - to, N\n";
+    text += "\n          the paper's metrics                             the sensor itself, contact of 1 S/m\n\
+             sample        SENS     FMAX       SR       PA  PA noisy   place    auto  two points  S/N   from - to, N\n";
     for sample in &report.samples {
         _ = writeln!(text, "{}", row(sample));
     }
-    text + "SENS in V per S/m and FMAX in S/m of the contact; place, auto and two points in mm, S/N in dB\n"
+    text + "SENS in V per S/m and FMAX in S/m of the contact; SR and PA in brackets are of images that have collapsed; place, auto and two points in mm, S/N in dB\n"
 }
 
 fn row(sample: &Condition) -> String {
     let limit = &sample.limit;
     let reached = sample.reached.and_then(|reached| reached.place_m);
     format!(
-        "{:8}  {:>9}  {:>7}  {:>5}  {:>5}  {:>5}       {:>6}  {:>6}  {:>6}      {:>4.0}  {} - {}",
+        "{:8}  {:>9}  {:>7}  {:>7}  {:>7}  {:>7}     {:>6}  {:>6}  {:>6}      {:>4.0}  {} - {}",
         sample.name.unwrap_or("map"),
         number(sample.exact.sensitivity(), 1.0),
         number(sample.exact.maximum(), 1.0),
-        digits(sample.exact.spatial_resolution),
-        digits(sample.exact.position_accuracy),
-        digits(sample.noisy.position_accuracy),
+        figure(&sample.exact.imaging, 0),
+        figure(&sample.exact.imaging, 1),
+        figure(&sample.noisy.imaging, 1),
         number(limit.place_m, 1e3),
         number(reached, 1e3),
         number(limit.two_points_m, 1e3),
@@ -43,10 +44,6 @@ fn row(sample: &Condition) -> String {
         number(sample.force_range_n[0], 1.0),
         number(sample.force_range_n[1], 1.0)
     )
-}
-
-fn digits(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |value| format!("{value:.3}"))
 }
 
 /// A row for each condition and sample, with heads; empty where a figure is open.
@@ -74,22 +71,31 @@ pub(super) fn csv(report: &Report) -> String {
         "saturated_n",
         "auto_place_m",
         "auto_found",
+        "sr_collapsed",
+        "pa_collapsed",
+        "half_s_per_m",
+        "half_sr",
+        "half_pa",
+        "half_sr_collapsed",
+        "half_pa_collapsed",
+        "half_place_m",
+        "half_two_points_m",
     ];
     let mut text = heads.join(",") + "\n";
     for c in report.samples.iter().chain(&report.conditions) {
-        let limit = &c.limit;
+        let (limit, half) = (&c.limit, c.at_half.as_ref());
         let figures = [
             Some(c.bottom_s_per_m),
             Some(c.top_s_per_m),
             c.exact.sensitivity(),
             c.exact.maximum(),
             c.exact.printed_maximum,
-            c.exact.spatial_resolution,
-            c.exact.position_accuracy,
+            c.exact.imaging.spatial_resolution,
+            c.exact.imaging.position_accuracy,
             c.noisy.sensitivity(),
             c.noisy.maximum(),
-            c.noisy.spatial_resolution,
-            c.noisy.position_accuracy,
+            c.noisy.imaging.spatial_resolution,
+            c.noisy.imaging.position_accuracy,
             Some(limit.signal_to_noise_db),
             limit.place_m,
             limit.conductance,
@@ -100,6 +106,15 @@ pub(super) fn csv(report: &Report) -> String {
             c.force_range_n[1],
             c.reached.and_then(|reached| reached.place_m),
             c.reached.map(|reached| reached.found),
+            Some(f64::from(u8::from(c.exact.imaging.is_spread_out))),
+            Some(f64::from(u8::from(c.exact.imaging.is_central))),
+            half.map(|half| half.strength_s_per_m),
+            half.and_then(|half| half.imaging.spatial_resolution),
+            half.and_then(|half| half.imaging.position_accuracy),
+            half.map(|half| f64::from(u8::from(half.imaging.is_spread_out))),
+            half.map(|half| f64::from(u8::from(half.imaging.is_central))),
+            half.and_then(|half| half.place_m),
+            half.and_then(|half| half.two_points_m),
         ];
         _ = writeln!(text, "{},{}", c.name.unwrap_or_default(), cells(&figures));
     }

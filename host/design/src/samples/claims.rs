@@ -1,13 +1,11 @@
 //! Whether the simulation ranks the samples as the experiment did.
 
-use tactomo_touch::student::quantile;
-
-use super::super::claim::Verdict;
-use super::super::rank::spearman;
+use super::super::claim::{Basis, Verdict};
+use super::super::rank::{chance, holm, spearman};
 use super::{Claim, Sample};
 
-/// Of a standard normal distribution: one in 20 is beyond.
-const CHANCE_DEVIATIONS: f64 = 1.959_964;
+/// One false prediction among all tests of the family is less likely than this.
+const FALSE_ONE: f64 = 0.05;
 
 type Figure = fn(&Sample) -> Option<f64>;
 
@@ -35,57 +33,66 @@ pub(super) const METRICS: [Metric; 4] = [
     Metric {
         claim: "... of measured spatial resolutions",
         measured: |sample| Some(sample.measured.spatial_resolution),
-        solver: |sample| sample.spatial_resolution,
+        solver: |sample| sample.imaging.sharpness(),
         sensor: ("two points told apart", |sample| sample.limit.two_points_m.map(|m| -m)),
     },
     Metric {
         claim: "... of measured position accuracies",
         measured: |sample| Some(sample.measured.position_accuracy),
-        solver: |sample| sample.position_accuracy,
+        solver: |sample| sample.imaging.accuracy(),
         sensor: ("standard error of places", |sample| sample.limit.place_m.map(|m| -m)),
     },
 ];
 
+/// Eight tests, two of each metric, are one family: chance gives one of them in 20 three times as often as one alone.
 pub(super) fn of(samples: &[Sample]) -> Vec<Claim> {
-    let claim = |metric: &Metric| {
-        let [solver, sensor] =
-            [metric.solver, metric.sensor.1].map(|figure| Ranked::of(samples, metric.measured, figure));
-        Claim {
-            claim: metric.claim,
-            verdict: Verdict::of(solver.is_there(), sensor.is_there()),
-            solver: solver.text("the same metric"),
-            sensor: sensor.text(metric.sensor.0),
-        }
+    let ranked: Vec<[Ranked; 2]> = METRICS
+        .iter()
+        .map(|metric| [metric.solver, metric.sensor.1].map(|figure| Ranked::of(samples, metric.measured, figure)))
+        .collect();
+    let chances: Vec<_> = ranked.iter().flatten().map(|ranked| ranked.chance).collect();
+    let stand = holm(&chances, FALSE_ONE);
+    let claim = |((metric, [solver, sensor]), stand): ((&Metric, &[Ranked; 2]), &[bool])| Claim {
+        claim: metric.claim,
+        basis: Basis::Solver,
+        verdict: Verdict::of(solver.is_there(stand[0]), sensor.is_there(stand[1])),
+        paper: solver.text("the same metric", stand[0], chances.len()),
+        sensor: sensor.text(metric.sensor.0, stand[1], chances.len()),
     };
-    METRICS.iter().map(claim).collect()
+    METRICS.iter().zip(&ranked).zip(stand.chunks_exact(2)).map(claim).collect()
 }
 
 /// How a figure ranks samples, against the measured one.
 struct Ranked {
     correlation: Option<f64>,
+    /// Probability of a correlation so far from zero by chance alone.
+    chance: Option<f64>,
     samples: usize,
 }
 
 impl Ranked {
     fn of(samples: &[Sample], measured: Figure, figure: Figure) -> Self {
         let pairs: Vec<_> = samples.iter().filter_map(|sample| Some([measured(sample)?, figure(sample)?])).collect();
-        Self { correlation: spearman(&pairs), samples: pairs.len() }
+        Self { correlation: spearman(&pairs), chance: chance(&pairs), samples: pairs.len() }
     }
 
-    /// Whether chance alone ranks so well once in 20 times or less: Student's test of a rank correlation.
-    fn is_there(&self) -> Option<bool> {
-        let (correlation, freedom) = (self.correlation?, self.samples as f64 - 2.0);
-        let t = correlation * (freedom / (1.0 - correlation * correlation).max(1e-12)).sqrt();
-        Some(t > quantile(CHANCE_DEVIATIONS, freedom))
+    /// Whether the order is predicted: in the right direction, and beyond what chance gives among all tests.
+    fn is_there(&self, stands: bool) -> Option<bool> {
+        self.correlation.map(|correlation| stands && correlation > 0.0)
     }
 
-    fn text(&self, what: &str) -> String {
-        let Some(correlation) = self.correlation else { return format!("{what}: too few samples") };
-        let words = match self.is_there() {
-            Some(true) => "the order is predicted",
-            _ if correlation < -0.5 => "the order is rather the opposite",
-            _ => "no more than chance can give",
+    fn text(&self, what: &str, stands: bool, tests: usize) -> String {
+        let (Some(correlation), Some(chance)) = (self.correlation, self.chance) else {
+            return format!("{what}: too few samples");
         };
-        format!("{what}: rank correlation {correlation:+.2} over {} samples; {words}", self.samples)
+        let words = match stands {
+            true if correlation > 0.0 => "the order is predicted",
+            true => "the order is the opposite",
+            false => "no more than chance can give",
+        };
+        format!(
+            "{what}: rank correlation {correlation:+.2} (n = {}), p = {chance:.3} alone; of {tests} tests (Holm), {words}",
+            self.samples
+        )
     }
 }

@@ -7,9 +7,10 @@ pub struct Measured {
     pub name: &'static str,
     /// SENS (mV/N of the reconstructed value).
     pub sensitivity_mv_per_n: f64,
-    /// FMAX (N). Of sample D the paper prints 34 975 N and of DA 105.5 N, 7000 and 21 times what was applied: fits without an end, not
-    /// measurements.
+    /// FMAX (N), if it is a measurement.
     pub maximum_n: Option<f64>,
+    /// FMAX as printed (N). Of sample D that is 34 975 N and of DA 105.5 N, 7000 and 21 times what was applied: fits that failed, not measurements.
+    pub printed_maximum_n: f64,
     /// SR.
     pub spatial_resolution: f64,
     /// PA.
@@ -34,12 +35,23 @@ const TABLE: [(&str, [f64; 4]); 11] = [
     ("BB-7x7", [0.005, 8.525, 0.466, 0.804]),
 ];
 
+impl Measured {
+    /// FMAX (N) as printed, with a word where that is a failed fit.
+    pub fn maximum_text(&self) -> String {
+        match self.maximum_n {
+            Some(newtons) => newtons.to_string(),
+            None => format!("{}, failed fit", self.printed_maximum_n),
+        }
+    }
+}
+
 /// All samples of the table.
 pub fn all() -> impl Iterator<Item = Measured> {
     TABLE.into_iter().map(|(name, [sensitivity_mv_per_n, maximum_n, spatial_resolution, position_accuracy])| Measured {
         name,
         sensitivity_mv_per_n,
         maximum_n: (maximum_n < BELIEVED_TIMES * super::super::press::FORCES_N[1]).then_some(maximum_n),
+        printed_maximum_n: maximum_n,
         spatial_resolution,
         position_accuracy,
     })

@@ -4,9 +4,12 @@
 //! 60 x 60 mm, each layer 5 mm; nine places; a ball of 5 mm pressed from 0 to 5 N and let go, on foam with hysteresis. The output is the value of the
 //! paper's image at its centroid, over a sheet of 1 S.
 
+mod card;
+mod choices;
 mod claims;
 mod measured;
 mod page;
+mod planes;
 mod table;
 
 use std::time::Instant;
@@ -19,9 +22,10 @@ use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Fault, Foam, Noise, measured as through_converter};
 
+pub use self::choices::{Choice, Choices};
 pub use self::measured::Measured;
 use super::curve::{Fit, fit};
-use super::metrics::mean;
+use super::imaging::{Images, Imaging, accuracy_of_the_middle};
 use super::press::{FORCES_N, MIDDLE, nine_places};
 use super::reached::by_auto;
 use super::{Claim, Course, DesignError, Heading, Limit, PaperSolver, Press, Progress, Reached};
@@ -53,10 +57,9 @@ pub struct Sample {
     pub unloading: Vec<[f64; 2]>,
     /// Eq. (6) over the loading; strengths are newtons.
     pub curve: Option<Fit>,
-    /// SR (9) in the middle at 2.25 N.
-    pub spatial_resolution: Option<f64>,
-    /// PA (10) at 2.25 N, mean over the nine places.
-    pub position_accuracy: Option<f64>,
+    /// SR and PA at 2.25 N.
+    #[serde(flatten)]
+    pub imaging: Imaging,
     /// Value of the image along the line through the middle at 2.25 N: x (m) and share of its largest value.
     pub profile: Vec<[f64; 2]>,
     /// Where the nine contacts are and where the paper's solver sees them (m).
@@ -72,6 +75,10 @@ pub struct Sample {
 pub struct Report {
     /// In the order of the table.
     pub samples: Vec<Sample>,
+    /// PA of answering "the middle", whatever is read.
+    pub accuracy_of_the_middle: f64,
+    /// What the paper leaves open of its solver, and what each choice gives of its sample A; `None` where that was not computed.
+    pub choices: Option<Choices>,
     /// Seed of the noise.
     pub seed: u64,
     /// What was concluded, and how the study went.
@@ -90,34 +97,40 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
     let computed = progress.map("samples", &tasks, |(seed, measured)| sample(*measured, &solver, *seed));
     let is_stopped = computed.iter().any(Option::is_none);
     let samples: Vec<Sample> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
-    let course = Course::since(start, is_stopped, claims::of(&samples));
-    Ok(Report { samples, seed: plan.seed, course })
+    let choices = choices::of(progress)?;
+    let course = Course::since(start, is_stopped || choices.is_none(), claims::of(&samples));
+    let accuracy_of_the_middle = accuracy_of_the_middle(&Detector::default());
+    Ok(Report { samples, accuracy_of_the_middle, choices, seed: plan.seed, course })
+}
+
+/// The detector that a sample was, and the paper's indenter on it.
+fn pressed(name: &str) -> Result<(Detector, Press), DesignError> {
+    let wrong = |what: String| ForwardError::Detector { detector: name.to_owned(), what };
+    let stack: Stack = name.parse().map_err(wrong)?;
+    let detector = Detector::default().in_material(&stack).map_err(wrong)?.taken_as_exact();
+    let press = Press::indenter(&detector, Skin::from(&stack))?;
+    Ok((detector, press))
 }
 
 fn sample(measured: Measured, solver: &PaperSolver, seed: u64) -> Result<Sample, DesignError> {
-    let wrong = |what: String| ForwardError::Detector { detector: measured.name.to_owned(), what };
-    let stack: Stack = measured.name.parse().map_err(wrong)?;
-    let detector = Detector::default().in_material(&stack).map_err(wrong)?.taken_as_exact();
-    let press = Press::indenter(&detector, Skin::from(&stack))?;
+    let (detector, press) = pressed(measured.name)?;
     let model = Auto::new(&detector, None)?.model;
     let mut bench = Bench { model: &*model, noise: Noise::new(seed) };
     let [loading, unloading] = bench.load_and_unload(&press, solver)?;
     let places = nine_places(&detector).map(|place| press.at(place, COMPARED_N));
-    let (mut places_m, mut accuracies) = (Vec::new(), Vec::new());
+    let (mut places_m, mut images) = (Vec::new(), Images::new(solver));
     for contact in &places {
-        let Some(imaged) = solver.imaged(&bench.read(contact)?, contact) else { continue };
-        places_m.push([[contact.x_m, contact.y_m], imaged.centroid_m]);
-        accuracies.push(imaged.figures.position_accuracy);
+        if let Some(imaged) = images.add(&bench.read(contact)?, contact) {
+            places_m.push([[contact.x_m, contact.y_m], imaged.centroid_m]);
+        }
     }
-    let middle = press.at(MIDDLE, COMPARED_N);
-    let readings = bench.read(&middle)?;
+    let readings = bench.read(&press.at(MIDDLE, COMPARED_N))?;
     Ok(Sample {
         measured,
         curve: fit(&loading),
         loading,
         unloading,
-        spatial_resolution: solver.imaged(&readings, &middle).map(|imaged| imaged.figures.spatial_resolution),
-        position_accuracy: mean(&accuracies),
+        imaging: images.figures(),
         profile: normalised(solver.profile(&readings, MIDDLE, PROFILE_PLACES).unwrap_or_default()),
         places_m,
         limit: Limit::of(&*model, &press, COMPARED_N, FORCES_N)?,

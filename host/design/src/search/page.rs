@@ -107,6 +107,7 @@ fn chart(answer: &Answer, wish: Wish, x_title: &str, x: fn(&Rating) -> f64, x_un
         series: std::iter::once(tried).chain(chosen).chain(compared).collect(),
         has_front: true,
         guide: None,
+        level: None,
         size: [430.0, 380.0],
     }
 }

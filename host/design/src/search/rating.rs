@@ -4,7 +4,7 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab};
 use tactomo_physics::hertz::{Beyond, Hertz, Skin};
 
-use super::super::limit::{place_everywhere_m, range, two_points_m};
+use super::super::limit::{places_everywhere, range, two_points_m};
 use super::super::{DesignError, Press};
 use super::{Wish, Wishes};
 
@@ -98,7 +98,7 @@ impl Rating {
         Ok(Self {
             smallest_n,
             largest_n,
-            place_m: place_everywhere_m(slab, &press, middle_n, noise_v, PLACES)?,
+            place_m: places_everywhere(slab, &press, middle_n, noise_v, PLACES)?.map(|spread| spread.rms_m),
             two_points_m: two_points_m(slab, &press, middle_n, noise_v)?,
             frames_per_s: frames_per_s(detector.electrodes.len()),
             drive_v,

@@ -14,10 +14,9 @@ use tactomo_study::{Experiment, Frame, StudyError};
 use tactomo_touch::metrics::Matching;
 use tactomo_touch::solve::Method;
 
-use super::claim::{Trend, Verdict};
+use super::claim::{Basis, Trend, Verdict};
 use super::metrics::mean;
 use super::press::{COMPARED_S_PER_M, nine_places};
-use super::rank::spearman;
 use super::{Claim, Course, DesignError, Heading, Press, Progress};
 
 /// Thicknesses (m), and conductivity (S/m), section III.B.
@@ -28,6 +27,8 @@ const FAILS_OF_WIDTH: f64 = 0.05;
 /// Correlation above which vectors count as strongly correlated.
 const STRONG: f64 = 0.9;
 
+/// Of the nine places, the one whose readings are drawn: a side.
+const DRAWN: usize = 5;
 /// Of the nine places, those that solvers are tried at: the middle, a side and a corner. The others are these again, turned or mirrored.
 const TRIED: [usize; 3] = [4, 5, 8];
 
@@ -59,6 +60,8 @@ pub struct Row {
     pub shell_largest_v: f64,
     /// Mean absolute error of the readings, each over the largest of its model.
     pub mean_absolute_error: f64,
+    /// Readings of one contact at a side over the largest of them, but for those of grounded electrodes: of the slab, and of the shell.
+    pub normalised: [Vec<f64>; 2],
     /// What solvers make of the slab's readings.
     pub solvers: Vec<SolverRow>,
 }
@@ -120,8 +123,16 @@ fn row(plan: &Plan, thickness_m: f64) -> Result<Row, DesignError> {
         largest_v,
         shell_largest_v,
         mean_absolute_error: thick.iter().zip(&thin).map(apart).sum::<f64>() / thick.len() as f64,
+        normalised: [&thick, &thin].map(|vector| drawn(vector, contacts.len())),
         solvers: solvers(plan, &detector, shell, slab, &contacts)?,
     })
+}
+
+/// The part of a vector over several contacts that is of the one that is drawn, over its largest reading.
+fn drawn(vector: &[f64], contacts: usize) -> Vec<f64> {
+    let one = vector.chunks(vector.len() / contacts).nth(DRAWN).unwrap_or_default();
+    let largest_v = one.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    one.iter().map(|volt| volt / largest_v).collect()
 }
 
 /// Readings of each contact alone, but for those of grounded electrodes (V).
@@ -196,18 +207,17 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
             rows.iter().filter_map(|row| Some(format!("{:.2} mm at {:.0} mm", of(&contacts(row)?) * 1e3, mm(row))));
         all.collect::<Vec<_>>().join(", ")
     };
-    let grows = Trend {
-        of: "mean absolute error with thickness",
-        correlation: spearman(&rows.iter().map(|row| [row.thickness_m, row.mean_absolute_error]).collect::<Vec<_>>()),
-    };
+    let errors: Vec<_> = rows.iter().map(|row| [row.thickness_m, row.mean_absolute_error]).collect();
+    let grows = Trend::of("mean absolute error with thickness", &errors);
     // Of the sensor it would be that a solver with the right model got worse as well.
     let right = rows.iter().filter_map(|row| Some([row.thickness_m, contacts(row)?.on_slab_m])).collect::<Vec<_>>();
     let worse = right.first().zip(right.last()).map(|(thin, thick)| thick[1] > 2.0 * thin[1]);
     vec![
         Claim {
             claim: "readings of thick detectors correlate strongly with those of the thin shell",
+            basis: Basis::Readings,
             verdict: Verdict::of(Some(correlated), Some(correlated)),
-            solver: format!(
+            paper: format!(
                 "correlation {:.3} at {:.0} mm, {:.3} at {:.0} mm",
                 first.correlation,
                 mm(first),
@@ -218,8 +228,9 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
         },
         Claim {
             claim: "the error grows with the detector's thickness",
+            basis: Basis::Readings,
             verdict: Verdict::of(grows.confirms(), worse),
-            solver: format!(
+            paper: format!(
                 "{}: {:.3} to {:.3} of the largest reading",
                 grows.text(),
                 first.mean_absolute_error,
@@ -280,6 +291,14 @@ mod tests {
         assert!(rows.windows(2).all(|pair| pair[1].mean_absolute_error > pair[0].mean_absolute_error));
         let contacts = |row: &Row| row.solvers[0].clone();
         assert!(contacts(&rows[4]).on_slab_m < 1e-3 && contacts(&rows[4]).on_shell_m > contacts(&rows[4]).on_slab_m);
+        for row in rows {
+            let [slab, shell] = &row.normalised;
+            let largest = slab.iter().copied().fold(0.0, f64::max);
+            assert!(slab.len() == 240 && shell.len() == 240 && (largest - 1.0).abs() < 1e-12);
+        }
+        let apart =
+            |row: &Row| row.normalised[0].iter().zip(&row.normalised[1]).map(|(a, b)| (a - b).abs()).sum::<f64>();
+        assert!(apart(&rows[4]) > 5.0 * apart(&rows[0]));
         assert_eq!(report.fails_at_m("contacts", |row| row.on_slab_m), None);
         let text = crate::page(&[&report], "tactomo study thickness");
         assert!(text.contains("contacts") && text.contains("16 mm"), "{text}");

@@ -37,6 +37,10 @@ pub(super) fn parts(report: &Report) -> Vec<String> {
     ];
     let solvers: String = solvers.iter().map(|chart| chart.svg() + "\n").collect();
     vec![
+        "<h3>Readings against the thin shell's</h3><p class=\"quiet\">Of one contact at a side, each vector over its largest reading: the slab's upwards over the shell's. On the dashed line the \
+         shell would be right.</p>"
+            .to_owned(),
+        format!("<div class=\"charts small\">{}</div>", report.rows.iter().map(|row| vectors(row).svg() + "\n").collect::<String>()),
         format!("<div class=\"charts small\">{figures}</div>"),
         "<h3>Which solvers fail because of it</h3><p class=\"quiet\">Mean error in the middle, at a side and in a corner, one noisy frame each, a contact missed or invented counted as the distance \
          of electrodes; readings come from a finer slab.</p>"
@@ -44,6 +48,33 @@ pub(super) fn parts(report: &Report) -> Vec<String> {
         format!("<div class=\"charts\">{solvers}</div>"),
         errors(report),
     ]
+}
+
+/// The normalised vector of a thickness over that of the shell.
+fn vectors(row: &Row) -> Chart {
+    let [slab, shell] = &row.normalised;
+    let mark = |(y, x): (&f64, &f64)| Mark {
+        x: *x,
+        y: *y,
+        tooltip: format!("slab {}, shell {}", number(Some(*y), 1.0), number(Some(*x), 1.0)),
+    };
+    let readings = slab.iter().zip(shell).map(mark).collect();
+    let line = [0.0, 1.0].map(|at| Mark { x: at, y: at, tooltip: "the shell itself".to_owned() });
+    let axis = |title: &str| Axis::linear(title, Unit::Plain, slab.iter().chain(shell).copied().chain([0.0, 1.0]));
+    Chart {
+        title: Unit::Metres.text(row.thickness_m),
+        subtitle: format!("correlation {:.4} over all nine places", row.correlation),
+        x: axis("shell, normalised"),
+        y: axis(""),
+        series: vec![
+            Series { name: String::new(), class: "linear", marks: readings, main: usize::MAX, is_joined: false },
+            Series { name: String::new(), class: "bound", marks: line.into(), main: usize::MAX, is_joined: true },
+        ],
+        has_front: false,
+        guide: None,
+        level: None,
+        size: [300.0, 280.0],
+    }
 }
 
 type Value = fn(&Row) -> f64;
@@ -68,6 +99,7 @@ fn chart(report: &Report, title: &str, subtitle: &str, lines: &[(&str, &'static 
         series,
         has_front: false,
         guide: None,
+        level: None,
         size: [330.0, 280.0],
     }
 }
@@ -97,6 +129,7 @@ fn solvers(report: &Report, title: &str, error_m: fn(&SolverRow) -> f64) -> Char
         series: series.collect(),
         has_front: false,
         guide: None,
+        level: None,
         size: [520.0, 400.0],
     }
 }

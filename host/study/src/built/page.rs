@@ -52,6 +52,7 @@ fn chart(report: &OverFrames, solver: &str) -> Chart {
         series: curves().zip(CLASSES).map(|(curve, class)| series(curve, class)).collect(),
         has_front: false,
         guide: None,
+        level: None,
         size: [430.0, 380.0],
     }
 }

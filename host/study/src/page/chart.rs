@@ -30,6 +30,8 @@ pub struct Chart {
     pub has_front: bool,
     /// A value to the right that matters, and why.
     pub guide: Option<(f64, &'static str)>,
+    /// A value upwards that matters, and why.
+    pub level: Option<(f64, &'static str)>,
     /// Width and height (px).
     pub size: [f64; 2],
 }
@@ -134,6 +136,16 @@ impl Chart {
                 escaped(why)
             );
         }
+        let has = |(value, _): &(f64, &str)| (self.y.range[0]..=self.y.range[1]).contains(value);
+        if let Some((value, why)) = self.level.filter(has) {
+            let [_, y] = self.at(self.x.range[0], value);
+            _ = writeln!(
+                svg,
+                "<path class=\"guide\" d=\"M{left} {y:.1}H{right}\"/><text class=\"tick\" x=\"{right}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                y - 4.0,
+                escaped(why)
+            );
+        }
         if self.has_front {
             _ = writeln!(svg, "<text class=\"better\" x=\"{}\" y=\"{}\">↙ better</text>", left, bottom + 33.0);
         }
@@ -209,6 +221,14 @@ impl Chart {
         }
         let small = self.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
         let mut labels = Labels::new(self.plot(), spots.iter().map(|spot| spot.at), small);
+        let [_, top, right, _] = self.plot();
+        if let Some((value, why)) = self.guide {
+            let left = self.at(value, self.y.range[0])[0] + 5.0;
+            labels.keep_clear([left, left + Labels::width(why)], top + 10.0);
+        }
+        if let Some((value, why)) = self.level {
+            labels.keep_clear([right - Labels::width(why), right], self.at(self.x.range[0], value)[1] - 4.0);
+        }
         for spot in &spots {
             let text = spot.text(if self.size[0] > ROOMY { usize::MAX } else { 1 });
             let place = labels.place(spot.at, &text);
@@ -277,6 +297,7 @@ mod tests {
             series: series.collect(),
             has_front: true,
             guide: None,
+            level: None,
             size: [400.0, 300.0],
         }
     }
@@ -293,6 +314,26 @@ mod tests {
         let [x, y] = chart(&[]).at(10.0, 10.0);
         assert!((x - (58.0 + 386.0) / 2.0).abs() < 1e-9 && (y - (44.0 + 258.0) / 2.0).abs() < 1e-9);
         assert_eq!(chart(&[]).at(1e9, 0.0), [386.0, 258.0], "what is beyond an axis lies on its end");
+    }
+
+    #[test]
+    fn a_level_is_a_line_across_where_its_value_is() {
+        let with = |value| Chart { level: Some((value, "the <middle>")), ..chart(&[[10.0, 10.0]]) }.svg();
+        assert!(with(10.0).contains("M58 151.0H386") && with(10.0).contains("the &lt;middle&gt;"));
+        assert!(!with(1000.0).contains("middle"), "a value beyond the axis has no line");
+    }
+
+    #[test]
+    fn labels_keep_clear_of_what_the_lines_say() {
+        let label = |chart: &Chart| {
+            let svg = chart.svg();
+            let found = svg.lines().find(|line| line.contains("class=\"label")).map(str::to_owned);
+            found.unwrap_or_default()
+        };
+        let mut one = chart(&[[10.0, 90.0]]);
+        let free = label(&one);
+        one.guide = Some((9.0, "a line that matters"));
+        assert_ne!(label(&one), free, "{free}");
     }
 
     #[test]

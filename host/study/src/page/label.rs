@@ -4,7 +4,7 @@
 pub(super) type Area = [f64; 4];
 
 /// Width of a character and height of a line at the size of labels (px).
-const CHARACTER: f64 = 6.4;
+const CHARACTER: f64 = 7.0;
 const LINE: f64 = 13.0;
 /// Room that a mark takes, from its middle (px), and a small one.
 const MARK: f64 = 5.0;
@@ -45,9 +45,19 @@ impl Labels {
         Self { frame, taken, small: small.into_iter().map(around(SMALL_MARK)).collect() }
     }
 
+    /// Keeps labels clear of a text that is there already: left and right end and baseline (px).
+    pub fn keep_clear(&mut self, [left, right]: [f64; 2], baseline: f64) {
+        self.taken.push([left, baseline - LINE, right, baseline + 4.0]);
+    }
+
+    /// Width of a text (px).
+    pub fn width(text: &str) -> f64 {
+        CHARACTER * text.chars().count() as f64
+    }
+
     /// A place for `text` near a mark: beside it, above or below, clear of all if that is near; else over small marks; else further away.
     pub fn place(&mut self, [x, y]: [f64; 2], text: &str) -> Place {
-        let width = CHARACTER * text.chars().count() as f64;
+        let width = Self::width(text);
         let at = |dx: f64, dy: f64| [x + dx, y + dy - LINE / 2.0, x + dx + width, y + dy + LINE / 2.0];
         let steps = |from: u32, to: u32| {
             (from..to).map(|step| 8.0 * f64::from(step)).flat_map(|away| {

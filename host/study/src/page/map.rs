@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::axis::{Axis, Unit};
+use super::label::Labels;
 use super::{colour, escaped};
 
 /// Room around the map: left, top, right (the scale), bottom (px).
@@ -25,8 +26,10 @@ pub struct Map {
     pub axes: [String; 2],
     /// Values of both axes, rising.
     pub ticks: [Vec<f64>; 2],
-    /// A row for each value of the upward axis, from the lowest; `None` where there is no figure.
+    /// A row for each value of the upward axis, from the lowest; `None` where there is no figure: such cells are grey.
     pub rows: Vec<Vec<Option<f64>>>,
+    /// What a cell without a figure is.
+    pub empty: &'static str,
     /// Whether colours follow the logarithm.
     pub is_log: bool,
     /// A value as text.
@@ -114,7 +117,7 @@ impl Map {
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
         let normalised = |value: f64| if high > low { (value - low) / (high - low) } else { 0.0 };
         let text = |value: f64| format!("{}, normalised {:.2},", (self.text)(value), normalised(value));
-        let value = value.map_or("no figure".to_owned(), text);
+        let value = value.map_or(self.empty.to_owned(), text);
         format!("{value} at {} {}, {} {}", self.axes[0], at(0, column), self.axes[1], at(1, row))
     }
 
@@ -210,16 +213,21 @@ impl Map {
     }
 
     fn draw_marks(&self, svg: &mut String) {
-        for (at, name) in &self.marks {
-            let [x, y] = self.at(*at);
-            // To the left where there is no room to the right.
-            let (dx, anchor) = if x > ROOM[0] + SIDE - 20.0 { (-6.0, "end") } else { (6.0, "start") };
+        let places: Vec<[f64; 2]> = self.marks.iter().map(|(at, _)| self.at(*at)).collect();
+        let frame = [ROOM[0], ROOM[1], ROOM[0] + SIDE, ROOM[1] + SIDE];
+        let mut labels = Labels::new(frame, places.iter().copied(), []);
+        for ([x, y], (_, name)) in places.iter().zip(&self.marks) {
+            let place = labels.place([*x, *y], name);
+            if place.is_far {
+                let (to, height) = (place.left + 4.0, place.baseline - 4.0);
+                _ = write!(svg, "<path class=\"sample\" d=\"M{x:.1} {y:.1}L{to:.1} {height:.1}\"/>");
+            }
             _ = writeln!(
                 svg,
                 "<circle class=\"sample\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.2\"/>\
-                 <text class=\"sample\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
-                x + dx,
-                y + 4.0,
+                 <text class=\"sample\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                place.left,
+                place.baseline,
                 escaped(name)
             );
         }
@@ -268,6 +276,7 @@ mod tests {
             axes: ["x".to_owned(), "y".to_owned()],
             ticks,
             rows,
+            empty: "no figure",
             is_log: false,
             text: |value| format!("{value:.1}"),
             marks: vec![([10.0, 1.0], "A".to_owned())],
@@ -288,6 +297,16 @@ mod tests {
         let middle = ROOM[0] + SIDE / 2.0;
         assert!(svg.contains(&format!("L{middle:.1}")), "{svg}");
         assert!(svg.contains("t &lt;"));
+    }
+
+    #[test]
+    fn labels_of_marks_that_are_near_do_not_lie_on_one_another() {
+        let mut crowded = map(vec![vec![Some(0.0); 3]; 3]);
+        crowded.marks = ["AB", "BA", "AD", "DA"].map(|name| ([10.0, 10.0], name.to_owned())).into();
+        let svg = crowded.svg();
+        let places: std::collections::BTreeSet<&str> =
+            svg.lines().filter_map(|line| line.split("<text class=\"sample\"").nth(1)?.split('>').next()).collect();
+        assert_eq!(places.len(), 4, "{places:?}");
     }
 
     #[test]

@@ -85,6 +85,7 @@ fn rows_of_charts(report: &Report, against: Against) -> String {
             series: series.clone(),
             has_front: false,
             guide: None,
+            level: None,
             size: SIZE,
         };
         let charts: String = report.contacts.iter().copied().zip(&charts).map(|of| chart(of).svg() + "\n").collect();

@@ -130,6 +130,7 @@ fn errors(report: &Report) -> String {
         series,
         has_front: false,
         guide: None,
+        level: None,
         size: [640.0, 460.0],
     };
     format!("{map}\n<div class=\"single\">{}</div>", chart.svg())
@@ -228,6 +229,7 @@ fn bound_chart(report: &BoundChart) -> Chart {
         series: report.curves.iter().map(curve).collect(),
         has_front: false,
         guide: None,
+        level: None,
         size: [430.0, 380.0],
     }
 }

@@ -160,6 +160,7 @@ fn drawn(panels: &[Panel]) -> Vec<String> {
             series: panel.series.clone(),
             has_front: true,
             guide: (panel.size[0] > SMALL_PX).then_some((1e-3, "1000 frames/s")),
+            level: None,
             size: panel.size,
         };
         chart.svg() + "\n"

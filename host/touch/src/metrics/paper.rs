@@ -13,6 +13,9 @@ pub struct PaperFigures {
     /// Spatial resolution `SR = 1 - FWHM / WIDTH`. FWHM is what the paper says it is, the largest distance of the contour at half
     /// of the highest value from the image's centre: of a round spot, its half width.
     pub spatial_resolution: f64,
+    /// Whether the image is above half of its highest value as far from its centre as the detector reaches, to a corner of a rectangle: SR then is what
+    /// the outline gives, whatever the image.
+    pub is_spread_out: bool,
     /// Position accuracy `PA = 1 - |P_cop - P_t| / WIDTH`, with `P_cop` the centroid of the image above zero.
     pub position_accuracy: f64,
 }
@@ -26,8 +29,13 @@ impl PaperFigures {
     pub fn of(mesh: &ImageMesh, image: &[f32], contact: &Contact, width_m: f64) -> Option<Self> {
         let centre_m = centroid_m(mesh, image)?;
         let spread_m = half_maximum_distance_m(mesh, image, centre_m);
+        let reach_m = mesh.nodes_m.iter().map(|node_m| geometry::distance(centre_m, *node_m)).fold(0.0, f64::max);
         let error_m = geometry::distance(centre_m, [contact.x_m, contact.y_m]);
-        Some(Self { spatial_resolution: 1.0 - spread_m / width_m, position_accuracy: 1.0 - error_m / width_m })
+        Some(Self {
+            spatial_resolution: 1.0 - spread_m / width_m,
+            is_spread_out: spread_m >= reach_m,
+            position_accuracy: 1.0 - error_m / width_m,
+        })
     }
 }
 
@@ -90,6 +98,19 @@ mod tests {
         // The centroid is half way, 2 mm off; the contours are half a step beyond the spots, along edges and along diagonals.
         assert!((found.position_accuracy - 0.9).abs() < 1e-6, "{found:?}");
         assert!((found.spatial_resolution - (1.0 - 2.5f64.hypot(0.5) / 20.0)).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn an_image_that_is_above_half_at_a_corner_has_the_resolution_of_the_outline() {
+        let contact = Contact::flat(0.0, 0.0, 1e-3, 1e-3);
+        // A dome from 1 in the middle of 20 x 20 mm down to `edge` at the corners.
+        let dome = |edge: f64| {
+            let height = |k: usize| ((k % 21) as f64 - 10.0).hypot((k / 21) as f64 - 10.0) / 10f64.hypot(10.0);
+            (0..441).map(|k| (1.0 - (1.0 - edge) * height(k)) as f32).collect::<Vec<f32>>()
+        };
+        let flat = figures(&dome(0.51), contact);
+        assert!(flat.is_spread_out && (flat.spatial_resolution - (1.0 - 0.5f64.sqrt())).abs() < 1e-6, "{flat:?}");
+        assert!(!figures(&dome(0.49), contact).is_spread_out);
     }
 
     #[test]

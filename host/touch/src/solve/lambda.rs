@@ -36,6 +36,11 @@ pub enum Lambda {
     Gcv,
 }
 
+impl Lambda {
+    /// The paper's `lambda^2`, section II.C.
+    pub const PAPER: Self = Self::Paper(5000.0);
+}
+
 impl Default for Lambda {
     /// Smallest position error over light and firm contacts with 1.5 LSB of noise, on shell and slab together:
     /// `examples/lambda.rs`.

@@ -294,7 +294,7 @@ const TABLE: [Row; 13] = [
         family: Family::Paper,
         parameter: Some(ParameterKind::Lambda),
         build: |problem, parameter| {
-            Ok(Box::new(Tikhonov::new(&problem.jacobian, lambda(parameter).unwrap_or_default(), Variant::Paper)))
+            Ok(Box::new(Tikhonov::new(&problem.jacobian, lambda(parameter).unwrap_or(Lambda::PAPER), Variant::Paper)))
         },
     },
 ];
