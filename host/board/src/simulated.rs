@@ -27,6 +27,7 @@ use self::model::Wiring;
 pub use self::model::{BoardModel, UnknownBoard};
 use self::sampler::SimulatedSampler;
 use crate::link::{Control, ControlError, Link, Playing};
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::simulate::{Controls, Physics, Simulation};
 
@@ -64,7 +65,7 @@ impl Default for Options {
 #[derive(Debug, thiserror::Error)]
 pub enum SimulatedBoardError {
     /// The firmware does not take the detector.
-    #[error("the board cannot scan detector `{detector}`: {source}")]
+    #[error("the board cannot scan detector `{detector}`")]
     Board {
         /// Name of the detector.
         detector: String,
@@ -165,7 +166,7 @@ impl Link for SimulatedBoard {
             Control::Press(contacts) => controls.press(contacts.clone()),
             Control::Scene(name) => controls.play(*name)?,
             Control::Faults(faults) => {
-                let failed = |error| tracing::warn!("the detector cannot have these faults: {error}");
+                let failed = |error| tracing::warn!("the detector cannot have these faults: {}", with_causes(&error));
                 controls.set_faults(faults.clone(), failed)?;
             }
             Control::Pause(_) | Control::Seek(_) | Control::Speed(_) | Control::Loop(_) => {

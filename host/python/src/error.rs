@@ -1,7 +1,7 @@
 //! Errors of the library as Python's exceptions, with the same words.
 
 use std::error::Error;
-use std::fmt::Write as _;
+use tactomo::causes::with_causes;
 
 use pyo3::PyErr;
 use pyo3::create_exception;
@@ -16,19 +16,7 @@ create_exception!(
 
 /// The exception for an error and what caused it.
 pub fn raised(error: impl Error) -> PyErr {
-    TactomoError::new_err(words(&error))
-}
-
-/// The words of an error and of what caused it.
-pub fn words(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        // Writing to a string cannot fail.
-        let _ = write!(text, ": {error}");
-        cause = error.source();
-    }
-    text
+    TactomoError::new_err(with_causes(&error))
 }
 
 /// The exception with these words.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use serde::Serialize;
+use tactomo::causes::with_causes;
 use tactomo::forward::ForwardModel;
 use tactomo::forward::shell::Shell;
 use tactomo::solve::{Lambda, Method, Parameter, Problem};
@@ -18,9 +19,11 @@ use super::output::{self, message};
 /// The forward model computes the readings of each case, to compare with the ones in the file;
 /// the solvers find contacts from the readings in the file.
 ///
-/// Examples:
-///   tactomo validate reference/slab/*.json --noise-lsb 1.5 --trials 20
-///   tactomo validate reference/slab/*.json --model slab
+/// Cases are JSON files, compressed by gzip or not; twelve are in tests/reference/slab (see the README there).
+///
+/// Examples, from the repository's root:
+///   tactomo validate tests/reference/slab/*.json.gz --solver contacts --noise-lsb 1.5 --trials 20
+///   tactomo validate tests/reference/slab/*.json.gz --model slab --solver tikhonov
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {
@@ -85,7 +88,7 @@ fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
         match method.build_with(&problem, lambda) {
             Ok(mut solver) => solvers.push(try_solver(case, &mut *solver, &trials)?),
             // Of all solvers, those that there are for this detector.
-            Err(error) if args.solver.is_empty() => message!("{}: not tried: {error}", method.name()),
+            Err(error) if args.solver.is_empty() => message!("{}: not tried: {}", method.name(), with_causes(&error)),
             Err(error) => return Err(error.into()),
         }
     }

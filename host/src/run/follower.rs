@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::pointer::{Pointer, PointerState};
@@ -331,7 +332,7 @@ impl FollowLoop {
                 self.pause = SearchPause::default();
             }
             (Err(error), Some(BoardState { follower: None, .. })) => return Err(LiveError::MakeSolver(error)),
-            (Err(error), _) => tracing::warn!("the solver stays, for another cannot be made: {error}"),
+            (Err(error), _) => tracing::warn!("the solver stays, for another cannot be made: {}", with_causes(&*error)),
             _ => {}
         }
         self.show_solver();

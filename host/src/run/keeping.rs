@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use tactomo_board::record::{Closing, Note, RecordError, Recorder, Ring};
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_protocol::Hello;
 
@@ -62,8 +63,9 @@ impl Keeping {
 
     /// Goes on without a recording that failed; it is told at the end too.
     pub fn give_up(&mut self, error: RecordError) {
-        tracing::error!("{error}");
-        let refused = Some(error.to_string());
+        let line = with_causes(&error);
+        tracing::error!("{line}");
+        let refused = Some(line);
         self.notice.change(|snapshot| snapshot.refused = refused);
         self.show();
         self.lost.get_or_insert(error);
@@ -82,7 +84,7 @@ impl Keeping {
             None => Some("a mark is set in a recording: begin one first (key R)".to_owned()),
             Some(recorder) => {
                 self.marks += 1;
-                recorder.note(Note::Mark { text }, Instant::now()).err().map(|error| error.to_string())
+                recorder.note(Note::Mark { text }, Instant::now()).err().map(|error| with_causes(&error))
             }
         };
         let marks = self.marks;
@@ -106,7 +108,7 @@ impl Keeping {
     pub fn begin(&mut self, hello: &Hello) {
         let (None, Some(begin)) = (&self.recorder, &mut self.begin) else { return };
         let begun = begin(hello, self.found.as_deref());
-        let refused = begun.as_ref().err().map(ToString::to_string);
+        let refused = begun.as_ref().err().map(|error| with_causes(error));
         self.notice.change(|snapshot| snapshot.refused = refused);
         (self.recorder, self.marks) = (begun.ok(), 0);
         self.show();

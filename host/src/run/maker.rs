@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::thread;
 
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{FaultyElectrodes, Method, Solver};
 
@@ -96,7 +97,7 @@ impl Maker {
                 Ok(Some((made.order, solver)))
             }
             Err(error) => {
-                self.refused = Some(format!("{}: {error}", method.name()));
+                self.refused = Some(format!("{}: {}", method.name(), with_causes(&*error)));
                 Err(error)
             }
         }

@@ -12,6 +12,7 @@ use tactomo_board::link::{Control, Link, Source};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::sequence::Sequence;
 use tactomo_board::session::{self, GreetError};
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::SceneName;
 use tactomo_protocol::{BoardMessage, DecodeError, Frame, Hello};
@@ -80,7 +81,7 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
     // What ended the solving also ended the reading; a failure to keep the recording counts for more than either.
     let ended = reader.keeping.finish().and(solved).and(ended);
     if let Err(error) = &ended {
-        notice.publish(|snapshot| snapshot.link = LinkState::Ended(error.to_string()));
+        notice.publish(|snapshot| snapshot.link = LinkState::Ended(with_causes(error)));
     }
     ended.map(|source| summary(&notice, source, &course))
 }
@@ -175,7 +176,7 @@ impl Reader {
         while !self.is_over() {
             match source.open() {
                 Ok(link) => return Some(link),
-                Err(error) => tracing::debug!("{error}"),
+                Err(error) => tracing::debug!("{}", with_causes(&error)),
             }
             self.answer_requests(None);
             self.notice.keep_fresh();
@@ -220,7 +221,7 @@ impl Reader {
         let error =
             GreetError::Silent { seconds: PATIENCE.as_secs(), junk_bytes: talk.receiver.counters().dropped_bytes };
         if self.greeted.is_some() {
-            return Ok(End::Lost(error.to_string()));
+            return Ok(End::Lost(with_causes(&error)));
         }
         Err(LiveError::Greet { link: link.name(), error })
     }
@@ -375,7 +376,7 @@ impl Reader {
                     if let (None, Control::Scene(scene)) = (&refused, control) {
                         self.inbox.put(Event::Pointer(self.plan.pointer || scene == SceneName::Pointer));
                     }
-                    self.notice.change(|snapshot| snapshot.refused = refused.map(|error| error.to_string()));
+                    self.notice.change(|snapshot| snapshot.refused = refused.map(|error| with_causes(&error)));
                 }
             }
         }
@@ -415,8 +416,8 @@ fn is_same(one: &Hello, other: &Hello) -> bool {
 
 fn lost(link: &dyn Link, error: io::Error, comes_back: bool) -> Result<End, LiveError> {
     match error.kind() {
-        io::ErrorKind::UnexpectedEof => Ok(End::Over(error.to_string())),
-        _ if comes_back => Ok(End::Lost(error.to_string())),
+        io::ErrorKind::UnexpectedEof => Ok(End::Over(with_causes(&error))),
+        _ if comes_back => Ok(End::Lost(with_causes(&error))),
         _ => Err(LiveError::Link { link: link.name(), source: error }),
     }
 }

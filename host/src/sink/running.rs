@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::feed::{Delivery, Feed, Keeps, Next, Tail, Taps};
 use crate::run::Listener;
+use tactomo_physics::causes::with_causes;
 
 /// Longest wait at the end for a sink to take what is left.
 pub(super) const PATIENCE: Duration = Duration::from_secs(1);
@@ -141,8 +142,9 @@ impl Ended {
             self.stop.store(true, Ordering::Relaxed);
             return;
         }
-        tracing::error!("{name} ended early: {source}");
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(SinkError { name, source });
+        let error = SinkError { name, source };
+        tracing::error!("{}", with_causes(&error));
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
     }
 }
 

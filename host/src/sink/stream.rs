@@ -69,7 +69,7 @@ pub struct Form {
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
     /// The file cannot be made, or is there already.
-    #[error("cannot write the stream {path}: {source}; it has to be a new file, or `-` for stdout")]
+    #[error("cannot write the stream {path} (it has to be a new file, or `-` for stdout)")]
     Create {
         /// The file.
         path: PathBuf,
@@ -77,7 +77,7 @@ pub enum StreamError {
         source: io::Error,
     },
     /// The same of an MCAP file.
-    #[error("cannot write {path}: {source}; an MCAP file has to be a new one")]
+    #[error("cannot write {path} (an MCAP file has to be a new one)")]
     Mcap {
         /// The file.
         path: PathBuf,
@@ -93,9 +93,7 @@ pub enum StreamError {
         address: Address,
     },
     /// An address that this machine does not have, or that nobody has.
-    #[error(
-        "cannot use {address} for {what}: {source}; give it an address that this machine can reach, or only a port"
-    )]
+    #[error("cannot use {address} for {what} (give it an address that this machine can reach, or only a port)")]
     Address {
         /// What was to use it.
         what: &'static str,

@@ -15,6 +15,7 @@ use super::feed::{Keeps, Next, Tail, Taps};
 use super::lines::Fields;
 use super::running::{PATIENCE, Sinks};
 use super::stream::{Form, StreamError};
+use tactomo_physics::causes::with_causes;
 
 /// Readers at a time.
 const MOST_READERS: usize = 32;
@@ -28,7 +29,7 @@ pub(super) fn serve(sinks: &mut Sinks, address: &Address, form: Form) -> Result<
     let (name, taps) = (format!("the stream tcp:{at}"), sinks.taps());
     let work = move |runtime: tokio::runtime::Runtime| {
         if let Err(error) = runtime.block_on(accept(listener, taps, form)) {
-            tracing::error!("the stream tcp:{at} takes no more readers: {error}");
+            tracing::error!("the stream tcp:{at} takes no more readers: {}", with_causes(&error));
         }
     };
     sinks.thread(name.clone(), 2 * PATIENCE, work).map_err(StreamError::thread(&name))?;
@@ -45,7 +46,7 @@ async fn accept(listener: std::net::TcpListener, taps: Taps, form: Form) -> io::
             accepted = listener.accept() => match accepted {
                 Ok(accepted) => accepted,
                 Err(error) => {
-                    tracing::debug!("a reader could not connect: {error}");
+                    tracing::debug!("a reader could not connect: {}", with_causes(&error));
                     tokio::time::sleep(PATIENCE / 10).await;
                     continue;
                 }

@@ -1,12 +1,12 @@
 //! Reference cases: a detector, its contacts, and the readings that an independent solver found for them.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 use serde::Deserialize;
 
+use super::json_file;
 use tactomo_physics::detector::{Adc, Detector, Electrode, Layer, Outline, Tolerances, Unevenness};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
@@ -30,7 +30,7 @@ pub struct Case {
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("cannot read the case {}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -38,7 +38,7 @@ pub enum CaseError {
         source: io::Error,
     },
     /// Not JSON, or a field is missing or of the wrong type; the message names it with line and column.
-    #[error("{}: not a case: {source}", path.display())]
+    #[error("{}: not a case", path.display())]
     Parse {
         /// The file.
         path: PathBuf,
@@ -58,12 +58,12 @@ pub enum CaseError {
 }
 
 impl Case {
-    /// Reads a case from a JSON file.
+    /// Reads a case from a JSON file, which may be compressed by gzip.
     ///
     /// # Errors
     /// [`CaseError`], which names the file and the field.
     pub fn read(path: &Path) -> Result<Self, CaseError> {
-        let text = fs::read_to_string(path).map_err(|source| CaseError::Read { path: path.to_owned(), source })?;
+        let text = json_file::text(path).map_err(|source| CaseError::Read { path: path.to_owned(), source })?;
         Self::parse(&text, path)
     }
 
@@ -261,6 +261,7 @@ fn on_detector(field: &'static str, [width_m, height_m, _]: [f64; 3], [x_m, y_m]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tactomo_physics::causes::with_causes;
 
     const TWO_ELECTRODES: &str = r#"{"name": "two", "size_m": [0.06, 0.04, 0.01],
         "conductivity_s_per_m": {"kind": "layers", "layers": [
@@ -304,10 +305,11 @@ mod tests {
             ("[1.5, 0.2]]", "[1.5]]", "field `readings_v` has to be 2 x 2"),
         ];
         for (from, to, message) in wrong {
-            let error = parse(&TWO_ELECTRODES.replacen(from, to, 1)).map_or_else(|e| e.to_string(), |_| String::new());
+            let error =
+                parse(&TWO_ELECTRODES.replacen(from, to, 1)).map_or_else(|e| with_causes(&e), |_| String::new());
             assert!(error.contains(message), "{error}");
         }
-        let missing = Case::read(Path::new("no-such.json")).map_or_else(|e| e.to_string(), |_| String::new());
-        assert!(missing.starts_with("no-such.json: "), "{missing}");
+        let missing = Case::read(Path::new("no-such.json")).map_or_else(|e| with_causes(&e), |_| String::new());
+        assert!(missing.starts_with("cannot read the case no-such.json: "), "{missing}");
     }
 }

@@ -8,6 +8,7 @@ mod calibrate;
 pub mod case;
 pub mod contacts;
 mod experiment;
+mod json_file;
 mod machine;
 pub mod page;
 mod presses;

@@ -4,6 +4,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use serialport::SerialPortType;
+use tactomo_physics::causes::with_causes;
 use tactomo_protocol::Hello;
 
 use super::Link;
@@ -62,7 +63,7 @@ pub fn ports() -> Vec<Port> {
         return Vec::new();
     }
     let found = serialport::available_ports().unwrap_or_else(|error| {
-        tracing::warn!("cannot list the serial ports: {error}");
+        tracing::warn!("cannot list the serial ports: {}", with_causes(&error));
         Vec::new()
     });
     let mut ports: Vec<Port> = found.into_iter().map(|info| port(info.port_name, info.port_type)).collect();
@@ -112,7 +113,7 @@ fn choose(probes: &[Probe]) -> Result<String, NoBoard> {
 
 fn refusal(probe: &Probe) -> Option<String> {
     let error = probe.answer.as_ref().err()?;
-    Some(format!("{}: {error}.", probe.port.name))
+    Some(format!("{}: {}.", probe.port.name, with_causes(error)))
 }
 
 #[cfg(test)]

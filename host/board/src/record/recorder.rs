@@ -9,6 +9,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use tactomo_physics::causes::with_causes;
 use tactomo_protocol::Hello;
 
 use super::packets::FirstPacket;
@@ -206,7 +207,7 @@ impl Drop for Recorder {
     fn drop(&mut self) {
         self.end();
         if let Some(Err(error)) = self.writer.take().map(|writer| outcome(&self.path, Some(writer))) {
-            tracing::warn!("{error}");
+            tracing::warn!("{}", with_causes(&error));
         }
     }
 }

@@ -15,6 +15,7 @@ use tactomo::board::link::Control;
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::RequestedSettings;
+use tactomo::causes::with_causes;
 use tactomo::detector::Detector as Described;
 use tactomo::run::plan::{Ends, Plan, Solving};
 use tactomo::run::scanning::ScanChoice;
@@ -348,7 +349,7 @@ impl Live {
 fn ended(run: thread::Result<Result<tactomo::run::plan::Summary, tactomo::run::plan::LiveError>>) -> Ended {
     match run {
         Ok(Ok(summary)) => serde_json::to_string(&summary).map_err(|error| error.to_string()),
-        Ok(Err(error)) => Err(crate::error::words(&error)),
+        Ok(Err(error)) => Err(with_causes(&error)),
         Err(_) => Err("the run panicked: this is a mistake in tactomo, please report it".to_owned()),
     }
 }

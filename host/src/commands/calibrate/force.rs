@@ -6,7 +6,7 @@ mod report;
 
 use std::path::PathBuf;
 
-use anyhow::anyhow;
+use anyhow::Context;
 use tactomo::calibrate::force::{Law, fit_force};
 use tactomo::detector::Detector;
 
@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let known = Known::of(&args.newtons, args.forces.as_deref())?;
     let gathered = gather(args, &known)?;
     let presses: Vec<_> = gathered.presses.iter().map(|press| press.press).collect();
-    let fit = fit_force(&presses, args.law).map_err(|error| anyhow!("{}: {error}", args.file.display()))?;
+    let fit = fit_force(&presses, args.law).with_context(|| args.file.display().to_string())?;
     let calibrated = Detector { force: Some(fit.law.clone()), ..gathered.detector };
     super::write(&calibrated, &args.out, out)?;
     let report = Report::of(&calibrated.name, &args.out, &gathered.presses, &fit);

@@ -5,7 +5,7 @@ mod report;
 
 use std::path::PathBuf;
 
-use anyhow::{anyhow, ensure};
+use anyhow::{Context, ensure};
 use tactomo::calibrate::known::correction;
 use tactomo::detector::Detector;
 
@@ -79,7 +79,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             1e3 * progress.after_m
         );
     });
-    let found = found.map_err(|error| anyhow!("{}: {error}", file.display()))?;
+    let found = found.with_context(|| file.display().to_string())?;
     let detector = Detector { correction: found.correction.clone(), ..gathered.detector.clone() };
     super::write(&detector, &args.out, out)?;
     let report = Report::of(&gathered, &found, &args.out);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 use tactomo::board::identity;
 use tactomo::calibrate::{Frame, Rub, RubSettings, rub};
 use tactomo::date::today;
@@ -70,7 +70,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         );
         true
     });
-    let mut found = found.map_err(|error| anyhow!("{}: {error}", file.display()))?;
+    let mut found = found.with_context(|| file.display().to_string())?;
     if let Some(calibration) = &mut found.detector.calibration {
         calibration.board = board;
         calibration.date = today();

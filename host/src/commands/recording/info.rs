@@ -6,6 +6,7 @@ use anyhow::bail;
 use serde::Serialize;
 use tactomo::board::frames::{RecordingLoss, Survey};
 use tactomo::board::record::Note;
+use tactomo::causes::with_causes;
 use tactomo::date::date_time;
 
 use crate::commands::output;
@@ -130,7 +131,7 @@ pub fn check(files: &[PathBuf]) -> anyhow::Result<()> {
             }
             Err(error) => {
                 damaged += 1;
-                format!("{:#}", anyhow::Error::new(error))
+                with_causes(&error)
             }
         };
         output::print(&line)?;

@@ -19,7 +19,7 @@ use crate::commands::output::{self, NewFile, message};
 ///   tactomo study built --tolerances 0.1 --solver auto --json
 ///   tactomo study built --rub 300 --known 3
 ///   tactomo study built --chart-frames --detectors 4 --solver contacts --out frames.html
-///   tactomo study built --rub 24 reference/built/*.json
+///   tactomo study built --rub 24 --solver contacts tests/reference/built/*.json.gz
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub struct Args {

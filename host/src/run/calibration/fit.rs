@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ForwardError;
 use tactomo_touch::calibrate::{Frame, Rub, RubSettings, rub};
@@ -76,13 +77,13 @@ fn fit(task: &Task) -> Result<Fit, String> {
     let presses = if task.is_last { usual.presses } else { (first << task.before.min(8)).min(most) };
     let goes_on = &mut |_| !task.cancelled.load(Ordering::Relaxed);
     let found = rub(&task.description, &task.frames, &RubSettings { presses, ..usual }, goes_on);
-    let mut rub = found.map_err(|error| error.to_string())?;
+    let mut rub = found.map_err(|error| with_causes(&error))?;
     if let Some(calibration) = &mut rub.detector.calibration {
         calibration.board.clone_from(&task.board);
         calibration.date = today();
     }
     let compared = match task.is_last && rub.left_out.is_empty() {
-        true => compare(&task.description, &rub.detector, &task.frames).map_err(|error| error.to_string())?,
+        true => compare(&task.description, &rub.detector, &task.frames).map_err(|error| with_causes(&error))?,
         false => None,
     };
     Ok(Fit { rub, compared })

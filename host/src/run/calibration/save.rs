@@ -4,6 +4,7 @@ use std::fs::OpenOptions;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 
 /// Most files of one name.
@@ -16,7 +17,9 @@ const MOST: usize = 1000;
 pub(super) fn save(detector: &Detector, folder: &Path) -> Result<PathBuf, String> {
     let text = detector.to_toml();
     let read = Detector::from_toml_in(folder, &text, "");
-    read.map_err(|error| format!("the detector could not be read back from {}: {error}", folder.display()))?;
+    read.map_err(|error| {
+        format!("the detector could not be read back from {}: {}", folder.display(), with_causes(&error))
+    })?;
     let name: String =
         detector.name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '-' }).collect();
     for number in 1..=MOST {

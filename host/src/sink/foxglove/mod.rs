@@ -25,6 +25,7 @@ use super::channels::Messages;
 use super::feed::Taps;
 use super::running::{PATIENCE, Sinks};
 use super::stream::StreamError;
+use tactomo_physics::causes::with_causes;
 
 /// The port that Foxglove's app proposes.
 pub const DEFAULT_PORT: u16 = 8765;
@@ -61,7 +62,7 @@ impl Sinks {
         let name = format!("Foxglove at ws://{at}");
         let work = move |runtime: tokio::runtime::Runtime| {
             if let Err(error) = runtime.block_on(serve(listener, shared)) {
-                tracing::error!("Foxglove is no longer served at ws://{at}: {error}");
+                tracing::error!("Foxglove is no longer served at ws://{at}: {}", with_causes(&error));
             }
         };
         self.thread(name.clone(), 2 * PATIENCE, work).map_err(StreamError::thread(&name))?;

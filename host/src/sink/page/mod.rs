@@ -29,6 +29,7 @@ use tokio::sync::{Semaphore, oneshot, watch};
 
 use self::access::Access;
 use crate::run::{Request, Snapshot};
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ImageMesh;
 use tactomo_physics::scene::Contact;
@@ -114,8 +115,8 @@ pub enum ServerError {
     },
     /// The system refuses.
     #[error(
-        "cannot serve the page on port {port} of {address}: {source}; choose another port with --http-port, or with --listen an \
-         address that this machine has"
+        "cannot serve the page on port {port} of {address} (choose another port with --http-port, or with --listen an address \
+         that this machine has)"
     )]
     Listen {
         /// The address asked for.
@@ -126,7 +127,7 @@ pub enum ServerError {
         source: io::Error,
     },
     /// A setup with numbers that are none.
-    #[error("detector {detector} cannot be described to the page: {source}")]
+    #[error("detector {detector} cannot be described to the page")]
     PageSetup {
         /// Its name.
         detector: String,
@@ -255,7 +256,7 @@ fn run(listener: TcpListener, shared: Arc<Shared>, stopped: oneshot::Receiver<()
     };
     std::thread::Builder::new().name("page server".to_owned()).spawn(move || {
         if let Err(error) = runtime.block_on(serve) {
-            tracing::error!("the page is no longer served: {error}");
+            tracing::error!("the page is no longer served: {}", with_causes(&error));
         }
     })
 }

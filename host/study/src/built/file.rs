@@ -1,11 +1,11 @@
 //! Detectors as built that another program has solved: a description, and readings of what was made of it.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use crate::json_file;
 use tactomo_physics::detector::{Detector, Electrode, Layer, Outline};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
@@ -23,7 +23,7 @@ pub struct BuiltFile {
 #[derive(Debug, thiserror::Error)]
 pub enum BuiltFileError {
     /// It cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("cannot read {}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -31,7 +31,7 @@ pub enum BuiltFileError {
         source: io::Error,
     },
     /// Not JSON, or a field is missing or of the wrong type; the message names it with line and column.
-    #[error("{}: not a detector as built: {source}", path.display())]
+    #[error("{}: not a detector as built", path.display())]
     Parse {
         /// The file.
         path: PathBuf,
@@ -75,12 +75,12 @@ struct Scene {
 }
 
 impl BuiltFile {
-    /// Reads it from a JSON file.
+    /// Reads it from a JSON file, which may be compressed by gzip.
     ///
     /// # Errors
     /// [`BuiltFileError`], which names the file and what is wrong.
     pub fn read(path: &Path) -> Result<Self, BuiltFileError> {
-        let text = fs::read_to_string(path).map_err(|source| BuiltFileError::Read { path: path.to_owned(), source })?;
+        let text = json_file::text(path).map_err(|source| BuiltFileError::Read { path: path.to_owned(), source })?;
         let file: File =
             serde_json::from_str(&text).map_err(|source| BuiltFileError::Parse { path: path.to_owned(), source })?;
         let electrodes = file.nominal.electrodes_m.len();

@@ -16,6 +16,7 @@ use std::thread;
 use super::calibrate::{Calibrated, Scene, read, rubbed};
 use super::experiment::{Experiment, StudyError};
 use super::presses;
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, measured};
@@ -182,7 +183,7 @@ impl Built {
         }
         let Calibrated { detector, refused } = Calibrated::of(self.problem.detector(), rubbed, plan.known);
         if let Some(error) = refused {
-            return Ok(Self { refused: Some(format!("{}: {error}", self.name)), ..self });
+            return Ok(Self { refused: Some(format!("{}: {}", self.name, with_causes(&error))), ..self });
         }
         let problem = Problem::of(&detector).map_err(StudyError::from)?;
         let corrected = |(contacts, mut readings): Scene| {

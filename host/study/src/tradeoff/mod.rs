@@ -15,6 +15,7 @@ use super::machine::Machine;
 use super::scenes::{Group, SceneKind};
 use super::score::Summary;
 use super::variant::Variation;
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{Family, Method};
 
@@ -224,7 +225,7 @@ fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str))
         progress(&format!("{}: {}", detector.name, variation.label()));
         match try_variation(plan.heap, &mut trials, variation) {
             Ok(report) => solvers.push(report),
-            Err(error) => unavailable.push(format!("{}: {error}", variation.label())),
+            Err(error) => unavailable.push(format!("{}: {}", variation.label(), with_causes(&error))),
         }
     }
     let [Trial { experiment, .. }] = trials;
@@ -259,7 +260,10 @@ fn as_built(plan: &Plan, sound: &Experiment, progress: &mut dyn FnMut(&str)) -> 
                 Some(calibrate) => {
                     let found = calibrate.find(built, seed)?;
                     refused += usize::from(found.refused.is_some());
-                    found.refused.iter().for_each(|why| progress(&format!("{}: {why}", built.detector.name)));
+                    found
+                        .refused
+                        .iter()
+                        .for_each(|why| progress(&format!("{}: {}", built.detector.name, with_causes(why))));
                     built.known_as(&found.detector)?
                 }
                 None => built.with_faults(&[], 0)?,

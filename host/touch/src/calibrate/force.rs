@@ -145,7 +145,7 @@ pub enum ForceError {
         range_n: [f64; 2],
     },
     /// Conductances that contradict the forces.
-    #[error("{0}")]
+    #[error(transparent)]
     Mistyped(#[from] Mistyped),
     /// Too many outliers.
     #[error(

@@ -49,7 +49,7 @@ pub enum LearnedError {
         path: PathBuf,
     },
     /// It holds something else.
-    #[error("{path}: {source}")]
+    #[error("cannot use {path}")]
     Content {
         /// The file.
         path: PathBuf,

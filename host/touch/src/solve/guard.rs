@@ -4,6 +4,7 @@ use super::contacts::ContactSettings;
 use super::follow::{Followed, Follower, Lead, Parts, Searcher};
 use super::watch::{ElectrodeWatch, FaultyElectrodes, Look};
 use super::{Contacts, ElectrodeFault, FoundContact, Method, Problem, Solution, SolveError, Solver};
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
@@ -64,7 +65,7 @@ impl Guard {
     fn rebuild(&mut self) {
         match without(self.method, &self.problem, self.watch.faulty()) {
             Ok(solver) => self.solver = solver,
-            Err(error) => tracing::warn!("there is no solver without the faulty electrodes: {error}"),
+            Err(error) => tracing::warn!("there is no solver without the faulty electrodes: {}", with_causes(&error)),
         }
     }
 }

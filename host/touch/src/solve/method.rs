@@ -9,6 +9,7 @@ use super::{
     NonlinearSettings, Nonnegative, Problem, Solver, Tikhonov, Tsvd, Tv, Variant, correct, newtons,
 };
 use crate::learned::Learned;
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::forward::ForwardError;
 
 /// A solver by its name; the order is that of the [table](Method::ALL).
@@ -277,7 +278,7 @@ const TABLE: [Row; 13] = [
         build: |problem, _| {
             let named = |error: NetworkError| ForwardError::Detector {
                 detector: problem.detector().name.clone(),
-                what: error.to_string(),
+                what: with_causes(&error),
             };
             let network = match problem.learned() {
                 Some(Learned::Network(network)) => Ok(Arc::clone(network)),

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread;
 
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Nuisance, Through};
@@ -134,7 +135,7 @@ impl Problem {
         let made = || {
             let nuisance = Nuisance::new(&self.model, self.detector(), cores);
             nuisance.unwrap_or_else(|error| {
-                tracing::warn!("what is not known of the detector is left out: {error}");
+                tracing::warn!("what is not known of the detector is left out: {}", with_causes(&error));
                 None
             })
         };

@@ -48,7 +48,7 @@ pub struct Surface {
 #[derive(Debug, thiserror::Error)]
 pub enum SurfaceError {
     /// It cannot be read.
-    #[error("{0}")]
+    #[error(transparent)]
     Read(#[from] io::Error),
     /// A unit that is none.
     #[error("a unit of {0:?}, but it has to be one of mm, cm, m, in")]

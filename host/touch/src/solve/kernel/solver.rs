@@ -6,6 +6,7 @@ use super::{Kernel, Presses, TeachError};
 use crate::learned::Learned;
 use crate::solve::locate::Locator;
 use crate::solve::{Problem, Solution, SolveError, Solver};
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Surface;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
@@ -30,7 +31,7 @@ impl KernelSolver {
     pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
         let detector = problem.detector();
         let told =
-            |error: TeachError| ForwardError::Detector { detector: detector.name.clone(), what: error.to_string() };
+            |error: TeachError| ForwardError::Detector { detector: detector.name.clone(), what: with_causes(&error) };
         let kernel = match problem.learned() {
             Some(Learned::Kernel(kernel)) => Arc::clone(kernel),
             _ => Arc::new(Kernel::train(&Presses::simulated(problem, SIMULATED)).map_err(told)?),

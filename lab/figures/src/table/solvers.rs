@@ -1,0 +1,118 @@
+//! Solvers on random scenes and detectors as built, and their times: docs/solvers.md, README.
+
+use super::figure;
+use crate::figure::Figure;
+
+/// Classes of `study contacts`, and what ids call them.
+const CLASSES: [(&str, &str, bool); 15] = [
+    ("1 contact", "1", true),
+    ("2 contacts", "2", true),
+    ("3 contacts", "3", true),
+    ("4 contacts", "4", true),
+    ("5 contacts", "5", true),
+    ("all", "all", true),
+    ("contrast above 100", "contrast", true),
+    ("in corners", "corners", false),
+    ("at walls", "walls", false),
+    ("radius below 2 mm", "narrow", false),
+    ("radius 2 to 3.5 mm", "middling", false),
+    ("radius above 3.5 mm", "wide", false),
+    ("below 0.1 sheets", "light", false),
+    ("0.1 to 1 sheets", "firm", false),
+    ("above 1 sheet", "hard", false),
+];
+
+pub(super) fn figures() -> Vec<Figure> {
+    [random(), built(), speed(), rows()].concat()
+}
+
+/// `auto` on random contacts.
+fn random() -> Vec<Figure> {
+    let mut all = Vec::new();
+    for (class, name, has_scenes) in CLASSES {
+        let of = |field: &str, says: &str, path: &str| {
+            let (id, says) = (format!("contacts.{name}.{field}"), format!("random contacts, {class}: {says}"));
+            figure("contacts", id, says, format!("rows/class={class}/{path}"))
+        };
+        if has_scenes {
+            all.push(of("count", "as many found as are there", "scenes/count_right").per_cent().by(3.0));
+            all.push(of("right", "all visible ones found and none invented", "scenes/all_found").per_cent().by(3.0));
+        }
+        all.extend([
+            of("found", "visible ones found", "contacts/found").per_cent().by(3.0),
+            of("error", "error, median", "contacts/error_m/median").mm().share(0.1),
+            of("error-p90", "error, 90 % below", "contacts/error_m/high").mm().share(0.3),
+            of("over-bound", "error over the bound, 90 % below", "contacts/over_bound/high").share(0.2),
+            of("within-1", "coordinates within one standard error", "contacts/place_within/0").per_cent().by(4.0),
+            of("within-2", "coordinates within two standard errors", "contacts/place_within/1").per_cent().by(4.0),
+            of("conductance-1", "conductances within one standard error", "contacts/conductance_within/0")
+                .per_cent()
+                .by(4.0),
+            of("conductance-2", "conductances within two standard errors", "contacts/conductance_within/1")
+                .per_cent()
+                .by(4.0),
+        ]);
+    }
+    all
+}
+
+/// Single presses and pairs on the reference detector as built.
+fn built() -> Vec<Figure> {
+    let mut all = Vec::new();
+    for solver in ["auto", "network", "tikhonov"] {
+        for (contacts, name) in [(1, "single"), (2, "pairs")] {
+            let of = |field: &str, says: &str, path: &str| {
+                let says = format!("{says}, {name} presses on built101, {solver} by the description");
+                let path = format!("rows/detector=built101&solver={solver}&contacts={contacts}/{path}");
+                figure("built", format!("built.{solver}.{name}.{field}"), says, path)
+            };
+            all.push(of("error", "mean error", "error_m").mm().share(0.05));
+            all.push(of("p95", "error, 95 % below", "p95_m").mm().share(0.1));
+            all.push(of("count", "count right", "count_right").per_cent().by(3.0));
+        }
+    }
+    all
+}
+
+/// Time against error of defaults on `square-60`.
+fn speed() -> Vec<Figure> {
+    let mut all =
+        vec![figure("tradeoff", "tradeoff.seconds", "time of `tradeoff --quick`", "seconds").unit("s", 1.0).share(0.5)];
+    for solver in ["auto", "contacts", "tikhonov", "network"] {
+        for name in ["one", "several", "shapes"] {
+            let of = |field: &str, says: &str, path: &str| {
+                let says = format!("{says} of {solver}, scenes of the group `{name}`, square-60");
+                let path =
+                    format!("detectors/0/solvers/solver={solver}&parameter=null/groups/group={name}/summary/{path}");
+                figure("tradeoff", format!("tradeoff.{solver}.{name}.{field}"), says, path)
+            };
+            all.push(of("time", "time a frame, median", "time_us/median").unit("us", 1.0).share(0.5));
+            all.push(of("error", "error", "error_m").mm().share(0.2));
+        }
+    }
+    all
+}
+
+/// Whole frames against rows.
+fn rows() -> Vec<Figure> {
+    let mut all = Vec::new();
+    for (choice, rows, name) in [("whole", 16, "whole"), ("adaptive", 1, "one-row"), ("adaptive", 2, "two-rows")] {
+        for contacts in 1..=3 {
+            for (speed, motion) in [("0.0", "stands"), ("0.05", "slow"), ("0.5", "fast")] {
+                let path = format!("points/choice={choice}&rows={rows}&contacts={contacts}&speed_m_per_s={speed}");
+                let of = |field: &str, says: &str| {
+                    let id = format!("rows.{name}.{contacts}.{motion}.{field}");
+                    figure(
+                        "scan",
+                        id,
+                        format!("{says}, {contacts} contacts at {speed} m/s, {name}"),
+                        format!("{path}/{field}_m"),
+                    )
+                };
+                all.push(of("arrived", "error on arrival").mm().share(0.3));
+                all.push(of("middle", "error in the middle of the rows").mm().share(0.3));
+            }
+        }
+    }
+    all
+}
