@@ -109,25 +109,26 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         if identity.adc.full_scale_mv == 0 || identity.drive_mv == 0 {
             return Err(NewBoardError::Millivolts);
         }
-        let hello = hello(&identity);
+        let hello = hello(&identity, M::SELECT_US);
         if !hello.is_valid() {
             return Err(NewBoardError::Ranges);
         }
-        let mut board = Self {
+        let scan = Scan::new(identity.electrodes, &identity.adc).ok_or(electrodes)?;
+        let mut uplink = Uplink::default();
+        uplink.message(&BoardMessage::Hello(hello.clone()));
+        Ok(Self {
             parts,
             adc: identity.adc,
             hello,
             inbox: Inbox::default(),
             receiver: CommandReceiver::default(),
-            scan: Scan::new(identity.electrodes, &identity.adc).ok_or(electrodes)?,
-            uplink: Uplink::default(),
+            scan,
+            uplink,
             pace: Pace::default(),
             sequence: 0,
             stuck_told: false,
             boot_fault: None,
-        };
-        board.say_hello(0);
-        Ok(board)
+        })
     }
 
     /// Tells the host what went wrong before the reset. A host that was not listening yet hears it again after its first
@@ -308,7 +309,7 @@ impl<L: Serial, C: Chip, const WIRE: usize> Attended<C> for Line<'_, L, WIRE> {
     }
 }
 
-fn hello(identity: &Identity) -> Hello {
+fn hello(identity: &Identity, select_us: u16) -> Hello {
     Hello {
         version: VERSION,
         answers: 0,
@@ -318,7 +319,7 @@ fn hello(identity: &Identity) -> Hello {
         adc_bits: identity.adc.bits,
         adc_full_scale_mv: identity.adc.full_scale_mv,
         drive_mv: identity.drive_mv,
-        settings: Settings::default(),
+        settings: Settings { select_us, ..Settings::default() },
         is_streaming: false,
         ranges: identity.adc.ranges_of(identity.electrodes),
     }

@@ -32,6 +32,7 @@ mod pace;
 mod parts;
 mod row;
 mod scan;
+mod side_by_side;
 pub mod uplink;
 
 pub use adc::Adc;
@@ -39,3 +40,4 @@ pub use board::{Activity, Board, Board16, Board32, Identity, NewBoardError};
 pub use mux::Mux;
 pub use parts::{Chip, Parts, Sampler, Serial, TimedOut};
 pub use row::Row;
+pub use side_by_side::{ConverterPair, SideBySide};

@@ -3,8 +3,8 @@
 //! After its data sheet (Analog Devices, ADG726/ADG732), times rounded to the safe side: with WR and a half's chip select (CSA, CSB) low, that half follows the
 //! address lines; it keeps what it had once WR or its chip select is high. EN is active low and is latched along with the
 //! address. A change of address breaks before it makes, so two electrodes are never joined. All its times are shorter than
-//! two writes to a GPIO register of the chips used here, so that only [`Latched::select`] needs a wait of its own, for the
-//! analogue side. The ADG732 (one switch, 32 channels, five lines) works as [`Transparent`] does, two of them as [`Latched`] does, and two
+//! two writes to a GPIO register of the chips used here, so that only `select` needs a wait of its own, for the
+//! analogue side: [`Mux::SELECT_US`]. The ADG732 (one switch, 32 channels, five lines) works as [`Transparent`] does, two of them as [`Latched`] does, and two
 //! ADG726 as [`Paired`] does.
 
 use embedded_hal::digital::OutputPin;
@@ -23,8 +23,9 @@ pub trait Mux {
     /// Error of the pins.
     type Error;
 
-    /// Wait between [`select`](Self::select) and the first conversion, in nanoseconds (ns).
-    const SELECT_SETTLE_NS: u32;
+    /// Wait between [`select`](Self::select) and the first conversion after a reset, in microseconds (us); the host may set another one
+    /// ([`Settings::select_us`](tactomo_protocol::Settings::select_us)). 0 where every electrode has an input of its own: then none is waited.
+    const SELECT_US: u16;
 
     /// Grounds `electrode` and lets go of the one grounded before.
     ///
@@ -64,7 +65,7 @@ impl<P: OutputPin, const LINES: usize> Transparent<P, LINES> {
 
 impl<P: OutputPin, const LINES: usize> Mux for Transparent<P, LINES> {
     type Error = P::Error;
-    const SELECT_SETTLE_NS: u32 = 0;
+    const SELECT_US: u16 = 0;
 
     fn ground(&mut self, electrode: u8) -> Result<(), P::Error> {
         self.0.set(electrode)
@@ -124,11 +125,17 @@ fn latch<P: OutputPin>(wr: &mut P, select: &mut P) -> Result<(), P::Error> {
     select.set_high()
 }
 
+/// [`Mux::SELECT_US`] of [`Latched`], in microseconds (us).
+///
+/// Half B, the ADC input and its sampling capacitor hold 228 pF (200, 20 and 8: data sheet of the ADG726, and `docs/hardware.md`). Half an LSB of
+/// 12 bits is 9.0 time constants: so long, up to 8.3 kilohm charge them. That is more than the pads of the smallest detector of foam A have
+/// (electrodes of a radius of 0.5 mm: 2.2 kilohm, and as much again on the way to ground), with 1 kilohm of protection. What has more needs a
+/// longer wait, or conversions that are thrown away for the charge that the last electrode has left: `tactomo board check` says which.
+pub const ONE_INPUT_SELECT_US: u16 = 17;
+
 impl<P: OutputPin, const LINES: usize> Mux for Latched<P, LINES> {
     type Error = P::Error;
-    /// The ADC input and half B hold about 150 pF, which a pad of up to 1 kilohm charges to half an LSB of 12 bits (9 time
-    /// constants) in 1.4 us.
-    const SELECT_SETTLE_NS: u32 = 2_000;
+    const SELECT_US: u16 = ONE_INPUT_SELECT_US;
 
     fn ground(&mut self, electrode: u8) -> Result<(), P::Error> {
         self.address.set(electrode)?;
@@ -198,8 +205,8 @@ impl<P: OutputPin> Paired<P> {
 
 impl<P: OutputPin> Mux for Paired<P> {
     type Error = P::Error;
-    /// Twice what one chip needs, as two drains are at the ADC input: 300 pF and 1 kilohm, 2.7 us to half an LSB of 12 bits.
-    const SELECT_SETTLE_NS: u32 = 4_000;
+    /// Twice what one chip needs, as two drains are at the ADC input: 428 pF.
+    const SELECT_US: u16 = 2 * ONE_INPUT_SELECT_US;
 
     fn ground(&mut self, electrode: u8) -> Result<(), P::Error> {
         self.set(Half::A, electrode)
@@ -231,7 +238,7 @@ impl<P: OutputPin, M: Mux<Error = P::Error>> Enabled<M, P> {
 
 impl<P: OutputPin, M: Mux<Error = P::Error>> Mux for Enabled<M, P> {
     type Error = P::Error;
-    const SELECT_SETTLE_NS: u32 = M::SELECT_SETTLE_NS;
+    const SELECT_US: u16 = M::SELECT_US;
 
     fn ground(&mut self, electrode: u8) -> Result<(), P::Error> {
         self.enable.set_low()?;

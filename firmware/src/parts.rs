@@ -25,8 +25,8 @@ pub struct TimedOut;
 /// Converts the voltages of electrodes.
 ///
 /// A converter that does one thing after the other needs [`sample`](Self::sample) alone, and [`restart`](Self::restart) where it can hang. One that
-/// can do better writes [`sample_row`](Self::sample_row) itself: two converters that work side by side, or one behind a bus that takes the
-/// next address while it sends the last code.
+/// can do better writes [`sample_row`](Self::sample_row) itself: two converters that work side by side ([`SideBySide`](crate::SideBySide)), or one
+/// behind a bus that takes the next address while it sends the last code.
 ///
 /// A conversion that comes too late is never to be returned in place of another: whoever starts a conversion first clears, or reads and
 /// throws away, what an earlier one may have left.
@@ -47,7 +47,7 @@ pub trait Sampler {
     /// Converts every electrode of a row as often as it says, and hands it the codes.
     ///
     /// This form takes one electrode after the other: [`select`](Row::select)s it, [`sample`](Self::sample)s it, and calls
-    /// [`attend`](Row::attend) before each conversion. The first conversion that times out is the electrode's last, so that a stuck converter
+    /// [`attend`](Row::attend) before each conversion; the first are [thrown away](Row::discarded). The first conversion that times out is the electrode's last, so that a stuck converter
     /// costs one bound an electrode, whatever the averaging, and the converter is [restarted](Self::restart). Other forms do so too.
     ///
     /// # Errors
@@ -58,10 +58,13 @@ pub trait Sampler {
         while electrodes != 0 {
             if electrodes & 1 == 1 {
                 row.select(electrode)?;
-                for _ in 0..row.conversions() {
+                let discarded = row.discarded();
+                for number in 0..discarded + row.conversions() {
                     row.attend();
                     let sampled = self.sample(electrode);
-                    row.take(electrode, sampled);
+                    if number >= discarded || sampled.is_err() {
+                        row.take(electrode, sampled);
+                    }
                     if sampled.is_err() {
                         self.restart();
                         break;

@@ -16,7 +16,11 @@ pub trait Row {
     /// How often each is to be converted: 1 to 256 times.
     fn conversions(&self) -> u32;
 
-    /// Brings an electrode to the converter and waits until it is there. Needed where the multiplexer has one ADC input for all, before the
+    /// Conversions of each electrode that come before those and are thrown away: 0 to 15. They find the sampling capacitor charged by another
+    /// electrode, and leave it charged by this one. One that times out is [taken](Self::take) all the same.
+    fn discarded(&self) -> u32;
+
+    /// Brings an electrode to the converter and waits as long as the settings say. Needed where the multiplexer has one ADC input for all, before the
     /// first conversion of each electrode; where every electrode has an input of its own this does nothing, and may be left out.
     ///
     /// # Errors
@@ -44,6 +48,22 @@ pub(crate) trait Attended<C> {
     fn exchange(&mut self, chip: &mut C);
 }
 
+/// Longest stretch of a wait in which nobody looks at the line (us): at 921600 baud, 23 bytes of the 128 of a UART's FIFO.
+const WAIT_US: u32 = 250;
+
+/// Waits, at least for `us`, and keeps line and watchdog alive.
+pub(crate) fn wait<C: Chip>(chip: &mut C, line: &mut impl Attended<C>, mut us: u32) {
+    while us > 0 {
+        let piece = us.min(WAIT_US);
+        chip.delay_us(piece);
+        us -= piece;
+        if us > 0 {
+            chip.feed_watchdog();
+            line.exchange(chip);
+        }
+    }
+}
+
 /// A row under way.
 pub(crate) struct ScanRow<'a, M, C, A> {
     pub mux: &'a mut M,
@@ -51,6 +71,9 @@ pub(crate) struct ScanRow<'a, M, C, A> {
     pub line: &'a mut A,
     pub electrodes: u32,
     pub average_log2: u8,
+    /// Wait after an electrode was brought to the converter (us), and conversions that do not count then.
+    pub select_us: u16,
+    pub discarded: u8,
     pub ceilings: &'a Ceilings,
     /// Sums of each electrode's codes.
     pub sums: &'a mut Sums,
@@ -70,10 +93,14 @@ impl<M: Mux, C: Chip, A: Attended<C>> Row for ScanRow<'_, M, C, A> {
         1 << self.average_log2
     }
 
+    fn discarded(&self) -> u32 {
+        self.discarded.into()
+    }
+
     fn select(&mut self, electrode: u8) -> Result<(), M::Error> {
         self.mux.select(electrode)?;
-        if M::SELECT_SETTLE_NS > 0 {
-            self.chip.delay_ns(M::SELECT_SETTLE_NS);
+        if M::SELECT_US > 0 {
+            wait(self.chip, self.line, self.select_us.into());
         }
         Ok(())
     }

@@ -6,11 +6,8 @@ use tactomo_protocol::scope::electrodes_of;
 use tactomo_protocol::{FrameHead, MAX_ELECTRODES, MAX_READINGS, Plan, Scope, Settings, Status};
 
 use crate::adc::{Adc, Ceilings};
-use crate::row::{Attended, ScanRow, Sums};
+use crate::row::{Attended, ScanRow, Sums, wait};
 use crate::{Chip, Mux, Sampler};
-
-/// Longest stretch of a wait in which nobody looks at the line (us): at 921600 baud, 23 bytes of the 128 of a UART's FIFO.
-const WAIT_US: u32 = 250;
 
 /// A scan under way and the readings of the last frame; room for `READINGS` of them.
 #[derive(Debug)]
@@ -64,23 +61,8 @@ pub(crate) struct Bench<'a, M, S, C, A> {
     pub line: &'a mut A,
     /// What the converter gives.
     pub adc: Adc,
-    /// Settle time and averaging.
+    /// Settle times and averaging.
     pub settings: Settings,
-}
-
-impl<M, S, C: Chip, A: Attended<C>> Bench<'_, M, S, C, A> {
-    /// Waits, at least for `us`, and keeps line and watchdog alive.
-    fn wait(&mut self, mut us: u32) {
-        while us > 0 {
-            let piece = us.min(WAIT_US);
-            self.chip.delay_us(piece);
-            us -= piece;
-            if us > 0 {
-                self.chip.feed_watchdog();
-                self.line.exchange(self.chip);
-            }
-        }
-    }
 }
 
 impl<const READINGS: usize> Scan<READINGS> {
@@ -150,13 +132,16 @@ impl<const READINGS: usize> Scan<READINGS> {
         let row = mem::take(&mut self.row);
         let average_log2 = if self.plan.is_whole() { bench.settings.average_log2 } else { self.plan.average_log2 };
         bench.mux.ground(self.scope.ground(row))?;
-        bench.wait(bench.settings.settle_us.into());
+        let Settings { settle_us, select_us, discarded, .. } = bench.settings;
+        wait(bench.chip, bench.line, settle_us.into());
         let mut scanned = ScanRow {
             mux: bench.mux,
             chip: bench.chip,
             line: bench.line,
             electrodes: self.scope.reads(),
             average_log2,
+            select_us,
+            discarded,
             ceilings: &self.ceilings,
             sums: &mut self.sums,
             status: self.status,

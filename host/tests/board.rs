@@ -119,6 +119,9 @@ fn a_sound_board_passes_and_a_faulty_one_fails_with_its_electrodes_named() {
     assert_eq!(sound.status.code(), Some(0), "{}", String::from_utf8_lossy(&sound.stderr));
     let sound: Value = serde_json::from_slice(&sound.stdout).unwrap();
     assert_eq!((&sound["sound"], &sound["presses"]), (&true.into(), &4.into()));
+    let settling = &sound["settling"];
+    assert_eq!((&settling["board"], &settling["suits"]), (&"esp32".into(), &true.into()));
+    assert!(settling["pad_ohm"].as_f64().is_some_and(|ohm| (ohm - 550.0).abs() < 5.0), "{settling}");
 
     let faulty = check(&["--json", "--fault", "short:2,7", "--seed", "3"]);
     assert_eq!(faulty.status.code(), Some(1));

@@ -66,6 +66,12 @@ fn a_design_is_a_detector_that_live_takes() {
     let answer = json(&tactomo(&asked));
     assert!(answer["choices"].as_array().is_some_and(|choices| !choices.is_empty()));
     assert!(answer["compared"]["rating"]["electrodes"] == 16);
+    // How the boards suit the pads of each choice: foams A and B suit all of them.
+    let settling = answer["settling"].as_array().unwrap();
+    assert_eq!(Some(settling.len()), answer["choices"].as_array().map(Vec::len));
+    let boards: Vec<_> = settling[0].as_array().unwrap().iter().map(|one| one["board"].as_str().unwrap()).collect();
+    assert_eq!(boards, ["esp32", "esp32c3", "esp32c6", "stm32f405"]);
+    assert!(settling[0][0]["pad_ohm"].as_f64().is_some_and(|ohm| ohm > 100.0));
     let live = json(&tactomo(&["live", "--simulate", "--detector", &path, "--seconds", "0.5", "--json"]));
     assert!(live["frames"].as_u64().is_some_and(|frames| frames > 0), "{live}");
 }

@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Hello, Kind, Log, Request};
-use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_WIRE, Scope, VERSION, cobs, v1};
+use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_WIRE, Scope, VERSION, cobs, v1, v2};
 
 /// Why bytes between two zeros are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -31,7 +31,8 @@ pub struct Counters {
     pub dropped_bytes: u64,
 }
 
-/// Finds packets in a stream of bytes; holds the one that is under way, `N` bytes at most.
+/// Finds packets in a stream of bytes; the longest takes `N` bytes on the wire, its closing zero included. Of a longer stretch nothing is taken,
+/// whatever it may say.
 #[derive(Debug)]
 pub struct Receiver<const N: usize> {
     held: Vec<u8, N>,
@@ -40,7 +41,7 @@ pub struct Receiver<const N: usize> {
     counters: Counters,
 }
 
-/// The host's receiver, which knows version 1 of the protocol too.
+/// The host's receiver, which knows versions 1 and 2 of the protocol too.
 pub type BoardReceiver = Receiver<MAX_WIRE>;
 /// The board's receiver.
 pub type CommandReceiver = Receiver<MAX_COMMAND>;
@@ -89,7 +90,9 @@ impl<const N: usize> Receiver<N> {
 
     /// Keeps bytes of a stretch that is still open, or notes that it is too long for a packet.
     fn hold(&mut self, bytes: &[u8]) {
-        if self.lost > 0 || self.held.extend_from_slice(bytes).is_err() {
+        // The closing zero is one of the `N` bytes, and is not held.
+        let fits = self.held.len() + bytes.len() < N;
+        if self.lost > 0 || !fits || self.held.extend_from_slice(bytes).is_err() {
             self.lost += bytes.len();
         }
     }
@@ -133,7 +136,7 @@ fn open(packet: &[u8]) -> Result<(u8, u8, &[u8]), DecodeError> {
 
 fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
     let (version, kind, body) = open(packet)?;
-    if ![v1::VERSION, VERSION].contains(&version) {
+    if ![v1::VERSION, v2::VERSION, VERSION].contains(&version) {
         return Err(DecodeError::Version(version));
     }
     let kind = Kind::from_bits(kind).ok_or(DecodeError::Body)?;
@@ -141,7 +144,7 @@ fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
         return v1::board_message(kind, body);
     }
     Ok(match kind {
-        Kind::Hello => BoardMessage::Hello(hello(body)?),
+        Kind::Hello => BoardMessage::Hello(hello(version, body)?),
         Kind::Frame => BoardMessage::Frame(frame(body).ok_or(DecodeError::Body)?),
         Kind::Log => BoardMessage::Log(log(body)?),
         Kind::Fault => BoardMessage::Fault(from_postcard(body)?),
@@ -149,8 +152,11 @@ fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
     })
 }
 
-fn hello(body: &[u8]) -> Result<Hello, DecodeError> {
-    let hello = Hello { version: VERSION, ..from_postcard(body)? };
+fn hello(version: u8, body: &[u8]) -> Result<Hello, DecodeError> {
+    let hello = match version {
+        v2::VERSION => v2::hello(body)?,
+        _ => Hello { version, ..from_postcard(body)? },
+    };
     if hello.is_valid() { Ok(hello) } else { Err(DecodeError::Body) }
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::frame::{self, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Hello, Kind, Request};
-use crate::{CRC, CRC_BYTES, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, Scope, VERSION, cobs, v1, wire_bytes};
+use crate::{CRC, CRC_BYTES, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, Scope, VERSION, cobs, v1, v2, wire_bytes};
 
 /// Longest postcard body with room to spare; a [`Fault`](crate::Fault) with the longest text takes 98 bytes, a request 106.
 const MAX_BODY: usize = 160;
@@ -70,6 +70,7 @@ pub fn encode_hello(hello: &Hello, out: &mut [u8]) -> Result<usize, EncodeError>
         _ if !hello.is_valid() => Err(EncodeError::Hello),
         VERSION => encode_body(VERSION, Kind::Hello, hello, out),
         v1::VERSION => v1::encode_hello(hello, out),
+        v2::VERSION => v2::encode_hello(hello, out),
         version => Err(EncodeError::NotInVersion(version)),
     }
 }
@@ -78,13 +79,14 @@ pub fn encode_hello(hello: &Hello, out: &mut [u8]) -> Result<usize, EncodeError>
 /// Version 1 has no tags.
 ///
 /// # Errors
-/// [`EncodeError::Full`] if `out` is too short, [`EncodeError::Tag`] if the tag is 0, [`EncodeError::NotInVersion`] if the version is neither 1
-/// nor 2, or cannot say it: there are no plans in version 1.
+/// [`EncodeError::Full`] if `out` is too short, [`EncodeError::Tag`] if the tag is 0, [`EncodeError::NotInVersion`] if there is no such
+/// version, or it cannot say it: there are no plans in version 1, and no `select_us` and `discarded` in versions 1 and 2.
 pub fn encode_request(request: &Request, version: u8, out: &mut [u8]) -> Result<usize, EncodeError> {
     match version {
         _ if request.tag == 0 => Err(EncodeError::Tag),
         VERSION => encode_body(VERSION, Kind::Command, request, out),
         v1::VERSION => v1::encode_command(&request.command, out),
+        v2::VERSION => v2::encode_request(request, out),
         version => Err(EncodeError::NotInVersion(version)),
     }
 }

@@ -25,7 +25,7 @@
 //!
 //! let mut command = [0; MAX_COMMAND];
 //! let length = encode_request(&Request { tag: 7, command: Command::Start }, VERSION, &mut command)?;
-//! assert_eq!(command[..length], [0x08, 0x28, 0x07, 0x01, 0x1B, 0x68, 0x59, 0xF1, 0x00]);
+//! assert_eq!(command[..length], [0x08, 0x38, 0x07, 0x01, 0x1B, 0x68, 0x59, 0xF1, 0x00]);
 //!
 //! let mut line = *b"ets Jul 29 2019\r\n\0.............";
 //! let length = encode_board(&BoardMessage::Fault(Fault::AdcStuck), &mut line[18..])?;
@@ -48,12 +48,14 @@
 extern crate std;
 
 mod cobs;
+mod coding;
 pub mod decode;
 pub mod encode;
 pub mod frame;
 pub mod message;
 pub mod scope;
 mod v1;
+mod v2;
 
 pub use decode::{BoardReceiver, CommandReceiver, Counters, DecodeError, Receiver};
 pub use encode::{EncodeError, encode_board, encode_frame, encode_hello, encode_log, encode_request, encode_rows};
@@ -63,8 +65,8 @@ pub use message::{
 };
 pub use scope::{MAX_PLAN_ROWS, MAX_ROWS, Plan, Scope};
 
-/// Version of the protocol that this crate speaks: 1 to 15. Hosts understand boards of version 1 too.
-pub const VERSION: u8 = 2;
+/// Version of the protocol that this crate speaks: 1 to 15. Hosts understand boards of versions 1 and 2 too.
+pub const VERSION: u8 = 3;
 /// Most electrodes that a frame can carry.
 pub const MAX_ELECTRODES: usize = 32;
 /// Fewest electrodes that a frame can carry (in version 1, fewer would make a frame's length ambiguous).

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[cfg(feature = "test-support")]
 use crate::VERSION;
 use crate::frame::Frame;
-use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Plan};
+use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Plan, coding};
 
 /// Most [ranges](Range) of a board.
 pub const MAX_RANGES: usize = 4;
@@ -59,8 +59,10 @@ pub struct Hello {
     /// Tag of the command that this answers; 0 if nobody asked: the board has just started. Always 0 in version 1.
     pub answers: u8,
     /// Version of the firmware, such as `0.1.0`.
+    #[serde(deserialize_with = "coding::text")]
     pub firmware_version: String<24>,
     /// Name of the board, such as `esp32`.
+    #[serde(deserialize_with = "coding::text")]
     pub board: String<24>,
     /// Electrodes scanned; a whole frame has its square of readings.
     pub electrodes: u8,
@@ -75,6 +77,7 @@ pub struct Hello {
     /// Whether the board sends frames. Not told in version 1.
     pub is_streaming: bool,
     /// What the converters can see, from electrode 0 on.
+    #[serde(deserialize_with = "coding::list")]
     pub ranges: Vec<Range, MAX_RANGES>,
 }
 
@@ -172,15 +175,26 @@ pub struct Settings {
     pub average_log2: u8,
     /// Frames a second at most; 0 means as fast as the board can.
     pub max_frames_per_s: u16,
+    /// Wait between bringing an electrode to the converter and its first conversion, in microseconds (us). A board on which every electrode has
+    /// an input of its own does not wait. 0 to 10000; not told in versions 1 and 2: 0.
+    pub select_us: u16,
+    /// Conversions of each electrode in each row that are thrown away before those that count: 0 to 15; not told in versions 1 and 2: 0.
+    pub discarded: u8,
 }
 
 impl Settings {
     /// Largest [`average_log2`](Self::average_log2) that a board accepts.
     pub const MAX_AVERAGE_LOG2: u8 = 8;
+    /// Largest [`discarded`](Self::discarded) that a board accepts.
+    pub const MAX_DISCARDED: u8 = 15;
+    /// Longest [`select_us`](Self::select_us) that a board accepts (us): nine time constants of 228 pF behind 5 megohm.
+    pub const MAX_SELECT_US: u16 = 10_000;
 
     /// Whether a board may take these settings.
     pub fn is_valid(&self) -> bool {
         self.average_log2 <= Self::MAX_AVERAGE_LOG2
+            && self.select_us <= Self::MAX_SELECT_US
+            && self.discarded <= Self::MAX_DISCARDED
     }
 
     /// Conversions averaged into one reading.
@@ -191,7 +205,7 @@ impl Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { settle_us: 20, average_log2: 0, max_frames_per_s: 0 }
+        Self { settle_us: 20, average_log2: 0, max_frames_per_s: 0, select_us: 0, discarded: 0 }
     }
 }
 
@@ -203,9 +217,9 @@ pub struct Log(pub Vec<u8, MAX_LOG>);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Fault {
     /// The firmware panicked before the last reset, here (file, line, message).
-    Panic(String<96>),
+    Panic(#[serde(deserialize_with = "coding::text")] String<96>),
     /// The chip restarted by itself: watchdog, brown-out, and so on.
-    Reset(String<24>),
+    Reset(#[serde(deserialize_with = "coding::text")] String<24>),
     /// No conversion finished in time in a whole frame: is the ADC stuck?
     AdcStuck,
     /// A command with settings out of range; the old ones stay.

@@ -12,7 +12,7 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Settings};
+use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Settings, coding};
 
 /// Most rows that one frame holds.
 pub const MAX_ROWS: usize = 32;
@@ -164,6 +164,7 @@ pub fn electrodes_of(mut mask: u32) -> impl Iterator<Item = u8> {
 pub struct Plan {
     /// Which electrode is grounded in each row; repeats are how often each is. None at all: whole frames at the settings' average, the
     /// other fields being zero.
+    #[serde(deserialize_with = "coding::list")]
     pub grounds: Vec<u8, MAX_PLAN_ROWS>,
     /// The electrodes that are read in every row, a bit each, electrode 0 the lowest.
     pub reads: u32,

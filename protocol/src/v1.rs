@@ -1,6 +1,7 @@
 //! Version 1 of the protocol, as far as hosts still need it: recordings of then, and boards whose firmware is older.
 //!
-//! Its commands had no tag and its answers named none, its frames were whole ones without a scope, and its Hello had no ranges.
+//! Its commands had no tag and its answers named none, its frames were whole ones without a scope, its Hello had no ranges, and its settings were
+//! those of version 2.
 //! Head, framing, checksum, log, and the coding of values were the same.
 
 use heapless::String;
@@ -9,15 +10,18 @@ use serde::{Deserialize, Serialize};
 use crate::decode::{DecodeError, from_postcard, log};
 use crate::encode::{EncodeError, encode_body};
 use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
-use crate::message::{self, BoardMessage, Kind, Range, Settings};
-use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Scope};
+use crate::message::{self, BoardMessage, Kind, Range};
+use crate::v2::Settings;
+use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Scope, coding};
 
 /// The number of this version.
 pub(crate) const VERSION: u8 = 1;
 
 #[derive(Serialize, Deserialize)]
 struct Hello {
+    #[serde(deserialize_with = "coding::text")]
     firmware_version: String<24>,
+    #[serde(deserialize_with = "coding::text")]
     board: String<24>,
     electrodes: u8,
     adc_bits: u8,
@@ -28,8 +32,8 @@ struct Hello {
 
 #[derive(Deserialize)]
 enum Fault {
-    Panic(String<96>),
-    Reset(String<24>),
+    Panic(#[serde(deserialize_with = "coding::text")] String<96>),
+    Reset(#[serde(deserialize_with = "coding::text")] String<24>),
     AdcStuck,
     BadSettings,
     UnknownVersion(u8),
@@ -68,7 +72,7 @@ fn hello(old: Hello) -> Result<message::Hello, DecodeError> {
         adc_bits,
         adc_full_scale_mv,
         drive_mv,
-        settings,
+        settings: settings.into(),
         is_streaming: false,
         ranges: [Range::of_codes(electrodes, adc_bits)].into_iter().collect(),
     };
@@ -101,7 +105,8 @@ fn electrodes(width: u32, bytes: usize) -> Option<usize> {
 
 /// Encodes a Hello of a board of this version, for recordings.
 pub(crate) fn encode_hello(hello: &message::Hello, out: &mut [u8]) -> Result<usize, EncodeError> {
-    let message::Hello { electrodes, adc_bits, adc_full_scale_mv, drive_mv, settings, .. } = *hello;
+    let message::Hello { electrodes, adc_bits, adc_full_scale_mv, drive_mv, .. } = *hello;
+    let settings = Settings::of(&hello.settings, VERSION)?;
     let (firmware_version, board) = (hello.firmware_version.clone(), hello.board.clone());
     let old = Hello { firmware_version, board, electrodes, adc_bits, adc_full_scale_mv, drive_mv, settings };
     encode_body(VERSION, Kind::Hello, &old, out)
@@ -113,7 +118,7 @@ pub(crate) fn encode_command(command: &message::Command, out: &mut [u8]) -> Resu
         message::Command::Hello => Command::Hello,
         message::Command::Start => Command::Start,
         message::Command::Stop => Command::Stop,
-        message::Command::Configure(settings) => Command::Configure(*settings),
+        message::Command::Configure(settings) => Command::Configure(Settings::of(settings, VERSION)?),
         message::Command::Scan(_) => return Err(EncodeError::NotInVersion(VERSION)),
     };
     encode_body(VERSION, Kind::Command, &old, out)

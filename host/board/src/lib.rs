@@ -8,6 +8,7 @@ pub mod board_log;
 pub mod check;
 pub mod frames;
 pub mod identity;
+pub mod inputs;
 pub mod link;
 pub mod measured;
 pub mod record;

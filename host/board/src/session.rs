@@ -16,7 +16,7 @@ pub use greet::{GreetError, Outgoing, explain, greet, send};
 pub use plan::PlanState;
 pub use requested::{Refusal, RequestedSettings};
 
-/// The version of the protocol before this one, which boards with older firmware speak.
+/// The version of the protocol whose answers name no command, which boards with the oldest firmware speak.
 const OLD_VERSION: u8 = 1;
 
 /// Time between two askings for Hello.
@@ -25,8 +25,8 @@ const ASK_EVERY: Duration = Duration::from_millis(250);
 /// A board that was started and sends no frame for this long is asked again.
 const SILENCE: Duration = Duration::from_millis(1500);
 
-/// Time between two sendings of a command that the board has not answered. It obeys between two rows of a scan, of which the longest (16 x 256
-/// conversions of 40 us, 66 ms to settle) takes 0.23 s; but one that is just starting, or a flipped bit on the line, loses them.
+/// Time between two sendings of a command that the board has not answered. It obeys between two rows of a scan, of which the longest (16 x 271
+/// conversions of 40 us, 66 ms to settle, 16 x 10 ms to select) takes 0.4 s; but one that is just starting, or a flipped bit on the line, loses them.
 const REPEAT_EVERY: Duration = Duration::from_millis(500);
 /// How often it is sent before it counts as refused: 2.5 s, in which a board has started anew, too.
 const TRIES: u32 = 5;
@@ -53,7 +53,7 @@ struct Pending {
 
 /// The talk with one board, from the opening of its link on. One command at a time is on its way.
 ///
-/// A board of version 2 names the command that it answers, so an answer to an earlier one is known as such. Any Hello of a board of version 1 may
+/// A board of version 2 or 3 names the command that it answers, so an answer to an earlier one is known as such. Any Hello of a board of version 1 may
 /// be an old one: the one of the board's start, or the answer to an earlier question. There, settings count as taken when a Hello shows them, and as
 /// refused after [`Fault::BadSettings`], or silence about settings that were sent several times.
 #[derive(Debug)]
@@ -176,7 +176,7 @@ impl Session {
     fn due(&mut self, now: Instant) -> Option<Command> {
         let silence = self.is_silent(now).then_some(Command::Hello);
         let Some(hello) = &self.hello else { return silence };
-        let wanted = self.requested.over(hello.settings);
+        let wanted = self.requested.in_version(self.version).over(hello.settings);
         let is_other = wanted != hello.settings || self.settings_in_doubt;
         self.settings_due &= is_other;
         if self.settings_due {
@@ -263,7 +263,7 @@ impl Session {
     /// A Hello of version 1.
     fn untagged_hello(&mut self, hello: &Hello, now: Instant) {
         self.heard = Some(now);
-        let wanted = self.requested.over(hello.settings);
+        let wanted = self.requested.in_version(self.version).over(hello.settings);
         let sent = self.pending.as_ref().map(|pending| &pending.request.command);
         if hello.settings == wanted {
             self.pending = None;
@@ -280,6 +280,11 @@ impl Session {
     /// Begins anew in this version of the protocol.
     fn speak(&mut self, version: u8) {
         tracing::debug!("the board speaks version {version} of the protocol");
+        if self.requested.in_version(version) != self.requested {
+            tracing::warn!(
+                "the board's firmware is too old for a select time or discarded conversions: flash it with `tactomo board flash`"
+            );
+        }
         self.version = version;
         (self.hello, self.pending, self.heard) = (None, None, None);
         (self.settings_in_doubt, self.start_due) = (false, false);
@@ -292,7 +297,7 @@ impl Session {
             Fault::UnknownVersion(version) => {
                 // An answer to what was said before the version changed is no reason to change it again.
                 if version == self.version {
-                    self.speak(if version == VERSION { OLD_VERSION } else { VERSION });
+                    self.speak(if version == OLD_VERSION { VERSION } else { version - 1 });
                 }
                 return true;
             }
@@ -366,7 +371,9 @@ fn slowest_frame(hello: &Hello, plan: Option<&Plan>) -> Duration {
         None => (electrodes, settings.average_log2),
     };
     let conversions = (rows * electrodes) << average_log2.min(Settings::MAX_AVERAGE_LOG2);
-    let scan = CONVERSION * conversions + Duration::from_micros(settings.settle_us.into()) * rows;
+    let discarded = rows * electrodes * u32::from(settings.discarded);
+    let settling = u64::from(settings.settle_us) + u64::from(electrodes) * u64::from(settings.select_us);
+    let scan = CONVERSION * (conversions + discarded) + Duration::from_micros(settling) * rows;
     let period = match settings.max_frames_per_s {
         0 => Duration::ZERO,
         rate => Duration::from_secs(1) / u32::from(rate),

@@ -6,7 +6,6 @@
 
 mod circuit;
 mod converter;
-mod input;
 mod line;
 mod model;
 mod pads;
@@ -24,7 +23,7 @@ use tactomo_firmware::{Activity, Adc, Board32, Identity, Mux, NewBoardError, Par
 use self::circuit::{Circuit, MuxLine, MuxPin, SimulatedChip};
 use self::line::{BoardEnd, Line};
 use self::model::Wiring;
-pub use self::model::{BoardModel, UnknownBoard};
+pub use self::model::{BoardModel, FRAME_INSTRUCTIONS, UnknownBoard};
 use self::sampler::SimulatedSampler;
 use crate::link::{Control, ControlError, Link, Playing};
 use tactomo_physics::causes::with_causes;

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tactomo_board::frames::FrameFile;
+use tactomo_board::inputs::BoardInputs;
 use tactomo_board::link::{Control, ControlError, Link, Playing};
 use tactomo_board::measured::{Volts, as_measured};
 use tactomo_board::record::{Header, Recorder};
@@ -143,8 +144,12 @@ impl Host {
 #[test]
 fn settings_reach_the_board_before_its_first_frame_every_time() {
     for run in 0..100u64 {
-        let requested =
-            RequestedSettings { settle_us: Some(70), average_log2: Some(1), max_frames_per_s: Some(500 + run as u16) };
+        let requested = RequestedSettings {
+            settle_us: Some(70),
+            average_log2: Some(1),
+            max_frames_per_s: Some(500 + run as u16),
+            ..Default::default()
+        };
         let mut host = Host::new(board(Untouched::default()), requested);
         // A command is two writes, of which the first ends whatever was on the line before.
         host.board.lost = match run {
@@ -156,7 +161,8 @@ fn settings_reach_the_board_before_its_first_frame_every_time() {
         };
         std::thread::sleep(Duration::from_micros(run % 6 * 400));
         host.frames_more(2);
-        let expected = Settings { settle_us: 70, average_log2: 1, max_frames_per_s: 500 + run as u16 };
+        let expected =
+            Settings { settle_us: 70, average_log2: 1, max_frames_per_s: 500 + run as u16, ..Settings::default() };
         assert_eq!((host.settings(), host.session.refusal()), (expected, None), "run {run}");
         assert_eq!(host.frames[0].head.sequence, 0);
         assert_eq!(host.frames[0].head.fraction_bits, 1, "the first frame is averaged");
@@ -252,7 +258,7 @@ fn frames_at(board: BoardModel, volts: f64, seed: u64) -> Vec<Frame> {
 #[test]
 fn boards_scan_as_fast_as_their_budgets_say() {
     // Settle, conversions and the firmware's work of sixteen rows (`docs/hardware.md`).
-    let budgets_us = [(BoardModel::Ideal, 832.0), (BoardModel::Esp32, 2365.0), (BoardModel::Esp32c3, 11_227.0)];
+    let budgets_us = [(BoardModel::Ideal, 832.0), (BoardModel::Esp32, 2386.0), (BoardModel::Esp32c3, 15_098.0)];
     for (board, budget_us) in budgets_us {
         let mut host = model(board, 1, Rising(0.5, 0.0));
         host.frames_more(40);
@@ -276,6 +282,61 @@ fn boards_tell_their_names_and_what_their_converters_can_see() {
     let esp32 = vec![(6, 142, 3100), (10, 128, 3100)];
     assert_eq!(told(BoardModel::Esp32), ("esp32 (simulated)".to_owned(), 4096, esp32));
     assert_eq!(told(BoardModel::Esp32c3), ("esp32c3 (simulated)".to_owned(), 4096, vec![(16, 0, 2500)]));
+}
+
+/// What the firmware reads, with noise and the chip's own errors averaged out, against what foams of little conductivity let through; and what the
+/// settings that are advised make of it.
+#[test]
+fn a_foam_of_little_conductivity_lags_until_the_settings_suit_it() {
+    /// Electrodes by turns at 0.5 and 1.5 V.
+    #[derive(Clone, Copy)]
+    struct Turns;
+    impl Physics for Turns {
+        fn readings_v(&mut self, _time_s: f64) -> Readings {
+            Readings::from_fn(16, |g, e| if (g + e) % 2 == 0 { 0.5 } else { 1.5 })
+        }
+    }
+    // Largest lag of the mean reading of an electrode, of a step of 1 V from one to the next (mV).
+    let lag_mv = |board, foam: &str, settings| {
+        let foam = detector().in_material(&foam.parse().unwrap()).unwrap();
+        let options = Options { seed: 3, model: board };
+        let board = SimulatedBoard::start(&foam, Box::new(Turns), options).unwrap();
+        let mut host = Host::new(board, settings);
+        host.exchange_until("its settings", |host| host.session.refusal().is_none() && host.frames.len() > 5);
+        host.frames.clear();
+        host.frames_more(40);
+        let mean = |cell: usize| {
+            let codes = host
+                .frames
+                .iter()
+                .map(|frame| f64::from(frame.readings[cell]) / f64::from(1 << frame.head.fraction_bits));
+            codes.sum::<f64>() / host.frames.len() as f64
+        };
+        // High and low of one electrode differ by a volt where nothing lags; a chip's gain and bow are a per cent of that.
+        (0..15).map(|g| (1000.0 - (mean(16 * g + 5) - mean(16 * (g + 1) + 5)).abs()).abs()).fold(0.0, f64::max)
+    };
+    let need = |board: &str, foam: &str| {
+        let pad_ohm = detector().in_material(&foam.parse().unwrap()).unwrap().largest_pad_ohm();
+        BoardInputs::of(board).unwrap().need(pad_ohm).unwrap()
+    };
+    for (name, board, foam, lags_mv) in [
+        ("esp32", BoardModel::Esp32, "C", 60.0),
+        ("esp32c3", BoardModel::Esp32c3, "C", 300.0),
+        ("esp32c3", BoardModel::Esp32c3, "D", 25.0),
+    ] {
+        let asked = |select_us, settle_us, discarded| RequestedSettings {
+            select_us: Some(select_us),
+            settle_us: Some(settle_us),
+            discarded: Some(discarded),
+            ..RequestedSettings::default()
+        };
+        let as_it_was = if name == "esp32c3" { asked(2, 20, 0) } else { RequestedSettings::default() };
+        let before_mv = lag_mv(board, foam, as_it_was);
+        let need = need(name, foam);
+        let after_mv = lag_mv(board, foam, asked(need.select_us, need.settle_us, need.discarded));
+        assert!(before_mv > lags_mv && after_mv < 30.0, "{name}, {foam}: {before_mv} mV, then {after_mv} mV");
+        assert!(lag_mv(board, "A", RequestedSettings::default()) < 30.0, "{name}");
+    }
 }
 
 /// Board time of a scan, of the frames that went lost between too.
@@ -356,14 +417,14 @@ fn a_seed_repeats_a_board_and_another_is_another_chip() {
 
 #[test]
 fn the_scene_moves_on_while_a_real_board_scans() {
-    // 10 V/s over fifteen rows of 702 us, and the ideal board's noise.
+    // 10 V/s over fifteen rows of 944 us, and the ideal board's noise.
     let risen = |board| {
         let frame = first_frame(model(board, 2, Rising(0.5, 10.0)));
         let row =
             |ground: usize| frame.readings[16 * ground..][..16].iter().map(|code| f64::from(*code)).sum::<f64>() / 16.0;
         row(15) - row(0)
     };
-    assert!((risen(BoardModel::Esp32c3) - 105.0).abs() < 8.0, "{} mV", risen(BoardModel::Esp32c3));
+    assert!((risen(BoardModel::Esp32c3) - 141.5).abs() < 8.0, "{} mV", risen(BoardModel::Esp32c3));
     assert!(risen(BoardModel::Ideal).abs() < 3.0, "{} codes", risen(BoardModel::Ideal));
 }
 

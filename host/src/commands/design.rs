@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use anyhow::Context;
+use tactomo::board::inputs::{self, Settling};
 use tactomo::design::search::{self, Material, Plan, Wishes};
-use tactomo::detector::{Chosen, Stack};
+use tactomo::detector::{Chosen, Detector, Stack};
 use tactomo::hertz::Skin;
 
 use super::output::{self, NewFile, message};
@@ -106,7 +107,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let page = NewFile::optional(args.page.as_ref(), args.overwrite)?;
     let answer = watched(|progress| search::answer(&plan, progress))?;
     page.map(|page| page.write(search::page(&answer, &output::command_line()))).transpose()?;
-    output::print(&if args.json { serde_json::to_string(&answer)? } else { search::table(&answer) })?;
+    let settling = answer.choices.iter().map(|choice| settlings(&choice.detector)).collect();
+    let output = Output { answer: &answer, settling };
+    output::print(&if args.json { serde_json::to_string(&output)? } else { output.text() })?;
     if let (Some(file), Some(path)) = (file, &args.out) {
         let index = usize::from(args.choose) - 1;
         let toml = answer.toml(index).with_context(|| {
@@ -116,6 +119,32 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         message!("choice {} is written: tactomo live --simulate --detector {}", args.choose, path.display());
     }
     Ok(())
+}
+
+/// What is printed: the answer, and how boards as they are after a reset suit the pads of each choice.
+#[derive(serde::Serialize)]
+struct Output<'a> {
+    #[serde(flatten)]
+    answer: &'a search::Answer,
+    settling: Vec<Vec<Settling>>,
+}
+
+/// How each board, with the settings that it has after a reset, suits the pads of a detector.
+fn settlings(detector: &Detector) -> Vec<Settling> {
+    let pad_ohm = detector.largest_pad_ohm();
+    inputs::BOARDS.iter().filter_map(|board| inputs::settling(board.board, &board.after_reset(), pad_ohm)).collect()
+}
+
+impl Output<'_> {
+    /// The answer as a table, and what the boards need that do not suit.
+    fn text(&self) -> String {
+        let mut lines = vec![search::table(self.answer)];
+        for (choice, settlings) in (1..).zip(&self.settling) {
+            let unsuited = settlings.iter().filter(|settling| !settling.suits);
+            lines.extend(unsuited.map(|settling| format!("choice {choice}: {settling}")));
+        }
+        lines.join("\n")
+    }
 }
 
 impl Args {

@@ -53,7 +53,7 @@ pub struct Args {
     #[command(flatten)]
     pub board: BoardArgs,
     /// Plays a recording instead
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "simulate", "settle_us", "average", "max_fps"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "simulate", "settle_us", "average", "max_fps", "select_us", "discard"])]
     pub replay: Option<PathBuf>,
     /// How many times faster the recording is played; `max` for as fast as it can be read
     #[arg(long, value_name = "FACTOR", default_value = "1", requires = "replay", value_parser = source::speed)]

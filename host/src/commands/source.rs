@@ -13,6 +13,7 @@ use tactomo::detector::Detector;
 use tactomo::scene::SceneName;
 use tactomo::simulate::Simulation;
 use tactomo::sink::page::Finger;
+use tactomo_protocol::Settings;
 
 use super::choice::DetectorArgs;
 use super::scene::{self, SceneArgs};
@@ -57,6 +58,12 @@ pub struct SettingsArgs {
     /// Frames per second at most; 0 for as fast as the board can
     #[arg(long, value_name = "FRAMES")]
     max_fps: Option<u16>,
+    /// Wait after bringing an electrode to a board's one ADC input before its conversions (us); `board check` says what the foam needs
+    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u16).range(..=i64::from(Settings::MAX_SELECT_US)))]
+    select_us: Option<u16>,
+    /// Conversions of each electrode that are thrown away before those that count
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u8).range(..=i64::from(Settings::MAX_DISCARDED)))]
+    discard: Option<u8>,
 }
 
 impl BoardArgs {
@@ -78,7 +85,13 @@ impl BoardArgs {
 impl SettingsArgs {
     /// What is asked of the board.
     pub fn requested(&self) -> RequestedSettings {
-        RequestedSettings { settle_us: self.settle_us, average_log2: self.average, max_frames_per_s: self.max_fps }
+        RequestedSettings {
+            settle_us: self.settle_us,
+            average_log2: self.average,
+            max_frames_per_s: self.max_fps,
+            select_us: self.select_us,
+            discarded: self.discard,
+        }
     }
 }
 

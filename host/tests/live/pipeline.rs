@@ -72,7 +72,7 @@ fn a_detector_that_was_calibrated_on_another_board_is_shown_as_such() {
 #[test]
 fn settings_that_are_asked_for_reach_the_board() {
     let settings = Settings { settle_us: 70, average_log2: 3, ..Settings::default() };
-    let wanted = RequestedSettings { settle_us: Some(70), average_log2: Some(3), max_frames_per_s: None };
+    let wanted = RequestedSettings { settle_us: Some(70), average_log2: Some(3), ..RequestedSettings::default() };
     let (ends, other) = ends();
     tactomo::run::run(&mut opened(FakeBoard::new(5)), Plan { settings: wanted, ..plan() }, ends).unwrap();
     assert_eq!(other.snapshots.borrow().hello.as_ref().unwrap().settings, settings);

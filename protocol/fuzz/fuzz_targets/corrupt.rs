@@ -37,9 +37,12 @@ static PACKETS_SENT: LazyLock<Vec<(Sent, Vec<u8>)>> = LazyLock::new(|| {
     sent
 });
 
-const SETTINGS: Settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 0 };
+const SETTINGS: Settings =
+    Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 0, select_us: 35, discarded: 1 };
+/// What versions 1 and 2 know of them.
+const OLD_SETTINGS: Settings = Settings { select_us: 0, discarded: 0, ..SETTINGS };
 
-/// Messages of this version, and a Hello of version 1.
+/// Messages of this version, and a Hello of each earlier one.
 fn board_messages() -> Vec<BoardMessage> {
     let frame = |sequence, scope: Option<Scope>, readings: &[u16]| {
         let head = FrameHead { sequence, time_us: 7 * u32::from(sequence), ..FrameHead::default() };
@@ -60,7 +63,8 @@ fn board_messages() -> Vec<BoardMessage> {
         ranges: [Range::of_codes(16, 12)].into_iter().collect(),
     };
     vec![
-        BoardMessage::Hello(Hello { version: 1, answers: 0, ..hello.clone() }),
+        BoardMessage::Hello(Hello { version: 1, answers: 0, settings: OLD_SETTINGS, ..hello.clone() }),
+        BoardMessage::Hello(Hello { version: 2, settings: OLD_SETTINGS, ..hello.clone() }),
         BoardMessage::Hello(hello),
         frame(1, Scope::whole(4), &std::array::from_fn::<u16, 16, _>(|i| i as u16)),
         frame(0, Scope::whole(8), &[0; 64]),

@@ -1,4 +1,4 @@
-//! Any bytes in any chunks, in both versions of the protocol: no panic, and whatever is accepted goes out and comes back as it was.
+//! Any bytes in any chunks, in all versions of the protocol: no panic, and whatever is accepted goes out and comes back as it was.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

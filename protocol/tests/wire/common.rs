@@ -18,8 +18,16 @@ fn text<const N: usize>() -> impl Strategy<Value = heapless::String<N>> {
 }
 
 pub fn settings() -> impl Strategy<Value = Settings> {
-    (any::<u16>(), 0..=Settings::MAX_AVERAGE_LOG2, any::<u16>())
-        .prop_map(|(settle_us, average_log2, max_frames_per_s)| Settings { settle_us, average_log2, max_frames_per_s })
+    let selecting = (0..=Settings::MAX_SELECT_US, 0..=Settings::MAX_DISCARDED);
+    (any::<u16>(), 0..=Settings::MAX_AVERAGE_LOG2, any::<u16>(), selecting).prop_map(
+        |(settle_us, average_log2, max_frames_per_s, (select_us, discarded))| Settings {
+            settle_us,
+            average_log2,
+            max_frames_per_s,
+            select_us,
+            discarded,
+        },
+    )
 }
 
 /// One to four ranges that sum up to all electrodes.

@@ -1,9 +1,9 @@
 //! The edges of the protocol: other versions, bodies that break a rule, and messages that are too long.
 
 use tactomo_protocol::{
-    BoardMessage, Command, Counters, DecodeError, EncodeError, FrameHead, Hello, MAX_COMMAND, MAX_WIRE, Plan, Range,
-    Request, Scope, Settings, Status, VERSION, encode_board, encode_frame, encode_log, encode_request, encode_rows,
-    wire_bytes,
+    BoardMessage, Command, Counters, DecodeError, EncodeError, Fault, FrameHead, Hello, MAX_COMMAND, MAX_WIRE, Plan,
+    Range, Request, Scope, Settings, Status, VERSION, encode_board, encode_frame, encode_log, encode_request,
+    encode_rows, wire_bytes,
 };
 
 use crate::common::{board_wire, hello, packet, receive_board, receive_command, request_wire};
@@ -28,8 +28,8 @@ fn another_version_is_named_whatever_the_kind_and_the_body() {
         for kind in 0..16 {
             for body in [&[][..], &[1; 8], &[0xFF; 16]] {
                 let head = version << 4 | kind;
-                // A host understands version 1, a board does not.
-                if version != 1 {
+                // A host understands versions 1 and 2, a board does not.
+                if ![1, 2].contains(&version) {
                     assert_eq!(board_result(head, body), Err(DecodeError::Version(version)));
                 }
                 assert_eq!(command_result(head, body), Err(DecodeError::Version(version)));
@@ -37,14 +37,14 @@ fn another_version_is_named_whatever_the_kind_and_the_body() {
         }
     }
     assert_eq!(
-        DecodeError::Version(3).to_string(),
-        "the peer speaks version 3 of the protocol, this side version 2: update the older of the two"
+        DecodeError::Version(4).to_string(),
+        "the peer speaks version 4 of the protocol, this side version 3: update the older of the two"
     );
 }
 
 #[test]
 fn an_unknown_kind_and_the_wrong_direction_are_refused() {
-    for version in [1, VERSION] {
+    for version in [1, 2, VERSION] {
         for kind in 4..16 {
             assert_eq!(board_result(version << 4 | kind, &[]), Err(DecodeError::Body));
         }
@@ -57,7 +57,7 @@ fn an_unknown_kind_and_the_wrong_direction_are_refused() {
 #[test]
 fn a_body_that_is_cut_or_too_long_is_refused() {
     assert_eq!(command_result(COMMAND, &[9, 1]), Ok(Request { tag: 9, command: Command::Start }));
-    for body in [&[][..], &[9], &[9, 5], &[9, 1, 0], &[9, 3, 20, 0], &[0xFF; 12]] {
+    for body in [&[][..], &[9], &[9, 5], &[9, 1, 0], &[9, 3, 20, 0, 0, 0], &[0xFF; 12]] {
         assert_eq!(command_result(COMMAND, body), Err(DecodeError::Body), "{body:?}");
     }
     // A plan of 97 rows.
@@ -74,7 +74,7 @@ fn a_body_that_is_cut_or_too_long_is_refused() {
 #[test]
 fn a_command_without_a_tag_is_neither_sent_nor_taken() {
     let request = Request { tag: 0, command: Command::Start };
-    for version in [1, VERSION] {
+    for version in [1, 2, VERSION] {
         assert_eq!(encode_request(&request, version, &mut [0; MAX_COMMAND]), Err(EncodeError::Tag));
     }
     assert_eq!(command_result(COMMAND, &[0, 1]), Err(DecodeError::Body));
@@ -83,8 +83,8 @@ fn a_command_without_a_tag_is_neither_sent_nor_taken() {
 /// Longer forms of a number stand for the same, up to the bytes that the longest number of its type takes: as postcard has it.
 #[test]
 fn a_varint_may_be_longer_than_it_needs_to_be() {
-    let with = |settle: &[u8]| command_result(COMMAND, &[&[1, 3][..], settle, &[2, 100]].concat());
-    let settings = Settings { settle_us: 20, average_log2: 2, max_frames_per_s: 100 };
+    let with = |settle: &[u8]| command_result(COMMAND, &[&[1, 3][..], settle, &[2, 100, 17, 1]].concat());
+    let settings = Settings { settle_us: 20, average_log2: 2, max_frames_per_s: 100, select_us: 17, discarded: 1 };
     let expected = Ok(Request { tag: 1, command: Command::Configure(settings) });
     for settle in [&[20][..], &[0x94, 0], &[0x94, 0x80, 0]] {
         assert_eq!(with(settle), expected, "{settle:?}");
@@ -102,10 +102,68 @@ fn a_varint_may_be_longer_than_it_needs_to_be() {
     assert_eq!(command_result(COMMAND, &long), Ok(Request { tag: 1, command: Command::Scan(plan) }));
 }
 
+/// A host reads lengths on 64 bits and a board on 32: both take five bytes of them.
+#[test]
+fn a_length_of_six_bytes_is_refused_by_hosts_and_boards() {
+    let scan = |length: &[u8]| command_result(COMMAND, &[&[1, 4][..], length, &[3, 1, 1, 0]].concat());
+    let plan = Plan { grounds: [3].into_iter().collect(), reads: 1, rows_a_frame: 1, average_log2: 0 };
+    assert_eq!(scan(&[0x81, 0x80, 0x80, 0x80, 0]), Ok(Request { tag: 1, command: Command::Scan(plan) }));
+    let reset = |length: &[u8]| board_result(FAULT, &[&[1][..], length, b"ok"].concat());
+    let told = Fault::Reset("ok".try_into().unwrap());
+    assert_eq!(reset(&[0x82, 0x80, 0x80, 0x80, 0]), Ok(BoardMessage::Fault(told)));
+    let mut hello_body = postcard::to_allocvec(&hello()).unwrap();
+    let ranges = hello_body.iter().rposition(|byte| *byte == 0x8E).unwrap() - 2;
+    assert_eq!(hello_body[ranges], 2, "the length of the list of ranges");
+    let mut hello_with = |length: &[u8]| {
+        hello_body.splice(ranges..=ranges, length.iter().copied());
+        let result = board_result(HELLO, &hello_body);
+        hello_body.splice(ranges..ranges + length.len(), [2]);
+        result
+    };
+    assert_eq!(hello_with(&[0x82, 0x80, 0x80, 0x80, 0]), Ok(BoardMessage::Hello(hello())));
+    // Six bytes up to ten, which a number of 64 bits may have, and five that are more than 32 bits.
+    for fill in 4..9 {
+        let long = |least: u8| [&[least | 0x80][..], &vec![0x80; fill], &[0]].concat();
+        assert_eq!(scan(&long(1)), Err(DecodeError::Body), "{} bytes", fill + 2);
+        assert_eq!(reset(&long(2)), Err(DecodeError::Body), "{} bytes", fill + 2);
+        assert_eq!(hello_with(&long(2)), Err(DecodeError::Body), "{} bytes", fill + 2);
+    }
+    assert_eq!(scan(&[0x81, 0x80, 0x80, 0x80, 0x10]), Err(DecodeError::Body));
+}
+
+/// One byte more than the longest packet takes is junk, though the packet in it would be right.
+#[test]
+fn a_packet_that_takes_a_byte_more_than_the_limit_is_junk() {
+    let grounds = [7; 96];
+    let scan = |length: &[u8]| [&[255, 4][..], length, &grounds, &[0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 32, 8]].concat();
+    let plan = Plan { grounds: grounds.into_iter().collect(), reads: u32::MAX, rows_a_frame: 32, average_log2: 8 };
+    let longest = packet(COMMAND, &scan(&[96]));
+    assert_eq!(longest.len(), MAX_COMMAND);
+    assert_eq!(receive_command(&longest).0, [Ok(Request { tag: 255, command: Command::Scan(plan) })]);
+    let longer = packet(COMMAND, &scan(&[0xE0, 0]));
+    assert_eq!(longer.len(), MAX_COMMAND + 1);
+    let expected = Counters { messages: 0, corrupt: 1, dropped_bytes: MAX_COMMAND as u64 };
+    assert_eq!(receive_command(&longer), (vec![Err(DecodeError::Corrupt)], expected));
+    // In any chunks.
+    for cut in 1..longer.len() {
+        let mut receiver = tactomo_protocol::CommandReceiver::default();
+        let (mut first, mut rest) = longer.split_at(cut);
+        assert_eq!(receiver.receive(&mut first), None);
+        assert_eq!(receiver.receive(&mut rest), Some(Err(DecodeError::Corrupt)), "cut at {cut}");
+    }
+    // A board of the same: the longest frame, and a whole packet of a version to come that is longer.
+    let to_come = |bytes: usize| packet(0xF0, &vec![7; bytes]);
+    let room = MAX_WIRE - to_come(0).len() - 8;
+    assert_eq!(to_come(room).len(), MAX_WIRE);
+    assert_eq!(receive_board(&[&to_come(room)]).0, [Err(DecodeError::Version(15))]);
+    assert_eq!(to_come(room + 1).len(), MAX_WIRE + 1);
+    assert_eq!(receive_board(&[&to_come(room + 1)]).0, [Err(DecodeError::Corrupt)]);
+}
+
 #[test]
 fn a_hello_out_of_range_is_neither_sent_nor_taken() {
     let valid = hello();
-    let break_it: [fn(&mut Hello); 15] = [
+    let break_it: [fn(&mut Hello); 17] = [
         |hello| hello.electrodes = 3,
         |hello| hello.electrodes = 33,
         |hello| hello.adc_bits = 0,
@@ -113,6 +171,8 @@ fn a_hello_out_of_range_is_neither_sent_nor_taken() {
         |hello| hello.adc_full_scale_mv = 0,
         |hello| hello.drive_mv = 0,
         |hello| hello.settings.average_log2 = 9,
+        |hello| hello.settings.discarded = 16,
+        |hello| hello.settings.select_us = 10_001,
         |hello| hello.electrodes = 17,
         |hello| hello.ranges.clear(),
         |hello| hello.ranges[0].electrodes = 7,
@@ -221,7 +281,7 @@ fn what_breaks_a_limit_is_not_sent() {
     assert_eq!(encode_frame(head, &[0; 16], &mut out), Err(EncodeError::FractionBits(16)));
     assert_eq!(encode_log(&[0; 65], &mut out), Err(EncodeError::LogLength(65)));
     let request = Request { tag: 1, command: Command::Start };
-    assert_eq!(encode_request(&request, 3, &mut out), Err(EncodeError::NotInVersion(3)));
+    assert_eq!(encode_request(&request, 4, &mut out), Err(EncodeError::NotInVersion(4)));
 }
 
 #[test]

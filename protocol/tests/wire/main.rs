@@ -6,3 +6,4 @@ mod limits;
 mod properties;
 mod specification;
 mod version1;
+mod version2;

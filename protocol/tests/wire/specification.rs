@@ -61,7 +61,7 @@ fn board_messages() -> Vec<BoardMessage> {
 }
 
 fn requests() -> Vec<Request> {
-    let settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 100 };
+    let settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 100, select_us: 35, discarded: 1 };
     let grounds = [0, 5, 10, 15].into_iter().collect();
     let plan = Plan { grounds, reads: 0xFFFF, rows_a_frame: 2, average_log2: 1 };
     let commands = [
@@ -82,16 +82,28 @@ fn told<M: Debug>(result: &Result<M, DecodeError>) -> String {
     }
 }
 
-/// The examples as the crate sends them, and two packets that it refuses.
+/// The examples as the crate sends them, and packets that it refuses: for a host one of a newer version, one that lost a byte, and one with a length
+/// of six bytes; for a board one with such a length, and one that takes a byte more than the longest.
 fn expected() -> Vec<Example> {
     let boards = board_messages().into_iter().map(|message| (board_wire(&message), Ok(message)));
+    let [reset, scan, longest] = too_long();
     let refused = [
-        (packet(0x30, &[0xC0, 0xDE]), Err(DecodeError::Version(3))),
+        (packet(0x40, &[0xC0, 0xDE]), Err(DecodeError::Version(4))),
         (board_wire(&BoardMessage::Fault(Fault::AdcStuck))[1..].to_vec(), Err(DecodeError::Corrupt)),
+        (reset, Err(DecodeError::Body)),
     ];
-    let hosts = requests().into_iter().map(|request| (request_wire(&request), request));
+    let hosts = requests().into_iter().map(|request| (request_wire(&request), Ok(request)));
+    let hosts = hosts.chain([(scan, Err(DecodeError::Body)), (longest, Err(DecodeError::Corrupt))]);
     let boards = boards.chain(refused).map(|(wire, result)| (format!("board: {}", told(&result)), wire));
-    boards.chain(hosts.map(|(wire, request)| (format!("host: {request:?}"), wire))).collect()
+    boards.chain(hosts.map(|(wire, result)| (format!("host: {}", told(&result)), wire))).collect()
+}
+
+/// A fault and a plan whose lengths have six bytes, and the longest plan with a length of two.
+fn too_long() -> [Vec<u8>; 3] {
+    let reset = [&[1, 0x82, 0x80, 0x80, 0x80, 0x80, 0][..], b"ok"].concat();
+    let scan = [13, 4, 0x81, 0x80, 0x80, 0x80, 0x80, 0, 3, 1, 1, 0];
+    let longest = [&[14, 4, 0xE0, 0][..], &[7; 96], &[0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 32, 8]].concat();
+    [packet(0x33, &reset), packet(0x38, &scan), packet(0x38, &longest)]
 }
 
 fn page_text(examples: &[Example]) -> String {

@@ -79,13 +79,13 @@ fn a_hello_of_version_1_out_of_range_is_refused_and_a_good_one_is_kept_as_it_cam
         body[at] = value;
         assert_eq!(received(&packet(0x10, &body)), Err(DecodeError::Body), "{value} at {at}");
     }
-    let newer = Hello { version: 3, ..hello() };
-    assert_eq!(encode_hello(&newer, &mut wire), Err(EncodeError::NotInVersion(3)));
+    let newer = Hello { version: 4, ..hello() };
+    assert_eq!(encode_hello(&newer, &mut wire), Err(EncodeError::NotInVersion(4)));
 }
 
 #[test]
 fn commands_can_be_said_in_version_1_and_plans_cannot() {
-    let settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 100 };
+    let settings = Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 100, ..Settings::default() };
     let examples: [(Command, &[u8]); 4] = [
         (Command::Hello, &[0x02, 0x18, 0x05, 0xA6, 0x8A, 0xC2, 0xC3, 0x00]),
         (Command::Start, &[0x07, 0x18, 0x01, 0x30, 0xBA, 0xC5, 0xB4, 0x00]),

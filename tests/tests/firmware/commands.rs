@@ -1,8 +1,10 @@
 //! The command loop: commands good and bad, the frame-rate cap, what is told after a reset.
 
 use tactomo_firmware::mux::Transparent;
-use tactomo_firmware::{Activity, Board16, Identity, NewBoardError, Parts};
-use tactomo_protocol::{Command, Fault, Hello, MAX_COMMAND, Plan, Request, Settings, VERSION, encode_request};
+use tactomo_firmware::{Activity, Adc, Board16, Identity, NewBoardError, Parts};
+use tactomo_protocol::{
+    Command, ConverterErrors, Fault, Hello, MAX_COMMAND, Plan, Range, Request, Settings, VERSION, encode_request,
+};
 
 use super::parts::*;
 
@@ -31,7 +33,7 @@ fn settings_take_effect_at_once_and_are_confirmed() {
     let mut board = simple_board(&outside, numbered);
     outside.send(Command::Start);
     board.step().unwrap();
-    let settings = Settings { settle_us: 500, average_log2: 1, max_frames_per_s: 0 };
+    let settings = Settings { settle_us: 500, average_log2: 1, ..Settings::default() };
     outside.send(Command::Configure(settings));
     let (begin_us, before) = (outside.clock_us.get(), outside.conversions.get());
     scan(&mut board, 1);
@@ -52,12 +54,82 @@ fn settings_out_of_range_are_refused_and_the_old_ones_stay() {
     let mut board = simple_board(&outside, numbered);
     board.step().unwrap();
     outside.messages();
-    outside.send(Command::Configure(Settings { average_log2: 9, ..Settings::default() }));
-    outside.send(Command::Hello);
+    let refused = [
+        Settings { average_log2: 9, ..Settings::default() },
+        Settings { select_us: 10_001, ..Settings::default() },
+        Settings { discarded: 16, ..Settings::default() },
+    ];
+    for settings in refused {
+        outside.send(Command::Configure(settings));
+        outside.send(Command::Hello);
+        board.step().unwrap();
+        let messages = outside.messages();
+        assert_eq!(faults(&messages), [&Fault::BadSettings { answers: 1 }]);
+        assert_eq!(hellos(&messages)[0].settings, Settings::default());
+    }
+}
+
+#[test]
+fn numbers_go_on_where_the_stream_was_stopped() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    scan(&mut board, 2);
+    outside.send(Command::Stop);
+    board.step().unwrap();
+    outside.send(Command::Start);
+    scan(&mut board, 1);
     board.step().unwrap();
     let messages = outside.messages();
-    assert_eq!(faults(&messages), [&Fault::BadSettings { answers: 1 }]);
-    assert_eq!(hellos(&messages)[0].settings, Settings::default());
+    assert_eq!(frames(&messages).iter().map(|frame| frame.head.sequence).collect::<Vec<_>>(), [0, 1, 2]);
+}
+
+#[test]
+fn a_new_plan_is_begun_at_once_whatever_the_frame_rate() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Configure(Settings { max_frames_per_s: 1, ..Settings::default() }));
+    outside.send(Command::Start);
+    scan(&mut board, 1);
+    assert!(matches!(board.step(), Ok(Activity::Waiting { .. })));
+    let plan = Plan { grounds: [3, 4].into_iter().collect(), reads: 0xFFFF, rows_a_frame: 2, average_log2: 0 };
+    outside.send(Command::Scan(plan));
+    assert_eq!(board.step(), Ok(Activity::Row));
+    assert_eq!(board.step(), Ok(Activity::Frame));
+    assert!(matches!(board.step(), Ok(Activity::Waiting { .. })), "the next one is due in a second");
+}
+
+/// The longest Hello that there can be: names of 24 bytes, four ranges, and numbers that take three bytes each.
+#[test]
+fn a_hello_with_four_ranges_and_the_longest_values_is_sent_whole() {
+    let errors = ConverterErrors { noise_uv: u16::MAX, gain_ppm: u16::MAX, bow_uv: u16::MAX };
+    let range = |electrodes| Range { electrodes, floor: u16::MAX - 1, ceiling: u16::MAX, errors };
+    let adc = Adc::new(16, u16::MAX).with_ranges(&[range(1), range(2), range(3), range(4)]);
+    let name = "123456789012345678901234";
+    let identity = Identity { firmware_version: name, board: name, electrodes: 16, adc, drive_mv: u16::MAX };
+    let outside = Outside::default();
+    let parts = Parts { mux: NoMux, sampler: NullPart, serial: serial(&outside), chip: NullPart };
+    let mut board = Board16::new(parts, identity).unwrap();
+    let settings = Settings {
+        settle_us: u16::MAX,
+        average_log2: 8,
+        max_frames_per_s: u16::MAX,
+        select_us: Settings::MAX_SELECT_US,
+        discarded: Settings::MAX_DISCARDED,
+    };
+    outside.send_tagged(255, Command::Configure(settings));
+    board.step().unwrap();
+    let messages = outside.messages();
+    let [start, answer] = hellos(&messages)[..] else { panic!("{messages:?}") };
+    assert_eq!((start.board.as_str(), start.firmware_version.as_str()), (name, name));
+    assert_eq!((answer.answers, answer.settings), (255, settings));
+    let electrodes: Vec<_> = answer.ranges.iter().map(|range| (range.electrodes, range.ceiling)).collect();
+    let ends = u16::MAX;
+    assert_eq!(
+        electrodes,
+        [(1, ends), (2, ends), (3, ends), (10, ends)],
+        "the last one reaches over those that are left"
+    );
 }
 
 #[test]
@@ -91,9 +163,9 @@ fn every_command_is_answered_by_its_tag_and_the_repetition_changes_nothing() {
 fn a_newer_host_is_told_by_number_and_not_obeyed() {
     let outside = Outside::default();
     let mut board = simple_board(&outside, numbered);
-    outside.send_bytes(&in_version(3, Command::Start));
+    outside.send_bytes(&in_version(4, Command::Start));
     assert_eq!(board.step(), Ok(Activity::Idle));
-    assert_eq!(faults(&outside.messages()), [&Fault::UnknownVersion(3)]);
+    assert_eq!(faults(&outside.messages()), [&Fault::UnknownVersion(4)]);
 }
 
 /// A command as another version of the protocol would send it: head, checksum and framing are the same in every version.

@@ -131,7 +131,7 @@ pub struct NoMux;
 
 impl Mux for NoMux {
     type Error = std::convert::Infallible;
-    const SELECT_SETTLE_NS: u32 = 0;
+    const SELECT_US: u16 = 0;
 
     fn ground(&mut self, _electrode: u8) -> Result<(), Self::Error> {
         Ok(())

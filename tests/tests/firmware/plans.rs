@@ -54,7 +54,7 @@ struct NotingMux(std::rc::Rc<std::cell::RefCell<Vec<u8>>>);
 
 impl tactomo_firmware::Mux for NotingMux {
     type Error = std::convert::Infallible;
-    const SELECT_SETTLE_NS: u32 = 0;
+    const SELECT_US: u16 = 0;
 
     fn ground(&mut self, electrode: u8) -> Result<(), Self::Error> {
         self.0.borrow_mut().push(electrode);
@@ -126,6 +126,27 @@ fn the_largest_frames_of_rows_fit() {
         assert_eq!(frames(&messages)[0].readings, [0xFFF0; 256]);
         assert_eq!(frames(&messages)[0].scope.rows(), grounds.len());
     }
+}
+
+#[test]
+fn the_last_range_is_stretched_over_the_electrodes_that_are_left() {
+    let outside = Outside::default();
+    let ranges = [(6, 142, 3000), (4, 128, 2000)].map(|(electrodes, floor, ceiling)| Range {
+        floor,
+        ceiling,
+        ..Range::of_codes(electrodes, 12)
+    });
+    let identity = Identity { adc: Adc::new(12, 4096).with_ranges(&ranges), ..IDENTITY };
+    let sample = |_, electrode: u8| Ok(if electrode == 15 { 2500 } else { 0 });
+    let parts = Parts { mux: NoMux, sampler: sampler(&outside, sample), serial: serial(&outside), chip: NullPart };
+    let mut board = Board16::new(parts, identity).unwrap();
+    outside.send(Command::Start);
+    while board.step().unwrap() != Activity::Frame {}
+    board.step().unwrap();
+    let messages = outside.messages();
+    let told: Vec<_> = hellos(&messages)[0].ranges.iter().map(|range| (range.electrodes, range.floor)).collect();
+    assert_eq!(told, [(6, 142), (10, 128)]);
+    assert_eq!(frames(&messages)[0].head.status, Status::SATURATED, "the last electrode has the last one's ceiling");
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use tactomo_firmware::{Activity, Board16, Parts, Row, Sampler, TimedOut};
-use tactomo_protocol::{Command, Fault, Settings, Status};
+use tactomo_firmware::{Activity, Board16, ConverterPair, Parts, Row, Sampler, SideBySide, TimedOut};
+use tactomo_protocol::{Command, Fault, Plan, Settings, Status};
 
 use super::parts::*;
 
@@ -21,41 +21,95 @@ fn scan_with<S: Sampler>(board: &mut Board16<NoMux, S, TestSerial, NullPart>, fr
 }
 
 /// Two converters that work side by side, as the ESP32's do: electrodes 0 to 5 are at one, 6 to 15 at the other.
-struct Pairs {
+struct Pair {
     slots: Rc<RefCell<u32>>,
+    /// Which of them hang, and restarts.
+    hang: [bool; 2],
+    restarts: Rc<RefCell<u32>>,
 }
 
-impl Sampler for Pairs {
-    fn sample(&mut self, electrode: u8) -> Result<u16, TimedOut> {
-        Ok(u16::from(electrode) * 10)
+impl ConverterPair for Pair {
+    fn convert(&mut self, electrodes: [Option<u8>; 2]) -> [Result<u16, TimedOut>; 2] {
+        assert_ne!(electrodes, [None, None], "nothing is asked for");
+        *self.slots.borrow_mut() += 1;
+        let of = |unit: usize| match electrodes[unit] {
+            Some(electrode) if !self.hang[unit] => Ok(u16::from(electrode) * 10),
+            Some(_) => Err(TimedOut),
+            // What nobody asked for means nothing.
+            None => Err(TimedOut),
+        };
+        [of(0), of(1)]
     }
 
-    fn sample_row<R: Row>(&mut self, row: &mut R) -> Result<(), R::Error> {
-        let electrodes = row.electrodes();
-        let at = |first: u8, end: u8| (first..end).filter(move |electrode| electrodes >> electrode & 1 == 1);
-        let (mut first, mut second) = (at(0, 6), at(6, 16));
-        loop {
-            let pair = [first.next(), second.next()];
-            if pair == [None, None] {
-                return Ok(());
-            }
-            for _ in 0..row.conversions() {
-                row.attend();
-                *self.slots.borrow_mut() += 1;
-                for electrode in pair.into_iter().flatten() {
-                    let sampled = self.sample(electrode);
-                    row.take(electrode, sampled);
-                }
-            }
-        }
+    fn restart(&mut self) {
+        *self.restarts.borrow_mut() += 1;
     }
+}
+
+/// What two converters did: slots, restarts.
+type Done = (Rc<RefCell<u32>>, Rc<RefCell<u32>>);
+
+fn pair(hang: [bool; 2]) -> (SideBySide<Pair>, Done) {
+    let done = Done::default();
+    let pair = Pair { slots: Rc::clone(&done.0), hang, restarts: Rc::clone(&done.1) };
+    (SideBySide::new(pair, 6), done)
+}
+
+/// Both hang at the largest average: an electrode of each costs one conversion, and not 256.
+#[test]
+fn two_converters_that_hang_cost_one_slot_and_one_restart_a_pair() {
+    let outside = Outside::default();
+    let (sampler, (slots, restarts)) = pair([true; 2]);
+    let mut board = board_with(&outside, sampler);
+    outside.send(Command::Configure(Settings { average_log2: 8, discarded: 3, ..Settings::default() }));
+    outside.send(Command::Start);
+    assert_eq!(board.step(), Ok(Activity::Row));
+    assert_eq!((*slots.borrow(), *restarts.borrow()), (10, 10));
+    scan_with(&mut board, 1);
+    board.step().unwrap();
+    assert_eq!(faults(&outside.messages()), [&Fault::AdcStuck]);
+}
+
+#[test]
+fn one_converter_that_hangs_leaves_the_other_its_average() {
+    let outside = Outside::default();
+    let (sampler, (slots, restarts)) = pair([true, false]);
+    let mut board = board_with(&outside, sampler);
+    outside.send(Command::Configure(Settings { average_log2: 2, ..Settings::default() }));
+    outside.send(Command::Start);
+    scan_with(&mut board, 1);
+    assert_eq!((*slots.borrow(), *restarts.borrow()), (16 * 40, 16 * 6));
+    board.step().unwrap();
+    let messages = outside.messages();
+    let frame = frames(&messages)[0];
+    assert_eq!(frame.head.status, Status::TIMED_OUT);
+    let row: Vec<u16> = (0..16).map(|electrode| if electrode < 6 { 0 } else { 40 * electrode }).collect();
+    assert!(frame.readings.chunks(16).all(|found| found == row), "{:?}", frame.readings);
+}
+
+#[test]
+fn of_two_converters_rows_and_single_electrodes_can_be_asked() {
+    let outside = Outside::default();
+    let (mut sampler, (slots, _)) = pair([false; 2]);
+    assert_eq!([0, 5, 6, 15].map(|electrode| sampler.sample(electrode)), [Ok(0), Ok(50), Ok(60), Ok(150)]);
+    slots.replace(0);
+    let mut board = board_with(&outside, sampler);
+    let plan =
+        Plan { grounds: [2].into_iter().collect(), reads: 0b1000_0001_0010_0001, rows_a_frame: 1, average_log2: 0 };
+    outside.send(Command::Scan(plan));
+    outside.send(Command::Configure(Settings { discarded: 1, ..Settings::default() }));
+    outside.send(Command::Start);
+    scan_with(&mut board, 1);
+    assert_eq!(*slots.borrow(), 2 * 2, "two pairs, each once for nothing");
+    board.step().unwrap();
+    assert_eq!(frames(&outside.messages())[0].readings, [0, 50, 80, 150]);
 }
 
 #[test]
 fn two_converters_side_by_side_take_ten_slots_a_row() {
     let outside = Outside::default();
-    let slots = Rc::new(RefCell::new(0));
-    let mut board = board_with(&outside, Pairs { slots: Rc::clone(&slots) });
+    let (sampler, (slots, _)) = pair([false; 2]);
+    let mut board = board_with(&outside, sampler);
     outside.send(Command::Start);
     scan_with(&mut board, 1);
     assert_eq!(*slots.borrow(), 16 * 10);

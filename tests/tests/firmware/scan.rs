@@ -53,7 +53,7 @@ fn a_latched_scan_strobes_half_a_for_a_ground_and_half_b_for_an_electrode() {
     };
     let lines = [strobes(16 + 256), strobes(16), strobes(256)];
     let [wr, csa, csb] = lines.clone();
-    let row = || std::iter::once(Delay::delay_us(20)).chain((0..16).map(|_| Delay::delay_ns(2000)));
+    let row = || std::iter::once(Delay::delay_us(20)).chain((0..16).map(|_| Delay::delay_us(17)));
     let mut delay = CheckedDelay::new(&(0..16).flat_map(|_| row()).collect::<Vec<_>>());
 
     let outside = Outside::default();
@@ -139,9 +139,9 @@ fn an_electrode_settles_after_it_was_selected_and_before_it_is_converted() {
     record.take();
     outside.send(Command::Start);
     board.step().unwrap();
-    let events = ["csa1", "csb1", "20000 ns", "2000 ns", "convert"];
+    let events = ["csa1", "csb1", "20000 ns", "17000 ns", "convert"];
     let order: Vec<_> = record.take().into_iter().filter(|event| events.contains(&event.as_str())).collect();
-    assert_eq!(order[..8], ["csa1", "20000 ns", "csb1", "2000 ns", "convert", "csb1", "2000 ns", "convert"]);
+    assert_eq!(order[..8], ["csa1", "20000 ns", "csb1", "17000 ns", "convert", "csb1", "17000 ns", "convert"]);
 }
 
 #[test]

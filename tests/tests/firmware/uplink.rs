@@ -1,6 +1,6 @@
 //! The uplink on fast, slow and dead lines.
 
-use tactomo_protocol::{BoardMessage, Command, Fault, Settings};
+use tactomo_protocol::{BoardMessage, Command, Fault, Plan, Settings};
 
 use super::parts::*;
 
@@ -135,6 +135,64 @@ fn log_bytes_arrive_in_order() {
         .flatten()
         .collect();
     assert_eq!(arrived, log);
+}
+
+/// A line that frames fill: one waits whenever another is sent. The log has its turn all the same.
+#[test]
+fn a_line_that_is_full_of_frames_carries_the_log_between_them() {
+    let outside = Outside::default();
+    outside.set_room(1);
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Start);
+    scan(&mut board, 10);
+    let log: Vec<u8> = (0..=255).chain(0..=63).collect();
+    outside.log.borrow_mut().extend(&log);
+    scan(&mut board, 30);
+    assert!(outside.log.borrow().is_empty(), "{} bytes still wait", outside.log.borrow().len());
+    outside.set_room(usize::MAX);
+    step(&mut board, 20);
+    let messages = outside.messages();
+    let arrived: Vec<u8> = messages
+        .iter()
+        .filter_map(|message| if let BoardMessage::Log(log) = message { Some(log.0.to_vec()) } else { None })
+        .flatten()
+        .collect();
+    assert_eq!(arrived, log);
+    let kinds: String = messages.iter().map(kind).collect();
+    assert!(!kinds.contains("LL") && frames(&messages).len() > 20, "{kinds}");
+}
+
+/// A UART's FIFO holds 128 bytes; what it had at the last look before a conversion has to be taken out of it at once.
+#[test]
+fn a_whole_fifo_of_commands_is_taken_in_one_look() {
+    let outside = Outside::default();
+    let mut board = simple_board(&outside, numbered);
+    outside.send(Command::Configure(Settings { settle_us: 400, ..Settings::default() }));
+    outside.send(Command::Start);
+    board.step().unwrap();
+    outside.set_room(usize::MAX);
+    outside.messages();
+    let packet = |command| {
+        let other = Outside::default();
+        other.send(command);
+        other.wire.take().to_board
+    };
+    let grounds = (0..96).map(|row| row % 16).collect();
+    let plan = Plan { grounds, reads: 0x7FFF_FFFF & 0xFFFF, rows_a_frame: 16, average_log2: 8 };
+    let mut fifo: Vec<u8> = packet(Command::Scan(plan)).into();
+    fifo.extend(packet(Command::Hello));
+    let noise = 128 - fifo.len();
+    assert!(fifo.len() > 114 && noise > 0, "{} bytes", fifo.len());
+    fifo.splice(0..0, vec![0; noise]);
+    // It comes while the board waits.
+    {
+        let mut wire = outside.wire.borrow_mut();
+        (wire.soon, wire.pulls) = (fifo, 0);
+    }
+    board.step().unwrap();
+    assert!(outside.wire.borrow().to_board.is_empty(), "{} bytes are left", outside.wire.borrow().to_board.len());
+    board.step().unwrap();
+    assert_eq!(hellos(&outside.messages()).len(), 2, "both are answered");
 }
 
 #[test]

@@ -73,7 +73,12 @@ async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
             .run("document.getElementById('settle').value = 25; document.getElementById('max-rate').value = 100")
             .await?;
         stage.browser.run("document.getElementById('settings').requestSubmit()").await?;
-        let settings = RequestedSettings { settle_us: Some(25), average_log2: Some(3), max_frames_per_s: Some(100) };
+        let settings = RequestedSettings {
+            settle_us: Some(25),
+            average_log2: Some(3),
+            max_frames_per_s: Some(100),
+            ..Default::default()
+        };
         asks(&stage, Request::Settings(settings)).await?;
         stage.browser.click("rezero").await?;
         asks(&stage, Request::Rezero).await

@@ -1,6 +1,18 @@
-//! What the boards share beside the firmware library: the record of a panic, which outlives the reset that follows.
+//! What the boards share beside the firmware library, and what of them decides something: it is compiled and tested without a chip
+//! (`cargo test -p tactomo-board-common`). What is left in the boards' own crates are registers and pins.
 #![no_std]
 
+pub mod bounded;
+pub mod brown_out;
+pub mod clock;
+pub mod converters;
 pub mod panic_record;
+pub mod range;
+pub mod reset;
 
 pub use panic_record::{PanicRecord, RECORD_BYTES};
+pub use reset::Reset;
+
+/// A scan that feeds the watchdog no more in this time is stuck (ms): it does so before every conversion, of which a stuck pair of converters makes
+/// the longest, and every 0.25 ms of a wait.
+pub const WATCHDOG_TIMEOUT_MS: u32 = 1000;

@@ -14,7 +14,7 @@ use tactomo_board_espressif::{EspChip, brown_out, output, run};
 use tactomo_firmware::Parts;
 use tactomo_firmware::mux::{Enabled, Transparent};
 
-use crate::inputs::{InputPins, Inputs};
+use crate::inputs::InputPins;
 use crate::line::UartLine;
 
 esp_bootloader_esp_idf::esp_app_desc!();
@@ -45,7 +45,7 @@ fn main() -> ! {
     };
     let parts = Parts {
         mux,
-        sampler: Inputs::new(chip.ADC1, chip.ADC2, pins),
+        sampler: inputs::new(chip.ADC1, chip.ADC2, pins),
         serial: UartLine::new(chip.UART0, chip.GPIO1, chip.GPIO3),
         chip: EspChip::new(TimerGroup::new(chip.TIMG0)),
     };

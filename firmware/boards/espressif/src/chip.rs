@@ -4,11 +4,8 @@ use embedded_hal::delay::DelayNs;
 use esp_hal::delay::Delay;
 use esp_hal::time::{Duration, Instant};
 use esp_hal::timer::timg::{MwdtStage, TimerGroup, TimerGroupInstance, Wdt};
+use tactomo_board_common::WATCHDOG_TIMEOUT_MS;
 use tactomo_firmware::{Chip, log};
-
-/// A scan that feeds the watchdog no more in this time is stuck: it does so before every reading, whose 256 conversions
-/// take some milliseconds, and after every settle time, 65 ms at most.
-const WATCHDOG_TIMEOUT: Duration = Duration::from_secs(1);
 
 defmt::timestamp!("{=u64:us}", now_us());
 
@@ -27,7 +24,7 @@ impl<Group: TimerGroupInstance> EspChip<Group> {
     /// Starts the watchdog; `esp_hal::init` has stopped all of them.
     pub fn new(group: TimerGroup<'_, Group>) -> Self {
         let mut watchdog = group.wdt;
-        watchdog.set_timeout(MwdtStage::Stage0, WATCHDOG_TIMEOUT);
+        watchdog.set_timeout(MwdtStage::Stage0, Duration::from_millis(WATCHDOG_TIMEOUT_MS.into()));
         watchdog.enable();
         Self { delay: Delay::new(), watchdog }
     }

@@ -16,8 +16,7 @@ use core::panic::PanicInfo;
 use esp_hal::gpio::{Level, Output, OutputConfig, OutputPin};
 use esp_hal::ram;
 use esp_hal::rtc_cntl::SocResetReason;
-use heapless::String;
-use tactomo_board_common::{PanicRecord, RECORD_BYTES};
+use tactomo_board_common::{PanicRecord, RECORD_BYTES, Reset};
 use tactomo_firmware::mux::Mux;
 use tactomo_firmware::{Adc, Board16, Chip, Identity, Parts, Sampler, Serial};
 use tactomo_protocol::Fault;
@@ -78,55 +77,36 @@ fn panic(panic: &PanicInfo) -> ! {
 
 /// What went wrong before this boot, if something did.
 fn boot_fault() -> Option<Fault> {
-    if let Some(text) = panic_record().take() {
-        return Some(Fault::Panic(text));
-    }
-    let name = match esp_hal::system::reset_reason() {
-        None => "unknown",
-        Some(reason) => reset_name(reason)?,
-    };
-    String::try_from(name).ok().map(Fault::Reset)
+    let reset = esp_hal::system::reset_reason().map_or(Reset::Unknown, reset);
+    reset.boot_fault(&mut panic_record())
 }
 
-/// What restarted the chip; `None` after power-on, the reset button, or a reset by the host.
+/// What restarted the chip.
 #[cfg(feature = "esp32")]
-fn reset_name(reason: SocResetReason) -> Option<&'static str> {
+fn reset(reason: SocResetReason) -> Reset {
     use SocResetReason as R;
-    Some(match reason {
-        R::ChipPowerOn => return None,
-        R::SysBrownOut => "brown-out",
-        R::CoreMwdt0 | R::CoreMwdt1 | R::CpuMwdt0 => "watchdog",
-        R::CoreRtcWdt | R::Cpu0RtcWdt | R::SysRtcWdt => "RTC watchdog",
-        R::CoreSw | R::Cpu0Sw => "software",
-        _ => "other",
-    })
+    match reason {
+        R::ChipPowerOn => Reset::AsWanted,
+        R::SysBrownOut => Reset::BrownOut,
+        R::CoreMwdt0 | R::CoreMwdt1 | R::CpuMwdt0 => Reset::Watchdog,
+        R::CoreRtcWdt | R::Cpu0RtcWdt | R::SysRtcWdt => Reset::RtcWatchdog,
+        R::CoreSw | R::Cpu0Sw => Reset::Software,
+        _ => Reset::Other,
+    }
 }
 
-/// What restarted the chip; `None` after power-on, the reset button, or a reset by the host.
-#[cfg(feature = "esp32c3")]
-fn reset_name(reason: SocResetReason) -> Option<&'static str> {
+/// What restarted the chip.
+#[cfg(any(feature = "esp32c3", feature = "esp32c6"))]
+fn reset(reason: SocResetReason) -> Reset {
     use SocResetReason as R;
-    Some(match reason {
-        R::ChipPowerOn | R::CoreUsbUart | R::CoreUsbJtag => return None,
-        R::SysBrownOut => "brown-out",
-        R::CoreMwdt0 | R::CoreMwdt1 | R::Cpu0Mwdt0 | R::Cpu0Mwdt1 => "watchdog",
-        R::CoreRtcWdt | R::Cpu0RtcWdt | R::SysRtcWdt | R::SysSuperWdt => "RTC watchdog",
-        R::CoreSw | R::Cpu0Sw => "software",
-        R::SysClkGlitch | R::CorePwrGlitch => "power or clock glitch",
-        _ => "other",
-    })
-}
-
-/// What restarted the chip; `None` after power-on, the reset button, or a reset by the host.
-#[cfg(feature = "esp32c6")]
-fn reset_name(reason: SocResetReason) -> Option<&'static str> {
-    use SocResetReason as R;
-    Some(match reason {
-        R::ChipPowerOn | R::CoreUsbUart | R::CoreUsbJtag => return None,
-        R::SysBrownOut => "brown-out",
-        R::CoreMwdt0 | R::CoreMwdt1 | R::Cpu0Mwdt0 | R::Cpu0Mwdt1 => "watchdog",
-        R::CoreRtcWdt | R::Cpu0RtcWdt | R::SysRtcWdt | R::SysSuperWdt => "RTC watchdog",
-        R::CoreSw | R::Cpu0Sw => "software",
-        _ => "other",
-    })
+    match reason {
+        R::ChipPowerOn | R::CoreUsbUart | R::CoreUsbJtag => Reset::AsWanted,
+        R::SysBrownOut => Reset::BrownOut,
+        R::CoreMwdt0 | R::CoreMwdt1 | R::Cpu0Mwdt0 | R::Cpu0Mwdt1 => Reset::Watchdog,
+        R::CoreRtcWdt | R::Cpu0RtcWdt | R::SysRtcWdt | R::SysSuperWdt => Reset::RtcWatchdog,
+        R::CoreSw | R::Cpu0Sw => Reset::Software,
+        #[cfg(feature = "esp32c3")]
+        R::SysClkGlitch | R::CorePwrGlitch => Reset::Glitch,
+        _ => Reset::Other,
+    }
 }

@@ -1,12 +1,15 @@
 //! The one ADC input, at the drain of the multiplexer's half B: GPIO 0 on both chips.
 
 use esp_hal::Blocking;
-use esp_hal::analog::adc::{Adc as Driver, AdcCalCurve, AdcConfig, AdcPin, RegisterAccess};
+use esp_hal::analog::adc::{Adc as Driver, AdcCalCurve, AdcCalScheme, AdcConfig, AdcPin, RegisterAccess};
 use esp_hal::peripherals::{ADC1, GPIO0};
+use tactomo_board_common::bounded::within;
+use tactomo_board_common::converters::MAX_LOOKS;
+use tactomo_board_common::range;
 use tactomo_firmware::{Adc, Sampler, TimedOut};
 
 use crate::ELECTRODES;
-use crate::analog::{ATTENUATION, MAX_POLLS, millivolts, range};
+use crate::analog::ATTENUATION;
 
 /// ADC1 and its calibrated pin.
 pub struct OneInput<'d> {
@@ -24,7 +27,8 @@ impl<'d> OneInput<'d> {
 
     /// What the readings mean.
     pub fn adc() -> Adc {
-        millivolts(&[range::<_, AdcCalCurve<ADC1>>(ELECTRODES)])
+        let calibration = <AdcCalCurve<ADC1> as AdcCalScheme<ADC1>>::new_cal(ATTENUATION);
+        range::curve(ELECTRODES, &|code| calibration.adc_val(code))
     }
 }
 
@@ -33,7 +37,7 @@ impl Sampler for OneInput<'_> {
     fn sample(&mut self, _electrode: u8) -> Result<u16, TimedOut> {
         // Takes back the mark of a conversion that came too late.
         ADC1::reset();
-        (0..MAX_POLLS).find_map(|_| self.adc.read_oneshot(&mut self.pin).ok()).ok_or(TimedOut)
+        within(MAX_LOOKS, || self.adc.read_oneshot(&mut self.pin).ok())
     }
 
     /// Sets the ADC up anew: the driver waits for ever for a conversion that it has begun.

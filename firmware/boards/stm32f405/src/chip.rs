@@ -3,11 +3,11 @@
 use core::panic::PanicInfo;
 
 use embedded_hal::delay::DelayNs;
-use heapless::String;
 use stm32f4xx_hal::pac::{RCC, TIM2};
 use stm32f4xx_hal::timer::{CounterUs, SysDelay};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
-use tactomo_board_common::{PanicRecord, RECORD_BYTES};
+use tactomo_board_common::clock::Clock;
+use tactomo_board_common::{PanicRecord, RECORD_BYTES, Reset};
 use tactomo_firmware::{Chip, log};
 use tactomo_protocol::Fault;
 
@@ -37,16 +37,14 @@ defmt::timestamp!("");
 pub struct StmChip {
     delay: SysDelay,
     counter: CounterUs<TIM2>,
-    last_us: u32,
-    /// Microseconds of whole rounds of the counter (us).
-    rounds_us: u64,
+    clock: Clock,
     watchdog: IndependentWatchdog,
 }
 
 impl StmChip {
     /// Of parts that were started.
     pub fn new(delay: SysDelay, counter: CounterUs<TIM2>, watchdog: IndependentWatchdog) -> Self {
-        Self { delay, counter, last_us: 0, rounds_us: 0, watchdog }
+        Self { delay, counter, clock: Clock::default(), watchdog }
     }
 }
 
@@ -59,12 +57,7 @@ impl DelayNs for StmChip {
 impl Chip for StmChip {
     /// Sees every round of the counter, of 71 minutes, as the watchdog is fed far more often.
     fn now_us(&mut self) -> u64 {
-        let now_us = self.counter.now().ticks();
-        if now_us < self.last_us {
-            self.rounds_us += u64::from(ROUND_US);
-        }
-        self.last_us = now_us;
-        self.rounds_us + u64::from(now_us)
+        self.clock.now_us(self.counter.now().ticks(), ROUND_US)
     }
 
     fn feed_watchdog(&mut self) {
@@ -79,26 +72,23 @@ impl Chip for StmChip {
 
 /// What went wrong before this boot, if something did; forgets it.
 pub fn boot_fault(rcc: &RCC) -> Option<Fault> {
-    let reset = reset_name(rcc);
+    let reset = reset(rcc);
     rcc.csr().modify(|_, w| w.rmvf().set_bit());
-    if let Some(text) = panic_record().take() {
-        return Some(Fault::Panic(text));
-    }
-    String::try_from(reset?).ok().map(Fault::Reset)
+    reset.boot_fault(&mut panic_record())
 }
 
-/// What restarted the chip; `None` after power-on, which counts as a brown-out too, and after the reset button.
-fn reset_name(rcc: &RCC) -> Option<&'static str> {
+/// What restarted the chip; power-on counts as a brown-out too.
+fn reset(rcc: &RCC) -> Reset {
     let flags = rcc.csr().read();
     if flags.porrstf().bit_is_set() {
-        None
+        Reset::AsWanted
     } else if flags.wdgrstf().bit_is_set() || flags.wwdgrstf().bit_is_set() {
-        Some("watchdog")
+        Reset::Watchdog
     } else if flags.sftrstf().bit_is_set() {
-        Some("software")
+        Reset::Software
     } else if flags.borrstf().bit_is_set() {
-        Some("brown-out")
+        Reset::BrownOut
     } else {
-        None
+        Reset::AsWanted
     }
 }

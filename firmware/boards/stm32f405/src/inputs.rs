@@ -6,6 +6,7 @@ use stm32f4xx_hal::gpio::{Analog, PA0, PA1, PA2, PA3, PA4, PA5, PA6, PA7, PB0, P
 use stm32f4xx_hal::hal_02::adc::Channel;
 use stm32f4xx_hal::pac::ADC1;
 use stm32f4xx_hal::rcc::Rcc;
+use tactomo_board_common::bounded::within;
 use tactomo_firmware::{Adc, Sampler, TimedOut};
 
 /// Electrodes of the board.
@@ -20,7 +21,7 @@ const REFERENCE_CYCLES: u32 = 2 * 10 * 168;
 /// The converter takes 3 us to start: twice that, in cycles of 168 MHz.
 const START_CYCLES: u32 = 2 * 3 * 168;
 /// Looks at the ADC before a conversion is given up: about ten times what a conversion takes, at some 5 cycles of 168 MHz a look.
-const MAX_POLLS: u32 = 600;
+const MAX_LOOKS: u32 = 600;
 
 macro_rules! inputs {
     ($($electrode:literal $pin:ident),*) => {
@@ -104,7 +105,7 @@ impl Sampler for Inputs {
         adc.sqr3().write(|w| unsafe { w.bits(u32::from(channel)) });
         adc.sr().modify(|_, w| w.eoc().clear_bit());
         adc.cr2().modify(|_, w| w.swstart().set_bit());
-        (0..MAX_POLLS).find(|_| adc.sr().read().eoc().bit_is_set()).ok_or(TimedOut)?;
+        within(MAX_LOOKS, || adc.sr().read().eoc().bit_is_set().then_some(()))?;
         Ok(adc.dr().read().data().bits())
     }
 

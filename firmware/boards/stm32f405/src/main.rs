@@ -13,6 +13,7 @@ use stm32f4xx_hal::pac::{CorePeripherals, Peripherals};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
+use tactomo_board_common::WATCHDOG_TIMEOUT_MS;
 use tactomo_firmware::mux::Transparent;
 use tactomo_firmware::{Board16, Identity, Parts};
 
@@ -24,8 +25,6 @@ use crate::line::UsbLine;
 const QUARTZ_MHZ: u32 = 8;
 /// Clock of the core (MHz): the chip's fastest.
 const CORE_MHZ: u32 = 168;
-/// A scan that feeds the watchdog no more in this time is stuck (ms).
-const WATCHDOG_TIMEOUT_MS: u32 = 1000;
 
 #[allow(missing_docs, reason = "the macro makes a public symbol of it")]
 #[cortex_m_rt::entry]

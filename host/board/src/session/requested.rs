@@ -4,6 +4,9 @@ use std::fmt;
 
 use tactomo_protocol::Settings;
 
+/// The first version of the protocol in which a board can be told of the select time and of discarded conversions.
+const FIRST_WITH_SELECT: u8 = 3;
+
 /// Settings of the scan that the user asks for; what is `None` stays as the board has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RequestedSettings {
@@ -13,6 +16,10 @@ pub struct RequestedSettings {
     pub average_log2: Option<u8>,
     /// Frames a second at most; 0 for as fast as the board can.
     pub max_frames_per_s: Option<u16>,
+    /// Wait between bringing an electrode to the converter and its first conversion (us).
+    pub select_us: Option<u16>,
+    /// Conversions of each electrode that are thrown away before those that count.
+    pub discarded: Option<u8>,
 }
 
 impl RequestedSettings {
@@ -22,7 +29,14 @@ impl RequestedSettings {
             settle_us: later.settle_us.or(self.settle_us),
             average_log2: later.average_log2.or(self.average_log2),
             max_frames_per_s: later.max_frames_per_s.or(self.max_frames_per_s),
+            select_us: later.select_us.or(self.select_us),
+            discarded: later.discarded.or(self.discarded),
         }
+    }
+
+    /// These, but for what a board that speaks this version of the protocol has no word for.
+    pub(super) fn in_version(self, version: u8) -> Self {
+        if version >= FIRST_WITH_SELECT { self } else { Self { select_us: None, discarded: None, ..self } }
     }
 
     /// The settings `now`, with those that are asked for.
@@ -31,6 +45,8 @@ impl RequestedSettings {
             settle_us: self.settle_us.unwrap_or(now.settle_us),
             average_log2: self.average_log2.unwrap_or(now.average_log2),
             max_frames_per_s: self.max_frames_per_s.unwrap_or(now.max_frames_per_s),
+            select_us: self.select_us.unwrap_or(now.select_us),
+            discarded: self.discarded.unwrap_or(now.discarded),
         }
     }
 }
@@ -61,6 +77,10 @@ impl fmt::Display for Refusal {
             }),
             (wanted.max_frames_per_s != kept.max_frames_per_s)
                 .then(|| format!("{} instead of {}", rate(kept), rate(wanted))),
+            (wanted.select_us != kept.select_us)
+                .then(|| format!("a select time of {} us instead of {} us", kept.select_us, wanted.select_us)),
+            (wanted.discarded != kept.discarded)
+                .then(|| format!("{} discarded conversions instead of {}", kept.discarded, wanted.discarded)),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
         let says = if *is_said { "keeps" } else { "did not confirm its settings, and may keep" };

@@ -1,4 +1,4 @@
-//! What boards say, and what the session says to that, in both versions of the protocol.
+//! What boards say, and what the session says to that, in all versions of the protocol.
 
 mod any_order;
 
@@ -82,10 +82,12 @@ fn a_board_of_version_1_is_spoken_to_in_version_1() {
     let now = Instant::now();
     let versions = |session: &mut Session, at| session.command(at).map(|out| (out.version, out.request.command));
     let mut session = Session::new(settle(70));
-    assert_eq!(versions(&mut session, now), Some((2, Command::Hello)));
-    assert!(session.fault(&Fault::UnknownVersion(2)), "no news for people");
+    assert_eq!(versions(&mut session, now), Some((3, Command::Hello)));
+    assert!(session.fault(&Fault::UnknownVersion(3)), "no news for people");
+    assert_eq!(versions(&mut session, now), Some((2, Command::Hello)), "at once");
+    assert!(session.fault(&Fault::UnknownVersion(3)), "the answer to what was sent before");
+    assert!(session.fault(&Fault::UnknownVersion(2)));
     assert_eq!(versions(&mut session, now), Some((1, Command::Hello)), "at once");
-    assert!(session.fault(&Fault::UnknownVersion(2)), "the answer to what was sent before");
     session.hello(&old_hello(Settings::default()), now);
     assert_eq!(versions(&mut session, now), Some((1, Command::Configure(with_settle(70)))));
     session.hello(&old_hello(with_settle(70)), now);
@@ -98,13 +100,36 @@ fn a_board_of_version_1_is_spoken_to_in_version_1() {
     session.hello(&hello(0, Settings::default(), false), now);
     assert_eq!(
         versions(&mut session, now),
-        Some((2, Command::Scan(Plan::default()))),
+        Some((3, Command::Scan(Plan::default()))),
         "it came back with newer firmware"
     );
+    assert!(session.fault(&Fault::UnknownVersion(3)));
     assert!(session.fault(&Fault::UnknownVersion(2)));
     assert_eq!(versions(&mut session, now), Some((1, Command::Hello)));
     assert!(session.fault(&Fault::UnknownVersion(1)));
-    assert_eq!(versions(&mut session, now), Some((2, Command::Hello)));
+    assert_eq!(versions(&mut session, now), Some((3, Command::Hello)));
+}
+
+/// It is told what its version has words for, and the rest is left out: it is neither asked for again and again nor a broken link.
+#[test]
+fn a_board_of_version_2_is_told_all_but_its_select_time() {
+    let now = Instant::now();
+    let requested = RequestedSettings { select_us: Some(35), discarded: Some(1), ..settle(70) };
+    let mut session = Session::new(requested);
+    let Some(Outgoing { version: 3, .. }) = session.command(now) else { panic!("it is asked in the newest version") };
+    assert!(session.fault(&Fault::UnknownVersion(3)));
+    let older = |answers, settings| Hello { version: 2, ..hello(answers, settings, false) };
+    let Some(Outgoing { version: 2, request }) = session.command(now) else { panic!("then in its own") };
+    session.hello(&older(request.tag, Settings::default()), now);
+    let Some(Outgoing { version: 2, request }) = session.command(now) else { panic!("its settings") };
+    assert_eq!(request.command, Command::Configure(with_settle(70)));
+    session.hello(&older(request.tag, with_settle(70)), now);
+    let next = session.command(now).map(|outgoing| outgoing.request.command);
+    assert_eq!((next, session.refusal()), (Some(Command::Scan(Plan::default())), None));
+    // With newer firmware it is told everything.
+    session.hello(&hello(0, Settings::default(), false), now);
+    let wanted = Settings { select_us: 35, discarded: 1, ..with_settle(70) };
+    assert_eq!(command(&mut session, now), Some(Command::Configure(wanted)));
 }
 
 #[test]
@@ -171,7 +196,7 @@ fn changes_in_a_row_are_sent_as_one_and_none_is_lost() {
     session.request(settle(60));
     let (second, sent) = said(&mut session, now).unwrap();
     assert_eq!(sent, Command::Configure(Settings { settle_us: 60, ..both }));
-    session.request(RequestedSettings { settle_us: Some(20), average_log2: Some(0), max_frames_per_s: None });
+    session.request(RequestedSettings { settle_us: Some(20), average_log2: Some(0), ..RequestedSettings::default() });
     let (third, sent) = said(&mut session, now).unwrap();
     assert_eq!(sent, Command::Configure(Settings::default()), "though the board had it when it was last heard");
     session.hello(&hello(tag, both, true), now);
@@ -304,12 +329,13 @@ fn settings_that_a_board_of_version_1_calls_bad_or_never_confirms_are_refused_in
 
 #[test]
 fn every_setting_that_is_refused_is_named() {
-    let wanted = Settings { settle_us: 70, average_log2: 3, max_frames_per_s: 100 };
+    let wanted = Settings { settle_us: 70, average_log2: 3, max_frames_per_s: 100, select_us: 35, discarded: 1 };
     let refusal = Refusal { wanted, kept: Settings::default(), is_said: true }.to_string();
     assert_eq!(
         refusal,
         "the board keeps a settle time of 20 us instead of 70 us, and an average over 1 instead of 8 conversions, and as many \
-         frames a second as it can instead of at most 100 frames a second"
+         frames a second as it can instead of at most 100 frames a second, and a select time of 0 us instead of 35 us, and 0 discarded \
+         conversions instead of 1"
     );
 }
 
@@ -351,7 +377,7 @@ fn a_board_that_answers_and_sends_no_frames_is_mute_until_one_comes() {
 fn slow_scans_are_waited_for() {
     let begin = Instant::now();
     let mut session = Session::new(RequestedSettings::default());
-    session.hello(&old_hello(Settings { average_log2: 8, settle_us: u16::MAX, max_frames_per_s: 0 }), begin);
+    session.hello(&old_hello(Settings { average_log2: 8, settle_us: u16::MAX, ..Settings::default() }), begin);
     session.command(begin);
     // 65536 conversions of 50 us and 16 settle times of 65.5 ms: 4.3 s.
     assert!(!session.is_mute(begin + Duration::from_secs(8)) && session.is_mute(begin + Duration::from_secs(9)));

@@ -8,6 +8,8 @@ use tactomo_firmware::Adc as FirmwareAdc;
 use tactomo_physics::detector::{Adc, Detector};
 use tactomo_protocol::{ConverterErrors, Range};
 
+use crate::inputs::{self, InputFigures};
+
 /// Which board is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BoardModel {
@@ -94,20 +96,6 @@ pub(super) struct ConverterFigures {
     pub(super) bow_mv: f64,
 }
 
-/// The way from a pad to an ADC.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct InputFigures {
-    /// Resistance of the foam at the pad and of what is in series (ohm).
-    pub(super) source_ohm: f64,
-    /// Capacitor across the series resistor (F).
-    pub(super) across_f: f64,
-    /// Capacitance of the pin and of what hangs on it (F).
-    pub(super) node_f: f64,
-    /// The ADC's sampling capacitor (F), and for how long it is on the pin (s).
-    pub(super) sampling_f: f64,
-    pub(super) sampling_s: f64,
-}
-
 /// Calibrated codes are millivolts: 12 bits of 4096 mV, as `firmware/boards/espressif/src/analog.rs` has them.
 const BITS: u8 = 12;
 const FULL_SCALE_MV: u16 = 1 << BITS;
@@ -115,35 +103,11 @@ const FULL_SCALE_MV: u16 = 1 << BITS;
 /// Standard deviation of one conversion (mV): nine of 721 mV behind a divider of 100 and 4.7 kilohm, published by the user of a Pycom board
 /// with an ESP32 ("ADC woes"), have 4.9 mV. The C3's is not published and taken as the same.
 const NOISE_MV: f64 = 5.0;
-/// The firmware's instructions outside conversions and waits, for each of 16 rows (`docs/hardware.md`), and cycles for each.
-const ROW_CYCLES: u64 = 71_261 * 3 / 2 / 16;
-
-/// The foam at a pad: 976 ohm between two electrodes of the 5 mm detector by an independent solver; and 1 kilohm against discharges.
-const PAD_OHM: f64 = 1e3;
-const SERIES_OHM: f64 = 1e3;
-const STRAPPING_OHM: f64 = 100e3;
-/// A pin of the chip with its wire (F), an open switch of the ADG726, and the drain of a half with the closed one (data sheet, 13 and
-/// 200 pF).
-const PIN_F: f64 = 20e-12;
-const SOURCE_OFF_F: f64 = 13e-12;
-const DRAIN_ON_F: f64 = 200e-12;
-/// The sampling capacitor is not published for these chips. Sharing with a probe of 18 pF, an STM32's was seen to carry 27 % of the voltage
-/// of the channel before (efton.sk, STM32 gotcha 220): 8 pF with the pin's own few.
-const SAMPLING_F: f64 = 8e-12;
-/// Nine cycles of the ESP32's ADC clock, 8 MHz by 2 (reset values of `SENS_SAR1_SAMPLE_CYCLE` and `SENS_SAR1_CLK_DIV`).
-const SAMPLING_S: f64 = 2.25e-6;
-/// Across the strapping resistors, as `docs/hardware.md` has the wiring, and why.
-const ACROSS_F: f64 = 47e-9;
-
-const INPUT: InputFigures = InputFigures {
-    source_ohm: PAD_OHM + SERIES_OHM,
-    across_f: 0.0,
-    node_f: PIN_F + SOURCE_OFF_F,
-    sampling_f: SAMPLING_F,
-    sampling_s: SAMPLING_S,
-};
-const STRAPPING_INPUT: InputFigures =
-    InputFigures { source_ohm: PAD_OHM + STRAPPING_OHM, across_f: ACROSS_F, node_f: PIN_F, ..INPUT };
+/// The firmware's instructions outside conversions and waits, for a frame of 16 electrodes: measured on the emulated board by the test
+/// `a_frame_costs_the_same_in_every_run` of `tests/tests/emulated_board`, which holds this figure too.
+pub const FRAME_INSTRUCTIONS: u64 = 74_508;
+/// Cycles of a row of 16 of them, at one and a half for an instruction.
+const ROW_CYCLES: u64 = FRAME_INSTRUCTIONS * 3 / 2 / 16;
 
 /// Integral non-linearity 12 LSB of 0.76 mV by the data sheet, and 60 mV of total error from 150 to 2450 mV after calibration at this
 /// attenuation: a bow of 12 mV and a gain of 1 % make 60 mV at 2450 mV about twice their deviation together.
@@ -180,9 +144,9 @@ static ESP32: Figures = Figures {
     analog: Some(Analog {
         // The floors are what code 0 of either ADC reads after calibration.
         converters: &[ESP32_ADC1, ConverterFigures { electrodes: 10, floor_mv: 128.0, ..ESP32_ADC1 }],
-        input: INPUT,
+        input: inputs::ESP32,
         // GPIO 0, 2, 15 and 12.
-        strapping: (&[7, 8, 9, 11], STRAPPING_INPUT),
+        strapping: (&[7, 8, 9, 11], inputs::ESP32_STRAPPING),
     }),
 };
 
@@ -190,7 +154,7 @@ static ESP32C3: Figures = Figures {
     name: "esp32c3 (simulated)",
     link: "simulated ESP32-C3",
     wiring: Wiring::Latched,
-    // 40 us with the 2 us after each change of half B (`docs/hardware.md`).
+    // The wait after each change of half B comes on top of it (`docs/hardware.md`).
     conversion_ns: 38_000,
     // At 160 MHz.
     row_work_ns: ROW_CYCLES * 1000 / 160,
@@ -206,8 +170,8 @@ static ESP32C3: Figures = Figures {
             gain_deviation: 0.005,
             bow_mv: 5.0,
         }],
-        input: InputFigures { source_ohm: PAD_OHM, node_f: DRAIN_ON_F + PIN_F, ..INPUT },
-        strapping: (&[], STRAPPING_INPUT),
+        input: inputs::ONE_INPUT,
+        strapping: (&[], inputs::ESP32_STRAPPING),
     }),
 };
 

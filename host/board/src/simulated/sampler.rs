@@ -9,9 +9,9 @@ use tactomo_protocol::MAX_ELECTRODES;
 
 use super::circuit::Circuit;
 use super::converter::Converter;
-use super::input::Input;
 use super::model::{Analog, Figures, Wiring};
 use super::pads::{Moment, Pads, seconds};
+use crate::inputs::Input;
 
 /// Converts what the pads have, as the board's model does.
 pub(super) struct SimulatedSampler {
@@ -43,7 +43,7 @@ impl SimulatedSampler {
     ) -> Self {
         let mut noise = Noise::new(seed);
         let front = match &figures.analog {
-            Some(analog) => Front::Real(RealFront::new(analog, figures.wiring, detector.electrodes.len(), &mut noise)),
+            Some(analog) => Front::Real(RealFront::new(analog, figures.wiring, pads_ohm(detector), &mut noise)),
             None => Front::Ideal(detector.adc),
         };
         let runs = match &figures.analog {
@@ -101,15 +101,24 @@ impl Sampler for SimulatedSampler {
                 return Ok(());
             }
             slot.iter().try_for_each(|electrode| row.select(*electrode))?;
-            for _ in 0..row.conversions() {
+            let discarded = row.discarded();
+            for number in 0..discarded + row.conversions() {
                 row.attend();
                 for electrode in &slot {
-                    row.take(*electrode, Ok(self.convert(*electrode)));
+                    let code = self.convert(*electrode);
+                    if number >= discarded {
+                        row.take(*electrode, Ok(code));
+                    }
                 }
                 self.circuit.advance(self.conversion_ns);
             }
         }
     }
+}
+
+/// Resistance of each electrode's pad (ohm).
+fn pads_ohm(detector: &Detector) -> Vec<f64> {
+    detector.electrodes.iter().map(|electrode| detector.pad_ohm(electrode)).collect()
 }
 
 fn moment(circuit: &Circuit) -> Moment {
@@ -126,26 +135,28 @@ struct RealFront {
     converters: Vec<Converter>,
     /// Each with the converter that it is on, and the electrode that it is joined to.
     inputs: Vec<(Input, usize, u8)>,
+    /// Resistance of each electrode's pad (ohm).
+    pads_ohm: Vec<f64>,
     wiring: Wiring,
     /// Groundings that the inputs know of.
     groundings: u64,
 }
 
 impl RealFront {
-    fn new(analog: &'static Analog, wiring: Wiring, electrodes: usize, chip: &mut Noise) -> Self {
+    fn new(analog: &'static Analog, wiring: Wiring, pads_ohm: Vec<f64>, chip: &mut Noise) -> Self {
         let converters = analog.converters.iter().map(|figures| Converter::drawn(figures, chip)).collect();
         let (strapping, strapping_input) = &analog.strapping;
         let runs = analog.converters.iter().enumerate();
         let on = runs.flat_map(|(index, converter)| std::iter::repeat_n(index, converter.electrodes));
-        let inputs = on.enumerate().map(|(electrode, converter)| {
+        let inputs = on.zip(&pads_ohm).enumerate().map(|(electrode, (converter, pad_ohm))| {
             let figures = if strapping.contains(&electrode) { strapping_input } else { &analog.input };
-            (Input::new(*figures), converter, electrode as u8)
+            (Input::new(*figures, *pad_ohm), converter, electrode as u8)
         });
         let count = match wiring {
-            Wiring::Transparent => electrodes,
+            Wiring::Transparent => pads_ohm.len(),
             Wiring::Latched => 1,
         };
-        Self { converters, inputs: inputs.take(count).collect(), wiring, groundings: 0 }
+        Self { converters, inputs: inputs.take(count).collect(), pads_ohm, wiring, groundings: 0 }
     }
 
     /// Samples now, as the conversion begins: what time the firmware and the chip take before that is counted after it, to be on the safe side.
@@ -161,7 +172,9 @@ impl RealFront {
         if self.wiring == Wiring::Latched && *joined != circuit.selected() {
             *joined = circuit.selected();
             let selected_ns = circuit.selected_ns();
-            input.follow(seconds(selected_ns), pads.at(Moment { now_ns: selected_ns, ..now }, *joined));
+            let pad_v = pads.at(Moment { now_ns: selected_ns, ..now }, *joined);
+            let pad_ohm = self.pads_ohm.get(usize::from(*joined)).copied().unwrap_or(f64::INFINITY);
+            input.change_to(seconds(selected_ns), pad_v, pad_ohm);
         }
         input.follow(seconds(now.now_ns), pads.at(now, *joined));
         let converter = &mut self.converters[*converter];
@@ -185,8 +198,9 @@ impl RealFront {
 #[cfg(test)]
 mod tests {
     use super::super::circuit::{MuxLine, MuxPin};
-    use super::super::model::{BoardModel, InputFigures};
+    use super::super::model::BoardModel;
     use super::*;
+    use crate::inputs::InputFigures;
     use tactomo_firmware::Mux;
     use tactomo_firmware::mux::Transparent;
     use tactomo_physics::readings::Readings;
@@ -238,7 +252,7 @@ mod tests {
         }));
         let circuit = Arc::new(Circuit::default());
         let mut noise = Noise::new(1);
-        let mut front = RealFront::new(analog, Wiring::Transparent, 16, &mut noise);
+        let mut front = RealFront::new(analog, Wiring::Transparent, pads_ohm(&Detector::default()), &mut noise);
         let mut pads = Pads::new(Box::new(Fixed(volts.clone())), 0.0, true);
         let mut mux = Transparent::new([0, 1, 2, 3].map(|bit| MuxPin::new(&circuit, MuxLine::Address(bit))));
         let mut errors = [0.0; 2];

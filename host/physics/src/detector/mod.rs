@@ -8,6 +8,7 @@ mod correction;
 mod file;
 mod force;
 mod material;
+mod pad;
 mod parameters;
 mod preset;
 pub mod surface;

@@ -311,6 +311,8 @@ class Live:
         settle_us: int | None = None,
         average: int | None = None,
         max_frames_per_s: int | None = None,
+        select_us: int | None = None,
+        discard: int | None = None,
         baud: int = 921600,
     ) -> Self: ...
     def __enter__(self) -> Live: ...

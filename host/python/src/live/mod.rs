@@ -41,8 +41,8 @@ const REQUESTS: usize = 64;
 ///
 /// `port` names the board's serial port; without it, the USB serial port on which a board answers is found. `simulate` takes the simulated
 /// board instead, with `scene`, `board` (`ideal`, `esp32`, `esp32c3`), `faults`, `seed` and `as_built` (a seed) as the program's options;
-/// `replay` plays a recording, `speed` times as fast. `record` keeps every byte in a new file. `settle_us`, `average` (1, 2, 4 ... 256 conversions) and `max_frames_per_s` are asked of
-/// the board, and `scan`: `whole`, `four`, `adaptive`, or a list of grounds such as `"0,5,10,15"`.
+/// `replay` plays a recording, `speed` times as fast. `record` keeps every byte in a new file. `settle_us`, `average` (1, 2, 4 ... 256 conversions),
+/// `max_frames_per_s`, `select_us` and `discard` are asked of the board, and `scan`: `whole`, `four`, `adaptive`, or a list of grounds such as `"0,5,10,15"`.
 ///
 /// Up to `queue` events wait; if more come, the oldest are lost and counted in `lost`: a slow loop never slows the board.
 ///
@@ -85,12 +85,12 @@ impl Live {
     #[pyo3(signature = (
         port = None, *, detector = None, solver = "auto", seconds = None, queue = 4096, simulate = false, scene = None, board = None,
         faults = None, seed = None, as_built = None, replay = None, speed = 1.0, record = None, scan = "whole", settle_us = None, average = None,
-        max_frames_per_s = None, baud = DEFAULT_BAUD
+        max_frames_per_s = None, select_us = None, discard = None, baud = DEFAULT_BAUD
     ))]
     #[pyo3(
         text_signature = "(port=None, *, detector=None, solver='auto', seconds=None, queue=4096, simulate=False, scene=None, board=None, \
         faults=None, seed=None, as_built=None, replay=None, speed=1.0, record=None, scan='whole', settle_us=None, average=None, \
-        max_frames_per_s=None, baud=921600)"
+        max_frames_per_s=None, select_us=None, discard=None, baud=921600)"
     )]
     #[allow(clippy::too_many_arguments)]
     fn new(
@@ -112,6 +112,8 @@ impl Live {
         settle_us: Option<u16>,
         average: Option<u16>,
         max_frames_per_s: Option<u16>,
+        select_us: Option<u16>,
+        discard: Option<u8>,
         baud: u32,
     ) -> PyResult<Self> {
         let has_simulation =
@@ -154,6 +156,8 @@ impl Live {
                 settle_us,
                 average_log2: average.map(average_log2).transpose()?,
                 max_frames_per_s,
+                select_us,
+                discarded: discard,
             },
             seconds: seconds.transpose()?,
             record,

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::{bail, ensure};
 use serde::Serialize;
 use tactomo::board::check::{Counted, Listening};
+use tactomo::board::inputs::{Settling, settling};
 use tactomo::board::link::{Control, ControlError, Link};
 use tactomo::board::measured;
 use tactomo::board::session;
@@ -12,6 +13,7 @@ use tactomo::check::{Ask, Check, FINGERS, Presser, Report, picture};
 use tactomo::detector::Detector;
 use tactomo::scene::SceneName;
 use tactomo::solve::Problem;
+use tactomo_protocol::Settings;
 
 use crate::commands::choice::{DetectorArgs, Model};
 use crate::commands::output::{self, message};
@@ -39,7 +41,7 @@ pub struct Args {
     /// How long each touch that is asked for is waited for (s)
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = source::seconds)]
     patience: Duration,
-    /// Prints `{source, board, firmware, frames, frames_per_s, dropped, corrupt, faults, presses, electrodes, notes, sound}` as JSON
+    /// Prints `{source, board, firmware, frames, frames_per_s, dropped, corrupt, faults, presses, electrodes, notes, sound, settling}` as JSON
     #[arg(long)]
     json: bool,
 }
@@ -56,6 +58,9 @@ struct Output {
     faults: Vec<String>,
     #[serde(flatten)]
     report: Report,
+    /// How the board's settings suit the resistance of the foam's pads; absent for boards of which that is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    settling: Option<Settling>,
 }
 
 #[derive(Serialize)]
@@ -96,8 +101,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 fn greet(listening: &Listening) {
     let hello = listening.hello();
+    let Settings { settle_us, select_us, discarded, .. } = hello.settings;
     message!(
-        "board {} with firmware {}: {} electrodes, {} bits of {} mV, drive {} mV",
+        "board {} with firmware {}: {} electrodes, {} bits of {} mV, drive {} mV; {settle_us} us to settle, {select_us} us to select, {discarded} \
+         conversions discarded",
         hello.board,
         hello.firmware_version,
         hello.electrodes,
@@ -172,9 +179,11 @@ fn show(listening: &Listening, source: String, detector: &Detector, report: &Rep
     let Counted { frames, dropped, corrupt } = listening.counted();
     let counted = Counts { frames, frames_per_s: listening.frames_per_s(), dropped, corrupt };
     let faults: Vec<String> = listening.faults().iter().map(session::explain).collect();
+    let hello = listening.hello();
+    let settling = settling(&hello.board, &hello.settings, detector.largest_pad_ohm());
     if json {
-        let (board, firmware) = (listening.hello().board.to_string(), listening.hello().firmware_version.to_string());
-        let output = Output { source, board, firmware, counted, faults, report: report.clone() };
+        let (board, firmware) = (hello.board.to_string(), hello.firmware_version.to_string());
+        let output = Output { source, board, firmware, counted, faults, report: report.clone(), settling };
         return Ok(output::print(&serde_json::to_string(&output)?)?);
     }
     message!("{frames} frames, {:.0} a second, {dropped} dropped, {corrupt} corrupt", counted.frames_per_s);
@@ -183,5 +192,6 @@ fn show(listening: &Listening, source: String, detector: &Detector, report: &Rep
     let named = |advice: &String, electrode: usize| format!("electrode {electrode}: {advice}");
     lines.extend(report.faulty().filter_map(|found| Some(named(found.advice.as_ref()?, found.electrode))));
     lines.extend(report.notes.iter().cloned());
+    lines.extend(settling.filter(|settling| !settling.suits).map(|settling| settling.to_string()));
     Ok(output::print(&lines.join("\n"))?)
 }

@@ -138,7 +138,7 @@ impl Settings {
         let Self { settle_us, average_log2, max_frames_per_s } = self;
         match average_log2 {
             Some(log2) if log2 > MAX_AVERAGE_LOG2 => Err("at most 256 conversions can be averaged"),
-            _ => Ok(RequestedSettings { settle_us, average_log2, max_frames_per_s }),
+            _ => Ok(RequestedSettings { settle_us, average_log2, max_frames_per_s, ..Default::default() }),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Any order of what a board may say, in both versions of the protocol.
+//! Any order of what a board may say, in all versions of the protocol.
 
 use std::collections::VecDeque;
 
@@ -31,6 +31,7 @@ impl Board {
         let at = self.line.back().map_or(at, |last| at.max(last.0));
         let message = match self.version {
             1 => old_hello(self.settings),
+            2 => Hello { version: 2, ..hello(answers, self.settings, self.streaming) },
             _ => hello(answers, self.settings, self.streaming),
         };
         self.line.push_back((at, message));
@@ -38,7 +39,7 @@ impl Board {
 
     fn obey(&mut self, Outgoing { version, request }: Outgoing, at: u64) {
         if version != self.version {
-            return self.say_hello(0, at); // Only to a board of version 1, and as good as the fault.
+            return self.say_hello(0, at); // Only to a board of an older version, and as good as the fault.
         }
         let has_answer = version != 1 || matches!(request.command, Command::Hello | Command::Configure(_));
         match request.command {
@@ -71,9 +72,11 @@ enum Event {
 }
 
 fn any_request() -> impl Strategy<Value = RequestedSettings> {
-    (prop::option::of(20..25u16), prop::option::of(0..4u8), prop::option::of(100..103u16)).prop_map(
-        |(settle_us, average_log2, max_frames_per_s)| RequestedSettings { settle_us, average_log2, max_frames_per_s },
-    )
+    let scan = (prop::option::of(20..25u16), prop::option::of(0..4u8), prop::option::of(100..103u16));
+    (scan, prop::option::of(0..3u16), prop::option::of(0..2u8)).prop_map(|(scan, select_us, discarded)| {
+        let (settle_us, average_log2, max_frames_per_s) = scan;
+        RequestedSettings { settle_us, average_log2, max_frames_per_s, select_us, discarded }
+    })
 }
 
 fn any_event() -> impl Strategy<Value = Event> {
@@ -94,7 +97,7 @@ proptest! {
     /// Steps of 20 ms; after the events, eight seconds in which nothing more happens.
     #[test]
     fn whatever_order_hellos_come_in_the_board_does_what_was_asked_for_last_and_nobody_cries_wolf(
-        version in 1..=2u8,
+        version in 1..=3u8,
         first in any_request(),
         events in prop::collection::vec(any_event(), 0..60),
         delays in prop::collection::vec(0..12u64, 500),
@@ -143,7 +146,7 @@ proptest! {
             }
             prop_assert_eq!(session.refusal(), None, "step {}", step);
         }
-        prop_assert_eq!(board.settings, wanted.over(board.settings));
+        prop_assert_eq!(board.settings, wanted.in_version(version).over(board.settings));
         prop_assert!(board.streaming);
         let expected = if version == 1 && !plan.is_whole() { PlanState::Refused } else { PlanState::InForce };
         prop_assert_eq!(session.plan_state(), expected);
