@@ -6,8 +6,8 @@
 
 mod commands;
 mod heap;
+mod log;
 
-use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -17,22 +17,14 @@ static ALLOCATOR: heap::Counting = heap::Counting;
 
 fn main() -> ExitCode {
     let cli = commands::Cli::parse();
-    print_log_on_stderr();
-    match commands::run(cli) {
+    let log = log::Log::begin();
+    let ended = commands::run(cli);
+    drop(log);
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             commands::output::print_message(format_args!("error: {error:#}"));
             ExitCode::FAILURE
         }
     }
-}
-
-fn print_log_on_stderr() {
-    let colours = std::io::stderr().is_terminal();
-    tracing_subscriber::fmt()
-        .with_writer(|| commands::output::Stderr)
-        .with_ansi(colours)
-        .with_target(false)
-        .without_time()
-        .init();
 }

@@ -24,10 +24,10 @@ impl Tools {
     }
 
     /// A file beside the tool.
-    fn file(&self, name: &str) -> PathBuf {
+    fn file(&self, name: &str, content: &[u8]) -> PathBuf {
         let path = self.0.join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(&path, "").unwrap();
+        fs::write(&path, content).unwrap();
         path
     }
 
@@ -50,6 +50,64 @@ impl Drop for Tools {
     }
 }
 
+/// An ELF file of a processor, with 16 bytes of code at an address and so much data at another, that begins at a third.
+fn elf(machine: u16, code_at: u32, (data_at, data): (u32, u32), entry: u32) -> Vec<u8> {
+    let word = |value: u32| value.to_le_bytes();
+    let mut bytes =
+        [&b"\x7fELF\x01\x01\x01"[..], &[0; 9], &2u16.to_le_bytes(), &machine.to_le_bytes(), &word(1)].concat();
+    bytes.extend([word(entry), word(52), word(0), word(0)].concat());
+    for half in [52u16, 32, 2, 40, 0, 0] {
+        bytes.extend(half.to_le_bytes());
+    }
+    for [from, at, length, flags] in [[116, code_at, 16, 5], [132, data_at, data, 4]] {
+        for field in [1, from, at, at, length, length, flags, 4] {
+            bytes.extend(word(field));
+        }
+    }
+    bytes.resize(132 + data as usize, 0);
+    bytes
+}
+
+/// An image that a board could run.
+fn image_of(board: &str) -> Vec<u8> {
+    let (machine, code_at, data_at) = match board {
+        "esp32" => (94, 0x400d_0020, 0x3ffb_0000),
+        "esp32c3" => (243, 0x4200_0020, 0x3fc8_0000),
+        "esp32c6" => (243, 0x4200_0020, 0x4080_0000),
+        _ => (40, 0x0800_0000, 0x2000_0000),
+    };
+    elf(machine, code_at, (data_at, 64), code_at + 9)
+}
+
+#[test]
+fn an_image_for_another_board_or_none_is_told_before_a_tool_is_called() {
+    let tools = Tools::new("images", "espflash", 0);
+    let of_c3 = image_of("esp32c3");
+    let long = elf(243, 0x4200_0020, (0x3c00_0000, 0x3f_0000), 0x4200_0020);
+    let part = [&of_c3[..16], &1u16.to_le_bytes(), &of_c3[18..]].concat();
+    for (image, board, told) in [
+        (&b""[..], "esp32c3", "it is empty"),
+        (b"\xe9 an image that espflash saved", "esp32c3", "no ELF file"),
+        (&of_c3[..20], "esp32c3", "cut off"),
+        (&of_c3[..140], "esp32c3", "cut off"),
+        (&fs::read(env!("CARGO_BIN_EXE_tactomo")).unwrap()[..4096], "esp32c3", "it is for a computer"),
+        (&of_c3, "esp32", "for the processor RISC-V, and the esp32 has Xtensa"),
+        (&image_of("stm32f405"), "esp32c3", "for the processor ARM"),
+        (&of_c3, "esp32c6", "0x3fc80000, where the esp32c6 has no memory"),
+        (&image_of("esp32c6"), "esp32c3", "built for another chip"),
+        (&elf(243, 0x4200_0020, (0x3fc8_0000, 8), 0), "esp32c3", "it begins at 0x00000000"),
+        (&elf(243, 0x4200_0020, (0x3fc8_0000, 8), 0x3fc8_0000), "esp32c3", "where it has no code"),
+        (&part, "esp32c3", "not linked yet"),
+        (&long, "esp32c3", "4128784 bytes of flash"),
+    ] {
+        let path = tools.file("some.elf", image);
+        let (code, message) = tools.flash(&[board, "--image", path.to_str().unwrap()], &tools.0);
+        assert!(code == Some(1) && message.contains(told), "{board}, {told}: {message}");
+        assert!(message.contains("some.elf is no image for the board") && message.contains("cargo build"), "{message}");
+    }
+    assert_eq!(tools.called(), None);
+}
+
 #[test]
 fn an_image_is_handed_to_the_tool_of_its_chip_and_the_command_is_shown() {
     for (board, program, port, expected) in [
@@ -58,7 +116,7 @@ fn an_image_is_handed_to_the_tool_of_its_chip_and_the_command_is_shown() {
         ("stm32f405", "probe-rs", None, "download --chip STM32F405RG"),
     ] {
         let tools = Tools::new(board, program, 0);
-        let image = tools.file("image.elf");
+        let image = tools.file("image.elf", &image_of(board));
         let image = image.to_str().unwrap();
         let mut args = vec![board, "--image", image];
         args.extend(port.into_iter().flat_map(|port| ["--port", port]));
@@ -73,8 +131,8 @@ fn an_image_is_handed_to_the_tool_of_its_chip_and_the_command_is_shown() {
 #[test]
 fn the_image_that_was_built_in_the_repository_is_found_from_any_folder_of_it() {
     let tools = Tools::new("built", "espflash", 0);
-    tools.file("firmware/boards/Cargo.toml");
-    let below = tools.file("docs/page.md");
+    tools.file("firmware/boards/Cargo.toml", b"");
+    let below = tools.file("docs/page.md", b"");
     let here = below.parent().unwrap();
     let (code, told) = tools.flash(&["esp32c3"], here);
     assert!(code == Some(1) && tools.called().is_none(), "{told}");
@@ -82,7 +140,7 @@ fn the_image_that_was_built_in_the_repository_is_found_from_any_folder_of_it() {
         told.contains("not built yet") && told.contains("cd firmware/boards/esp32c3 && cargo build --release"),
         "{told}"
     );
-    tools.file("firmware/boards/target/riscv32imc-unknown-none-elf/release/tactomo-esp32c3");
+    tools.file("firmware/boards/target/riscv32imc-unknown-none-elf/release/tactomo-esp32c3", &image_of("esp32c3"));
     let (code, told) = tools.flash(&["esp32c3"], here);
     assert_eq!(code, Some(0), "{told}");
     assert!(tools.called().unwrap().ends_with("release/tactomo-esp32c3"));
@@ -91,12 +149,14 @@ fn the_image_that_was_built_in_the_repository_is_found_from_any_folder_of_it() {
 #[test]
 fn what_is_missing_or_fails_is_told_with_what_to_do() {
     let other = Tools::new("other", "some-tool", 0);
-    let image = other.file("image.elf");
+    let image = other.file("image.elf", &image_of("esp32"));
     let image = image.to_str().unwrap();
+    let arm = other.file("arm.elf", &image_of("stm32f405"));
+    let arm = arm.to_str().unwrap();
     let failing = Tools::new("failing", "espflash", 3);
     for (tools, args, told) in [
         (&other, &["esp32", "--image", image][..], "cargo install espflash --locked"),
-        (&other, &["stm32f405", "--image", image], "cargo install probe-rs-tools --locked"),
+        (&other, &["stm32f405", "--image", arm], "cargo install probe-rs-tools --locked"),
         (&other, &["esp32", "--image", "no.elf"], "there is no image no.elf"),
         (&other, &["esp32"], "--image FILE"),
         (&other, &["stm32f405", "--image", image, "--port", "/dev/ttyACM0"], "leave out --port"),

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use tactomo_physics::scene::{Contact, SceneName};
 use tactomo_physics::simulate::{Fault, SimulationError};
 
-use crate::record::RecordError;
+use crate::record::{Loss, RecordError};
 use discover::NoBoard;
 use replay::ReplayLink;
 use serial::{PortError, SerialLink};
@@ -125,6 +125,8 @@ pub enum Playing {
         looped: bool,
         /// Whether it is at its end, and stays there until it is asked to go on elsewhere.
         ended: bool,
+        /// What is damaged in it, as far as it was played.
+        damage: Loss,
     },
 }
 

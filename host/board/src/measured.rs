@@ -116,9 +116,21 @@ impl Volts {
         Self { ground_v, ..self }
     }
 
-    /// Readings of a frame (V), those that it does not hold say [nothing](Says::Nothing); of a cell that it holds several times the mean.
-    /// `None` if it is a frame of another board.
+    /// Readings of a frame as they are used (V): see [`measured`](Self::measured) and [`used`](Self::used). `None` if it is a frame of another
+    /// board.
     pub fn readings(&self, frame: &Frame) -> Option<Readings> {
+        self.measured(frame).map(|measured| self.used(measured))
+    }
+
+    /// Readings as measured (V) as they are used: one that is within two deviations of the noise of an end of its converter's range is the bound
+    /// there, for it says no more than that.
+    pub fn used(&self, measured: Readings) -> Readings {
+        if self.ranges.is_empty() { measured } else { measured.within(&self.ranges) }
+    }
+
+    /// Readings of a frame as measured (V): each as its converter gave it. Those that the frame does not hold say [nothing](Says::Nothing); of a
+    /// cell that it holds several times the mean. `None` if it is a frame of another board.
+    pub fn measured(&self, frame: &Frame) -> Option<Readings> {
         let n = usize::from(self.electrodes);
         if frame.scope.electrodes() != self.electrodes || frame.readings.len() != frame.scope.readings() {
             return None;
@@ -126,8 +138,7 @@ impl Volts {
         let per_unit = self.per_code / f64::from(1u32 << frame.head.fraction_bits.min(31));
         let volt = |units: &u16| f64::from(*units) * per_unit - self.ground_v;
         if frame.scope.is_whole() {
-            let readings = Readings::new(n, frame.readings.iter().map(volt).collect())?;
-            return Some(if self.ranges.is_empty() { readings } else { readings.within(&self.ranges) });
+            return Readings::new(n, frame.readings.iter().map(volt).collect());
         }
         let (mut sums_v, mut counts) = (vec![0.0; n * n], vec![0u32; n * n]);
         for ((g, e), units) in frame.scope.cells().zip(&frame.readings) {
@@ -136,7 +147,7 @@ impl Volts {
             counts[cell] += 1;
         }
         let means_v = sums_v.iter().zip(&counts).map(|(sum, count)| sum / f64::from((*count).max(1)));
-        let readings = Readings::new(n, means_v.collect())?.within(&self.ranges);
+        let readings = Readings::new(n, means_v.collect())?;
         Some(readings.hiding(|g, e| counts[g * n + e] == 0))
     }
 }
@@ -212,6 +223,8 @@ mod tests {
         assert_eq!(says(140), [(AtMost, 148.0), (Voltage, 140.0)]);
         assert_eq!(says(500), [(Voltage, 500.0), (Voltage, 500.0)]);
         assert_eq!(says(899), [(AtLeast, 894.0), (AtLeast, 894.0)]);
+        let measured = Volts::of(&board).measured(&frame(128)).unwrap();
+        assert!(measured.all_say().is_empty() && measured.volts().iter().all(|volts| (volts - 0.128).abs() < 1e-12));
         let lifted = Volts::of(&board).above(0.25).readings(&frame(250)).unwrap();
         assert!(lifted.all_say().is_empty() && lifted.at(1, 1).abs() < 1e-12, "rest is clear of the floor");
     }

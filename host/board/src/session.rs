@@ -3,6 +3,7 @@
 //! No input or output happens here: a [`Session`] is given what came and asked what to send.
 
 mod greet;
+mod pace;
 mod plan;
 mod requested;
 
@@ -10,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use tactomo_protocol::{Command, Fault, Hello, Plan, Request, Settings, VERSION};
 
+use self::pace::Paces;
 use self::plan::PlanWish;
 
 pub use greet::{GreetError, Outgoing, explain, greet, send};
@@ -73,6 +75,10 @@ pub struct Session {
     /// What the board said of itself last, in answer to what it was asked last.
     hello: Option<Hello>,
     pending: Option<Pending>,
+    /// How soon a command is sent again that was answered and not followed.
+    paces: Paces,
+    /// The last answer to a command that was not sent, while nobody knows the board: its tag.
+    stray: Option<u8>,
     /// Since when frames are expected and none came: since the first Start after the last frame.
     waiting_since: Option<Instant>,
     /// Whether the board was started.
@@ -95,6 +101,8 @@ impl Session {
             start_due: false,
             hello: None,
             pending: None,
+            paces: Paces::default(),
+            stray: None,
             waiting_since: None,
             started: false,
             heard: None,
@@ -108,6 +116,7 @@ impl Session {
         self.requested = self.requested.changed_by(requested);
         self.refusal = None;
         self.settings_due = self.hello.is_some();
+        self.paces.restart(&Command::Configure(Settings::default()));
         self.give_way(|command| matches!(command, Command::Configure(_)));
     }
 
@@ -115,6 +124,7 @@ impl Session {
     /// anew gets the plan again.
     pub fn request_plan(&mut self, plan: Option<Plan>) {
         self.plan.request(plan.unwrap_or_default());
+        self.paces.restart(&Command::Scan(Plan::default()));
         if self.give_way(|command| matches!(command, Command::Scan(_))) {
             // It may arrive all the same.
             self.plan.forget();
@@ -122,6 +132,16 @@ impl Session {
         if self.version == OLD_VERSION {
             self.plan.not_offered();
         }
+    }
+
+    /// Whether a board has said who it is, by itself or in answer to what it was asked.
+    pub fn knows_the_board(&self) -> bool {
+        self.hello.is_some()
+    }
+
+    /// Of a board that only answers what it was not asked, the command that it names, and the one that was sent.
+    pub fn stray(&self) -> Option<(u8, u8)> {
+        self.stray.filter(|_| self.hello.is_none()).map(|named| (named, self.tag))
     }
 
     /// What became of the plan that was [asked for](Self::request_plan) last: whole frames, if none was.
@@ -179,13 +199,13 @@ impl Session {
         let wanted = self.requested.in_version(self.version).over(hello.settings);
         let is_other = wanted != hello.settings || self.settings_in_doubt;
         self.settings_due &= is_other;
-        if self.settings_due {
-            return Some(Command::Configure(wanted));
-        }
-        if let Some(plan) = self.plan.due() {
-            return Some(Command::Scan(plan.clone()));
-        }
-        if self.start_due { Some(Command::Start) } else { silence }
+        let due = [
+            self.settings_due.then_some(Command::Configure(wanted)),
+            self.plan.due().cloned().map(Command::Scan),
+            self.start_due.then_some(Command::Start),
+        ];
+        let due = due.into_iter().flatten().find(|command| self.paces.allow(command, now));
+        due.or(silence)
     }
 
     /// Gives a command a tag, and waits for its answer: in version 1 only settings have one that is sure to come.
@@ -193,6 +213,7 @@ impl Session {
         self.tag = self.tag.checked_add(1).unwrap_or(1);
         let is_settings = matches!(command, Command::Configure(_));
         self.settings_in_doubt |= is_settings;
+        self.paces.sent(&command, now);
         if command == Command::Start {
             self.started = true;
             self.waiting_since.get_or_insert(now);
@@ -223,7 +244,10 @@ impl Session {
             return self.board_has_started(hello, now);
         }
         let is_answer = |pending: &mut Pending| pending.request.tag == hello.answers;
-        let Some(answered) = self.pending.take_if(is_answer) else { return };
+        let Some(answered) = self.pending.take_if(is_answer) else {
+            self.stray = Some(hello.answers);
+            return;
+        };
         self.heard = Some(now);
         let is_first = self.hello.replace(hello.clone()).is_none();
         if !is_first && !self.start_due && !hello.is_streaming {
@@ -231,11 +255,24 @@ impl Session {
             return self.board_has_started(hello, now);
         }
         self.settings_due = true;
-        match answered.request.command {
+        self.answered(answered.request.command, is_first, hello, now);
+    }
+
+    /// Takes the answer to a command.
+    fn answered(&mut self, command: Command, is_first: bool, hello: &Hello, now: Instant) {
+        let is_followed = match &command {
+            Command::Start | Command::Stop => hello.is_streaming,
+            Command::Configure(wanted) => *wanted == hello.settings,
+            Command::Hello | Command::Scan(_) => true,
+        };
+        if is_followed {
+            self.paces.restart(&command);
+        }
+        match command {
             Command::Hello if is_first => self.greeted(hello, now),
             Command::Hello => {}
-            Command::Start | Command::Stop => self.start_due = !hello.is_streaming,
-            Command::Configure(wanted) if wanted == hello.settings => self.settings_in_doubt = false,
+            Command::Start | Command::Stop => self.start_due = !is_followed,
+            Command::Configure(_) if is_followed => self.settings_in_doubt = false,
             Command::Configure(wanted) => self.refused(wanted, true),
             Command::Scan(plan) => self.plan.confirmed(plan),
         }
@@ -266,6 +303,7 @@ impl Session {
         let wanted = self.requested.in_version(self.version).over(hello.settings);
         let sent = self.pending.as_ref().map(|pending| &pending.request.command);
         if hello.settings == wanted {
+            self.paces.restart(&Command::Configure(wanted));
             self.pending = None;
             (self.settings_due, self.settings_in_doubt) = (false, false);
         } else if sent != Some(&Command::Configure(wanted)) {
@@ -352,6 +390,10 @@ impl Session {
         if self.started {
             self.heard = Some(now);
             self.waiting_since = None;
+        }
+        if self.version == OLD_VERSION {
+            // Its only answer to Start.
+            self.paces.restart(&Command::Start);
         }
     }
 

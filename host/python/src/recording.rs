@@ -21,7 +21,7 @@ use crate::json;
 
 /// A recording: all bytes of a board, and the detector that they were taken from.
 ///
-/// To iterate over it gives its frames as measured (V), each time from the start; `less_baseline()` gives what solvers take. Frames that hold
+/// To iterate over it gives its frames, each time from the start; `less_baseline()` gives what solvers take. Frames that hold
 /// some rows only are gathered to whole ones. `detector` is used in place of the one in the recording.
 #[pyclass(frozen, module = "tactomo")]
 pub struct Recording {
@@ -56,7 +56,7 @@ impl Recording {
     }
 
     fn frames(&self) -> PyResult<Frames> {
-        Ok(Frames { file: self.file()?, rounds: Rounds::default(), baseline: None })
+        Ok(Frames { file: self.file()?, rounds: Default::default(), baseline: None })
     }
 }
 
@@ -124,7 +124,8 @@ impl Recording {
         })
     }
 
-    /// All frames as arrays: `{time_s (frames,), sequence (frames,), lost_before (frames,), readings_v (frames, n, n)}`.
+    /// All frames as arrays: `{time_s (frames,), sequence (frames,), lost_before (frames,), readings_v (frames, n, n), used_v (frames, n, n)}`;
+    /// readings as measured and as they are used.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = py.detach(|| -> PyResult<All> {
             let mut all = All::default();
@@ -136,12 +137,14 @@ impl Recording {
         })?;
         let n = self.detector.electrodes.len();
         let frames = all.time_s.len();
-        let readings: Bound<'_, PyArray3<f64>> = PyArray1::from_vec(py, all.readings_v).reshape([frames, n, n])?;
+        let volts =
+            |volts| -> PyResult<Bound<'_, PyArray3<f64>>> { PyArray1::from_vec(py, volts).reshape([frames, n, n]) };
         let arrays = PyDict::new(py);
         arrays.set_item("time_s", PyArray1::from_vec(py, all.time_s))?;
         arrays.set_item("sequence", PyArray1::from_vec(py, all.sequence))?;
         arrays.set_item("lost_before", PyArray1::from_vec(py, all.lost_before))?;
-        arrays.set_item("readings_v", readings)?;
+        arrays.set_item("readings_v", volts(all.readings_v)?)?;
+        arrays.set_item("used_v", volts(all.used_v)?)?;
         Ok(arrays)
     }
 
@@ -166,6 +169,7 @@ struct All {
     sequence: Vec<u64>,
     lost_before: Vec<u64>,
     readings_v: Vec<f64>,
+    used_v: Vec<f64>,
 }
 
 impl All {
@@ -173,7 +177,8 @@ impl All {
         self.time_s.push(frame.time_s);
         self.sequence.push(frame.sequence);
         self.lost_before.push(frame.lost_before);
-        self.readings_v.extend_from_slice(frame.readings.volts());
+        self.readings_v.extend_from_slice(frame.measured.volts());
+        self.used_v.extend_from_slice(frame.readings.volts());
     }
 }
 
@@ -181,7 +186,8 @@ impl All {
 #[pyclass(module = "tactomo")]
 pub struct Frames {
     file: FrameFile,
-    rounds: Rounds,
+    /// As measured, and as used.
+    rounds: [Rounds; 2],
     /// The baseline to take off, and how many frames are still to come that are nothing else.
     baseline: Option<(Baseline, u32)>,
 }
@@ -208,8 +214,10 @@ impl Frames {
 
     fn whole(&mut self, frame: &FileFrame, lost_before: u64) -> Option<Frame> {
         let (time_s, sequence) = (frame.time_s.unwrap_or_default(), frame.sequence.unwrap_or_default());
-        let readings = self.rounds.add(&frame.readings()?, time_s).filter(Readings::is_whole)?;
-        Some(Frame { time_s, sequence, lost_before, readings })
+        let [measured, used] = &mut self.rounds;
+        let measured = measured.add(&frame.measured()?, time_s);
+        let readings = used.add(&frame.readings()?, time_s).filter(Readings::is_whole)?;
+        Some(Frame { time_s, sequence, lost_before, measured: measured?, readings })
     }
 }
 
@@ -230,6 +238,7 @@ pub struct Frame {
     time_s: f64,
     sequence: u64,
     lost_before: u64,
+    measured: Readings,
     readings: Readings,
 }
 
@@ -260,9 +269,16 @@ impl Frame {
         self.lost_before
     }
 
-    /// Readings (V), `(n, n)`: `readings[g][e]` is electrode `e` while `g` is grounded.
-    #[getter(readings)]
+    /// Readings as measured (V), `(n, n)`: `readings_v[g][e]` is electrode `e` while `g` is grounded.
+    #[getter]
     fn readings_v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array(py, &self.measured)
+    }
+
+    /// The same as they are used (V), less the baseline where that is taken off: a reading within two deviations of the noise of an end of its
+    /// converter's range is the bound there.
+    #[getter(readings)]
+    fn used_v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         array(py, &self.readings)
     }
 

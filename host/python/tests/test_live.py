@@ -94,7 +94,16 @@ def test_stop_ends_an_iteration_in_another_thread():
     assert run.summary["frames"] > 0 and run.next(0.0) is None
 
 
+@pytest.fixture
+def ctrl_c():
+    """Python's own answer to SIGINT, which it does not set where it was started with SIGINT ignored, as in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="a silent board needs a pseudo-terminal")
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_the_wait_for_a_silent_board():
     board, port = os.openpty()
     try:

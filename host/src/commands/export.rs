@@ -9,6 +9,7 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use tactomo::board::frames::FileFrame;
 use tactomo::board::record::{RecordError, RecordReader};
+use tactomo::pointer::Pointer;
 use tactomo::readings::Readings;
 use tactomo::run::TouchEvent;
 use tactomo::schema::FrameReport;
@@ -66,6 +67,9 @@ pub struct Args {
     /// Parquet file have all [default: answer]
     #[arg(long, value_name = "FIELDS")]
     fields: Option<Fields>,
+    /// Makes a pointer of a contact, as live --pointer does: its motion, presses and clicks are the frames' events
+    #[arg(long)]
+    pointer: bool,
     /// Replaces the file if it exists
     #[arg(long, visible_alias = "force")]
     overwrite: bool,
@@ -123,6 +127,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let fields = args.fields.unwrap_or_default();
     let mut bar = ProgressBar::new("s recorded", last_us / 1_000_000);
     let (mut lost, mut solved) = (0, 0_u64);
+    let mut pointer = args.pointer.then(Pointer::default);
     while let Some(frame) = reader.next_frame()? {
         if stop.load(Ordering::Relaxed) {
             bail!("ended before {} was complete: nothing is written", args.out.display());
@@ -130,7 +135,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let solution = reader.solve(&frame).with_context(|| reader.place())?;
         lost += frame.lost_before;
         let arrived_s = frame.arrived_s.unwrap_or_default();
-        let event = event(&reader, &frame, solution, (header.started(), lost))?;
+        let mut event = event(&reader, &frame, solution, (header.started(), lost))?;
+        if let Some(pointer) = &mut pointer {
+            event.pointer_events = pointer.take(event.time_s(), &event.solution.contacts);
+        }
         out.write(&event.into(), fields, reader.frame() as u64)?;
         solved += 1;
         bar.tell(arrived_s as u64);
@@ -168,8 +176,9 @@ fn event(
     (started, lost): (Duration, u64),
 ) -> anyhow::Result<TouchEvent> {
     let electrodes = frame.volts.len().isqrt();
-    let measured = Readings::new(electrodes, reader.measured_v().to_vec());
-    let (measured, touch) = measured.zip(reader.touch(frame)).with_context(|| reader.place())?;
+    let used = Readings::new(electrodes, reader.used_v().to_vec());
+    let touch = reader.touch(frame).with_context(|| reader.place())?;
+    let (measured, used) = frame.measured().zip(used).with_context(|| reader.place())?;
     let time_s = frame.time_s.unwrap_or_default().max(0.0);
     let arrived_s = frame.arrived_s.unwrap_or(time_s).max(0.0);
     Ok(TouchEvent {
@@ -178,7 +187,8 @@ fn event(
         arrived_unix_ns: (started + Duration::from_secs_f64(arrived_s)).as_nanos() as u64,
         age: None,
         status: Default::default(),
-        readings: measured.saying(|g, e| touch.says(g, e)),
+        readings: measured,
+        used: used.saying(|g, e| touch.says(g, e)),
         touch,
         averaged: 1,
         lost,

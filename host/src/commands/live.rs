@@ -1,6 +1,5 @@
 //! `tactomo live`: the live picture.
 
-use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -18,6 +17,8 @@ use tactomo::run::plan::{Ends, Plan, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Listener, Request, Snapshot};
 use tactomo::scene::SceneName;
+use tactomo::sink::address::Address;
+use tactomo::sink::door::{Door, Origin};
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
 use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
@@ -93,13 +94,17 @@ pub struct PictureArgs {
     #[arg(long, value_name = "FILE")]
     pub jacobian: Option<PathBuf>,
     /// Port of the page; 0 for any
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", conflicts_with = "listen")]
     pub http_port: Option<u16>,
-    /// Shares the page on the network, at this address of this machine or at 0.0.0.0 for all it has; else only this machine
-    /// reaches it. The address that is printed has a random token: who has it sees the page and can press its buttons, and the
-    /// link is not encrypted
+    /// Where the page is served: ADDRESS, ADDRESS:PORT or PORT. With an address of this machine, or 0.0.0.0 for all it has, it is shared on the
+    /// network; else only this machine reaches it. The address that is printed then has a random token: who has it sees the page and can press
+    /// its buttons, and the link is not encrypted
     #[arg(long, value_name = "ADDRESS", conflicts_with = "json")]
-    pub listen: Option<IpAddr>,
+    pub listen: Option<Address>,
+    /// Pages of this site in a browser, such as https://app.example, may read what is touched too: through Foxglove's connection, or the socket of
+    /// the page. May be given several times
+    #[arg(long, value_name = "ORIGIN")]
+    pub allow_origin: Vec<Origin>,
     /// Leaves it to you to open the page: else the browser opens by itself where there is a desktop
     #[arg(long)]
     pub no_open: bool,
@@ -164,7 +169,7 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
     let (request, requests) = mpsc::sync_channel(REQUESTS);
     // Whatever cannot be is said before a page opens.
     show.streams.check(show.picture.json)?;
-    let mut sinks = show.streams.begin(&problem, &show.source.name(), Arc::clone(&stop))?;
+    let mut sinks = show.streams.begin(&problem, &show.source.name(), door(&show.picture), Arc::clone(&stop))?;
     let plan = plan(&mut show, problem.clone(), sinks.listener())?;
     let server = serve(&show, &problem, shown, request)?;
     // The page may outlive the pipeline, so the snapshots have a sender here too.
@@ -233,8 +238,13 @@ fn serve(
         source: show.source.name(),
         finger: show.finger,
     };
-    let PictureArgs { listen: address, http_port: port, no_open, .. } = show.picture;
-    let server = Server::start(Listen { address, port }, setup, snapshots, requests)?;
+    let PictureArgs { listen, http_port: port, no_open, .. } = &show.picture;
+    let door = door(&show.picture);
+    let listen = match listen {
+        Some(address) => Listen::at(address, door)?,
+        None => Listen { address: None, port: *port, door },
+    };
+    let server = Server::start(listen, setup, snapshots, requests)?;
     message!("live picture: {}", server.url());
     if let Some(url) = server.shared_url() {
         message!("on the network: {url}\nwho has this address can see the page and press its buttons");
@@ -243,6 +253,11 @@ fn serve(
         browser::open(&server.url());
     }
     Ok(Some(server))
+}
+
+/// Who gets in besides those who always do.
+fn door(args: &PictureArgs) -> Door {
+    Door { origins: args.allow_origin.clone(), ..Door::default() }
 }
 
 /// Waits for Ctrl-C: the last picture stays on the page.

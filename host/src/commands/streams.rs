@@ -11,6 +11,7 @@ use tactomo::schema::SCHEMA;
 use tactomo::sink::Sinks;
 use tactomo::sink::address::Address;
 use tactomo::sink::channels::Messages;
+use tactomo::sink::door::Door;
 use tactomo::sink::foxglove;
 use tactomo::sink::lines::Fields;
 use tactomo::sink::stream::{Form, Target};
@@ -34,8 +35,9 @@ pub struct StreamArgs {
     /// as contacts,image [default: answer]
     #[arg(long, value_name = "FIELDS", requires = "stream")]
     stream_fields: Option<Fields>,
-    /// Serves Foxglove's app: open ws://127.0.0.1:8765 in it. Who can reach the address can read what is touched
-    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1)]
+    /// Serves Foxglove's app: open ws://127.0.0.1:8765 in it. Programs that can reach the address can read what is touched; of pages in a
+    /// browser Foxglove's own, and those that --allow-origin names
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1)]
     foxglove: Option<Option<Address>>,
     /// Keeps all answers and readings in a new MCAP file, for Foxglove and Python
     #[arg(long, value_name = "FILE")]
@@ -51,8 +53,8 @@ impl StreamArgs {
         Ok(())
     }
 
-    /// Begins all of them. `stop` is set when whoever reads stdout has gone; `source` is where the bytes come from.
-    pub fn begin(&self, problem: &Problem, source: &str, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
+    /// Begins all of them. `stop` is set when whoever reads stdout has gone; `source` is where the bytes come from, and `door` lets pages in.
+    pub fn begin(&self, problem: &Problem, source: &str, door: Door, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
         let mut sinks = Sinks::new(stop);
         let form = Form { fields: self.stream_fields.unwrap_or_default(), most_per_s: self.stream_hz };
         for target in &self.stream {
@@ -62,7 +64,7 @@ impl StreamArgs {
         }
         if let Some(address) = &self.foxglove {
             let address = address.clone().unwrap_or(Address::local(foxglove::DEFAULT_PORT));
-            let at = sinks.add_foxglove(&address, messages(problem))?;
+            let at = sinks.add_foxglove(&address, messages(problem), door)?;
             message!("Foxglove: open ws://{at} in the app");
         }
         if let Some(path) = &self.mcap {

@@ -29,6 +29,9 @@ pub struct TouchEvent {
     pub status: Status,
     /// Readings as measured (V), of this frame; of rows the latest of each.
     pub readings: Readings,
+    /// The same as they are [used](tactomo_board::measured::Volts::used) (V): one that its converter's noise may hide below the floor, or above the
+    /// ceiling, is that bound.
+    pub used: Readings,
     /// What the solver got (V): the mean of the last frames as far as they stood still, less the baseline, as no channel differs from
     /// others.
     pub touch: Readings,
@@ -61,6 +64,7 @@ impl TouchEvent {
             rezeroing: self.is_taking_baseline,
             image_s_per_m2: self.solution.image_s_per_m2.as_deref(),
             readings_v: Some(&self.readings),
+            used_v: Some(&self.used),
             touch_v: Some(&self.touch),
             averaged: Some(self.averaged),
             events: &self.pointer_events,
@@ -141,7 +145,8 @@ impl Listeners {
             arrived_unix_ns: unix_ns(frame.arrived),
             age: Some(answer.ready - frame.arrived),
             status: frame.status,
-            readings: frame.newest.clone(),
+            readings: frame.measured.clone(),
+            used: frame.newest.clone(),
             touch: answer.touch.clone(),
             averaged: frame.averaged,
             lost: frame.lost,

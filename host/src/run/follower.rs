@@ -435,7 +435,7 @@ impl Taken {
             board_time_us: self.board_time_us,
             arrived: self.arrived,
             status: self.status,
-            readings: self.newest.clone(),
+            readings: self.measured.clone(),
             solution,
             pointer,
             rezeroing,

@@ -31,7 +31,9 @@ pub struct Rows {
 /// A frame, or the mean of some that stood still.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taken {
-    /// Readings (V): of the newest frame as measured; of rows the latest of each.
+    /// Readings as measured (V), of the newest frame; of rows the latest of each.
+    pub measured: Readings,
+    /// The same as they are [used](tactomo_board::measured::Volts::used) (V).
     pub newest: Readings,
     /// The rows that came since the last one was taken, the oldest first; none of whole frames.
     pub rows: Vec<Rows>,
@@ -58,6 +60,7 @@ impl Taken {
     /// A frame of such readings (V) that comes now, the first of all.
     pub fn of(readings: Readings) -> Self {
         Self {
+            measured: readings.clone(),
             newest: readings.clone(),
             rows: Vec::new(),
             mean: readings,

@@ -16,7 +16,7 @@ use tactomo_board::board_log::BoardLog;
 use tactomo_board::link::SourceError;
 use tactomo_board::measured::Mismatch;
 use tactomo_board::record::{RecordError, Recorder, Ring};
-use tactomo_board::session::{GreetError, RequestedSettings};
+use tactomo_board::session::{self, GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
@@ -205,6 +205,12 @@ pub enum LiveError {
         link: String,
         /// Why.
         error: GreetError,
+    },
+    /// The board has said Hello, and the time is over without a frame.
+    #[error("{link}: {}", session::MUTE)]
+    Mute {
+        /// Name of the link.
+        link: String,
     },
     /// The link broke and cannot come back.
     #[error("{link} broke")]

@@ -26,7 +26,7 @@ use super::notice::NoticeBoard;
 use super::plan::{Ends, LiveError, Plan, Summary};
 use super::scanned::Scanned;
 use super::scanning::{PlanAsk, PlanWish};
-use super::talk::{PATIENCE, Talk};
+use super::talk::Talk;
 use super::{LinkState, Request};
 
 /// Time between two tries to open a link that was lost.
@@ -131,8 +131,8 @@ struct Reader {
     keeping: Keeping,
     course: Course,
     scanned: Scanned,
-    /// The latest of each reading, while the board sends rows.
-    latest: Option<Latest>,
+    /// The latest of each reading as measured and as used, while the board sends rows.
+    latest: Option<[Latest; 2]>,
     /// The plan that the follower wishes, on its way to the board.
     scan: PlanAsk,
 }
@@ -187,7 +187,7 @@ impl Reader {
 
     /// Talks with the board on `link` to the end.
     fn talk(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
-        let mut talk = Talk::new(self.plan.settings);
+        let mut talk = Talk::new(self.plan.settings, comes_back);
         self.scan.ask_again(&mut talk.session);
         let mut buffer = [0; READ_BYTES];
         self.sequence.restart();
@@ -208,18 +208,20 @@ impl Reader {
                 }
                 Err(error) => return lost(link, error, comes_back),
             }
-            if comes_back && talk.is_in_vain() {
-                return self.unanswered(&talk, link);
+            if comes_back && let Some(error) = talk.in_vain() {
+                return self.unanswered(error, link);
             }
             self.show_link(link, &mut talk);
+        }
+        let frames = self.notice.count(|meter| meter.statistics(Instant::now()).frames);
+        if comes_back && frames == 0 && self.is_timed_out() {
+            return Err(LiveError::Mute { link: link.name() });
         }
         Ok(End::Stopped)
     }
 
     /// No board has answered: at the start that is an error, later it may come back.
-    fn unanswered(&self, talk: &Talk, link: &dyn Link) -> Result<End, LiveError> {
-        let error =
-            GreetError::Silent { seconds: PATIENCE.as_secs(), junk_bytes: talk.receiver.counters().dropped_bytes };
+    fn unanswered(&self, error: GreetError, link: &dyn Link) -> Result<End, LiveError> {
         if self.greeted.is_some() {
             return Ok(End::Lost(with_causes(&error)));
         }
@@ -269,6 +271,9 @@ impl Reader {
 
     fn hello(&mut self, talk: &mut Talk, hello: Hello, now: Instant) -> Result<(), LiveError> {
         talk.session.hello(&hello, now);
+        if talk.answers && !talk.session.knows_the_board() {
+            return Ok(());
+        }
         self.keeping.hello(&hello);
         talk.junk.get_or_insert(talk.receiver.counters().corrupt);
         self.greeted.get_or_insert(now);
@@ -302,8 +307,8 @@ impl Reader {
         // Before Hello nobody knows what the readings mean.
         let (Some(board), Some(_)) = (&self.board, talk.junk) else { return };
         talk.session.frame(received);
-        talk.landing = false;
-        let Some(readings) = board.volts.readings(frame) else {
+        talk.landed();
+        let Some(measured) = board.volts.measured(frame) else {
             return self.notice.count(|meter| meter.corrupt(1));
         };
         let place = self.sequence.place(&frame.head);
@@ -317,12 +322,17 @@ impl Reader {
             return;
         }
         // Elapsed time is nothing to the latest of all.
-        let (newest, rows) = match frame.scope.is_whole() {
-            true => (readings, Vec::new()),
+        let readings = board.volts.used(measured.clone());
+        let (measured, newest, rows) = match frame.scope.is_whole() {
+            true => (measured, readings, Vec::new()),
             false => {
-                let latest = self.latest.get_or_insert_with(|| Latest::new(readings.electrodes()));
-                latest.add(&readings, 0.0, None);
-                (latest.readings(f64::MAX, None), vec![Rows { readings, time_us: place.time_us }])
+                let latest = self.latest.get_or_insert_with(|| [(); 2].map(|()| Latest::new(readings.electrodes())));
+                let [as_measured, as_used] = latest;
+                let [measured, newest] = [(as_measured, &measured), (as_used, &readings)].map(|(latest, rows)| {
+                    latest.add(rows, 0.0, None);
+                    latest.readings(f64::MAX, None)
+                });
+                (measured, newest, vec![Rows { readings, time_us: place.time_us }])
             }
         };
         if rows.is_empty() {
@@ -330,6 +340,7 @@ impl Reader {
         }
         self.course.add(place.time_us, &newest);
         let taken = Taken {
+            measured,
             mean: newest.clone(),
             newest,
             rows,
@@ -344,9 +355,12 @@ impl Reader {
         self.inbox.put_frame(taken, board.noise_v);
     }
 
+    fn is_timed_out(&self) -> bool {
+        self.plan.seconds.zip(self.greeted).is_some_and(|(limit, begin)| begin.elapsed() >= limit)
+    }
+
     fn is_over(&self) -> bool {
-        let timed_out = self.plan.seconds.zip(self.greeted).is_some_and(|(limit, begin)| begin.elapsed() >= limit);
-        timed_out || self.stop.load(Ordering::Relaxed) || self.inbox.is_closed()
+        self.is_timed_out() || self.stop.load(Ordering::Relaxed) || self.inbox.is_closed()
     }
 
     fn answer_requests(&mut self, mut open: Option<(&mut dyn Link, &mut Talk)>) {

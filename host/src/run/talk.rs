@@ -4,18 +4,20 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use tactomo_board::link::Link;
-use tactomo_board::session::{self, Session};
+use tactomo_board::session::{self, GreetError, Session};
 use tactomo_protocol::BoardReceiver;
 
 /// How long a board has to say Hello: opening the port may have reset it, and then it boots first.
-pub(super) const PATIENCE: Duration = Duration::from_secs(6);
+const PATIENCE: Duration = Duration::from_secs(6);
 
 /// One link, from its opening on.
 pub(super) struct Talk {
+    /// Whether there is a board that hears what it is asked: a recording has the answers that another host got.
+    pub answers: bool,
     pub session: Session,
     pub receiver: BoardReceiver,
     opened: Instant,
-    /// Stretches of junk until the board said Hello; `None` before.
+    /// Stretches of junk until the board said Hello, in answer to what it was asked; `None` before.
     pub junk: Option<u64>,
     /// Corrupt stretches that were counted.
     counted: u64,
@@ -26,9 +28,10 @@ pub(super) struct Talk {
 }
 
 impl Talk {
-    /// A link that was just opened, to a board that such settings are asked of.
-    pub fn new(settings: session::RequestedSettings) -> Self {
+    /// A link that was just opened, to a board that such settings are asked of, and that answers or does not.
+    pub fn new(settings: session::RequestedSettings, answers: bool) -> Self {
         Self {
+            answers,
             session: Session::new(settings),
             receiver: BoardReceiver::default(),
             opened: Instant::now(),
@@ -47,15 +50,27 @@ impl Talk {
         link.read(buffer)
     }
 
-    /// Whether no board has said Hello in time.
-    pub fn is_in_vain(&self) -> bool {
-        self.junk.is_none() && self.opened.elapsed() >= PATIENCE
+    /// Whether no board has said Hello in time, and what is wrong.
+    pub fn in_vain(&self) -> Option<GreetError> {
+        if self.junk.is_some() || self.opened.elapsed() < PATIENCE {
+            return None;
+        }
+        let junk_bytes = self.receiver.counters().dropped_bytes;
+        let silent = GreetError::Silent { seconds: PATIENCE.as_secs(), junk_bytes };
+        Some(self.session.stray().map_or(silent, |(named, sent)| GreetError::Stray { named, sent }))
     }
 
     /// Forgets the packet under way: what follows it is elsewhere.
     pub fn jumped(&mut self) {
         self.receiver = BoardReceiver::default();
         (self.junk, self.counted, self.landing) = (self.junk.map(|_| 0), 0, true);
+    }
+
+    /// Takes note of a frame: the rest of a packet that a jump has landed in is behind.
+    pub fn landed(&mut self) {
+        if std::mem::take(&mut self.landing) {
+            self.counted = self.receiver.counters().corrupt;
+        }
     }
 
     /// Corrupt stretches since the last time this was asked; boot text before Hello is none.
@@ -70,5 +85,46 @@ impl Talk {
         let newly = corrupt - self.counted;
         self.counted = corrupt;
         newly
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tactomo_protocol::{FrameHead, MAX_WIRE, encode_frame};
+
+    use super::*;
+
+    fn frame() -> Vec<u8> {
+        let mut wire = [0; MAX_WIRE];
+        let length = encode_frame(FrameHead::default(), &[7; 16], &mut wire).unwrap();
+        wire[..length].to_vec()
+    }
+
+    /// Receives bytes in one read, and takes note of the frames in them; how many stretches are newly corrupt.
+    fn receive(talk: &mut Talk, bytes: &[u8]) -> u64 {
+        let mut input = bytes;
+        while let Some(message) = talk.receiver.receive(&mut input) {
+            if message.is_ok() {
+                talk.landed();
+            }
+        }
+        talk.newly_corrupt()
+    }
+
+    #[test]
+    fn where_a_jump_lands_is_no_damage_and_what_comes_after_is() {
+        let mut talk = Talk::new(session::RequestedSettings::default(), false);
+        talk.junk = Some(0);
+        let junk = b"\x09a rest\0";
+        assert_eq!(receive(&mut talk, &[junk, &frame()[..]].concat()), 1);
+        talk.jumped();
+        assert_eq!(
+            receive(&mut talk, &[junk, &frame()[..]].concat()),
+            0,
+            "the rest of a packet, and a frame in the same read"
+        );
+        assert_eq!(receive(&mut talk, &[junk, &frame()[..]].concat()), 1);
+        talk.jumped();
+        assert_eq!(receive(&mut talk, junk) + receive(&mut talk, &frame()), 0, "in two reads");
     }
 }

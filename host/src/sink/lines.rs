@@ -13,7 +13,7 @@ pub struct Fields {
     pub answer: bool,
     /// The image, if the answer has one.
     pub image: bool,
-    /// The readings as measured, and as the solver got them.
+    /// The readings as measured, as they are used, and as the solver got them.
     pub readings: bool,
 }
 
@@ -58,6 +58,7 @@ impl Fields {
             choice: all.choice.filter(|_| self.answer),
             image_s_per_m2: all.image_s_per_m2.filter(|_| self.image),
             readings_v: all.readings_v.filter(|_| self.readings),
+            used_v: all.used_v.filter(|_| self.readings),
             touch_v: all.touch_v.filter(|_| self.readings),
             averaged: all.averaged.filter(|_| self.readings),
             ..all
@@ -108,12 +109,12 @@ mod tests {
 
     #[test]
     fn a_line_has_the_fields_that_were_asked_for() {
-        let names = ["contacts", "flags", "residual", "image_s_per_m2", "readings_v", "touch_v"];
-        assert_eq!(has(&line("contacts"), &names), [true, false, false, false, false, false]);
-        assert_eq!(has(&line("answer"), &names), [true, true, true, false, false, false]);
-        assert_eq!(has(&line("contacts,image"), &names), [true, false, false, true, false, false]);
-        assert_eq!(has(&line("answer,readings"), &names), [true, true, true, false, true, true]);
-        assert_eq!(has(&line("all"), &names), [true; 6]);
+        let names = ["contacts", "flags", "residual", "image_s_per_m2", "readings_v", "used_v", "touch_v"];
+        assert_eq!(has(&line("contacts"), &names), [true, false, false, false, false, false, false]);
+        assert_eq!(has(&line("answer"), &names), [true, true, true, false, false, false, false]);
+        assert_eq!(has(&line("contacts,image"), &names), [true, false, false, true, false, false, false]);
+        assert_eq!(has(&line("answer,readings"), &names), [true, true, true, false, true, true, true]);
+        assert_eq!(has(&line("all"), &names), [true; 7]);
         assert!("contacts,forces".parse::<Fields>().is_err_and(|error| error.contains("`forces`")));
     }
 

@@ -3,6 +3,7 @@
 
 pub mod address;
 pub mod channels;
+pub mod door;
 mod feed;
 pub mod foxglove;
 pub mod lines;
@@ -14,6 +15,7 @@ pub mod stream;
 mod tcp;
 mod thin;
 mod udp;
+mod web;
 
 pub use self::feed::Delivery;
 pub use self::running::{SinkError, Sinks};

@@ -1,59 +1,96 @@
 //! Solved frames as a Parquet file: a row a frame, for pandas, Polars, DuckDB and whatever else reads tables.
 //!
-//! Columns are those of [`schema`], each an optional double; `contact_*` are lists, of a number for each contact (NaN where
-//! it is not known), `readings_v`, `touch_v` and `image_s_per_m2` lists too; `excluded` and `choice` are text. Readings are the doubles that were solved, bit for
-//! bit; where nothing was read they are NaN.
+//! Columns are those of [`schema`], each in its kind: optional 64-bit integers, booleans and doubles; `contact_*` are lists, of a value for
+//! each contact (of a number NaN, of others null where it is not known), `readings_v`, `used_v`, `touch_v` and `image_s_per_m2` lists of numbers too;
+//! `excluded`, `choice` and `events` are text. Readings are the doubles that were solved, bit for bit; where nothing was read they are NaN.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::sync::Arc;
 
 use parquet::basic::Compression;
-use parquet::data_type::{ByteArray, ByteArrayType, DoubleType};
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
-use tactomo_physics::readings::{Readings, Says};
-use tactomo_touch::schema::{self, CONTACT_COLUMNS, FRAME_COLUMNS, FrameReport, SHAPE_COLUMNS, TEXT_COLUMNS};
+use tactomo_physics::readings::Readings;
+use tactomo_touch::schema::{self, CONTACT_COLUMNS, FRAME_COLUMNS, FrameReport, Kind, SHAPE_COLUMNS, TEXT_COLUMNS};
 
 /// Frames that are written together: readings of 16 electrodes of so many take 17 MB.
 const FRAMES: usize = 4096;
 /// Lists that are no numbers of contacts.
-const LISTS: [&str; 3] = ["readings_v", "touch_v", "image_s_per_m2"];
+const LISTS: [&str; 4] = ["readings_v", "used_v", "touch_v", "image_s_per_m2"];
 
 /// Writes solved frames.
 pub struct ParquetWriter {
     writer: SerializedFileWriter<BufWriter<File>>,
-    /// Numbers of frames and shapes, a column each.
-    numbers: Vec<Vec<Option<f64>>>,
-    /// Numbers of contacts, and [`LISTS`].
-    lists: Vec<Lists>,
+    /// Of frames and shapes, then of contacts, then [`LISTS`], in the order of [`columns`].
+    columns: Vec<Values>,
     texts: [Vec<ByteArray>; TEXT_COLUMNS.len()],
     frames: usize,
 }
 
-/// A column of lists, as Parquet has them: the values of all, and for each value, or empty list, whether it is one and whether it
+/// A column, as Parquet has it: the values that there are, and for each value, gap or empty list, how much of it is there and whether it
 /// goes on with the list before.
-#[derive(Default)]
-struct Lists {
+struct Values {
+    kind: Kind,
     values: Vec<f64>,
     definitions: Vec<i16>,
+    /// None in a column that has no lists.
     repetitions: Vec<i16>,
 }
 
-impl Lists {
-    fn push(&mut self, list: impl Iterator<Item = f64>) {
-        let before = self.values.len();
-        self.values.extend(list);
-        let added = self.values.len() - before;
-        if added == 0 {
+impl Values {
+    fn new(kind: Kind) -> Self {
+        Self { kind, values: Vec::new(), definitions: Vec::new(), repetitions: Vec::new() }
+    }
+
+    fn push(&mut self, value: Option<f64>) {
+        self.definitions.push(i16::from(value.is_some()));
+        self.values.extend(value);
+    }
+
+    fn push_list(&mut self, list: impl Iterator<Item = Option<f64>>) {
+        let before = self.definitions.len();
+        for value in list {
+            self.repetitions.push(i16::from(self.definitions.len() > before));
+            match (self.kind, value) {
+                (Kind::Number, value) => {
+                    self.values.push(value.unwrap_or(f64::NAN));
+                    self.definitions.push(1);
+                }
+                (_, None) => self.definitions.push(1),
+                (_, Some(value)) => {
+                    self.values.push(value);
+                    self.definitions.push(2);
+                }
+            }
+        }
+        if self.definitions.len() == before {
             self.definitions.push(0);
             self.repetitions.push(0);
         }
-        self.definitions.extend(std::iter::repeat_n(1, added));
-        self.repetitions.extend((0..added).map(|index| i16::from(index > 0)));
+    }
+
+    /// Writes all of it in its kind, and begins anew.
+    fn write(&mut self, mut column: SerializedColumnWriter) -> Result<(), ParquetError> {
+        let Self { values, definitions, repetitions, .. } = std::mem::replace(self, Self::new(self.kind));
+        let (definitions, repetitions) =
+            (Some(&definitions[..]), (!repetitions.is_empty()).then_some(&repetitions[..]));
+        match self.kind {
+            Kind::Number => column.typed::<DoubleType>().write_batch(&values, definitions, repetitions),
+            Kind::Integer => {
+                let values: Vec<i64> = values.iter().map(|value| *value as i64).collect();
+                column.typed::<Int64Type>().write_batch(&values, definitions, repetitions)
+            }
+            Kind::Flag => {
+                let values: Vec<bool> = values.iter().map(|value| *value != 0.0).collect();
+                column.typed::<BoolType>().write_batch(&values, definitions, repetitions)
+            }
+        }?;
+        column.close()
     }
 }
 
@@ -70,8 +107,7 @@ impl ParquetWriter {
         let writer = SerializedFileWriter::new(out, message, Arc::new(properties.build()))?;
         Ok(Self {
             writer,
-            numbers: vec![Vec::new(); number_columns().count()],
-            lists: list_columns().map(|_| Lists::default()).collect(),
+            columns: columns().map(|column| Values::new(column.kind)).collect(),
             texts: Default::default(),
             frames: 0,
         })
@@ -84,17 +120,18 @@ impl ParquetWriter {
     pub fn write(&mut self, frame: &FrameReport) -> Result<(), ParquetError> {
         let of_frame = FRAME_COLUMNS.iter().map(|column| column.value(frame));
         let of_shape = SHAPE_COLUMNS.iter().map(|column| frame.shape.and_then(|shape| column.value(shape)));
-        for (column, value) in self.numbers.iter_mut().zip(of_frame.chain(of_shape)) {
-            column.push(value);
+        let mut columns = self.columns.iter_mut();
+        // The values come first: `zip` takes from both, and asks the first one more.
+        of_frame.chain(of_shape).zip(&mut columns).for_each(|(value, column)| column.push(value));
+        for (of_contact, column) in CONTACT_COLUMNS.iter().zip(&mut columns) {
+            column.push_list(frame.contacts.iter().map(|contact| of_contact.value(contact)));
         }
-        let (contacts, others) = self.lists.split_at_mut(CONTACT_COLUMNS.len());
-        for (list, column) in contacts.iter_mut().zip(&CONTACT_COLUMNS) {
-            list.push(frame.contacts.iter().map(|contact| column.value(contact).unwrap_or(f64::NAN)));
+        for (readings, column) in [frame.readings_v, frame.used_v, frame.touch_v].into_iter().zip(&mut columns) {
+            column.push_list(readings.into_iter().flat_map(Readings::read_v).map(Some));
         }
-        let [readings, touch, image] = others else { return Ok(()) };
-        readings.push(volts(frame.readings_v));
-        touch.push(volts(frame.touch_v));
-        image.push(frame.image_s_per_m2.unwrap_or_default().iter().map(|value| f64::from(*value)));
+        if let Some(column) = columns.next() {
+            column.push_list(frame.image_s_per_m2.unwrap_or_default().iter().map(|value| Some(f64::from(*value))));
+        }
         for (column, text) in self.texts.iter_mut().zip(schema::texts(frame)) {
             column.push(ByteArray::from(text.into_bytes()));
         }
@@ -117,13 +154,10 @@ impl ParquetWriter {
             return Ok(());
         }
         let mut group = self.writer.next_row_group()?;
-        for column in &mut self.numbers {
-            let definitions: Vec<i16> = column.iter().map(|value| i16::from(value.is_some())).collect();
-            let values: Vec<f64> = column.drain(..).flatten().collect();
-            put(&mut group, &Lists { values, definitions, repetitions: Vec::new() })?;
-        }
-        for list in &mut self.lists {
-            put(&mut group, &std::mem::take(list))?;
+        for values in &mut self.columns {
+            if let Some(column) = group.next_column()? {
+                values.write(column)?;
+            }
         }
         for texts in &mut self.texts {
             if let Some(mut column) = group.next_column()? {
@@ -136,45 +170,49 @@ impl ParquetWriter {
     }
 }
 
-fn put<W: Write + Send>(group: &mut SerializedRowGroupWriter<W>, list: &Lists) -> Result<(), ParquetError> {
-    let Some(mut column) = group.next_column()? else { return Ok(()) };
-    let repetitions = Some(&list.repetitions[..]).filter(|repetitions| !repetitions.is_empty());
-    column.typed::<DoubleType>().write_batch(&list.values, Some(&list.definitions), repetitions)?;
-    column.close()
+/// A column of the file.
+struct Column {
+    name: String,
+    kind: Kind,
+    is_list: bool,
 }
 
-fn volts(readings: Option<&Readings>) -> impl Iterator<Item = f64> {
-    readings.into_iter().flat_map(|readings| {
-        let n = readings.electrodes();
-        let is_read = move |index: usize| readings.says(index / n, index % n) != Says::Nothing;
-        readings.volts().iter().enumerate().map(move |(index, volts)| if is_read(index) { *volts } else { f64::NAN })
-    })
-}
-
-fn number_columns() -> impl Iterator<Item = &'static str> {
-    let frame = FRAME_COLUMNS.iter().map(|column| column.name);
-    frame.chain(SHAPE_COLUMNS.iter().map(|column| column.name))
-}
-
-fn list_columns() -> impl Iterator<Item = String> {
-    let contact = CONTACT_COLUMNS.iter().map(|column| format!("contact_{}", column.name));
-    contact.chain(LISTS.map(str::to_owned))
+/// All but the texts, in their order.
+fn columns() -> impl Iterator<Item = Column> {
+    let one = |name: &str, kind| Column { name: name.to_owned(), kind, is_list: false };
+    let list = |name: String, kind| Column { name, kind, is_list: true };
+    let frame = FRAME_COLUMNS.iter().map(move |column| one(column.name, column.kind));
+    let shape = SHAPE_COLUMNS.iter().map(move |column| one(column.name, Kind::Number));
+    let contact = CONTACT_COLUMNS.iter().map(move |column| list(format!("contact_{}", column.name), column.kind));
+    let lists = LISTS.iter().map(move |name| list((*name).to_owned(), Kind::Number));
+    frame.chain(shape).chain(contact).chain(lists)
 }
 
 /// The columns in Parquet's own words.
 fn message() -> String {
-    let numbers = number_columns().map(|name| format!("optional double {name};"));
-    let lists = list_columns()
-        .map(|name| format!("required group {name} (LIST) {{ repeated group list {{ required double element; }} }}"));
+    let told = |Column { name, kind, is_list }: Column| {
+        let kind = match kind {
+            Kind::Number if is_list => "required double",
+            Kind::Number => "optional double",
+            Kind::Integer => "optional int64",
+            Kind::Flag => "optional boolean",
+        };
+        match is_list {
+            true => format!("required group {name} (LIST) {{ repeated group list {{ {kind} element; }} }}"),
+            false => format!("{kind} {name};"),
+        }
+    };
     let texts = TEXT_COLUMNS.iter().map(|name| format!("required binary {name} (STRING);"));
-    format!("message touch {{ {} }}", numbers.chain(lists).chain(texts).collect::<Vec<_>>().join(" "))
+    format!("message touch {{ {} }}", columns().map(told).chain(texts).collect::<Vec<_>>().join(" "))
 }
 
 #[cfg(test)]
 mod tests {
     use parquet::file::reader::{FileReader, SerializedFileReader};
-    use parquet::record::RowAccessor;
-    use tactomo_touch::solve::{FoundContact, Solution};
+    use parquet::record::{ListAccessor, RowAccessor};
+    use tactomo_physics::readings::Says;
+    use tactomo_touch::pointer::PointerEvent;
+    use tactomo_touch::solve::{Flags, FoundContact, Solution};
 
     use super::*;
 
@@ -189,20 +227,43 @@ mod tests {
                 .saying(|g, _| if g == 2 { Says::Nothing } else { Says::Voltage })
         };
         for frame in 0..FRAMES + 3 {
-            let contacts = (0..frame % 3).map(|index| FoundContact::flat(index as f64, 0.5, 1e-3)).collect();
-            let (solution, readings) = (Solution { contacts, ..Solution::default() }, readings(frame));
-            let sequence = Some(frame as u64);
-            writer.write(&FrameReport { sequence, readings_v: Some(&readings), ..FrameReport::of(&solution) }).unwrap();
+            let id = |index| (index > 0).then_some(1 << 24 | index as u32);
+            let contact = |index| FoundContact { id: id(index), ..FoundContact::flat(index as f64, 0.5, 1e-3) };
+            let flags = Flags { misfit: frame == 5, ..Flags::default() };
+            let solution = Solution { contacts: (0..frame % 3).map(contact).collect(), flags, ..Solution::default() };
+            let readings = readings(frame);
+            let report = FrameReport {
+                sequence: (frame != 7).then_some(1 << 40 | frame as u64),
+                arrived_unix_s: Some(1.79e9 + frame as f64),
+                readings_v: Some(&readings),
+                events: if frame == 9 { &[PointerEvent::Press] } else { &[] },
+                ..FrameReport::of(&solution)
+            };
+            writer.write(&report).unwrap();
         }
         writer.finish().unwrap();
         let reader = SerializedFileReader::new(File::open(&path).unwrap()).unwrap();
         assert_eq!((reader.num_row_groups(), reader.metadata().file_metadata().num_rows()), (2, FRAMES as i64 + 3));
-        let place =
-            |name: &str| number_columns().map(str::to_owned).chain(list_columns()).position(|column| column == name);
-        let (x_at, readings_at) = (place("contact_x_m").unwrap(), place("readings_v").unwrap());
+        let place = |name: &str| {
+            columns()
+                .map(|column| column.name)
+                .chain(TEXT_COLUMNS.map(str::to_owned))
+                .position(|known| known == name)
+                .unwrap()
+        };
+        let (x_at, readings_at) = (place("contact_x_m"), place("readings_v"));
         for (frame, row) in reader.get_row_iter(None).unwrap().enumerate() {
             let row = row.unwrap();
-            assert_eq!(row.get_double(place("sequence").unwrap()).unwrap(), frame as f64);
+            match row.get_long(place("sequence")) {
+                Ok(sequence) => assert_eq!(sequence, 1 << 40 | frame as i64),
+                Err(_) => assert_eq!(frame, 7, "null where it is not known"),
+            }
+            assert_eq!(row.get_double(place("arrived_unix_s")).unwrap(), 1.79e9 + frame as f64);
+            assert_eq!(row.get_bool(place("misfit")).unwrap(), frame == 5);
+            assert_eq!(row.get_string(place("events")).unwrap() == r#"[{"kind":"press"}]"#, frame == 9);
+            let ids = row.get_list(place("contact_id")).unwrap();
+            let ids: Vec<_> = (0..ids.len()).map(|index| ids.get_long(index).ok()).collect();
+            assert_eq!(ids, [None, Some(1 << 24 | 1)][..frame % 3]);
             let x_m: Vec<f64> = doubles(row.get_list(x_at).unwrap());
             assert_eq!(x_m, (0..frame % 3).map(|index| index as f64).collect::<Vec<_>>());
             for (index, volts) in doubles(row.get_list(readings_at).unwrap()).into_iter().enumerate() {
@@ -214,7 +275,6 @@ mod tests {
     }
 
     fn doubles(list: &parquet::record::List) -> Vec<f64> {
-        use parquet::record::ListAccessor;
         (0..list.len()).map(|index| list.get_double(index).unwrap()).collect()
     }
 }

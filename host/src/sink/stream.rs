@@ -8,6 +8,7 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use super::address::Address;
+use super::door::Limits;
 use super::feed::{Delivery, Keeps};
 use super::lines::Fields;
 use super::running::{PATIENCE, Sink, Sinks};
@@ -38,8 +39,8 @@ impl FromStr for Target {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once(':') {
             _ if text == "-" => Ok(Self::Stdout),
-            Some(("tcp", address)) => address.parse().map(Self::Tcp),
-            Some(("udp", address)) => address.parse().map(Self::Udp),
+            Some(("tcp", address)) => Address::with_port(address).map(Self::Tcp),
+            Some(("udp", address)) => Address::with_port(address).map(Self::Udp),
             _ => Ok(Self::File(text.into())),
         }
     }
@@ -144,7 +145,7 @@ impl Sinks {
                 let lines = Lines::new(create(path)?, form.fields, FLUSH_EVERY);
                 self.run(name.clone(), pace(Keeps::All), DISK_PATIENCE, lines)
             }
-            Target::Tcp(address) => return tcp::serve(self, address, form).map(Some),
+            Target::Tcp(address) => return tcp::serve(self, address, form, Limits::default()).map(Some),
             Target::Udp(address) => {
                 let datagrams = udp::Datagrams::to(address, name.clone(), form.fields)?;
                 self.run(name.clone(), pace(Keeps::Newest), PATIENCE, datagrams)

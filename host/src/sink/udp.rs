@@ -15,14 +15,13 @@ pub(super) struct Datagrams {
     name: String,
     fields: Fields,
     line: Vec<u8>,
-    too_long: u64,
 }
 
 impl Datagrams {
     /// Sends to an address.
     pub fn to(address: &Address, name: String, fields: Fields) -> Result<Self, StreamError> {
         let refused = StreamError::address("a stream", address);
-        let to = address.resolve().map_err(&refused)?;
+        let to = address.resolve(0).map_err(&refused)?;
         let from = if to.is_ipv4() { (Ipv4Addr::UNSPECIFIED, 0).into() } else { (Ipv6Addr::UNSPECIFIED, 0).into() };
         let bound = |from: std::net::SocketAddr| {
             let socket = UdpSocket::bind(from)?;
@@ -30,7 +29,7 @@ impl Datagrams {
             Ok(socket)
         };
         let socket = bound(from).map_err(&refused)?;
-        Ok(Self { socket, name, fields, line: Vec::new(), too_long: 0 })
+        Ok(Self { socket, name, fields, line: Vec::new() })
     }
 }
 
@@ -40,14 +39,10 @@ impl Sink for Datagrams {
         // The most that one over IPv4 carries: 65535 bytes less the headers of IP and UDP (RFC 768, RFC 791).
         const LONGEST: usize = 65_507;
         if self.line.len() > LONGEST {
-            if self.too_long == 0 {
-                let length = self.line.len();
-                tracing::warn!(
-                    "{}: a line of {length} bytes is too long for a datagram, and is left out; ask for fewer fields",
-                    self.name
-                );
-            }
-            self.too_long += 1;
+            tracing::warn!(
+                "{}: a line of more than {LONGEST} bytes is too long for a datagram, and is left out; ask for fewer fields",
+                self.name
+            );
             return Ok(());
         }
         match self.socket.send(&self.line) {
@@ -58,9 +53,6 @@ impl Sink for Datagrams {
     }
 
     fn finish(&mut self) -> io::Result<()> {
-        if self.too_long > 0 {
-            tracing::warn!("{}: {} lines were too long for a datagram", self.name, self.too_long);
-        }
         Ok(())
     }
 }

@@ -9,6 +9,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 pub use self::csv::CsvWriter;
+pub use self::npy::Values;
 pub use self::npz::NpzWriter;
 
 /// Longest file that is read (bytes).

@@ -99,7 +99,7 @@ impl Number {
         let wrong = || format!("arrays of {} are not read: save them as float64", kind.escape_debug());
         let &[order, kind, size] = kind.as_bytes() else { return Err(wrong()) };
         let bytes = usize::from(size.wrapping_sub(b'0'));
-        let known = matches!((kind, bytes), (b'f', 4 | 8) | (b'i' | b'u', 1 | 2 | 4 | 8));
+        let known = matches!((kind, bytes), (b'f', 4 | 8) | (b'i' | b'u', 1 | 2 | 4 | 8) | (b'b', 1));
         if !known || !b"<>|=".contains(&order) {
             return Err(wrong());
         }
@@ -117,7 +117,7 @@ impl Number {
         match (self.kind, self.bytes) {
             (b'f', 4) => f64::from(f32::from_bits(unsigned as u32)),
             (b'f', _) => f64::from_bits(unsigned),
-            (b'u', _) => unsigned as f64,
+            (b'u' | b'b', _) => unsigned as f64,
             _ => {
                 let unused = 64 - 8 * self.bytes as u32;
                 ((unsigned << unused) as i64 >> unused) as f64
@@ -126,16 +126,47 @@ impl Number {
     }
 }
 
-/// The file of an array, in double precision.
-pub fn bytes(shape: &[usize], values: &[f64]) -> Vec<u8> {
+/// Numbers of an array, in the kind in which they are kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Values<'a> {
+    /// In double precision.
+    Numbers(&'a [f64]),
+    /// In 64 bits.
+    Integers(&'a [i64]),
+    /// In a byte each.
+    Flags(&'a [bool]),
+}
+
+impl Values<'_> {
+    /// What NumPy calls their kind.
+    fn kind(self) -> &'static str {
+        match self {
+            Self::Numbers(_) => "<f8",
+            Self::Integers(_) => "<i8",
+            Self::Flags(_) => "|b1",
+        }
+    }
+
+    fn bytes(self) -> Vec<u8> {
+        match self {
+            Self::Numbers(values) => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
+            Self::Integers(values) => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
+            Self::Flags(values) => values.iter().map(|value| u8::from(*value)).collect(),
+        }
+    }
+}
+
+/// The file of an array.
+pub fn bytes(shape: &[usize], values: Values) -> Vec<u8> {
     let lengths: String = shape.iter().map(|length| format!("{length},")).collect();
-    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({lengths}), }}");
+    let kind = values.kind();
+    let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({lengths}), }}");
     let before = MAGIC.len() + 4;
     let padding = (before + header.len() + 1).next_multiple_of(ALIGNMENT) - before - header.len() - 1;
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');
     let mut bytes = [MAGIC, &[1, 0], &(header.len() as u16).to_le_bytes(), header.as_bytes()].concat();
-    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    bytes.extend(values.bytes());
     bytes
 }
 
@@ -156,10 +187,13 @@ mod tests {
     fn what_is_written_is_read() {
         let values = [1.0, -2.5, f64::INFINITY, 1e-300, 0.0, 7.0];
         for shape in [&[6][..], &[2, 3], &[1, 3, 2]] {
-            let bytes = bytes(shape, &values);
+            let bytes = bytes(shape, Values::Numbers(&values));
             assert_eq!(parse(&bytes), Ok(Array { shape: shape.to_vec(), values: values.to_vec() }));
             assert_eq!((bytes.len() - 48) % ALIGNMENT, 0, "as NumPy aligns them");
         }
+        let integers = bytes(&[2], Values::Integers(&[-1, 1 << 52]));
+        assert_eq!(parse(&integers), Ok(Array::flat(vec![-1.0, (1u64 << 52) as f64])));
+        assert_eq!(parse(&bytes(&[2], Values::Flags(&[true, false]))), Ok(Array::flat(vec![1.0, 0.0])));
     }
 
     #[test]

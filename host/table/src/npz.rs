@@ -5,6 +5,7 @@ use std::io::{self, Cursor, Read, Seek, Write};
 use zip::write::{SimpleFileOptions, ZipWriter};
 use zip::{CompressionMethod, ZipArchive};
 
+use super::npy::Values;
 use super::{Array, LONGEST, npy};
 
 /// Most arrays in an archive.
@@ -49,11 +50,19 @@ impl<W: Write + Seek> NpzWriter<W> {
         Self { zip: ZipWriter::new(out) }
     }
 
-    /// Adds an array.
+    /// Adds an array in double precision.
     ///
     /// # Errors
     /// If it cannot be written, or one of its name is there already.
     pub fn add(&mut self, name: &str, shape: &[usize], values: &[f64]) -> io::Result<()> {
+        self.add_values(name, shape, Values::Numbers(values))
+    }
+
+    /// Adds an array of any kind.
+    ///
+    /// # Errors
+    /// If it cannot be written, or one of its name is there already.
+    pub fn add_values(&mut self, name: &str, shape: &[usize], values: Values) -> io::Result<()> {
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated).large_file(true);
         self.zip.start_file(format!("{name}.npy"), options)?;
         self.zip.write_all(&npy::bytes(shape, values))

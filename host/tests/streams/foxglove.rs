@@ -1,6 +1,8 @@
 //! A client that follows the published protocol: <https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>.
 
+use std::io::Read;
 use std::net::TcpStream;
+use std::time::Duration;
 
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
@@ -14,8 +16,16 @@ type Answer = Response<Option<Vec<u8>>>;
 
 /// Connects and offers a subprotocol.
 fn connect(at: &str, subprotocol: &str) -> Result<(Socket, Answer), String> {
+    connect_from(at, subprotocol, None)
+}
+
+/// The same as a page of an origin does.
+fn connect_from(at: &str, subprotocol: &str, origin: Option<&str>) -> Result<(Socket, Answer), String> {
     let mut request = format!("ws://{at}").into_client_request().unwrap();
     request.headers_mut().insert("sec-websocket-protocol", subprotocol.parse().unwrap());
+    if let Some(origin) = origin {
+        request.headers_mut().insert("origin", origin.parse().unwrap());
+    }
     client(request, TcpStream::connect(at).unwrap()).map_err(|error| error.to_string())
 }
 
@@ -91,6 +101,41 @@ fn an_app_sees_the_channels_and_gets_those_that_it_subscribes_to() {
     say(&mut socket, &json!({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 99}]}));
     let status = json(&mut socket);
     assert!(status["op"] == "status" && status["message"].as_str().unwrap().contains("99"), "{status}");
+    live.child.kill().unwrap();
+    live.end();
+}
+
+#[test]
+fn pages_of_other_sites_are_refused_and_connections_that_say_nothing_end() {
+    let args = [
+        "--json",
+        "--solver",
+        "tikhonov",
+        "--foxglove",
+        "0",
+        "--allow-origin",
+        "https://robot.example",
+        "--seconds",
+        "60",
+    ];
+    let mut live = Live::start(&args);
+    let at = live.told("open ws://");
+    let status = |origin| match connect_from(&at, "foxglove.websocket.v1", origin) {
+        Ok((_, answer)) => answer.status().to_string(),
+        Err(error) => error,
+    };
+    for origin in [None, Some("https://app.foxglove.dev"), Some("https://robot.example")] {
+        assert!(status(origin).starts_with("101"), "{origin:?}");
+    }
+    for origin in
+        ["https://evil.example", "null", "http://127.0.0.1:8765", "https://app.foxglove.dev.evil.example", "file://"]
+    {
+        assert!(status(Some(origin)).contains("403"), "{origin}");
+    }
+    let mut idle = TcpStream::connect(&at).unwrap();
+    idle.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    let mut bytes = Vec::new();
+    assert!(idle.read_to_end(&mut bytes).is_ok(), "it is hung up on");
     live.child.kill().unwrap();
     live.end();
 }

@@ -2,7 +2,8 @@
 //!
 //! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of its contacts [`CONTACT_COLUMNS`], those of its shape
 //! [`SHAPE_COLUMNS`]; a column that is added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
-//! newtons, `_v` volts, `_us` microseconds. `sigma_` is a standard error, and `force_deviation_n` that of the force. What is not known is absent in JSON, empty in CSV and NaN elsewhere.
+//! newtons, `_v` volts, `_us` microseconds. `sigma_` is a standard error, and `force_deviation_n` that of the force. What is not known is absent in JSON, empty in CSV, null in Parquet, and in arrays NaN, -1 of an
+//! integer and false of a flag.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
@@ -12,30 +13,66 @@ use tactomo_physics::readings::Readings;
 use crate::pointer::PointerEvent;
 use crate::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
+/// What kind of number a column has. In files of columns each kind is that of the file: 64-bit integers, booleans, double precision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A whole number.
+    Integer,
+    /// Whether something is so: 1 or 0.
+    Flag,
+    /// Any number.
+    Number,
+}
+
+impl Kind {
+    /// A value of this kind as text; nothing if it is not known.
+    fn text(self, value: Option<f64>) -> String {
+        match (self, value) {
+            (_, None) => String::new(),
+            (Self::Flag, Some(value)) => (value != 0.0).to_string(),
+            (Self::Integer | Self::Number, Some(value)) => value.to_string(),
+        }
+    }
+}
+
 /// A number of a contact, by its name.
 pub struct ContactColumn {
     /// Name with unit.
     pub name: &'static str,
+    /// What kind of number it is.
+    pub kind: Kind,
     of: fn(&FoundContact) -> Option<f64>,
 }
 
 /// The numbers of a contact, in the order of every format.
 pub const CONTACT_COLUMNS: [ContactColumn; 15] = [
-    ContactColumn { name: "id", of: |contact| contact.id.map(f64::from) },
-    ContactColumn { name: "x_m", of: |contact| Some(contact.x_m) },
-    ContactColumn { name: "y_m", of: |contact| Some(contact.y_m) },
-    ContactColumn { name: "z_m", of: |contact| Some(contact.z_m) },
-    ContactColumn { name: "conductance_s", of: |contact| Some(contact.conductance_s) },
-    ContactColumn { name: "apparent_conductance_s", of: |contact| contact.apparent_conductance_s },
-    ContactColumn { name: "radius_m", of: |contact| contact.radius_m },
-    ContactColumn { name: "force_n", of: |contact| contact.force_n },
-    ContactColumn { name: "force_deviation_n", of: |contact| contact.force_deviation_n },
-    ContactColumn { name: "force_beyond_maximum", of: |contact| contact.force_beyond_maximum.map(f64::from) },
-    ContactColumn { name: "sigma_x_m", of: |contact| error(contact, |errors| errors.x_m) },
-    ContactColumn { name: "sigma_y_m", of: |contact| error(contact, |errors| errors.y_m) },
-    ContactColumn { name: "correlation", of: |contact| error(contact, |errors| errors.correlation) },
-    ContactColumn { name: "sigma_conductance_s", of: |contact| error(contact, |errors| errors.conductance_s) },
-    ContactColumn { name: "depth_m", of: |contact| contact.depth_m },
+    ContactColumn { name: "id", kind: Kind::Integer, of: |contact| contact.id.map(f64::from) },
+    ContactColumn { name: "x_m", kind: Kind::Number, of: |contact| Some(contact.x_m) },
+    ContactColumn { name: "y_m", kind: Kind::Number, of: |contact| Some(contact.y_m) },
+    ContactColumn { name: "z_m", kind: Kind::Number, of: |contact| Some(contact.z_m) },
+    ContactColumn { name: "conductance_s", kind: Kind::Number, of: |contact| Some(contact.conductance_s) },
+    ContactColumn { name: "apparent_conductance_s", kind: Kind::Number, of: |contact| contact.apparent_conductance_s },
+    ContactColumn { name: "radius_m", kind: Kind::Number, of: |contact| contact.radius_m },
+    ContactColumn { name: "force_n", kind: Kind::Number, of: |contact| contact.force_n },
+    ContactColumn { name: "force_deviation_n", kind: Kind::Number, of: |contact| contact.force_deviation_n },
+    ContactColumn {
+        name: "force_beyond_maximum",
+        kind: Kind::Flag,
+        of: |contact| contact.force_beyond_maximum.map(f64::from),
+    },
+    ContactColumn { name: "sigma_x_m", kind: Kind::Number, of: |contact| error(contact, |errors| errors.x_m) },
+    ContactColumn { name: "sigma_y_m", kind: Kind::Number, of: |contact| error(contact, |errors| errors.y_m) },
+    ContactColumn {
+        name: "correlation",
+        kind: Kind::Number,
+        of: |contact| error(contact, |errors| errors.correlation),
+    },
+    ContactColumn {
+        name: "sigma_conductance_s",
+        kind: Kind::Number,
+        of: |contact| error(contact, |errors| errors.conductance_s),
+    },
+    ContactColumn { name: "depth_m", kind: Kind::Number, of: |contact| contact.depth_m },
 ];
 
 fn error(contact: &FoundContact, of: fn(&Uncertainty) -> f64) -> Option<f64> {
@@ -60,11 +97,11 @@ impl Serialize for FoundContact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for column in &CONTACT_COLUMNS {
-            match (column.name, column.value(self)) {
-                ("id", Some(_)) => map.serialize_entry("id", &self.id)?,
-                (name @ "force_beyond_maximum", Some(_)) => map.serialize_entry(name, &self.force_beyond_maximum)?,
-                ("z_m", Some(0.0)) | (_, None) => {}
-                (name, Some(value)) => map.serialize_entry(name, &value)?,
+            match (column.name, column.kind, column.value(self)) {
+                ("z_m", _, Some(0.0)) | (_, _, None) => {}
+                (name, Kind::Integer, Some(value)) => map.serialize_entry(name, &(value as u64))?,
+                (name, Kind::Flag, Some(value)) => map.serialize_entry(name, &(value != 0.0))?,
+                (name, Kind::Number, Some(value)) => map.serialize_entry(name, &value)?,
             }
         }
         map.end()
@@ -223,13 +260,16 @@ pub struct FrameReport<'a> {
     /// Readings as measured (V), if they are wanted: electrode `e` while `g` is grounded at `g n + e`; `null` where nothing was read.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "volts")]
     pub readings_v: Option<&'a Readings>,
+    /// The same as they are used (V), if they are wanted: one near an end of its converter's range is the bound there.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "volts")]
+    pub used_v: Option<&'a Readings>,
     /// What the solver got (V), in that order: the mean of the last frames as far as they stood still, less the baseline.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "volts")]
     pub touch_v: Option<&'a Readings>,
     /// How many frames that is the mean of.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub averaged: Option<u32>,
-    /// What the pointer did since the frame before; in JSON alone, of a live stream with a pointer.
+    /// What the pointer did since the frame before, where a contact is one.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     pub events: &'a [PointerEvent],
 }
@@ -271,23 +311,31 @@ impl<'a> FrameReport<'a> {
 pub struct FrameColumn {
     /// Name with unit.
     pub name: &'static str,
+    /// What kind of number it is.
+    pub kind: Kind,
     of: fn(&FrameReport) -> Option<f64>,
 }
 
 /// The numbers of a frame but for its contacts and image, in the order of every format.
-pub const FRAME_COLUMNS: [FrameColumn; 12] = [
-    FrameColumn { name: "frame", of: |frame| frame.frame.map(|frame| frame as f64) },
-    FrameColumn { name: "sequence", of: |frame| frame.sequence.map(|sequence| sequence as f64) },
-    FrameColumn { name: "time_s", of: |frame| frame.time_s },
-    FrameColumn { name: "lost_before", of: |frame| frame.lost_before.map(|count| count as f64) },
-    FrameColumn { name: "frame_us", of: |frame| frame.frame_us },
-    FrameColumn { name: "age_us", of: |frame| frame.age_us },
-    FrameColumn { name: "residual", of: |frame| frame.residual },
-    FrameColumn { name: "saturated", of: |frame| frame.flag(|flags| flags.saturated) },
-    FrameColumn { name: "misfit", of: |frame| frame.flag(|flags| flags.misfit) },
-    FrameColumn { name: "unfinished", of: |frame| frame.flag(|flags| flags.unfinished) },
-    FrameColumn { name: "calibrate", of: |frame| frame.flag(|flags| flags.calibrate) },
-    FrameColumn { name: "excluded_count", of: |frame| frame.flags.map(|flags| flags.excluded.len() as f64) },
+pub const FRAME_COLUMNS: [FrameColumn; 14] = [
+    FrameColumn { name: "frame", kind: Kind::Integer, of: |frame| frame.frame.map(|frame| frame as f64) },
+    FrameColumn { name: "sequence", kind: Kind::Integer, of: |frame| frame.sequence.map(|sequence| sequence as f64) },
+    FrameColumn { name: "time_s", kind: Kind::Number, of: |frame| frame.time_s },
+    FrameColumn { name: "arrived_unix_s", kind: Kind::Number, of: |frame| frame.arrived_unix_s },
+    FrameColumn { name: "lost_before", kind: Kind::Integer, of: |frame| frame.lost_before.map(|count| count as f64) },
+    FrameColumn { name: "rezeroing", kind: Kind::Flag, of: |frame| Some(f64::from(frame.rezeroing)) },
+    FrameColumn { name: "frame_us", kind: Kind::Number, of: |frame| frame.frame_us },
+    FrameColumn { name: "age_us", kind: Kind::Number, of: |frame| frame.age_us },
+    FrameColumn { name: "residual", kind: Kind::Number, of: |frame| frame.residual },
+    FrameColumn { name: "saturated", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.saturated) },
+    FrameColumn { name: "misfit", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.misfit) },
+    FrameColumn { name: "unfinished", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.unfinished) },
+    FrameColumn { name: "calibrate", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.calibrate) },
+    FrameColumn {
+        name: "excluded_count",
+        kind: Kind::Integer,
+        of: |frame| frame.flags.map(|flags| flags.excluded.len() as f64),
+    },
 ];
 
 impl FrameColumn {
@@ -297,13 +345,68 @@ impl FrameColumn {
     }
 }
 
-/// Names of the text columns that follow the numbers in CSV.
-pub const TEXT_COLUMNS: [&str; 2] = ["excluded", "choice"];
+/// A number of an event of the pointer, by its name.
+pub struct EventColumn {
+    /// Name with unit, after `event_`.
+    pub name: &'static str,
+    /// What kind of number it is.
+    pub kind: Kind,
+    of: fn(&PointerEvent) -> Option<f64>,
+}
 
-/// Electrodes left out, with blanks between them, and what was chosen.
+/// The numbers of an event, for arrays: its kind (0 a move, 1 a press, 2 a release, 3 a click) and what belongs to that.
+pub const EVENT_COLUMNS: [EventColumn; 6] = [
+    EventColumn {
+        name: "kind",
+        kind: Kind::Integer,
+        of: |event| {
+            Some(match event {
+                PointerEvent::Move { .. } => 0.0,
+                PointerEvent::Press => 1.0,
+                PointerEvent::Release { .. } => 2.0,
+                PointerEvent::Click { .. } => 3.0,
+            })
+        },
+    },
+    EventColumn { name: "dx_m", kind: Kind::Number, of: |event| moved(event).map(|[dx_m, _]| dx_m) },
+    EventColumn { name: "dy_m", kind: Kind::Number, of: |event| moved(event).map(|[_, dy_m]| dy_m) },
+    EventColumn {
+        name: "held_s",
+        kind: Kind::Number,
+        of: |event| if let PointerEvent::Release { held_s } = event { Some(*held_s) } else { None },
+    },
+    EventColumn { name: "x_m", kind: Kind::Number, of: |event| clicked(event).map(|[x_m, _]| x_m) },
+    EventColumn { name: "y_m", kind: Kind::Number, of: |event| clicked(event).map(|[_, y_m]| y_m) },
+];
+
+fn moved(event: &PointerEvent) -> Option<[f64; 2]> {
+    if let PointerEvent::Move { dx_m, dy_m } = event { Some([*dx_m, *dy_m]) } else { None }
+}
+
+fn clicked(event: &PointerEvent) -> Option<[f64; 2]> {
+    if let PointerEvent::Click { x_m, y_m } = event { Some([*x_m, *y_m]) } else { None }
+}
+
+impl EventColumn {
+    /// Its value, if an event of its kind has it.
+    pub fn value(&self, event: &PointerEvent) -> Option<f64> {
+        (self.of)(event)
+    }
+}
+
+/// Names of the text columns that follow the numbers in tables.
+pub const TEXT_COLUMNS: [&str; 3] = ["excluded", "choice", "events"];
+
+/// Electrodes left out, with blanks between them, what was chosen, and what the pointer did, as in JSON.
 pub fn texts(frame: &FrameReport) -> [String; TEXT_COLUMNS.len()] {
     let excluded = frame.flags.map(|flags| flags.excluded.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
-    [excluded.unwrap_or_default(), frame.choice.map(|choice| choice.what.clone()).unwrap_or_default()]
+    // Names and finite numbers are always JSON.
+    let events = || serde_json::to_string(frame.events).unwrap_or_default();
+    [
+        excluded.unwrap_or_default(),
+        frame.choice.map(|choice| choice.what.clone()).unwrap_or_default(),
+        if frame.events.is_empty() { String::new() } else { events() },
+    ]
 }
 
 /// Heads of a CSV table with a contact a row: a frame's columns, its shape's, `contact` (from 0), a contact's columns in that order,
@@ -317,13 +420,14 @@ pub fn csv_heads() -> Vec<&'static str> {
 
 /// Rows of that table: one for each contact, or one without a contact.
 pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
-    let text = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-    let shape = SHAPE_COLUMNS.iter().map(|column| text(frame.shape.and_then(|shape| column.value(shape))));
-    let start: Vec<_> = FRAME_COLUMNS.iter().map(|column| text(column.value(frame))).chain(shape).collect();
+    let shape = SHAPE_COLUMNS.iter().map(|column| Kind::Number.text(frame.shape.and_then(|shape| column.value(shape))));
+    let start: Vec<_> = FRAME_COLUMNS.iter().map(|column| column.kind.text(column.value(frame))).chain(shape).collect();
     let end = texts(frame);
     let row = |contact: Option<(usize, &FoundContact)>| {
         let index = contact.map_or_else(String::new, |(index, _)| index.to_string());
-        let values = CONTACT_COLUMNS.iter().map(|column| text(contact.and_then(|(_, contact)| column.value(contact))));
+        let values = CONTACT_COLUMNS
+            .iter()
+            .map(|column| column.kind.text(contact.and_then(|(_, contact)| column.value(contact))));
         start.iter().cloned().chain([index]).chain(values).chain(end.iter().cloned()).collect()
     };
     match frame.contacts {
@@ -379,7 +483,7 @@ mod tests {
             let flag = json[column.name].as_bool().map(f64::from);
             assert_eq!(json[column.name].as_f64().or(flag), Some(value), "{}", column.name);
             let cell = heads.iter().position(|head| *head == column.name).unwrap();
-            assert_eq!(rows[0][cell].parse(), Ok(value), "{}", column.name);
+            assert_eq!(rows[0][cell], column.kind.text(Some(value)), "{}", column.name);
             if index > 0 {
                 assert_eq!(f64::from(contact_values(&contact())[index - 1]), value, "{}", column.name);
             }
@@ -423,6 +527,11 @@ mod tests {
         let rows = csv_rows(&FrameReport::of(&nothing));
         assert_eq!((rows.len(), rows[0].len()), (1, csv_heads().len()));
         assert!(rows[0][FRAME_COLUMNS.len()..].iter().all(String::is_empty), "{rows:?}");
+        let at = |name: &str| csv_heads().iter().position(|head| *head == name).unwrap();
+        assert_eq!(
+            [&rows[0][at("misfit")], &rows[0][at("excluded_count")], &rows[0][at("sequence")]],
+            ["false", "0", ""]
+        );
     }
 
     #[test]
@@ -442,7 +551,17 @@ mod tests {
         assert_eq!(json["choice"]["what"], "2 contacts");
         assert_eq!(json["contacts"].as_array().map(Vec::len), Some(2));
         assert!(["image_s_per_m2", "frame", "shape", "events"].iter().all(|name| json.get(name).is_none()));
-        let rows = csv_rows(&FrameReport::of(&solution));
-        assert_eq!(rows[1][csv_heads().len() - 2..], ["3 14", "2 contacts"]);
+        let events = [PointerEvent::Press, PointerEvent::Move { dx_m: 0.5, dy_m: -0.25 }];
+        let report = FrameReport { events: &events, arrived_unix_s: Some(1.79e9), ..FrameReport::of(&solution) };
+        let rows = csv_rows(&report);
+        let told = r#"[{"kind":"press"},{"kind":"move","dx_m":0.5,"dy_m":-0.25}]"#;
+        assert_eq!(rows[1][csv_heads().len() - 3..], ["3 14", "2 contacts", told]);
+        let at = |name: &str| csv_heads().iter().position(|head| *head == name).unwrap();
+        assert_eq!([&rows[1][at("arrived_unix_s")], &rows[1][at("misfit")]], ["1790000000", "true"]);
+        let values = |event: &PointerEvent| EVENT_COLUMNS.each_ref().map(|column| column.value(event));
+        assert_eq!(values(&events[0]), [Some(1.0), None, None, None, None, None]);
+        assert_eq!(values(&events[1]), [Some(0.0), Some(0.5), Some(-0.25), None, None, None]);
+        assert_eq!(values(&PointerEvent::Release { held_s: 2.0 })[3], Some(2.0));
+        assert_eq!(values(&PointerEvent::Click { x_m: 3.0, y_m: 4.0 })[4..], [Some(3.0), Some(4.0)]);
     }
 }

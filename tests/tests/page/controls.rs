@@ -6,6 +6,7 @@ use anyhow::{Result, ensure};
 use fantoccini::Locator;
 use fantoccini::key::Key;
 use tactomo::board::link::{Control, Playing};
+use tactomo::board::record::Loss;
 use tactomo::board::session::RequestedSettings;
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{LinkState, Request, Scan, Snapshot};
@@ -23,7 +24,12 @@ fn hello() -> Hello {
 }
 
 fn recording(position_s: f64, paused: bool) -> Playing {
-    Playing::Recording { position_s, length_s: 20.0, speed: 1.0, paused, looped: false, ended: position_s >= 20.0 }
+    damaged(position_s, paused, Loss::default())
+}
+
+fn damaged(position_s: f64, paused: bool, damage: Loss) -> Playing {
+    let ended = position_s >= 20.0;
+    Playing::Recording { position_s, length_s: 20.0, speed: 1.0, paused, looped: false, ended, damage }
 }
 
 async fn visible(browser: &Browser, id: &str) -> Result<bool> {
@@ -126,6 +132,22 @@ async fn recording_is_asked_for_and_its_file_shown() -> Result<()> {
         ensure!(notice == "Recording to /tmp/touch.tactomo", "{notice}");
         stage.browser.client.find(Locator::Css("body")).await?.send_keys("r").await?;
         asks(&stage, Request::Record(false)).await
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_is_damaged_in_a_recording_is_said() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let damage = Loss { damaged_places: 1, left_out_bytes: 70, ..Loss::default() };
+        for (damage, said) in
+            [(damage, "This recording is damaged: it is damaged in 1 place (70 bytes left out)"), (Loss::default(), "")]
+        {
+            stage.behind.set(|snapshot| snapshot.playing = damaged(1.0, false, damage));
+            status_shown().await;
+            let notice = stage.browser.run("return document.getElementById('notice').textContent").await?;
+            ensure!(notice == said, "{notice}");
+        }
+        Ok(())
     })
 }
 

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use tactomo::board::link::Playing;
+use tactomo::board::record::Loss;
 use tactomo::run::{LinkState, Snapshot};
 use tactomo::scene::SceneName;
 use tactomo::solve::{Choice, Flags, FoundContact, Method, Solution, Uncertainty};
@@ -74,12 +75,26 @@ async fn states(stage: &Stage<Script>, folder: &Path) -> Result<()> {
         snapshot.baseline = Some("Something pressed at the start: it is shown as the contact that it is.".to_owned());
     });
     shot(stage, folder, "excluded").await?;
-    let playing =
-        Playing::Recording { position_s: 7.4, length_s: 20.0, speed: 0.5, paused: false, looped: true, ended: false };
+    let playing = Playing::Recording {
+        position_s: 7.4,
+        length_s: 20.0,
+        speed: 0.5,
+        paused: false,
+        looped: true,
+        ended: false,
+        damage: Loss::default(),
+    };
     stage.behind.set(|snapshot| (snapshot.playing, snapshot.baseline) = (playing, None));
     shot(stage, folder, "recording").await?;
-    let playing =
-        Playing::Recording { position_s: 20.0, length_s: 20.0, speed: 0.5, paused: false, looped: false, ended: true };
+    let playing = Playing::Recording {
+        position_s: 20.0,
+        length_s: 20.0,
+        speed: 0.5,
+        paused: false,
+        looped: false,
+        ended: true,
+        damage: Loss::default(),
+    };
     let link = LinkState::Ended("the recording is over".to_owned());
     stage.behind.set(|snapshot| (snapshot.playing, snapshot.link) = (playing, link));
     shot(stage, folder, "ended").await?;

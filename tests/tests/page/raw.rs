@@ -24,6 +24,13 @@ pub struct Answer {
     stream: BufReader<TcpStream>,
 }
 
+impl Answer {
+    /// The stream behind the headers; what of it was read already is lost.
+    pub fn stream(self) -> TcpStream {
+        self.stream.into_inner()
+    }
+}
+
 /// Asks for `path` under the name `host`, with further header lines.
 pub fn ask(port: u16, path: &str, host: &str, headers: &[(&str, &str)]) -> Result<Answer> {
     let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, port))?;

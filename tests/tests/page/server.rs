@@ -1,6 +1,7 @@
 //! The server alone: what it lets in, what it sends when, and what it makes of nonsense.
 
-use std::net::Ipv4Addr;
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Ipv4Addr, TcpStream};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
@@ -12,6 +13,7 @@ use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
 use tactomo::run::{FrameSnapshot, Request, Snapshot};
 use tactomo::scene::Contact;
+use tactomo::sink::door::{Door, Limits};
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server, ServerError};
 use tactomo::solve::{Method, Solution};
 use tokio::sync::watch;
@@ -114,6 +116,69 @@ fn a_foreign_page_cannot_open_the_socket() -> Result<()> {
 }
 
 #[test]
+fn a_page_of_an_origin_that_is_named_opens_the_socket() -> Result<()> {
+    let origins = vec!["https://robot.example".parse().map_err(anyhow::Error::msg)?];
+    let door = Door { origins, ..Door::default() };
+    let rig = Rig::listening(Listen { door, ..local(Some(0)) }, None)?;
+    let port = rig.server.port();
+    let own = format!("127.0.0.1:{port}");
+    for (origin, status) in [("https://robot.example", 101), ("https://other.example", 403)] {
+        assert_eq!(ask_socket(port, &own, Some(origin))?.status, status, "{origin}");
+    }
+    Ok(())
+}
+
+/// A server with little patience.
+fn hasty() -> Result<Rig> {
+    let limits = Limits {
+        head: Duration::from_millis(300),
+        connections: 16,
+        ping_every: Duration::from_millis(100),
+        gone_after: Duration::from_millis(400),
+        ..Limits::default()
+    };
+    Rig::listening(Listen { door: Door { limits, ..Door::default() }, ..local(Some(0)) }, None)
+}
+
+/// What comes until the server hangs up.
+fn until_closed(mut stream: TcpStream) -> Result<Vec<u8>> {
+    stream.set_read_timeout(Some(Duration::from_secs(20)))?;
+    let mut bytes = Vec::new();
+    match stream.read_to_end(&mut bytes) {
+        Err(error) if error.kind() != ErrorKind::ConnectionReset => Err(error.into()),
+        _ => Ok(bytes),
+    }
+}
+
+#[test]
+fn idle_connections_end_and_however_many_there_are_the_page_is_served() -> Result<()> {
+    let rig = hasty()?;
+    let port = rig.server.port();
+    let connect = || TcpStream::connect((Ipv4Addr::LOCALHOST, port));
+    let mut idle: Vec<TcpStream> = (0..200).map(|_| connect()).collect::<Result<_, _>>()?;
+    assert_eq!(ask(port, "/", &format!("127.0.0.1:{port}"), &[])?.status, 200);
+    // One that begins to ask and never ends, and one that has asked and asks nothing more.
+    let mut slow = connect()?;
+    slow.write_all(b"GET / HTTP/1.1\r\nHost: ")?;
+    let mut kept = connect()?;
+    write!(kept, "GET /app.js HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n")?;
+    ensure!(until_closed(kept)?.starts_with(b"HTTP/1.1 200"));
+    idle.push(slow);
+    idle.into_iter().try_for_each(|stream| until_closed(stream).map(drop))
+}
+
+#[test]
+fn a_socket_whose_page_has_gone_without_a_word_ends() -> Result<()> {
+    let rig = hasty()?;
+    let host = format!("127.0.0.1:{}", rig.server.port());
+    let answer = ask_socket(rig.server.port(), &host, Some(&format!("http://{host}")))?;
+    ensure!(answer.status == 101);
+    let came = until_closed(answer.stream())?;
+    assert!(came.windows(2).any(|pair| pair == [0x89, 0]), "it was pinged");
+    Ok(())
+}
+
+#[test]
 fn a_message_is_sent_when_the_last_was_taken() -> Result<()> {
     let rig = Rig::start(None)?;
     let mut page = RawPage::open(rig.server.port())?;
@@ -211,7 +276,7 @@ fn a_page_presses_on_the_detector_and_lets_go_when_it_leaves() -> Result<()> {
 
 #[test]
 fn a_shared_page_needs_its_token_for_everything() -> Result<()> {
-    let any = Listen { address: Some(Ipv4Addr::UNSPECIFIED.into()), port: Some(0) };
+    let any = Listen { address: Some(Ipv4Addr::UNSPECIFIED.into()), port: Some(0), ..Listen::default() };
     let rig = Rig::listening(any, None)?;
     let port = rig.server.port();
     let host = format!("127.0.0.1:{port}");
@@ -250,7 +315,7 @@ fn a_shared_page_needs_its_token_for_everything() -> Result<()> {
 #[test]
 fn only_a_shared_page_has_an_address_for_others() -> Result<()> {
     assert_eq!(Rig::start(None)?.server.shared_url(), None);
-    let loopback = Listen { address: Some(Ipv4Addr::LOCALHOST.into()), port: Some(0) };
+    let loopback = Listen { address: Some(Ipv4Addr::LOCALHOST.into()), port: Some(0), ..Listen::default() };
     let rig = Rig::listening(loopback, None)?;
     assert_eq!(rig.server.shared_url(), Some(rig.server.url()));
     Ok(())

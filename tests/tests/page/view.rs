@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail, ensure};
 use tactomo::run::LinkState;
 use tactomo::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
-use crate::chromium::Browser;
+use crate::chromium::{Browser, Told};
 use crate::script::Script;
 use crate::stage::{Stage, in_front_of};
 
@@ -95,6 +95,51 @@ async fn a_shape_is_named_outlined_and_listed_without_the_contacts_beside_it() -
             ensure!(shown[outlined].as_u64() > Some(60), "its outline: {shown}");
             ensure!(shown[4].as_u64() == Some(0), "the contact beside it is drawn: {shown}");
         }
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn while_a_touch_is_searched_nothing_says_that_nothing_touches() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let said = "return ['choice', 'no-contacts'].map((id) => document.getElementById(id).textContent);";
+        for (what, expected) in [
+            ("searching", ["Something touches", "What touches is being searched."]),
+            ("nothing", ["Nothing touches", "Nothing touches."]),
+        ] {
+            let choice = Some(Choice { what: what.to_owned(), why: "residual 9.0 x noise".to_owned() });
+            stage.behind.solution(Solution { choice, residual: Some(9.0), ..Solution::default() });
+            settled(&stage).await;
+            let shown = stage.browser.run(said).await?;
+            ensure!(shown[0] == expected[0] && shown[1] == expected[1], "{shown}");
+        }
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_warning_goes_with_its_answer_though_no_other_answer_comes() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let chips = "return document.getElementById('warnings').textContent";
+        let flagged = |misfit| Flags { misfit, ..Flags::default() };
+        let answer = |misfit| Solution {
+            contacts: vec![contact(1, [5.0, 5.0], 3e-4)],
+            residual: Some(1.0),
+            flags: flagged(misfit),
+            ..Solution::default()
+        };
+        stage.behind.solution(answer(true));
+        settled(&stage).await;
+        let shown = stage.browser.run(chips).await?;
+        ensure!(shown == "readings do not fit", "{shown}");
+        // The last answer has no warning, and then the stream stands still.
+        stage.behind.solution(answer(false));
+        let is_without = |told: &Told| told.text("flags").is_empty();
+        stage.browser.until("an answer without a warning", is_without).await?;
+        stage.behind.set(|snapshot| snapshot.frame = None);
+        tokio::time::sleep(Duration::from_millis(1500)).await;
+        let shown = stage.browser.run(chips).await?;
+        ensure!(shown == "", "{shown}: it is of an answer that is no longer shown");
         Ok(())
     })
 }

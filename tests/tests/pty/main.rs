@@ -60,6 +60,22 @@ fn garbage_between_frames_is_counted_and_garbage_within_costs_one_frame() {
 }
 
 #[test]
+fn a_board_that_answers_what_it_was_not_asked_is_told_as_such() {
+    let mut board = Board::plug("tags");
+    let host = Host::start(board.port());
+    for _ in 0..3 {
+        let tag = board.wait_for(Command::Hello);
+        board.answer(tag.wrapping_add(100));
+        board.frames(2);
+    }
+    let error = host.ended().unwrap_err().to_string();
+    assert!(
+        error.contains("never to what it was asked") && error.contains("name command 101, and command 1"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_flood_without_zeros_ends_with_the_next_frame() {
     let mut board = Board::plug("flood");
     let host = Host::start(board.port());

@@ -32,6 +32,14 @@ pub enum ListenError {
         /// What came instead.
         heard: Heard,
     },
+    /// It answers what it was not asked.
+    #[error("{link}: {error}")]
+    Stray {
+        /// Name of the link.
+        link: String,
+        /// What it names.
+        error: GreetError,
+    },
     /// Its protocol is another.
     #[error("{link}: {error}")]
     Version {
@@ -102,6 +110,9 @@ impl Listening {
                 match message {
                     Ok(BoardMessage::Hello(hello)) => {
                         session.hello(&hello, Instant::now());
+                        if !session.knows_the_board() {
+                            continue;
+                        }
                         let mut listening = Self::new(link, session, receiver, hello);
                         listening.receive(input)?;
                         return Ok(listening);
@@ -113,7 +124,11 @@ impl Listening {
                 }
             }
         }
-        Err(ListenError::Silent { link: link.name(), heard })
+        let link = link.name();
+        Err(match session.stray() {
+            Some((named, sent)) => ListenError::Stray { link, error: GreetError::Stray { named, sent } },
+            None => ListenError::Silent { link, heard },
+        })
     }
 
     fn new(link: Box<dyn Link>, session: Session, receiver: BoardReceiver, hello: Hello) -> Self {

@@ -45,8 +45,10 @@ pub struct FileFrame {
     pub sequence: Option<u64>,
     /// Scans that are missing since the frame before: lost on the way, or damaged in the file.
     pub lost_before: u64,
-    /// Readings (V) in the order of the channels; of a detector row by row.
+    /// Readings (V) in the order of the channels, as they are [used](crate::measured::Volts::used); of a detector row by row.
     pub volts: Vec<f64>,
+    /// The same as measured (V).
+    pub measured_v: Vec<f64>,
     /// What each says; empty where all are voltages.
     pub says: Vec<Says>,
 }
@@ -57,6 +59,13 @@ impl FileFrame {
         let n = self.volts.len().isqrt();
         let readings = Readings::new(n, self.volts.clone())?;
         Some(if self.says.is_empty() { readings } else { readings.saying(|g, e| self.says[g * n + e]) })
+    }
+
+    /// As the readings of a detector as measured; `None` if they are no square.
+    pub fn measured(&self) -> Option<Readings> {
+        let n = self.measured_v.len().isqrt();
+        let readings = Readings::new(n, self.measured_v.clone())?;
+        Some(readings.hiding(|g, e| self.says.get(g * n + e) == Some(&Says::Nothing)))
     }
 
     /// The same if some were not read: rows of a scan; `None` of a whole frame.
@@ -229,6 +238,7 @@ impl Rows {
             arrived_s: None,
             sequence: None,
             lost_before: 0,
+            measured_v: volts.clone(),
             volts,
             says: Vec::new(),
         })

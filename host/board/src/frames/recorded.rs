@@ -157,7 +157,8 @@ impl Recorded {
     pub(super) fn set_ground(&mut self, ground_v: f64) {
         self.volts = self.volts.clone().above(ground_v);
         for frame in &mut self.frames {
-            frame.volts.iter_mut().for_each(|volts| *volts -= ground_v);
+            let all = frame.volts.iter_mut().chain(&mut frame.measured_v);
+            all.for_each(|volts| *volts -= ground_v);
         }
     }
 
@@ -218,7 +219,9 @@ impl Recorded {
 
     /// Readings and time of a frame; `None` if it is of a board with other electrodes.
     fn in_volts(&mut self, frame: &Frame) -> Option<FileFrame> {
-        let readings = self.volts.readings(frame)?;
+        let measured = self.volts.measured(frame)?;
+        let measured_v = measured.volts().to_vec();
+        let readings = self.volts.used(measured);
         let place = self.sequence.place(&frame.head);
         if let Some((last_us, _)) = self.times.last.filter(|_| place.dropped > 0) {
             let gap_us = place.time_us.saturating_sub(last_us);
@@ -231,6 +234,7 @@ impl Recorded {
             sequence: Some(place.sequence),
             lost_before: place.dropped,
             volts: readings.volts().to_vec(),
+            measured_v,
             says: readings.all_say().to_vec(),
         })
     }

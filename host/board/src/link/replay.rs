@@ -174,17 +174,11 @@ impl ReplayLink {
     }
 
     /// What there is to do at the end: to begin again, to stay there, or to be over.
-    fn end(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+    fn end(&mut self) -> io::Result<usize> {
         let is_empty = self.span_us[0] == self.span_us[1] && self.chunk.time_us == 0;
         let begins_again = self.looped && !is_empty;
         if !self.stays_open && !begins_again {
             return Err(io::Error::new(io::ErrorKind::UnexpectedEof, ended(&self.reader)));
-        }
-        if let (Stage::Within, Some(place)) = (self.stage, buffer.first_mut()) {
-            // A packet that was cut off ends here, so that it does not spoil what comes next.
-            *place = 0;
-            self.stage = Stage::Between;
-            return Ok(1);
         }
         if self.stage != Stage::Ended && !begins_again {
             tracing::info!("{}", ended(&self.reader));
@@ -251,7 +245,7 @@ impl Link for ReplayLink {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.obey_seek()?;
         if self.stage == Stage::Ended || !self.has_bytes()? {
-            return self.end(buffer);
+            return self.end();
         }
         let is_due = self.must_go_on() || self.shows && self.clock.is_paused();
         let wait = if is_due { Duration::ZERO } else { self.clock.wait(self.chunk.time_us, Instant::now()) };
@@ -293,6 +287,7 @@ impl Link for ReplayLink {
             paused: self.clock.is_paused(),
             looped: self.looped,
             ended: self.stage == Stage::Ended && self.seek_us.is_none(),
+            damage: self.reader.loss(),
         }
     }
 

@@ -128,6 +128,15 @@ fn the_detector_is_in_the_recording_a_curved_one_with_its_surface() {
     assert_eq!(again.surface.as_ref().map(|s| &s.triangles), curved.surface.as_ref().map(|s| &s.triangles));
     assert!(read.is_of(&curved));
 
+    // A header that names a file without having it is damaged or meant badly.
+    for named in ["fingertip.obj", "/dev/zero"] {
+        let toml = read.detector_toml.as_ref().map(|toml| toml.replace("fingertip.obj", named));
+        let without = Header { detector_toml: toml, surface_obj: None, ..read.clone() };
+        let error = without.detector(Path::new("some.file")).unwrap_err();
+        let source = std::error::Error::source(&error).map(ToString::to_string).unwrap_or_default();
+        assert!(format!("{error} {source}").contains("may name another one"), "{error} {source}");
+    }
+
     let old = open(&written_in_version_1(&Vec::new()).0).unwrap().header().clone();
     assert!(old.detector(Path::new("x")).unwrap().is_none(), "the name alone tells no detector");
     let wrong = Header { detector_toml: Some("drive_v = \"two\"".into()), ..old };

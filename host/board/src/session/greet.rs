@@ -18,6 +18,17 @@ pub enum GreetError {
         /// Bytes that came and were no message: many mean another baud rate or another program on the board.
         junk_bytes: u64,
     },
+    /// Answers to commands that were not sent.
+    #[error(
+        "the board says Hello, but never to what it was asked: its answers name command {named}, and command {sent} was sent. If another \
+         program talks to this board, end that; else its firmware does not follow docs/protocol.md: flash it again"
+    )]
+    Stray {
+        /// The command that its last answer names.
+        named: u8,
+        /// The command that was sent last.
+        sent: u8,
+    },
     /// The board's version of the protocol is not known here.
     #[error("this board cannot be used: {0}")]
     Version(DecodeError),

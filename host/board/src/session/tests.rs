@@ -272,6 +272,63 @@ fn a_plan_is_taken_or_refused_or_not_offered_at_all() {
     assert_eq!(self::command(&mut session, now), Some(Command::Start));
 }
 
+/// A board that answers each command at once in its own way, for so long in steps of a millisecond: how many commands it got.
+fn commands_within(time: Duration, mut answer: impl FnMut(&mut Session, u8, Command, Instant)) -> u32 {
+    let begin = Instant::now();
+    let mut session = Session::new(RequestedSettings::default());
+    session.hello(&hello(0, Settings::default(), false), begin);
+    let mut count = 0;
+    for millis in 0..time.as_millis() as u64 {
+        let now = begin + Duration::from_millis(millis);
+        if let Some((tag, command)) = said(&mut session, now) {
+            count += 1;
+            answer(&mut session, tag, command, now);
+        }
+    }
+    count
+}
+
+#[test]
+fn what_a_board_does_not_follow_is_asked_for_again_with_longer_and_longer_pauses() {
+    let all_plans = commands_within(Duration::from_secs(8), |session, tag, command, now| match command {
+        Command::Scan(_) => assert!(session.fault(&Fault::BadPlan { answers: tag })),
+        Command::Start => {
+            session.hello(&hello(tag, Settings::default(), true), now);
+            session.frame(now);
+        }
+        _ => session.hello(&hello(tag, Settings::default(), true), now),
+    });
+    // Whole frames at 0, 0, 0.5, 1.5, 3.5 and 7.5 s, one Start, and a question for each 1.5 s of silence.
+    assert!((7..=12).contains(&all_plans), "{all_plans}");
+    let never_started = commands_within(Duration::from_secs(8), |session, tag, command, now| {
+        drop(command);
+        session.hello(&hello(tag, Settings::default(), false), now);
+    });
+    // A plan, six Starts, and questions.
+    assert!((7..=13).contains(&never_started), "{never_started}");
+    let always_restarts = commands_within(Duration::from_secs(8), |session, _, _, now| {
+        session.hello(&hello(0, Settings::default(), false), now);
+    });
+    assert!((7..=40).contains(&always_restarts), "{always_restarts}");
+}
+
+#[test]
+fn a_plan_that_is_refused_holds_up_no_start_and_another_one_is_sent_at_once() {
+    let now = Instant::now();
+    let mut session = Session::new(RequestedSettings::default());
+    session.hello(&hello(0, Settings::default(), false), now);
+    for _ in 0..2 {
+        let (tag, command) = said(&mut session, now).unwrap();
+        assert_eq!(command, Command::Scan(Plan::default()));
+        assert!(session.fault(&Fault::BadPlan { answers: tag }));
+    }
+    let (tag, command) = said(&mut session, now).unwrap();
+    assert_eq!((command, session.plan_state()), (Command::Start, PlanState::Refused));
+    session.hello(&hello(tag, Settings::default(), true), now);
+    session.request_plan(Some(four_rows()));
+    assert_eq!(self::command(&mut session, now), Some(Command::Scan(four_rows())));
+}
+
 #[test]
 fn an_earlier_hosts_stream_is_joined_and_its_plan_ended() {
     let now = Instant::now();

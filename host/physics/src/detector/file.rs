@@ -116,12 +116,20 @@ impl Detector {
         Self::from_toml_in(folder, &text, &stem).map_err(|error| FileError::Wrong { path: named(), error })
     }
 
-    /// Reads a detector from TOML, named `name` unless the text has a name. A surface's file is sought in the current folder.
+    /// Reads a detector from TOML, named `name` unless the text has a name. No file is opened: text that names one is from who knows where,
+    /// a recording or a message. [`read`](Self::read) and [`from_toml_in`](Self::from_toml_in) open a surface's file, and
+    /// [`from_toml_and_obj`](Self::from_toml_and_obj) is given it.
     ///
     /// # Errors
     /// [`TomlError`] with field, line and what is allowed.
     pub fn from_toml(text: &str, name: &str) -> Result<Self, TomlError> {
-        Self::from_toml_in(Path::new(""), text, name)
+        Self::from_toml_with(text, name, &|file, _| {
+            let expected = format!(
+                "in the text itself, not in a file {}: only a detector's own file may name another one, so save the text as one",
+                quoted(file)
+            );
+            Err(Problem::new("surface", expected))
+        })
     }
 
     /// Reads a detector from TOML, with the text of an OBJ file ([`Surface::to_obj`]) in place of the file that the TOML names.
@@ -160,6 +168,17 @@ impl Detector {
         // Writing to a string cannot fail.
         let _ = self.write_toml(&mut text);
         text
+    }
+
+    /// This detector as files of its own: the TOML, and of a curved one the OBJ file of its surface, with the name `STEM.obj` by which the TOML
+    /// names it. The name that the surface had is not kept: it may be of another folder, or come from a recording.
+    pub fn to_files(&self, stem: &str) -> (String, Option<(String, String)>) {
+        let Some(surface) = &self.surface else { return (self.to_toml(), None) };
+        let file = format!("{stem}.obj");
+        let obj = surface.to_obj();
+        let mut named = self.clone();
+        named.surface.iter_mut().for_each(|surface| surface.file.clone_from(&file));
+        (named.to_toml(), Some((file, obj)))
     }
 
     fn write_toml(&self, text: &mut String) -> std::fmt::Result {

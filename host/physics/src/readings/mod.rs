@@ -75,11 +75,13 @@ impl Readings {
     }
 
     /// The same by converters of such ranges, one an electrode: readings at an end of the range are bounds. An electrode beyond them has no
-    /// range.
+    /// range, and what was not read still says [nothing](Says::Nothing).
     pub fn within(mut self, ranges: &[Range]) -> Self {
         let n = self.electrodes.max(1);
+        let before = std::mem::take(&mut self.says);
         let bounded = |(i, volts): (usize, &mut f64)| {
-            let Some(range) = ranges.get(i % n) else { return Says::Voltage };
+            let before = before.get(i).copied().unwrap_or_default();
+            let Some(range) = ranges.get(i % n).filter(|_| before == Says::Voltage) else { return before };
             let says = range.says(*volts);
             *volts = volts.clamp(range.floor_v, range.ceiling_v);
             says

@@ -74,6 +74,13 @@ impl TouchEvent {
         array(py, &self.0.readings)
     }
 
+    /// The same as they are used (V), `(n, n)`: a reading within two deviations of the noise of an end of its converter's range is the bound
+    /// there.
+    #[getter]
+    fn used_v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        array(py, &self.0.used)
+    }
+
     /// What the solver got (V), `(n, n)`: the mean of the last frames as far as they stood still, less the baseline.
     #[getter]
     fn touch_v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -111,6 +118,7 @@ impl TouchEvent {
         let report = FrameReport {
             image_s_per_m2: all.image_s_per_m2.filter(|_| image),
             readings_v: all.readings_v.filter(|_| readings),
+            used_v: all.used_v.filter(|_| readings),
             touch_v: all.touch_v.filter(|_| readings),
             ..all
         };

@@ -6,12 +6,14 @@ use std::process::Command;
 
 use anyhow::{Context, bail, ensure};
 
+use super::elf;
 use super::firmware::{self, Board, Tool};
 use crate::commands::output::message;
 
 /// Puts the firmware on a board, with the tool for its chip: espflash or probe-rs.
 ///
-/// Says what to install or to build if something is missing, and shows the command that it runs.
+/// Looks first whether the image is one for this board. Says what to install or to build if something is missing, and shows the command that it
+/// runs.
 ///
 /// Examples:
 ///   tactomo board flash esp32 --port /dev/ttyUSB0
@@ -40,6 +42,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         args.board.name()
     );
     let image = image(args.board, args.image.as_deref())?;
+    elf::check(&image, args.board)?;
     let found = on_path(program)
         .with_context(|| format!("{program} is not installed, and it is what flashes this board: {install}"))?;
     let arguments = args.board.arguments(&image, args.port.as_deref());

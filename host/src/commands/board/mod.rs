@@ -1,6 +1,7 @@
 //! `tactomo board`: a new board, from the box to frames.
 
 mod check;
+mod elf;
 mod firmware;
 mod flash;
 

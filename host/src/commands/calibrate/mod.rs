@@ -5,10 +5,11 @@ mod known;
 mod presses;
 mod rub;
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use tactomo::detector::Detector;
 
 use super::choice::DetectorArgs;
@@ -92,15 +93,19 @@ struct Reading {
     unit: Option<Unit>,
 }
 
-/// Writes a detector that can be read back from where it will be: a curved one names the file of its surface.
+/// Writes a detector, and beside it the surface of a curved one.
 fn write(detector: &Detector, path: &Path, out: NewFile) -> anyhow::Result<()> {
-    let text = detector.to_toml();
-    let folder = path.parent().unwrap_or(Path::new(""));
-    Detector::from_toml_in(folder, &text, "").with_context(|| {
-        format!(
-            "{} could not be read as a detector: write it into the folder of the surface that it names",
-            path.display()
-        )
-    })?;
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let (text, surface) = detector.to_files(&stem);
+    if let Some((name, obj)) = surface {
+        let beside = path.with_file_name(name);
+        // The one that an earlier calibration of the same name wrote.
+        let is_there = fs::metadata(&beside).is_ok_and(|data| data.is_file() && data.len() == obj.len() as u64)
+            && fs::read(&beside).is_ok_and(|there| there == obj.as_bytes());
+        if !is_there {
+            NewFile::never_replacing(&beside)?.write(&obj)?;
+            message!("its surface: {}", beside.display());
+        }
+    }
     out.write(&text)
 }

@@ -76,8 +76,8 @@ pub struct Reader {
     /// Frames still to come that are the baseline and nothing else, because the user said so.
     given: u32,
     touch: Touch,
-    /// Readings of the newest frame as measured (V).
-    measured_v: Vec<f64>,
+    /// Readings of the newest frame as they are used, before the baseline was taken off (V).
+    used_v: Vec<f64>,
     /// The detector as it was chosen, of a solver for a detector.
     detector: Option<Detector>,
 }
@@ -130,7 +130,7 @@ impl Reader {
         };
         let frames = Frames::of(file, input, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
         let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));
-        Ok(Self { path, frames, baseline, count: 0, given, touch, measured_v: Vec::new(), detector: chosen })
+        Ok(Self { path, frames, baseline, count: 0, given, touch, used_v: Vec::new(), detector: chosen })
     }
 
     /// The detector as it was chosen, before its board was asked; `None` where presses were learned from.
@@ -173,8 +173,8 @@ impl Reader {
             self.count += 1;
             if self.given == 0 {
                 frame.note_rest(&mut self.baseline);
-                self.measured_v.clone_from(&frame.volts);
-                self.baseline.subtract(&self.measured_v, &mut frame.volts);
+                self.used_v.clone_from(&frame.volts);
+                self.baseline.subtract(&self.used_v, &mut frame.volts);
                 return Ok(Some(frame));
             }
             if frame.volts.iter().any(|volts| !volts.is_finite()) {
@@ -197,9 +197,9 @@ impl Reader {
         self.baseline.state().notice()
     }
 
-    /// Readings of the newest frame as measured, before the baseline was taken off (V).
-    pub fn measured_v(&self) -> &[f64] {
-        &self.measured_v
+    /// Readings of the newest frame as they are used, before the baseline was taken off (V).
+    pub fn used_v(&self) -> &[f64] {
+        &self.used_v
     }
 
     /// What the solver gets of a frame (less the baseline): as no channel differs from others; `None` of a frame of another length.
@@ -296,7 +296,8 @@ impl Frames {
         let unit = input.unit.unwrap_or(Unit::Volt);
         let mut frames = Vec::new();
         while let Some(mut frame) = file.next_frame()? {
-            frame.volts.iter_mut().for_each(|value| *value *= unit.volts());
+            let all = frame.volts.iter_mut().chain(&mut frame.measured_v);
+            all.for_each(|value| *value *= unit.volts());
             frames.push(frame);
         }
         let volts = || frames.iter().flat_map(|frame| &frame.volts);

@@ -6,9 +6,9 @@ use std::io::{self, BufWriter, Write};
 use anyhow::{Context, bail};
 use tactomo::detector::short;
 use tactomo::forward::ImageMesh;
-use tactomo::schema::{self, CONTACT_COLUMNS, FRAME_COLUMNS, FrameReport, SHAPE_COLUMNS};
+use tactomo::schema::{self, CONTACT_COLUMNS, EVENT_COLUMNS, FRAME_COLUMNS, FrameReport, Kind, SHAPE_COLUMNS};
 use tactomo::solve::{FoundContact, FoundShape};
-use tactomo::table::{CsvWriter, NpzWriter};
+use tactomo::table::{CsvWriter, NpzWriter, Values};
 
 use super::super::output::{NewFile, unless_closed};
 use super::{Args, Reader};
@@ -49,10 +49,12 @@ struct Arrays {
     /// Number of the frame of each image: a solver need not make one of every frame.
     image_frames: Vec<f64>,
     images: Vec<f64>,
-    /// Of each frame, if they are wanted: electrodes, and readings as measured and as the solver got them (V).
+    /// Number of the frame of each event of the pointer, and the events' own columns.
+    event_frames: Vec<f64>,
+    events: [Vec<f64>; EVENT_COLUMNS.len()],
+    /// Of each frame, if they are wanted: electrodes, and readings as measured, as they are used, and as the solver got them (V).
     electrodes: usize,
-    readings: Vec<f64>,
-    touch: Vec<f64>,
+    readings: [Vec<f64>; 3],
 }
 
 impl Writer {
@@ -176,28 +178,38 @@ impl Arrays {
             self.image_frames.push(number);
             self.images.extend(image.iter().map(|&value| f64::from(value)));
         }
-        if let Some((readings, touch)) = frame.readings_v.zip(frame.touch_v) {
-            self.electrodes = readings.electrodes();
-            self.readings.extend(readings.read_v());
-            self.touch.extend(touch.read_v());
+        for event in frame.events {
+            self.event_frames.push(number);
+            for (column, values) in EVENT_COLUMNS.iter().zip(&mut self.events) {
+                values.push(column.value(event).unwrap_or(f64::NAN));
+            }
+        }
+        if let (Some(measured), Some(used), Some(touch)) = (frame.readings_v, frame.used_v, frame.touch_v) {
+            self.electrodes = measured.electrodes();
+            for (all, readings) in self.readings.iter_mut().zip([measured, used, touch]) {
+                all.extend(readings.read_v());
+            }
         }
     }
 
     fn write(&self, out: BufWriter<File>, mesh: Option<&ImageMesh>) -> io::Result<()> {
         let mut writer = NpzWriter::new(out);
-        let mut column = |name: &str, values: &[f64]| writer.add(name, &[values.len()], values);
         for (frame, values) in FRAME_COLUMNS.iter().zip(&self.frames) {
-            column(frame.name, values)?;
+            column(&mut writer, frame.name, frame.kind, values)?;
         }
         for (shape, values) in SHAPE_COLUMNS.iter().zip(&self.shapes) {
-            column(shape.name, values)?;
+            column(&mut writer, shape.name, Kind::Number, values)?;
         }
-        column("contact_frame", &self.contact_frames)?;
+        column(&mut writer, "contact_frame", Kind::Integer, &self.contact_frames)?;
         for (contact, values) in CONTACT_COLUMNS.iter().zip(&self.contacts) {
-            column(&format!("contact_{}", contact.name), values)?;
+            column(&mut writer, &format!("contact_{}", contact.name), contact.kind, values)?;
+        }
+        column(&mut writer, "event_frame", Kind::Integer, &self.event_frames)?;
+        for (event, values) in EVENT_COLUMNS.iter().zip(&self.events) {
+            column(&mut writer, &format!("event_{}", event.name), event.kind, values)?;
         }
         if let Some(mesh) = mesh.filter(|_| !self.images.is_empty()) {
-            column("image_frame", &self.image_frames)?;
+            column(&mut writer, "image_frame", Kind::Integer, &self.image_frames)?;
             let nodes = mesh.nodes_m.len();
             let places: Vec<f64> = (0..nodes).flat_map(|node| mesh.place_m(node)).collect();
             writer.add("node_x_y_z_m", &[nodes, 3], &places)?;
@@ -205,10 +217,27 @@ impl Arrays {
         }
         if self.electrodes > 0 {
             let n = self.electrodes;
-            let shape = [self.readings.len() / (n * n), n, n];
-            writer.add("readings_v", &shape, &self.readings)?;
-            writer.add("touch_v", &shape, &self.touch)?;
+            let shape = [self.readings[0].len() / (n * n), n, n];
+            for (name, readings) in ["readings_v", "used_v", "touch_v"].into_iter().zip(&self.readings) {
+                writer.add(name, &shape, readings)?;
+            }
         }
         writer.finish()
+    }
+}
+
+/// Adds a column in its kind; what is not known is -1 of an integer and false of a flag.
+fn column(writer: &mut NpzWriter<BufWriter<File>>, name: &str, kind: Kind, values: &[f64]) -> io::Result<()> {
+    let shape = [values.len()];
+    match kind {
+        Kind::Number => writer.add(name, &shape, values),
+        Kind::Integer => {
+            let values: Vec<i64> = values.iter().map(|value| if value.is_nan() { -1 } else { *value as i64 }).collect();
+            writer.add_values(name, &shape, Values::Integers(&values))
+        }
+        Kind::Flag => {
+            let values: Vec<bool> = values.iter().map(|value| *value == 1.0).collect();
+            writer.add_values(name, &shape, Values::Flags(&values))
+        }
     }
 }

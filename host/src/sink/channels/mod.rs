@@ -5,7 +5,7 @@
 //! | `/tactomo/touch` | `tactomo.Touch` | the event, as a line of `--stream` |
 //! | `/tactomo/contacts` | `foxglove.SceneUpdate` | contacts as discs, a shape as a line or a ring |
 //! | `/tactomo/image` | `foxglove.PointCloud` | the image: a point at each node, if the answer has one |
-//! | `/tactomo/readings` | `foxglove.Grid` | the readings as measured and as the solver got them, 64 bits each |
+//! | `/tactomo/readings` | `foxglove.Grid` | the readings as measured, as they are used, and as the solver got them, 64 bits each |
 //!
 //! The schemas of Foxglove are those of its documentation (<https://docs.foxglove.dev/docs/sdk/schemas>), in JSON, where bytes are base64.
 
@@ -105,7 +105,9 @@ impl Messages {
                 }
                 _ => return Ok(false),
             },
-            Channel::Readings => put(&packed::readings(&event.readings, &event.touch, self.bounds_m, at), out),
+            Channel::Readings => {
+                put(&packed::readings([&event.readings, &event.used, &event.touch], self.bounds_m, at), out)
+            }
         }?;
         Ok(true)
     }
@@ -237,16 +239,18 @@ mod tests {
         let says = |g: usize, e: usize| if (g, e) == (1, 2) { Says::Nothing } else { Says::Voltage };
         let readings = Readings::from_fn(4, volts).saying(says);
         let touch = Readings::from_fn(4, |g, e| volts(g, e) / 7.0);
-        let event = TouchEvent { readings, touch, ..TouchEvent::of(0, Solution::default()) };
+        let used = Readings::from_fn(4, |g, e| volts(g, e).max(1.0));
+        let event = TouchEvent { readings, used, touch, ..TouchEvent::of(0, Solution::default()) };
         let grid = message(Channel::Readings, event).unwrap();
         let (columns, stride) = (grid["column_count"].as_u64().unwrap(), grid["cell_stride"].as_u64().unwrap());
-        assert_eq!((columns, stride, grid["row_stride"].as_u64()), (4, 16, Some(64)));
+        assert_eq!((columns, stride, grid["row_stride"].as_u64()), (4, 24, Some(96)));
         let data = STANDARD.decode(grid["data"].as_str().unwrap()).unwrap();
         let found: Vec<f64> = data.chunks(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap())).collect();
-        for (i, pair) in found.chunks(2).enumerate() {
+        for (i, pair) in found.chunks(3).enumerate() {
             let (g, e) = (i / 4, i % 4);
             let is_same = if (g, e) == (1, 2) { pair[0].is_nan() } else { pair[0] == volts(g, e) };
-            assert!(is_same && pair[1] == volts(g, e) / 7.0, "{g} {e}: {pair:?}");
+            let others = [volts(g, e).max(1.0), volts(g, e) / 7.0];
+            assert!(is_same && pair[1..] == others, "{g} {e}: {pair:?}");
         }
         assert_eq!(
             (&grid["timestamp"]["sec"], &grid["timestamp"]["nsec"]),

@@ -33,7 +33,7 @@ pub(super) struct Grid {
     cell_size: Vector2,
     row_stride: usize,
     cell_stride: usize,
-    fields: [Field; 2],
+    fields: [Field; 3],
     data: String,
 }
 
@@ -68,19 +68,22 @@ pub(super) fn image(image_s_per_m2: &[f32], mesh: &ImageMesh, timestamp: Stamp) 
     }
 }
 
-/// Readings (V), as measured and as the solver got them: a row a ground, a column an electrode, beside the detector and as high as it is.
+/// Readings (V) as measured, as they are used, and as the solver got them: a row a ground, a column an electrode, beside the detector and as high as it is.
 pub(super) fn readings(
-    readings: &Readings,
-    touch: &Readings,
+    [readings, used, touch]: [&Readings; 3],
     [[_, low_m], [right_m, high_m]]: [[f64; 2]; 2],
     timestamp: Stamp,
 ) -> Grid {
     let n = readings.electrodes();
     let cell_m = (high_m - low_m) / n.max(1) as f64;
-    let cells = readings.read_v().zip(touch.read_v()).flat_map(|(reading_v, touch_v)| [reading_v, touch_v]);
+    let cells = readings
+        .read_v()
+        .zip(used.read_v())
+        .zip(touch.read_v())
+        .flat_map(|((read_v, used_v), touch_v)| [read_v, used_v, touch_v]);
     let data: Vec<u8> = cells.flat_map(f64::to_le_bytes).collect();
     let field = |name, offset| Field { name, offset, r#type: FLOAT64 };
-    let cell_stride = 2 * size_of::<f64>();
+    let cell_stride = 3 * size_of::<f64>();
     Grid {
         timestamp,
         frame_id: FRAME,
@@ -89,7 +92,7 @@ pub(super) fn readings(
         cell_size: Vector2 { x: cell_m, y: cell_m },
         row_stride: n * cell_stride,
         cell_stride,
-        fields: [field("readings_v", 0), field("touch_v", 8)],
+        fields: [field("readings_v", 0), field("used_v", 8), field("touch_v", 16)],
         data: STANDARD.encode(data),
     }
 }

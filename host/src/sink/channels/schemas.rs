@@ -2,7 +2,7 @@
 //! used here, and all that it requires.
 
 use serde_json::{Map, Value, json};
-use tactomo_touch::schema::{CONTACT_COLUMNS, SHAPE_COLUMNS};
+use tactomo_touch::schema::{CONTACT_COLUMNS, Kind, SHAPE_COLUMNS};
 
 /// An object of such fields, those of which are required whose name does not end in `?`.
 fn object(fields: &[(&str, Value)]) -> Value {
@@ -205,10 +205,10 @@ pub(super) fn touch() -> Value {
 fn contact() -> Value {
     let is_always_there = |name: &str| ["x_m", "y_m", "conductance_s"].contains(&name);
     let fields = CONTACT_COLUMNS.iter().map(|column| {
-        let schema = match column.name {
-            "id" => integer(),
-            "force_beyond_maximum" => boolean(),
-            _ => number(),
+        let schema = match column.kind {
+            Kind::Integer => integer(),
+            Kind::Flag => boolean(),
+            Kind::Number => number(),
         };
         (format!("{}{}", column.name, if is_always_there(column.name) { "" } else { "?" }), schema)
     });

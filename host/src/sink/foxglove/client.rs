@@ -6,13 +6,15 @@ use super::Shared;
 use super::protocol::{self, Asked, Subscription};
 use crate::sink::channels::Channel;
 use crate::sink::feed::{Delivery, Keeps, Next, Tail};
+use crate::sink::web::{Beat, Pulse};
 
 /// Talks to an app until it leaves or nothing more comes.
 pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
-    let mut app = App { shared, subscriptions: Vec::new(), tail: None, out: Vec::new() };
+    let pulse = Pulse::new(shared.door.limits);
+    let mut app = App { shared, subscriptions: Vec::new(), tail: None, out: Vec::new(), pulse };
     // It fails when the app has gone, which is its business.
     let _ = app.talk(&mut socket).await;
-    let _ = socket.send(Message::Close(None)).await;
+    let _ = app.pulse.send(&mut socket, Message::Close(None)).await;
 }
 
 struct App<'a> {
@@ -21,23 +23,31 @@ struct App<'a> {
     /// While something is subscribed to.
     tail: Option<Tail>,
     out: Vec<u8>,
+    pulse: Pulse,
 }
 
 impl App<'_> {
     async fn talk(&mut self, socket: &mut WebSocket) -> Result<(), axum::Error> {
-        socket.send(Message::text(protocol::server_info(&self.shared.session))).await?;
-        socket.send(Message::text(protocol::advertise())).await?;
+        self.pulse.send(socket, Message::text(protocol::server_info(&self.shared.session))).await?;
+        self.pulse.send(socket, Message::text(protocol::advertise())).await?;
         let mut alive = self.shared.taps.clone();
         loop {
             tokio::select! {
-                heard = socket.recv() => match heard {
-                    Some(Ok(Message::Text(text))) => for warning in self.hear(&text) {
-                        socket.send(Message::text(protocol::warning(&warning))).await?;
-                    },
-                    Some(Ok(Message::Close(_))) | None => return Ok(()),
-                    Some(Err(error)) => return Err(error),
-                    // Nothing that an app sends in bytes is for a server that offers nothing of the kind.
-                    Some(Ok(Message::Binary(_) | Message::Ping(_) | Message::Pong(_))) => {}
+                heard = socket.recv() => {
+                    self.pulse.heard();
+                    match heard {
+                        Some(Ok(Message::Text(text))) => for warning in self.hear(&text) {
+                            self.pulse.send(socket, Message::text(protocol::warning(&warning))).await?;
+                        },
+                        Some(Ok(Message::Close(_))) | None => return Ok(()),
+                        Some(Err(error)) => return Err(error),
+                        // Nothing that an app sends in bytes is for a server that offers nothing of the kind.
+                        Some(Ok(Message::Binary(_) | Message::Ping(_) | Message::Pong(_))) => {}
+                    }
+                }
+                beat = self.pulse.next() => match beat {
+                    Beat::Ping => self.pulse.send(socket, Message::Ping(Vec::new().into())).await?,
+                    Beat::Gone => return Ok(()),
                 },
                 next = next(&mut self.tail), if self.tail.is_some() => match next {
                     Next::Event(delivery) => self.send(socket, &delivery).await?,
@@ -80,12 +90,12 @@ impl App<'_> {
     }
 
     async fn send(&mut self, socket: &mut WebSocket, delivery: &Delivery) -> Result<(), axum::Error> {
-        let Self { shared, subscriptions, tail: Some(tail), out } = self else { return Ok(()) };
+        let Self { shared, subscriptions, tail: Some(tail), out, pulse } = self else { return Ok(()) };
         for (id, channel) in subscriptions {
             protocol::begin_data(*id, delivery.event.arrived_unix_ns, out);
             if shared.messages.write(*channel, delivery, out).map_err(axum::Error::new)? {
                 // Waits here while the app does not read; nobody else waits for it.
-                tail.wait_for(socket.send(Message::binary(out.clone()))).await?;
+                tail.wait_for(pulse.send(socket, Message::binary(out.clone()))).await?;
             }
         }
         Ok(())

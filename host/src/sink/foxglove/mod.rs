@@ -1,7 +1,8 @@
 //! A live connection for Foxglove's app: a server that speaks its WebSocket protocol, version 1
 //! (<https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>).
 //!
-//! It only sends: nothing can be asked of the board through it. Who can reach the address can read what is touched.
+//! It only sends: nothing can be asked of the board through it. Programs that can reach the address can read what is touched; of pages in a
+//! browser those of Foxglove, and others that are named.
 
 mod client;
 mod protocol;
@@ -14,7 +15,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use axum::Router;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::{State, WebSocketUpgrade};
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
@@ -22,14 +23,18 @@ use tokio::time::timeout;
 
 use super::address::Address;
 use super::channels::Messages;
+use super::door::Door;
 use super::feed::Taps;
 use super::running::{PATIENCE, Sinks};
 use super::stream::StreamError;
+use super::web;
 use tactomo_physics::causes::with_causes;
 
 /// The port that Foxglove's app proposes.
 pub const DEFAULT_PORT: u16 = 8765;
 
+/// Where Foxglove's app comes from in a browser.
+const OWN: &str = "https://app.foxglove.dev";
 /// Apps at a time.
 const MOST_APPS: u32 = 16;
 /// Largest message that an app may send, in bytes: a list of a few subscriptions.
@@ -44,6 +49,7 @@ struct Shared {
     /// Tells an app that connects again whether it is the same run.
     session: String,
     room: Arc<Semaphore>,
+    door: Door,
 }
 
 impl Sinks {
@@ -51,14 +57,19 @@ impl Sinks {
     ///
     /// # Errors
     /// [`StreamError`] if the port is busy or the address not this machine's.
-    pub fn add_foxglove(&mut self, address: &Address, messages: Messages) -> Result<SocketAddr, StreamError> {
+    pub fn add_foxglove(
+        &mut self,
+        address: &Address,
+        messages: Messages,
+        door: Door,
+    ) -> Result<SocketAddr, StreamError> {
         let refused = StreamError::address("Foxglove", address);
-        let listener = address.resolve().and_then(std::net::TcpListener::bind).map_err(&refused)?;
+        let listener = address.resolve(DEFAULT_PORT).and_then(std::net::TcpListener::bind).map_err(&refused)?;
         let at = listener.local_addr().map_err(&refused)?;
         listener.set_nonblocking(true).map_err(&refused)?;
         let session = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis().to_string();
         let room = Arc::new(Semaphore::new(MOST_APPS as usize));
-        let shared = Arc::new(Shared { taps: self.taps(), messages, session, room });
+        let shared = Arc::new(Shared { taps: self.taps(), messages, session, room, door });
         let name = format!("Foxglove at ws://{at}");
         let work = move |runtime: tokio::runtime::Runtime| {
             if let Err(error) = runtime.block_on(serve(listener, shared)) {
@@ -74,8 +85,9 @@ async fn serve(listener: std::net::TcpListener, shared: Arc<Shared>) -> io::Resu
     let listener = TcpListener::from_std(listener)?;
     let mut alive = shared.taps.clone();
     let router = Router::new().fallback(connect).with_state(Arc::clone(&shared));
+    let limits = shared.door.limits;
     tokio::select! {
-        served = axum::serve(listener, router) => return served,
+        () = web::serve(listener, router, limits) => {}
         () = alive.ended() => {}
     }
     // What is left is for those who read; a stalled one is not waited for.
@@ -85,8 +97,13 @@ async fn serve(listener: std::net::TcpListener, shared: Arc<Shared>) -> io::Resu
 
 async fn connect(
     State(shared): State<Arc<Shared>>,
+    headers: HeaderMap,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Response {
+    if !shared.door.lets_in(&headers, OWN, true) {
+        let refused = "Only Foxglove's own pages may read this, and those that --allow-origin names.\n";
+        return (StatusCode::FORBIDDEN, refused).into_response();
+    }
     let Ok(upgrade) = upgrade else {
         return (StatusCode::UPGRADE_REQUIRED, "Open this address in Foxglove, as a WebSocket.\n").into_response();
     };

@@ -1,6 +1,6 @@
 //! Who may ask: only pages that this server served itself, and over the network only who has the token.
 //!
-//! Any page in the same browser can reach a server on 127.0.0.1. A foreign page that opens the socket says so in `Origin`; one
+//! A foreign page that opens the socket says so in `Origin`, which the [door](crate::sink::door) looks at; one
 //! that had its own name resolve to this machine (DNS rebinding) says so in `Host`. A server that other machines can reach asks for
 //! more: every path begins with a token of 128 random bits, which only the printed address has.
 
@@ -8,10 +8,10 @@ use std::fmt::Write;
 use std::hint::black_box;
 use std::net::{IpAddr, SocketAddr};
 
-use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, HOST, ORIGIN, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
-};
-use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use axum::http::header::{CACHE_CONTROL, CONTENT_SECURITY_POLICY, HOST, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS};
+use axum::http::{HeaderMap, HeaderValue};
+
+use crate::sink::door::only;
 
 /// Bytes of a token: 128 bits.
 const TOKEN_BYTES: usize = 16;
@@ -108,18 +108,6 @@ fn authority(name: &str, port: u16) -> String {
     if port == 80 { name.to_owned() } else { format!("{name}:{port}") }
 }
 
-/// Whether the request comes from a page of the server that it reaches as `host`.
-pub(super) fn is_own_page(headers: &HeaderMap, host: &str) -> bool {
-    only(headers, &ORIGIN).and_then(|origin| origin.strip_prefix("http://")) == Some(host)
-}
-
-/// The value of a header that is there exactly once.
-fn only<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
-    let mut values = headers.get_all(name).iter();
-    let value = values.next()?;
-    if values.next().is_some() { None } else { value.to_str().ok() }
-}
-
 /// Tells the browser what the page, reached as `host`, may do.
 pub(super) fn protect(headers: &mut HeaderMap, host: Option<&str>) {
     // Some browsers do not count the socket as 'self'.
@@ -139,16 +127,16 @@ mod tests {
     use super::*;
     use std::net::Ipv4Addr;
 
-    fn headers(name: HeaderName, values: &[&'static str]) -> HeaderMap {
-        values.iter().map(|value| (name.clone(), HeaderValue::from_static(value))).collect()
+    fn headers(hosts: &[&'static str]) -> HeaderMap {
+        hosts.iter().map(|host| (HOST, HeaderValue::from_static(host))).collect()
     }
 
     fn knows(access: &Access, host: &'static str) -> bool {
-        access.host(&headers(HOST, &[host])).is_some()
+        access.host(&headers(&[host])).is_some()
     }
 
     #[test]
-    fn hosts_and_origins_must_match_to_the_letter() {
+    fn hosts_must_match_to_the_letter() {
         let access = Access::local(7878);
         for host in ["127.0.0.1:7878", "localhost:7878"] {
             assert!(knows(&access, host), "{host}");
@@ -156,14 +144,8 @@ mod tests {
         for host in ["127.0.0.1", "127.0.0.1:7879", "evil.example:7878", "localhost.evil.example:7878", ""] {
             assert!(!knows(&access, host), "{host}");
         }
-        assert!(access.host(&headers(HOST, &["127.0.0.1:7878", "evil.example"])).is_none());
+        assert!(access.host(&headers(&["127.0.0.1:7878", "evil.example"])).is_none());
         assert!(access.host(&HeaderMap::new()).is_none());
-        let own = "localhost:7878";
-        assert!(is_own_page(&headers(ORIGIN, &["http://localhost:7878"]), own));
-        for origin in ["null", "https://localhost:7878", "http://localhost", "http://localhost:7878.evil.example"] {
-            assert!(!is_own_page(&headers(ORIGIN, &[origin]), own), "{origin}");
-        }
-        assert!(!is_own_page(&HeaderMap::new(), own));
     }
 
     #[test]

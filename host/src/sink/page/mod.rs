@@ -28,6 +28,9 @@ use axum::response::{IntoResponse, Response};
 use tokio::sync::{Semaphore, oneshot, watch};
 
 use self::access::Access;
+use super::address::Address;
+use super::door::Door;
+use super::web;
 use crate::run::{Request, Snapshot};
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
@@ -77,16 +80,28 @@ impl From<Contact> for Finger {
 }
 
 /// Who can reach the page.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Listen {
     /// Address of this machine that other machines reach, or `0.0.0.0` for all it has; then the page's address has a random token,
     /// without which nothing is answered. `None` for this machine alone.
     pub address: Option<IpAddr>,
     /// Port, 0 for any free one; `None` for [`DEFAULT_PORT`] or the next free one.
     pub port: Option<u16>,
+    /// Who may open its socket besides its own pages, and how long somebody may stay without a word.
+    pub door: Door,
 }
 
 impl Listen {
+    /// At an address as a person types it, which other machines reach if it has a host.
+    ///
+    /// # Errors
+    /// [`ServerError::Address`] if nothing has such a name.
+    pub fn at(address: &Address, door: Door) -> Result<Self, ServerError> {
+        let resolved = address.resolve(DEFAULT_PORT);
+        let at = resolved.map_err(|source| ServerError::Address { address: address.clone(), source })?;
+        Ok(Self { address: address.has_host().then_some(at.ip()), port: address.port(), door })
+    }
+
     fn ip(&self) -> IpAddr {
         self.address.unwrap_or(Ipv4Addr::LOCALHOST.into())
     }
@@ -134,6 +149,16 @@ pub enum ServerError {
         /// What cannot be written.
         source: serde_json::Error,
     },
+    /// An address that nobody has.
+    #[error(
+        "cannot serve the page at {address}: {source}; give --listen an address that this machine has, or only a port"
+    )]
+    Address {
+        /// The address asked for.
+        address: Address,
+        /// What the system says.
+        source: io::Error,
+    },
     /// No random numbers.
     #[error("the system gives no random numbers for the token of a shared page ({0}): leave out --listen")]
     Token(getrandom::Error),
@@ -149,6 +174,7 @@ struct Shared {
     rezeros: AtomicU64,
     pages: Arc<Semaphore>,
     access: Access,
+    door: Door,
 }
 
 impl Server {
@@ -164,7 +190,7 @@ impl Server {
         snapshots: watch::Receiver<Arc<Snapshot>>,
         requests: SyncSender<Request>,
     ) -> Result<Self, ServerError> {
-        let listener = bind(listen)?;
+        let listener = bind(&listen)?;
         let (address, port) = (listen.ip(), listen.port.unwrap_or(DEFAULT_PORT));
         let refused = |source| ServerError::Listen { address, port, source };
         let at = listener.local_addr().map_err(refused)?;
@@ -177,7 +203,8 @@ impl Server {
             .map_err(|source| ServerError::PageSetup { detector: setup.detector.name.clone(), source })?;
         let pages = Arc::new(Semaphore::new(MAX_PAGES));
         let rezeros = AtomicU64::new(0);
-        let shared = Arc::new(Shared { setup, setup_message, snapshots, requests, rezeros, pages, access });
+        let shared =
+            Arc::new(Shared { setup, setup_message, snapshots, requests, rezeros, pages, access, door: listen.door });
         let (stop, stopped) = oneshot::channel();
         let thread = run(listener, shared, stopped).map_err(refused)?;
         Ok(Self { at, prefix, stop: Some(stop), thread: Some(thread) })
@@ -223,18 +250,19 @@ fn own_address() -> Option<IpAddr> {
     socket.local_addr().ok().map(|address| address.ip())
 }
 
-fn bind(listen: Listen) -> Result<TcpListener, ServerError> {
+fn bind(listen: &Listen) -> Result<TcpListener, ServerError> {
     let address = listen.ip();
     let Some(port) = listen.port else {
         let mut refusal = None;
         let ports = DEFAULT_PORT..=DEFAULT_PORT + PORTS_TRIED;
-        let found = ports.map(|port| bind(Listen { port: Some(port), ..listen })).find_map(|bound| match bound {
-            Ok(listener) => Some(listener),
-            Err(error) => {
-                refusal.get_or_insert(error);
-                None
-            }
-        });
+        let found =
+            ports.map(|port| bind(&Listen { port: Some(port), ..listen.clone() })).find_map(|bound| match bound {
+                Ok(listener) => Some(listener),
+                Err(error) => {
+                    refusal.get_or_insert(error);
+                    None
+                }
+            });
         return found.ok_or(refusal.unwrap_or(ServerError::Busy { address, port: DEFAULT_PORT }));
     };
     TcpListener::bind((address, port)).map_err(|source| match source.kind() {
@@ -250,9 +278,10 @@ fn run(listener: TcpListener, shared: Arc<Shared>, stopped: oneshot::Receiver<()
     let serve = async move {
         let listener = tokio::net::TcpListener::from_std(listener)?;
         tokio::select! {
-            served = axum::serve(listener, router(shared)) => served,
-            _ = stopped => Ok(()),
+            () = web::serve(listener, router(Arc::clone(&shared)), shared.door.limits) => {}
+            _ = stopped => {}
         }
+        io::Result::Ok(())
     };
     std::thread::Builder::new().name("page server".to_owned()).spawn(move || {
         if let Err(error) = runtime.block_on(serve) {
@@ -303,8 +332,8 @@ fn redirect(to: &str) -> Response {
 }
 
 fn open_socket(shared: Arc<Shared>, parts: &Parts, host: &str, upgrade: WebSocketUpgrade) -> Response {
-    if !access::is_own_page(&parts.headers, host) {
-        return refuse("Only the live page itself may open its socket.\n");
+    if !shared.door.lets_in(&parts.headers, &format!("http://{host}"), false) {
+        return refuse("Only the live page itself may open its socket, and pages that --allow-origin names.\n");
     }
     let Ok(page) = shared.pages.clone().try_acquire_owned() else {
         return (StatusCode::SERVICE_UNAVAILABLE, "Too many pages are open.\n").into_response();

@@ -13,6 +13,7 @@ use tokio::time::{Instant, sleep_until};
 use super::messages::PageMessage;
 use super::{Shared, update, wire};
 use crate::run::{Request, Snapshot};
+use crate::sink::web::{Beat, Pulse};
 
 /// Least time between two updates: a little less than a screen's refresh, so that a page that asks at each refresh is served
 /// at each.
@@ -32,7 +33,7 @@ pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
     if let Some(reason) = reason {
         let frame = CloseFrame { code: close_code::POLICY, reason: reason.into() };
         // The page may be gone already.
-        let _ = socket.send(Message::Close(Some(frame))).await;
+        let _ = page.pulse.send(&mut socket, Message::Close(Some(frame))).await;
     }
 }
 
@@ -47,6 +48,7 @@ struct Page<'a> {
     course_points: u64,
     /// Whether this page presses on the simulated detector.
     presses: bool,
+    pulse: Pulse,
 }
 
 enum Turn {
@@ -59,21 +61,38 @@ impl<'a> Page<'a> {
         let mut snapshots = shared.snapshots.clone();
         snapshots.mark_changed();
         let now = Instant::now();
-        Self { shared, snapshots, taken: false, update_due: now, status_due: now, course_points: 0, presses: false }
+        let pulse = Pulse::new(shared.door.limits);
+        Self {
+            shared,
+            snapshots,
+            taken: false,
+            update_due: now,
+            status_due: now,
+            course_points: 0,
+            presses: false,
+            pulse,
+        }
     }
 
     /// Returns when the page has left, or with the reason to close.
     async fn talk(&mut self, socket: &mut WebSocket) -> Option<&'static str> {
-        socket.send(Message::text(self.shared.setup_message.clone())).await.ok()?;
+        self.pulse.send(socket, Message::text(self.shared.setup_message.clone())).await.ok()?;
         loop {
             tokio::select! {
-                heard = socket.recv() => match heard?.ok()? {
-                    Message::Text(text) => if let Err(reason) = self.hear(&text) {
-                        return Some(reason);
-                    },
-                    Message::Binary(_) => return Some("pages send text only"),
-                    Message::Close(_) => return None,
-                    Message::Ping(_) | Message::Pong(_) => {}
+                heard = socket.recv() => {
+                    self.pulse.heard();
+                    match heard?.ok()? {
+                        Message::Text(text) => if let Err(reason) = self.hear(&text) {
+                            return Some(reason);
+                        },
+                        Message::Binary(_) => return Some("pages send text only"),
+                        Message::Close(_) => return None,
+                        Message::Ping(_) | Message::Pong(_) => {}
+                    }
+                }
+                beat = self.pulse.next() => match beat {
+                    Beat::Ping => self.pulse.send(socket, Message::Ping(Vec::new().into())).await.ok()?,
+                    Beat::Gone => return Some("nothing was heard of the page for too long"),
                 },
                 turn = next_turn(&mut self.snapshots, self.update_due, self.status_due), if self.taken => {
                     let message = match turn {
@@ -83,7 +102,7 @@ impl<'a> Page<'a> {
                     if let Some(message) = message {
                         self.taken = false;
                         // Waits here while the page does not read; nothing else waits for this.
-                        socket.send(message).await.ok()?;
+                        self.pulse.send(socket, message).await.ok()?;
                     }
                 }
             }

@@ -169,6 +169,8 @@ enum PlayingMessage {
         paused: bool,
         looped: bool,
         ended: bool,
+        /// What is damaged in it, as far as it was played.
+        damage: Option<String>,
     },
 }
 
@@ -262,14 +264,17 @@ fn playing(playing: &Playing) -> PlayingMessage {
             scene: scene.to_string(),
             faults: faults.iter().map(ToString::to_string).collect(),
         },
-        Playing::Recording { position_s, length_s, speed, paused, looped, ended } => PlayingMessage::Recording {
-            position_s: *position_s,
-            length_s: *length_s,
-            speed: speed.is_finite().then_some(*speed),
-            paused: *paused,
-            looped: *looped,
-            ended: *ended,
-        },
+        Playing::Recording { position_s, length_s, speed, paused, looped, ended, damage } => {
+            PlayingMessage::Recording {
+                position_s: *position_s,
+                length_s: *length_s,
+                speed: speed.is_finite().then_some(*speed),
+                paused: *paused,
+                looped: *looped,
+                ended: *ended,
+                damage: damage.is_any().then(|| damage.to_string()),
+            }
+        }
     }
 }
 
@@ -315,6 +320,7 @@ fn hello(hello: &Hello) -> HelloMessage<'_> {
 mod tests {
     use super::*;
     use crate::run::scanning::ScanChoice;
+    use tactomo_board::record::Loss;
     use tactomo_physics::detector::Detector;
     use tactomo_physics::forward::ImageMesh;
 
@@ -376,6 +382,7 @@ mod tests {
             paused: true,
             looped: false,
             ended: false,
+            damage: Loss { damaged_places: 2, left_out_bytes: 90, ..Loss::default() },
         };
         let snapshot = Snapshot {
             link: LinkState::Silent("no frames for 2 s".to_owned()),
@@ -392,7 +399,7 @@ mod tests {
             value["playing"],
             serde_json::json!({
                 "kind": "recording", "position_s": 1.5, "length_s": 4.0, "speed": null, "paused": true, "looped": false,
-                "ended": false
+                "ended": false, "damage": "it is damaged in 2 places (90 bytes left out)"
             })
         );
         assert_eq!(value["recording"], "touch.tactomo");

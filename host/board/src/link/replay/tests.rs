@@ -66,6 +66,33 @@ fn the_end_is_calm_and_says_what_is_damaged() {
     std::fs::remove_file(path).unwrap();
 }
 
+#[test]
+fn what_is_damaged_is_known_while_it_is_played_and_a_packet_that_was_cut_off_is_given_as_it_is() {
+    let path = recording("cut", &[(0, b"\x05whole\0"), (1, b"\x05cut")]);
+    let mut link = ReplayLink::open(&path, f64::INFINITY, true).unwrap();
+    let damage = |link: &ReplayLink| match link.playing() {
+        Playing::Recording { damage, ended, .. } => (damage.is_any(), ended),
+        other => panic!("{other:?}"),
+    };
+    let play = |link: &mut ReplayLink| {
+        let (mut all, mut buffer) = (Vec::new(), [0; 100]);
+        while !damage(link).1 {
+            let count = link.read(&mut buffer).unwrap();
+            all.extend_from_slice(&buffer[..count]);
+        }
+        all
+    };
+    assert_eq!(play(&mut link), b"\x05whole\0\x05cut");
+    assert!(!damage(&link).0);
+    let mut file = std::fs::read(&path).unwrap();
+    file.truncate(file.len() - 1);
+    std::fs::write(&path, file).unwrap();
+    let mut link = ReplayLink::open(&path, f64::INFINITY, true).unwrap();
+    play(&mut link);
+    assert!(damage(&link).0, "the last chunk is not whole");
+    std::fs::remove_file(path).unwrap();
+}
+
 fn hello() -> Vec<u8> {
     let hello = Hello::example(4);
     let mut wire = [0; MAX_WIRE];

@@ -311,8 +311,25 @@ fn a_curved_detector_is_whole_with_its_surface_as_text() {
     for (ours, theirs) in again.electrodes.iter().zip(&detector.electrodes) {
         assert!(space::distance(ours.place_m(), theirs.place_m()) < 1e-12);
     }
+    let (toml, file) = detector.to_files("tip-cal");
+    let (name, obj) = file.unwrap();
+    assert!(name == "tip-cal.obj" && toml.contains("surface = \"tip-cal.obj\""), "{toml}");
+    assert_eq!(obj, surface.to_obj());
     let wrong = Detector::from_toml_and_obj(&detector.to_toml(), "v 1 2", "else").unwrap_err().to_string();
     assert!(wrong.contains("surface"), "{wrong}");
+}
+
+#[test]
+fn text_opens_no_file_whatever_it_names() {
+    let text = std::fs::read_to_string(example("fingertip.toml")).unwrap();
+    let there = example("fingertip.obj").display().to_string();
+    for file in [&there, "fingertip.obj", "/dev/zero", "no-such.obj"] {
+        let wrong = Detector::from_toml(&text.replace("fingertip.obj", file), "x").unwrap_err().to_string();
+        assert!(wrong.contains("only a detector's own file may name another one") && wrong.contains(file), "{wrong}");
+    }
+    let device = text.replace("fingertip.obj", "/dev/zero");
+    let wrong = Detector::from_toml_in(Path::new(""), &device, "x").unwrap_err().to_string();
+    assert!(wrong.contains("it is no file"), "{wrong}");
 }
 
 #[test]

@@ -76,6 +76,10 @@ impl Surface {
     /// # Errors
     /// [`SurfaceError`], which says where in the file and what is allowed.
     pub fn read(path: &Path, named: &str, unit: &str) -> Result<Self, SurfaceError> {
+        if !path.metadata()?.is_file() {
+            // A pipe would be waited for, and a device has no end.
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is no file").into());
+        }
         let mut bytes = Vec::new();
         File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
         if bytes.len() as u64 > MAX_BYTES {

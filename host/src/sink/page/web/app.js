@@ -68,11 +68,13 @@ function showStatus(status) {
 }
 
 // One line for what the program has to say: what was refused, what to know of the baseline and the calibration, where the recording is.
-function showNotice({ refused, baseline, calibration, recording, solver }) {
+function showNotice({ refused, baseline, calibration, recording, solver, playing }) {
   const notice = document.getElementById("notice");
   const method = solver?.refused ? `This solver cannot be used: ${solver.refused}` : null;
-  notice.textContent = refused ?? method ?? baseline ?? calibration ?? (recording ? `Recording to ${recording}` : "");
-  notice.className = refused || method ? "bad" : baseline || calibration ? "warning" : "";
+  const damage = playing.damage ? `This recording is damaged: ${playing.damage}` : null;
+  const warning = damage ?? baseline ?? calibration;
+  notice.textContent = refused ?? method ?? warning ?? (recording ? `Recording to ${recording}` : "");
+  notice.className = refused || method ? "bad" : warning ? "warning" : "";
   notice.hidden = !notice.textContent;
 }
 

@@ -4,6 +4,7 @@ import { errorOf, placesOf } from "./bars.js";
 import { ellipseOf, strengthOf } from "./marks.js";
 import { hueOf } from "./palette.js";
 import { count, millimetres, withError, withPrefix } from "./units.js";
+import { inPlaceOfContacts } from "./verdict.js";
 
 // Numbers that change faster cannot be read.
 const SHOWN_EVERY_MS = 120;
@@ -78,7 +79,8 @@ export class ContactTable {
   }
 
   /** Shows the contacts of an update. */
-  show({ contacts, image, shape }, now) {
+  show(update, now) {
+    const { contacts, shape } = update;
     if (now - this.shown < SHOWN_EVERY_MS) return;
     this.shown = now;
     const sorted = [...contacts].sort((a, b) => (a.id ?? 0) - (b.id ?? 0) || b.conductanceS - a.conductanceS);
@@ -86,7 +88,7 @@ export class ContactTable {
     this.body.replaceChildren(...rows);
     this.strength.textContent = contacts.some(({ forceN }) => forceN !== null) ? "force" : "conductance";
     this.rest.hidden = rows.length > 0;
-    this.rest.textContent = image.length ? "The image has no single contacts." : "Nothing touches.";
+    this.rest.textContent = inPlaceOfContacts(update);
     this.more.textContent = contacts.length > ROWS ? `and ${count(contacts.length - ROWS)} more` : "";
   }
 }

@@ -3,9 +3,8 @@
 import { nameOf } from "./bars.js";
 import { fixed } from "./units.js";
 
-// A warning stays this long after the last frame with it, and words until the next are due: what flickers cannot be read.
-const WARNING_STAYS_MS = 800;
-const WORDS_STAY_MS = 250;
+// Words and warnings stay this long: what flickers cannot be read.
+const STAYS_MS = 250;
 
 const WARNINGS = {
   saturated: ["saturated", "Readings at the end of the converter's range, or contacts that conduct so well that more would change nothing"],
@@ -22,10 +21,20 @@ function chip(kind, text, title) {
   return made;
 }
 
+// While the first answer to a touch is searched, nobody knows what it is.
+const isSearched = ({ choice }) => choice?.what === "searching";
+
+/** What stands in place of contacts where there are none. */
+export function inPlaceOfContacts(update) {
+  if (isSearched(update)) return "What touches is being searched.";
+  return update.image.length ? "The image has no single contacts." : "Nothing touches.";
+}
+
 // What a passer-by calls it.
-function headline({ choice, contacts, image, shape }) {
+function headline(update) {
+  const { choice, contacts, image, shape } = update;
   const what = choice?.what ?? "";
-  if (what === "searching") return "Something touches";
+  if (isSearched(update)) return "Something touches";
   const counted = (word) => (contacts.length === 1 ? `1 ${word}` : `${contacts.length} ${word}s`);
   if (shape) return nameOf(shape);
   // Of a solver that chooses, contacts beside an image are what `contacts` would find; of others, they are its peaks.
@@ -55,7 +64,7 @@ export class Verdict {
   show(update, explanation, now) {
     const { choice, flags, excluded, residual, ageS } = update;
     const words = headline(update);
-    if (words !== this.what.textContent || now - this.shown > WORDS_STAY_MS) {
+    if (words !== this.what.textContent || now - this.shown > STAYS_MS) {
       this.shown = now;
       this.what.textContent = words;
       const left = residual === null ? [] : [`residual ${fixed(residual, 1)} × noise`];
@@ -66,6 +75,9 @@ export class Verdict {
     }
     // A warm image is never quite settled, and right all the same.
     this.#warn(update.image.length ? flags.filter((flag) => flag !== "unfinished") : flags, excluded, now);
+    // Where no other answer comes, as where it is paused, only what this one says stays.
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.#settle(), STAYS_MS);
     Object.assign(document.documentElement.dataset, { choice: choice?.what ?? "", flags: flags.join(" "), ageS: String(ageS) });
   }
 
@@ -74,9 +86,15 @@ export class Verdict {
     if (this.what.textContent.trim()) this.residual.textContent = "the last answer";
   }
 
+  #settle() {
+    this.seen.clear();
+    this.#warn(this.flags, this.excluded, performance.now());
+  }
+
   #warn(flags, excluded, now) {
+    [this.flags, this.excluded] = [flags, excluded];
     flags.forEach((flag) => this.seen.set(flag, now));
-    const shown = Object.keys(WARNINGS).filter((flag) => now - (this.seen.get(flag) ?? -Infinity) < WARNING_STAYS_MS);
+    const shown = Object.keys(WARNINGS).filter((flag) => now - (this.seen.get(flag) ?? -Infinity) < STAYS_MS);
     const told = [...shown, ...excluded].join();
     if (told === this.told) return;
     this.told = told;
