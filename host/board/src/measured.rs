@@ -1,5 +1,7 @@
 //! A detector as a board measures it, and the volts of the board's codes.
 
+use std::iter;
+
 use tactomo_physics::detector::{ConverterErrors, Detector};
 #[cfg(doc)]
 use tactomo_physics::readings::Says;
@@ -39,6 +41,10 @@ pub fn as_measured(detector: &Detector, board: &Hello) -> Result<Detector, Misma
         measured.adc.noise_lsb = 1e-6 * f64::from(noise_uv) / measured.adc.lsb_v();
     }
     measured.converters = converters(board, detector.ground_v);
+    let runs = board.ranges.iter().enumerate().flat_map(|(index, run)| iter::repeat_n(index, run.electrodes.into()));
+    // A channel in no run is on a converter of which nothing is known.
+    let converter_of = runs.chain(iter::repeat(board.ranges.len()));
+    measured.electrodes.iter_mut().zip(converter_of).for_each(|(pad, converter)| pad.converter = converter);
     Ok(measured)
 }
 
@@ -46,7 +52,6 @@ pub fn as_measured(detector: &Detector, board: &Hello) -> Result<Detector, Misma
 fn converters(board: &Hello, ground_v: f64) -> Vec<ConverterErrors> {
     let per_code = volts(board.adc_full_scale_mv) / f64::from(1u32 << board.adc_bits.min(31));
     let of = |range: &tactomo_protocol::Range| ConverterErrors {
-        channels: range.electrodes.into(),
         gain_share: 1e-6 * f64::from(range.errors.gain_ppm),
         bow_v: 1e-6 * f64::from(range.errors.bow_uv),
         range_v: [range.floor, range.ceiling].map(|code| f64::from(code) * per_code - ground_v),
@@ -155,6 +160,7 @@ impl Volts {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tactomo_physics::detector::Electrode;
     use tactomo_physics::readings::Says;
     use tactomo_protocol::{FrameHead, Scope};
 
@@ -176,6 +182,31 @@ mod tests {
         let preset = Detector::preset(Detector::DEFAULT).unwrap();
         let board = Hello { adc_bits: 12, adc_full_scale_mv: 3300, drive_mv: 2000, ..hello(16) };
         assert_eq!(as_measured(&preset, &board), Ok(preset));
+    }
+
+    #[test]
+    fn channels_know_their_converters_and_take_them_along() {
+        let errors = tactomo_protocol::ConverterErrors { gain_ppm: 10_000, ..Default::default() };
+        let range = |electrodes, floor| tactomo_protocol::Range { electrodes, floor, ceiling: 900, errors };
+        let board = Hello { ranges: [range(6, 142), range(9, 128)].into_iter().collect(), ..hello(16) };
+        let measured = as_measured(&Detector::default(), &board).unwrap();
+        let floors_v = |detector: &Detector| {
+            let floor = |pad: &Electrode| detector.converters.get(pad.converter).map(|known| known.range_v[0]);
+            detector.electrodes.iter().map(floor).collect::<Vec<_>>()
+        };
+        let of_all = floors_v(&measured);
+        assert_eq!([of_all[0], of_all[5], of_all[6], of_all[14], of_all[15]], [
+            Some(0.142),
+            Some(0.142),
+            Some(0.128),
+            Some(0.128),
+            None
+        ]);
+        for left_out in 0..16 {
+            let kept: Vec<usize> = (0..16).filter(|e| *e != left_out).collect();
+            let expected: Vec<_> = kept.iter().map(|e| of_all[*e]).collect();
+            assert_eq!(floors_v(&measured.keeping(&kept)), expected, "without {left_out}");
+        }
     }
 
     #[test]

@@ -2,7 +2,8 @@
 
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
-use tactomo::readings::Readings;
+use tactomo::detector::Detector;
+use tactomo::readings::{Likely, Readings, check_volts};
 
 use crate::error::refused;
 use crate::live::TouchEvent;
@@ -26,6 +27,17 @@ pub fn readings(given: &Bound<'_, PyAny>) -> PyResult<Readings> {
 /// Frames of readings: an array `(frames, n, n)`, `(frames, n * n)`, or a list of what [`readings`] takes.
 pub fn frames(given: &Bound<'_, PyAny>) -> PyResult<Vec<Readings>> {
     given.try_iter()?.map(|frame| readings(&frame?)).collect()
+}
+
+/// Refuses readings that cannot be volts of a detector, with what they may be.
+pub fn require_volts<'a>(all: impl IntoIterator<Item = &'a Readings>, detector: &Detector) -> PyResult<()> {
+    let volts = all.into_iter().flat_map(|readings| readings.volts().iter().copied());
+    check_volts(volts, detector).map_err(|error| {
+        refused(match error.likely {
+            Likely::Millivolts => format!("{error} Divide them by 1000"),
+            Likely::Codes => format!("{error} Convert them to volts"),
+        })
+    })
 }
 
 fn of_array(array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Readings> {

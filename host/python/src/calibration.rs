@@ -81,6 +81,7 @@ impl Calibration {
     ) -> PyResult<Self> {
         let mut frames: Vec<Frame> =
             array::frames(readings)?.into_iter().map(|readings| Frame { readings, known_m: None }).collect();
+        array::require_volts(frames.iter().map(|frame| &frame.readings), &detector.0)?;
         for (index, x_m, y_m) in known {
             let count = frames.len();
             let frame = frames.get_mut(index);

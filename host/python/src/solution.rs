@@ -191,17 +191,20 @@ pub struct Flags {
     calibrate: bool,
     /// Electrodes that were left out.
     excluded: Vec<usize>,
+    /// What is wrong with each of those: `open`, `shorted`, `exchanged` or `contradicting`.
+    faults: Vec<&'static str>,
 }
 
 impl From<&tactomo::solve::Flags> for Flags {
     fn from(flags: &tactomo::solve::Flags) -> Self {
-        let tactomo::solve::Flags { saturated, misfit, unfinished, calibrate, excluded } = flags;
+        let tactomo::solve::Flags { saturated, misfit, unfinished, calibrate, excluded, faults } = flags;
         Self {
             saturated: *saturated,
             misfit: *misfit,
             unfinished: *unfinished,
             calibrate: *calibrate,
             excluded: excluded.clone(),
+            faults: faults.iter().map(|fault| fault.name()).collect(),
         }
     }
 }
@@ -217,7 +220,8 @@ impl Flags {
         ];
         let mut set: Vec<String> =
             set.iter().filter(|(is_set, _)| *is_set).map(|(_, name)| (*name).to_owned()).collect();
-        set.extend((!self.excluded.is_empty()).then(|| format!("excluded {:?}", self.excluded)));
+        let left_out = self.excluded.iter().zip(&self.faults);
+        set.extend(left_out.map(|(electrode, fault)| format!("electrode {electrode} left out ({fault})")));
         format!("Flags({})", set.join(", "))
     }
 }

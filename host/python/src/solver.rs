@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use pyo3::prelude::*;
 use tactomo::solve::{Guard, Lambda, Method, Parameter, ParameterKind, Problem, Solver as Solves};
 
-use crate::array::readings;
+use crate::array::{readings, require_volts};
 use crate::detector::Detector;
 use crate::error::{raised, refused};
 use crate::mesh::Mesh;
@@ -56,11 +56,14 @@ impl Solver {
     }
 
     /// What the readings of a frame, less the baseline (V), say of the touch: `(n, n)` or `(n * n,)`, or a frame of a `Recording`.
+    ///
+    /// What stands still is averaged over frames. The very same readings again are the same observation, and tell no more than once.
     fn solve(
         &self,
         py: Python<'_>,
         #[pyo3(from_py_with = readings)] readings: tactomo::readings::Readings,
     ) -> PyResult<Solution> {
+        require_volts([&readings], self.problem.detector())?;
         let mut readings = readings;
         let solved = py.detach(|| {
             readings.correct_channels(self.problem.detector());

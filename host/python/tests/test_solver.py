@@ -115,6 +115,27 @@ def test_readings_of_another_detector_say_so(change, words, detector, readings):
         tactomo.Solver("tikhonov", detector).solve(change(readings))
 
 
+def test_readings_in_millivolts_or_codes_are_refused_with_what_they_may_be(detector, readings):
+    solver = tactomo.Solver("tikhonov", detector)
+    with pytest.raises(tactomo.TactomoError, match=r"driven with 2 V .*are these millivolts\? Divide them by 1000"):
+        solver.solve(1e3 * readings)
+    with pytest.raises(tactomo.TactomoError, match=r"are these codes of the converter\? Convert them to volts"):
+        solver.solve(np.where(readings > 0, 4095, 0))
+    with pytest.raises(tactomo.TactomoError, match="are these millivolts"):
+        tactomo.Calibration.rub(detector, [1e3 * readings])
+    assert len(solver.solve(readings).contacts) > 0
+
+
+@pytest.mark.parametrize("name", ["auto", "contacts"])
+def test_the_same_array_again_is_one_observation(name, simulator, detector):
+    readings, solver = simulator.readings([PRESS]), tactomo.Solver(name, detector)
+    first, *others = (solver.solve(readings) for _ in range(40))
+    for again in others:
+        assert len(again.contacts) == len(first.contacts) == 1
+        assert again.residual == pytest.approx(first.residual, rel=1e-3)
+        assert again.contacts[0].sigma_x_m == pytest.approx(first.contacts[0].sigma_x_m, rel=1e-2)
+
+
 def test_wrong_solvers_say_what_there_is(detector):
     with pytest.raises(tactomo.TactomoError, match="there is no solver `jazz`; choose one of auto, contacts"):
         tactomo.Solver("jazz", detector)

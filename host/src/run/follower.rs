@@ -238,9 +238,7 @@ impl FollowLoop {
 
     /// Begins with a board's detector, or with another.
     fn begin_with(&mut self, description: Arc<Detector>) {
-        let Detector { drive_v, adc, .. } = &*description;
-        let calibrated =
-            |known: &Arc<Detector>| Arc::new(Detector { drive_v: *drive_v, adc: *adc, ..(**known).clone() });
+        let calibrated = |known: &Arc<Detector>| Arc::new(known.measured_as(&description));
         let detector = self.calibrated.as_ref().map_or_else(|| Arc::clone(&description), calibrated);
         let baseline = (self.begin_baseline)(&detector, self.conversions);
         self.board = Some(BoardState::new(description, detector, baseline));
@@ -387,8 +385,9 @@ impl FollowLoop {
             pointer_events,
         };
         self.listeners.tell(&solved.frame, answer);
+        board.watch.answered(&solution);
         if !self.search.is_busy() {
-            if let Some(look) = board.watch.look(&solution) {
+            if let Some(look) = board.watch.look() {
                 self.search.look(board.order(self.maker.method()), look, solved.touch.clone());
             } else if search
                 && self.pause.is_over(&solution, now)

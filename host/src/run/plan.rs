@@ -128,9 +128,10 @@ struct Problems {
 
 impl Problems {
     fn of(&self, detector: &Detector) -> Result<Problem, ForwardError> {
+        // Models do not depend on what measures the detector.
         let is_of = |problem: &Problem| {
             let modelled = problem.model.detector();
-            *modelled == Detector { drive_v: modelled.drive_v, adc: modelled.adc, ..detector.clone() }
+            *modelled == detector.measured_as(modelled)
         };
         if is_of(&self.described) {
             return Ok(self.described.measured_as(detector));

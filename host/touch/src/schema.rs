@@ -439,7 +439,7 @@ pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::LineUncertainty;
+    use crate::solve::{ElectrodeFault, LineUncertainty};
 
     fn contact() -> FoundContact {
         FoundContact {
@@ -460,7 +460,12 @@ mod tests {
         Solution {
             contacts: vec![contact(), FoundContact::flat(-1.0, -2.0, 5.0)],
             residual: Some(1.5),
-            flags: Flags { misfit: true, excluded: vec![3, 14], ..Flags::default() },
+            flags: Flags {
+                misfit: true,
+                excluded: vec![3, 14],
+                faults: vec![ElectrodeFault::Open, ElectrodeFault::Contradicting],
+                ..Flags::default()
+            },
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "they fit".to_owned() }),
             ..Solution::default()
         }
@@ -548,6 +553,8 @@ mod tests {
         assert_eq!((json["sequence"].as_u64(), json["lost_before"].as_u64()), (Some(9), Some(3)));
         assert_eq!((json["time_s"].as_f64(), json["age_us"].as_f64()), (Some(0.5), Some(40.0)));
         assert_eq!(json["flags"]["excluded"], serde_json::json!([3, 14]));
+        let names = solution.flags.faults.iter().map(|fault| fault.name()).collect::<Vec<_>>();
+        assert_eq!(json["flags"]["faults"], serde_json::json!(names));
         assert_eq!(json["choice"]["what"], "2 contacts");
         assert_eq!(json["contacts"].as_array().map(Vec::len), Some(2));
         assert!(["image_s_per_m2", "frame", "shape", "events"].iter().all(|name| json.get(name).is_none()));

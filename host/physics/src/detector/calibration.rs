@@ -57,20 +57,25 @@ impl super::Detector {
 
 impl Calibration {
     /// What it says of some of the electrodes only.
-    pub(super) fn keeping(&self, kept: &[usize]) -> Self {
+    pub(super) fn keeping(self, kept: &[usize]) -> Self {
+        // All fields by name, as in `Detector::keeping`.
+        let Self { board, date, frames, presses, parameters, directions } = self;
         let renumbered = |known: &CalibratedParameter| match known.parameter.electrode() {
             Some(e) => kept.iter().position(|kept| *kept == e).map(|to| known.parameter.with_electrode(to)),
             None => Some(known.parameter),
         };
-        let left: Vec<_> = self.parameters.iter().map(renumbered).collect();
+        let left: Vec<_> = parameters.iter().map(renumbered).collect();
         let of_left = |all: &Vec<f64>| all.iter().zip(&left).filter_map(|(step, to)| to.map(|_| *step)).collect();
-        let parameters = self.parameters.iter().zip(&left);
+        let with_number = |(known, to): (&CalibratedParameter, &Option<Parameter>)| {
+            to.map(|parameter| CalibratedParameter { parameter, ..*known })
+        };
         Self {
-            parameters: parameters
-                .filter_map(|(known, to)| to.map(|parameter| CalibratedParameter { parameter, ..*known }))
-                .collect(),
-            directions: self.directions.iter().map(of_left).collect(),
-            ..self.clone()
+            parameters: parameters.iter().zip(&left).filter_map(with_number).collect(),
+            directions: directions.iter().map(of_left).collect(),
+            board,
+            date,
+            frames,
+            presses,
         }
     }
 

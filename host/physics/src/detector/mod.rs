@@ -64,8 +64,8 @@ pub struct Detector {
     pub on_resistance_ohm: f64,
     /// How the voltages become numbers.
     pub adc: Adc,
-    /// What is known of the errors of the converters that the channels share, from channel 0 on, as a board tells it; none is known of a
-    /// description alone.
+    /// What is known of the errors of the converters that the channels share, as a board tells it; none is known of a description alone. Which
+    /// channels are on which, [`Electrode::converter`] tells.
     #[serde(skip)]
     pub converters: Vec<ConverterErrors>,
     /// How far it may be from this description.
@@ -84,8 +84,6 @@ pub struct Detector {
 /// What a converter's readings may be off by, as standard deviations from chip to chip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConverterErrors {
-    /// Channels on it.
-    pub channels: usize,
     /// Of its gain, as a share.
     pub gain_share: f64,
     /// Of the height of a bow over its range (V).
@@ -150,6 +148,9 @@ pub struct Electrode {
     /// What its channel reads where nothing is (V): in simulated detectors only, since a baseline takes it away.
     #[serde(default)]
     pub offset_v: f64,
+    /// Which of [`Detector::converters`] reads its channel; of no consequence where none of these is known.
+    #[serde(skip)]
+    pub converter: usize,
 }
 
 const fn one() -> f64 {
@@ -198,17 +199,60 @@ impl Detector {
         }
     }
 
-    /// This detector with some of its electrodes only, in the order given.
+    /// This detector with some of its electrodes only, in the order given. What belongs to an electrode or to its channel goes with it: it is in
+    /// [`Electrode`], or is chosen here.
     ///
     /// # Panics
     /// If there is no such electrode.
     #[must_use]
     pub fn keeping(&self, kept: &[usize]) -> Self {
+        // All fields by name: whoever adds one is asked here whether it belongs to electrodes.
+        let Self {
+            name,
+            outline,
+            surface,
+            layers,
+            unevenness,
+            electrodes,
+            contact_impedance_ohm_m2,
+            drive_v,
+            ground_v,
+            on_resistance_ohm,
+            adc,
+            converters,
+            tolerances,
+            calibration,
+            force,
+            correction,
+        } = self.clone();
         Self {
-            electrodes: kept.iter().map(|e| self.electrodes[*e]).collect(),
-            calibration: self.calibration.as_ref().map(|calibration| calibration.keeping(kept)),
-            ..self.clone()
+            electrodes: kept.iter().map(|e| electrodes[*e]).collect(),
+            calibration: calibration.map(|calibration| calibration.keeping(kept)),
+            name,
+            outline,
+            surface,
+            layers,
+            unevenness,
+            contact_impedance_ohm_m2,
+            drive_v,
+            ground_v,
+            on_resistance_ohm,
+            adc,
+            converters,
+            tolerances,
+            force,
+            correction,
         }
+    }
+
+    /// This detector as the board measures it that `other` is measured by: its drive, its converters and what is known of their errors.
+    #[must_use]
+    pub fn measured_as(&self, other: &Self) -> Self {
+        let (drive_v, adc, converters) = (other.drive_v, other.adc, other.converters.clone());
+        let mut measured = Self { drive_v, adc, converters, ..self.clone() };
+        let pads = measured.electrodes.iter_mut().zip(&other.electrodes);
+        pads.for_each(|(pad, other)| pad.converter = other.converter);
+        measured
     }
 
     /// This detector with its description taken as exact: there is nothing to correct then.
@@ -251,6 +295,7 @@ impl Electrode {
             gain: 1.0,
             unseen_offset_v: 0.0,
             offset_v: 0.0,
+            converter: 0,
         }
     }
 }

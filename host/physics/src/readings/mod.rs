@@ -1,10 +1,12 @@
 //! The readings of one frame, in volts, and what each of them says.
 
 mod rounds;
+mod scale;
 
 use std::borrow::Cow;
 
 pub use self::rounds::Rounds;
+pub use self::scale::{Likely, NotVolts, check_volts};
 use crate::detector::{Detector, Electrode};
 
 /// What the number of a reading says of the pad's voltage.

@@ -300,10 +300,9 @@ impl Frames {
             all.for_each(|value| *value *= unit.volts());
             frames.push(frame);
         }
-        let volts = || frames.iter().flat_map(|frame| &frame.volts);
-        let largest_v = volts().map(|volts| volts.abs()).filter(|volts| volts.is_finite()).fold(0.0, f64::max);
         if let Some(detector) = detector {
-            units::check(largest_v, unit, detector).map_err(|what| anyhow!("{path}: {what}"))?;
+            let volts = frames.iter().flat_map(|frame| frame.volts.iter().copied());
+            units::check(volts, unit, detector).map_err(|what| anyhow!("{path}: {what}"))?;
         }
         Ok(Self::Table(frames.into_iter()))
     }

@@ -176,7 +176,7 @@ fn label() -> Value {
 /// What a line of `--stream` has without image and readings, which have channels of their own.
 pub(super) fn touch() -> Value {
     let flags = ["saturated", "misfit", "unfinished", "calibrate"].map(|name| (name, boolean()));
-    let flags: Vec<_> = flags.into_iter().chain([("excluded", array(integer()))]).collect();
+    let flags: Vec<_> = flags.into_iter().chain([("excluded", array(integer())), ("faults", array(text()))]).collect();
     let event = ["dx_m?", "dy_m?", "held_s?", "x_m?", "y_m?"].map(|name| (name, number()));
     let event: Vec<_> = event.into_iter().chain([("kind", text())]).collect();
     titled(

@@ -4,7 +4,7 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 10 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; shape: 0 none, 1 a line, 2 a ring; flags: 1 saturated, 2 the readings do not fit, 4 unfinished, 8 the detector differs from its description; electrodes left out: bit `e` is electrode `e`; points of the [course](crate::run::course) `s` |
+//! | 11 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; shape: 0 none, 1 a line, 2 a ring; flags: 1 saturated, 2 the readings do not fit, 4 unfinished, 8 the detector differs from its description; electrodes left out: bit `e` is electrode `e`; those of them whose wires are exchanged; points of the [course](crate::run::course) `s` |
 //! | f32 | residual of the readings: root mean square, in standard deviations of the noise |
 //! | f32 | age of the answer when this was sent: since the last byte of its frame came (s) |
 //! | 4 x f32 | the pointer: sum of its motion along x and y (m), 1 while it is pressed, clicks so far; not numbers if no contact is one |
@@ -19,10 +19,10 @@ use crate::run::FrameSnapshot;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::pointer::PointerState;
 use tactomo_touch::schema::{CONTACT_COLUMNS, contact_values, shape_values};
-use tactomo_touch::solve::{Flags, FoundContact, FoundShape};
+use tactomo_touch::solve::{ElectrodeFault, Flags, FoundContact, FoundShape};
 
 /// Version of the layout; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 8;
+pub(super) const LAYOUT: u32 = 9;
 
 /// Numbers of a contact: the columns after its id, and its place on the map.
 const CONTACT_FLOATS: usize = CONTACT_COLUMNS.len() - 1 + 2;
@@ -69,10 +69,13 @@ fn kind(shape: Option<&FoundShape>) -> u32 {
     }
 }
 
-fn flags(flags: &Flags) -> [u32; 2] {
+fn flags(flags: &Flags) -> [u32; 3] {
     let bits = [flags.saturated, flags.misfit, flags.unfinished, flags.calibrate];
     let told = bits.iter().enumerate().map(|(bit, set)| u32::from(*set) << bit).sum();
-    [told, flags.excluded.iter().filter_map(|e| 1_u32.checked_shl(*e as u32)).fold(0, |all, bit| all | bit)]
+    let bit = |e: &usize| 1_u32.checked_shl(*e as u32).unwrap_or_default();
+    let excluded = flags.excluded.iter().map(bit).fold(0, |all, bit| all | bit);
+    let exchanged = flags.excluded.iter().zip(&flags.faults).filter(|(_, fault)| **fault == ElectrodeFault::Exchanged);
+    [told, excluded, exchanged.map(|(e, _)| bit(e)).fold(0, |all, bit| all | bit)]
 }
 
 fn contact(found: &FoundContact, detector: &Detector) -> [f32; CONTACT_FLOATS] {
@@ -135,26 +138,32 @@ mod tests {
             image_s_per_m2: Some(vec![2.0, 4.0, -8.0]),
             contacts: vec![known, FoundContact::flat(1.0, 2.0, 3.0)],
             residual: Some(1.25),
-            flags: Flags { saturated: true, misfit: false, unfinished: true, calibrate: false, excluded: vec![3, 31] },
+            flags: Flags {
+                saturated: true,
+                unfinished: true,
+                excluded: vec![3, 31],
+                faults: vec![ElectrodeFault::Open, ElectrodeFault::Exchanged],
+                ..Flags::default()
+            },
             calibrated: None,
             shape: None,
             certainty: Some(0.75),
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
-        assert_eq!(words(&bytes[..40]), [LAYOUT, 9, 300, 3, 2, 2, 0, 0b101, 1 << 31 | 1 << 3, 2]);
-        let head = floats(&bytes[40..100]);
+        assert_eq!(words(&bytes[..44]), [LAYOUT, 9, 300, 3, 2, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 2]);
+        let head = floats(&bytes[44..104]);
         assert_eq!(head[0], 1.25);
         assert!((0.0..5.0).contains(&head[1]), "{} s old", head[1]);
         assert_eq!(head[2..6], [0.5, -0.25, 1.0, 3.0], "the pointer");
         assert_eq!(head[6..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
-        assert_eq!(words(&bytes[100..104]), [6]);
+        assert_eq!(words(&bytes[104..108]), [6]);
         let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.125, 0.25, -0.5];
-        assert_eq!(floats(&bytes[104..168]), known);
-        assert_eq!(words(&bytes[168..172]), [0]);
-        assert_eq!(floats(&bytes[172..188]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[188..228]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[228..236]), [1.0, 2.0]);
-        assert_eq!(&bytes[236..], "2 contacts\nµ".as_bytes());
+        assert_eq!(floats(&bytes[108..172]), known);
+        assert_eq!(words(&bytes[172..176]), [0]);
+        assert_eq!(floats(&bytes[176..192]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[192..232]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[232..240]), [1.0, 2.0]);
+        assert_eq!(&bytes[240..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -167,7 +176,7 @@ mod tests {
             ..Solution::default()
         });
         assert_eq!(words(&bytes[20..28]), [1, 2]);
-        let shape = floats(&bytes[64 + 4 * 6 + 68..]);
+        let shape = floats(&bytes[68 + 4 * 6 + 68..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }
@@ -175,8 +184,8 @@ mod tests {
     #[test]
     fn nothing_found_is_head_and_readings_alone() {
         let bytes = bytes_of(Solution::default());
-        assert_eq!(words(&bytes[..40]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0, 0, 2]);
-        assert!(floats(&bytes[40..44])[0].is_nan());
-        assert_eq!(bytes.len(), 64 + 4 * 6);
+        assert_eq!(words(&bytes[..44]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0, 0, 0, 2]);
+        assert!(floats(&bytes[44..48])[0].is_nan());
+        assert_eq!(bytes.len(), 68 + 4 * 6);
     }
 }

@@ -41,6 +41,18 @@ pub enum ElectrodeFault {
     Contradicting,
 }
 
+impl ElectrodeFault {
+    /// Its name in machine output.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Open => "open",
+            Self::Shorted => "shorted",
+            Self::Exchanged => "exchanged",
+            Self::Contradicting => "contradicting",
+        }
+    }
+}
+
 impl fmt::Display for ElectrodeFault {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {

@@ -111,7 +111,8 @@ pub struct Solution {
     pub flags: Flags,
     /// What a calibration would bring, where [`Flags::calibrate`] asks for one.
     pub calibrated: Option<Calibrated>,
-    /// Probability that as many contacts touch as were found, against other numbers of contacts; of a method that weighs them.
+    /// Probability that as many contacts touch as were found, against other numbers of contacts; of a method that weighs them. `None` where the
+    /// answer [is doubtful](Flags::is_doubtful).
     pub certainty: Option<f64>,
     /// What was chosen and why, by a solver that chooses.
     pub choice: Option<Choice>,
@@ -137,6 +138,15 @@ pub struct Flags {
     pub calibrate: bool,
     /// Electrodes that were left out.
     pub excluded: Vec<usize>,
+    /// What is wrong with each of those, in their order.
+    pub faults: Vec<ElectrodeFault>,
+}
+
+impl Flags {
+    /// Whether the answer does not explain the readings, or is not the last word: then nothing can be said of how sure it is.
+    pub fn is_doubtful(&self) -> bool {
+        self.misfit || self.unfinished
+    }
 }
 
 /// Standard error of a place, of the least known contact.

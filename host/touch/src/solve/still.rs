@@ -94,14 +94,17 @@ impl Still {
         }
     }
 
-    /// Adds a frame's readings.
+    /// Adds a frame's readings, unless they are the very same as those before: noise never repeats itself in all of them, so that they are the
+    /// same observation, and tell no more than once.
     pub fn add(&mut self, readings: &Readings) {
         self.add_beside(readings, &[]);
     }
 
-    /// Adds a frame's readings; `slopes_v` are their derivatives by the parameters of contacts that are known, in pairs that belong
-    /// together (V).
+    /// The same; `slopes_v` are the readings' derivatives by the parameters of contacts that are known, in pairs that belong together (V).
     pub(super) fn add_beside(&mut self, readings: &Readings, slopes_v: &[Vec<f64>]) {
+        if self.newest_v == readings.volts() && self.newest_says == readings.all_say() {
+            return;
+        }
         if self.newest_v.len() != readings.volts().len() {
             self.reset();
         }
@@ -110,13 +113,6 @@ impl Still {
         if self.frames() > 1 {
             let moves = Moves::new(slopes_v, self.noise_v);
             self.forget_what_differs(moves.as_ref());
-        }
-    }
-
-    /// Adds a frame unless it is the newest already.
-    pub(super) fn add_if_new(&mut self, readings: &Readings, slopes_v: &[Vec<f64>]) {
-        if self.newest_v != readings.volts() {
-            self.add_beside(readings, slopes_v);
         }
     }
 
@@ -407,10 +403,23 @@ mod tests {
     }
 
     #[test]
+    fn the_same_readings_again_are_one_observation() {
+        let mut bench = Bench::new(6);
+        let (first, second) = (bench.frame(0.0), bench.frame(0.0));
+        (0..20).for_each(|_| bench.still.add_beside(&first, &bench.slopes_v));
+        assert_eq!((bench.still.count(), bench.still.mean_readings()), (1, Some(first.clone())));
+        bench.still.add(&second);
+        assert_eq!(bench.still.count(), 2);
+        // What is the same but for what it says is another observation.
+        bench.still.add(&second.clone().saying(|g, e| if g == e { Says::AtMost } else { Says::Voltage }));
+        assert_eq!(bench.still.count(), 3);
+    }
+
+    #[test]
     fn other_readings_begin_anew() {
         let mut still = Still::new(NOISE_V);
         assert_eq!((still.count(), still.mean()), (0, None));
-        (0..5).for_each(|_| still.add(&Readings::from_fn(4, |_, _| 0.5)));
+        (0..5).for_each(|frame| still.add(&Readings::from_fn(4, |_, _| 0.5 + 1e-5 * f64::from(frame))));
         still.add(&Readings::from_fn(3, |_, _| 0.5));
         assert_eq!((still.count(), still.mean_v().len()), (1, 9));
     }

@@ -18,8 +18,8 @@ const HEALTHY: [u32; 2] = [64, 64 << 10];
 const STRIDE: u32 = 8;
 /// Share of the largest reading at which a fault was found from which readings would show it again.
 const AS_LARGE: f64 = 0.7;
-/// Answers in a row that do not fit after which a look is taken for exchanged wires: it takes as long as some hundred frames.
-const MISFITS: [u32; 3] = [16, 160, 1600];
+/// Answers in a row that are not one contact that fits, after which a look is taken for exchanged wires: it takes as long as some frames.
+const DOUBTS: [u32; 6] = [16, 48, 160, 480, 1600, 4800];
 /// Answers with contacts after which exchanged wires are looked at again.
 const LOOK_AGAIN: u32 = 1200;
 /// Fewest electrodes that are worth solving for.
@@ -65,8 +65,12 @@ pub struct ElectrodeWatch {
     /// Largest reading between healthy electrodes in the newest frame that was judged (V).
     largest_v: f64,
     skipped: u32,
-    misfits: u32,
+    /// Answers in a row that are not one contact that fits, and looks that were taken since they began.
+    doubts: u32,
+    looks: usize,
+    /// Answers with contacts since a look at what was exchanged, and whether the newest is one.
     touched: u32,
+    is_touched: bool,
 }
 
 /// An electrode's history.
@@ -107,8 +111,10 @@ impl ElectrodeWatch {
             cases: vec![Case::default(); electrodes],
             largest_v: 0.0,
             skipped: 0,
-            misfits: 0,
+            doubts: 0,
+            looks: 0,
             touched: 0,
+            is_touched: false,
         }
     }
 
@@ -192,8 +198,15 @@ impl ElectrodeWatch {
         if found.is_empty() || self.electrodes < FEWEST + self.faulty.faults.len() + found.len() {
             return false;
         }
-        for (electrode, fault) in &found {
-            tracing::warn!("electrode {electrode} is left out: {fault}");
+        match found[..] {
+            [(a, ElectrodeFault::Exchanged), (b, ElectrodeFault::Exchanged)] => {
+                tracing::warn!("electrodes {a} and {b} are left out: their wires are exchanged");
+            }
+            _ => found.iter().for_each(|(electrode, fault)| {
+                tracing::warn!("electrode {electrode} is left out: {fault}");
+            }),
+        }
+        for (electrode, _) in &found {
             (self.cases[*electrode].found_at_v, self.cases[*electrode].seen) = (self.largest_v, 0);
         }
         self.faulty.faults.extend(found);
@@ -201,11 +214,22 @@ impl ElectrodeWatch {
         true
     }
 
-    /// What to look for after this answer, if anything.
-    pub fn look(&mut self, solution: &Solution) -> Option<Look> {
-        self.misfits = if solution.flags.misfit { self.misfits + 1 } else { 0 };
-        self.touched += u32::from(!solution.contacts.is_empty());
-        if MISFITS.contains(&self.misfits) {
+    /// Takes note of an answer. Exchanged wires make several contacts of one, which may well fit, or none that fits.
+    pub fn answered(&mut self, solution: &Solution) {
+        let is_one_at_most = solution.is_contacts() && solution.contacts.len() <= 1;
+        if !is_one_at_most || solution.flags.misfit {
+            self.doubts += 1;
+        } else if !solution.flags.unfinished {
+            (self.doubts, self.looks) = (0, 0);
+        }
+        self.is_touched = !solution.contacts.is_empty();
+        self.touched += u32::from(self.is_touched);
+    }
+
+    /// What to look for in the newest frame by now, if anything; whoever asks looks.
+    pub fn look(&mut self) -> Option<Look> {
+        if DOUBTS.get(self.looks).is_some_and(|due| self.doubts >= *due) {
+            self.looks += 1;
             return Some(Look::Exchanged);
         }
         let is_exchanged =
@@ -213,7 +237,7 @@ impl ElectrodeWatch {
         let mut exchanged = self.faulty.faults.iter().filter_map(is_exchanged);
         let (a, b) = exchanged.next().zip(exchanged.next())?;
         // A light touch, or none, does not tell exchanged wires.
-        let is_telling = !solution.contacts.is_empty() && self.largest_v > AS_LARGE * self.cases[a].found_at_v;
+        let is_telling = self.is_touched && self.largest_v > AS_LARGE * self.cases[a].found_at_v;
         if self.touched < LOOK_AGAIN || !is_telling {
             return None;
         }
@@ -225,7 +249,10 @@ impl ElectrodeWatch {
     pub fn conclude(&mut self, look: Look, found: Option<[usize; 2]>) -> bool {
         match (look, found) {
             (_, None) => false,
-            (Look::Exchanged, Some(pair)) => self.exclude(&pair.map(|e| (e, ElectrodeFault::Exchanged))),
+            (Look::Exchanged, Some(pair)) => {
+                (self.doubts, self.looks) = (0, 0);
+                self.exclude(&pair.map(|e| (e, ElectrodeFault::Exchanged)))
+            }
             (Look::Healed(_), Some(pair)) => {
                 self.faulty = self.faulty.but(&pair);
                 true

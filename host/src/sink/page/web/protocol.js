@@ -2,9 +2,9 @@
 // the same.
 
 /** Version of the layout below; the setup carries the program's. */
-export const LAYOUT = 8;
+export const LAYOUT = 9;
 
-const HEAD_WORDS = 10;
+const HEAD_WORDS = 11;
 // From the lowest bit on.
 const FLAGS = ["saturated", "misfit", "unfinished", "calibrate"];
 
@@ -73,7 +73,7 @@ function choice(text) {
  */
 export function decodeUpdate(buffer) {
   const taker = new Taker(buffer);
-  const [layout, sequence, frames, nodes, electrodes, count, kind, flags, excluded, points] =
+  const [layout, sequence, frames, nodes, electrodes, count, kind, flags, excluded, exchanged, points] =
     Array.from({ length: HEAD_WORDS }, () => taker.word());
   if (layout !== LAYOUT) throw new Error("The program is of another version than this page: reload it.");
   const [residual, ageS] = [...taker.floats(2)].map(known);
@@ -81,7 +81,7 @@ export function decodeUpdate(buffer) {
   const [image, readings, course] = [taker.floats(nodes), taker.floats(electrodes * electrodes), taker.floats(points)];
   const contacts = Array.from({ length: count }, () => contact(taker));
   return {
-    sequence, frames, residual, ageS, electrodes, flags: bitsOf(flags).map((bit) => FLAGS[bit]), excluded: bitsOf(excluded),
+    sequence, frames, residual, ageS, electrodes, flags: bitsOf(flags).map((bit) => FLAGS[bit]), excluded: bitsOf(excluded), exchanged: bitsOf(exchanged),
     image, readings, course,
     pointer: pointed,
     contacts: kind ? [] : contacts,

@@ -62,7 +62,7 @@ export class Verdict {
 
   /** Shows an update; `explanation` of the solver, for one that does not choose. */
   show(update, explanation, now) {
-    const { choice, flags, excluded, residual, ageS } = update;
+    const { choice, flags, residual, ageS } = update;
     const words = headline(update);
     if (words !== this.what.textContent || now - this.shown > STAYS_MS) {
       this.shown = now;
@@ -74,7 +74,7 @@ export class Verdict {
       this.why.title = this.why.textContent;
     }
     // A warm image is never quite settled, and right all the same.
-    this.#warn(update.image.length ? flags.filter((flag) => flag !== "unfinished") : flags, excluded, now);
+    this.#warn(update.image.length ? flags.filter((flag) => flag !== "unfinished") : flags, update, now);
     // Where no other answer comes, as where it is paused, only what this one says stays.
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.#settle(), STAYS_MS);
@@ -88,19 +88,21 @@ export class Verdict {
 
   #settle() {
     this.seen.clear();
-    this.#warn(this.flags, this.excluded, performance.now());
+    this.#warn(this.flags, this.wires, performance.now());
   }
 
-  #warn(flags, excluded, now) {
-    [this.flags, this.excluded] = [flags, excluded];
+  #warn(flags, { excluded, exchanged }, now) {
+    [this.flags, this.wires] = [flags, { excluded, exchanged }];
     flags.forEach((flag) => this.seen.set(flag, now));
     const shown = Object.keys(WARNINGS).filter((flag) => now - (this.seen.get(flag) ?? -Infinity) < STAYS_MS);
-    const told = [...shown, ...excluded].join();
+    const told = [...shown, ...excluded, "of them", ...exchanged].join();
     if (told === this.told) return;
     this.told = told;
-    const left = excluded.length === 1 ? `electrode ${excluded[0]} left out` : `electrodes ${excluded.join(", ")} left out`;
+    const others = excluded.filter((electrode) => !exchanged.includes(electrode));
+    const left = `${others.length === 1 ? "electrode" : "electrodes"} ${others.join(", ")} left out`;
     this.chips.replaceChildren(
-      ...(excluded.length ? [chip("bad", left, "Their readings cannot be right: a broken or exchanged wire, a short, a bad channel")] : []),
+      ...(exchanged.length ? [chip("bad", `wires ${exchanged.join(" and ")} exchanged`, "Readings fit once they are changed back; these electrodes are left out")] : []),
+      ...(others.length ? [chip("bad", left, "Their readings cannot be right: a broken wire, a short, a bad channel")] : []),
       ...shown.map((flag) => chip("", ...WARNINGS[flag])),
     );
   }

@@ -238,7 +238,7 @@ impl Follower for AutoFollower {
         crate::solve::check(readings, self.electrodes)?;
         match self.latest() {
             Some(latest) => self.still.add(&latest.readings),
-            None => self.still.add_if_new(readings, Self::slopes_v(self.contacts.as_ref())),
+            None => self.still.add_beside(readings, Self::slopes_v(self.contacts.as_ref())),
         }
         self.contacts.iter_mut().for_each(|contacts| contacts.searched_in(lead.mean.as_ref()));
         let mean = self.still.mean_or(readings);

@@ -8,7 +8,7 @@ use crate::scanning::{Attention, FOCUS, with_others};
 use crate::solve::follow::follow_rows_and_search;
 use crate::solve::latest::Latest;
 use crate::solve::{Parts, Solver};
-use tactomo_physics::detector::{Adc, ConverterErrors, Detector};
+use tactomo_physics::detector::{Adc, ConverterErrors, Detector, Electrode};
 use tactomo_physics::forward::{Resolution, Slab, readings_v};
 use tactomo_physics::hertz::Hertz;
 use tactomo_physics::readings::Range;
@@ -42,13 +42,10 @@ impl Board {
             Self::Ideal => detector.adc.noise_lsb = 1.5,
             Self::Esp32 => {
                 detector.adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 5.0 };
-                let converter = |channels: usize, floor_v: f64| ConverterErrors {
-                    channels,
-                    gain_share: 0.01,
-                    bow_v: 0.012,
-                    range_v: [floor_v, 3.1],
-                };
-                detector.converters = vec![converter(6, 0.142), converter(10, 0.128)];
+                let converter =
+                    |floor_v: f64| ConverterErrors { gain_share: 0.01, bow_v: 0.012, range_v: [floor_v, 3.1] };
+                detector.converters = [0.142, 0.128].map(converter).into();
+                detector.electrodes.iter_mut().skip(6).for_each(|pad| pad.converter = 1);
             }
         }
         detector
@@ -72,12 +69,11 @@ impl<'a> Chip<'a> {
         let errors = detector.converters.iter().map(|_| [noise.normal(), noise.normal()]).collect();
         // As near to its ends as its noise a reading says no more than a bound.
         let margin_v = 2.0 * detector.adc.noise_lsb * detector.adc.lsb_v();
-        let range = |converter: &ConverterErrors| {
-            let [floor_v, ceiling_v] = converter.range_v;
-            let range = Range { floor_v: floor_v + margin_v, ceiling_v: ceiling_v - margin_v };
-            std::iter::repeat_n(range, converter.channels)
+        let range = |pad: &Electrode| {
+            let [floor_v, ceiling_v] = detector.converters.get(pad.converter)?.range_v;
+            Some(Range { floor_v: floor_v + margin_v, ceiling_v: ceiling_v - margin_v })
         };
-        let ranges = detector.converters.iter().flat_map(range).collect();
+        let ranges = detector.electrodes.iter().filter_map(range).collect();
         Self { detector, built, errors, ranges, noise }
     }
 
@@ -87,15 +83,12 @@ impl<'a> Chip<'a> {
         let pad = &self.built.electrodes[e];
         let volts = pad.gain * volts + pad.offset_v;
         let mut read_v = volts;
-        let mut first = 0;
-        for (converter, [gain, bow]) in self.detector.converters.iter().zip(&self.errors) {
-            if (first..first + converter.channels).contains(&e) {
-                let [low_v, high_v] = converter.range_v;
-                let share = ((volts - low_v) / (high_v - low_v)).clamp(0.0, 1.0);
-                let bow_v = converter.bow_v * bow * 4.0 * share * (1.0 - share);
-                read_v = volts * (1.0 + converter.gain_share * gain) + bow_v;
-            }
-            first += converter.channels;
+        let of_channel = self.detector.electrodes[e].converter;
+        if let Some((converter, [gain, bow])) = self.detector.converters.iter().zip(&self.errors).nth(of_channel) {
+            let [low_v, high_v] = converter.range_v;
+            let share = ((volts - low_v) / (high_v - low_v)).clamp(0.0, 1.0);
+            let bow_v = converter.bow_v * bow * 4.0 * share * (1.0 - share);
+            read_v = volts * (1.0 + converter.gain_share * gain) + bow_v;
         }
         let noisy = (read_v / adc.lsb_v() + adc.noise_lsb * self.noise.normal()).round();
         noisy.clamp(0.0, f64::from((1 << adc.bits) - 1)) * adc.lsb_v()

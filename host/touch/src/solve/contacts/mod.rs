@@ -178,6 +178,7 @@ impl ContactFinder {
                 drive_v: detector.drive_v,
                 full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
                 converters: detector.converters.clone().into(),
+                converter_of: detector.electrodes.iter().map(|pad| pad.converter).collect(),
             },
             sheet_s: detector.sheet_conductance_s(),
             spacing_m: problem.spacing_m(),
@@ -279,6 +280,7 @@ impl ContactFinder {
         (cost / self.freedom(fit, target)).sqrt() * target.deviation_v() / target.noise_v
     }
 
+    /// An explanation as a solution, but for the certainty of its count: whoever answers knows whether it is an answer.
     fn solution(&self, found: &Explanation, target: &Target) -> Solution {
         let fit = &found.fit;
         let covariance = fit.covariance();
@@ -296,10 +298,10 @@ impl ContactFinder {
             misfit: self.is_misfit(fit, target),
             unfinished: !fit.settled || target.is_provisional(),
             calibrate: calibrated.is_some(),
-            excluded: Vec::new(),
+            ..Flags::default()
         };
         let residual = Some(self.residual(fit, fit.cost, target));
-        Solution { contacts, residual, flags, calibrated, certainty: found.certainty, ..Solution::default() }
+        Solution { contacts, residual, flags, calibrated, ..Solution::default() }
     }
 
     /// A contact of a fit with its standard errors: of a place no more than that of one anywhere on the detector.

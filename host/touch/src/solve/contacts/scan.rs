@@ -85,6 +85,17 @@ impl Scan {
         }
     }
 
+    /// Share of the square of balanced `readings` that the best single place leaves: of one contact, what noise and the model's error do.
+    pub fn left_by_one(&self, network: &Network, readings: &Readings) -> f64 {
+        let mut volts = readings.volts().to_vec();
+        balance::balance(&mut volts, network.electrodes(), network.drive_v);
+        let volts = DVector::from_vec(volts);
+        let along = self.first.patterns.tr_mul(&self.first.basis.tr_mul(&volts));
+        let gains = along.iter().zip(&self.first.squares).filter(|(along, _)| **along > 0.0);
+        let explained = gains.map(|(along, square)| along * along / square).fold(0.0, f64::max);
+        1.0 - explained / volts.norm_squared().max(f64::MIN_POSITIVE)
+    }
+
     /// Looks for more contacts beside those of a fit, which are `spots`: what they would explain that a change of those would not.
     ///
     /// With the fit's derivatives `S` and normal matrix `H`, of a pattern `p` only `p - S H^-1 S^T p` is new; what is left, `r`, has no

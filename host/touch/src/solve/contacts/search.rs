@@ -60,6 +60,11 @@ impl ContactFinder {
         Some(cost / count.max(1) as f64)
     }
 
+    /// Share of readings that one contact leaves, as far as a look at every place tells: next to no time, and no standard errors.
+    pub fn roughly_left_by_one(&self, readings: &Readings) -> f64 {
+        self.scan.left_by_one(&self.network, &self.problem.completed(readings))
+    }
+
     /// A look for contacts where there are none yet.
     fn looks(&self, target: &Target) -> Looks<'_> {
         self.scan.at_first(&self.network, target, &self.problem.completed(&target.readings()))

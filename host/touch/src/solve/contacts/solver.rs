@@ -88,6 +88,12 @@ impl Contacts {
         self.follower.contacts.finder.left_by_one(readings)
     }
 
+    /// Share of readings that one contact leaves, as far as a look at every place tells, in some 10 us; of readings some of which are bounds, in some
+    /// 300 us.
+    pub(in crate::solve) fn roughly_left_by_one(&self, readings: &Readings) -> f64 {
+        self.follower.contacts.finder.roughly_left_by_one(readings)
+    }
+
     #[cfg(test)]
     pub(super) fn finder(&self) -> &ContactFinder {
         &self.follower.contacts.finder
@@ -214,6 +220,9 @@ impl ContactFollower {
         let mut solution =
             self.last.as_ref().map_or_else(|| self.finder.nothing(target), |found| self.finder.solution(found, target));
         solution.flags.unfinished |= self.is_stale;
+        // Among explanations none of which explains the readings, or of which better ones are still sought, the share of one says nothing.
+        let certainty = self.last.as_ref().and_then(|found| found.certainty);
+        solution.certainty = certainty.filter(|_| !solution.flags.is_doubtful());
         self.tracker.follow(&mut solution.contacts);
         solution
     }
@@ -258,7 +267,7 @@ impl Follower for FrameFollower {
         self.contacts.finder.check(readings)?;
         match self.contacts.latest() {
             Some(latest) => self.still.add(&latest.readings),
-            None => self.still.add_if_new(readings, self.contacts.slopes_v()),
+            None => self.still.add_beside(readings, self.contacts.slopes_v()),
         }
         self.contacts.searched_in(lead.mean.as_ref());
         let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());

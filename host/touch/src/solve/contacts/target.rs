@@ -33,8 +33,10 @@ pub(super) struct Errors {
     pub drive_v: f64,
     /// Readings from here on are saturated and do not count (V).
     pub full_v: f64,
-    /// Errors of the converters, from channel 0 on; none where nothing is known of them.
+    /// Errors of the converters; none where nothing is known of them.
     pub converters: Arc<[ConverterErrors]>,
+    /// Which of them reads each electrode.
+    pub converter_of: Arc<[usize]>,
 }
 
 impl Errors {
@@ -51,14 +53,11 @@ impl Errors {
         let of_pads = self.pad_patterns_v(readings);
         let mut patterns_v = DMatrix::zeros(n * n, n + 2 * self.converters.len());
         of_pads.iter().enumerate().for_each(|(i, volts)| patterns_v[(i, i / n)] = *volts);
-        let mut first = 0;
-        for (index, converter) in self.converters.iter().enumerate() {
-            let channels = first..(first + converter.channels).min(n);
-            first = channels.end;
-            for (g, e) in (0..n).flat_map(|g| channels.clone().map(move |e| (g, e))) {
-                let changes_v = converter.changes_v(readings.touch_v(g, e));
-                (0..2).for_each(|kind| patterns_v[(g * n + e, n + 2 * index + kind)] = changes_v[kind]);
-            }
+        for (g, e) in (0..n).flat_map(|g| (0..n).map(move |e| (g, e))) {
+            let index = self.converter_of.get(e).copied().unwrap_or_default();
+            let Some(converter) = self.converters.get(index) else { continue };
+            let changes_v = converter.changes_v(readings.touch_v(g, e));
+            (0..2).for_each(|kind| patterns_v[(g * n + e, n + 2 * index + kind)] = changes_v[kind]);
         }
         patterns_v
     }

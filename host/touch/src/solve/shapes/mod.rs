@@ -243,18 +243,23 @@ impl ShapeFollower {
         self.found().map(StripFit::evidence)
     }
 
-    /// Brings the shape to the next frame; whether it has to be searched.
+    /// Brings the shape to the next frame; whether it has to be searched. What has become a disc to the readings is let go: it is no answer in
+    /// any frame.
     pub fn follow(&mut self, target: &Target) -> bool {
         let Some((last, mut watch)) = self.last.take() else { return true };
         let moved = self.finder.follow(last, target);
-        let has_lost = watch.has_lost(moved.evidence(), target.count()) || !self.finder.is_clear(moved.strip());
+        if !self.finder.is_clear(moved.strip()) {
+            return true;
+        }
+        let has_lost = watch.has_lost(moved.evidence(), target.count());
         self.last = Some((moved, watch));
         has_lost
     }
 
-    /// Takes what a search has found, if it explains this frame better than what is followed.
+    /// Takes what a search has found, if it explains this frame better than what is followed, and is still more than a disc in it.
     pub fn adopt(&mut self, found: &StripFit, target: &Target) {
-        let Some(caught_up) = self.finder.catch_up(found, target) else { return };
+        let caught_up = self.finder.catch_up(found, target).filter(|fit| self.finder.is_clear(fit.strip()));
+        let Some(caught_up) = caught_up else { return };
         let score = |fit: &StripFit| fit.evidence().score();
         if self.found().is_none_or(|last| score(&caught_up) <= score(last)) {
             let watch = Watch::new(caught_up.evidence(), found.evidence(), target.count());
