@@ -75,7 +75,7 @@ impl Address {
         let address: Self = text.parse()?;
         match address.port {
             Some(_) => Ok(address),
-            None => Err(format!("`{text}` has no port: add one, such as {address}:9000")),
+            None => Err(format!("`{text}` has no port: give a port, or an address and a port such as 127.0.0.1:9000")),
         }
     }
 
