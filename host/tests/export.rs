@@ -24,7 +24,19 @@ fn array(arrays: &[(String, Array)], name: &str) -> Array {
 fn readings_times_and_events_are_the_same_in_every_form() {
     let folder = Folder::new("export");
     let recording = folder.path("esp32.tactomo");
-    run(&["record", &recording, "--simulate", "--board", "esp32", "--detector", "square-60", "--scene", "pointer", "--seconds", "6"]);
+    run(&[
+        "record",
+        &recording,
+        "--simulate",
+        "--board",
+        "esp32",
+        "--detector",
+        "square-60",
+        "--scene",
+        "pointer",
+        "--seconds",
+        "6",
+    ]);
     let [lines, table, archive] = ["a.jsonl", "a.csv", "a.npz"].map(|name| folder.path(name));
     for (form, out) in [("jsonl", &lines), ("csv", &table), ("npz", &archive)] {
         let fields: &[&str] = if form == "csv" { &[] } else { &["--fields", "all"] };
