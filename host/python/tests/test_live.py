@@ -57,6 +57,17 @@ def test_an_event_is_the_line_of_the_stream():
     assert np.allclose(full["image_s_per_m2"], event.solution.image, rtol=1e-6)
 
 
+def test_readings_are_as_measured_and_beside_them_as_used():
+    with live(board="esp32") as run:
+        event = until(run, lambda event: not event.rezeroing)
+    # At rest nothing is above the floor of an ESP32's converters, within two deviations of the noise: all are that bound.
+    assert event.readings_v.min() < event.used_v.min()
+    is_bound = event.readings_v != event.used_v
+    assert is_bound.mean() > 0.5 and np.all(event.used_v[is_bound] > event.readings_v[is_bound])
+    line = json.loads(event.to_json(readings=True))
+    assert np.array_equal(np.ravel(line["used_v"]), event.used_v.ravel())
+
+
 def test_a_press_on_the_simulated_detector_is_found_where_it_is():
     def is_there(event):
         return any(np.hypot(contact.x_m - 0.01, contact.y_m + 0.005) < 2e-3 for contact in event.contacts)

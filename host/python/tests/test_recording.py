@@ -27,7 +27,8 @@ def test_a_recording_has_frames_and_its_detector(path):
     assert all(one.sequence + 1 + other.lost_before == other.sequence for one, other in itertools.pairwise(frames))
     arrays = recording.arrays()
     assert arrays["readings_v"].shape == (len(frames), 16, 16)
-    assert np.array_equal(arrays["readings_v"], [frame.readings for frame in frames])
+    assert np.array_equal(arrays["readings_v"], [frame.readings_v for frame in frames])
+    assert np.array_equal(arrays["used_v"], [frame.readings for frame in frames])
     assert np.array_equal(arrays["sequence"], [frame.sequence for frame in frames])
     assert np.array_equal(arrays["time_s"], [frame.time_s for frame in frames])
 
@@ -46,7 +47,7 @@ def test_a_recording_is_solved_less_its_baseline(path):
 
 
 def test_a_replay_gives_the_readings_of_the_recording(path):
-    frames = {frame.sequence: frame.readings for frame in tactomo.Recording(path)}
+    frames = {frame.sequence: frame.readings_v for frame in tactomo.Recording(path)}
     with tactomo.Live(replay=path, speed=float("inf"), solver="tikhonov") as live:
         events = list(live)
     assert len(events) == len(frames) and live.lost == 0

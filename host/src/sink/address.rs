@@ -42,7 +42,7 @@ fn split(text: &str) -> (Option<&str>, Option<&str>) {
         return (Some(text), None);
     }
     if let Some((host, rest)) = text.strip_prefix('[').and_then(|text| text.split_once(']')) {
-        return (Some(host), if rest.is_empty() { None } else { Some(rest.strip_prefix(':').unwrap_or(rest)) });
+        return (Some(host), if rest.is_empty() { None } else { Some(rest.strip_prefix(':').unwrap_or_default()) });
     }
     match text.rsplit_once(':') {
         Some((host, port)) => (Some(host), Some(port)),
@@ -75,7 +75,7 @@ impl Address {
         let address: Self = text.parse()?;
         match address.port {
             Some(_) => Ok(address),
-            None => Err(format!("`{text}` has no port: add one, such as {address}:9000")),
+            None => Err(format!("`{text}` has no port: give a port, or an address and a port such as 127.0.0.1:9000")),
         }
     }
 
