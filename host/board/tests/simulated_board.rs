@@ -419,18 +419,17 @@ fn a_seed_repeats_a_board_and_another_is_another_chip() {
 fn the_scene_moves_on_while_a_real_board_scans() {
     // 10 V/s over fifteen rows of 944 us, and the ideal board's noise.
     let risen = |board| {
-        let frame = first_frame(model(board, 2, Rising(0.5, 10.0)));
-        let row =
-            |ground: usize| frame.readings[16 * ground..][..16].iter().map(|code| f64::from(*code)).sum::<f64>() / 16.0;
-        row(15) - row(0)
+        let mut host = model(board, 2, Rising(0.5, 10.0));
+        host.frames_more(6);
+        let row = |frame: &Frame, ground: usize| {
+            frame.readings[16 * ground..][..16].iter().map(|code| f64::from(*code)).sum::<f64>() / 16.0
+        };
+        // Where the machine is too slow the board's clock jumps, and never back; near the ceiling nothing rises.
+        let in_range = host.frames.iter().filter(|frame| row(frame, 15) < 2300.0);
+        in_range.map(|frame| row(frame, 15) - row(frame, 0)).fold(f64::INFINITY, f64::min)
     };
     assert!((risen(BoardModel::Esp32c3) - 141.5).abs() < 8.0, "{} mV", risen(BoardModel::Esp32c3));
     assert!(risen(BoardModel::Ideal).abs() < 3.0, "{} codes", risen(BoardModel::Ideal));
-}
-
-fn first_frame(mut host: Host) -> Frame {
-    host.frames_more(1);
-    host.frames.remove(0)
 }
 
 #[test]

@@ -55,7 +55,7 @@ fn a_pin_that_fails_once_abandons_its_frame_which_begins_anew() {
         let grounded = Rc::clone(&mux.grounded);
         let mut board = board(&outside, mux, |_, electrode| Ok(100 + u16::from(electrode)), NoopDelay::new());
         outside.send(Command::Start);
-        (0..5).for_each(|_| drop(board.step().unwrap()));
+        step(&mut board, 5);
         assert_eq!(board.step(), Err("the pin is broken"));
         grounded.borrow_mut().clear();
         let begun_us = outside.clock_us.get();

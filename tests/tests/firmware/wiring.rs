@@ -13,7 +13,8 @@ const ESP32C3_MAIN: &str = include_str!("../../../firmware/boards/esp32c3/src/ma
 const ESP32C6_MAIN: &str = include_str!("../../../firmware/boards/esp32c6/src/main.rs");
 const STM32_MAIN: &str = include_str!("../../../firmware/boards/stm32f405/src/main.rs");
 const ONE_INPUT: &str = include_str!("../../../firmware/boards/espressif/src/one_input.rs");
-const CHIP: &str = include_str!("../../../firmware/boards/espressif/src/chip.rs");
+const ESPRESSIF_CHIP: &str = include_str!("../../../firmware/boards/espressif/src/chip.rs");
+const COMMON: &str = include_str!("../../../firmware/boards/common/src/lib.rs");
 
 /// Cells of the page's table rows, without ends and quotes.
 fn rows() -> Vec<Vec<String>> {
@@ -105,8 +106,8 @@ fn the_line_has_the_pins_and_the_baud_rate_that_the_page_says() {
 
 #[test]
 fn the_watchdog_and_the_oldest_silicon_are_those_of_the_page() {
-    let seconds = between(CHIP, "Duration::from_secs(", ")");
-    assert_eq!(seconds, "1");
+    assert_eq!(between(COMMON, "pub const WATCHDOG_TIMEOUT_MS: u32 = ", ";"), "1000");
+    assert!([ESPRESSIF_CHIP, STM32_MAIN].iter().all(|user| user.contains("(WATCHDOG_TIMEOUT_MS.")), "both take it");
     assert!(row("Fault: Reset(watchdog)")[1].contains("for a second"));
     assert!(ESP32_CONFIG.contains("\nESP_HAL_CONFIG_MIN_CHIP_REVISION = \"0\"\n"), "as a line of its own");
 }

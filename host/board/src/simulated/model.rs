@@ -96,7 +96,7 @@ pub(super) struct ConverterFigures {
     pub(super) bow_mv: f64,
 }
 
-/// Calibrated codes are millivolts: 12 bits of 4096 mV, as `firmware/boards/espressif/src/analog.rs` has them.
+/// Calibrated codes are millivolts: 12 bits of 4096 mV, as `firmware/boards/common/src/range.rs` has them.
 const BITS: u8 = 12;
 const FULL_SCALE_MV: u16 = 1 << BITS;
 
