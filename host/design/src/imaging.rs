@@ -133,7 +133,7 @@ mod tests {
         assert!((collapsed.spatial_resolution.unwrap() - corner).abs() < 1e-3, "{collapsed:?}");
         let middle = accuracy_of_the_middle(&Detector::default());
         assert!((collapsed.position_accuracy.unwrap() - middle).abs() <= CENTRAL_OF_WIDTH, "{collapsed:?}");
-        let seen = imaging(0.2, 0.2);
+        let seen = imaging(3.0, 0.001);
         assert!(seen.sharpness().is_some() && seen.accuracy() > Some(middle), "{seen:?}");
     }
 }

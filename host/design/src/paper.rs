@@ -154,7 +154,7 @@ mod tests {
         let contact = Contact::flat(0.02, 0.02, 0.002, 0.0251);
         let solver = PaperSolver::new(&detector).unwrap();
         let [x_m, y_m] = solver.imaged(&readings(&detector, &contact), &contact).unwrap().centroid_m;
-        assert!((0.004..0.006).contains(&x_m) && (x_m - y_m).abs() < 1e-4, "{x_m} {y_m}");
+        assert!((0.004..0.006).contains(&x_m) && (x_m - y_m).abs() < 3e-4, "{x_m} {y_m}");
     }
 
     #[test]

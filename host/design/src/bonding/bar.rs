@@ -177,9 +177,9 @@ mod tests {
     #[test]
     fn a_narrow_dot_has_the_resistance_of_a_constriction() {
         // Negus and Yovanovich (1984): a disc of radius a on a tube of radius R has psi / (4 sigma a) on either side besides that of the tube.
-        let (layer_m, radius_m) = (0.020, 0.006);
+        let (layer_m, radius_m) = (0.010, 0.006);
         let pitch_m = radius_m * PI.sqrt();
-        for share in [0.3, 0.5, 0.7] {
+        for share in [0.4, 0.6, 0.8] {
             let bar = Bar::of(pitch_m, layer_m, 2.0 * share * radius_m);
             let e: f64 = share;
             let psi = 1.0 - 1.409_78 * e + 0.344_06 * e.powi(3) + 0.0435 * e.powi(5) + 0.022_71 * e.powi(7);

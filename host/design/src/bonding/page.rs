@@ -41,7 +41,7 @@ pub(super) fn parts(report: &Report) -> Vec<String> {
         "<h3>A bar with 1 V from top to bottom</h3><p class=\"quiet\">Two halves of a conductor of 1 S/m that one dot of glue joins: a dot's share of the bond, as a cylinder. Wider dots let more current through \
          the bond, and less through each square metre of dot. Lines are 0.05 V apart.</p>"
             .to_owned(),
-        format!("<div class=\"charts small\">{}{}</div>", density(report).svg(), bars(report)),
+        format!("<div class=\"single\">{}</div>{}", density(report).svg(), bars(report)),
         all(report),
     ]
 }

@@ -44,7 +44,7 @@ impl Found {
         let [one, half] = figures.map(test);
         Self {
             holds: one.0.zip(half.0).map(|(one, half)| one && half),
-            text: format!("{what}: {}, {}; {}, {}", AT[0], one.1, AT[1], half.1),
+            text: format!("{what}, {}: {}; {}: {}", AT[0], one.1, AT[1], half.1),
         }
     }
 }
@@ -218,10 +218,10 @@ impl<'a> Map<'a> {
             means.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(bottom, _)| bottom)
         };
         let found = |figures: [Figure; 2], what: &str| {
-            Found::at_both(figures, &format!("{what} is best at a bottom of"), |figure| {
+            Found::at_both(figures, &format!("{what} is best"), |figure| {
                 let at = best_at(figure);
                 let is_there = at.map(|at| (1.0 / ABOUT..=ABOUT).contains(&(at / PEAK_S_PER_M)));
-                (is_there, at.map_or(NOT_COMPUTED.to_owned(), |at| format!("{} S/m", short(at))))
+                (is_there, at.map_or(NOT_COMPUTED.to_owned(), |at| format!("at a bottom of {} S/m", short(at))))
             })
         };
         at_both(

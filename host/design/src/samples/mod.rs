@@ -223,4 +223,25 @@ mod tests {
         assert!(sample.profile.iter().all(|[_, share]| *share <= 1.0));
         assert!(measured::all().filter(|sample| sample.maximum_n.is_none()).map(|sample| sample.name).eq(["D", "DA"]));
     }
+
+    #[test]
+    fn the_whole_says_what_is_a_failed_fit_what_has_collapsed_and_what_the_middle_gives() {
+        let stop = std::sync::atomic::AtomicBool::new(false);
+        let report = run(&Plan { seed: 1 }, Progress::new(&stop, &|_| {})).unwrap();
+        let below = report.samples.iter().filter(|one| one.measured.position_accuracy < report.accuracy_of_the_middle);
+        assert_eq!(below.count(), 5);
+        let text = crate::Report::table(&report);
+        let page = crate::page(&[&report], "tactomo study samples");
+        for part in ["34975, failed fit", "105.5, failed fit", "of 11 measured PA 5 are below", "of 8 tests (Holm)"] {
+            assert!(text.contains(part) && page.contains(part), "{part}: {text}");
+        }
+        for part in ["SR and FMAX, measured", "PA and SENS, simulated", "the middle", "force, N", "ideal points"] {
+            assert!(page.contains(part), "{part}");
+        }
+        // A collapsed image is no figure of any claim: of SR none is left.
+        assert!(report.samples.iter().all(|one| one.imaging.is_spread_out));
+        let resolutions = report.course.claims.iter().find(|claim| claim.claim.contains("resolutions")).unwrap();
+        assert!(resolutions.paper.contains("too few"), "{resolutions:?}");
+        assert!(page.contains("class=\"collapsed\"") && !page.contains("NaN"));
+    }
 }
