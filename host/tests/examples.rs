@@ -56,7 +56,6 @@ fn they_run_as_printed() {
                 .output()
                 .unwrap();
             let said = String::from_utf8_lossy(&ran.stderr);
-            assert!(ran.status.success() && !ran.stdout.is_empty() || example.contains("--save-"), "{example}: {said}");
             assert!(ran.status.success(), "{example}: {said}");
         }
     }

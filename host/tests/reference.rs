@@ -3,9 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use tactomo::detector::Detector;
-use tactomo::forward::Slab;
+use tactomo::forward::{ForwardModel, Slab};
 use tactomo::solve::{Method, Problem};
 use tactomo::study::built::{self, Plan};
 use tactomo::study::case::Case;
@@ -27,7 +28,8 @@ fn cases() -> Vec<Case> {
 
 /// What a solver makes of a case on the slab, from cold starts.
 fn tried(case: &Case, method: Method, noise_lsb: Option<f64>, count: usize) -> SolverReport {
-    let problem = Problem::new(Box::new(Slab::new(&case.detector).unwrap()));
+    let slab: Arc<dyn ForwardModel> = Arc::new(Slab::new(&case.detector).unwrap());
+    let problem = Problem::new(slab);
     let mut solver = method.build(&problem).unwrap();
     try_solver(case, &mut *solver, &Trials { noise_lsb, seed: 1, count }).unwrap()
 }

@@ -128,10 +128,14 @@ async fn taken(browser: &Browser, live: &Live, picture: &Path) -> Result<String>
         browser.client.find(Locator::Id("pause")).await?.click().await?;
         let now = told(browser).await?;
         if is_wanted(&now, live) {
-            // The button that was clicked is not lit up.
+            // It looks as it does while frames come.
             browser
                 .client
-                .execute("document.activeElement.blur(); document.getElementById('frozen').hidden = true", Vec::new())
+                .execute(
+                    "const pause = document.getElementById('pause'); pause.blur(); pause.textContent = 'Pause';
+                     pause.setAttribute('aria-pressed', 'false'); document.getElementById('frozen').hidden = true",
+                    Vec::new(),
+                )
                 .await?;
             let image = browser.client.screenshot().await?;
             fs::write(picture, image).with_context(|| picture.display().to_string())?;

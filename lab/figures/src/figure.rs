@@ -33,8 +33,6 @@ pub enum Fold {
     One,
     /// The largest.
     Largest,
-    /// The smallest.
-    Smallest,
 }
 
 /// How far a value may be off when it is taken again: by other rounding in another processor's arithmetic, which may turn a close decision
@@ -59,7 +57,6 @@ impl Figure {
             (Fold::One, _, [Value::String(word)]) => return Ok(Value::String(said(word))),
             (Fold::One, Some([number]), _) => *number,
             (Fold::Largest, Some(numbers @ [_, ..]), _) => numbers.iter().copied().fold(f64::MIN, f64::max),
-            (Fold::Smallest, Some(numbers @ [_, ..]), _) => numbers.iter().copied().fold(f64::MAX, f64::min),
             _ => bail!("{}: `{}` leads to {} values in the report of {}", self.id, self.path, found.len(), self.job),
         };
         rounded(number * self.scale).with_context(|| format!("{}: {number} is no value", self.id))

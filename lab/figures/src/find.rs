@@ -3,7 +3,8 @@
 use serde_json::Value;
 
 /// Everything in a report that a path leads to. Steps are separated by `/`: a field's name, the number of an item, `*` for all items,
-/// `field=value` for the items whose field is this, several of which are joined by `&`, or `#2` for the third number in a sentence.
+/// `field=value` for the items whose field is this, several of which are joined by `&`, or `#2` for the third number in a sentence. A `/` in a value is
+/// written `%2F`.
 pub fn find(report: &Value, path: &str) -> Vec<Value> {
     let step = |found: Vec<Value>, step: &str| found.iter().flat_map(|value| taken(value, step)).collect();
     path.split('/').fold(vec![report.clone()], step)
@@ -36,7 +37,7 @@ fn numbers(sentence: &str) -> impl Iterator<Item = f64> {
 fn is_such(item: &Value, wanted: &str) -> bool {
     let Some((field, wanted)) = wanted.split_once('=') else { return false };
     match &item[field] {
-        Value::String(text) => text == wanted,
+        Value::String(text) => *text == wanted.replace("%2F", "/"),
         other => other.to_string() == wanted,
     }
 }
@@ -53,6 +54,7 @@ mod tests {
         assert_eq!(find(&report, "rows/name=a&n=1/v/1"), [json!(4)]);
         assert_eq!(find(&report, "rows/*/v/*"), [json!(3), json!(4), json!(5)]);
         assert!(find(&report, "rows/name=c/v").is_empty());
+        assert_eq!(find(&json!([{"claim": "1 S/m", "n": 6}]), "claim=1 S%2Fm/n"), [json!(6)]);
         let report = json!({"claim": "rank correlation -0.53 with 5 x 7 dots."});
         assert_eq!(find(&report, "claim/#0"), [json!(-0.53)]);
         assert_eq!(find(&report, "claim/#2"), [json!(7.0)]);

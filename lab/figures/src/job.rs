@@ -63,11 +63,6 @@ pub const JOBS: &[Job] = &[
 ];
 
 impl Job {
-    /// The one of a name.
-    pub fn named(name: &str) -> Option<&'static Self> {
-        JOBS.iter().find(|job| job.name == name)
-    }
-
     /// What a person types to repeat it.
     pub fn command(&self) -> String {
         format!("tactomo {} --json", self.args)

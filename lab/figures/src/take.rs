@@ -82,9 +82,8 @@ fn is_chart_of(picture: &Picture, job: &Job) -> bool {
 }
 
 fn known(ids: &[String], figures: &[Figure]) -> Result<()> {
-    let mut all = figures.iter().map(|figure| figure.id.as_str()).collect::<Vec<_>>();
-    all.extend(JOBS.iter().map(|job| job.name));
-    all.extend(PICTURES.iter().map(Picture::id));
+    let own = JOBS.iter().map(|job| job.name).chain(PICTURES.iter().map(Picture::id));
+    let all: Vec<&str> = figures.iter().map(|figure| figure.id.as_str()).chain(own.map(|id| -> &str { id })).collect();
     for asked in ids {
         let is_there = all.iter().any(|id| is_asked(std::slice::from_ref(asked), id));
         ensure!(is_there, "there is no figure, run or picture `{asked}`: `{COMMAND} -- --list` has all");

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use serialport::{ErrorKind, SerialPort};
+use tactomo_physics::causes::with_causes;
 
 use super::Link;
 
@@ -87,7 +88,7 @@ impl SerialLink {
     fn release_reset(&mut self) {
         let lowered = self.port.write_request_to_send(false).and_then(|()| self.port.write_data_terminal_ready(false));
         if let Err(error) = lowered {
-            tracing::debug!("{}: no control lines ({error})", self.name);
+            tracing::debug!("{}: no control lines ({})", self.name, with_causes(&error));
         }
     }
 }

@@ -87,10 +87,11 @@ pub(super) fn figures() -> Vec<Figure> {
 fn claims() -> Vec<Figure> {
     let mut all = Vec::new();
     for (job, id, claim, numbers) in CLAIMS {
-        all.push(figure(job, *id, format!("whether it holds that {claim}"), format!("claims/claim={claim}/verdict")));
+        let escaped = claim.replace('/', "%2F");
+        all.push(figure(job, *id, format!("whether it holds that {claim}"), format!("claims/claim={escaped}/verdict")));
         for (of, index, spread) in *numbers {
             let says = format!("number {index} in what was found of the {of}: {claim}");
-            let path = format!("claims/claim={claim}/{of}/#{index}");
+            let path = format!("claims/claim={escaped}/{of}/#{index}");
             all.push(figure(job, format!("{id}.{of}.{index}"), says, path).by(*spread));
         }
     }
