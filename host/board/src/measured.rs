@@ -184,13 +184,10 @@ mod tests {
             detector.electrodes.iter().map(floor).collect::<Vec<_>>()
         };
         let of_all = floors_v(&measured);
-        assert_eq!([of_all[0], of_all[5], of_all[6], of_all[14], of_all[15]], [
-            Some(0.142),
-            Some(0.142),
-            Some(0.128),
-            Some(0.128),
-            None
-        ]);
+        assert_eq!(
+            [of_all[0], of_all[5], of_all[6], of_all[14], of_all[15]],
+            [Some(0.142), Some(0.142), Some(0.128), Some(0.128), None]
+        );
         for left_out in 0..16 {
             let kept: Vec<usize> = (0..16).filter(|e| *e != left_out).collect();
             let expected: Vec<_> = kept.iter().map(|e| of_all[*e]).collect();
