@@ -3,7 +3,6 @@
 //! Frames are those of the firmware on the simulated pins; the watch and the solvers are those of live and `reconstruct`.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::DMatrix;
@@ -126,7 +125,7 @@ fn apart(one: &FoundContact, other: &FoundContact) -> f64 {
 
 /// `open:E` and `short:E,F` for each electrode `E` end with the answer of the healthy board.
 fn left_out_everywhere(model: BoardModel) {
-    let bench = Arc::new(Bench::new(&Detector::default()));
+    let bench = Bench::new(&Detector::default());
     let impedance_ohm = bench.touched_ohm(SceneName::Single, 1);
     let healthy = bench.frames(model, &impedance_ohm, None);
     let (expected, none) = answered(&healthy.0, &healthy.1);
