@@ -97,7 +97,9 @@ impl Bench {
 /// The contacts of the last frames of some, without the electrodes that the first ones show to be faulty, and what is wrong with these.
 fn answered(problem: &Problem, frames: &[Readings]) -> (Vec<FoundContact>, Vec<(usize, ElectrodeFault)>) {
     let mut watch = ElectrodeWatch::new(problem.detector());
-    frames.iter().for_each(|frame| drop(watch.note(frame)));
+    for frame in frames {
+        watch.note(frame);
+    }
     let mut solver = without(Method::Auto, problem, watch.faulty()).unwrap();
     let mut contacts = Vec::new();
     for frame in &frames[frames.len() - SOLVED..] {
