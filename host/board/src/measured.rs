@@ -190,22 +190,19 @@ mod tests {
         let range = |electrodes, floor| tactomo_protocol::Range { electrodes, floor, ceiling: 900, errors };
         let board = Hello { ranges: [range(6, 142), range(9, 128)].into_iter().collect(), ..hello(16) };
         let measured = as_measured(&Detector::default(), &board).unwrap();
-        let floors_v = |detector: &Detector| {
-            let floor = |pad: &Electrode| detector.converters.get(pad.converter).map(|known| known.range_v[0]);
+        let floors_mv = |detector: &Detector| {
+            let floor = |pad: &Electrode| Some((1e3 * detector.converters.get(pad.converter)?.range_v[0]).round());
             detector.electrodes.iter().map(floor).collect::<Vec<_>>()
         };
-        let of_all = floors_v(&measured);
-        assert_eq!([of_all[0], of_all[5], of_all[6], of_all[14], of_all[15]], [
-            Some(0.142),
-            Some(0.142),
-            Some(0.128),
-            Some(0.128),
-            None
-        ]);
+        let of_all = floors_mv(&measured);
+        assert_eq!(
+            [of_all[0], of_all[5], of_all[6], of_all[14], of_all[15]],
+            [Some(142.0), Some(142.0), Some(128.0), Some(128.0), None]
+        );
         for left_out in 0..16 {
             let kept: Vec<usize> = (0..16).filter(|e| *e != left_out).collect();
             let expected: Vec<_> = kept.iter().map(|e| of_all[*e]).collect();
-            assert_eq!(floors_v(&measured.keeping(&kept)), expected, "without {left_out}");
+            assert_eq!(floors_mv(&measured.keeping(&kept)), expected, "without {left_out}");
         }
     }
 

@@ -386,15 +386,17 @@ impl FollowLoop {
         };
         self.listeners.tell(&solved.frame, answer);
         board.watch.answered(&solution);
-        if !self.search.is_busy() {
-            if let Some(look) = board.watch.look() {
-                self.search.look(board.order(self.maker.method()), look, solved.touch.clone());
-            } else if search
-                && self.pause.is_over(&solution, now)
-                && let Some(follower) = &board.follower
-            {
-                self.search.search(follower.lead(), solved.touch.clone());
-            }
+        if !self.search.is_looking()
+            && let Some(look) = board.watch.look()
+        {
+            self.search.look(board.order(self.maker.method()), look, solved.touch.clone());
+        }
+        if search
+            && !self.search.is_busy()
+            && self.pause.is_over(&solution, now)
+            && let Some(follower) = &board.follower
+        {
+            self.search.search(follower.lead(), solved.touch.clone());
         }
         let telling = |count: usize| board.follower.as_ref()?.telling_grounds(count);
         self.planner.consider(&self.wish, &board.detector, (!solution.contacts.is_empty(), self.conversions), telling);

@@ -1,4 +1,5 @@
-//! The thread that searches: thorough answers, always on the newest frame that the follower had when it was free.
+//! The thread that searches: thorough answers, always on the newest frame that the follower had when it was free. Looks for exchanged wires have
+//! threads of their own: what these make of the readings may be searched for seconds, in vain.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -17,8 +18,6 @@ enum Job {
     Solver(Option<Box<dyn Searcher>>),
     /// To search what explains readings.
     Search { epoch: u64, from: Lead, readings: Readings },
-    /// To look for exchanged wires.
-    Look { order: Order, look: Look, readings: Readings },
 }
 
 /// The searching thread, seen from the follower: it does one thing at a time. It ends by itself once this is dropped, and nobody waits for what it still
@@ -26,16 +25,20 @@ enum Job {
 pub(super) struct SearchThread {
     jobs: Sender<Job>,
     busy: bool,
+    inbox: Arc<Inbox>,
+    look_at_wires: LookAtWires,
+    looking: bool,
     /// Counts what makes running searches useless: another solver, a jump.
     epoch: u64,
 }
 
 impl SearchThread {
     /// Starts it; what it finds goes to `inbox`.
-    pub fn start(inbox: Arc<Inbox>, look: LookAtWires) -> std::io::Result<Self> {
+    pub fn start(inbox: Arc<Inbox>, look_at_wires: LookAtWires) -> std::io::Result<Self> {
         let (jobs, queue) = channel();
-        thread::Builder::new().name("searcher".to_owned()).spawn(move || work(&queue, &inbox, &look))?;
-        Ok(Self { jobs, busy: false, epoch: 0 })
+        let found = Arc::clone(&inbox);
+        thread::Builder::new().name("searcher".to_owned()).spawn(move || work(&queue, &found))?;
+        Ok(Self { jobs, busy: false, inbox, look_at_wires, looking: false, epoch: 0 })
     }
 
     /// Searches with this half from now on; what is still searched with another is thrown away.
@@ -59,9 +62,24 @@ impl SearchThread {
         self.busy = self.send(Job::Search { epoch: self.epoch, from, readings });
     }
 
-    /// Looks for exchanged wires.
+    /// Whether it still looks at the wires.
+    pub fn is_looking(&self) -> bool {
+        self.looking
+    }
+
+    /// Looks for exchanged wires, beside a search.
     pub fn look(&mut self, order: Order, look: Look, readings: Readings) {
-        self.busy = self.send(Job::Look { order, look, readings });
+        let (look_at_wires, inbox) = (Arc::clone(&self.look_at_wires), Arc::clone(&self.inbox));
+        let looks = move || {
+            // Whatever happens, the follower is not left waiting.
+            let looked = std::panic::AssertUnwindSafe(|| look_at_wires(&order, look, &readings));
+            let found = std::panic::catch_unwind(looked).unwrap_or_else(|_| {
+                tracing::error!("a look at the wires panicked: this is a mistake in the program, please report it");
+                None
+            });
+            inbox.put(Event::Looked(look, found));
+        };
+        self.looking = thread::Builder::new().name("looks at wires".to_owned()).spawn(looks).is_ok();
     }
 
     /// Takes what has come from it: the lead, unless it is of no use by now.
@@ -72,7 +90,7 @@ impl SearchThread {
 
     /// Takes note that a look has ended.
     pub fn looked(&mut self) {
-        self.busy = false;
+        self.looking = false;
     }
 
     /// Whether the thread takes it.
@@ -81,7 +99,7 @@ impl SearchThread {
     }
 }
 
-fn work(jobs: &Receiver<Job>, inbox: &Inbox, look_at_wires: &LookAtWires) {
+fn work(jobs: &Receiver<Job>, inbox: &Inbox) {
     let mut half: Option<Box<dyn Searcher>> = None;
     while let Ok(job) = jobs.recv() {
         if inbox.is_closed() {
@@ -103,10 +121,6 @@ fn work(jobs: &Receiver<Job>, inbox: &Inbox, look_at_wires: &LookAtWires) {
                 // Readings that cannot be were refused by the follower before.
                 let lead = found.and_then(Result::ok).unwrap_or_default();
                 inbox.put(Event::Searched(Searched { epoch, lead, is_last: true }));
-            }
-            Job::Look { order, look, readings } => {
-                let found = look_at_wires(&order, look, &readings);
-                inbox.put(Event::Looked(look, found));
             }
         }
     }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{ForwardError, ForwardModel, readings_v};
+use super::{ForwardError, ForwardModel, Joint, Through, readings_v};
 use crate::detector::{Detector, Electrode, Parameter};
 use crate::readings::Readings;
 use crate::scene::Contact;
@@ -129,6 +129,38 @@ impl Nuisance {
         let parameters = parameters.into_iter().collect::<Result<_, _>>()?;
         let pads_ohm = pads_ohm(&**model)?;
         Ok(Some(Self { model: Arc::clone(model), parameters, directions, pads_ohm }))
+    }
+
+    /// The same seen through some of the electrodes, in this order, with some of all of them joined: `through` is the model so seen. What belongs
+    /// to electrodes that are left out is left out.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if a detector that is a little different cannot be modelled.
+    pub fn through(
+        &self,
+        through: &Arc<dyn ForwardModel>,
+        kept: &[usize],
+        joints: &[Joint],
+    ) -> Result<Self, ForwardError> {
+        let seen = |model: &Arc<dyn ForwardModel>| {
+            Arc::new(Through::new(Arc::clone(model), kept.to_vec(), joints.to_vec())) as Arc<dyn ForwardModel>
+        };
+        let renumbered = |parameter: Parameter| match parameter.electrode() {
+            Some(e) => kept.iter().position(|kept| *kept == e).map(|to| parameter.with_electrode(to)),
+            None => Some(parameter),
+        };
+        let left = self.parameters.iter().enumerate().filter_map(|(row, changed)| {
+            let models = || changed.models.iter().map(seen).collect();
+            let of = |parameter| Changed { parameter, models: models(), ..*changed };
+            Some((row, of(renumbered(changed.parameter)?)))
+        });
+        let (rows, parameters): (Vec<usize>, Vec<Changed>) = left.unzip();
+        // Joined pads share what is under them.
+        let pads_ohm = match joints {
+            [] => kept.iter().map(|e| self.pads_ohm[*e]).collect(),
+            _ => pads_ohm(&**through)?,
+        };
+        Ok(Self { model: Arc::clone(through), parameters, directions: self.directions.select_rows(&rows), pads_ohm })
     }
 
     /// Changes of the readings of contacts (V), as `measured` has them, by one standard deviation of each independent error: a column each, in the readings' order.

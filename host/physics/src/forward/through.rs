@@ -174,7 +174,7 @@ fn square(matrix: &DMatrix<f64>, kept: &[usize]) -> DMatrix<f64> {
 mod tests {
     use super::*;
     use crate::forward::contact::conducting_patches;
-    use crate::forward::{Patches, Slab, readings_v};
+    use crate::forward::{Nuisance, Patches, Slab, readings_v};
     use crate::simulate::{Fault, Measurement};
 
     #[test]
@@ -207,6 +207,26 @@ mod tests {
         let found = readings_v(&some.impedance_ohm(&contacts)?, some.detector());
         let off = found.volts().iter().zip(expected.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-9, "{off}");
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_not_known_is_seen_through_them_too() -> Result<(), ForwardError> {
+        let all: Arc<dyn ForwardModel> = Arc::new(Slab::new(&Detector::default())?.on_image(200));
+        let whole = Nuisance::new(&all, all.detector(), 2)?.unwrap();
+        let contacts = [Contact::flat(0.006, 0.012, 0.0025, 1e-3)];
+        for (kept, joints) in [(vec![5, 0, 9, 12], Vec::new()), (vec![2, 3, 4, 8, 11], vec![Joint::short(2, 7)])] {
+            let some: Arc<dyn ForwardModel> = Arc::new(Through::new(Arc::clone(&all), kept.clone(), joints.clone()));
+            let [seen, anew] =
+                [whole.through(&some, &kept, &joints)?, Nuisance::new(&some, some.detector(), 2)?.unwrap()];
+            let covariance = |nuisance: &Nuisance| {
+                let patterns_v = nuisance.patterns_v(&contacts, some.detector()).unwrap();
+                &patterns_v * patterns_v.transpose()
+            };
+            let [seen, anew] = [seen, anew].map(|nuisance| covariance(&nuisance));
+            // But for what is common to all pads' impedances, which is a mean over pairs of those that there are.
+            assert!((&seen - &anew).amax() < 1e-5 * anew.amax(), "{kept:?}: {}", (seen - &anew).amax() / anew.amax());
+        }
         Ok(())
     }
 

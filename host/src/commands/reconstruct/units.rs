@@ -1,7 +1,7 @@
 //! The unit of readings in a table.
 
 use tactomo::detector::Detector;
-use tactomo::readings::{Likely, NotVolts, check_volts};
+use tactomo::readings::{Likely, check_volts};
 
 /// Unit of readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,10 +39,13 @@ impl std::str::FromStr for Unit {
 /// # Errors
 /// What the readings may be in, and what to do.
 pub fn check(volts: impl IntoIterator<Item = f64>, unit: Unit, detector: &Detector) -> Result<(), String> {
-    check_volts(volts, detector).map_err(|refused| match (refused.likely, unit) {
+    check_volts(volts, detector).map_err(|mut refused| match (refused.likely, unit) {
         (Likely::Millivolts, Unit::Volt) => format!("{refused} Give --unit mV"),
-        // Thousandths of millivolts are not measured.
-        _ => format!("{} Convert them to volts", NotVolts { likely: Likely::Codes, ..refused }),
+        _ => {
+            // Thousandths of millivolts are not measured.
+            refused.likely = Likely::Codes;
+            format!("{refused} Convert them to volts")
+        }
     })
 }
 
@@ -56,7 +59,10 @@ mod tests {
         assert_eq!(check([1.99], Unit::Volt, &detector), Ok(()));
         let refused = |largest_v, unit| check([0.0, largest_v], unit, &detector).err().unwrap_or_default();
         assert!(refused(1500.0, Unit::Volt).contains("up to 1500 V"), "{}", refused(1500.0, Unit::Volt));
-        assert!(refused(8.0, Unit::Volt).ends_with("are these millivolts? Give --unit mV"), "a light touch in millivolts");
+        assert!(
+            refused(8.0, Unit::Volt).ends_with("are these millivolts? Give --unit mV"),
+            "a light touch in millivolts"
+        );
         assert!(refused(4095.0, Unit::Volt).ends_with("codes of the converter? Convert them to volts"));
         assert!(refused(5.0, Unit::Millivolt).contains("codes of the converter"));
     }

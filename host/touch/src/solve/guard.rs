@@ -12,8 +12,10 @@ use tactomo_physics::readings::Readings;
 /// makes, that shows an exchange.
 const HEALED: f64 = 0.1;
 const FITS: f64 = 6.0;
-/// Exchanges that are tried with fits: those that leave least in the linear theory.
+/// Exchanges that are tried with fits: those that leave least in the linear theory, as long as they leave at most such a share of what is left
+/// without.
 const TRIED: usize = 6;
+const ROUGHLY_HEALED: f64 = 0.5;
 
 /// A solver that leaves out electrodes that are open, shorted, exchanged or otherwise wrong, once it has seen that, and takes them back
 /// when they are healthy.
@@ -239,22 +241,27 @@ fn one_contact(problem: &Problem, kept: &[usize], faulty: &FaultyElectrodes) -> 
 fn exchanged(problem: &Problem, faulty: &FaultyElectrodes, readings: &Readings) -> Option<[usize; 2]> {
     let kept = faulty.kept(problem.detector().electrodes.len());
     let contacts = one_contact(problem, &kept, faulty)?;
+    let exchanging = |[i, j]: [usize; 2]| {
+        let mut order = kept.clone();
+        order.swap(i, j);
+        order
+    };
+    let roughly = |order: &[usize]| contacts.roughly_left_by_one(&readings.of(order));
+    let most = ROUGHLY_HEALED * roughly(&kept);
+    let pairs = (0..kept.len()).flat_map(|i| (0..i).map(move |j| [j, i]));
+    let mut tried: Vec<_> =
+        pairs.map(|pair| (roughly(&exchanging(pair)), pair)).filter(|(left, _)| *left < most).collect();
+    if tried.is_empty() {
+        return None;
+    }
+    tried.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let residual = |order: &[usize]| contacts.left_by_one(&readings.of(order));
     let before = residual(&kept)?;
     // What is explained to within noise needs no exchange.
     if before < 1.0 {
         return None;
     }
-    let exchanging = |[i, j]: [usize; 2]| {
-        let mut order = kept.clone();
-        order.swap(i, j);
-        order
-    };
-    let pairs = (0..kept.len()).flat_map(|i| (0..i).map(move |j| [j, i]));
-    let mut roughly: Vec<_> =
-        pairs.map(|pair| (contacts.roughly_left_by_one(&readings.of(&exchanging(pair))), pair)).collect();
-    roughly.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let scored = roughly.iter().take(TRIED).filter_map(|(_, pair)| Some((residual(&exchanging(*pair))?, *pair)));
+    let scored = tried.iter().take(TRIED).filter_map(|(_, pair)| Some((residual(&exchanging(*pair))?, *pair)));
     let (after, pair) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
     (after < FITS && after < HEALED * before).then_some(pair.map(|place| kept[place]))
 }
@@ -267,7 +274,7 @@ mod tests {
     use tactomo_physics::detector::Detector;
     use tactomo_physics::forward::{ForwardModel, Joint, Resolution, Slab};
     use tactomo_physics::scene::Contact;
-    use tactomo_physics::simulate::{Fault, Measurement};
+    use tactomo_physics::simulate::{Fault, Measurement, drawn};
 
     const CONTACT: Contact = Contact::flat(0.011, -0.006, 0.0025, 6e-4);
 
@@ -359,6 +366,85 @@ mod tests {
         let (excluded, last) = guarded(Method::Contacts, &["swap:5,6"], 20);
         assert_eq!(excluded, [(5, ElectrodeFault::Exchanged), (6, ElectrodeFault::Exchanged)]);
         assert_found(&last, 2e-4);
+    }
+
+    /// Presses of one to three fingers on a detector, as a board reads them: of one with floors some readings are bounds.
+    fn presses(built: &Detector, count: usize, seed: u64, faults: &[Fault]) -> Vec<(usize, Readings)> {
+        let fine = Slab::with_resolution(built, Resolution::FINE).unwrap();
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut board = Measurement::new(built, faults, seed).unwrap();
+        let mut press = |press: usize| loop {
+            let fingers = 1 + press % 3;
+            let finger = |random: &mut fastrand::Rng| {
+                let [x_m, y_m] = [0, 1].map(|_| 0.046 * (random.f64() - 0.5));
+                Contact::flat(x_m, y_m, 0.002 + 0.002 * random.f64(), 1e-4 * 30f64.powf(random.f64()))
+            };
+            let contacts: Vec<_> = (0..fingers).map(|_| finger(&mut random)).collect();
+            // Discs that overlap are no contacts of the model.
+            let Ok(impedance_ohm) = fine.impedance_ohm(&contacts) else { continue };
+            let readings = board.readings_v(Some(&impedance_ohm));
+            let ranges = [tactomo_physics::readings::Range { floor_v: 0.14, ceiling_v: 3.1 }; 16];
+            break (fingers, if press.is_multiple_of(2) { readings.within(&ranges) } else { readings });
+        };
+        (0..count).map(&mut press).collect()
+    }
+
+    fn looked(problem: &Problem, readings: &Readings) -> Option<[usize; 2]> {
+        Look::Exchanged.run(problem, &FaultyElectrodes::default(), readings)
+    }
+
+    #[test]
+    fn healthy_detectors_as_built_are_never_told_exchanged() {
+        let described = Detector::default();
+        let problem = Problem::of(&described).unwrap();
+        for seed in 0..24 {
+            for (fingers, readings) in presses(&drawn(&described, seed), 12, seed, &[]) {
+                assert_eq!(looked(&problem, &readings), None, "seed {seed}, {fingers} fingers");
+            }
+        }
+    }
+
+    #[test]
+    fn exchanged_wires_of_detectors_as_built_are_told_by_most_presses() {
+        let described = Detector::default();
+        let problem = Problem::of(&described).unwrap();
+        // Neighbours, electrodes far apart, and across the converters of an ESP32.
+        let pairs = [[5, 6], [0, 1], [1, 9], [3, 12], [10, 14], [2, 6], [7, 8], [0, 15]];
+        for (seed, [a, b]) in (100..).zip(pairs) {
+            let swap = Fault::Swap { channels: [a, b] };
+            let singles = presses(&drawn(&described, seed), 19, seed, &[swap]);
+            let found = singles.iter().filter(|(fingers, _)| *fingers == 1).map(|(_, press)| looked(&problem, press));
+            let told: Vec<_> = found.collect();
+            let right = told.iter().filter(|pair| **pair == Some([a, b])).count();
+            let others = told.iter().flatten().filter(|pair| **pair != [a, b]).count();
+            assert!(2 * right >= told.len() && others == 0, "{a},{b}, seed {seed}: {told:?}");
+        }
+    }
+
+    #[test]
+    fn a_certainty_is_told_of_no_answer_that_is_doubtful() {
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
+        detector.adc.noise_lsb = 1.5;
+        let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
+        let impedance_ohm = fine.impedance_ohm(&[CONTACT]).unwrap();
+        for method in [Method::Auto, Method::Contacts] {
+            // Without the guard, which would leave out the wires: their readings fit nothing.
+            let mut solver = method.build(&Problem::of(&detector).unwrap()).unwrap();
+            for (fault, is_sound) in [("swap:5,6", false), ("gain:4:1.0", true)] {
+                solver.reset();
+                let mut board = Measurement::new(&detector, &[fault.parse().unwrap()], 5).unwrap();
+                let answers: Vec<_> =
+                    (0..4).map(|_| solver.solve(&board.readings_v(Some(&impedance_ohm))).unwrap()).collect();
+                for answer in &answers {
+                    assert!(answer.certainty.is_none() || !answer.flags.is_doubtful(), "{answer:?}");
+                    let is_said = answer.choice.as_ref().map(|choice| choice.why.contains("sure"));
+                    assert!(is_said.is_none_or(|is_said| is_said == answer.certainty.is_some()), "{answer:?}");
+                }
+                let is_sure = |answer: &Solution| answer.certainty.is_some_and(|certainty| certainty > 0.9);
+                let is_doubtful = |answer: &Solution| answer.is_contacts() && answer.flags.is_doubtful();
+                assert!(if is_sound { answers.iter().all(is_sure) } else { answers.iter().any(is_doubtful) });
+            }
+        }
     }
 
     #[test]

@@ -44,6 +44,15 @@ struct Unknown {
     made: OnceLock<Option<Nuisance>>,
     /// Whether a thread of its own makes it.
     beside: AtomicBool,
+    /// Of a problem through some of the electrodes: where it is had from in next to no time.
+    seen_of: Option<Whole>,
+}
+
+/// A problem with all electrodes, some of which are seen.
+struct Whole {
+    problem: Problem,
+    kept: Vec<usize>,
+    joints: Vec<Joint>,
 }
 
 impl Problem {
@@ -108,15 +117,24 @@ impl Problem {
     /// What is not known of the detector; `None` if it is exact, and as long as it is [made beside](Self::make_nuisance_beside). Else the
     /// first call makes a model for each of some dozens of parameters, which takes about a second with 16 electrodes, and half a minute with 32.
     pub fn nuisance(&self) -> Option<&Nuisance> {
-        if self.nuisance.beside.load(Ordering::Acquire) {
+        if self.is_made_beside() {
             return self.made_already();
         }
         self.made_nuisance(threads::cores())
     }
 
+    /// Whether a thread of its own makes what is not known of the detector, or has made it.
+    fn is_made_beside(&self) -> bool {
+        let of_whole = self.nuisance.seen_of.as_ref().is_some_and(|whole| whole.problem.is_made_beside());
+        of_whole || self.nuisance.beside.load(Ordering::Acquire)
+    }
+
     /// What is not known of the detector, if that was made.
     pub(super) fn made_already(&self) -> Option<&Nuisance> {
-        self.nuisance.made.get()?.as_ref()
+        match &self.nuisance.seen_of {
+            Some(whole) if whole.problem.nuisance.made.get().is_some() => self.made_nuisance(1),
+            _ => self.nuisance.made.get()?.as_ref(),
+        }
     }
 
     /// Begins to make what is not known of the detector in a thread of its own, and leaves a core to others. Meanwhile contacts are found
@@ -133,7 +151,13 @@ impl Problem {
 
     fn made_nuisance(&self, cores: usize) -> Option<&Nuisance> {
         let made = || {
-            let nuisance = Nuisance::new(&self.model, self.detector(), cores);
+            let nuisance = match &self.nuisance.seen_of {
+                Some(Whole { problem, kept, joints }) => {
+                    let whole = problem.made_nuisance(cores);
+                    whole.map(|whole| whole.through(&self.model, kept, joints)).transpose()
+                }
+                None => Nuisance::new(&self.model, self.detector(), cores),
+            };
             nuisance.unwrap_or_else(|error| {
                 tracing::warn!("what is not known of the detector is left out: {}", with_causes(&error));
                 None
@@ -171,6 +195,8 @@ impl Problem {
         };
         let model = Through::new(Arc::clone(&self.model), kept.to_vec(), joints.to_vec());
         let (model, jacobian) = (Arc::new(model), Arc::new(jacobian));
-        Self { model, jacobian, nuisance: Arc::default(), completer: Arc::default(), learned: None }
+        let whole = Whole { problem: self.clone(), kept: kept.to_vec(), joints: joints.to_vec() };
+        let nuisance = Arc::new(Unknown { seen_of: Some(whole), ..Unknown::default() });
+        Self { model, jacobian, nuisance, completer: Arc::default(), learned: None }
     }
 }

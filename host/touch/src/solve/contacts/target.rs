@@ -336,3 +336,33 @@ pub(in crate::solve) fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ContactFinder, ContactSettings};
+    use crate::solve::Problem;
+    use tactomo_physics::detector::{ConverterErrors, Detector};
+    use tactomo_physics::readings::Readings;
+
+    #[test]
+    fn electrodes_that_are_left_out_take_what_their_converter_is_off_by_along_and_leave_that_of_the_others() {
+        let mut detector = Detector::default();
+        let converter = |floor_v: f64| ConverterErrors { gain_share: 0.01, bow_v: 0.012, range_v: [floor_v, 3.1] };
+        detector.converters = [0.142, 0.128].map(converter).into();
+        detector.electrodes.iter_mut().skip(6).for_each(|pad| pad.converter = 1);
+        let problem = Problem::of(&Detector::default()).unwrap().measured_as(&detector);
+        let readings = Readings::from_fn(16, |g, e| if g == e { 0.0 } else { 0.2 + 0.01 * (16 * g + e) as f64 });
+        let of_converters = |problem: &Problem, readings: &Readings| {
+            let finder = ContactFinder::new(problem, ContactSettings::of(problem)).unwrap();
+            let patterns_v = finder.errors.patterns_v(readings);
+            patterns_v.columns(readings.electrodes(), 4).into_owned()
+        };
+        let of_all = of_converters(&problem, &readings);
+        for left_out in [0, 3, 5, 6, 15] {
+            let kept: Vec<usize> = (0..16).filter(|e| *e != left_out).collect();
+            let rows: Vec<usize> = kept.iter().flat_map(|g| kept.iter().map(move |e| 16 * g + e)).collect();
+            let found = of_converters(&problem.through(&kept, &[]), &readings.of(&kept));
+            assert_eq!(found, of_all.select_rows(&rows), "without {left_out}");
+        }
+    }
+}

@@ -189,3 +189,29 @@ fn a_shape_is_followed_as_it_moves_and_lost_when_it_is_gone() {
     let target = bench.target(&ring(0.5));
     assert!(follower.follow(&target), "a ring is no line");
 }
+
+#[test]
+fn a_ring_that_closes_is_let_go_before_it_is_a_disc() {
+    let mut bench = Bench::new();
+    let sheet_s = Detector::default().sheet_conductance_s();
+    let touch = |radius_m: f64| Touch::flat([0.004, 0.006], Shape::Ring { radius_m, width_m: 0.006 }, sheet_s);
+    let (_, target, fit) = bench.found(&touch(0.013), AROUND);
+    let mut follower = ShapeFollower::new(Arc::clone(&bench.finder));
+    follower.adopt(&fit, &target);
+    let mut radius_m = 0.013;
+    let mut was_let_go = false;
+    while radius_m > 0.004 {
+        let target = bench.target(&touch(radius_m));
+        let is_lost = follower.follow(&target);
+        // A search would find it again, perhaps as what it is no longer.
+        follower.adopt(&fit, &target);
+        if let Some(Solution { shape: Some(FoundShape::Ring(found)), .. }) = follower.solution(&target) {
+            assert!(found.radius_m > 1.5 * found.width_m, "{found:?} of a ring of {radius_m} m");
+        } else {
+            assert!(is_lost);
+            was_let_go = true;
+        }
+        radius_m -= 5e-4;
+    }
+    assert!(was_let_go);
+}

@@ -1,0 +1,217 @@
+//! Faults of wires on every simulated board: what is left answers as the healthy board does, and exchanged wires are told.
+//!
+//! Frames are those of the firmware on the simulated pins; the watch and the solvers are those of live and `reconstruct`.
+#![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
+
+use std::time::{Duration, Instant};
+
+use nalgebra::DMatrix;
+use tactomo::board::link::Link;
+use tactomo::board::measured::{Volts, as_measured};
+use tactomo::board::session::{RequestedSettings, Session, send};
+use tactomo::board::simulated::{BoardModel, Options, SimulatedBoard};
+use tactomo::detector::Detector;
+use tactomo::forward::{ForwardModel, touched_impedance_ohm};
+use tactomo::readings::Readings;
+use tactomo::scene::{Hand, Scene, SceneName};
+use tactomo::simulate::{Fault, Measurement, Physics, finer_model};
+use tactomo::solve::{
+    ElectrodeFault, ElectrodeWatch, FoundContact, FoundShape, Guard, Method, Problem, Solver, without,
+};
+use tactomo_protocol::{BoardMessage, BoardReceiver};
+
+/// Frames of each board: an electrode is left out after 8 that show it, and the rest is averaged.
+const FRAMES: usize = 24;
+/// Frames that are solved, of these.
+const SOLVED: usize = 6;
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A steady press, behind wires that may be faulty.
+struct Pressed {
+    impedance_ohm: DMatrix<f64>,
+    wires: Measurement,
+}
+
+impl Physics for Pressed {
+    fn readings_v(&mut self, _time_s: f64) -> Readings {
+        self.wires.pad_voltages(Some(&self.impedance_ohm))
+    }
+}
+
+/// A detector with its models: one that is pressed, and one that is inverted.
+struct Bench {
+    fine: Box<dyn ForwardModel>,
+    problem: Problem,
+}
+
+impl Bench {
+    fn new(detector: &Detector) -> Self {
+        Self { fine: finer_model(detector, &[], 1).unwrap(), problem: Problem::of(detector).unwrap() }
+    }
+
+    /// Impedances under what touches at the start of a scene.
+    fn touched_ohm(&self, scene: SceneName, seed: u64) -> DMatrix<f64> {
+        let detector = self.fine.detector();
+        let touches = Scene::new(scene, detector, Hand::relative(detector), seed).at(0.0);
+        touched_impedance_ohm(&*self.fine, &touches).unwrap()
+    }
+
+    /// Frames of a board with such a fault, and the problem as that board measures it.
+    fn frames(&self, model: BoardModel, impedance_ohm: &DMatrix<f64>, fault: Option<&str>) -> (Problem, Vec<Readings>) {
+        let detector = self.problem.detector();
+        let faults: Vec<Fault> = fault.map(|fault| fault.parse().unwrap()).into_iter().collect();
+        let wires = Measurement::new(detector, &faults, 1).unwrap();
+        let pressed = Pressed { impedance_ohm: impedance_ohm.clone(), wires };
+        let mut board = SimulatedBoard::start(detector, Box::new(pressed), Options { seed: 1, model }).unwrap();
+        let (mut session, mut receiver) = (Session::new(RequestedSettings::default()), BoardReceiver::default());
+        let (mut problem, mut frames, mut volts) = (self.problem.clone(), Vec::new(), None);
+        let begun = Instant::now();
+        while frames.len() < FRAMES {
+            assert!(begun.elapsed() < PATIENCE, "{model:?}: no frames");
+            if let Some(command) = session.command(Instant::now()) {
+                send(&mut board, &command).unwrap();
+            }
+            let mut buffer = [0; 4096];
+            let count = board.read(&mut buffer).unwrap();
+            let mut input = &buffer[..count];
+            while let Some(message) = receiver.receive(&mut input) {
+                match message {
+                    Ok(BoardMessage::Hello(hello)) => {
+                        session.hello(&hello, Instant::now());
+                        problem = self.problem.measured_as(&as_measured(detector, &hello).unwrap());
+                        volts = Some(Volts::of(&hello));
+                    }
+                    Ok(BoardMessage::Frame(frame)) => {
+                        session.frame(Instant::now());
+                        frames.extend(volts.as_ref().and_then(|volts: &Volts| volts.readings(&frame)));
+                    }
+                    _ => {}
+                }
+            }
+        }
+        frames.truncate(FRAMES);
+        (problem, frames)
+    }
+}
+
+/// The contacts of the last frames of some, without the electrodes that the first ones show to be faulty, and what is wrong with these.
+fn answered(problem: &Problem, frames: &[Readings]) -> (Vec<FoundContact>, Vec<(usize, ElectrodeFault)>) {
+    let mut watch = ElectrodeWatch::new(problem.detector());
+    for frame in frames {
+        watch.note(frame);
+    }
+    let mut solver = without(Method::Auto, problem, watch.faulty()).unwrap();
+    let mut contacts = Vec::new();
+    for frame in &frames[frames.len() - SOLVED..] {
+        let solution = solver.solve(frame).unwrap();
+        assert!(solution.certainty.is_none() || !solution.flags.is_doubtful(), "{solution:?}");
+        contacts = solution.contacts;
+    }
+    (contacts, watch.faulty().faults.clone())
+}
+
+fn faults_of(fault: &str, kind: ElectrodeFault) -> Vec<(usize, ElectrodeFault)> {
+    let (_, electrodes) = fault.split_once(':').unwrap();
+    let mut all: Vec<usize> = electrodes.split(',').map(|e| e.parse().unwrap()).collect();
+    all.sort_unstable();
+    all.into_iter().map(|e| (e, kind)).collect()
+}
+
+/// Standard deviations between two places.
+fn apart(one: &FoundContact, other: &FoundContact) -> f64 {
+    let errors = [one, other].map(|contact| contact.uncertainty.unwrap());
+    let off = |a: f64, b: f64, errors: [f64; 2]| (a - b) / errors[0].hypot(errors[1]);
+    let x = off(one.x_m, other.x_m, errors.map(|error| error.x_m));
+    let y = off(one.y_m, other.y_m, errors.map(|error| error.y_m));
+    x.hypot(y)
+}
+
+/// `open:E` and `short:E,F` for each electrode `E` end with the answer of the healthy board.
+fn left_out_everywhere(model: BoardModel) {
+    let bench = Bench::new(&Detector::default());
+    let impedance_ohm = bench.touched_ohm(SceneName::Single, 1);
+    let healthy = bench.frames(model, &impedance_ohm, None);
+    let (expected, none) = answered(&healthy.0, &healthy.1);
+    assert_eq!((expected.len(), none), (1, vec![]), "{model:?}");
+    let cases = (0..16).flat_map(|e| {
+        // The next one: of the ESP32's two converters electrodes 5 and 6 are at different ones.
+        let other = (e + 1) % 16;
+        [(format!("open:{e}"), ElectrodeFault::Open), (format!("short:{e},{other}"), ElectrodeFault::Shorted)]
+    });
+    let mut wrong = Vec::new();
+    for (fault, kind) in cases {
+        let (problem, frames) = bench.frames(model, &impedance_ohm, Some(&fault));
+        let (found, faults) = answered(&problem, &frames);
+        let is_as_healthy = found.len() == 1 && apart(&found[0], &expected[0]) < 3.0;
+        if !is_as_healthy || faults != faults_of(&fault, kind) {
+            wrong.push((fault, faults, found));
+        }
+    }
+    assert!(wrong.is_empty(), "{model:?}: healthy {expected:?}, but {wrong:#?}");
+}
+
+#[test]
+fn open_and_shorted_electrodes_change_no_answer_of_the_ideal_board() {
+    left_out_everywhere(BoardModel::Ideal);
+}
+
+#[test]
+fn open_and_shorted_electrodes_change_no_answer_of_the_esp32() {
+    left_out_everywhere(BoardModel::Esp32);
+}
+
+#[test]
+fn open_and_shorted_electrodes_change_no_answer_of_the_esp32c3() {
+    left_out_everywhere(BoardModel::Esp32c3);
+}
+
+/// Pairs of neighbours, of electrodes far apart, and across the ESP32's converters.
+const EXCHANGED: [[usize; 2]; 5] = [[5, 6], [0, 1], [1, 9], [3, 12], [10, 14]];
+
+#[test]
+fn exchanged_wires_are_told_within_two_seconds_of_presses() {
+    let bench = Bench::new(&Detector::default());
+    for (index, [a, b]) in EXCHANGED.into_iter().enumerate() {
+        let model = BoardModel::ALL[index % BoardModel::ALL.len()];
+        // One press after another, as many frames of each as come in a tenth of a second on the slowest board.
+        let presses: Vec<_> = (1..=3)
+            .map(|seed| {
+                bench.frames(model, &bench.touched_ohm(SceneName::Single, seed), Some(&format!("swap:{a},{b}")))
+            })
+            .collect();
+        let mut guard = Guard::new(Method::Contacts, &presses[0].0).unwrap();
+        let mut last = None;
+        for frame in presses.iter().flat_map(|(_, frames)| frames) {
+            let solution = guard.solve(frame).unwrap();
+            assert!(solution.certainty.is_none() || !solution.flags.is_doubtful(), "{solution:?}");
+            last = Some(solution);
+        }
+        let flags = last.unwrap().flags;
+        assert_eq!(
+            (flags.excluded, flags.faults),
+            (vec![a, b], vec![ElectrodeFault::Exchanged; 2]),
+            "{model:?} {a},{b}"
+        );
+    }
+}
+
+#[test]
+fn a_wide_press_is_a_contact_and_a_ring_a_ring() {
+    let bench = Bench::new(&Detector::default());
+    for seed in 1..=3 {
+        for (scene, is_ring) in [(SceneName::Wide, false), (SceneName::Ring, true)] {
+            let (problem, frames) = bench.frames(BoardModel::Esp32, &bench.touched_ohm(scene, seed), None);
+            let mut solver = Method::Auto.build(&problem).unwrap();
+            let shapes = frames.iter().map(|frame| solver.solve(frame).unwrap().shape);
+            let shapes: Vec<_> = shapes.collect();
+            for shape in &shapes {
+                if let Some(FoundShape::Ring(ring)) = shape {
+                    assert!(ring.radius_m > 1.5 * ring.width_m, "{scene}, seed {seed}: {ring:?}");
+                }
+            }
+            let rings = shapes.iter().filter(|shape| matches!(shape, Some(FoundShape::Ring(_)))).count();
+            let right = if is_ring { rings } else { FRAMES - rings };
+            assert!(10 * right >= 9 * FRAMES, "{scene}, seed {seed}: {shapes:?}");
+        }
+    }
+}
