@@ -101,6 +101,27 @@ impl Bench {
 }
 
 #[test]
+fn only_what_helped_on_presses_that_were_not_used_is_recommended() {
+    let folder = Folder::new("worth");
+    let mut bench = Bench::new("square-60", &[]);
+    for (count, is_helped) in [(10, false), (30, true)] {
+        let table = [bench.frames(32, 0), bench.frames(count, 1)].concat();
+        let line = |frame: &Vec<f64>| frame.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        let file = folder.with("rub.csv", table.iter().map(line).collect::<Vec<_>>().join("\n"));
+        let out = folder.path(&format!("cal-{count}.toml"));
+        let output = tactomo(&["calibrate", "rub", &file, "--out", &out, "--json"]);
+        let told = String::from_utf8(output.stderr).unwrap();
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["helped"], is_helped, "{told}");
+        assert_eq!(told.contains("use it with --detector"), is_helped, "{told}");
+        assert_eq!(report["held_out"].is_object(), is_helped, "{report}");
+        // All presses are of one firmness.
+        let missing = report["missing"].as_array().unwrap();
+        assert!(missing.iter().any(|missing| missing.as_str().unwrap().starts_with("press lighter")), "{told}");
+    }
+}
+
+#[test]
 fn where_nobody_or_a_whole_hand_presses_one_fingertip_is_asked_for() {
     let folder = Folder::new("fingers");
     let mut bench = Bench::new("square-60", &[]);

@@ -59,9 +59,29 @@ fn what_is_learned_is_kept_scored_and_used() {
     let truth = [0.8191, 0.6710, 0.5497].map(|step| (step * 158.0_f64).fract());
     assert!((of("x_m") - truth[0]).hypot(of("y_m") - truth[1]) < 0.05, "{}", lines[7]);
     assert!((of("depth_m") / (0.001 * (1.0 + truth[2])) - 1.0).abs() < 0.1, "{}", lines[7]);
+    assert!(lines[7]["contacts"][0].get("conductance_s").is_none(), "depths were taught: {}", lines[7]);
     let before = std::fs::read(&model).unwrap();
     assert!(refused(&["learn", &presses, "--out", &model]).contains("is not replaced"));
     assert_eq!(std::fs::read(&model).unwrap(), before);
+}
+
+#[test]
+fn presses_at_places_of_others_are_told_to_teach_nothing() {
+    let folder = Folder::new("learn-middle");
+    let right = csv(0..60, [0, 1, 2]);
+    // Of each row the place of the one seven further.
+    let rows: Vec<Vec<&str>> = right.lines().skip(1).map(|row| row.split(',').collect()).collect();
+    let row = |i: usize| [&rows[i][..1], &rows[(i + 7) % 60][1..3], &rows[i][3..]].concat().join(",");
+    let head = right.lines().next().unwrap().to_owned();
+    let wrong = [vec![head], (0..60).map(row).collect()].concat().join("\n");
+    for (name, table, is_warned) in [("right", right.clone(), false), ("wrong", wrong, true)] {
+        let presses = folder.with(&format!("{name}.csv"), table);
+        let output = tactomo(&["learn", &presses, "--out", &folder.path(name), "--json"]);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(told.contains("no better than guessing the middle"), is_warned, "{name}: {told}");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["no_better_than_middle"], is_warned, "{report}");
+    }
 }
 
 #[test]

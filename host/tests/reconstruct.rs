@@ -102,6 +102,42 @@ fn frames_at_rest_are_subtracted() {
     assert_found(&found[0]);
 }
 
+/// Readings that `forward` has (V), row by row.
+fn forward(args: &[&str]) -> Vec<f64> {
+    let output = tactomo(&[&["forward", "--json"], args].concat());
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let rows = report["readings_v"].as_array().unwrap();
+    rows.iter().flat_map(|row| row.as_array().unwrap()).map(|volts| volts.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn leakage_in_a_table_is_taken_off_under_load_as_live_takes_it_off() {
+    let (rest, pressed) =
+        (forward(&["--fault", "leak:0.01"]), forward(&["--fault", "leak:0.01", "--contact", "9,-6,3,1e-3"]));
+    let file = Temporary::with("leak.csv", csv(&[vec![rest; 40], vec![pressed]].concat()));
+    let solver = ["--solver", "contacts", "--detector", "square-60"];
+    for rest in [&["--rest", "40"][..], &[]] {
+        let found = lines(&[&[file.name()], &solver[..], rest].concat());
+        let contacts = &found.last().unwrap()["contacts"];
+        let ratio = contacts[0]["conductance_s"].as_f64().unwrap() / 1e-3;
+        // With the readings at rest alone taken off it is 1.6 times too large.
+        assert!((0.8..1.25).contains(&ratio) && contacts.as_array().unwrap().len() == 1, "{rest:?}: {contacts}");
+    }
+}
+
+#[test]
+fn a_driving_sheet_that_nobody_described_is_in_the_standard_error_of_conductances() {
+    for (contact, conductance_s) in [("9,-6,3,3e-4", 3e-4), ("-14,11,3,1.5e-3", 1.5e-3), ("0,0,3,5e-3", 5e-3)] {
+        let readings = forward(&["--fault", "driving-sheet:100", "--contact", contact]);
+        let file = Temporary::with("sheet.csv", csv(&[readings]));
+        let found = lines(&[file.name(), "--solver", "contacts", "--detector", "square-60"]);
+        let contacts = &found[0]["contacts"];
+        let of = |name: &str| contacts[0][name].as_f64().unwrap();
+        let off = (of("conductance_s") / conductance_s).ln() / (of("sigma_conductance_s") / of("conductance_s"));
+        assert!(off.abs() < 2.0 && contacts.as_array().unwrap().len() == 1, "{contact}: {off} {contacts}");
+    }
+}
+
 #[test]
 fn gains_that_the_detectors_file_tells_are_taken_off_the_readings() {
     let mut detector = Detector::default();

@@ -111,13 +111,12 @@ impl Recording {
     fn less_baseline(&self, py: Python<'_>, rest: Option<u32>) -> PyResult<Frames> {
         py.detach(|| {
             let mut frames = self.frames()?;
-            let channels = frames.file.channels();
-            let baseline = match (rest, frames.file.board()) {
-                (None, Some(board)) => {
-                    let problem = Problem::of(&self.detector).map_err(raised)?;
-                    Baseline::new(Arc::clone(&problem.jacobian), board.settings.conversions())
-                }
-                _ => Baseline::over(rest.unwrap_or(0), channels),
+            let problem = Problem::of(&self.detector).map_err(raised)?;
+            let jacobian = Arc::clone(&problem.jacobian);
+            let conversions = frames.file.board().map_or(1, |board| board.settings.conversions());
+            let baseline = match rest {
+                None => Baseline::new(jacobian, conversions),
+                Some(rest) => Baseline::told(jacobian, conversions, rest),
             };
             frames.baseline = Some((baseline, rest.unwrap_or(0)));
             Ok(frames)

@@ -20,7 +20,8 @@ use super::output::{self, NewFile, message};
 /// and those in another unit (`..._mm`, `..._deg`). Or NPZ, with arrays of these names, a number a
 /// press, and `readings_v`, a row a press. Some hundreds of presses are good.
 ///
-/// What is learned is told with its error on presses that are left out one after the other.
+/// What is learned is told with its error on presses that are left out one after the other, and
+/// with that of guessing the middle of all presses each time; where it is no better, it says so.
 ///
 /// Examples:
 ///   tactomo learn presses.csv --out skin.safetensors
@@ -37,7 +38,7 @@ pub struct Args {
     /// The detector, if the channels are its readings, row by row: then the force is taken out of them before places are learned
     #[arg(long, value_name = "NAME|FILE")]
     detector: Option<Chosen>,
-    /// Prints `{presses, channels, components, left_out_m, strength, left_out_strength_share, seconds, out}` as JSON
+    /// Prints `{presses, channels, components, left_out_m, middle_m, no_better_than_middle, strength, left_out_strength_share, seconds, out}` as JSON
     #[arg(long)]
     json: bool,
 }
@@ -48,6 +49,8 @@ struct Report {
     channels: usize,
     components: usize,
     left_out_m: f64,
+    middle_m: Option<f64>,
+    no_better_than_middle: bool,
     strength: Option<&'static str>,
     left_out_strength_share: Option<f64>,
     seconds: f64,
@@ -72,6 +75,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             channels: kernel.channels(),
             components: kernel.components(),
             left_out_m: kernel.left_out_m(),
+            middle_m: kernel.middle_m(),
+            no_better_than_middle: kernel.is_no_better_than_middle(),
             strength: kernel.strength().map(Strength::name),
             left_out_strength_share: kernel.left_out_strength(),
             seconds,
@@ -100,8 +105,19 @@ pub fn sentence(kernel: &Kernel) -> String {
         .strength()
         .zip(kernel.left_out_strength())
         .map_or_else(String::new, |(strength, share)| format!(", {} within {:.0} %", strength.name(), share * 100.0));
+    let middle = kernel.middle_m().map_or_else(String::new, |middle_m| {
+        format!(", where guessing the middle of all presses misses by {:.2} mm", middle_m * 1e3)
+    });
+    let warning = match kernel.is_no_better_than_middle() {
+        true => {
+            "\nwarning: that is no better than guessing the middle: nothing was learned of places. See that each place belongs to its row, that \
+             readings are less those at rest, and that the channels are the sensor's"
+        }
+        false => "",
+    };
     format!(
-        "learned from {} presses on {} channels, in {} dimensions; a press that is left out is found within {:.2} mm{strength} (root mean square)",
+        "learned from {} presses on {} channels, in {} dimensions; a press that is left out is found within {:.2} mm{strength} (root mean \
+         square){middle}{warning}",
         kernel.presses(),
         kernel.channels(),
         kernel.components(),

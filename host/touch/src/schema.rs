@@ -50,7 +50,7 @@ pub const CONTACT_COLUMNS: [ContactColumn; 15] = [
     ContactColumn { name: "x_m", kind: Kind::Number, of: |contact| Some(contact.x_m) },
     ContactColumn { name: "y_m", kind: Kind::Number, of: |contact| Some(contact.y_m) },
     ContactColumn { name: "z_m", kind: Kind::Number, of: |contact| Some(contact.z_m) },
-    ContactColumn { name: "conductance_s", kind: Kind::Number, of: |contact| Some(contact.conductance_s) },
+    ContactColumn { name: "conductance_s", kind: Kind::Number, of: FoundContact::known_conductance_s },
     ContactColumn { name: "apparent_conductance_s", kind: Kind::Number, of: |contact| contact.apparent_conductance_s },
     ContactColumn { name: "radius_m", kind: Kind::Number, of: |contact| contact.radius_m },
     ContactColumn { name: "force_n", kind: Kind::Number, of: |contact| contact.force_n },
@@ -92,7 +92,7 @@ pub fn contact_values(contact: &FoundContact) -> [f32; CONTACT_COLUMNS.len() - 1
     std::array::from_fn(|index| CONTACT_COLUMNS[index + 1].value(contact).map_or(f32::NAN, |value| value as f32))
 }
 
-/// `{id?, x_m, y_m, z_m?, conductance_s, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ..., depth_m?}`; z is left out on a flat detector.
+/// `{id?, x_m, y_m, z_m?, conductance_s?, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ..., depth_m?}`; z is left out on a flat detector.
 impl Serialize for FoundContact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;

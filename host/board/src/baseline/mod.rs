@@ -3,7 +3,8 @@
 //! Without contact an ideal detector reads 0 V everywhere; a real one has offsets of its converter and perhaps leakage, and both drift. A
 //! baseline is taken at the start, follows what drifts while nothing touches, and never learns a touch: what looks like a contact is told
 //! from offsets and leakage by its pattern ([`RestPatterns`](tactomo_physics::rest::RestPatterns)), in each frame and in the mean of many.
-//! Under load it stays as it was. What it cannot decide, a person is asked ([`BaselineState::notice`]).
+//! Under load it stays as it was. What it cannot decide, a person is asked ([`BaselineState::notice`]). Live, of recordings and of tables it
+//! is the same; where a person has said which frames are the baseline ([`Baseline::told`]), it is neither judged nor followed.
 
 mod follow;
 mod judge;
@@ -40,17 +41,19 @@ pub struct Baseline {
     held: bool,
     /// Rows that have come since all were read.
     rounds: RestRounds,
-    /// What knows and follows the detector; nothing where a person has said which frames are the baseline.
+    /// What knows and follows the detector; nothing where there is none.
     known: Option<Known>,
 }
 
-/// A detector whose baseline is followed.
+/// A detector whose baseline is taken.
 #[derive(Clone, Debug)]
 struct Known {
     judge: Judge,
     /// Conversions that a reading is the mean of.
     conversions: u32,
     following: Following,
+    /// Whether a person has said which frames the baseline is.
+    is_told: bool,
 }
 
 /// A baseline that is being taken.
@@ -73,12 +76,22 @@ impl Baseline {
     /// That of a detector as measured, whose readings are means of so many conversions each. It is zero until the first frames that nothing
     /// presses in.
     pub fn new(jacobian: Arc<Jacobian>, conversions: u32) -> Self {
-        let readings = jacobian.electrodes().pow(2);
-        let known = Known { judge: Judge::new(jacobian), conversions, following: Following::default() };
-        Self { known: Some(known), ..Self::over(FRAMES, readings) }
+        Self::of(jacobian, conversions, FRAMES, false)
     }
 
-    /// The mean of so many frames of `count` readings, whatever they are; of none it stays zero.
+    /// The mean of the first `frames` frames of a detector as measured, whatever they are, because a person says so; of none it stays zero.
+    /// What the converter cuts off, and what leakage does under load, is known of it as of any other.
+    pub fn told(jacobian: Arc<Jacobian>, conversions: u32, frames: u32) -> Self {
+        Self::of(jacobian, conversions, frames, true)
+    }
+
+    fn of(jacobian: Arc<Jacobian>, conversions: u32, frames: u32, is_told: bool) -> Self {
+        let readings = jacobian.electrodes().pow(2);
+        let known = Known { judge: Judge::new(jacobian), conversions, following: Following::default(), is_told };
+        Self { known: Some(known), ..Self::over(frames, readings) }
+    }
+
+    /// The mean of so many frames of `count` readings of whatever that is; of none it stays zero.
     pub fn over(frames: u32, count: usize) -> Self {
         let held = frames == 0;
         Self {
@@ -149,8 +162,8 @@ impl Baseline {
     fn take(&mut self, mut taking: Taking, readings_v: &[f64], frames: u32, time_s: f64) {
         let asked = taking.asked;
         let judged = |readings_v: &[f64], frames: u32| match &self.known {
-            Some(known) => known.judge.absolute(readings_v, frames, asked),
-            None => Absolute::Rest,
+            Some(known) if !known.is_told => known.judge.absolute(readings_v, frames, asked),
+            _ => Absolute::Rest,
         };
         // A press that begins in the last of the frames hardly shows in their mean.
         if let Absolute::Pressed(largest_v) = judged(readings_v, frames) {
@@ -171,9 +184,12 @@ impl Baseline {
     fn hold(&mut self, sum: &RestSum, time_s: f64, state: BaselineState) {
         (self.state, self.held) = (state, true);
         match &mut self.known {
-            Some(Known { judge, conversions, following }) => {
+            Some(Known { judge, conversions, following, is_told }) => {
                 self.rest = sum.rest(&judge.detector().adc, judge.detector().ground_v, *conversions);
-                self.leakage_sheets = judge.leakage_sheets(self.rest.offset_v());
+                // Of frames that a person has called rest although something presses in them, nothing but the mean is known.
+                let presses = || matches!(judge.absolute(&sum.mean_v(), sum.frames(), true), Absolute::Pressed(_));
+                let is_rest = !*is_told || !presses();
+                self.leakage_sheets = if is_rest { judge.leakage_sheets(self.rest.offset_v()) } else { 0.0 };
                 *following = Following::from(self.rest.mean_v().to_vec(), sum.frames(), time_s);
             }
             None => self.rest.set(sum.mean_v(), f64::from(sum.frames())),
@@ -195,7 +211,7 @@ impl Baseline {
 
     /// Follows what drifts while nothing touches.
     fn follow(&mut self, readings_v: &[f64], frames: u32, time_s: f64) {
-        let Some(Known { judge, conversions, following }) = &mut self.known else { return };
+        let Some(Known { judge, conversions, following, is_told: false }) = &mut self.known else { return };
         let seen = following.see(judge, self.rest.mean_v(), readings_v, frames, time_s);
         match seen {
             follow::Seen::Nothing => {}

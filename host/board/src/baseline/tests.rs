@@ -320,6 +320,51 @@ fn more_noise_than_the_description_says_is_no_press() {
 }
 
 #[test]
+fn leakage_is_taken_off_under_load_where_a_person_says_what_is_the_baseline() {
+    let press = [Contact::flat(HERE[0], HERE[1], 0.003, detector().sheet_conductance_s())];
+    let (rest_v, both_v) = (leaking_v(&detector(), 0.02, &[]), leaking_v(&detector(), 0.02, &press));
+    let touch_v = leaking_v(&detector(), 0.0, &press);
+    let mut noise = Noise::new(3);
+    let adc = detector().adc;
+    let mut read_v = |volts: &[f64]| measured(&Readings::from_fn(16, |g, e| volts[16 * g + e]), &adc, &mut noise);
+    let (mut told, mut live) = (Baseline::told(Arc::clone(&JACOBIAN), 1, 40), Baseline::new(Arc::clone(&JACOBIAN), 1));
+    for frame in 0..40 {
+        let readings = read_v(&rest_v);
+        told.add(readings.volts(), 1, 1e-3 * f64::from(frame), &[]);
+        live.add(readings.volts(), 1, 1e-3 * f64::from(frame), &[]);
+    }
+    let mut left_v = [&told, &live].map(|baseline| {
+        let mut left_v = vec![0.0; 256];
+        baseline.subtract(&both_v, &mut left_v);
+        left_v.iter_mut().zip(&touch_v).for_each(|(left, touch)| *left -= touch);
+        left_v.iter().map(|volts| volts.abs()).fold(0.0, f64::max)
+    });
+    let least_v = both_v.iter().zip(&rest_v).zip(&touch_v).map(|((both, rest), touch)| (both - rest - touch).abs());
+    let by_rest_alone_v = least_v.fold(0.0, f64::max);
+    assert!(left_v[0] < 0.2 * by_rest_alone_v && left_v[1] < 0.2 * by_rest_alone_v, "{left_v:?} {by_rest_alone_v}");
+    left_v.sort_by(f64::total_cmp);
+    assert!(left_v[1] - left_v[0] < 1e-3, "{left_v:?}");
+    // Frames that something presses in are the baseline too, if a person says so; of leakage they tell nothing.
+    let mut pressed = Baseline::told(Arc::clone(&JACOBIAN), 1, 2);
+    (0..2).for_each(|_| _ = pressed.add(&both_v, 1, 0.0, &[]));
+    assert_eq!((pressed.leakage_sheets(), pressed.state()), (0.0, BaselineState::Held));
+}
+
+#[test]
+fn what_was_never_cut_off_has_no_hidden_offset() {
+    // Readings that something was taken off already: noise about zero, on both sides.
+    let mut noise = Noise::new(5);
+    let mut told = Baseline::told(Arc::clone(&JACOBIAN), 1, 64);
+    for _ in 0..64 {
+        let readings_v: Vec<f64> = (0..256).map(|_| 1.5e-3 * noise.normal()).collect();
+        told.add(&readings_v, 1, 0.0, &[]);
+    }
+    let mut touch_v = vec![0.0; 256];
+    told.subtract(&[0.5; 256], &mut touch_v);
+    assert!(touch_v.iter().all(|volts| (volts - 0.5).abs() < 1e-3), "{:?}", &touch_v[..4]);
+}
+
+#[test]
 fn frames_that_a_person_says_are_the_baseline_are() {
     let mut baseline = Baseline::over(2, 4);
     let mut touch_v = [0.0; 4];

@@ -203,6 +203,7 @@ impl Tolerances {
             let allowed = match *name {
                 "electrodes_m" => 0.0..=0.1,
                 "offset_lsb" => 0.0..=1e4,
+                "driving_sheet_ohm" => 0.0..=1e6,
                 name if name.ends_with("_factor") => 1.0..=1e3,
                 _ => 0.0..=1.0,
             };

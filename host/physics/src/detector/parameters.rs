@@ -32,6 +32,9 @@ pub enum Parameter {
     Offset(usize),
     /// On-resistance of the multiplexer (logarithm).
     OnResistance,
+    /// Sheet resistance of the driving layer (ohm per square). Detectors are described, and modelled, under one of none: it is in what their
+    /// readings may be off by alone.
+    DrivingSheet,
 }
 
 /// Most half waves of unevenness along a side.
@@ -45,7 +48,7 @@ impl Parameter {
         let uneven = Self::uneven_modes(detector, 2.0 / shortest_wave).map(Self::Uneven);
         let of_electrode = |e| [Self::ElectrodeX(e), Self::ElectrodeY(e), Self::Pad(e), Self::Gain(e), Self::Offset(e)];
         let each = electrodes().flat_map(of_electrode);
-        one.into_iter().chain(uneven).chain(each).collect()
+        one.into_iter().chain(uneven).chain(each).chain([Self::DrivingSheet]).collect()
     }
 
     /// Modes of unevenness of up to so many half waves on the shorter side.
@@ -82,7 +85,7 @@ impl Parameter {
 
     /// Whether its steps are logarithms.
     pub fn is_log(self) -> bool {
-        !matches!(self, Self::ElectrodeX(_) | Self::ElectrodeY(_) | Self::Offset(_))
+        !matches!(self, Self::ElectrodeX(_) | Self::ElectrodeY(_) | Self::Offset(_) | Self::DrivingSheet)
     }
 
     /// Whether it belongs to the board that measures, and not to the detector.
@@ -93,7 +96,7 @@ impl Parameter {
 
 impl Detector {
     /// This detector with some of its parameters changed by steps in their units. An electrode stays within the outline's bounding box, or on
-    /// the surface.
+    /// the surface; the driving layer, which is no part of a detector, changes nothing.
     pub fn stepped(&self, steps: &[(Parameter, f64)]) -> Self {
         let mut detector = self.clone();
         steps.iter().for_each(|(parameter, step)| detector.step(*parameter, *step));
@@ -119,6 +122,7 @@ impl Detector {
             Parameter::Gain(e) => self.electrodes[e].gain *= step.exp(),
             Parameter::Offset(e) => self.electrodes[e].unseen_offset_v += step,
             Parameter::OnResistance => self.on_resistance_ohm *= step.exp(),
+            Parameter::DrivingSheet => {}
         }
     }
 
@@ -174,8 +178,8 @@ impl Layer {
 }
 
 /// Form of all parameters, for messages.
-const FORMS: &str =
-    "thickness, conductivity, top-over-bottom, uneven:1,0, x:3, y:3, pads, pad:3, gain:3, offset:3 or on-resistance";
+const FORMS: &str = "thickness, conductivity, top-over-bottom, uneven:1,0, x:3, y:3, pads, pad:3, gain:3, offset:3, \
+     on-resistance or driving-sheet";
 
 impl fmt::Display for Parameter {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -191,6 +195,7 @@ impl fmt::Display for Parameter {
             Self::Gain(e) => write!(formatter, "gain:{e}"),
             Self::Offset(e) => write!(formatter, "offset:{e}"),
             Self::OnResistance => formatter.write_str("on-resistance"),
+            Self::DrivingSheet => formatter.write_str("driving-sheet"),
         }
     }
 }
@@ -208,6 +213,7 @@ impl FromStr for Parameter {
                 "top-over-bottom" => Ok(Self::TopOverBottom),
                 "pads" => Ok(Self::Pads),
                 "on-resistance" => Ok(Self::OnResistance),
+                "driving-sheet" => Ok(Self::DrivingSheet),
                 _ => Err(wrong()),
             },
             Some(("uneven", modes)) => {
@@ -367,6 +373,7 @@ mod tests {
             Just(Parameter::TopOverBottom),
             Just(Parameter::Pads),
             Just(Parameter::OnResistance),
+            Just(Parameter::DrivingSheet),
             [any::<usize>(), any::<usize>()].prop_map(Parameter::Uneven),
             any::<usize>().prop_map(Parameter::ElectrodeX),
             any::<usize>().prop_map(Parameter::ElectrodeY),

@@ -32,6 +32,8 @@ pub struct Tolerances {
     pub offset_lsb: f64,
     /// Of the multiplexer's on-resistance, as a share of it.
     pub on_resistance_share: f64,
+    /// Of the driving layer's sheet resistance from none (ohm per square), in the root of the mean square.
+    pub driving_sheet_ohm: f64,
 }
 
 /// Length over which the conductivity changes, as a share of the shorter side.
@@ -50,6 +52,7 @@ impl Tolerances {
         gain_share: 0.0,
         offset_lsb: 0.0,
         on_resistance_share: 0.0,
+        driving_sheet_ohm: 0.0,
     };
 
     /// Whether there are none.
@@ -71,11 +74,12 @@ impl Tolerances {
             gain_share: factor * self.gain_share,
             offset_lsb: factor * self.offset_lsb,
             on_resistance_share: factor * self.on_resistance_share,
+            driving_sheet_ohm: factor * self.driving_sheet_ohm,
         }
     }
 
     /// All of them by the names that they have in a file.
-    pub fn named(&self) -> [(&'static str, f64); 10] {
+    pub fn named(&self) -> [(&'static str, f64); 11] {
         [
             ("thickness_share", self.thickness_share),
             ("conductivity_share", self.conductivity_share),
@@ -87,6 +91,7 @@ impl Tolerances {
             ("gain_share", self.gain_share),
             ("offset_lsb", self.offset_lsb),
             ("on_resistance_share", self.on_resistance_share),
+            ("driving_sheet_ohm", self.driving_sheet_ohm),
         ]
     }
 
@@ -104,6 +109,7 @@ impl Tolerances {
             // A baseline takes away those above zero: half of them.
             Parameter::Offset(_) => 0.5f64.sqrt() * self.offset_lsb * detector.adc.lsb_v(),
             Parameter::OnResistance => self.on_resistance_share,
+            Parameter::DrivingSheet => self.driving_sheet_ohm,
         }
     }
 }
@@ -121,6 +127,7 @@ impl Default for Tolerances {
             gain_share: 0.003,
             offset_lsb: 2.0,
             on_resistance_share: 0.25,
+            driving_sheet_ohm: 100.0,
         }
     }
 }

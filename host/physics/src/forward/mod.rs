@@ -23,7 +23,7 @@ use nalgebra::DMatrix;
 
 pub use self::auto::Auto;
 pub use self::contact::ContactFields;
-pub use self::driving::{ConnectingPoints, DrivingLayer};
+pub use self::driving::{ConnectingPoints, DrivingLayer, sheet_drops_ohm};
 pub use self::jacobian_file::JacobianFileError;
 pub use self::joined::{Exchanges, Joint};
 pub use self::nuisance::{Nuisance, Similar};

@@ -9,11 +9,24 @@
 //! `P` depends on what touches. Each parameter has a model of the detector with that parameter changed by one standard deviation, made
 //! once, and a column is the difference of two answers. Pads, channels and the multiplexer need no model: with `L = Z[g][g] + R`,
 //! a resistance `d` in series with ground `g` adds `(Vcc - V[g][e]) d / L`, a factor of a channel `V[g][e]` itself.
+//!
+//! Nor does the conductivity `s`. Readings stay as they are if it, the contacts `C`, and one over pads' and switch's resistances `z` and `R` are
+//! multiplied alike, so that
+//!
+//! ```text
+//! dV/d ln s = dV/d ln z + dV/d ln R - sum over contacts of dV/d ln C,
+//! ```
+//!
+//! and to a contact's conductance it is no error that is nearly, but one that is exactly, what that conductance does. So it is taken without its
+//! square too: conductances that are all larger by a factor explain any change. (Dots of glue are left out of it: their own resistance hardly
+//! matters.) The same holds of the driving layer under a single contact. With `J[k]` the current through contact `k` for an ampere into
+//! each electrode, `J J' = -C dZ/d ln C`, a sheet resistance adds `sum J[k] D[k][l] J[l]'` to `Z`.
 
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::driving::sheet_drops_ohm;
 use super::{ForwardError, ForwardModel, Joint, Through, readings_v};
 use crate::detector::{Detector, Electrode, Parameter};
 use crate::readings::Readings;
@@ -22,6 +35,8 @@ use crate::threads;
 
 /// Standard deviation of a logarithm from which its square is reckoned with as well: below, it makes less than a thirtieth of the change.
 const CURVED: f64 = 0.05;
+/// Step of the logarithm of a conductance for a derivative.
+const STEP_LOG: f64 = 1e-3;
 
 /// Models of a detector in which one thing each is different.
 pub struct Nuisance {
@@ -56,6 +71,8 @@ pub struct Similar {
     model: Arc<dyn ForwardModel>,
     /// Steps of those that belong to the board.
     board: Vec<(Parameter, f64)>,
+    /// Sheet resistance of the driving layer (ohm per square), to first order.
+    driving_sheet_ohm: f64,
 }
 
 impl Similar {
@@ -65,7 +82,13 @@ impl Similar {
     /// [`ForwardError`] if a contact is not on the detector or none conducts.
     pub fn readings_v(&self, contacts: &[Contact], measured: &Detector) -> Result<Readings, ForwardError> {
         let board = measured.stepped(&self.board);
-        let mut readings = readings_v(&self.model.impedance_ohm(contacts)?, &board);
+        let impedance_ohm = if self.driving_sheet_ohm == 0.0 {
+            self.model.impedance_ohm(contacts)?
+        } else {
+            let pressed = Pressed::new(&*self.model, contacts)?;
+            &pressed.impedance_ohm + pressed.under_sheet_ohm() * self.driving_sheet_ohm
+        };
+        let mut readings = readings_v(&impedance_ohm, &board);
         let n = readings.electrodes();
         // Described gains and offsets are taken out of readings before they get here.
         let of = |(b, m): (&Electrode, &Electrode)| [b.gain / m.gain, b.unseen_offset_v - m.unseen_offset_v];
@@ -93,7 +116,10 @@ impl Nuisance {
         let steps = self.parameters.iter().zip(&deviations).map(|(of, step)| (of.parameter, step * of.deviation));
         let steps: Vec<_> = steps.collect();
         let model = self.model.of_similar(&self.model.detector().stepped(&steps))?;
-        Ok(Similar { model, board: steps.into_iter().filter(|(parameter, _)| parameter.is_of_board()).collect() })
+        let of_sheet = steps.iter().filter(|(parameter, _)| *parameter == Parameter::DrivingSheet);
+        let driving_sheet_ohm = of_sheet.map(|(_, step)| step).sum();
+        let board = steps.iter().filter(|(parameter, _)| parameter.is_of_board()).copied().collect();
+        Ok(Similar { model, board, driving_sheet_ohm })
     }
 
     /// Of all that is not known of the detector that a model is of, as it is described; `None` if that is nothing. It takes a model for most
@@ -168,8 +194,8 @@ impl Nuisance {
     /// # Errors
     /// [`ForwardError`] if a contact is not on the detector or none conducts.
     pub fn patterns_v(&self, contacts: &[Contact], measured: &Detector) -> Result<DMatrix<f64>, ForwardError> {
-        let impedance_ohm = self.model.impedance_ohm(contacts)?;
-        let at = At { contacts, measured, readings: readings_v(&impedance_ohm, measured), impedance_ohm };
+        let pressed = Pressed::new(&*self.model, contacts)?;
+        let at = At { contacts, measured, readings: readings_v(&pressed.impedance_ohm, measured), pressed };
         let changes = self.parameters.iter().map(|changed| self.change_v(changed, &at));
         let changes = changes.collect::<Result<Vec<_>, _>>()?;
         let size = at.readings.volts().len();
@@ -192,10 +218,15 @@ impl Nuisance {
                 odd(at.each(|_, read, volts| if read == e { changed.deviation * volts } else { 0.0 }))
             }
             Parameter::Offset(e) => odd(at.each(|_, read, _| if read == e { changed.deviation } else { 0.0 })),
-            Parameter::OnResistance => {
-                let share = changed.deviation * at.measured.on_resistance_ohm;
-                odd(at.each(|g, _, volts| (at.measured.drive_v - volts) * share / at.load_ohm(g)))
+            Parameter::OnResistance => odd(at.of_switch(changed.deviation)),
+            Parameter::Conductivity => {
+                let mut all = at.of_impedance(&-at.pressed.by_all_conductances_ohm());
+                let resistances = at.of_switch(1.0).into_iter().zip(at.under_pads(|g| self.pads_ohm[g]));
+                all.iter_mut().zip(resistances).for_each(|(all, (switch, pads))| *all += switch + pads);
+                all.iter_mut().for_each(|volts| *volts *= changed.deviation);
+                odd(all)
             }
+            Parameter::DrivingSheet => odd(at.of_impedance(&(at.pressed.under_sheet_ohm() * changed.deviation))),
             Parameter::Pads => {
                 let ohm = |sign: f64| (sign * changed.deviation).exp_m1();
                 let half = |sign: f64| 0.5 * (ohm(1.0) + sign * ohm(-1.0));
@@ -232,10 +263,61 @@ struct At<'a> {
     contacts: &'a [Contact],
     measured: &'a Detector,
     readings: Readings,
+    pressed: Pressed,
+}
+
+/// Contacts on a detector.
+struct Pressed {
+    contacts: Vec<Contact>,
     impedance_ohm: DMatrix<f64>,
+    /// Its change by the logarithm of each contact's conductance (ohm).
+    by_conductance_ohm: Vec<DMatrix<f64>>,
+    /// `D` of the contacts under a sheet of one ohm per square (ohm).
+    drops_ohm: DMatrix<f64>,
+}
+
+impl Pressed {
+    fn new(model: &dyn ForwardModel, contacts: &[Contact]) -> Result<Self, ForwardError> {
+        let more = |contact: &Contact| Contact { conductance_s: contact.conductance_s * STEP_LOG.exp(), ..*contact };
+        let firmer: Vec<_> = contacts.iter().map(more).enumerate().collect();
+        let (impedance_ohm, mut by_conductance_ohm) = model.impedance_with_changes_ohm(contacts, &firmer)?;
+        by_conductance_ohm.iter_mut().for_each(|change| *change /= STEP_LOG);
+        let drops_ohm = sheet_drops_ohm(model.detector(), contacts);
+        Ok(Self { contacts: contacts.to_vec(), impedance_ohm, by_conductance_ohm, drops_ohm })
+    }
+
+    /// Change of the impedances by the logarithm of all contacts' conductances together (ohm).
+    fn by_all_conductances_ohm(&self) -> DMatrix<f64> {
+        let n = self.impedance_ohm.nrows();
+        self.by_conductance_ohm.iter().fold(DMatrix::zeros(n, n), |sum, change| sum + change)
+    }
+
+    /// What a sheet of one ohm per square adds to the impedances (ohm).
+    fn under_sheet_ohm(&self) -> DMatrix<f64> {
+        let current = |(contact, change): (&Contact, &DMatrix<f64>)| {
+            change.diagonal().map(|ohm| (-contact.conductance_s * ohm).max(0.0).sqrt())
+        };
+        let currents: Vec<_> = self.contacts.iter().zip(&self.by_conductance_ohm).map(current).collect();
+        let currents = DMatrix::from_columns(&currents);
+        &currents * &self.drops_ohm * currents.transpose()
+    }
 }
 
 impl At<'_> {
+    /// What a change of the impedances (ohm) changes (V).
+    fn of_impedance(&self, change_ohm: &DMatrix<f64>) -> Vec<f64> {
+        let drive_v = self.measured.drive_v;
+        self.each(|g, e, volts| {
+            ((drive_v - volts) * change_ohm[(g, g)] - drive_v * change_ohm[(e, g)]) / self.load_ohm(g)
+        })
+    }
+
+    /// What a change of the logarithm of the switch's resistance changes (V).
+    fn of_switch(&self, log: f64) -> Vec<f64> {
+        let ohm = log * self.measured.on_resistance_ohm;
+        self.each(|g, _, volts| (self.measured.drive_v - volts) * ohm / self.load_ohm(g))
+    }
+
     fn each(&self, value: impl Fn(usize, usize, f64) -> f64) -> Vec<f64> {
         let electrodes = self.readings.electrodes();
         let of = |(index, volts): (usize, &f64)| value(index / electrodes, index % electrodes, *volts);
@@ -244,7 +326,7 @@ impl At<'_> {
 
     /// `Z[g][g] + R` (ohm).
     fn load_ohm(&self, g: usize) -> f64 {
-        self.impedance_ohm[(g, g)] + self.measured.on_resistance_ohm
+        self.pressed.impedance_ohm[(g, g)] + self.measured.on_resistance_ohm
     }
 
     /// What a resistance under each pad (ohm) changes while it is grounded.
@@ -264,8 +346,10 @@ impl Changed {
             | Parameter::Offset(_)
             | Parameter::OnResistance
             | Parameter::Pads
-            | Parameter::Pad(_) => (Vec::new(), 1.0),
-            Parameter::Thickness | Parameter::Conductivity | Parameter::TopOverBottom if deviation > CURVED => {
+            | Parameter::Pad(_)
+            | Parameter::Conductivity
+            | Parameter::DrivingSheet => (Vec::new(), 1.0),
+            Parameter::Thickness | Parameter::TopOverBottom if deviation > CURVED => {
                 (vec![with(deviation)?, with(-deviation)?], 1.0)
             }
             Parameter::ElectrodeX(_) | Parameter::ElectrodeY(_) => match with(deviation) {
@@ -294,4 +378,63 @@ fn pads_ohm(model: &dyn ForwardModel) -> Result<Vec<f64>, ForwardError> {
         off.sum::<f64>() / (n * (n - 1)) as f64
     };
     Ok((0..n).map(|g| ((after[(g, g)] - before[(g, g)] - constant) / STEP.exp_m1()).max(0.0)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detector::Tolerances;
+    use crate::forward::{DrivingLayer, Resolution, Slab};
+
+    const SHEET_S: f64 = 0.2273 * 0.005;
+
+    /// The one pattern of a detector with such tolerances under contacts (V).
+    fn pattern_v(tolerances: Tolerances, contacts: &[Contact]) -> Vec<f64> {
+        let detector = Detector { tolerances, ..Detector::default() };
+        let model: Arc<dyn ForwardModel> = Arc::new(Slab::new(&detector).unwrap().on_image(100));
+        let patterns_v = Nuisance::new(&model, &detector, 1).unwrap().unwrap().patterns_v(contacts, &detector).unwrap();
+        assert_eq!(patterns_v.ncols(), 1, "no square of what contacts can be");
+        patterns_v.as_slice().to_vec()
+    }
+
+    fn read_v(detector: &Detector, sheet_ohm: f64, contacts: &[Contact]) -> Vec<f64> {
+        let layer = DrivingLayer { sheet_ohm, ..DrivingLayer::default() };
+        let slab = Slab::under(detector, Resolution::STANDARD, layer).unwrap().on_image(100);
+        readings_v(&slab.impedance_ohm(contacts).unwrap(), detector).volts().to_vec()
+    }
+
+    /// Largest difference over the largest change.
+    fn off(found_v: &[f64], a_v: &[f64], b_v: &[f64]) -> f64 {
+        let largest = |all: &mut dyn Iterator<Item = f64>| all.map(f64::abs).fold(0.0, f64::max);
+        let change = || a_v.iter().zip(b_v).map(|(a, b)| a - b);
+        largest(&mut found_v.iter().zip(change()).map(|(found, change)| found - change)) / largest(&mut change())
+    }
+
+    fn some() -> [Vec<Contact>; 2] {
+        let at = |x_m, y_m, sheets: f64| Contact::flat(x_m, y_m, 0.003, sheets * SHEET_S);
+        [vec![at(0.011, -0.006, 0.8)], vec![at(-0.018, 0.012, 2.0), at(0.016, 0.009, 0.3)]]
+    }
+
+    #[test]
+    fn conductivity_is_what_contacts_pads_and_switch_do() {
+        for contacts in some() {
+            let tolerances = Tolerances { conductivity_share: 0.01, ..Tolerances::EXACT };
+            let found_v = pattern_v(tolerances, &contacts);
+            let detector = Detector::default();
+            let more = detector.stepped(&[(Parameter::Conductivity, 0.01)]);
+            let off = off(&found_v, &read_v(&more, 0.0, &contacts), &read_v(&detector, 0.0, &contacts));
+            assert!(off < 0.02, "{off}");
+        }
+    }
+
+    #[test]
+    fn a_driving_sheet_is_what_it_does_to_contacts() {
+        for contacts in some() {
+            let tolerances = Tolerances { driving_sheet_ohm: 2.0, ..Tolerances::EXACT };
+            let found_v = pattern_v(tolerances, &contacts);
+            let detector = Detector::default();
+            let off = off(&found_v, &read_v(&detector, 2.0, &contacts), &read_v(&detector, 0.0, &contacts));
+            assert!(off < 0.05, "{off}");
+        }
+    }
 }

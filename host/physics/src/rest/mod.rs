@@ -32,6 +32,8 @@ pub struct RestSum {
     frames: u32,
     /// How many means were added.
     means: u32,
+    /// The lowest reading in them (V).
+    lowest_v: f64,
 }
 
 /// What a detector reads at rest.
@@ -60,6 +62,7 @@ impl RestSum {
         }
         self.frames += frames;
         self.means += 1;
+        self.lowest_v = readings_v.iter().copied().fold(self.lowest_v, f64::min);
     }
 
     /// Frames in it.
@@ -78,8 +81,10 @@ impl RestSum {
         let (mean_v, lsb_v) = (self.mean_v(), adc.lsb_v());
         // Noise that is cut off shows in some of the readings. Where it shows in none they are below the converter's floor, and nothing is known of them.
         let is_hidden = ground_v == 0.0 && self.squares_v2.iter().all(|square_v2| *square_v2 == 0.0);
+        // Where there are readings below the converter's zero, no converter has cut them off: something was taken off them already.
+        let is_whole = self.lowest_v < -ground_v - lsb_v;
         let clipping = match self.noise_of(&mean_v) {
-            _ if is_hidden => Clipping::new(0.0),
+            _ if is_hidden || is_whole => Clipping::new(0.0),
             None => Clipping::new(adc.noise_lsb),
             Some((means_v, variance_v2)) => {
                 let means: Vec<f64> = means_v.iter().map(|volts| (volts + ground_v) / lsb_v).collect();

@@ -83,10 +83,11 @@ pub fn try_drawn(detector: &Detector, seed: u64) -> Result<Detector, CannotDraw>
     }
 }
 
-/// A step of every parameter but the offsets, which are the board's.
+/// A step of every parameter but the offsets, which are the board's, and the driving layer, which is a [`Fault`].
 fn steps(detector: &Detector, tolerances: &Tolerances, noise: &mut Noise) -> Vec<(Parameter, f64)> {
     let step = |parameter: Parameter| (parameter, tolerances.deviation(detector, parameter) * noise.normal());
-    let all = Parameter::all(detector, 0.0).into_iter().filter(|parameter| !matches!(parameter, Parameter::Offset(_)));
+    let is_drawn = |parameter: &Parameter| !matches!(parameter, Parameter::Offset(_) | Parameter::DrivingSheet);
+    let all = Parameter::all(detector, 0.0).into_iter().filter(is_drawn);
     // What is exact stays as it is described, to the digit.
     all.map(step).filter(|(_, step)| *step != 0.0).collect()
 }

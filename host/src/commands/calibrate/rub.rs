@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use tactomo::board::identity;
-use tactomo::calibrate::{Frame, Rub, RubSettings, rub};
+use tactomo::calibrate::{Frame, HeldOut, Rub, RubSettings, rub};
 use tactomo::date::today;
 use tactomo::detector::Detector;
 use tactomo::readings::{Readings, Rounds};
@@ -49,7 +49,7 @@ pub struct Args {
     /// The detector file to write; a file that exists is not replaced
     #[arg(long, value_name = "CAL.toml")]
     out: PathBuf,
-    /// Prints `{detector, out, presses, place_error_m, parameters, wires, left_out, ...}` as JSON
+    /// Prints `{detector, out, presses, place_error_m, held_out, helped, missing, parameters, wires, left_out, ...}` as JSON
     #[arg(long)]
     json: bool,
 }
@@ -162,10 +162,35 @@ struct Report {
     place_error_m: f64,
     /// Places and their standard errors (m).
     place_errors_m: Vec<[f64; 3]>,
+    /// Of presses that were not used, before and after; none where there are too few.
+    held_out: Option<ReportedHeldOut>,
+    /// Whether they say that it has helped.
+    helped: bool,
+    /// What the rub is missing.
+    missing: Vec<String>,
     wires: Option<Vec<usize>>,
     left_out: Vec<usize>,
     parameters: Vec<ReportedParameter>,
     seconds: f64,
+}
+
+#[derive(serde::Serialize)]
+struct ReportedHeldOut {
+    presses: usize,
+    /// Over the noise of a frame, median.
+    residual_before: f64,
+    residual_after: f64,
+    /// Expected standard error of places (m).
+    place_error_before_m: f64,
+    place_error_after_m: f64,
+}
+
+impl From<HeldOut> for ReportedHeldOut {
+    fn from(HeldOut { presses, residuals, place_errors_m }: HeldOut) -> Self {
+        let ([residual_before, residual_after], [place_error_before_m, place_error_after_m]) =
+            (residuals, place_errors_m);
+        Self { presses, residual_before, residual_after, place_error_before_m, place_error_after_m }
+    }
 }
 
 #[derive(serde::Serialize)]
@@ -189,6 +214,9 @@ impl Report {
             residual: found.chi_square[1].sqrt(),
             place_error_m: found.place_error_m(),
             place_errors_m: found.place_errors_m.iter().map(|([x, y], error_m)| [*x, *y, *error_m]).collect(),
+            held_out: found.held_out.map(ReportedHeldOut::from),
+            helped: found.helped(),
+            missing: found.missing.iter().map(ToString::to_string).collect(),
             wires: found.wires.clone(),
             left_out: found.left_out.clone(),
             parameters: known
@@ -200,6 +228,36 @@ impl Report {
                 .collect(),
             seconds: took.as_secs_f64(),
         }
+    }
+
+    /// What presses that were not used say of it, what is missing, and whether to use it.
+    fn worth(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let Some(held_out) = &self.held_out {
+            lines.push(format!(
+                "{} presses that were not used: residual {:.2} x noise before, {:.2} after; places known to {:.2} mm before, {:.2} after",
+                held_out.presses,
+                held_out.residual_before,
+                held_out.residual_after,
+                1e3 * held_out.place_error_before_m,
+                1e3 * held_out.place_error_after_m
+            ));
+        }
+        if !self.missing.is_empty() {
+            lines.push(format!("it would be better still: {}", self.missing.join("; ")));
+        }
+        lines.push(match (self.helped, &self.held_out) {
+            (true, _) => format!("written to {0}: use it with --detector {0}", self.out),
+            (false, Some(_)) => format!(
+                "warning: that has not helped, so it is not recommended: keep the description, and rub again; written to {} all the same",
+                self.out
+            ),
+            (false, None) => format!(
+                "warning: there are too few presses to hold some out, so nothing says whether it helps: rub for longer; written to {}",
+                self.out
+            ),
+        });
+        lines
     }
 
     /// For a person.
@@ -241,7 +299,7 @@ impl Report {
                     .to_owned(),
             );
         }
-        lines.push(format!("written to {}", self.out));
+        lines.extend(self.worth());
         lines.join("\n")
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail, ensure};
-use tactomo::board::baseline::Baseline;
+use tactomo::board::baseline::{Baseline, BaselineState};
 use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
 use tactomo::board::{identity, measured};
 use tactomo::detector::{Detector, ForceLaw};
@@ -123,10 +123,12 @@ impl Reader {
             Some(Learned::Kernel(kernel)) => learned(input, kernel)?,
             other => solved(input, solver, other)?,
         };
-        // That of a recording is taken as live takes it, while its frames are solved.
-        let baseline = match (&jacobian, input.rest, file.board()) {
-            (Some(jacobian), None, Some(board)) => Baseline::new(Arc::clone(jacobian), board.settings.conversions()),
-            (_, frames, _) => Baseline::over(frames.unwrap_or(0), file.channels()),
+        // It is taken as live takes it, while frames are solved.
+        let conversions = file.board().map_or(1, |board| board.settings.conversions());
+        let baseline = match (&jacobian, input.rest) {
+            (Some(jacobian), None) => Baseline::new(Arc::clone(jacobian), conversions),
+            (Some(jacobian), Some(frames)) => Baseline::told(Arc::clone(jacobian), conversions, frames),
+            (None, frames) => Baseline::over(frames.unwrap_or(0), file.channels()),
         };
         let frames = Frames::of(file, input, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
         let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));
@@ -192,9 +194,11 @@ impl Reader {
         Some(format!("{}: {loss}", self.path.display()))
     }
 
-    /// What a person should know of the baseline, in words.
+    /// What a person should know of the baseline, in words. That a table begins with a press is no news: most are of presses alone.
     pub fn notice(&self) -> Option<String> {
-        self.baseline.state().notice()
+        let state = self.baseline.state();
+        let is_table_of_presses = !self.is_recording() && matches!(state, BaselineState::Pressed(_));
+        state.notice().filter(|_| !is_table_of_presses)
     }
 
     /// Readings of the newest frame as they are used, before the baseline was taken off (V).

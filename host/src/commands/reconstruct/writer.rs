@@ -120,11 +120,12 @@ impl Writer {
 /// A frame for people.
 fn sentence(frame: &FrameReport) -> String {
     let contact = |found: &FoundContact| {
-        let strength = match found.force_n {
-            Some(force_n) => force_sentence(force_n, found),
-            None => format!("{:.2e} S", found.conductance_s),
+        let strength = match (found.force_n, found.known_conductance_s()) {
+            (Some(force_n), _) => format!(" {}", force_sentence(force_n, found)),
+            (None, Some(conductance_s)) => format!(" {conductance_s:.2e} S"),
+            (None, None) => String::new(),
         };
-        format!("({:.2}, {:.2}) mm {strength}", found.x_m * 1e3, found.y_m * 1e3)
+        format!("({:.2}, {:.2}) mm{strength}", found.x_m * 1e3, found.y_m * 1e3)
     };
     let contacts: Vec<_> = frame.contacts.iter().map(contact).collect();
     let number = frame.frame.map_or_else(String::new, |number| format!(" {number}"));

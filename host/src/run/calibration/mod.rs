@@ -13,11 +13,11 @@ use std::time::{Duration, Instant};
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::{Readings, Rounds};
+use tactomo_touch::calibrate::{HeldOut, Rub};
 use tactomo_touch::solve::FoundContact;
 
 use self::collected::Collected;
 pub use self::collected::Coverage;
-pub use self::fit::{Compared, Fit};
 use self::fit::{Fitted, Task};
 use super::inbox::{Event, Inbox};
 
@@ -31,6 +31,8 @@ const WHOLE: f64 = 0.8;
 const WORTH: f64 = 0.05;
 /// Frames of rows without a whole one between them from which on the board's plan has none: an adaptive plan of 32 electrodes has one in every 64.
 const NEVER_WHOLE: u64 = 500;
+/// Most that is said to be missing at a time.
+const TOLD: usize = 3;
 /// Time between two pictures of how it is: a person sees that at once.
 const SHOWN_EVERY: Duration = Duration::from_millis(80);
 
@@ -75,7 +77,7 @@ pub struct Calibrating {
     /// Expected standard error of a place (m) after each fit.
     pub errors_m: Vec<f64>,
     /// The newest fit.
-    pub fit: Option<Arc<Fit>>,
+    pub fit: Option<Arc<Rub>>,
     /// Why there is none, or no newer one, as a sentence for a person.
     pub trouble: Option<String>,
     /// The file that was written.
@@ -166,7 +168,7 @@ impl Desk {
     pub fn use_found(&mut self) -> Option<Arc<Detector>> {
         let fit = self.shown.fit.as_ref().filter(|_| self.shown.stage == Stage::Done)?;
         (self.shown.used, self.showed) = (true, None);
-        Some(Arc::new(fit.rub.detector.clone()))
+        Some(Arc::new(fit.detector.clone()))
     }
 
     /// Takes a frame, or rows of one: readings (V) less the baseline, as the channels read them, their time (s), and the contacts found.
@@ -255,13 +257,17 @@ impl Desk {
                 self.shown.stage = if is_asked { Stage::Finishing } else { Stage::Rubbing };
             }
             Ok(fit) => {
-                let error_m = fit.rub.place_error_m();
-                let is_settled = self.shown.errors_m.last().is_some_and(|before_m| error_m > (1.0 - WORTH) * before_m);
+                let error_m = fit.place_error_m();
+                // An error that rose is not settled: of few presses, or of one firmness, it is not known what it will be.
+                let settled = |before_m: &f64| (error_m / before_m - 1.0).abs() < WORTH;
+                let is_settled = self.shown.errors_m.last().is_some_and(settled) && fit.helped();
+                let least_m = self.shown.errors_m.iter().copied().fold(f64::INFINITY, f64::min);
+                let unfinished = is_last.then(|| unfinished(&fit, least_m)).flatten();
                 self.shown.errors_m.push(error_m);
                 self.shown.fit = Some(Arc::new(fit));
-                (self.shown.trouble, self.shown.saved, self.shown.used) = (None, None, false);
+                (self.shown.trouble, self.shown.saved, self.shown.used) = (unfinished, None, false);
                 if is_last {
-                    self.shown.stage = Stage::Done;
+                    self.shown.stage = if self.shown.trouble.is_none() { Stage::Done } else { Stage::Rubbing };
                 } else if !is_asked && is_settled && self.collected.coverage.share() >= WHOLE {
                     self.finish();
                 }
@@ -277,11 +283,70 @@ impl Desk {
         let (fit, folder) = (Arc::clone(fit), self.folder.clone());
         let (number, inbox) = (self.number, Arc::clone(&self.inbox));
         let write = move || {
-            let saved = save::save(&fit.rub.detector, &folder);
+            let saved = save::save(&fit.detector, &folder);
             inbox.put(Event::Calibrated(number, Outcome::Saved(saved)));
         };
         if let Err(error) = thread::Builder::new().name("calibration file".to_owned()).spawn(write) {
             self.shown.trouble = Some(format!("cannot start a thread: {error}"));
         }
+    }
+}
+
+/// Why a detector that was found is not to be used, and what to do, as a sentence for a person; `None` if presses that it was not fitted to
+/// say that it has helped. An expected error that has risen from the least one before (m) is none to end with, while anything is missing.
+fn unfinished(found: &Rub, least_m: f64) -> Option<String> {
+    let error_m = found.place_error_m();
+    let has_risen = error_m > (1.0 + WORTH) * least_m && !found.missing.is_empty();
+    if found.helped() && !has_risen {
+        return None;
+    }
+    let why = match &found.held_out {
+        _ if found.helped() => {
+            format!("The expected error has risen from {:.2} to {:.2} mm", 1e3 * least_m, 1e3 * error_m)
+        }
+        None => "It is too little to tell whether it helps".to_owned(),
+        Some(HeldOut { residuals: [before, after], place_errors_m: [before_m, after_m], .. }) => format!(
+            "It has not helped: presses that were not used leave {before:.1} × noise before and {after:.1} after, and places are known to \
+             {:.2} mm before and {:.2} after",
+            1e3 * before_m,
+            1e3 * after_m
+        ),
+    };
+    let missing: Vec<_> = found.missing.iter().take(TOLD).map(ToString::to_string).collect();
+    let what = if missing.is_empty() { "rub on, with one fingertip alone".to_owned() } else { missing.join("; ") };
+    Some(format!("{why}. What is missing: {what}."))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_touch::calibrate::Missing;
+
+    fn found(place_errors_m: [f64; 2], residuals: [f64; 2], missing: &[Missing]) -> Rub {
+        Rub {
+            detector: Detector::default(),
+            wires: None,
+            left_out: Vec::new(),
+            touched: 200,
+            single: 200,
+            presses: 160,
+            known: 0,
+            held_out: Some(HeldOut { presses: 24, residuals, place_errors_m }),
+            missing: missing.to_vec(),
+            chi_square: [9.0, 1.0],
+            place_errors_m: vec![([0.0; 2], place_errors_m[1])],
+        }
+    }
+
+    #[test]
+    fn what_rose_is_not_done_and_says_what_is_missing() {
+        assert_eq!(unfinished(&found([0.9e-3, 0.2e-3], [3.0, 1.0], &[]), 0.25e-3), None);
+        let risen = unfinished(&found([0.9e-3, 0.75e-3], [3.0, 1.0], &[Missing::Firm]), 0.68e-3).unwrap_or_default();
+        assert!(risen.contains("risen from 0.68 to 0.75 mm") && risen.contains("press harder"), "{risen}");
+        let worse = found([0.68e-3, 0.75e-3], [3.0, 1.0], &[Missing::Place([-0.02, 0.02])]);
+        let worse = unfinished(&worse, 0.75e-3).unwrap_or_default();
+        assert!(worse.contains("0.68 mm before and 0.75 after") && worse.contains("(-20, 20) mm"), "{worse}");
+        let none = Rub { held_out: None, ..found([0.9e-3, 0.2e-3], [3.0, 1.0], &[]) };
+        assert!(unfinished(&none, 0.3e-3).unwrap_or_default().contains("too little to tell"));
     }
 }

@@ -134,9 +134,9 @@ pub(super) fn update(solution: &Solution, usual_radius_m: f64, timestamp: Stamp)
 }
 
 fn said(contact: &FoundContact) -> Vec<Pair> {
-    let conductance = Pair { key: "conductance_s", value: contact.conductance_s.to_string() };
-    let force = contact.force_n.map(|force_n| Pair { key: "force_n", value: force_n.to_string() });
-    [conductance].into_iter().chain(force).collect()
+    let told = [("conductance_s", contact.known_conductance_s()), ("force_n", contact.force_n)];
+    let pair = |(key, value): (&'static str, Option<f64>)| Some(Pair { key, value: value?.to_string() });
+    told.into_iter().filter_map(pair).collect()
 }
 
 fn disc(contact: &FoundContact, usual_radius_m: f64, color: Color) -> Cylinder {

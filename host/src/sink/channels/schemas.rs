@@ -203,7 +203,7 @@ pub(super) fn touch() -> Value {
 }
 
 fn contact() -> Value {
-    let is_always_there = |name: &str| ["x_m", "y_m", "conductance_s"].contains(&name);
+    let is_always_there = |name: &str| ["x_m", "y_m"].contains(&name);
     let fields = CONTACT_COLUMNS.iter().map(|column| {
         let schema = match column.kind {
             Kind::Integer => integer(),

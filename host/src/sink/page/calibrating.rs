@@ -3,7 +3,7 @@
 use serde::Serialize;
 use tactomo_touch::calibrate::Rub;
 
-use crate::run::calibration::{Calibrating, Compared, Fit, Stage};
+use crate::run::calibration::{Calibrating, Stage};
 
 /// A calibration under way.
 #[derive(Serialize)]
@@ -32,9 +32,9 @@ struct FitMessage<'a> {
     /// Electrode of each channel, if wires are exchanged.
     wires: Option<&'a [usize]>,
     left_out: &'a [usize],
-    /// Residuals before and after, in standard deviations of the noise, and how far places have moved (m).
+    /// Of presses that were not used, before and after: residuals, in standard deviations of the noise, and expected errors of places (m).
     residuals: Option<[f64; 2]>,
-    moved_m: Option<f64>,
+    place_errors_m: Option<[f64; 2]>,
 }
 
 impl<'a> CalibratingMessage<'a> {
@@ -60,15 +60,15 @@ impl<'a> CalibratingMessage<'a> {
 }
 
 impl<'a> FitMessage<'a> {
-    fn of(Fit { rub, compared }: &'a Fit) -> Self {
-        let Rub { place_errors_m, presses, wires, left_out, .. } = rub;
+    fn of(rub: &'a Rub) -> Self {
+        let Rub { place_errors_m, presses, wires, left_out, held_out, .. } = rub;
         Self {
             places_m: place_errors_m.iter().map(|([x_m, y_m], error_m)| [*x_m, *y_m, *error_m]).collect(),
             presses: *presses,
             wires: wires.as_deref(),
             left_out,
-            residuals: compared.map(|Compared { residuals, .. }| residuals),
-            moved_m: compared.map(|Compared { moved_m, .. }| moved_m),
+            residuals: held_out.map(|held_out| held_out.residuals),
+            place_errors_m: held_out.map(|held_out| held_out.place_errors_m),
         }
     }
 }

@@ -32,6 +32,8 @@ pub struct Figures {
     pub misfit: f64,
     /// Share of coordinates within one and two claimed standard errors; none if none are claimed.
     pub within: Option<[f64; 2]>,
+    /// The same of the logarithms of conductances.
+    pub within_conductance: Option<[f64; 2]>,
     /// Median of the claimed standard errors (m).
     pub claimed_m: Option<f64>,
     /// Median time of a frame (s), and its 95th percentile.
@@ -66,11 +68,10 @@ impl Figures {
             trials.iter().filter(|trial| is(trial)).count() as f64 / trials.len().max(1) as f64
         };
         let errors_m: Vec<_> = trials.iter().flat_map(|trial| trial.errors_m.iter().copied()).collect();
-        let sigmas: Vec<_> = trials.iter().flat_map(|trial| trial.sigmas.iter().flatten()).collect();
-        let within = |sigma: f64| {
-            let count = sigmas.iter().filter(|value| value.abs() < sigma).count();
-            count as f64 / sigmas.len() as f64
-        };
+        let sigmas: Vec<_> = trials.iter().flat_map(|trial| trial.sigmas.iter().flatten().copied()).collect();
+        let of_conductance = |[off, claimed]: &[f64; 2]| off / claimed;
+        let conductances: Vec<_> =
+            trials.iter().flat_map(|trial| trial.ln_conductances.iter().map(of_conductance)).collect();
         let times_s: Vec<_> = trials.iter().map(|trial| trial.time_s).collect();
         Self {
             scenes: trials.len(),
@@ -78,11 +79,18 @@ impl Figures {
             p95_m: quantile(&errors_m, 0.95),
             count_right: share(&|trial| trial.is_count_right),
             misfit: share(&|trial| trial.misfit),
-            within: (!sigmas.is_empty()).then(|| [within(1.0), within(2.0)]),
+            within: within(&sigmas),
+            within_conductance: within(&conductances),
             claimed_m: quantile(&trials.iter().flat_map(|trial| trial.claimed_m.clone()).collect::<Vec<_>>(), 0.5),
             time_s: [0.5, 0.95].map(|share| quantile(&times_s, share).unwrap_or_default()),
         }
     }
+}
+
+/// Shares of errors within one and two standard errors; `None` of none.
+fn within(sigmas: &[f64]) -> Option<[f64; 2]> {
+    let within = |sigma: f64| sigmas.iter().filter(|off| off.abs() < sigma).count() as f64 / sigmas.len() as f64;
+    (!sigmas.is_empty()).then(|| [within(1.0), within(2.0)])
 }
 
 fn quantile(values: &[f64], share: f64) -> Option<f64> {

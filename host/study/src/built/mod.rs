@@ -101,6 +101,8 @@ pub struct Trial {
     pub misfit: bool,
     /// Errors of x and y in standard errors as claimed.
     pub sigmas: Vec<[f64; 2]>,
+    /// Errors of the logarithms of conductances, each with the standard error that is claimed.
+    pub ln_conductances: Vec<[f64; 2]>,
     /// Claimed standard errors of places (m): the root of the mean square of both axes.
     pub claimed_m: Vec<f64>,
     /// Time of the frame (s).
@@ -224,10 +226,12 @@ impl Trial {
         let found = &solution.contacts;
         let matching = tactomo_touch::metrics::Matching::within(f64::INFINITY, truth, found);
         let mut sigmas = Vec::new();
-        let mut claimed_m = Vec::new();
+        let (mut claimed_m, mut ln_conductances) = (Vec::new(), Vec::new());
         for pair in &matching.pairs {
             let (truth, found) = (&truth[pair.truth], &found[pair.found]);
             if let Some(claimed) = found.uncertainty {
+                let off = (found.conductance_s / truth.conductance_s).ln();
+                ln_conductances.push([off, claimed.conductance_s / found.conductance_s]);
                 sigmas.push([(found.x_m - truth.x_m) / claimed.x_m, (found.y_m - truth.y_m) / claimed.y_m]);
                 claimed_m.push((0.5 * (claimed.x_m.powi(2) + claimed.y_m.powi(2))).sqrt());
             }
@@ -244,6 +248,7 @@ impl Trial {
             is_count_right: found.len() == truth.len() && !is_whole,
             misfit: solution.flags.misfit,
             sigmas,
+            ln_conductances,
             claimed_m,
             time_s,
         }

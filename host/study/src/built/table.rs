@@ -5,7 +5,7 @@ use super::{Curve, OverFrames, Point, Report, Row};
 /// Lines for a terminal: a row for each solver and number of contacts.
 pub fn table(report: &Report) -> String {
     let head = format!(
-        "{:<20} {:<12} {:>8} {:>6} {:>8} {:>7} {:>6} {:>7} {:>10} {:>9} {:>8} {:>8}",
+        "{:<20} {:<12} {:>8} {:>6} {:>8} {:>7} {:>6} {:>7} {:>10} {:>9} {:>9} {:>8} {:>8}",
         "detector",
         "solver",
         "contacts",
@@ -15,12 +15,13 @@ pub fn table(report: &Report) -> String {
         "count",
         "misfit",
         "xy 1s, 2s",
+        "C 1s, 2s",
         "claims mm",
         "ms",
         "p95 ms"
     );
-    let about =
-        "count: as many found as touch; xy: coordinates within 1 and 2 claimed standard errors; shares in per cent.";
+    let about = "count: as many found as touch; xy, C: coordinates and logarithms of conductances within 1 and 2 claimed \
+         standard errors; shares in per cent.";
     let mut lines = vec![format!("{} detectors", report.detectors.len()), head];
     lines.extend(report.rows.iter().map(line));
     lines.push(about.to_owned());
@@ -64,10 +65,11 @@ fn line(row: &Row) -> String {
     let figures = &row.figures;
     let mm = |metres: Option<f64>| metres.map_or_else(|| "-".to_owned(), |metres| format!("{:.2}", 1e3 * metres));
     let percent = |share: f64| format!("{:.0}", 100.0 * share);
-    let within =
-        figures.within.map_or_else(|| "-".to_owned(), |[one, two]| format!("{} {}", percent(one), percent(two)));
+    let within = |shares: Option<[f64; 2]>| {
+        shares.map_or_else(|| "-".to_owned(), |[one, two]| format!("{} {}", percent(one), percent(two)))
+    };
     format!(
-        "{:<20} {:<12} {:>8} {:>6} {:>8} {:>7} {:>6} {:>7} {:>10} {:>9} {:>8.1} {:>8.1}",
+        "{:<20} {:<12} {:>8} {:>6} {:>8} {:>7} {:>6} {:>7} {:>10} {:>9} {:>9} {:>8.1} {:>8.1}",
         row.detector.as_deref().unwrap_or("all"),
         row.solver,
         row.contacts,
@@ -76,7 +78,8 @@ fn line(row: &Row) -> String {
         mm(figures.p95_m),
         percent(figures.count_right),
         percent(figures.misfit),
-        within,
+        within(figures.within),
+        within(figures.within_conductance),
         mm(figures.claimed_m),
         1e3 * figures.time_s[0],
         1e3 * figures.time_s[1]

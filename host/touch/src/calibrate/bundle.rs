@@ -14,8 +14,8 @@ use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::scene::Contact;
 
-use super::contact::{Moves, OF_PRESS, Press};
-use super::slopes::{Slopes, as_read};
+use super::contact::{CONDUCTANCE, Moves, OF_PRESS, Press};
+use super::slopes::{At, Slopes, as_read};
 use super::{CalibrateError, Step};
 use tactomo_physics::threads::map;
 
@@ -71,7 +71,7 @@ pub(super) struct Iterations {
 
 impl Default for Iterations {
     fn default() -> Self {
-        Self { most: 9, renewed: 0 }
+        Self { most: 9, renewed: 2 }
     }
 }
 
@@ -190,12 +190,13 @@ impl Bundle {
         let predicted = DVector::from_vec(as_read(&impedance_ohm, detector));
         let volts = DVector::from_column_slice(press.readings.volts());
         let residual = weights.component_mul(&(volts - &predicted));
-        let column = |(change, (_, step)): (&DMatrix<f64>, &(Contact, f64))| {
-            let moved = DVector::from_vec(as_read(&(&impedance_ohm + change), detector));
-            weights.component_mul(&((moved - &predicted) / *step))
+        let by = |(change, (_, step)): (&DMatrix<f64>, &(Contact, f64))| {
+            (DVector::from_vec(as_read(&(&impedance_ohm + change), detector)) - &predicted) / *step
         };
-        let columns: Vec<_> = changes.iter().zip(&near).map(column).collect();
+        let changes_v: Vec<_> = changes.iter().zip(&near).map(by).collect();
+        let columns: Vec<_> = changes_v.iter().map(|change_v| weights.component_mul(change_v)).collect();
         let slopes = DMatrix::from_columns(&columns);
+        let by_conductance_v = changes_v[CONDUCTANCE].as_slice().to_vec();
         let mut own = slopes.tr_mul(&slopes);
         let mut slope = slopes.tr_mul(&residual);
         let mut cost = residual.norm_squared();
@@ -204,13 +205,20 @@ impl Bundle {
             slope[k] -= off * per;
             cost += off * off;
         }
-        Some(OfContact { impedance_ohm, weights, predicted, residual, slopes, own, slope, cost })
+        Some(OfContact { impedance_ohm, weights, predicted, by_conductance_v, residual, slopes, own, slope, cost })
     }
 
     /// Changes of readings by each of the detector's parameters, in deviations of both.
     fn by_detector(&self, contact: &Contact, of: &OfContact, slopes: &Slopes) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(of.weights.len(), self.parameters.len());
-        slopes.readings_v(contact, &of.impedance_ohm, of.predicted.as_slice(), |column, change_v| {
+        let at = At {
+            contact,
+            detector: self.model.detector(),
+            impedance_ohm: &of.impedance_ohm,
+            predicted: of.predicted.as_slice(),
+            by_conductance_v: &of.by_conductance_v,
+        };
+        slopes.readings_v(&at, |column, change_v| {
             all.column_mut(column).iter_mut().zip(change_v).zip(&of.weights).for_each(|((to, v), w)| *to = w * v);
         });
         all
@@ -395,6 +403,8 @@ struct OfContact {
     weights: DVector<f64>,
     /// Readings that it gives (V).
     predicted: DVector<f64>,
+    /// By how much they change with the logarithm of its conductance (V).
+    by_conductance_v: Vec<f64>,
     residual: DVector<f64>,
     slopes: DMatrix<f64>,
     /// Normal equations with what is known before.

@@ -5,11 +5,14 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-/// Standard deviation of the logarithm of a contact's radius about the usual one, and of its conductance about where it was found.
+/// Standard deviation of the logarithm of a contact's radius about the usual one, and of its conductance about where it was found: so wide that
+/// hundreds of presses together do not say what all conductances are, which is not known before.
 const RADIUS_DEVIATION: f64 = 0.5;
-const CONDUCTANCE_DEVIATION: f64 = 3.0;
+const CONDUCTANCE_DEVIATION: f64 = 30.0;
 /// Unknowns of a press.
 pub(super) const OF_PRESS: usize = 4;
+/// Which of them is the logarithm of the conductance.
+pub(super) const CONDUCTANCE: usize = 2;
 /// A press: one contact for as long as it stands.
 #[derive(Clone, Debug)]
 pub(super) struct Press {

@@ -3,12 +3,13 @@
 //! A finger rubbed over the foam is enough: the impedance matrix of a single contact, centred, is that of the bare detector wherever
 //! the contact is (`centred`), which tells single contacts from others and finds the order of the wires (`wires`); then detector and all
 //! contacts are fitted together (`bundle`), with the builder's tolerances as prior. What is left unknown is kept with the detector
-//! (`posterior`). What no parameter explains is corrected by presses at known places (`known`).
+//! (`posterior`); what that is worth, presses say that were not used (`held_out`). What no parameter explains is corrected by presses at known places (`known`).
 
 mod bundle;
 mod centred;
 mod contact;
 pub mod force;
+mod held_out;
 pub mod known;
 mod posterior;
 mod presses;
@@ -21,6 +22,7 @@ mod wires;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
+pub use self::held_out::{HeldOut, Missing};
 pub use self::rub::{Rub, RubSettings, rub};
 
 /// A frame of a rub, or a press of a table.

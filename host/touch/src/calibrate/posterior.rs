@@ -25,6 +25,11 @@ impl Posterior {
         Some(Self { covariance: Cholesky::new(system)?.inverse(), of_press })
     }
 
+    /// Before anything is fitted: the description.
+    pub fn before(count: usize) -> Self {
+        Self { covariance: DMatrix::identity(count, count), of_press: DMatrix::zeros(count, count) }
+    }
+
     /// The parameters with their standard errors.
     pub fn parameters(&self, parameters: &[(Parameter, f64)]) -> Vec<CalibratedParameter> {
         let of = |(index, (parameter, deviation)): (usize, &(Parameter, f64))| {

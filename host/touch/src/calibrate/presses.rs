@@ -87,17 +87,19 @@ impl Chosen {
     }
 
     /// At most so many of the single contacts, spread over places and firmness; those at known places are all among them.
-    pub fn spread(&self, most: usize, detector: &Detector) -> Vec<Mean> {
+    /// None of `without`.
+    pub fn spread(&self, most: usize, without: &[usize], detector: &Detector) -> Vec<Mean> {
         let features: Vec<_> = self.singles.iter().map(|mean| feature(&mean.readings, detector)).collect();
         let mut chosen: Vec<usize> =
             (0..self.singles.len()).filter(|index| self.singles[*index].known_m.is_some()).collect();
         if chosen.is_empty() {
-            chosen.push(0);
+            chosen.extend((0..self.singles.len()).find(|index| !without.contains(index)));
         }
         let apart = |a: usize, b: usize| (0..3).map(|k| (features[a][k] - features[b][k]).powi(2)).sum::<f64>();
         let mut nearest: Vec<f64> = (0..features.len())
             .map(|index| chosen.iter().map(|other| apart(index, *other)).fold(f64::INFINITY, f64::min))
             .collect();
+        without.iter().for_each(|index| nearest[*index] = 0.0);
         while chosen.len() < most.min(features.len()) {
             let farthest = (0..nearest.len()).max_by(|a, b| nearest[*a].total_cmp(&nearest[*b])).unwrap_or(0);
             if nearest[farthest] <= 0.0 {

@@ -9,6 +9,7 @@ use tactomo_physics::scene::Contact;
 use super::bundle::{Bundle, Iterations, Normal};
 use super::centred::between_others;
 use super::contact::Press;
+use super::held_out::{self, HeldOut, Missing};
 use super::posterior::Posterior;
 use super::presses::{Chosen, Mean};
 use super::slopes::Slopes;
@@ -51,6 +52,10 @@ pub struct Rub {
     pub presses: usize,
     /// Those of them at known places.
     pub known: usize,
+    /// What it is worth, on presses that were not used; none where there are too few to hold any out.
+    pub held_out: Option<HeldOut>,
+    /// What the rub is missing, what matters most first.
+    pub missing: Vec<Missing>,
     /// Sum of squares for each reading, in standard deviations, of the presses after the first step and with what was found.
     pub chi_square: [f64; 2],
     /// Places over the detector (m), with the standard error that a press of half a sheet conductance has there in one frame (m).
@@ -60,9 +65,18 @@ pub struct Rub {
 impl Rub {
     /// Root of the mean square of the standard errors of places (m).
     pub fn place_error_m(&self) -> f64 {
-        let squares = self.place_errors_m.iter().map(|(_, error_m)| error_m * error_m);
-        (squares.sum::<f64>() / self.place_errors_m.len().max(1) as f64).sqrt()
+        root_mean_square_m(&self.place_errors_m)
     }
+
+    /// Whether presses that were not used say that it has helped.
+    pub fn helped(&self) -> bool {
+        self.held_out.is_some_and(|held_out| held_out.helped())
+    }
+}
+
+fn root_mean_square_m(place_errors_m: &[([f64; 2], f64)]) -> f64 {
+    let squares = place_errors_m.iter().map(|(_, error_m)| error_m * error_m);
+    (squares.sum::<f64>() / place_errors_m.len().max(1) as f64).sqrt()
 }
 
 /// Places along a side that standard errors are told for, and how far they reach in shares of it.
@@ -99,7 +113,7 @@ pub fn rub(
 ) -> Result<Rub, CalibrateError> {
     // Readings are those of the channels: gains and offsets are fitted from none.
     let (told_channels, nominal) = (nominal, &without_channels(nominal));
-    let Sorted { chosen, means, order, problem } = Sorted::new(nominal, frames, settings.presses)?;
+    let Sorted { chosen, means, held, order, problem } = Sorted::new(nominal, frames, settings.presses)?;
     let parameters: Vec<_> = Parameter::all(problem.detector(), SHORTEST_WAVE)
         .into_iter()
         .map(|parameter| (parameter, nominal.tolerances.deviation(nominal, parameter)))
@@ -110,7 +124,9 @@ pub fn rub(
     let (first, rest) = presses.divided();
     let first = presses.started(&problem, &first)?;
     let mut bundle = Bundle::new(Arc::clone(&problem.model), parameters, first, full_v);
-    let (first, last, slopes) = adjusted(&mut bundle, &presses, &rest, told)?;
+    let mut slopes = Slopes::new(&bundle.model, &bundle.parameters)?;
+    let before_m = root_mean_square_m(&place_errors_m(&bundle, &slopes, &Posterior::before(bundle.parameters.len())));
+    let (first, last) = adjusted(&mut bundle, &mut slopes, &presses, &rest, told)?;
     let single = chosen.singles.iter().map(|mean| mean.frames).sum();
     if bundle.chi_square(&last) > UNFIT {
         let residual = bundle.chi_square(&last).sqrt();
@@ -120,9 +136,21 @@ pub fn rub(
         .ok_or_else(|| CalibrateError::Unfit { detector: nominal.name.clone(), residual: f64::INFINITY })?;
     let mut detector = calibrated(nominal, &chosen, &bundle, &posterior);
     detector.force.clone_from(&told_channels.force);
+    let place_errors_m = place_errors_m(&bundle, &slopes, &posterior);
+    let after_m = root_mean_square_m(&place_errors_m);
+    let residuals = [held_out::residual(&problem.model, &held)?, held_out::residual(&bundle.model, &held)?];
+    let held_out = match residuals {
+        [Some(before), Some(after)] => {
+            Some(HeldOut { presses: held.len(), residuals: [before, after], place_errors_m: [before_m, after_m] })
+        }
+        _ => None,
+    };
+    let contacts: Vec<Contact> = bundle.presses.iter().map(|press| press.contact).collect();
     Ok(Rub {
         detector,
-        place_errors_m: place_errors_m(&bundle, &slopes, &posterior),
+        held_out,
+        missing: held_out::missing(&contacts, bundle.model.detector()),
+        place_errors_m,
         wires: (!order.exchanged().is_empty()).then_some(order.electrodes),
         left_out: (0..nominal.electrodes.len()).filter(|e| !chosen.kept.contains(e)).collect(),
         touched: chosen.touched,
@@ -138,6 +166,8 @@ pub(super) struct Sorted {
     chosen: Chosen,
     /// Means of frames that are fitted.
     means: Vec<Mean>,
+    /// And of others, that what was found is tried on.
+    held: Vec<Mean>,
     pub order: Order,
     /// The detector as described, through electrodes that are sound, in the order of the channels.
     problem: Problem,
@@ -154,9 +184,11 @@ impl Sorted {
         let chosen = Chosen::among(frames, nominal)?;
         let problem = Problem::of(&nominal.taken_as_exact())?;
         let found = wired(&chosen, nominal, &problem)?;
-        let means = chosen.spread(presses, nominal);
+        let held = held_out::chosen(chosen.singles.len(), |index| chosen.singles[index].known_m.is_some());
+        let means = chosen.spread(presses, &held, nominal);
+        let held = held.into_iter().map(|index| chosen.singles[index].clone()).collect();
         let (order, problem) = ordered(&found, &chosen, &problem, &means)?;
-        Ok(Self { chosen, means, order, problem })
+        Ok(Self { chosen, means, held, order, problem })
     }
 }
 
@@ -304,20 +336,20 @@ impl Presses<'_> {
 /// Gives the sum of squares for each reading at the start.
 fn adjusted(
     bundle: &mut Bundle,
+    slopes: &mut Slopes,
     presses: &Presses<'_>,
     rest: &[usize],
     told: &mut dyn FnMut(Step) -> bool,
-) -> Result<(f64, Normal, Slopes), CalibrateError> {
-    let mut slopes = Slopes::new(&bundle.model, &bundle.parameters)?;
-    let first = bundle.chi_square(&bundle.normal(&slopes));
+) -> Result<(f64, Normal), CalibrateError> {
+    let first = bundle.chi_square(&bundle.normal(slopes));
     for rough in ROUGH {
         bundle.rough = rough;
-        bundle.adjust(&mut slopes, Iterations { most: 1, renewed: 1 }, told)?;
+        bundle.adjust(slopes, Iterations { most: 1, renewed: 1 }, told)?;
     }
     bundle.rough = 1.0;
     let others = presses.started(&Problem::new(Arc::clone(&bundle.model)), rest)?;
     bundle.presses.extend(others);
-    let mut normal = bundle.adjust(&mut slopes, Iterations { renewed: 1, ..Iterations::default() }, told)?;
+    let mut normal = bundle.adjust(slopes, Iterations::default(), told)?;
     for _ in 0..2 {
         let lost = bundle.lost(&normal, LOST);
         if lost.is_empty() {
@@ -329,9 +361,9 @@ fn adjusted(
         if !bundle.offer(&lost, &found) {
             break;
         }
-        normal = bundle.adjust(&mut slopes, Iterations::default(), told)?;
+        normal = bundle.adjust(slopes, Iterations::default(), told)?;
     }
-    Ok((first, normal, slopes))
+    Ok((first, normal))
 }
 
 /// The detector of all electrodes, in the order of the channels, with what is left unknown.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::solve::{ContactSettings, Contacts, Problem, Solver};
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Detector, Parameter, Tolerances};
 use tactomo_physics::readings::{Range, Says};
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Measurement, drawn, finer_model};
@@ -122,6 +122,58 @@ fn presses_at_unknown_places_make_places_right() {
     assert!(found.single <= 56 && found.wires.is_none(), "{}", found.single);
     let again = Detector::from_toml(&found.detector.to_toml(), "").unwrap();
     assert_eq!(again.calibration.unwrap().parameters.len(), found.detector.calibration.unwrap().parameters.len());
+}
+
+#[test]
+fn what_readings_do_not_tell_stays_as_uncertain_as_it_is_described() {
+    let mut bench = Bench::new(5);
+    let presses = both_boards(&mut bench, 48);
+    let frames: Vec<_> = presses.into_iter().map(|(_, [whole, _])| whole).collect();
+    let found = rubbed(&frames).unwrap();
+    let calibration = found.detector.calibration.clone().unwrap();
+    let left = |parameter: Parameter| {
+        let known = calibration.parameters.iter().find(|known| known.parameter == parameter).unwrap();
+        known.standard_error / Tolerances::default().deviation(&found.detector, parameter)
+    };
+    assert!(left(Parameter::Thickness) < 0.5, "{}", left(Parameter::Thickness));
+    // Conductivity, contacts, pads and switch together change nothing; nor does the driving layer what single contacts do not.
+    for parameter in [Parameter::Conductivity, Parameter::DrivingSheet] {
+        assert!(left(parameter) > 0.7 && left(parameter) < 1.01, "{parameter}: {}", left(parameter));
+    }
+    let problem = Problem::of(&found.detector).unwrap();
+    let mut solver = Contacts::new(&problem, ContactSettings::of(&problem)).unwrap();
+    let mut off = |contact: Contact, frame: &Frame| {
+        solver.reset();
+        let mut readings = frame.readings.clone();
+        readings.correct_channels(&found.detector);
+        let found = solver.solve(&readings).unwrap().contacts[0];
+        let deviation = found.uncertainty.unwrap().conductance_s / found.conductance_s;
+        ((found.conductance_s / contact.conductance_s).ln() / deviation).abs()
+    };
+    let offs: Vec<_> = both_boards(&mut bench, 16).iter().map(|(contact, [whole, _])| off(*contact, whole)).collect();
+    assert!(offs.iter().all(|off| *off < 2.5), "{offs:?}");
+}
+
+#[test]
+fn presses_that_were_not_used_say_whether_it_helped() {
+    let mut bench = Bench::new(5);
+    let frames: Vec<_> = both_boards(&mut bench, 48).into_iter().map(|(_, [whole, _])| whole).collect();
+    let found = rubbed(&frames).unwrap();
+    let held_out = found.held_out.unwrap();
+    let [before, after] = held_out.residuals;
+    assert!(found.helped() && held_out.presses == 8 && after < 0.5 * before, "{held_out:?}");
+    assert_eq!(found.place_error_m(), held_out.place_errors_m[1]);
+    // Of a few light presses in one place nothing can be told.
+    let few: Vec<_> = (0..8)
+        .map(|_| {
+            let [contact] = bench.contacts(1)[..] else { panic!() };
+            bench.frame(&[Contact { x_m: 0.2 * contact.x_m, y_m: 0.2 * contact.y_m, conductance_s: 1e-4, ..contact }])
+        })
+        .collect();
+    let found = rubbed(&few).unwrap();
+    assert!(!found.helped() && found.held_out.is_none(), "{:?}", found.held_out);
+    assert_eq!(found.missing[..2], [Missing::Presses(8), Missing::Firm]);
+    assert!(found.missing.iter().any(|missing| matches!(missing, Missing::Place(_))), "{:?}", found.missing);
 }
 
 #[test]

@@ -176,7 +176,8 @@ pub struct FoundContact {
     pub y_m: f64,
     /// Centre, z (m): on a curved detector; zero on a flat one.
     pub z_m: f64,
-    /// Conductance (S).
+    /// Conductance (S); zero where it is not known, of a solver that was taught something else (see
+    /// [`known_conductance_s`](Self::known_conductance_s)).
     pub conductance_s: f64,
     /// Conductance (S) of it in series with the current that crowds under it, its spreading resistance: of a firm contact readings give that far
     /// better than either. Of a method that fits contacts.
@@ -214,6 +215,11 @@ impl FoundContact {
     /// A contact on a flat detector.
     pub fn flat(x_m: f64, y_m: f64, conductance_s: f64) -> Self {
         Self { x_m, y_m, conductance_s, ..Self::default() }
+    }
+
+    /// Its conductance (S), where that is known: nothing that touches has none.
+    pub fn known_conductance_s(&self) -> Option<f64> {
+        (self.conductance_s != 0.0).then_some(self.conductance_s)
     }
 }
 

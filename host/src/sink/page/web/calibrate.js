@@ -126,7 +126,7 @@ export class CalibratePanel {
     element("calibrate-legend").style.background = ErrorMap.legend(theme());
     element("calibrate-error").textContent = errorM === undefined ? "not known yet" : `± ${errorText(errorM)}\u2009mm`;
     element("calibrate-history").replaceChildren(history(errorsM));
-    this.#compare(stage, fit, errorM);
+    this.#compare(stage, fit);
     this.#note(trouble, fit, saved, stage);
     const done = stage === "done";
     element("calibrate-finish").hidden = stage !== "rubbing";
@@ -139,14 +139,13 @@ export class CalibratePanel {
     element("calibrate-use").textContent = used ? "In use" : "Use it";
   }
 
-  #compare(stage, fit, errorM) {
+  #compare(stage, fit) {
     const table = element("calibrate-compared");
     table.hidden = stage !== "done" || !fit;
     if (table.hidden) return;
     const rows = [];
     if (fit.residuals) rows.push(row("residual", ...fit.residuals.map((value) => `${fixed(value, 1)} × noise`)));
-    const off = fit.moved_m === null ? "" : `${errorText(fit.moved_m)}\u2009mm off`;
-    rows.push(row("places", off, `± ${errorText(errorM)}\u2009mm`));
+    if (fit.place_errors_m) rows.push(row("places", ...fit.place_errors_m.map((metres) => `± ${errorText(metres)}\u2009mm`)));
     element("calibrate-rows").replaceChildren(...rows);
   }
 

@@ -42,7 +42,7 @@ function bar(share) {
 function strengthCell(contact) {
   const { forceN, forceErrorN, beyondMaximum, conductanceS, errorS } = contact;
   const value = element("td", "value", forceN === null || beyondMaximum ? strengthOf(contact) : withError(forceN, forceErrorN, "N"));
-  const conductance = errorS === null ? withPrefix(conductanceS, "S") : `${withPrefix(conductanceS, "S")} ± ${withPrefix(errorS, "S", 2)}`;
+  const conductance = conductanceS === null ? "conductance not known" : errorS === null ? withPrefix(conductanceS, "S") : `${withPrefix(conductanceS, "S")} ± ${withPrefix(errorS, "S", 2)}`;
   const force = forceN === null ? "" : `${withError(forceN, forceErrorN, "N")}${beyondMaximum ? ", beyond the largest force that can be told" : ""}; `;
   value.title = `${force}${conductance}`;
   return value;
@@ -53,7 +53,7 @@ function row(contact, sheetS) {
   return element("tr", hueOf(id),
     element("td", "id", element("span", "badge-id", id ? String(id) : "\u2013")),
     element("td", "", `${millimetres(xM, 1)}, ${millimetres(yM, 1)}`),
-    element("td", "error", placeError(ellipseOf(contact))), strengthCell(contact), bar(Math.max(1e-9, conductanceS / sheetS)));
+    element("td", "error", placeError(ellipseOf(contact))), strengthCell(contact), bar(Math.max(1e-9, (conductanceS ?? 0) / sheetS)));
 }
 
 function shapeRow(shape, sheetS) {

@@ -7,7 +7,7 @@ import { Raster } from "./raster.js";
 const REACH = 3.5;
 
 /** Density (S/m2) in the middle of a contact of this conductance and radius. */
-export const densityOf = ({ conductanceS }, radiusM) => Math.max(0, conductanceS) / (Math.PI * radiusM * radiusM);
+export const densityOf = ({ conductanceS }, radiusM) => Math.max(0, conductanceS ?? 0) / (Math.PI * radiusM * radiusM);
 
 /** The heat of the newest update. */
 export class HeatField {

@@ -13,7 +13,7 @@ const PILL = { height: 22, badge: 9, font: "600 12.5px system-ui, sans-serif" };
 
 /** What a contact presses with, for people: newtons where they are known, "or more" where they are beyond what the detector can tell. */
 export const strengthOf = ({ forceN, beyondMaximum, conductanceS }) => (
-  forceN === null ? withPrefix(conductanceS, "S") : `${beyondMaximum ? "\u2273\u2009" : ""}${withPrefix(forceN, "N")}`);
+  forceN === null ? (conductanceS === null ? "\u2013" : withPrefix(conductanceS, "S")) : `${beyondMaximum ? "\u2273\u2009" : ""}${withPrefix(forceN, "N")}`);
 
 /** The half axes (m) of one standard error and the direction of the longer (radians, anticlockwise), or null. */
 export function ellipseOf({ xErrorM, yErrorM, correlation }) {

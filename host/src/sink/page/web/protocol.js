@@ -36,9 +36,9 @@ class Taker {
 
 function contact(taker) {
   const id = taker.word() || null;
-  const [x, y, z, conductanceS, ...others] = taker.floats(16);
-  const [apparentS, radiusM, forceN, forceErrorN, beyond, xErrorM, yErrorM, correlation, errorS, depthM] = others.slice(0, 10).map(known);
-  const [xM, yM] = others.slice(10);
+  const [x, y, z, ...others] = taker.floats(16);
+  const [conductanceS, apparentS, radiusM, forceN, forceErrorN, beyond, xErrorM, yErrorM, correlation, errorS, depthM] = others.slice(0, 11).map(known);
+  const [xM, yM] = others.slice(11);
   return {
     id, xM, yM, conductanceS, apparentS, radiusM, forceN, forceErrorN, beyondMaximum: beyond === 1, xErrorM, yErrorM, correlation, errorS,
     depthM, place: [x, y, z],

@@ -31,6 +31,9 @@ impl Kernel {
         to.set_array("coordinates", &[presses, self.points.dimensions], &self.points.coordinates);
         to.set_array("log_sizes", &[presses], &self.points.log_sizes);
         write_regression(to, "place", &self.places);
+        if let Some(middle_m) = self.middle_m {
+            to.set_text("middle_m", middle_m.to_string());
+        }
         if let Some((strength, regression)) = &self.strengths {
             to.set_text("strength", strength.name());
             write_regression(to, "strength", regression);
@@ -77,6 +80,10 @@ impl Kernel {
             left_over: left_over(from, &features, classes)?,
             classes: Classes { smallest_v },
             limits: self::limits(from)?,
+            middle_m: match from.has_text("middle_m") {
+                true => Some(from.number("middle_m", |metres| metres >= 0.0, "a distance of 0 or more")?),
+                false => None,
+            },
             features,
             points,
             places,

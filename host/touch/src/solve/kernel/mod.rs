@@ -34,6 +34,9 @@ const SIZE_FOR_STRENGTH: f64 = 0.3;
 /// A size beyond those taught by this factor is too far, and below those taught no contact.
 const SIZES_BEYOND: f64 = 2.0;
 
+/// Standard errors by which places that say nothing may seem better than the middle.
+const BY_CHANCE: f64 = 3.0;
+
 /// A regression from readings to the place and the strength of a press.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kernel {
@@ -49,6 +52,8 @@ pub struct Kernel {
     novelty: Novelty,
     left_over: LeftOver,
     limits: Limits,
+    /// How far the middle of the others is from each press, in the root of the mean square (m); of a file that tells.
+    middle_m: Option<f64>,
 }
 
 /// What was taught.
@@ -119,6 +124,7 @@ impl Kernel {
             classes,
             left_over,
             limits,
+            middle_m: Some(middle_m(&presses.places_m)),
         })
     }
 
@@ -158,6 +164,20 @@ impl Kernel {
     /// Root mean square distance (m) by which it misses a press that it was not taught.
     pub fn left_out_m(&self) -> f64 {
         self.places.left_out.iter().map(|missed_m| missed_m * missed_m).sum::<f64>().sqrt()
+    }
+
+    /// Root mean square distance (m) by which the middle of all presses taught misses one of them: who reads nothing does as well.
+    /// `None` of a file that does not tell.
+    pub fn middle_m(&self) -> Option<f64> {
+        self.middle_m
+    }
+
+    /// Whether places are found no better than by guessing the middle of all presses: nothing was learned of them. The standard error of a root
+    /// mean square of two coordinates of `n` presses is a share of `1 / sqrt(4 n)`, and that parameters are chosen by presses left out makes a
+    /// few of them of noise.
+    pub fn is_no_better_than_middle(&self) -> bool {
+        let by_chance = BY_CHANCE / (4.0 * self.presses() as f64).sqrt();
+        self.middle_m.is_some_and(|middle_m| self.left_out_m() > middle_m * (1.0 - by_chance))
     }
 
     /// The same for the strength, as a share of it.
@@ -211,6 +231,15 @@ impl Kernel {
 /// Logarithms of strengths over sizes; none where strengths were not measured.
 fn shares(presses: &Presses, points: &Points) -> Vec<f64> {
     presses.strengths.iter().zip(&points.log_sizes).map(|(strength, log_size)| strength.ln() - log_size).collect()
+}
+
+/// How far each place is from the mean of the others, in the root of the mean square (m).
+fn middle_m(places_m: &[[f64; 3]]) -> f64 {
+    let count = places_m.len() as f64;
+    let mean_m = [0, 1, 2].map(|axis| places_m.iter().map(|place_m| place_m[axis]).sum::<f64>() / count);
+    let square = |place_m: &[f64; 3]| (0..3).map(|axis| (place_m[axis] - mean_m[axis]).powi(2)).sum::<f64>();
+    let mean_square = places_m.iter().map(square).sum::<f64>() / count;
+    mean_square.sqrt() * count / (count - 1.0).max(1.0)
 }
 
 fn held(value: f64, [low, high]: [f64; 2]) -> f64 {

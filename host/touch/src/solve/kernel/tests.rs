@@ -45,6 +45,31 @@ fn any_number_of_channels_is_learned_from() {
 }
 
 #[test]
+fn places_that_belong_to_other_presses_are_no_better_than_the_middle() {
+    for (count, seed) in [(30, 1), (30, 2), (30, 3), (60, 4), (60, 5), (60, 6), (200, 7), (200, 8)] {
+        let mut presses = five_channels(count);
+        let right = Kernel::train(&presses).unwrap();
+        assert!(!right.is_no_better_than_middle(), "{count}: {} {:?}", right.left_out_m(), right.middle_m());
+        fastrand::Rng::with_seed(seed).shuffle(&mut presses.places_m);
+        let wrong = Kernel::train(&presses).unwrap();
+        assert!(wrong.is_no_better_than_middle(), "{count}: {} {:?}", wrong.left_out_m(), wrong.middle_m());
+        // Of a square of 100 mm: 100 / sqrt(6).
+        assert!((wrong.middle_m().unwrap() / 0.0408 - 1.0).abs() < 0.1, "{:?}", wrong.middle_m());
+    }
+}
+
+#[test]
+fn of_what_was_not_taught_nothing_is_told() {
+    let kernel = Kernel::train(&five_channels(60)).unwrap();
+    let press = kernel.press(&five_channels(1).readings_v).unwrap().unwrap();
+    let told = |strength| serde_json::to_value(press.solution(strength).contacts[0]).unwrap();
+    let names = |strength| told(strength).as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(Some(Strength::Force)), ["force_n", "x_m", "y_m"]);
+    assert_eq!(names(Some(Strength::Conductance)), ["conductance_s", "x_m", "y_m"]);
+    assert_eq!(names(None), ["x_m", "y_m"]);
+}
+
+#[test]
 fn presses_that_are_alike_teach_nothing() {
     let mut presses = five_channels(20);
     presses.readings_v.fill(0.5);
