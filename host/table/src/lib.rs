@@ -183,7 +183,7 @@ mod tests {
             let mut writer = NpzWriter::new(io::Cursor::new(&mut bytes));
             writer.add("readings_v", &[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).unwrap();
             writer.finish().unwrap();
-            let npy = npy::bytes(&[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+            let npy = npy::bytes(&[2, 3], npy::Values::Numbers(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
             for mut bytes in [bytes, npy] {
                 let index = at.index(bytes.len());
                 bytes[index] ^= 1 << bit;

@@ -38,7 +38,7 @@ fn is_such(item: &Value, wanted: &str) -> bool {
     let Some((field, wanted)) = wanted.split_once('=') else { return false };
     match &item[field] {
         Value::String(text) => *text == wanted.replace("%2F", "/"),
-        other => other.to_string() == wanted,
+        other => wanted.parse::<Value>().is_ok_and(|wanted| *other == wanted),
     }
 }
 

@@ -118,8 +118,13 @@ impl Choice {
     }
 }
 
-/// What the pads are: a detector with them.
-const PADS: [(&str, fn(&mut Detector)); 4] = [
+/// Makes a detector's pads and switch what they are taken for.
+type Pads = fn(&mut Detector);
+/// Lambda (V m / S of a sheet of 1 S) from the area of a node (m2).
+type OfNode = fn(f64) -> f64;
+
+/// What the pads are.
+const PADS: [(&str, Pads); 4] = [
     ("as described", |_| {}),
     ("ideal", |detector| {
         (detector.contact_impedance_ohm_m2, detector.on_resistance_ohm) = (0.0, 0.0);
@@ -151,8 +156,8 @@ const ROWS: [(&str, Rows); 3] = [
     }),
 ];
 
-/// What 5000 is: lambda in V m / S of a sheet of 1 S, from the area of a node (m2).
-const LAMBDAS: [(&str, fn(f64) -> f64); 6] = [
+/// What 5000 is.
+const LAMBDAS: [(&str, OfNode); 6] = [
     ("conductances of nodes, sheet of 1 S", |node_m2| (PRINTED * node_m2).sqrt()),
     ("conductances of triangles, sheet of 1 S", |node_m2| (PRINTED * node_m2 / TRIANGLES_A_NODE).sqrt()),
     ("conductances of nodes, 1 S/m and 5 mm", |node_m2| (PRINTED * node_m2).sqrt() * SHEET_M),

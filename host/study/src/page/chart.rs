@@ -224,7 +224,8 @@ impl Chart {
         let [_, top, right, _] = self.plot();
         if let Some((value, why)) = self.guide {
             let left = self.at(value, self.y.range[0])[0] + 5.0;
-            labels.keep_clear([left, left + Labels::width(why)], top + 10.0);
+            // Clear of the line itself too.
+            labels.keep_clear([left - 8.0, left + Labels::width(why)], top + 10.0);
         }
         if let Some((value, why)) = self.level {
             labels.keep_clear([right - Labels::width(why), right], self.at(self.x.range[0], value)[1] - 4.0);
@@ -320,7 +321,7 @@ mod tests {
     fn a_level_is_a_line_across_where_its_value_is() {
         let with = |value| Chart { level: Some((value, "the <middle>")), ..chart(&[[10.0, 10.0]]) }.svg();
         assert!(with(10.0).contains("M58 151.0H386") && with(10.0).contains("the &lt;middle&gt;"));
-        assert!(!with(1000.0).contains("middle"), "a value beyond the axis has no line");
+        assert!(!with(1000.0).contains("the &lt;middle"), "a value beyond the axis has no line");
     }
 
     #[test]

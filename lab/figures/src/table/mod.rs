@@ -69,7 +69,8 @@ mod tests {
         let figures = figures();
         let mut ids: Vec<&str> = figures.iter().map(|figure| figure.id.as_str()).collect();
         ids.extend(JOBS.iter().map(|job| job.name));
-        ids.extend(PICTURES.iter().map(crate::picture::Picture::id));
+        let pictures: Vec<String> = PICTURES.iter().map(|picture| picture.id().to_string()).collect();
+        ids.extend(pictures.iter().map(String::as_str));
         let count = ids.len();
         ids.sort_unstable();
         ids.dedup();
