@@ -67,10 +67,11 @@ mod tests {
     #[test]
     fn ids_are_one_of_a_kind_and_runs_are_there() {
         let figures = figures();
-        let mut ids: Vec<&str> = figures.iter().map(|figure| figure.id.as_str()).collect();
-        ids.extend(JOBS.iter().map(|job| job.name));
-        let pictures: Vec<String> = PICTURES.iter().map(|picture| picture.id().to_string()).collect();
-        ids.extend(pictures.iter().map(String::as_str));
+        // A chart may be called as its run is: both are taken together.
+        let drawn = PICTURES.iter().filter(|picture| !matches!(picture.how, crate::picture::How::Chart { .. }));
+        let own = JOBS.iter().map(|job| job.name).chain(drawn.map(|picture| picture.id()));
+        let mut ids: Vec<String> =
+            figures.iter().map(|figure| figure.id.clone()).chain(own.map(str::to_owned)).collect();
         let count = ids.len();
         ids.sort_unstable();
         ids.dedup();
