@@ -303,7 +303,7 @@ impl Document {
             ground_v: self.ground_v.unwrap_or_default(),
             on_resistance_ohm: self.on_resistance_ohm.unwrap_or(ON_RESISTANCE_OHM),
             adc: self.adc.into_adc(),
-            tolerances: self.tolerances,
+            tolerances: self.tolerances.settled(),
             converters: Vec::new(),
             calibration: self.calibration.map(CalibrationTable::into_calibration).transpose()?,
             force: self.force,

@@ -32,8 +32,15 @@ pub struct Tolerances {
     pub offset_lsb: f64,
     /// Of the multiplexer's on-resistance, as a share of it.
     pub on_resistance_share: f64,
-    /// Of the driving layer's sheet resistance from none (ohm per square), in the root of the mean square.
+    /// Of the driving layer's sheet resistance from none (ohm per square), in the root of the mean square. Of a file whose other tolerances are
+    /// all nothing it is nothing too, unless it is given.
+    #[serde(default = "not_given")]
     pub driving_sheet_ohm: f64,
+}
+
+/// Stands for a sheet resistance that a file does not give, until it is [settled](Tolerances::settled).
+fn not_given() -> f64 {
+    f64::NAN
 }
 
 /// Length over which the conductivity changes, as a share of the shorter side.
@@ -54,6 +61,16 @@ impl Tolerances {
         on_resistance_share: 0.0,
         driving_sheet_ohm: 0.0,
     };
+
+    /// As they were read, with what was not given of the driving layer: nothing where all else is exact, else the default.
+    pub(super) fn settled(self) -> Self {
+        let given = |driving_sheet_ohm| Self { driving_sheet_ohm, ..self };
+        match self.driving_sheet_ohm.is_nan() {
+            true if given(0.0).is_exact() => Self::EXACT,
+            true => given(Self::default().driving_sheet_ohm),
+            false => self,
+        }
+    }
 
     /// Whether there are none.
     pub fn is_exact(&self) -> bool {
@@ -162,6 +179,19 @@ mod tests {
         let exact = |parameter| Tolerances::EXACT.deviation(&detector, parameter);
         assert!(Parameter::all(&detector, 0.0).into_iter().all(|parameter| exact(parameter) == 0.0));
         assert!(Tolerances::EXACT.is_exact() && !Tolerances::default().is_exact());
+    }
+
+    #[test]
+    fn a_file_of_an_exact_detector_is_exact_without_a_word_of_the_driving_layer() {
+        let read = |more: &str| {
+            let table = Tolerances::EXACT.named().map(|(name, value)| format!("{name} = {value:?}\n"));
+            let others = table.into_iter().filter(|line| !line.starts_with("driving")).collect::<String>();
+            let text = Detector { tolerances: Tolerances::default(), ..Detector::default() }.to_toml();
+            Detector::from_toml(&format!("{text}\n[tolerances]\n{others}{more}"), "").unwrap().tolerances
+        };
+        assert!(read("").is_exact());
+        assert_eq!(read("driving_sheet_ohm = 30.0\n"), Tolerances { driving_sheet_ohm: 30.0, ..Tolerances::EXACT });
+        assert_eq!(Detector::from_toml(&Detector::default().to_toml(), "").unwrap().tolerances, Tolerances::default());
     }
 
     #[test]

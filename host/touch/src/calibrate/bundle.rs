@@ -356,9 +356,9 @@ impl Bundle {
         best
     }
 
-    /// Standard error of the place (m) at which a contact would be found in one frame, by noise and by what is unknown of the detector with such a
-    /// covariance; `None` where the contact cannot be.
-    pub fn place_error_m(&self, contact: &Contact, slopes: &Slopes, covariance: &DMatrix<f64>) -> Option<f64> {
+    /// Standard error of the place (m) at which a contact is found in one frame by who reckons with noise and with what is unknown of the detector,
+    /// of such a precision (the inverse of the covariance); `None` where the contact cannot be.
+    pub fn place_error_m(&self, contact: &Contact, slopes: &Slopes, precision: &DMatrix<f64>) -> Option<f64> {
         let predicted = as_read(&self.model.impedance_ohm(&[*contact]).ok()?, self.model.detector());
         let press = Press {
             readings: Readings::new(self.nominal.electrodes.len(), predicted)?,
@@ -367,10 +367,12 @@ impl Bundle {
             contact: *contact,
             usual: *contact,
         };
-        let own = Cholesky::new(self.of_contact(&*self.model, &press, contact, MODEL_ERROR)?.own)?.inverse();
-        let coupling = self.of_press(&press, slopes, MODEL_ERROR)?.coupling;
-        let by_detector = &coupling * covariance * coupling.transpose();
-        Some((0..2).map(|axis| own[(axis, axis)] + by_detector[(axis, axis)]).sum::<f64>().sqrt())
+        let of = self.of_contact(&*self.model, &press, contact, MODEL_ERROR)?;
+        let of_detector = self.by_detector(contact, &of, slopes);
+        let detector = Cholesky::new(of_detector.tr_mul(&of_detector) + precision)?;
+        let cross = of_detector.tr_mul(&of.slopes);
+        let own = Cholesky::new(&of.own - cross.tr_mul(&detector.solve(&cross)))?.inverse();
+        Some((0..2).map(|axis| own[(axis, axis)]).sum::<f64>().sqrt())
     }
 
     /// Presses that fit so many times worse than most.

@@ -11,7 +11,9 @@ const NEGLIGIBLE: f64 = 0.3;
 
 /// Covariance of the parameters after a fit, in standard deviations before.
 pub(super) struct Posterior {
-    pub covariance: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    /// Its inverse.
+    pub precision: DMatrix<f64>,
     /// Information of the readings of an average press alone.
     of_press: DMatrix<f64>,
 }
@@ -22,12 +24,13 @@ impl Posterior {
         let count = information.nrows();
         // Where the model misses more than was reckoned, the readings say that much less.
         let system = information / chi_square.max(1.0) + DMatrix::identity(count, count);
-        Some(Self { covariance: Cholesky::new(system)?.inverse(), of_press })
+        Some(Self { covariance: Cholesky::new(system.clone())?.inverse(), precision: system, of_press })
     }
 
     /// Before anything is fitted: the description.
     pub fn before(count: usize) -> Self {
-        Self { covariance: DMatrix::identity(count, count), of_press: DMatrix::zeros(count, count) }
+        let one = DMatrix::identity(count, count);
+        Self { covariance: one.clone(), precision: one, of_press: DMatrix::zeros(count, count) }
     }
 
     /// The parameters with their standard errors.

@@ -216,7 +216,7 @@ fn place_errors_m(bundle: &Bundle, slopes: &Slopes, posterior: &Posterior) -> Ve
     let radius_m = bundle.presses.first().map_or(0.0, |press| press.usual.radius_m);
     let error_m = |at_m: &[f64; 2]| {
         let contact = Contact::flat(at_m[0], at_m[1], radius_m, 0.5 * detector.sheet_conductance_s());
-        Some((*at_m, bundle.place_error_m(&contact, slopes, &posterior.covariance)?))
+        Some((*at_m, bundle.place_error_m(&contact, slopes, &posterior.precision)?))
     };
     map(&places, error_m).into_iter().flatten().collect()
 }
