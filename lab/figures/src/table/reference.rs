@@ -43,9 +43,14 @@ pub(super) fn figures() -> Vec<Figure> {
     for (case, name) in CASES {
         for (job, model) in [("validate-slab", "slab"), ("validate-shell", "shell")] {
             for solver in ["tikhonov", "tikhonov-paper"] {
-                let path = format!("cases/case={case}/solvers/solver={solver}/position_error_m");
-                let says = format!("error of {solver} with the {model} on the reference case {case}");
-                all.push(figure(job, format!("{solver}.{model}.{name}"), says, path).mm().by(0.05));
+                let of = |what: &str, id: &str, field: &str| {
+                    let path = format!("cases/case={case}/solvers/solver={solver}/{field}");
+                    let says = format!("{what} of {solver} with the {model} on the reference case {case}");
+                    figure(job, format!("{solver}.{model}.{name}{id}"), says, path)
+                };
+                all.push(of("error", "", "position_error_m").mm().by(0.05));
+                // Equal peaks between electrodes may count or not, by the last digits.
+                all.push(of("number of contacts found", ".found", "count_found").by(1.0));
             }
         }
         let path = |field: &str| format!("cases/case={case}/solvers/solver=auto/{field}");

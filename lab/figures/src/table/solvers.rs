@@ -74,11 +74,35 @@ fn built() -> Vec<Figure> {
     all
 }
 
-/// Time against error of defaults on `square-60`.
+/// Solvers of `tradeoff`, with their defaults.
+const SOLVERS: [&str; 13] = [
+    "auto",
+    "contacts",
+    "network",
+    "nonlinear",
+    "bsbl",
+    "tv",
+    "nonnegative",
+    "laplace",
+    "noser",
+    "tsvd",
+    "tikhonov",
+    "tikhonov-paper",
+    "kernel",
+];
+
+/// Time against error of defaults on `square-60`, and how close images are to the truth.
 fn speed() -> Vec<Figure> {
     let mut all =
         vec![figure("tradeoff", "tradeoff.seconds", "time of `tradeoff --quick`", "seconds").unit("s", 1.0).share(0.5)];
-    for solver in ["auto", "contacts", "tikhonov", "network"] {
+    for solver in SOLVERS {
+        for scene in ["five-fingers", "wide", "ring", "line"] {
+            let id = format!("tradeoff.{solver}.{scene}.correlation");
+            let says = format!("correlation of the image of {solver} with the truth, scene `{scene}`, square-60");
+            let path =
+                format!("detectors/0/solvers/solver={solver}&parameter=null/scenes/scene={scene}/summary/correlation");
+            all.push(figure("tradeoff", id, says, path).by(0.1));
+        }
         for name in ["one", "several", "shapes"] {
             let of = |field: &str, says: &str, path: &str| {
                 let says = format!("{says} of {solver}, scenes of the group `{name}`, square-60");
