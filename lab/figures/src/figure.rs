@@ -74,8 +74,11 @@ impl Figure {
 /// What documents say for a word of a report.
 fn said(word: &str) -> String {
     match word {
-        "sensor-only" => "for the sensor, not with that solver".to_owned(),
-        "solver-only" => "for that solver only".to_owned(),
+        "paper-only" => "only as the paper computes it".to_owned(),
+        "sensor-only" => "for the sensor only".to_owned(),
+        "sensor-holds" => "for the sensor; else cannot be judged".to_owned(),
+        "sensor-does-not" => "not for the sensor; else cannot be judged".to_owned(),
+        "unknown" => "cannot be judged".to_owned(),
         word => word.replace('-', " "),
     }
 }

@@ -162,9 +162,9 @@ mod tests {
             ("in 5 mm 300<!-- figure: a -->", json!(301), "300", "301"),
             (
                 "| does not hold<!-- figure: a --> |",
-                json!("for that solver only"),
+                json!("for the sensor only"),
                 "does not hold",
-                "for that solver only",
+                "for the sensor only",
             ),
         ] {
             assert_eq!(shown(text, value), (there.to_owned(), wanted.to_owned()), "{text}");

@@ -1,7 +1,9 @@
 //! The figures: what there is, and where it comes from. A page of documents has a file here.
 
+mod calibrate;
 mod design;
 mod hardware;
+mod physics;
 mod reference;
 mod solvers;
 
@@ -9,7 +11,15 @@ use crate::figure::{Figure, Fold, Spread};
 
 /// All figures, in the order of the documents.
 pub fn figures() -> Vec<Figure> {
-    [reference::figures(), solvers::figures(), design::figures(), hardware::figures()].concat()
+    [
+        reference::figures(),
+        physics::figures(),
+        solvers::figures(),
+        design::figures(),
+        calibrate::figures(),
+        hardware::figures(),
+    ]
+    .concat()
 }
 
 /// One of a run: its id, what it says, where it stands.

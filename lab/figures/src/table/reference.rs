@@ -4,7 +4,7 @@ use super::figure;
 use crate::figure::Figure;
 
 /// The cases of `tests/reference/slab`, and what documents call them.
-const CASES: [(&str, &str); 12] = [
+pub(super) const CASES: [(&str, &str); 12] = [
     ("square60_A_light", "light"),
     ("square60_A_corner", "corner"),
     ("square60_A_centre", "centre"),
