@@ -14,6 +14,7 @@ use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::door::Limits;
+use tactomo_physics::causes::with_causes;
 
 /// Pause after a connection could not be accepted, as where the system has no more of them.
 const AFTER_FAILURE: Duration = Duration::from_millis(100);
@@ -28,7 +29,7 @@ pub(super) async fn serve(listener: TcpListener, router: Router, limits: Limits)
         let stream = match listener.accept().await {
             Ok((stream, _)) => stream,
             Err(error) => {
-                tracing::debug!("a connection could not be accepted: {error}");
+                tracing::debug!("a connection could not be accepted: {}", with_causes(&error));
                 sleep(AFTER_FAILURE).await;
                 continue;
             }

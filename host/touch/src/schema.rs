@@ -6,188 +6,18 @@
 //! integer and false of a flag.
 
 use serde::Serialize;
-use serde::ser::{SerializeMap, Serializer};
+use serde::ser::Serializer;
 
 use tactomo_physics::readings::Readings;
 
 use crate::pointer::PointerEvent;
-use crate::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
+use crate::solve::{Choice, Flags, FoundContact, FoundShape, Solution};
 
-/// What kind of number a column has. In files of columns each kind is that of the file: 64-bit integers, booleans, double precision.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A whole number.
-    Integer,
-    /// Whether something is so: 1 or 0.
-    Flag,
-    /// Any number.
-    Number,
-}
+mod columns;
+mod events;
 
-impl Kind {
-    /// A value of this kind as text; nothing if it is not known.
-    fn text(self, value: Option<f64>) -> String {
-        match (self, value) {
-            (_, None) => String::new(),
-            (Self::Flag, Some(value)) => (value != 0.0).to_string(),
-            (Self::Integer | Self::Number, Some(value)) => value.to_string(),
-        }
-    }
-}
-
-/// A number of a contact, by its name.
-pub struct ContactColumn {
-    /// Name with unit.
-    pub name: &'static str,
-    /// What kind of number it is.
-    pub kind: Kind,
-    of: fn(&FoundContact) -> Option<f64>,
-}
-
-/// The numbers of a contact, in the order of every format.
-pub const CONTACT_COLUMNS: [ContactColumn; 15] = [
-    ContactColumn { name: "id", kind: Kind::Integer, of: |contact| contact.id.map(f64::from) },
-    ContactColumn { name: "x_m", kind: Kind::Number, of: |contact| Some(contact.x_m) },
-    ContactColumn { name: "y_m", kind: Kind::Number, of: |contact| Some(contact.y_m) },
-    ContactColumn { name: "z_m", kind: Kind::Number, of: |contact| Some(contact.z_m) },
-    ContactColumn { name: "conductance_s", kind: Kind::Number, of: FoundContact::known_conductance_s },
-    ContactColumn { name: "apparent_conductance_s", kind: Kind::Number, of: |contact| contact.apparent_conductance_s },
-    ContactColumn { name: "radius_m", kind: Kind::Number, of: |contact| contact.radius_m },
-    ContactColumn { name: "force_n", kind: Kind::Number, of: |contact| contact.force_n },
-    ContactColumn { name: "force_deviation_n", kind: Kind::Number, of: |contact| contact.force_deviation_n },
-    ContactColumn {
-        name: "force_beyond_maximum",
-        kind: Kind::Flag,
-        of: |contact| contact.force_beyond_maximum.map(f64::from),
-    },
-    ContactColumn { name: "sigma_x_m", kind: Kind::Number, of: |contact| error(contact, |errors| errors.x_m) },
-    ContactColumn { name: "sigma_y_m", kind: Kind::Number, of: |contact| error(contact, |errors| errors.y_m) },
-    ContactColumn {
-        name: "correlation",
-        kind: Kind::Number,
-        of: |contact| error(contact, |errors| errors.correlation),
-    },
-    ContactColumn {
-        name: "sigma_conductance_s",
-        kind: Kind::Number,
-        of: |contact| error(contact, |errors| errors.conductance_s),
-    },
-    ContactColumn { name: "depth_m", kind: Kind::Number, of: |contact| contact.depth_m },
-];
-
-fn error(contact: &FoundContact, of: fn(&Uncertainty) -> f64) -> Option<f64> {
-    contact.uncertainty.as_ref().map(of)
-}
-
-impl ContactColumn {
-    /// Its value, if it is known.
-    pub fn value(&self, contact: &FoundContact) -> Option<f64> {
-        (self.of)(contact)
-    }
-}
-
-/// The numbers of a contact in the order of [`CONTACT_COLUMNS`] without the first, its id, which is an integer; NaN where not
-/// known. For binary layouts.
-pub fn contact_values(contact: &FoundContact) -> [f32; CONTACT_COLUMNS.len() - 1] {
-    std::array::from_fn(|index| CONTACT_COLUMNS[index + 1].value(contact).map_or(f32::NAN, |value| value as f32))
-}
-
-/// `{id?, x_m, y_m, z_m?, conductance_s?, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ..., depth_m?}`; z is left out on a flat detector.
-impl Serialize for FoundContact {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        for column in &CONTACT_COLUMNS {
-            match (column.name, column.kind, column.value(self)) {
-                ("z_m", _, Some(0.0)) | (_, _, None) => {}
-                (name, Kind::Integer, Some(value)) => map.serialize_entry(name, &(value as u64))?,
-                (name, Kind::Flag, Some(value)) => map.serialize_entry(name, &(value != 0.0))?,
-                (name, Kind::Number, Some(value)) => map.serialize_entry(name, &value)?,
-            }
-        }
-        map.end()
-    }
-}
-
-/// A number of a shape, by its name.
-pub struct ShapeColumn {
-    /// Name with unit, after `shape_`; in JSON, where the shape is an object, without that.
-    pub name: &'static str,
-    of: fn(&FoundShape) -> Option<f64>,
-}
-
-/// The numbers of a shape, in the order of every format: ends of a line, centre and radius of a ring, width and conductance of both, and the
-/// standard errors of all.
-pub const SHAPE_COLUMNS: [ShapeColumn; 18] = [
-    ShapeColumn { name: "shape_from_x_m", of: |shape| line(shape, |line| Some(line.from_m[0])) },
-    ShapeColumn { name: "shape_from_y_m", of: |shape| line(shape, |line| Some(line.from_m[1])) },
-    ShapeColumn { name: "shape_to_x_m", of: |shape| line(shape, |line| Some(line.to_m[0])) },
-    ShapeColumn { name: "shape_to_y_m", of: |shape| line(shape, |line| Some(line.to_m[1])) },
-    ShapeColumn { name: "shape_x_m", of: |shape| ring(shape, |ring| Some(ring.centre_m[0])) },
-    ShapeColumn { name: "shape_y_m", of: |shape| ring(shape, |ring| Some(ring.centre_m[1])) },
-    ShapeColumn { name: "shape_radius_m", of: |shape| ring(shape, |ring| Some(ring.radius_m)) },
-    ShapeColumn { name: "shape_width_m", of: |shape| Some(shape.width_m()) },
-    ShapeColumn { name: "shape_conductance_s", of: |shape| Some(shape.conductance_s()) },
-    ShapeColumn { name: "shape_sigma_from_x_m", of: |shape| line(shape, |line| Some(line.uncertainty?.from_m[0])) },
-    ShapeColumn { name: "shape_sigma_from_y_m", of: |shape| line(shape, |line| Some(line.uncertainty?.from_m[1])) },
-    ShapeColumn { name: "shape_sigma_to_x_m", of: |shape| line(shape, |line| Some(line.uncertainty?.to_m[0])) },
-    ShapeColumn { name: "shape_sigma_to_y_m", of: |shape| line(shape, |line| Some(line.uncertainty?.to_m[1])) },
-    ShapeColumn { name: "shape_sigma_x_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.centre_m[0])) },
-    ShapeColumn { name: "shape_sigma_y_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.centre_m[1])) },
-    ShapeColumn { name: "shape_sigma_radius_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.radius_m)) },
-    ShapeColumn {
-        name: "shape_sigma_width_m",
-        of: |shape| {
-            line(shape, |line| Some(line.uncertainty?.width_m)).or(ring(shape, |ring| Some(ring.uncertainty?.width_m)))
-        },
-    },
-    ShapeColumn {
-        name: "shape_sigma_conductance_s",
-        of: |shape| {
-            line(shape, |line| Some(line.uncertainty?.conductance_s))
-                .or(ring(shape, |ring| Some(ring.uncertainty?.conductance_s)))
-        },
-    },
-];
-
-fn line(shape: &FoundShape, of: fn(&FoundLine) -> Option<f64>) -> Option<f64> {
-    match shape {
-        FoundShape::Line(line) => of(line),
-        FoundShape::Ring(_) => None,
-    }
-}
-
-fn ring(shape: &FoundShape, of: fn(&FoundRing) -> Option<f64>) -> Option<f64> {
-    match shape {
-        FoundShape::Line(_) => None,
-        FoundShape::Ring(ring) => of(ring),
-    }
-}
-
-impl ShapeColumn {
-    /// Its value, if it is known.
-    pub fn value(&self, shape: &FoundShape) -> Option<f64> {
-        (self.of)(shape)
-    }
-}
-
-/// The numbers of a shape in the order of [`SHAPE_COLUMNS`]; NaN where not known. For binary layouts.
-pub fn shape_values(shape: &FoundShape) -> [f32; SHAPE_COLUMNS.len()] {
-    std::array::from_fn(|index| SHAPE_COLUMNS[index].value(shape).map_or(f32::NAN, |value| value as f32))
-}
-
-/// `{kind, from_x_m?, ..., x_m?, ..., width_m, conductance_s, sigma_...?}`; the kind is `line` or `ring`.
-impl Serialize for FoundShape {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("kind", self.name())?;
-        for column in &SHAPE_COLUMNS {
-            if let Some(value) = column.value(self) {
-                map.serialize_entry(column.name.trim_start_matches("shape_"), &value)?;
-            }
-        }
-        map.end()
-    }
-}
+pub use columns::{CONTACT_COLUMNS, ContactColumn, Kind, SHAPE_COLUMNS, ShapeColumn, contact_values, shape_values};
+pub use events::{EVENT_COLUMNS, EventColumn};
 
 /// Version of a frame's JSON: it changes where a field goes or means something else, and stays where one is added.
 pub const SCHEMA: u32 = 1;
@@ -317,7 +147,7 @@ pub struct FrameColumn {
 }
 
 /// The numbers of a frame but for its contacts and image, in the order of every format.
-pub const FRAME_COLUMNS: [FrameColumn; 14] = [
+pub const FRAME_COLUMNS: [FrameColumn; 15] = [
     FrameColumn { name: "frame", kind: Kind::Integer, of: |frame| frame.frame.map(|frame| frame as f64) },
     FrameColumn { name: "sequence", kind: Kind::Integer, of: |frame| frame.sequence.map(|sequence| sequence as f64) },
     FrameColumn { name: "time_s", kind: Kind::Number, of: |frame| frame.time_s },
@@ -327,6 +157,7 @@ pub const FRAME_COLUMNS: [FrameColumn; 14] = [
     FrameColumn { name: "frame_us", kind: Kind::Number, of: |frame| frame.frame_us },
     FrameColumn { name: "age_us", kind: Kind::Number, of: |frame| frame.age_us },
     FrameColumn { name: "residual", kind: Kind::Number, of: |frame| frame.residual },
+    FrameColumn { name: "certainty", kind: Kind::Number, of: |frame| frame.certainty },
     FrameColumn { name: "saturated", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.saturated) },
     FrameColumn { name: "misfit", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.misfit) },
     FrameColumn { name: "unfinished", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.unfinished) },
@@ -342,55 +173,6 @@ impl FrameColumn {
     /// Its value, if it is known.
     pub fn value(&self, frame: &FrameReport) -> Option<f64> {
         (self.of)(frame)
-    }
-}
-
-/// A number of an event of the pointer, by its name.
-pub struct EventColumn {
-    /// Name with unit, after `event_`.
-    pub name: &'static str,
-    /// What kind of number it is.
-    pub kind: Kind,
-    of: fn(&PointerEvent) -> Option<f64>,
-}
-
-/// The numbers of an event, for arrays: its kind (0 a move, 1 a press, 2 a release, 3 a click) and what belongs to that.
-pub const EVENT_COLUMNS: [EventColumn; 6] = [
-    EventColumn {
-        name: "kind",
-        kind: Kind::Integer,
-        of: |event| {
-            Some(match event {
-                PointerEvent::Move { .. } => 0.0,
-                PointerEvent::Press => 1.0,
-                PointerEvent::Release { .. } => 2.0,
-                PointerEvent::Click { .. } => 3.0,
-            })
-        },
-    },
-    EventColumn { name: "dx_m", kind: Kind::Number, of: |event| moved(event).map(|[dx_m, _]| dx_m) },
-    EventColumn { name: "dy_m", kind: Kind::Number, of: |event| moved(event).map(|[_, dy_m]| dy_m) },
-    EventColumn {
-        name: "held_s",
-        kind: Kind::Number,
-        of: |event| if let PointerEvent::Release { held_s } = event { Some(*held_s) } else { None },
-    },
-    EventColumn { name: "x_m", kind: Kind::Number, of: |event| clicked(event).map(|[x_m, _]| x_m) },
-    EventColumn { name: "y_m", kind: Kind::Number, of: |event| clicked(event).map(|[_, y_m]| y_m) },
-];
-
-fn moved(event: &PointerEvent) -> Option<[f64; 2]> {
-    if let PointerEvent::Move { dx_m, dy_m } = event { Some([*dx_m, *dy_m]) } else { None }
-}
-
-fn clicked(event: &PointerEvent) -> Option<[f64; 2]> {
-    if let PointerEvent::Click { x_m, y_m } = event { Some([*x_m, *y_m]) } else { None }
-}
-
-impl EventColumn {
-    /// Its value, if an event of its kind has it.
-    pub fn value(&self, event: &PointerEvent) -> Option<f64> {
-        (self.of)(event)
     }
 }
 
@@ -439,7 +221,7 @@ pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::{ElectrodeFault, LineUncertainty};
+    use crate::solve::{ElectrodeFault, FoundLine, FoundRing, LineUncertainty, Uncertainty};
 
     fn contact() -> FoundContact {
         FoundContact {

@@ -78,8 +78,8 @@ const fn live(
 
 /// All pictures.
 pub const PICTURES: &[Picture] = &[
-    live("docs/live.png", "--scene five-fingers", "light", 5, "5 contacts"),
-    live("docs/live-dark.png", "--scene five-fingers", "dark", 5, "5 contacts"),
+    live("docs/live.png", "--scene several", "light", 3, "3 contacts"),
+    live("docs/live-dark.png", "--scene several", "dark", 3, "3 contacts"),
     live("docs/demo-gripper.png", "--scene gripper --board ideal", "light", 0, "line"),
     live("docs/demo-display.png", "--scene display --board ideal", "light", 2, "2 contacts"),
     live("docs/demo-pointer.png", "--scene pointer --board ideal", "light", 1, "1 contact"),

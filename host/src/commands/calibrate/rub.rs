@@ -279,7 +279,7 @@ impl Report {
             format!("thickness {:.2} mm {}", 1e3 * detector.thickness_m(), share("thickness")),
             format!("top over bottom {ratio:.2} {}", share("top-over-bottom")),
             format!(
-                "places of a press are expected within {:.2} mm (one standard error, mean over the sensor)",
+                "places of a press are expected within {:.2} mm (one standard error, median over the sensor)",
                 1e3 * self.place_error_m
             ),
         ];

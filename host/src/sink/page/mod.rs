@@ -150,9 +150,7 @@ pub enum ServerError {
         source: serde_json::Error,
     },
     /// An address that nobody has.
-    #[error(
-        "cannot serve the page at {address}: {source}; give --listen an address that this machine has, or only a port"
-    )]
+    #[error("cannot serve the page at {address}: give --listen an address that this machine has, or only a port")]
     Address {
         /// The address asked for.
         address: Address,

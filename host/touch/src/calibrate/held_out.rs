@@ -37,7 +37,7 @@ pub struct HeldOut {
     pub presses: usize,
     /// What a single contact on the detector as described, and on the one found, leaves of them: median, in standard deviations of a frame's noise.
     pub residuals: [f64; 2],
-    /// Expected standard error of places (m) by what is known of the detector as described, and of the one found: root mean square.
+    /// Expected standard error of places (m) by what is known of the detector as described, and of the one found: median over the detector.
     pub place_errors_m: [f64; 2],
 }
 

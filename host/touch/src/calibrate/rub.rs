@@ -63,9 +63,9 @@ pub struct Rub {
 }
 
 impl Rub {
-    /// Root of the mean square of the standard errors of places (m).
+    /// Median of the standard errors of places over the detector (m): a few corners, where readings tell little, do not decide it.
     pub fn place_error_m(&self) -> f64 {
-        root_mean_square_m(&self.place_errors_m)
+        median_m(&self.place_errors_m)
     }
 
     /// Whether presses that were not used say that it has helped.
@@ -74,9 +74,10 @@ impl Rub {
     }
 }
 
-fn root_mean_square_m(place_errors_m: &[([f64; 2], f64)]) -> f64 {
-    let squares = place_errors_m.iter().map(|(_, error_m)| error_m * error_m);
-    (squares.sum::<f64>() / place_errors_m.len().max(1) as f64).sqrt()
+fn median_m(place_errors_m: &[([f64; 2], f64)]) -> f64 {
+    let mut sorted: Vec<f64> = place_errors_m.iter().map(|(_, error_m)| *error_m).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or_default()
 }
 
 /// Places along a side that standard errors are told for, and how far they reach in shares of it.
@@ -125,7 +126,7 @@ pub fn rub(
     let first = presses.started(&problem, &first)?;
     let mut bundle = Bundle::new(Arc::clone(&problem.model), parameters, first, full_v);
     let mut slopes = Slopes::new(&bundle.model, &bundle.parameters)?;
-    let before_m = root_mean_square_m(&place_errors_m(&bundle, &slopes, &Posterior::before(bundle.parameters.len())));
+    let before_m = median_m(&place_errors_m(&bundle, &slopes, &Posterior::before(bundle.parameters.len())));
     let (first, last) = adjusted(&mut bundle, &mut slopes, &presses, &rest, told)?;
     let single = chosen.singles.iter().map(|mean| mean.frames).sum();
     if bundle.chi_square(&last) > UNFIT {
@@ -137,7 +138,7 @@ pub fn rub(
     let mut detector = calibrated(nominal, &chosen, &bundle, &posterior);
     detector.force.clone_from(&told_channels.force);
     let place_errors_m = place_errors_m(&bundle, &slopes, &posterior);
-    let after_m = root_mean_square_m(&place_errors_m);
+    let after_m = median_m(&place_errors_m);
     let residuals = [held_out::residual(&problem.model, &held)?, held_out::residual(&bundle.model, &held)?];
     let held_out = match residuals {
         [Some(before), Some(after)] => {

@@ -1,0 +1,181 @@
+//! The numbers of a contact and of a shape, by their names.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use crate::solve::{FoundContact, FoundLine, FoundRing, FoundShape, Uncertainty};
+
+/// What kind of number a column has. In files of columns each kind is that of the file: 64-bit integers, booleans, double precision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A whole number.
+    Integer,
+    /// Whether something is so: 1 or 0.
+    Flag,
+    /// Any number.
+    Number,
+}
+
+impl Kind {
+    /// A value of this kind as text; nothing if it is not known.
+    pub(super) fn text(self, value: Option<f64>) -> String {
+        match (self, value) {
+            (_, None) => String::new(),
+            (Self::Flag, Some(value)) => (value != 0.0).to_string(),
+            (Self::Integer | Self::Number, Some(value)) => value.to_string(),
+        }
+    }
+}
+
+/// A number of a contact, by its name.
+pub struct ContactColumn {
+    /// Name with unit.
+    pub name: &'static str,
+    /// What kind of number it is.
+    pub kind: Kind,
+    of: fn(&FoundContact) -> Option<f64>,
+}
+
+/// The numbers of a contact, in the order of every format.
+pub const CONTACT_COLUMNS: [ContactColumn; 15] = [
+    ContactColumn { name: "id", kind: Kind::Integer, of: |contact| contact.id.map(f64::from) },
+    ContactColumn { name: "x_m", kind: Kind::Number, of: |contact| Some(contact.x_m) },
+    ContactColumn { name: "y_m", kind: Kind::Number, of: |contact| Some(contact.y_m) },
+    ContactColumn { name: "z_m", kind: Kind::Number, of: |contact| Some(contact.z_m) },
+    ContactColumn { name: "conductance_s", kind: Kind::Number, of: FoundContact::known_conductance_s },
+    ContactColumn { name: "apparent_conductance_s", kind: Kind::Number, of: |contact| contact.apparent_conductance_s },
+    ContactColumn { name: "radius_m", kind: Kind::Number, of: |contact| contact.radius_m },
+    ContactColumn { name: "force_n", kind: Kind::Number, of: |contact| contact.force_n },
+    ContactColumn { name: "force_deviation_n", kind: Kind::Number, of: |contact| contact.force_deviation_n },
+    ContactColumn {
+        name: "force_beyond_maximum",
+        kind: Kind::Flag,
+        of: |contact| contact.force_beyond_maximum.map(f64::from),
+    },
+    ContactColumn { name: "sigma_x_m", kind: Kind::Number, of: |contact| error(contact, |errors| errors.x_m) },
+    ContactColumn { name: "sigma_y_m", kind: Kind::Number, of: |contact| error(contact, |errors| errors.y_m) },
+    ContactColumn {
+        name: "correlation",
+        kind: Kind::Number,
+        of: |contact| error(contact, |errors| errors.correlation),
+    },
+    ContactColumn {
+        name: "sigma_conductance_s",
+        kind: Kind::Number,
+        of: |contact| error(contact, |errors| errors.conductance_s),
+    },
+    ContactColumn { name: "depth_m", kind: Kind::Number, of: |contact| contact.depth_m },
+];
+
+fn error(contact: &FoundContact, of: fn(&Uncertainty) -> f64) -> Option<f64> {
+    contact.uncertainty.as_ref().map(of)
+}
+
+impl ContactColumn {
+    /// Its value, if it is known.
+    pub fn value(&self, contact: &FoundContact) -> Option<f64> {
+        (self.of)(contact)
+    }
+}
+
+/// The numbers of a contact in the order of [`CONTACT_COLUMNS`] without the first, its id, which is an integer; NaN where not
+/// known. For binary layouts.
+pub fn contact_values(contact: &FoundContact) -> [f32; CONTACT_COLUMNS.len() - 1] {
+    std::array::from_fn(|index| CONTACT_COLUMNS[index + 1].value(contact).map_or(f32::NAN, |value| value as f32))
+}
+
+/// `{id?, x_m, y_m, z_m?, conductance_s?, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ..., depth_m?}`; z is left out on a flat detector.
+impl Serialize for FoundContact {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for column in &CONTACT_COLUMNS {
+            match (column.name, column.kind, column.value(self)) {
+                ("z_m", _, Some(0.0)) | (_, _, None) => {}
+                (name, Kind::Integer, Some(value)) => map.serialize_entry(name, &(value as u64))?,
+                (name, Kind::Flag, Some(value)) => map.serialize_entry(name, &(value != 0.0))?,
+                (name, Kind::Number, Some(value)) => map.serialize_entry(name, &value)?,
+            }
+        }
+        map.end()
+    }
+}
+
+/// A number of a shape, by its name.
+pub struct ShapeColumn {
+    /// Name with unit, after `shape_`; in JSON, where the shape is an object, without that.
+    pub name: &'static str,
+    of: fn(&FoundShape) -> Option<f64>,
+}
+
+/// The numbers of a shape, in the order of every format: ends of a line, centre and radius of a ring, width and conductance of both, and the
+/// standard errors of all.
+pub const SHAPE_COLUMNS: [ShapeColumn; 18] = [
+    ShapeColumn { name: "shape_from_x_m", of: |shape| line(shape, |line| Some(line.from_m[0])) },
+    ShapeColumn { name: "shape_from_y_m", of: |shape| line(shape, |line| Some(line.from_m[1])) },
+    ShapeColumn { name: "shape_to_x_m", of: |shape| line(shape, |line| Some(line.to_m[0])) },
+    ShapeColumn { name: "shape_to_y_m", of: |shape| line(shape, |line| Some(line.to_m[1])) },
+    ShapeColumn { name: "shape_x_m", of: |shape| ring(shape, |ring| Some(ring.centre_m[0])) },
+    ShapeColumn { name: "shape_y_m", of: |shape| ring(shape, |ring| Some(ring.centre_m[1])) },
+    ShapeColumn { name: "shape_radius_m", of: |shape| ring(shape, |ring| Some(ring.radius_m)) },
+    ShapeColumn { name: "shape_width_m", of: |shape| Some(shape.width_m()) },
+    ShapeColumn { name: "shape_conductance_s", of: |shape| Some(shape.conductance_s()) },
+    ShapeColumn { name: "shape_sigma_from_x_m", of: |shape| line(shape, |line| Some(line.uncertainty?.from_m[0])) },
+    ShapeColumn { name: "shape_sigma_from_y_m", of: |shape| line(shape, |line| Some(line.uncertainty?.from_m[1])) },
+    ShapeColumn { name: "shape_sigma_to_x_m", of: |shape| line(shape, |line| Some(line.uncertainty?.to_m[0])) },
+    ShapeColumn { name: "shape_sigma_to_y_m", of: |shape| line(shape, |line| Some(line.uncertainty?.to_m[1])) },
+    ShapeColumn { name: "shape_sigma_x_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.centre_m[0])) },
+    ShapeColumn { name: "shape_sigma_y_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.centre_m[1])) },
+    ShapeColumn { name: "shape_sigma_radius_m", of: |shape| ring(shape, |ring| Some(ring.uncertainty?.radius_m)) },
+    ShapeColumn {
+        name: "shape_sigma_width_m",
+        of: |shape| {
+            line(shape, |line| Some(line.uncertainty?.width_m)).or(ring(shape, |ring| Some(ring.uncertainty?.width_m)))
+        },
+    },
+    ShapeColumn {
+        name: "shape_sigma_conductance_s",
+        of: |shape| {
+            line(shape, |line| Some(line.uncertainty?.conductance_s))
+                .or(ring(shape, |ring| Some(ring.uncertainty?.conductance_s)))
+        },
+    },
+];
+
+fn line(shape: &FoundShape, of: fn(&FoundLine) -> Option<f64>) -> Option<f64> {
+    match shape {
+        FoundShape::Line(line) => of(line),
+        FoundShape::Ring(_) => None,
+    }
+}
+
+fn ring(shape: &FoundShape, of: fn(&FoundRing) -> Option<f64>) -> Option<f64> {
+    match shape {
+        FoundShape::Line(_) => None,
+        FoundShape::Ring(ring) => of(ring),
+    }
+}
+
+impl ShapeColumn {
+    /// Its value, if it is known.
+    pub fn value(&self, shape: &FoundShape) -> Option<f64> {
+        (self.of)(shape)
+    }
+}
+
+/// The numbers of a shape in the order of [`SHAPE_COLUMNS`]; NaN where not known. For binary layouts.
+pub fn shape_values(shape: &FoundShape) -> [f32; SHAPE_COLUMNS.len()] {
+    std::array::from_fn(|index| SHAPE_COLUMNS[index].value(shape).map_or(f32::NAN, |value| value as f32))
+}
+
+/// `{kind, from_x_m?, ..., x_m?, ..., width_m, conductance_s, sigma_...?}`; the kind is `line` or `ring`.
+impl Serialize for FoundShape {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("kind", self.name())?;
+        for column in &SHAPE_COLUMNS {
+            if let Some(value) = column.value(self) {
+                map.serialize_entry(column.name.trim_start_matches("shape_"), &value)?;
+            }
+        }
+        map.end()
+    }
+}
