@@ -16,7 +16,8 @@ use tactomo::readings::Readings;
 use tactomo::scene::{Hand, Scene, SceneName};
 use tactomo::simulate::{Fault, Measurement, Physics, finer_model};
 use tactomo::solve::{
-    ElectrodeFault, ElectrodeWatch, FaultyElectrodes, FoundContact, FoundShape, Look, Method, Problem, without,
+    ElectrodeFault, ElectrodeWatch, FaultyElectrodes, FoundContact, FoundShape, Guard, Look, Method, Problem, Solver,
+    without,
 };
 use tactomo_protocol::{BoardMessage, BoardReceiver};
 
@@ -25,6 +26,10 @@ const FRAMES: usize = 24;
 /// Frames that are solved, of these.
 const SOLVED: usize = 6;
 const PATIENCE: Duration = Duration::from_secs(60);
+/// Length of a press, where there are several (s).
+const PRESS_S: f64 = 0.5;
+/// Exchanged wires are named at most this long after the first frame that is pressed (s).
+const NAMED_WITHIN_S: f64 = 2.0;
 
 /// A steady press, behind wires that may be faulty.
 struct Pressed {
@@ -35,6 +40,19 @@ struct Pressed {
 impl Physics for Pressed {
     fn readings_v(&mut self, _time_s: f64) -> Readings {
         self.wires.pad_voltages(Some(&self.impedance_ohm))
+    }
+}
+
+/// Presses one after another, behind wires that may be faulty.
+struct Pressing {
+    impedances_ohm: Vec<DMatrix<f64>>,
+    wires: Measurement,
+}
+
+impl Physics for Pressing {
+    fn readings_v(&mut self, time_s: f64) -> Readings {
+        let press = (time_s / PRESS_S) as usize % self.impedances_ohm.len();
+        self.wires.pad_voltages(Some(&self.impedances_ohm[press]))
     }
 }
 
@@ -56,17 +74,32 @@ impl Bench {
         touched_impedance_ohm(&*self.fine, &touches).unwrap()
     }
 
+    /// Wires with such a fault.
+    fn wires(&self, fault: Option<&str>) -> Measurement {
+        let faults: Vec<Fault> = fault.map(|fault| fault.parse().unwrap()).into_iter().collect();
+        Measurement::new(self.problem.detector(), &faults, 1).unwrap()
+    }
+
     /// Frames of a board with such a fault, and the problem as that board measures it.
     fn frames(&self, model: BoardModel, impedance_ohm: &DMatrix<f64>, fault: Option<&str>) -> (Problem, Vec<Readings>) {
+        let pressed = Pressed { impedance_ohm: impedance_ohm.clone(), wires: self.wires(fault) };
+        let (problem, frames) = self.recorded(model, Box::new(pressed), |frames| frames.len() == FRAMES);
+        (problem, frames.into_iter().map(|(_, readings)| readings).collect())
+    }
+
+    /// Frames of a board until there are enough, each with the board's time since the first (s), and the problem as that board measures it.
+    fn recorded(
+        &self,
+        model: BoardModel,
+        physics: Box<dyn Physics>,
+        is_enough: impl Fn(&[(f64, Readings)]) -> bool,
+    ) -> (Problem, Vec<(f64, Readings)>) {
         let detector = self.problem.detector();
-        let faults: Vec<Fault> = fault.map(|fault| fault.parse().unwrap()).into_iter().collect();
-        let wires = Measurement::new(detector, &faults, 1).unwrap();
-        let pressed = Pressed { impedance_ohm: impedance_ohm.clone(), wires };
-        let mut board = SimulatedBoard::start(detector, Box::new(pressed), Options { seed: 1, model }).unwrap();
+        let mut board = SimulatedBoard::start(detector, physics, Options { seed: 1, model }).unwrap();
         let (mut session, mut receiver) = (Session::new(RequestedSettings::default()), BoardReceiver::default());
         let (mut problem, mut frames, mut volts) = (self.problem.clone(), Vec::new(), None);
-        let begun = Instant::now();
-        while frames.len() < FRAMES {
+        let (begun, mut first_us) = (Instant::now(), None);
+        loop {
             assert!(begun.elapsed() < PATIENCE, "{model:?}: no frames");
             if let Some(command) = session.command(Instant::now()) {
                 send(&mut board, &command).unwrap();
@@ -83,14 +116,19 @@ impl Bench {
                     }
                     Ok(BoardMessage::Frame(frame)) => {
                         session.frame(Instant::now());
-                        frames.extend(volts.as_ref().and_then(|volts: &Volts| volts.readings(&frame)));
+                        let Some(readings) = volts.as_ref().and_then(|volts: &Volts| volts.readings(&frame)) else {
+                            continue;
+                        };
+                        let since = *first_us.get_or_insert(frame.head.time_us);
+                        frames.push((1e-6 * f64::from(frame.head.time_us.wrapping_sub(since)), readings));
+                        if is_enough(&frames) {
+                            return (problem, frames);
+                        }
                     }
                     _ => {}
                 }
             }
         }
-        frames.truncate(FRAMES);
-        (problem, frames)
     }
 }
 
@@ -134,9 +172,7 @@ fn left_out_everywhere(model: BoardModel) {
     let (expected, none) = answered(&healthy.0, &healthy.1);
     assert_eq!((expected.len(), none), (1, vec![]), "{model:?}");
     let cases = (0..16).flat_map(|e| {
-        // The next one. A short of electrodes 5 and 6, on different converters of the ESP32, is not told yet: their errors part the readings by
-        // more than noise does (`SAME` in `touch/src/solve/health.rs`).
-        let other = if e == 5 { 4 } else { (e + 1) % 16 };
+        let other = (e + 1) % 16;
         [(format!("open:{e}"), ElectrodeFault::Open), (format!("short:{e},{other}"), ElectrodeFault::Shorted)]
     });
     let mut wrong = Vec::new();
@@ -184,6 +220,27 @@ fn exchanged_wires_are_told_by_most_presses_on_every_board() {
             .collect();
         let right = told.iter().filter(|pair| **pair == Some([a, b])).count();
         assert!(right >= 2 && told.iter().flatten().all(|pair| *pair == [a, b]), "{model:?} {a},{b}: {told:?}");
+    }
+}
+
+/// Counted in the board's time and in answers, one a frame as `live` has them: it is when the guard looks that is tested, not this machine.
+#[test]
+fn exchanged_wires_are_named_within_two_seconds_of_presses() {
+    let bench = Bench::new(&Detector::default());
+    let impedances_ohm: Vec<_> = (1..=4).map(|seed| bench.touched_ohm(SceneName::Single, seed)).collect();
+    for (index, [a, b]) in EXCHANGED.into_iter().chain([[4, 11], [7, 8]]).enumerate() {
+        let model = BoardModel::ALL[index % BoardModel::ALL.len()];
+        let wires = bench.wires(Some(&format!("swap:{a},{b}")));
+        let pressing = Pressing { impedances_ohm: impedances_ohm.clone(), wires };
+        let is_enough = |frames: &[(f64, Readings)]| frames.last().is_some_and(|(time_s, _)| *time_s > NAMED_WITHIN_S);
+        let (problem, frames) = bench.recorded(model, Box::new(pressing), is_enough);
+        let mut guard = Guard::new(Method::Auto, &problem).unwrap();
+        let named = frames.iter().enumerate().find_map(|(answer, (time_s, readings))| {
+            guard.solve(readings).unwrap();
+            (!guard.excluded().is_empty()).then_some((answer, *time_s))
+        });
+        let expected = [a, b].map(|e| (e, ElectrodeFault::Exchanged));
+        assert_eq!(guard.excluded(), expected, "{model:?} {a},{b}: named {named:?} in {} frames", frames.len());
     }
 }
 

@@ -58,7 +58,7 @@ impl Chosen {
         if touched.is_empty() {
             return Err(CalibrateError::NoPress { frames: frames.len() });
         }
-        let kept = kept(&touched, detector, noise_v);
+        let kept = kept(&touched, detector);
         if 2 * kept.len() <= detector.electrodes.len() {
             let all = 0..detector.electrodes.len();
             return Err(CalibrateError::Electrodes { faulty: all.filter(|e| !kept.contains(e)).collect() });
@@ -128,14 +128,11 @@ fn feature(readings: &Readings, detector: &Detector) -> [f64; 3] {
 }
 
 /// Electrodes that are not wrong in many of the frames.
-fn kept(touched: &[&Frame], detector: &Detector, noise_v: f64) -> Vec<usize> {
+fn kept(touched: &[&Frame], detector: &Detector) -> Vec<usize> {
     let n = detector.electrodes.len();
     let step = touched.len().div_ceil(200);
-    let looked: Vec<_> = touched
-        .iter()
-        .step_by(step)
-        .filter_map(|frame| faulty_electrodes(&frame.readings, detector.drive_v, noise_v))
-        .collect();
+    let looked: Vec<_> =
+        touched.iter().step_by(step).filter_map(|frame| faulty_electrodes(&frame.readings, detector)).collect();
     let wrong = |e: &usize| looked.iter().filter(|faulty| faulty.iter().any(|(other, _)| other == e)).count();
     (0..n).filter(|e| (wrong(e) as f64) <= FAULTY * looked.len().max(1) as f64).collect()
 }

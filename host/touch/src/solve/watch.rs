@@ -56,9 +56,7 @@ impl FaultyElectrodes {
 /// Watches readings for faulty electrodes.
 #[derive(Clone, Debug)]
 pub struct ElectrodeWatch {
-    electrodes: usize,
-    drive_v: f64,
-    noise_v: f64,
+    detector: Detector,
     faulty: FaultyElectrodes,
     /// Largest reading at which each electrode was found faulty (V), how many frames have shown it healthy since, and how many have to.
     cases: Vec<Case>,
@@ -102,13 +100,10 @@ pub enum Look {
 impl ElectrodeWatch {
     /// Watches a detector, as measured.
     pub fn new(detector: &Detector) -> Self {
-        let electrodes = detector.electrodes.len();
         Self {
-            electrodes,
-            drive_v: detector.drive_v,
-            noise_v: detector.adc.deviation_v(),
             faulty: FaultyElectrodes::default(),
-            cases: vec![Case::default(); electrodes],
+            cases: vec![Case::default(); detector.electrodes.len()],
+            detector: detector.clone(),
             largest_v: 0.0,
             skipped: 0,
             doubts: 0,
@@ -130,10 +125,10 @@ impl ElectrodeWatch {
             return false;
         }
         let frames = std::mem::take(&mut self.skipped);
-        if readings.electrodes() != self.electrodes || readings.volts().iter().any(|volts| !volts.is_finite()) {
+        if readings.electrodes() != self.cases.len() || readings.volts().iter().any(|volts| !volts.is_finite()) {
             return false;
         }
-        let Some(faulty) = health::faulty_electrodes(readings, self.drive_v, self.noise_v) else { return false };
+        let Some(faulty) = health::faulty_electrodes(readings, &self.detector) else { return false };
         self.largest_v = self.healthy_largest_v(readings, &faulty);
         let is_back = self.take_back(&faulty, frames);
         let is_out = self.suspect(&faulty, readings);
@@ -144,7 +139,7 @@ impl ElectrodeWatch {
     fn healthy_largest_v(&self, readings: &Readings, faulty: &[(usize, ElectrodeFault)]) -> f64 {
         let all = faulty.iter().chain(&self.faulty.faults);
         let wrong: Vec<usize> = all.map(|(electrode, _)| *electrode).collect();
-        let healthy: Vec<usize> = (0..self.electrodes).filter(|electrode| !wrong.contains(electrode)).collect();
+        let healthy: Vec<usize> = (0..self.cases.len()).filter(|electrode| !wrong.contains(electrode)).collect();
         readings.of(&healthy).largest_v()
     }
 
@@ -155,7 +150,7 @@ impl ElectrodeWatch {
             let case = &mut self.cases[*electrode];
             // A broken wire shows at any touch.
             let least_v = match fault {
-                ElectrodeFault::Open => health::TOUCHED * self.noise_v,
+                ElectrodeFault::Open => health::TOUCHED * self.detector.adc.deviation_v(),
                 _ => AS_LARGE * case.found_at_v,
             };
             if faulty.iter().any(|(wrong, _)| wrong == electrode) {
@@ -188,14 +183,14 @@ impl ElectrodeWatch {
         let left_out =
             |(electrode, _): &&(usize, ElectrodeFault)| self.faulty.faults.iter().any(|(e, _)| e == electrode);
         let shorted: Vec<_> = faulty.iter().filter(left_out).copied().collect();
-        self.faulty.joints = joints(&shorted, readings, self.drive_v);
+        self.faulty.joints = joints(&shorted, readings, self.detector.drive_v);
         true
     }
 
     fn exclude(&mut self, found: &[(usize, ElectrodeFault)]) -> bool {
         let is_known = |electrode: usize| self.faulty.faults.iter().any(|(known, _)| *known == electrode);
         let found: Vec<_> = found.iter().copied().filter(|(electrode, _)| !is_known(*electrode)).collect();
-        if found.is_empty() || self.electrodes < FEWEST + self.faulty.faults.len() + found.len() {
+        if found.is_empty() || self.cases.len() < FEWEST + self.faulty.faults.len() + found.len() {
             return false;
         }
         match found[..] {
