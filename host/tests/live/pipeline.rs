@@ -96,7 +96,7 @@ fn a_link_that_cannot_come_back_is_an_error() {
 fn a_board_of_a_newer_protocol_is_refused() {
     let error = tactomo::run::run(&mut opened(Says(newer_hello())), plan(), ends().0).unwrap_err();
     let LiveError::Greet { error: GreetError::Version(_), .. } = &error else { panic!("{error:?}") };
-    assert!(error.to_string().contains("version 3"), "{error}");
+    assert!(error.to_string().contains(&format!("version {NEWER}")), "{error}");
 }
 
 #[test]
@@ -195,11 +195,14 @@ impl Link for Says {
     }
 }
 
-/// A packet in version 3 of the protocol: a body without zeros whose checksum has none either is its own COBS.
+/// A version of the protocol that this program does not know.
+const NEWER: u8 = tactomo_protocol::VERSION + 1;
+
+/// A packet in it: a body without zeros whose checksum has none either is its own COBS.
 fn newer_hello() -> Vec<u8> {
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
     let packet = (1..=255u8).find_map(|byte| {
-        let body = [3 << 4, byte, 7, 7];
+        let body = [NEWER << 4, byte, 7, 7];
         let packet: Vec<u8> = body.into_iter().chain(crc.checksum(&body).to_le_bytes()).collect();
         (!packet.contains(&0)).then_some(packet)
     });
