@@ -182,7 +182,7 @@ fn a_socket_whose_page_has_gone_without_a_word_ends() -> Result<()> {
 fn a_message_is_sent_when_the_last_was_taken() -> Result<()> {
     let rig = Rig::start(None)?;
     let mut page = RawPage::open(rig.server.port())?;
-    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"setup","layout":8,"#)));
+    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"setup","layout":9,"#)));
     assert!(page.is_silent_for(Duration::from_millis(400))?, "the setup was not taken");
     page.take()?;
     assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"status","#)));
