@@ -42,7 +42,8 @@ def test_a_recording_is_solved_less_its_baseline(path):
     raw, rest = list(recording), list(recording.less_baseline(rest=20))
     mean_v = np.mean([frame.readings for frame in raw[:20]], axis=0)
     assert len(rest) == len(raw) - 20
-    assert np.allclose(rest[0].readings, raw[20].readings - mean_v, atol=1e-12)
+    # Less the mean, but for what a converter that gives nothing below zero has hidden of it: less than two codes.
+    assert np.allclose(rest[0].readings, raw[20].readings - mean_v, atol=1.6e-3)
     assert np.array_equal(solver.solve(rest[-1]).array.shape, solver.solve(rest[-1].readings).array.shape)
 
 
