@@ -25,7 +25,7 @@
 //!
 //! let mut command = [0; MAX_COMMAND];
 //! let length = encode_request(&Request { tag: 7, command: Command::Start }, VERSION, &mut command)?;
-//! assert_eq!(command[..length], [0x08, 0x38, 0x07, 0x01, 0x1B, 0x68, 0x59, 0xF1, 0x00]);
+//! assert_eq!(command[..length], [0x08, 0x38, 0x07, 0x01, 0x6B, 0xCB, 0x7F, 0xED, 0x00]);
 //!
 //! let mut line = *b"ets Jul 29 2019\r\n\0.............";
 //! let length = encode_board(&BoardMessage::Fault(Fault::AdcStuck), &mut line[18..])?;
