@@ -80,7 +80,7 @@ const fn live(
 pub const PICTURES: &[Picture] = &[
     live("docs/live.png", "--scene several", "light", 3, "3 contacts"),
     live("docs/live-dark.png", "--scene several", "dark", 3, "3 contacts"),
-    live("docs/demo-gripper.png", "--scene gripper --board ideal", "light", 0, "line"),
+    live("docs/demo-gripper.png", "--scene gripper --board ideal", "light", 0, "Line"),
     live("docs/demo-display.png", "--scene display --board ideal", "light", 2, "2 contacts"),
     live("docs/demo-pointer.png", "--scene pointer --board ideal", "light", 1, "1 contact"),
     live("docs/demo-texture.png", "--scene texture --board ideal", "light", 2, "2 contacts"),
