@@ -39,6 +39,11 @@ impl RequestedSettings {
         if version >= FIRST_WITH_SELECT { self } else { Self { select_us: None, discarded: None, ..self } }
     }
 
+    /// Whether a board may take them.
+    pub fn is_valid(&self) -> bool {
+        self.over(Settings::default()).is_valid()
+    }
+
     /// The settings `now`, with those that are asked for.
     pub(super) fn over(&self, now: Settings) -> Settings {
         Settings {

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::DMatrix;
 
+use super::{ForwardError, ForwardModel};
 use crate::detector::Detector;
 use crate::geometry::Point;
 use crate::scene::Contact;
@@ -80,6 +81,33 @@ pub fn sheet_drops_ohm(detector: &Detector, contacts: &[Contact]) -> DMatrix<f64
         let own_m = if k == l { discs[k].1 } else { 0.0 };
         neumann(size_m, discs[k].0, discs[l].0, own_m) - to_point[k] - to_point[l] + of_point
     })
+}
+
+/// Step of the logarithm of a conductance for a derivative.
+const STEP_LOG: f64 = 1e-3;
+
+/// What contacts have in common of a driving sheet of one ohm per square: by how much `Z` is larger (ohm) than that of contacts which each
+/// conduct less by what is below it alone. With `J[k]` the current through contact `k` for an ampere into each electrode, which
+/// `J[k] J[k]' = -C[k] dZ/d ln C[k]` tells, the sum of `J[k] D[k][l] J[l]'` over all that are two, to first order.
+///
+/// # Errors
+/// [`ForwardError`] if a contact is not on the detector or none conducts.
+pub fn sheet_between_ohm(model: &dyn ForwardModel, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
+    let n = model.detector().electrodes.len();
+    if contacts.len() < 2 {
+        return Ok(DMatrix::zeros(n, n));
+    }
+    let firmer = |contact: &Contact| Contact { conductance_s: contact.conductance_s * STEP_LOG.exp(), ..*contact };
+    let firmer: Vec<_> = contacts.iter().map(firmer).enumerate().collect();
+    let (_, changes_ohm) = model.impedance_with_changes_ohm(contacts, &firmer)?;
+    let current = |(contact, change): (&Contact, &DMatrix<f64>)| {
+        change.diagonal().map(|ohm| (-contact.conductance_s * ohm / STEP_LOG).max(0.0).sqrt())
+    };
+    let currents: Vec<_> = contacts.iter().zip(&changes_ohm).map(current).collect();
+    let currents = DMatrix::from_columns(&currents);
+    let mut drops_ohm = sheet_drops_ohm(model.detector(), contacts);
+    drops_ohm.fill_diagonal(0.0);
+    Ok(&currents * drops_ohm * currents.transpose())
 }
 
 /// Neumann's function of a rectangular sheet of one ohm per square between two places from its corner (m), of mean zero; of an even disc to

@@ -19,9 +19,6 @@ const MAX_FINGERS: usize = 10;
 /// Most faults at a time.
 const MAX_FAULTS: usize = 16;
 
-/// Most conversions averaged, as a base-2 logarithm: what the protocol carries.
-const MAX_AVERAGE_LOG2: u8 = 8;
-
 /// Most bytes of a mark.
 const MAX_MARK: usize = 1000;
 
@@ -77,6 +74,8 @@ pub(super) struct Settings {
     settle_us: Option<u16>,
     average_log2: Option<u8>,
     max_frames_per_s: Option<u16>,
+    select_us: Option<u16>,
+    discarded: Option<u8>,
 }
 
 /// A fault as it is written on the command line: `open:3`.
@@ -135,11 +134,10 @@ impl PageMessage {
 
 impl Settings {
     fn requested(self) -> Result<RequestedSettings, &'static str> {
-        let Self { settle_us, average_log2, max_frames_per_s } = self;
-        match average_log2 {
-            Some(log2) if log2 > MAX_AVERAGE_LOG2 => Err("at most 256 conversions can be averaged"),
-            _ => Ok(RequestedSettings { settle_us, average_log2, max_frames_per_s, ..Default::default() }),
-        }
+        let Self { settle_us, average_log2, max_frames_per_s, select_us, discarded } = self;
+        let asked = RequestedSettings { settle_us, average_log2, max_frames_per_s, select_us, discarded };
+        let refusal = "a board averages at most 256 conversions, discards at most 15 and selects in at most 10000 us";
+        if asked.is_valid() { Ok(asked) } else { Err(refusal) }
     }
 }
 
@@ -222,8 +220,10 @@ mod tests {
         assert_eq!(asks(r#"{"speed":0.25}"#), control(Control::Speed(0.25)));
         assert_eq!(asks(r#"{"speed":null}"#), control(Control::Speed(f64::INFINITY)));
         assert_eq!(asks(r#"{"loop":false}"#), control(Control::Loop(false)));
-        let settings = RequestedSettings { average_log2: Some(3), ..Default::default() };
-        assert_eq!(asks(r#"{"settings":{"average_log2":3}}"#), Ok(Some(Request::Settings(settings))));
+        let settings =
+            RequestedSettings { average_log2: Some(3), select_us: Some(17), discarded: Some(1), ..Default::default() };
+        let text = r#"{"settings":{"average_log2":3,"select_us":17,"discarded":1}}"#;
+        assert_eq!(asks(text), Ok(Some(Request::Settings(settings))));
     }
 
     #[test]
@@ -251,6 +251,8 @@ mod tests {
             r#"{"speed":1000}"#,
             r#"{"speed":"max"}"#,
             r#"{"settings":{"average_log2":9}}"#,
+            r#"{"settings":{"select_us":10001}}"#,
+            r#"{"settings":{"discarded":16}}"#,
             r#"{"settings":{"settle_us":70000}}"#,
             r#"{"settings":{"baud":1}}"#,
             r#"{"record":1}"#,

@@ -202,6 +202,8 @@ struct HelloMessage<'a> {
     settle_us: u16,
     averages: u32,
     max_frames_per_s: u16,
+    select_us: u16,
+    discarded: u8,
 }
 
 #[derive(Serialize)]
@@ -313,6 +315,8 @@ fn hello(hello: &Hello) -> HelloMessage<'_> {
         settle_us: hello.settings.settle_us,
         averages: 1_u32.checked_shl(hello.settings.average_log2.into()).unwrap_or(0),
         max_frames_per_s: hello.settings.max_frames_per_s,
+        select_us: hello.settings.select_us,
+        discarded: hello.settings.discarded,
     }
 }
 

@@ -26,6 +26,8 @@ export class Board {
     this.form = document.getElementById("settings");
     this.average = document.getElementById("average");
     this.settle = document.getElementById("settle");
+    this.select = document.getElementById("select");
+    this.discard = document.getElementById("discard");
     this.rate = document.getElementById("max-rate");
     this.average.replaceChildren(...AVERAGES.map((many, log2) => new Option(many === 1 ? "none" : String(many), String(log2))));
     this.form.onsubmit = (event) => {
@@ -39,8 +41,9 @@ export class Board {
 
   #asked() {
     // No limit of the rate is zero.
-    const [settle, most] = [this.settle, this.rate].map(({ value }) => Number(value));
-    return { average_log2: Number(this.average.value), settle_us: settle, max_frames_per_s: most };
+    const fields = [this.average, this.settle, this.select, this.discard, this.rate];
+    const [average, settle, select, discarded, most] = fields.map(({ value }) => Number(value));
+    return { average_log2: average, settle_us: settle, select_us: select, discarded, max_frames_per_s: most };
   }
 
   #showSource() {
@@ -72,12 +75,14 @@ export class Board {
   }
 
   // Only when the board changed them: what a person is typing stays.
-  #showSettings({ averages, settle_us: settle, max_frames_per_s: most }) {
-    const shown = JSON.stringify([averages, settle, most]);
+  #showSettings({ averages, settle_us: settle, select_us: select, discarded, max_frames_per_s: most }) {
+    const shown = JSON.stringify([averages, settle, select, discarded, most]);
     if (shown === this.shown) return;
     this.shown = shown;
     this.average.value = String(Math.log2(averages));
     this.settle.value = String(settle);
+    this.select.value = String(select);
+    this.discard.value = String(discarded);
     this.rate.value = most ? String(most) : "";
     this.rate.placeholder = "all";
   }

@@ -51,6 +51,7 @@ use super::{Calibrated, Flags, FoundContact, Problem, Solution, SolveError, Unce
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
 
 /// Places of the scan.
 const SCAN_PLACES: usize = 600;
@@ -311,7 +312,7 @@ impl ContactFinder {
         let most_m = self.problem.detector().outline.size_m().map(|side_m| side_m / 12f64.sqrt());
         let uncertainty = known.map(|(covariance, logs)| {
             let place = place_uncertainty(fit, k, covariance);
-            let conductance_s = conductance_s * logs.conductance[1];
+            let conductance_s = conductance_s * logs.conductance[1].hypot(self.scale_deviation(&fit.contacts, k));
             Uncertainty { conductance_s, x_m: place.x_m.min(most_m[0]), y_m: place.y_m.min(most_m[1]), ..place }
         });
         let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
@@ -322,6 +323,11 @@ impl ContactFinder {
             radius_m: radius.map(|[mean, _]| mean.exp()),
             ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)
         }
+    }
+
+    /// Standard deviation of the logarithm of a conductance by what of the detector no readings tell from it.
+    fn scale_deviation(&self, contacts: &[Contact], k: usize) -> f64 {
+        self.problem.made_already().map_or(0.0, |nuisance| nuisance.conductance_logs(contacts).row(k).norm())
     }
 
     /// What a calibration would bring, if the detector as described leaves more of the readings than noise and the model's own error do, and

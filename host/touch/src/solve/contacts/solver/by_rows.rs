@@ -110,9 +110,11 @@ impl ContactFollower {
         }
     }
 
-    /// Readings that what is followed predicts (V), as long as it fits the rows.
+    /// Readings that what is followed predicts (V), as long as it fits the rows. On a detector that is not known exactly, what was found in some rows
+    /// alone predicts no others: as more rows come it changes without that anything moves.
     pub(super) fn expected_v(&self) -> Option<&[f64]> {
-        let fits = self.rows.as_ref().is_some_and(|state| state.fits());
+        let is_rough = self.is_glimpsed && self.finder.errors.detector.is_some();
+        let fits = !is_rough && self.rows.as_ref().is_some_and(|state| state.fits());
         self.last.as_ref().filter(|_| fits).map(|last| &last.fit.volts[..])
     }
 }
