@@ -312,7 +312,7 @@ mod tests {
                     prop_assert!(faults.iter().all(|fault| fault.check(16).is_ok()));
                 }
                 Ok(Some(Request::Settings(settings))) => {
-                    prop_assert!(settings.average_log2.is_none_or(|log2| log2 <= MAX_AVERAGE_LOG2));
+                    prop_assert!(settings.is_valid());
                 }
                 _ => {}
             }
