@@ -78,12 +78,17 @@ async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
             .browser
             .run("document.getElementById('settle').value = 25; document.getElementById('max-rate').value = 100")
             .await?;
+        stage
+            .browser
+            .run("document.getElementById('select').value = 17; document.getElementById('discard').value = 1")
+            .await?;
         stage.browser.run("document.getElementById('settings').requestSubmit()").await?;
         let settings = RequestedSettings {
             settle_us: Some(25),
             average_log2: Some(3),
             max_frames_per_s: Some(100),
-            ..Default::default()
+            select_us: Some(17),
+            discarded: Some(1),
         };
         asks(&stage, Request::Settings(settings)).await?;
         stage.browser.click("rezero").await?;
