@@ -112,14 +112,14 @@ fn forces(file: &str, detector: &str, solver: &str) -> Vec<(f64, f64, bool)> {
 fn ten_presses_give_newtons_within_their_hysteresis() {
     const HYSTERESIS: f64 = 0.1;
     let folder = Folder::new("force-round");
-    let (mut middle, mut off, mut within, mut count, mut left_out) = (Vec::new(), Vec::new(), 0, 0, 0);
+    let (mut middle, mut off, mut within, mut count) = (Vec::new(), Vec::new(), 0, 0);
     for seed in 0..10 {
         let mut bench = Bench::new(seed);
         let presses = folder.with("presses.csv", csv(&bench.rows(&TEN_N, HYSTERESIS)));
         let out = folder.path(&format!("cal-{seed}.toml"));
         let report = calibrated(&[&presses, "--newtons", &list(&TEN_N), "--out", &out]);
         assert_eq!(report["presses"].as_array().map(Vec::len), Some(10));
-        left_out += report["left_out"].as_array().map_or(0, Vec::len);
+        assert_eq!(report["left_out"], serde_json::json!([]), "{report}");
         let truth: Vec<f64> = (0..16).map(|k| 0.1 * 26f64.powf(f64::from(k) / 15.0)).collect();
         let others = folder.with("others.csv", csv(&bench.rows(&truth, HYSTERESIS)));
         for (force_n, (found_n, deviation_n, _)) in truth.iter().zip(forces(&others, &out, "auto")) {
@@ -136,8 +136,6 @@ fn ten_presses_give_newtons_within_their_hysteresis() {
     assert!(middle[8] < HYSTERESIS, "the middle of both curves is missed by {middle:?}");
     // A press is off by the hysteresis to either side, whoever tells it, and by what the middle is off.
     assert!(mean < 1.1 * HYSTERESIS, "{mean}");
-    // In a corner a press is found up to 5 mm off, and its conductance with it.
-    assert!(left_out <= 1, "{left_out} of 100 presses were left out");
     assert!(within * 10 >= 9 * count, "{within} of {count} in bands of 90 %");
 }
 
