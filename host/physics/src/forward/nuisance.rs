@@ -15,7 +15,7 @@
 //! does a driving layer with a resistance: under one contact it is a contact that conducts less, and only what contacts have in common of it is
 //! more than that. What is a change of conductances alone, readings cannot tell from them, and nothing is gained by calling it an error of the
 //! readings: patterns leave it out, and are those of a detector on which contacts' conductances have changed along
-//! ([`conductance_logs`](Nuisance::conductance_logs)); whoever says what a conductance is adds it. As an error of the readings it made firm
+//! ([`conductance_deviations`](Nuisance::conductance_deviations)); whoever says what a conductance is adds it. As an error of the readings it made firm
 //! contacts several in one of ten answers: it is large, and far from linear, where the readings hardly change with a conductance. (Dots of glue
 //! are left out: their own resistance hardly matters.)
 
@@ -189,22 +189,27 @@ impl Nuisance {
         Ok(Self { model: Arc::clone(through), parameters, directions: self.directions.select_rows(&rows), pads_ohm })
     }
 
-    /// By how much the logarithm of each contact's conductance is larger than readings of the described detector say, with one standard deviation of
-    /// each independent error: `contacts x directions`. Patterns are of readings less this.
-    pub fn conductance_logs(&self, contacts: &[Contact]) -> DMatrix<f64> {
+    /// Standard deviation of the logarithm of each contact's conductance by what of the detector no readings tell from it. Patterns leave it out.
+    pub fn conductance_deviations(&self, contacts: &[Contact]) -> Vec<f64> {
         let below_ohm = sheet_drops_ohm(self.model.detector(), contacts).diagonal();
         let by = |k: usize, changed: &Changed| match changed.parameter {
-            Parameter::Conductivity => changed.deviation,
+            Parameter::Conductivity => Some(changed.deviation),
             // 1/C is less than it seems by what is below it.
-            Parameter::DrivingSheet => changed.deviation * below_ohm[k] * contacts[k].conductance_s,
-            _ => 0.0,
+            Parameter::DrivingSheet => Some(changed.deviation * below_ohm[k] * contacts[k].conductance_s),
+            _ => None,
         };
-        let by = DMatrix::from_fn(contacts.len(), self.parameters.len(), |k, row| by(k, &self.parameters[row]));
-        by * &self.directions
+        let deviation = |k: usize| {
+            let steps = self.parameters.iter().enumerate().filter_map(|(row, changed)| Some((row, by(k, changed)?)));
+            let steps: Vec<_> = steps.collect();
+            let along =
+                |column: usize| steps.iter().map(|(row, step)| step * self.directions[(*row, column)]).sum::<f64>();
+            (0..self.directions()).map(|column| along(column).powi(2)).sum::<f64>().sqrt()
+        };
+        (0..contacts.len()).map(deviation).collect()
     }
 
     /// Changes of the readings of contacts (V), as `measured` has them, by one standard deviation of each independent error: a column each, in the readings' order.
-    /// The contacts' conductances change along, so that patterns have [nothing that is but a change of these](Self::conductance_logs).
+    /// The contacts' conductances change along, so that patterns have [nothing that is but a change of these](Self::conductance_deviations).
     ///
     /// # Errors
     /// [`ForwardError`] if a contact is not on the detector or none conducts.
@@ -366,21 +371,19 @@ mod tests {
     const SHEET_S: f64 = 0.2273 * 0.005;
 
     /// The one pattern of a detector with such tolerances under contacts (V), and how conductances change along.
-    fn pattern(tolerances: Tolerances, contacts: &[Contact]) -> (Vec<f64>, DMatrix<f64>) {
+    fn pattern(tolerances: Tolerances, contacts: &[Contact]) -> (Vec<f64>, Vec<f64>) {
         let detector = Detector { tolerances, ..Detector::default() };
         let model: Arc<dyn ForwardModel> = Arc::new(Slab::new(&detector).unwrap().on_image(100));
         let nuisance = Nuisance::new(&model, &detector, 1).unwrap().unwrap();
         let patterns_v = nuisance.patterns_v(contacts, &detector).unwrap();
         assert_eq!(patterns_v.ncols(), 1, "no square of what contacts can be");
-        (patterns_v.as_slice().to_vec(), nuisance.conductance_logs(contacts))
+        (patterns_v.as_slice().to_vec(), nuisance.conductance_deviations(contacts))
     }
 
-    fn changed(contacts: &[Contact], logs: &DMatrix<f64>) -> Vec<Contact> {
-        let along = |(k, contact): (usize, &Contact)| Contact {
-            conductance_s: contact.conductance_s * logs[(k, 0)].exp(),
-            ..*contact
-        };
-        contacts.iter().enumerate().map(along).collect()
+    fn changed(contacts: &[Contact], logs: &[f64]) -> Vec<Contact> {
+        let along =
+            |(contact, log): (&Contact, &f64)| Contact { conductance_s: contact.conductance_s * log.exp(), ..*contact };
+        contacts.iter().zip(logs).map(along).collect()
     }
 
     fn read_v(detector: &Detector, sheet_ohm: f64, contacts: &[Contact]) -> Vec<f64> {

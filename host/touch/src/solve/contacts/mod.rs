@@ -51,7 +51,6 @@ use super::{Calibrated, Flags, FoundContact, Problem, Solution, SolveError, Unce
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
-use tactomo_physics::scene::Contact;
 
 /// Places of the scan.
 const SCAN_PLACES: usize = 600;
@@ -286,8 +285,9 @@ impl ContactFinder {
         let fit = &found.fit;
         let covariance = fit.covariance();
         let logs: Vec<_> = (0..fit.contacts.len()).map(|k| self.logs(fit, k, covariance.as_ref())).collect();
-        let contacts: Vec<_> =
+        let mut contacts: Vec<_> =
             logs.iter().enumerate().map(|(k, logs)| self.contact(fit, k, covariance.as_ref().zip(*logs))).collect();
+        self.add_unseen_scale(fit, &mut contacts);
         // A standard error more and it is as good as perfect.
         let perfect = (SATURATED * self.sheet_s).ln();
         let is_perfect = |logs: &Option<Logs>| {
@@ -312,7 +312,7 @@ impl ContactFinder {
         let most_m = self.problem.detector().outline.size_m().map(|side_m| side_m / 12f64.sqrt());
         let uncertainty = known.map(|(covariance, logs)| {
             let place = place_uncertainty(fit, k, covariance);
-            let conductance_s = conductance_s * logs.conductance[1].hypot(self.scale_deviation(&fit.contacts, k));
+            let conductance_s = conductance_s * logs.conductance[1];
             Uncertainty { conductance_s, x_m: place.x_m.min(most_m[0]), y_m: place.y_m.min(most_m[1]), ..place }
         });
         let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
@@ -325,9 +325,14 @@ impl ContactFinder {
         }
     }
 
-    /// Standard deviation of the logarithm of a conductance by what of the detector no readings tell from it.
-    fn scale_deviation(&self, contacts: &[Contact], k: usize) -> f64 {
-        self.problem.made_already().map_or(0.0, |nuisance| nuisance.conductance_logs(contacts).row(k).norm())
+    /// Adds to the standard errors of conductances what of the detector no readings tell from them.
+    fn add_unseen_scale(&self, fit: &DiscFit, contacts: &mut [FoundContact]) {
+        let Some(nuisance) = self.problem.made_already() else { return };
+        for (contact, deviation) in contacts.iter_mut().zip(nuisance.conductance_deviations(&fit.contacts)) {
+            let conductance_s = contact.conductance_s;
+            let uncertainty = contact.uncertainty.iter_mut();
+            uncertainty.for_each(|known| known.conductance_s = known.conductance_s.hypot(conductance_s * deviation));
+        }
     }
 
     /// What a calibration would bring, if the detector as described leaves more of the readings than noise and the model's own error do, and
