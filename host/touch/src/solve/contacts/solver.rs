@@ -47,6 +47,8 @@ pub(in crate::solve) struct ContactFollower {
     latest: Option<Latest>,
     /// Whether what is followed was found in some of the rows only.
     is_glimpsed: bool,
+    /// Time since a search changed the number of contacts (s), until one does not: rows from before were told for other contacts' motion.
+    recounted_s: Option<f64>,
     doubt: Doubt,
     /// Time for which no row has said more than that its readings are below the converter's range (s).
     silent_s: f64,
@@ -114,6 +116,7 @@ impl ContactFollower {
             rows: None,
             latest: None,
             is_glimpsed: false,
+            recounted_s: None,
             doubt: Doubt::default(),
             silent_s: 0.0,
             is_provisional: false,
@@ -174,6 +177,8 @@ impl ContactFollower {
     pub fn adopt(&mut self, found: Option<Found>, frames: usize, target: &Target) -> bool {
         self.tracker = self.before.clone();
         let expected_v = self.expected_v().map(<[f64]>::to_vec);
+        let count = |found: &Option<Explanation>| found.as_ref().map_or(0, |found| found.fit.contacts.len());
+        let before = count(&self.last);
         let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
         let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
         self.last = self.last.take().and_then(|last| self.finder.judged(last, target));
@@ -184,6 +189,7 @@ impl ContactFollower {
         if self.is_stale || evidence(&caught_up) >= evidence(&self.last) {
             (self.last, self.is_stale) = (caught_up, false);
         }
+        self.recounted_s = (count(&self.last) != before).then_some(0.0);
         self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(last, target)));
         if let Some(mut latest) = self.latest.take() {
             latest.exchange(expected_v.as_deref(), self.expected_v());

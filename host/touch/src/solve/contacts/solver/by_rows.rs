@@ -39,7 +39,9 @@ impl ContactFollower {
         }
         latest.add(rows, elapsed_s, self.expected_v());
         let is_outdated = self.last.is_some() && self.is_provisional && self.finder.knows_unknowns();
-        let search = search || is_outdated || self.is_glimpsed && latest.is_whole(OLDEST_S);
+        self.recounted_s = self.recounted_s.map(|time_s| time_s + elapsed_s);
+        let is_renewed = self.recounted_s.is_some_and(|time_s| latest.is_whole(time_s));
+        let search = search || is_outdated || is_renewed || self.is_glimpsed && latest.is_whole(OLDEST_S);
         self.latest = Some(latest);
         let mut solution = self.solution(&target);
         // A few rows do not tell it: what all readings are off by was taken off them.
