@@ -69,7 +69,7 @@ def pyeit_frame_us(solver):
 
 
 def tactomo(nodes):
-    run = ["cargo", "run", "--release", "--quiet", "--package", "tactomo", "--example", "speed", "--"]
+    run = ["cargo", "run", "--release", "--quiet", "--package", "tactomo-lab", "--example", "speed", "--"]
     command = sys.argv[2:3] or run
     return json.loads(subprocess.run([*command, str(nodes)], check=True, capture_output=True, text=True).stdout)
 

@@ -1,4 +1,4 @@
-"""Sets `tactomo learn` against scikit-learn's KernelRidge, on the same presses of five kinds of made-up skins.
+"""Sets `tactomo-lab learn` against scikit-learn's KernelRidge, on the same presses of five kinds of made-up skins.
 
 The presses are those of the example `skins`: 1800 taught, 400 unseen. KernelRidge has a Gaussian kernel, whose width and ridge are searched
 by cross-validation in three folds (least squares over x, y and z in metres), on each of two descriptions: the standardised channels,
@@ -6,9 +6,9 @@ as one would begin with, and the direction and the logarithm of the size of the 
 by the root mean square distance on the unseen presses. A second table says how many readings `tactomo` flags that no press can give.
 
     python3 -m venv .venv && .venv/bin/pip install numpy scikit-learn
-    cargo build --release --package tactomo
-    cargo run --release --package tactomo-touch --example skins -- skins 2
-    .venv/bin/python tools/compare_sklearn.py skins 2 [target/release/tactomo]
+    cargo build --release --package tactomo-lab
+    cargo run --release --package tactomo-lab --example skins -- skins 2
+    .venv/bin/python tools/compare_sklearn.py skins 2 [target/release/tactomo-lab]
 """
 
 import json
@@ -136,7 +136,7 @@ def flagged(program, folder, seed):
 
 def main():
     folder, seed = pathlib.Path(sys.argv[1]), sys.argv[2]
-    program = sys.argv[3] if len(sys.argv) > 3 else "target/release/tactomo"
+    program = sys.argv[3] if len(sys.argv) > 3 else "target/release/tactomo-lab"
     print("| skin | channels | KernelRidge: channels | directions | its search | tactomo | dimensions | fit | a press | flagged |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     for kind in KINDS:

@@ -2,8 +2,8 @@
 """Trains the solver `network` on simulated frames, or fine-tunes it on those of one calibrated detector.
 
     pip install jax optax numpy safetensors
-    cargo run --release --package tactomo --example network_data -- train.npz square-60 1500 30 1
-    cargo run --release --package tactomo --example network_data -- limits.npz square-60 100 30 2
+    cargo run --release --package tactomo-lab --example network_data -- train.npz square-60 1500 30 1
+    cargo run --release --package tactomo-lab --example network_data -- limits.npz square-60 100 30 2
     python3 tools/train_network.py --train train.npz --limits limits.npz --detector square-60 --out network.safetensors
 
 Fine-tuning takes data of the calibrated detector (the example's DETECTOR is then the calibration's file) and `--from network.safetensors`.

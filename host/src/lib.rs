@@ -2,7 +2,7 @@
 //! picture of it.
 //!
 //! Arrows run one way: [`detector`], [`scene`], [`forward`] and [`simulate`] (physics) <- [`solve`] and [`metrics`] (touch) <- [`run`] ->
-//! [`board`], with [`sink`] behind `run`, [`study`] on touch alone, and [`design`] on study. Each of them is a package of its own in the repository, and this one
+//! [`board`], with [`sink`] behind `run`. Each of them is a package of its own in the repository, and this one
 //! gives them all. Units are SI, and in the names.
 //!
 //! From a detector to contacts:
@@ -24,9 +24,7 @@
 //! ```
 
 pub use tactomo_board as board;
-pub use tactomo_design as design;
 pub use tactomo_physics::{causes, detector, forward, hertz, readings, rest, scene, simulate};
-pub use tactomo_study as study;
 pub use tactomo_table as table;
 pub use tactomo_touch::{calibrate, learned, metrics, pointer, schema, solve, vibration};
 

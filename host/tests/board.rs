@@ -5,9 +5,10 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::Value;
+use tactomo_tests::TACTOMO;
 
 /// A folder of its own with a tool that writes down what it is called with, and leaves with such a code.
 struct Tools(PathBuf);
@@ -37,7 +38,7 @@ impl Tools {
     }
 
     fn flash(&self, args: &[&str], here: &Path) -> (Option<i32>, String) {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tactomo"));
+        let mut command = TACTOMO.command();
         command.args(["board", "flash"]).args(args).current_dir(here).env("PATH", &self.0);
         let output = command.output().unwrap();
         (output.status.code(), String::from_utf8(output.stderr).unwrap())
@@ -90,7 +91,7 @@ fn an_image_for_another_board_or_none_is_told_before_a_tool_is_called() {
         (b"\xe9 an image that espflash saved", "esp32c3", "no ELF file"),
         (&of_c3[..20], "esp32c3", "cut off"),
         (&of_c3[..140], "esp32c3", "cut off"),
-        (&fs::read(env!("CARGO_BIN_EXE_tactomo")).unwrap()[..4096], "esp32c3", "it is for a computer"),
+        (&fs::read(TACTOMO.path()).unwrap()[..4096], "esp32c3", "it is for a computer"),
         (&of_c3, "esp32", "for the processor RISC-V, and the esp32 has Xtensa"),
         (&image_of("stm32f405"), "esp32c3", "for the processor ARM"),
         (&of_c3, "esp32c6", "0x3fc80000, where the esp32c6 has no memory"),
@@ -169,7 +170,7 @@ fn what_is_missing_or_fails_is_told_with_what_to_do() {
 }
 
 fn check(args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactomo"));
+    let mut command = TACTOMO.command();
     command.args(["board", "check", "--simulate"]).args(args).output().unwrap()
 }
 

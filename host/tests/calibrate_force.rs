@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-mod samples;
-
 use std::path::Path;
 
 use serde_json::Value;
@@ -14,7 +12,7 @@ use tactomo::readings::Readings;
 use tactomo::scene::Contact;
 use tactomo::simulate::{Noise, finer_model, measured};
 
-use self::samples::{Folder, csv, recording, tactomo};
+use tactomo_tests::{Folder, TACTOMO, csv, recording};
 
 /// Ten presses on a kitchen scale (N).
 const TEN_N: [f64; 10] = [0.1, 0.15, 0.25, 0.4, 0.6, 0.8, 1.1, 1.5, 2.0, 2.6];
@@ -80,7 +78,7 @@ fn list(forces_n: &[f64]) -> String {
 }
 
 fn calibrated(args: &[&str]) -> Value {
-    let output = tactomo(&[&["calibrate", "force"], args, &["--json"]].concat());
+    let output = TACTOMO.run(&[&["calibrate", "force"], args, &["--json"]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
@@ -89,7 +87,7 @@ fn calibrated(args: &[&str]) -> Value {
 fn refused(folder: &Folder, args: &[&str]) -> String {
     let before = folder.names();
     let out = folder.path("never.toml");
-    let output = tactomo(&[&["calibrate", "force"], args, &["--out", &out]].concat());
+    let output = TACTOMO.run(&[&["calibrate", "force"], args, &["--out", &out]].concat());
     assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0));
     assert_eq!(folder.names(), before, "nothing is written");
     String::from_utf8(output.stderr).unwrap()
@@ -97,7 +95,7 @@ fn refused(folder: &Folder, args: &[&str]) -> String {
 
 /// Force, its standard error and the flag of the only contact of each frame.
 fn forces(file: &str, detector: &str, solver: &str) -> Vec<(f64, f64, bool)> {
-    let output = tactomo(&["reconstruct", file, "--detector", detector, "--solver", solver, "--json"]);
+    let output = TACTOMO.run(&["reconstruct", file, "--detector", detector, "--solver", solver, "--json"]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let of = |line: &str| {
         let frame: Value = serde_json::from_str(line).unwrap();
@@ -171,7 +169,7 @@ fn every_solver_tells_the_force_that_was_calibrated_and_the_flag_beyond() {
             assert!(factor > 1.5 || *beyond == (*truth_n > 2.6), "{solver}: {truth_n} N");
         }
     }
-    let told = tactomo(&["reconstruct", &file, "--detector", &out, "--solver", "contacts"]);
+    let told = TACTOMO.run(&["reconstruct", &file, "--detector", &out, "--solver", "contacts"]);
     let told = String::from_utf8(told.stdout).unwrap();
     assert!(
         told.lines().all(|line| line.contains(" N")) && told.contains("N (beyond the largest that can be told)"),
@@ -186,7 +184,7 @@ fn a_file_is_never_replaced_and_bad_presses_write_none() {
     let rows = bench.rows(&TEN_N, 0.0);
     let good = folder.with("good.csv", csv(&rows));
     let precious = folder.with("precious.toml", "precious");
-    let output = tactomo(&["calibrate", "force", &good, "--newtons", &list(&TEN_N), "--out", &precious]);
+    let output = TACTOMO.run(&["calibrate", "force", &good, "--newtons", &list(&TEN_N), "--out", &precious]);
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("exists already, and is not replaced"));
     assert_eq!(std::fs::read_to_string(&precious).unwrap(), "precious");
@@ -236,7 +234,7 @@ fn a_file_is_never_replaced_and_bad_presses_write_none() {
         &[&good, "--newtons", "1,-2", "--out", "x.toml"],
         &[&good, "--newtons", "1", "--law", "5"],
     ] {
-        assert_eq!(tactomo(&[&["calibrate", "force"], wrong].concat()).status.code(), Some(2), "{wrong:?}");
+        assert_eq!(TACTOMO.run(&[&["calibrate", "force"], wrong].concat()).status.code(), Some(2), "{wrong:?}");
     }
 }
 
@@ -269,7 +267,7 @@ fn presses_of_a_recording_are_found_and_counted() {
     assert!(message.contains("6 presses are found, but 5 forces are given"), "{message}");
     assert!(message.contains("presses begin at 0.5, 1.5, 2.5, 3.5, 4.5, 5.5 s"), "{message}");
     // The recording is still one of this detector, whatever is known of its forces.
-    let again = tactomo(&["reconstruct", &file, "--detector", &out, "--solver", "contacts", "--json"]);
+    let again = TACTOMO.run(&["reconstruct", &file, "--detector", &out, "--solver", "contacts", "--json"]);
     assert!(
         !String::from_utf8_lossy(&again.stderr).contains("was recorded on"),
         "{}",

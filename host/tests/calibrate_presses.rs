@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-mod samples;
-
 use std::path::Path;
 
 use serde_json::Value;
@@ -13,7 +11,7 @@ use tactomo::readings::Readings;
 use tactomo::scene::Contact;
 use tactomo::simulate::{Noise, finer_model, measured};
 
-use self::samples::{Folder, csv, recording, tactomo};
+use tactomo_tests::{Folder, TACTOMO, csv, recording};
 
 /// How much larger the sensor is than its description says. Readings are those of what is described, at places that are as much nearer to the
 /// middle: no parameter of a calibration tells it.
@@ -75,7 +73,7 @@ fn table(places_m: &[[f64; 2]]) -> String {
 }
 
 fn calibrated(args: &[&str]) -> (Value, String) {
-    let output = tactomo(&[&["calibrate", "presses"], args, &["--json"]].concat());
+    let output = TACTOMO.run(&[&["calibrate", "presses"], args, &["--json"]].concat());
     let told = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(0), "{told}");
     (serde_json::from_slice(&output.stdout).unwrap(), told)
@@ -85,7 +83,7 @@ fn calibrated(args: &[&str]) -> (Value, String) {
 fn refused(folder: &Folder, args: &[&str]) -> String {
     let before = folder.names();
     let out = folder.path("never.toml");
-    let output = tactomo(&[&["calibrate", "presses"], args, &["--out", &out]].concat());
+    let output = TACTOMO.run(&[&["calibrate", "presses"], args, &["--out", &out]].concat());
     assert_eq!((output.status.code(), output.stdout.len()), (Some(1), 0), "{args:?}");
     assert_eq!(folder.names(), before, "nothing is written");
     String::from_utf8(output.stderr).unwrap()
@@ -93,7 +91,7 @@ fn refused(folder: &Folder, args: &[&str]) -> String {
 
 /// Mean distance (m) of the single contacts of a table from where they are, and the share of coordinates within one and two standard errors.
 fn off_m(file: &str, detector: &str, truth_m: &[[f64; 2]]) -> (f64, [f64; 2]) {
-    let output = tactomo(&["reconstruct", file, "--detector", detector, "--solver", "contacts", "--json"]);
+    let output = TACTOMO.run(&["reconstruct", file, "--detector", detector, "--solver", "contacts", "--json"]);
     let lines = String::from_utf8(output.stdout).unwrap();
     let (mut sum, mut within) = (0.0, [0.0; 2]);
     assert_eq!(lines.lines().count(), truth_m.len());
@@ -183,7 +181,7 @@ fn conductances_follow_the_law_where_forces_are_told() {
     let (report, _) = calibrated(&[&presses, "--detector", &described, "--places", &rising, "--out", &out]);
     assert_eq!(report["conductance"]["is_corrected"], true, "{report}");
     let others = folder.with("others.csv", csv(&bench.rows(&[[-0.012, 0.003], [0.012, 0.003]])));
-    let output = tactomo(&["reconstruct", &others, "--detector", &out, "--solver", "contacts", "--json"]);
+    let output = TACTOMO.run(&["reconstruct", &others, "--detector", &out, "--solver", "contacts", "--json"]);
     let force_n = |line: &str| serde_json::from_str::<Value>(line).unwrap()["contacts"][0]["force_n"].as_f64().unwrap();
     let found: Vec<f64> = String::from_utf8(output.stdout).unwrap().lines().map(force_n).collect();
     for (found_n, x_m) in found.iter().zip([-0.012, 0.012]) {
@@ -278,8 +276,8 @@ fn bad_presses_say_what_to_do_and_write_nothing() {
     let message = refused(&folder, &[&good, "--detector", &other, "--places", &places]);
     assert!(message.contains("has 256 readings a frame, but the detector strip-13x60"), "{message}");
     let precious = folder.with("precious.toml", "precious");
-    let output = tactomo(&["calibrate", "presses", &good, "--places", &places, "--out", &precious]);
+    let output = TACTOMO.run(&["calibrate", "presses", &good, "--places", &places, "--out", &precious]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("exists already, and is not replaced"));
     assert_eq!((output.status.code(), std::fs::read_to_string(&precious).unwrap()), (Some(1), "precious".to_owned()));
-    assert_eq!(tactomo(&["calibrate", "presses", &good, "--out", "x.toml"]).status.code(), Some(2));
+    assert_eq!(TACTOMO.run(&["calibrate", "presses", &good, "--out", "x.toml"]).status.code(), Some(2));
 }

@@ -2,60 +2,23 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-use std::path::PathBuf;
-use std::process::{Command, Output};
-
 use tactomo::detector::Detector;
 use tactomo::forward::ForwardModel;
 use tactomo::scene::Contact;
 use tactomo::simulate::{Fault, Measurement, drawn, finer_model};
+use tactomo_tests::{Folder, TACTOMO, csv};
 
-fn tactomo(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).output().unwrap()
-}
-
-/// A folder that goes when the test ends.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("tactomo-{}-rub-{name}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_str().unwrap().to_owned()
-    }
-
-    fn with(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
-        std::fs::write(self.0.join(name), bytes).unwrap();
-        self.path(name)
-    }
-
-    fn count(&self) -> usize {
-        std::fs::read_dir(&self.0).unwrap().count()
-    }
-
-    /// What is said where nothing is calibrated: exit code 1, nothing on stdout, and no file more than before.
-    fn refused(&self, table: &[Vec<f64>], more: &[&str]) -> String {
-        let line = |frame: &Vec<f64>| frame.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-        let file = self.with("rub.csv", table.iter().map(line).collect::<Vec<_>>().join("\n"));
-        let (out, files) = (self.path("cal.toml"), self.count());
-        let output =
-            tactomo(&[&["calibrate", "rub", &file, "--presses", "12", "--out", &out, "--json"], more].concat());
-        let message = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(1), "{message}");
-        assert!(output.stdout.is_empty(), "{message}");
-        assert_eq!(self.count(), files, "{message}");
-        message
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _gone = std::fs::remove_dir_all(&self.0);
-    }
+/// What is said where nothing is calibrated: exit code 1, nothing on stdout, and no file more than before.
+fn refused(folder: &Folder, table: &[Vec<f64>], more: &[&str]) -> String {
+    let file = folder.with("rub.csv", csv(table));
+    let (out, files) = (folder.path("cal.toml"), folder.names().len());
+    let output =
+        TACTOMO.run(&[&["calibrate", "rub", &file, "--presses", "12", "--out", &out, "--json"], more].concat());
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(output.stdout.is_empty(), "{message}");
+    assert_eq!(folder.names().len(), files, "{message}");
+    message
 }
 
 /// A detector as built, and its board.
@@ -109,7 +72,7 @@ fn only_what_helped_on_presses_that_were_not_used_is_recommended() {
         let line = |frame: &Vec<f64>| frame.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let file = folder.with("rub.csv", table.iter().map(line).collect::<Vec<_>>().join("\n"));
         let out = folder.path(&format!("cal-{count}.toml"));
-        let output = tactomo(&["calibrate", "rub", &file, "--out", &out, "--json"]);
+        let output = TACTOMO.run(&["calibrate", "rub", &file, "--out", &out, "--json"]);
         let told = String::from_utf8(output.stderr).unwrap();
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(report["helped"], is_helped, "{told}");
@@ -125,18 +88,18 @@ fn only_what_helped_on_presses_that_were_not_used_is_recommended() {
 fn where_nobody_or_a_whole_hand_presses_one_fingertip_is_asked_for() {
     let folder = Folder::new("fingers");
     let mut bench = Bench::new("square-60", &[]);
-    let rest = folder.refused(&bench.frames(30, 0), &[]);
+    let rest = refused(&folder, &bench.frames(30, 0), &[]);
     assert!(rest.contains("rub.csv: nothing presses in any of 30 frames: rub one fingertip"), "{rest}");
-    let hand = folder.refused(&bench.frames(24, 3), &[]);
+    let hand = refused(&folder, &bench.frames(24, 3), &[]);
     assert!(hand.contains("rub with one fingertip alone"), "{hand}");
 }
 
 #[test]
 fn readings_of_another_detector_are_not_fitted_to_this_one() {
     let folder = Folder::new("detector");
-    let many = folder.refused(&Bench::new("display-140x70", &[]).frames(4, 1), &[]);
+    let many = refused(&folder, &Bench::new("display-140x70", &[]).frames(4, 1), &[]);
     assert!(many.contains("1024 readings a frame") && many.contains("needs 256: give the right one with"), "{many}");
-    let strip = folder.refused(&Bench::new("strip-13x60", &[]).frames(12, 1), &[]);
+    let strip = refused(&folder, &Bench::new("strip-13x60", &[]).frames(12, 1), &[]);
     assert!(strip.contains("not those of square-60 within its tolerances") && strip.contains("choose the"), "{strip}");
 }
 
@@ -146,7 +109,7 @@ fn broken_wires_are_to_be_mended_where_too_few_are_left() {
     for broken in [vec![0, 2, 4, 6, 8, 10, 12], (0..12).collect()] {
         let faults: Vec<_> = broken.iter().map(|e| format!("open:{e}")).collect();
         let faults: Vec<_> = faults.iter().map(String::as_str).collect();
-        let message = folder.refused(&Bench::new("square-60", &faults).frames(12, 1), &[]);
+        let message = refused(&folder, &Bench::new("square-60", &faults).frames(12, 1), &[]);
         let told = format!("electrodes {broken:?} are broken, shorted or contradict the others: mend their wires");
         assert!(message.contains(&told), "{message}");
     }
@@ -161,7 +124,7 @@ fn known_places_in_the_wrong_order_or_beside_the_sensor_are_told() {
     frames.extend(bench.frames(20, 1));
     let refused = |places: [&str; 4]| {
         let known: Vec<_> = places.iter().flat_map(|place| ["--known", place]).collect();
-        folder.refused(&frames, &known)
+        refused(&folder, &frames, &known)
     };
     let order = refused(["1:20,15", "2:-20,-20", "3:-10,20", "4:20,-20"]);
     assert!(order.contains("presses at known places do not fit") && order.contains("belongs to its row"), "{order}");
@@ -175,7 +138,7 @@ fn known_places_in_the_wrong_order_or_beside_the_sensor_are_told() {
 fn a_file_that_exists_stays_as_it_is() {
     let folder = Folder::new("exists");
     let precious = folder.with("cal.toml", "precious");
-    let message = folder.refused(&[vec![0.0; 256]], &[]);
+    let message = refused(&folder, &[vec![0.0; 256]], &[]);
     assert!(message.contains("cal.toml exists already"), "{message}");
     assert_eq!(std::fs::read_to_string(precious).unwrap(), "precious");
 }

@@ -2,18 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-use std::process::{Command, Output};
-
-fn tactomo(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).output().unwrap()
-}
-
-/// Exit code and what stands on stderr.
-fn failure(args: &[&str]) -> (Option<i32>, String) {
-    let output = tactomo(args);
-    assert!(output.stdout.is_empty(), "only machine output belongs on stdout");
-    (output.status.code(), String::from_utf8(output.stderr).unwrap())
-}
+use tactomo_tests::TACTOMO;
 
 #[test]
 fn every_command_has_a_help_with_an_example() {
@@ -25,16 +14,12 @@ fn every_command_has_a_help_with_an_example() {
         "replay",
         "export",
         "forward",
-        "validate",
         "reconstruct",
         "detector",
-        "tradeoff",
-        "stability",
-        "study",
         "calibrate",
         "board",
     ] {
-        let output = tactomo(&[command, "--help"]);
+        let output = TACTOMO.run(&[command, "--help"]);
         let text = String::from_utf8(output.stdout).unwrap();
         assert_eq!(output.status.code(), Some(0));
         assert!(text.contains("Example") && text.contains(&format!("tactomo {command}")), "{command}: {text}");
@@ -66,12 +51,10 @@ fn wrong_use_exits_with_2_and_names_the_argument() {
         (&["forward", "--fault", "driving-sheet:100:3"], "1 or 2 points"),
         (&["live", "--time-factor", "10"], "--simulate"),
         (&["live", "--simulate", "--time-factor", "0"], "above 0"),
-        (&["study", "contacts", "--scenes", "0"], "--scenes"),
-        (&["tradeoff", "--scan", "--solver", "auto"], "--solver"),
         (&["calibrate", "force", "some.csv", "--out", "cal.toml"], "--newtons <N,N,...>|--forces <FILE>"),
         (&["dance"], "dance"),
     ] {
-        let (code, message) = failure(args);
+        let (code, message) = TACTOMO.failure(args);
         assert_eq!(code, Some(2), "{args:?}: {message}");
         assert!(message.contains(named), "{args:?}: {message}");
     }
@@ -98,17 +81,10 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         (&["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"], "Poisson's ratio is 0.6"),
         (&["live", "--port", "/dev/null", "--elf", text, "--json"], elf),
         (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
-        (&["tradeoff", "--quick", "--out", text], "exists already: give another name, or --overwrite"),
-        (&["tradeoff", "--quick", "--picture", text], "exists already: give another name, or --overwrite"),
-        (&["stability", "--quick", "--out", text], "exists already: give another name, or --overwrite"),
         (&["detector", "show", "--svg", text], "exists already: give another name, or --overwrite"),
         (&["forward", "--save-jacobian", text], "exists already: give another name, or --overwrite"),
-        (
-            &["stability", "--quick", "--out", "no/such/folder/a.html"],
-            "cannot write no/such/folder/a.html: No such file",
-        ),
     ] {
-        let (code, message) = failure(args);
+        let (code, message) = TACTOMO.failure(args);
         assert_eq!(code, Some(1), "{args:?}: {message}");
         assert!(message.contains(told), "{args:?}: {message}");
     }
@@ -122,8 +98,7 @@ fn with_closed(args: &[&str], [stdout, stderr]: [bool; 2]) -> (Option<i32>, Stri
     };
     let (stdout_reader, stdout) = pipe(stdout);
     let (stderr_reader, stderr) = pipe(stderr);
-    let mut child =
-        Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).stdout(stdout).stderr(stderr).spawn().unwrap();
+    let mut child = TACTOMO.command().args(args).stdout(stdout).stderr(stderr).spawn().unwrap();
     let drained = std::thread::spawn(move || stdout_reader.map(std::io::read_to_string));
     let messages = stderr_reader.map_or_else(String::new, |reader| std::io::read_to_string(reader).unwrap());
     drop(drained.join().unwrap());
@@ -166,12 +141,12 @@ fn reconstruct_ends_quietly_when_nobody_reads_on() {
 fn a_detector_goes_through_its_file_into_the_model() {
     let path = std::env::temp_dir().join(format!("tactomo-{}.toml", std::process::id()));
     let file = path.to_str().unwrap();
-    let shown = tactomo(&["detector", "show", "fingertip-10", "--material", "BC", "--toml"]);
+    let shown = TACTOMO.run(&["detector", "show", "fingertip-10", "--material", "BC", "--toml"]);
     std::fs::write(&path, &shown.stdout).unwrap();
     let contact = ["--contact", "1,0,1,1e-3", "--json"];
-    let from_file = tactomo(&[&["forward", "--detector", file], &contact[..]].concat());
-    let preset = tactomo(&[&["forward", "--detector", "fingertip-10", "--material", "BC"], &contact[..]].concat());
-    let again = tactomo(&["detector", "show", file, "--toml"]);
+    let from_file = TACTOMO.run(&[&["forward", "--detector", file], &contact[..]].concat());
+    let preset = TACTOMO.run(&[&["forward", "--detector", "fingertip-10", "--material", "BC"], &contact[..]].concat());
+    let again = TACTOMO.run(&["detector", "show", file, "--toml"]);
     std::fs::remove_file(&path).unwrap();
     assert_eq!(from_file.status.code(), Some(0), "{}", String::from_utf8_lossy(&from_file.stderr));
     assert_eq!(from_file.stdout, preset.stdout);
@@ -181,7 +156,7 @@ fn a_detector_goes_through_its_file_into_the_model() {
 #[test]
 fn the_study_of_contacts_has_a_row_for_each_class_and_shows_the_worst_scene() {
     let args = ["study", "contacts", "--detector", "square-60", "--scenes", "5", "--worst", "1"];
-    let output = tactomo(&args);
+    let output = TACTOMO.run(&args);
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(0), "{text}");
     for class in [
@@ -196,7 +171,7 @@ fn the_study_of_contacts_has_a_row_for_each_class_and_shows_the_worst_scene() {
         assert_eq!(text.lines().filter(|line| line.starts_with(class)).count(), 1, "{class}: {text}");
     }
     assert!(text.contains("on square-60: ") && text.contains(" visible, "), "{text}");
-    let output = tactomo(&[&args[..], &["--json"]].concat());
+    let output = TACTOMO.run(&[&args[..], &["--json"]].concat());
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&report["rows"][5]["class"], &report["rows"][5]["scenes"]["scenes"]), (&"all".into(), &5.into()));
     assert_eq!(report["worst"].as_array().map(Vec::len), Some(1));
@@ -207,7 +182,7 @@ fn scenes_faults_and_noise_repeat_with_their_seed() {
     let measured = |seed| {
         let faults = ["--fault", "open:3", "--fault", "contact-spread:0.3", "--fault", "uneven:0.2"];
         let scene = ["forward", "--scene", "several", "--force", "2", "--measured", "--json", "--seed", seed];
-        let output = tactomo(&[&scene[..], &faults].concat());
+        let output = TACTOMO.run(&[&scene[..], &faults].concat());
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         output.stdout
     };
@@ -218,7 +193,7 @@ fn scenes_faults_and_noise_repeat_with_their_seed() {
 #[test]
 fn foam_creeps_and_drifts_up_to_the_time_asked_for() {
     let report = |more: &[&str]| -> serde_json::Value {
-        let output = tactomo(&[&["forward", "--contact", "0,0,3,1e-3", "--json"], more].concat());
+        let output = TACTOMO.run(&[&["forward", "--contact", "0,0,3,1e-3", "--json"], more].concat());
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_slice(&output.stdout).unwrap()
     };
@@ -237,12 +212,12 @@ fn foam_creeps_and_drifts_up_to_the_time_asked_for() {
 fn what_was_built_is_told_and_can_be_simulated_again() {
     let contact = ["forward", "--contact", "3,-4,2.5,0.001", "--json", "--as-built"];
     let report = |args: &[&str]| -> serde_json::Value {
-        let output = tactomo(args);
+        let output = TACTOMO.run(args);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_slice(&output.stdout).unwrap()
     };
     let built = report(&[&contact[..], &["7"]].concat());
-    let shown = tactomo(&["detector", "show", "square-60", "--as-built", "7"]);
+    let shown = TACTOMO.run(&["detector", "show", "square-60", "--as-built", "7"]);
     let toml = String::from_utf8(shown.stdout).unwrap();
     assert_eq!(built["as_built"].as_str().unwrap().trim_end(), toml.trim_end());
     assert_eq!(built["detector"], "square-60");
@@ -250,7 +225,7 @@ fn what_was_built_is_told_and_can_be_simulated_again() {
     std::fs::write(&path, toml).unwrap();
     let again = report(&[&contact[..], &[path.to_str().unwrap()]].concat());
     let exact =
-        tactomo(&["forward", "--contact", "0,0,1,1e-3", "--detector", path.to_str().unwrap(), "--as-built", "1"]);
+        TACTOMO.run(&["forward", "--contact", "0,0,1,1e-3", "--detector", path.to_str().unwrap(), "--as-built", "1"]);
     std::fs::remove_file(&path).unwrap();
     assert_eq!(again["readings_v"], built["readings_v"]);
     assert_eq!(exact.status.code(), Some(1));
@@ -265,8 +240,9 @@ fn touches_go_through_their_file() {
     let path = std::env::temp_dir().join(format!("tactomo-touches-{}.json", std::process::id()));
     let ring = r#"[{"centre_m": [0.002, 0.0], "shape": {"ring": {"radius_m": 0.01, "width_m": 0.002}}, "conductance_s": 0.001}]"#;
     std::fs::write(&path, ring).unwrap();
-    let forward =
-        |more: &[&str]| tactomo(&[&["forward", "--nodes", "500", "--touches", path.to_str().unwrap()], more].concat());
+    let forward = |more: &[&str]| {
+        TACTOMO.run(&[&["forward", "--nodes", "500", "--touches", path.to_str().unwrap()], more].concat())
+    };
     let output = forward(&["--json"]);
     std::fs::write(&path, ring.replace("width_m", "breadth_m")).unwrap();
     let wrong = forward(&[]);
@@ -285,7 +261,7 @@ fn a_press_in_newtons_is_the_contact_that_hertz_tells() {
     let told = ["--contact", "2,3,2.498666,8.916526e-3"];
     let pressed = ["--press", "2,3,8,1"];
     let rows = |arguments: &[&str]| {
-        let output = tactomo(&[&["forward", "--nodes", "500"], arguments].concat());
+        let output = TACTOMO.run(&[&["forward", "--nodes", "500"], arguments].concat());
         String::from_utf8(output.stdout).unwrap()
     };
     assert!(rows(&told).contains("readings (mV)"));

@@ -2,15 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-use std::process::Command;
-
 use serde_json::Value;
 use tactomo::scene::TEXTURE_HZ;
+use tactomo_tests::TACTOMO;
 
 /// What `live --simulate --scene` says of a scene at the end.
 fn live(scene: &str, others: &[&str]) -> Value {
     let fixed = ["live", "--simulate", "--json", "--scene", scene];
-    let output = Command::new(env!("CARGO_BIN_EXE_tactomo")).args(fixed).args(others).output().unwrap();
+    let output = TACTOMO.command().args(fixed).args(others).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{said}");
     serde_json::from_slice(&output.stdout).unwrap()

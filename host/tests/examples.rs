@@ -7,10 +7,10 @@ use std::process::Command;
 
 use tactomo::detector::Detector;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_tactomo");
+use tactomo_tests::TACTOMO;
 
 /// Commands all of whose examples run here.
-const COMMANDS: [&[&str]; 3] = [&["detector"], &["forward"], &["validate"]];
+const COMMANDS: [&[&str]; 2] = [&["detector"], &["forward"]];
 
 /// A folder like the repository's root, for what examples write, with a detector of one's own that they take.
 struct Root(PathBuf);
@@ -36,7 +36,7 @@ impl Drop for Root {
 
 /// The examples of a command's help, as a shell takes them: three spaces begin a remark.
 fn examples(command: &[&str]) -> Vec<String> {
-    let help = Command::new(PROGRAM).args(command).arg("--help").output().unwrap();
+    let help = TACTOMO.command().args(command).arg("--help").output().unwrap();
     let help = String::from_utf8(help.stdout).unwrap();
     let lines = help.lines().filter_map(|line| line.strip_prefix("  tactomo "));
     lines.map(|line| line.split("   ").next().unwrap_or_default().to_owned()).collect()
@@ -52,7 +52,7 @@ fn they_run_as_printed() {
         for example in examples {
             let ran = Command::new("sh")
                 .current_dir(&root.0)
-                .args(["-c", &format!("'{PROGRAM}' {example}")])
+                .args(["-c", &format!("'{}' {example}", TACTOMO.path().display())])
                 .output()
                 .unwrap();
             let said = String::from_utf8_lossy(&ran.stderr);

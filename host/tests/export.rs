@@ -1,20 +1,10 @@
 //! What a recording of an ESP32 becomes in files for other programs: the same in each form.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-#[allow(dead_code, reason = "tables are for other tests")]
-mod samples;
-
-use std::process::Command;
-
 use serde_json::Value;
 use tactomo::table::{Array, Table};
 
-use self::samples::Folder;
-
-fn run(args: &[&str]) {
-    let output = Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).output().unwrap();
-    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-}
+use tactomo_tests::{Folder, TACTOMO};
 
 fn array(arrays: &[(String, Array)], name: &str) -> Array {
     arrays.iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no {name}")).1.clone()
@@ -24,7 +14,7 @@ fn array(arrays: &[(String, Array)], name: &str) -> Array {
 fn readings_times_and_events_are_the_same_in_every_form() {
     let folder = Folder::new("export");
     let recording = folder.path("esp32.tactomo");
-    run(&[
+    TACTOMO.succeeds(&[
         "record",
         &recording,
         "--simulate",
@@ -40,8 +30,10 @@ fn readings_times_and_events_are_the_same_in_every_form() {
     let [lines, table, archive] = ["a.jsonl", "a.csv", "a.npz"].map(|name| folder.path(name));
     for (form, out) in [("jsonl", &lines), ("csv", &table), ("npz", &archive)] {
         let fields: &[&str] = if form == "csv" { &[] } else { &["--fields", "all"] };
-        run(&[&["export", &recording, "--pointer", "--solver", "contacts", "--to", form, "--out", out], fields]
-            .concat());
+        TACTOMO.succeeds(
+            &[&["export", &recording, "--pointer", "--solver", "contacts", "--to", form, "--out", out], fields]
+                .concat(),
+        );
     }
     let lines: Vec<Value> =
         std::fs::read_to_string(lines).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use serde_json::Value;
 use tactomo::board::identity::identity;
@@ -12,12 +11,9 @@ use tactomo::detector::{Calibration, Detector, Tolerances};
 use tactomo::schema::{CONTACT_COLUMNS, Kind, csv_heads};
 use tactomo::table::{NpzWriter, Table};
 use tactomo_protocol::{BoardMessage, FrameHead, Hello, MAX_WIRE, encode_board, encode_frame};
+use tactomo_tests::{TACTOMO, csv};
 
 const PLACE_MM: [f64; 2] = [9.0, -6.0];
-
-fn tactomo(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_tactomo")).args(args).output().unwrap()
-}
 
 /// A file that goes when the test ends.
 struct Temporary(PathBuf);
@@ -47,20 +43,15 @@ impl Drop for Temporary {
 /// Readings of a light contact (V), row by row.
 fn readings() -> Vec<f64> {
     let contact = format!("{},{},2,2e-4", PLACE_MM[0], PLACE_MM[1]);
-    let output = tactomo(&["forward", "--contact", &contact, "--json"]);
+    let output = TACTOMO.run(&["forward", "--contact", &contact, "--json"]);
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let rows = report["readings_v"].as_array().unwrap();
     rows.iter().flat_map(|row| row.as_array().unwrap()).map(|volts| volts.as_f64().unwrap()).collect()
 }
 
-fn csv(frames: &[Vec<f64>]) -> String {
-    let line = |frame: &Vec<f64>| frame.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
-    frames.iter().map(line).collect::<Vec<_>>().join("\n")
-}
-
 /// The objects that the command prints.
 fn lines(args: &[&str]) -> Vec<Value> {
-    let output = tactomo(&[&["reconstruct"], args, &["--json"]].concat());
+    let output = TACTOMO.run(&[&["reconstruct"], args, &["--json"]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
@@ -104,7 +95,7 @@ fn frames_at_rest_are_subtracted() {
 
 /// Readings that `forward` has (V), row by row.
 fn forward(args: &[&str]) -> Vec<f64> {
-    let output = tactomo(&[&["forward", "--json"], args].concat());
+    let output = TACTOMO.run(&[&["forward", "--json"], args].concat());
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let rows = report["readings_v"].as_array().unwrap();
     rows.iter().flat_map(|row| row.as_array().unwrap()).map(|volts| volts.as_f64().unwrap()).collect()
@@ -166,7 +157,7 @@ fn a_recording_on_another_board_than_the_calibrated_one_is_reported() {
         let detector = Detector { calibration: Some(calibration), ..Detector::default() };
         let file = Temporary::with("calibrated.toml", detector.to_toml());
         let recording = recording_of("calibrated.tactomo", 0..40);
-        let output = tactomo(&["reconstruct", recording.name(), "--detector", file.name(), "--json"]);
+        let output = TACTOMO.run(&["reconstruct", recording.name(), "--detector", file.name(), "--json"]);
         assert_eq!(output.status.code(), Some(0));
         String::from_utf8(output.stderr).unwrap().contains("calibrated on another board")
     };
@@ -179,7 +170,7 @@ fn what_is_found_goes_into_files() {
     let file = Temporary::with("in.csv", csv(&[vec![0.0; 256], readings()]));
     let [table, archive] = ["out.csv", "out.npz"].map(Temporary::new);
     for out in [&table, &archive] {
-        let output = tactomo(&["reconstruct", file.name(), "--images", "--out", out.name()]);
+        let output = TACTOMO.run(&["reconstruct", file.name(), "--images", "--out", out.name()]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(output.stdout.is_empty());
         assert!(String::from_utf8_lossy(&output.stderr).contains("tikhonov: 2 frames, median"));
@@ -211,7 +202,7 @@ fn json_csv_and_npz_have_every_figure_of_a_contact_and_agree() {
     let found = lines(&[&[file.name()], &arguments[..]].concat());
     for out in [&table, &archive] {
         let arguments = [&["reconstruct", file.name()], &arguments[..], &["--out", out.name()]].concat();
-        assert_eq!(tactomo(&arguments).status.code(), Some(0));
+        assert_eq!(TACTOMO.run(&arguments).status.code(), Some(0));
     }
     let rows = cells(&table);
     let Table::Arrays(arrays) = Table::read(&archive.0).unwrap() else { panic!("no arrays") };
@@ -251,7 +242,7 @@ fn json_csv_and_npz_have_every_figure_of_a_contact_and_agree() {
 fn files_are_replaced_only_with_force_and_never_the_one_that_is_read() {
     let file = Temporary::with("force-in.csv", csv(&[readings()]));
     let out = Temporary::with("force-out.csv", "precious");
-    let run = |more: &[&str]| tactomo(&[&["reconstruct", file.name(), "--out"], more].concat());
+    let run = |more: &[&str]| TACTOMO.run(&[&["reconstruct", file.name(), "--out"], more].concat());
     let refused = run(&[out.name()]);
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("exists already: give another name, or --overwrite"));
@@ -265,7 +256,7 @@ fn files_are_replaced_only_with_force_and_never_the_one_that_is_read() {
     // What breaks in the middle leaves the file that was there.
     let nan = Temporary::with("force-nan.csv", csv(&[readings(), vec![f64::NAN; 256]]));
     let before = std::fs::read(&out.0).unwrap();
-    let broken = tactomo(&["reconstruct", nan.name(), "--out", out.name(), "--force"]);
+    let broken = TACTOMO.run(&["reconstruct", nan.name(), "--out", out.name(), "--force"]);
     assert_eq!(broken.status.code(), Some(1));
     assert_eq!(std::fs::read(&out.0).unwrap(), before);
 }
@@ -274,7 +265,7 @@ fn files_are_replaced_only_with_force_and_never_the_one_that_is_read() {
 fn millivolts_are_refused_as_volts_and_read_as_what_they_are() {
     let millivolts: Vec<f64> = readings().iter().map(|volts| volts * 1e3).collect();
     let file = Temporary::with("millivolts.csv", csv(&[vec![0.0; 256], millivolts]));
-    let refused = tactomo(&["reconstruct", file.name(), "--json"]);
+    let refused = TACTOMO.run(&["reconstruct", file.name(), "--json"]);
     let message = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1));
     assert!(message.contains("are these millivolts? Give --unit mV"), "{message}");
@@ -302,7 +293,7 @@ fn recording_of(name: &str, numbers: impl Iterator<Item = u16>) -> Temporary {
 #[test]
 fn frames_missing_in_a_recording_are_reported() {
     let run = |file: &Temporary| {
-        let output = tactomo(&["reconstruct", file.name(), "--json"]);
+        let output = TACTOMO.run(&["reconstruct", file.name(), "--json"]);
         assert_eq!(output.status.code(), Some(0));
         let lines: Vec<Value> =
             String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -328,7 +319,7 @@ fn frames_missing_in_a_recording_are_reported() {
 fn a_recording_is_read_with_its_board() {
     let recording = Temporary::new("touch.tactomo");
     let live = ["live", "--simulate", "--max-fps", "200", "--seconds", "1", "--json", "--record", recording.name()];
-    assert_eq!(tactomo(&live).status.code(), Some(0));
+    assert_eq!(TACTOMO.run(&live).status.code(), Some(0));
     let found = lines(&[recording.name()]);
     assert!(found.len() > 20, "{} frames", found.len());
     assert_eq!(found[0]["frame"], 0, "frames are solved while the baseline is taken");
@@ -358,7 +349,7 @@ fn a_kernel_learns_from_presses_on_any_channels() {
     for (key, truth) in [("x_m", 0.4), ("y_m", 0.6), ("force_n", 1.5)] {
         assert!((contact[key].as_f64().unwrap() - truth).abs() < 0.05, "{key}: {contact}");
     }
-    let other = tactomo(&["reconstruct", file.name(), "--presses", presses.name(), "--solver", "noser"]);
+    let other = TACTOMO.run(&["reconstruct", file.name(), "--presses", presses.name(), "--solver", "noser"]);
     assert!(String::from_utf8_lossy(&other.stderr).contains("leave out --solver"));
 }
 
@@ -375,7 +366,7 @@ fn wrong_files_are_told() {
     let broken = Temporary::with("broken.npz", b"PK\x03\x04 and no more");
     let recording = Temporary::with("cut.tactomo", b"\x89TCTO\r\n\x1a\x01");
     let told = |file: &str, more: &[&str]| {
-        let output = tactomo(&[&["reconstruct", file], more].concat());
+        let output = TACTOMO.run(&[&["reconstruct", file], more].concat());
         assert_eq!(output.status.code(), Some(1));
         String::from_utf8(output.stderr).unwrap()
     };

@@ -1,9 +1,6 @@
 //! Recordings as a person makes them: killed, on a full disk, cut, joined, and kept in a ring.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-#[allow(dead_code, reason = "tables are for other tests")]
-mod samples;
-
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -12,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use self::samples::Folder;
+use tactomo_tests::{Folder, TACTOMO};
 
 /// Longest wait for a program that has begun.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -21,12 +18,8 @@ fn file(folder: &Folder, name: &str) -> PathBuf {
     folder.path(name).into()
 }
 
-fn tactomo() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_tactomo"))
-}
-
 fn run(args: &[&str], files: &[&Path]) -> Output {
-    tactomo().args(args).args(files).output().unwrap()
+    TACTOMO.command().args(args).args(files).output().unwrap()
 }
 
 fn info(file: &Path) -> Value {
@@ -40,7 +33,7 @@ fn seconds(info: &Value) -> f64 {
 }
 
 fn record(file: &Path, more: &[&str]) -> Child {
-    let mut command = tactomo();
+    let mut command = TACTOMO.command();
     command.arg("record").arg(file).args(["--simulate", "--board", "ideal"]).args(more);
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
@@ -92,7 +85,7 @@ fn a_full_disk_ends_the_recording_with_a_word_and_keeps_what_came_before() {
     // No file may be longer than 300 blocks: what a full disk does to the program, without one.
     let script = "trap '' XFSZ; ulimit -f 300; exec \"$0\" record \"$1\" --simulate --board ideal --seconds 60";
     let output =
-        Command::new("sh").args(["-c", script, env!("CARGO_BIN_EXE_tactomo")]).arg(&recording).output().unwrap();
+        Command::new("sh").args(["-c", script, TACTOMO.path().to_str().unwrap()]).arg(&recording).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("what came before is kept") && said.contains("full.tactomo"), "{said}");

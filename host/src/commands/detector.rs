@@ -6,8 +6,8 @@ use serde::Serialize;
 use tactomo::detector::{Chosen, Detector, FOAMS, Foam, Stack, short};
 
 use super::as_built::AsBuiltArgs;
-use super::choice::DetectorArgs;
-use super::output::{self, NewFile, message};
+use tactomo_cli::choice::DetectorArgs;
+use tactomo_cli::output::{self, NewFile, message};
 
 /// Lists, shows and checks detectors.
 ///

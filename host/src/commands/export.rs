@@ -20,12 +20,12 @@ use tactomo::sink::mcap::McapFile;
 use tactomo::sink::parquet::ParquetWriter;
 use tactomo::solve::{Lambda, Method, Solution};
 
-use super::choice::{self, DetectorArgs, Model};
-use super::interrupt;
-use super::output::{NewFile, ProgressBar, message};
 use super::reconstruct::reader::{Input, Reader};
 use super::reconstruct::writer::{FileForm, Writer};
 use super::streams;
+use tactomo_cli::choice::{self, DetectorArgs, Model};
+use tactomo_cli::interrupt;
+use tactomo_cli::output::{NewFile, ProgressBar, message};
 
 /// Solves a recording and writes answers and readings for other programs.
 ///

@@ -5,18 +5,17 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use nalgebra::DMatrix;
 use serde::Serialize;
-use tactomo::detector::{Detector, Stack};
+use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::{ForwardModel, touched_impedance_ohm};
 use tactomo::readings::Readings;
 use tactomo::scene::{Contact, SceneName, Touch};
 use tactomo::simulate::{self, Foam, Measurement, Pressed};
-use tactomo::study::case::Case;
 
 use super::as_built::AsBuiltArgs;
-use super::choice::{self, DetectorArgs, Model};
-use super::output::{self, NewFile, message};
 use super::scene::{self, Press, SceneArgs};
+use tactomo_cli::choice::{self, DetectorArgs, Model};
+use tactomo_cli::output::{self, NewFile, message};
 
 /// Computes the readings of a detector for given contacts, or saves its Jacobian.
 ///
@@ -31,9 +30,6 @@ use super::scene::{self, Press, SceneArgs};
 pub struct Args {
     #[command(flatten)]
     detector: DetectorArgs,
-    /// Takes detector and contacts from a case file (see `validate`)
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["detector", "material"])]
-    case: Option<PathBuf>,
     /// A contact, in millimetres and siemens; give it again for more
     #[arg(long, value_name = "X,Y,RADIUS,CONDUCTANCE", value_parser = choice::contact, allow_hyphen_values = true)]
     contact: Vec<Contact>,
@@ -93,7 +89,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let (computes, saves) = (leaks || !pressed.touches.is_empty(), args.save_jacobian.is_some());
     ensure!(
         computes || saves,
-        "nothing to compute: give --contact, --press, --touches, --scene (at a time when something touches), --case or --save-jacobian"
+        "nothing to compute: give --contact, --press, --touches, --scene (at a time when something touches) or --save-jacobian"
     );
     ensure!(!(leaks && saves), "a detector that leaks has no Jacobian at no contact: leave out --fault leak");
     let jacobian = NewFile::optional(args.save_jacobian.as_ref(), args.overwrite)?;
@@ -129,11 +125,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 /// The detector, and all that touches it.
 fn pressed(args: &Args) -> anyhow::Result<(Detector, Pressed)> {
-    let (detector, foams, mut contacts) = detector(args)?;
-    if !args.contact.is_empty() {
-        contacts.clone_from(&args.contact);
-    }
-    let mut held: Vec<Touch> = contacts.into_iter().map(Touch::from).collect();
+    let (detector, foams) = (args.detector.get_or(args.scene.preset())?, args.detector.foams());
+    let mut held: Vec<Touch> = args.contact.iter().copied().map(Touch::from).collect();
     if !args.press.is_empty() {
         let hertz = args.scene.hertz(foams.clone(), &detector)?;
         held.extend(args.press.iter().map(|press| press.touch(&hertz)));
@@ -145,17 +138,6 @@ fn pressed(args: &Args) -> anyhow::Result<(Detector, Pressed)> {
     let pressed =
         Foam::after(&args.scene.fault, args.time, |time_s| held.iter().cloned().chain(scene.at(time_s)).collect());
     Ok((detector, pressed))
-}
-
-/// The detector, what it is made of if that is known, and the contacts of its case.
-fn detector(args: &Args) -> anyhow::Result<(Detector, Option<Stack>, Vec<Contact>)> {
-    match &args.case {
-        Some(path) => {
-            let case = Case::read(path)?;
-            Ok((case.detector, None, case.contacts))
-        }
-        None => Ok((args.detector.get_or(args.scene.preset())?, args.detector.foams(), Vec::new())),
-    }
 }
 
 fn model(args: &Args, detector: &Detector) -> anyhow::Result<Box<dyn ForwardModel>> {

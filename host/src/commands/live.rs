@@ -23,11 +23,12 @@ use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
 use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
 
-use super::choice::{DetectorArgs, Model};
-use super::output::message;
 use super::source::{self, BoardArgs};
 use super::streams::StreamArgs;
-use super::{browser, interrupt, keep, output};
+use super::{browser, keep};
+use tactomo_cli::choice::{DetectorArgs, Model};
+use tactomo_cli::output::message;
+use tactomo_cli::{interrupt, output};
 
 /// Requests of pages that may wait.
 const REQUESTS: usize = 64;
@@ -87,7 +88,7 @@ pub struct PictureArgs {
     /// Solver that reads the touch; on the page another can be chosen [default: auto; with --learned, what that teaches]
     #[arg(long, value_name = "NAME")]
     pub solver: Option<Method>,
-    /// What `tactomo learn` has learned on this sensor: its solver takes that in place of presses simulated on the model
+    /// What `tactomo-lab learn` has learned on this sensor: its solver takes that in place of presses simulated on the model
     #[arg(long, value_name = "MODEL")]
     pub learned: Option<PathBuf>,
     /// Jacobian from `forward --save-jacobian`, instead of computing it

@@ -4,29 +4,19 @@ mod as_built;
 mod board;
 mod browser;
 mod calibrate;
-mod choice;
-mod design;
 mod detector;
 mod export;
 mod forward;
-mod interrupt;
 mod keep;
-mod learn;
 mod live;
-pub mod output;
 mod ports;
 mod reconstruct;
 mod record;
 mod recording;
 mod replay;
 mod scene;
-mod score;
 mod source;
-mod stability;
 mod streams;
-mod study;
-mod tradeoff;
-mod validate;
 
 use clap::{Parser, Subcommand};
 
@@ -49,14 +39,7 @@ enum Command {
     Export(Box<export::Args>),
     Detector(detector::Args),
     Forward(Box<forward::Args>),
-    Validate(validate::Args),
-    Tradeoff(tradeoff::Args),
-    Stability(stability::Args),
-    Study(study::Args),
-    Design(Box<design::Args>),
     Reconstruct(reconstruct::Args),
-    Learn(learn::Args),
-    Score(score::Args),
     Calibrate(calibrate::Args),
 }
 
@@ -72,14 +55,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Export(args) => export::run(&args),
         Command::Detector(args) => detector::run(args),
         Command::Forward(args) => forward::run(&args),
-        Command::Validate(args) => validate::run(&args),
-        Command::Tradeoff(args) => tradeoff::run(&args),
-        Command::Stability(args) => stability::run(&args),
-        Command::Study(args) => study::run(&args),
-        Command::Design(args) => design::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
-        Command::Learn(args) => learn::run(&args),
-        Command::Score(args) => score::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
     }
 }

@@ -4,7 +4,7 @@ use tactomo::board::link::discover::{self, Probe};
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo_protocol::Hello;
 
-use super::output::{self, message};
+use tactomo_cli::output::{self, message};
 
 /// Lists the serial ports, and which USB ports have a board.
 ///

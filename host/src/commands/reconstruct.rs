@@ -14,8 +14,8 @@ use tactomo::solve::{Lambda, Method};
 use self::reader::{Input, Reader, Taught};
 use self::units::Unit;
 use self::writer::Writer;
-use super::choice::{self, DetectorArgs, Model};
-use super::output::message;
+use tactomo_cli::choice::{self, DetectorArgs, Model};
+use tactomo_cli::output::message;
 
 /// Finds contacts and images in a recording, or in a table of readings (CSV, NPY or NPZ).
 ///
@@ -48,10 +48,10 @@ pub struct Args {
     /// each frame
     #[arg(long, value_name = "SHARE|discrepancy|l-curve|gcv")]
     lambda: Option<Lambda>,
-    /// Presses at known places to learn from first, of any sensor: a file as `tactomo learn` takes it
+    /// Presses at known places to learn from first, of any sensor: a file as `tactomo-lab learn` takes it
     #[arg(long, value_name = "FILE", conflicts_with_all = ["detector", "material", "model", "lambda", "images"])]
     presses: Option<PathBuf>,
-    /// What `tactomo learn` has learned, of any sensor, or a network that was trained for the detector
+    /// What `tactomo-lab learn` has learned, of any sensor, or a network that was trained for the detector
     #[arg(long, value_name = "MODEL", conflicts_with_all = ["presses", "lambda"])]
     learned: Option<PathBuf>,
     /// Frames at the start whose mean is the baseline, whatever they are, and which are not solved [default: of a recording, the baseline that live takes; of a

@@ -12,10 +12,11 @@ use tactomo::run::{Listener, Request, Snapshot, TouchEvent};
 use tactomo::solve::{Method, Problem};
 use tokio::sync::watch;
 
-use super::choice::DetectorArgs;
-use super::output::message;
 use super::source::{self, BoardArgs};
-use super::{interrupt, keep, live};
+use super::{keep, live};
+use tactomo_cli::choice::DetectorArgs;
+use tactomo_cli::interrupt;
+use tactomo_cli::output::message;
 
 /// Marks that may wait to be set.
 const REQUESTS: usize = 64;

@@ -10,7 +10,7 @@ use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
 use super::as_built::AsBuiltArgs;
-use super::output::message;
+use tactomo_cli::output::message;
 
 /// Default seed.
 const SEED: u64 = 1;
@@ -128,7 +128,7 @@ impl Press {
 
 /// A press from `x_mm,y_mm,tip_radius_mm,force_n`, with `z_mm` after `y_mm` on a curved detector.
 pub fn press(text: &str) -> Result<Press, String> {
-    let (place_m, [radius_mm, force_n]) = super::choice::place_and(text, "tip_radius_mm,force_n")?;
+    let (place_m, [radius_mm, force_n]) = tactomo_cli::choice::place_and(text, "tip_radius_mm,force_n")?;
     if !(radius_mm > 0.0 && force_n > 0.0 && radius_mm.is_finite() && force_n.is_finite()) {
         return Err("the tip's radius and the force have to be above zero".to_owned());
     }

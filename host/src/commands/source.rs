@@ -15,8 +15,8 @@ use tactomo::simulate::Simulation;
 use tactomo::sink::page::Finger;
 use tactomo_protocol::Settings;
 
-use super::choice::DetectorArgs;
 use super::scene::{self, SceneArgs};
+use tactomo_cli::choice::DetectorArgs;
 
 /// How firmly the mouse presses on the simulated detector, from 0 to 1.
 const MOUSE_FIRMNESS: f64 = 0.3;

@@ -17,8 +17,8 @@ use tactomo::sink::lines::Fields;
 use tactomo::sink::stream::{Form, Target};
 use tactomo::solve::{ContactSettings, Problem};
 
-use super::output::message;
 use super::scene;
+use tactomo_cli::output::message;
 
 /// Where answers go besides the page.
 #[derive(Debug, clap::Args)]

@@ -4,6 +4,8 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
 use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
 
+use tactomo_tests::TACTOMO;
+
 /// `tactomo live` on the simulated board.
 pub struct Live {
     pub child: Child,
@@ -13,7 +15,7 @@ pub struct Live {
 
 /// `tactomo` with such arguments.
 pub fn tactomo(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tactomo"));
+    let mut command = TACTOMO.command();
     command.args(args);
     command
 }

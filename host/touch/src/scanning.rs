@@ -6,7 +6,7 @@
 use tactomo_physics::detector::Detector;
 
 /// Grounds that are told apart. More hardly tell more of one to three contacts, and each is then older
-/// (`tactomo tradeoff --scan` compares).
+/// (`tactomo-lab tradeoff --scan` compares).
 pub const FOCUS: usize = 3;
 /// Rows from one of the others to the next: what is new is seen within 25 ms on a wire of 921600 baud.
 const OTHERS: usize = 4;

@@ -174,7 +174,7 @@ async fn until(browser: &Browser, begun: Instant, wanted: impl Fn(&Value) -> boo
 
 /// The program, and the address of its page.
 fn serve(tools: &Tools, live: &Live) -> Result<(Ended, String)> {
-    let mut command = Command::new(&tools.program);
+    let mut command = Command::new(tools.programs.join("tactomo"));
     command.args(["live", "--simulate", "--no-open"]).args(live.args.split(' '));
     let mut program = Ended(command.stderr(Stdio::piped()).stdin(Stdio::null()).spawn()?);
     let stderr = program.0.stderr.take().context("the program's log")?;

@@ -1,4 +1,4 @@
-//! Runs of the program that figures are taken from.
+//! Runs of the programs that figures are taken from.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -12,63 +12,72 @@ use serde_json::Value;
 pub struct Job {
     /// Its name.
     pub name: &'static str,
-    /// Arguments of `tactomo`, as a shell takes them in the repository's root. `--json` is added.
-    pub args: &'static str,
+    /// Program and arguments, as a shell takes them in the repository's root. `--json` is added.
+    pub line: &'static str,
     /// Whether its figures depend on the machine: times, rates, and what live answers make of them.
     pub is_of_machine: bool,
     /// Whether `--check` takes it again without `--all`.
     pub is_quick: bool,
 }
 
-const fn job(name: &'static str, args: &'static str) -> Job {
-    Job { name, args, is_of_machine: false, is_quick: true }
+const fn job(name: &'static str, line: &'static str) -> Job {
+    Job { name, line, is_of_machine: false, is_quick: true }
 }
 
-const fn slow(name: &'static str, args: &'static str) -> Job {
-    Job { is_quick: false, ..job(name, args) }
+const fn slow(name: &'static str, line: &'static str) -> Job {
+    Job { is_quick: false, ..job(name, line) }
 }
 
-const fn of_machine(name: &'static str, args: &'static str) -> Job {
-    Job { is_of_machine: true, is_quick: false, ..job(name, args) }
+const fn of_machine(name: &'static str, line: &'static str) -> Job {
+    Job { is_of_machine: true, is_quick: false, ..job(name, line) }
 }
 
 /// All runs. Seeds are in their arguments, or the command's own default.
 pub const JOBS: &[Job] = &[
     job(
         "validate-slab",
-        "validate tests/reference/slab/*.json.gz --model slab --solver tikhonov --solver tikhonov-paper --trials 1",
+        "tactomo-lab validate tests/reference/slab/*.json.gz --model slab --solver tikhonov --solver tikhonov-paper --trials 1",
     ),
     job(
         "validate-shell",
-        "validate tests/reference/slab/*.json.gz --model shell --solver tikhonov --solver tikhonov-paper --trials 1",
+        "tactomo-lab validate tests/reference/slab/*.json.gz --model shell --solver tikhonov --solver tikhonov-paper --trials 1",
     ),
-    job("validate-noise", "validate tests/reference/slab/*.json.gz --solver auto --noise-lsb 1.5 --trials 20 --seed 1"),
+    job(
+        "validate-noise",
+        "tactomo-lab validate tests/reference/slab/*.json.gz --solver auto --noise-lsb 1.5 --trials 20 --seed 1",
+    ),
     job(
         "built",
-        "study built tests/reference/built/built101.json.gz --solver auto --solver network --solver tikhonov --seed 1",
+        "tactomo-lab study built tests/reference/built/built101.json.gz --solver auto --solver network --solver tikhonov --seed 1",
     ),
-    job("drawn", "study built --detectors 4 --presses 8 --seed 1001 --solver auto"),
-    job("built-rubbed", "study built tests/reference/built/built101.json.gz --rub 24 --solver auto --seed 1"),
-    slow("drawn-rubbed", "study built --detectors 4 --presses 8 --seed 1001 --rub 60 --solver auto"),
-    job("contacts", "study contacts --solver auto --scenes 180 --seed 21"),
-    job("materials", "study materials --seed 1"),
-    job("samples", "study samples --seed 1"),
-    job("bonding", "study bonding"),
-    job("electrodes", "study electrodes --seed 1"),
-    slow("thickness", "study thickness"),
-    slow("scan", "tradeoff --scan --places 6 --seed 21"),
-    of_machine("tradeoff", "tradeoff --quick --seed 1"),
-    of_machine("live-ideal", "live --simulate --board ideal --scene single --seconds 5 --no-open"),
-    of_machine("live-esp32", "live --simulate --board esp32 --scene single --seconds 5 --no-open"),
-    of_machine("live-esp32-firm", "live --simulate --board esp32 --scene five-fingers --seconds 5 --no-open"),
-    of_machine("live-esp32c3", "live --simulate --board esp32c3 --scene single --seconds 5 --no-open"),
-    of_machine("live-adaptive", "live --simulate --board esp32 --scan adaptive --scene single --seconds 5 --no-open"),
+    job("drawn", "tactomo-lab study built --detectors 4 --presses 8 --seed 1001 --solver auto"),
+    job(
+        "built-rubbed",
+        "tactomo-lab study built tests/reference/built/built101.json.gz --rub 24 --solver auto --seed 1",
+    ),
+    slow("drawn-rubbed", "tactomo-lab study built --detectors 4 --presses 8 --seed 1001 --rub 60 --solver auto"),
+    job("contacts", "tactomo-lab study contacts --solver auto --scenes 180 --seed 21"),
+    job("materials", "tactomo-lab study materials --seed 1"),
+    job("samples", "tactomo-lab study samples --seed 1"),
+    job("bonding", "tactomo-lab study bonding"),
+    job("electrodes", "tactomo-lab study electrodes --seed 1"),
+    slow("thickness", "tactomo-lab study thickness"),
+    slow("scan", "tactomo-lab tradeoff --scan --places 6 --seed 21"),
+    of_machine("tradeoff", "tactomo-lab tradeoff --quick --seed 1"),
+    of_machine("live-ideal", "tactomo live --simulate --board ideal --scene single --seconds 5 --no-open"),
+    of_machine("live-esp32", "tactomo live --simulate --board esp32 --scene single --seconds 5 --no-open"),
+    of_machine("live-esp32-firm", "tactomo live --simulate --board esp32 --scene five-fingers --seconds 5 --no-open"),
+    of_machine("live-esp32c3", "tactomo live --simulate --board esp32c3 --scene single --seconds 5 --no-open"),
+    of_machine(
+        "live-adaptive",
+        "tactomo live --simulate --board esp32 --scan adaptive --scene single --seconds 5 --no-open",
+    ),
 ];
 
 impl Job {
     /// What a person types to repeat it.
     pub fn command(&self) -> String {
-        format!("tactomo {} --json", self.args)
+        format!("{} --json", self.line)
     }
 
     /// Runs it, with further arguments that its report does not depend on, and gives its report. `seconds` is added to the report: the time
@@ -77,9 +86,10 @@ impl Job {
     /// # Errors
     /// If it fails, or prints no JSON.
     pub fn run(&self, tools: &Tools, further: &str) -> Result<Value> {
-        eprintln!("{}: tactomo {} {further}", self.name, self.args);
+        eprintln!("{}: {} {further}", self.name, self.line);
         let begun = Instant::now();
-        let line = format!("'{}' {} {further} --json", tools.program.display(), self.args);
+        let (program, args) = self.line.split_once(' ').unwrap_or((self.line, ""));
+        let line = format!("'{}' {args} {further} --json", tools.programs.join(program).display());
         let run = Command::new("sh").args(["-c", &line]).current_dir(&tools.root).stderr(Stdio::inherit()).output()?;
         ensure!(run.status.success(), "`{}` has failed", self.command());
         let report = serde_json::from_slice(&run.stdout).with_context(|| format!("the report of {}", self.name))?;
@@ -99,25 +109,26 @@ impl Job {
 pub struct Tools {
     /// The repository's root.
     pub root: PathBuf,
-    /// The program, built for speed.
-    pub program: PathBuf,
+    /// The folder of the programs, built for speed.
+    pub programs: PathBuf,
 }
 
 impl Tools {
-    /// Finds the repository, and builds the program as it is there now, beside this one.
+    /// Finds the repository, and builds the programs as they are there now, beside this one.
     ///
     /// # Errors
     /// If it cannot be built.
     pub fn build() -> Result<Self> {
         let root = root()?;
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let args =
-            ["build", "--release", "--locked", "--package", "tactomo", "--message-format", "json-render-diagnostics"];
+        let mut args = vec!["build", "--release", "--locked", "--message-format", "json-render-diagnostics"];
+        args.extend(["--package", "tactomo", "--package", "tactomo-lab"]);
         let built = Command::new(cargo).args(args).current_dir(&root).stderr(Stdio::inherit()).output()?;
-        ensure!(built.status.success(), "the program cannot be built");
+        ensure!(built.status.success(), "the programs cannot be built");
         let messages = String::from_utf8(built.stdout).context("cargo's messages")?;
         let program = messages.lines().filter_map(executable).next_back().context("cargo names no program")?;
-        Ok(Self { root, program })
+        let programs = program.parent().map(Path::to_owned).context("the program is in no folder")?;
+        Ok(Self { root, programs })
     }
 }
 

@@ -64,7 +64,7 @@ const PAGE: &[&str] = &[
     "host/src/sink/page/messages.rs",
 ];
 /// What charts are drawn by.
-const CHARTS: &[&str] = &["host/study/src/page", "host/study/src/tradeoff/page.rs"];
+const CHARTS: &[&str] = &["lab/study/src/page", "lab/study/src/tradeoff/page.rs"];
 
 const fn live(
     file: &'static str,
@@ -95,19 +95,19 @@ pub const PICTURES: &[Picture] = &[
         file: "docs/scan.png",
         how: How::Chart { job: "scan", option: "--picture" },
         size: [1300, 926],
-        sources: &["host/study/src/page", "host/study/src/scanning/page.rs"],
+        sources: &["lab/study/src/page", "lab/study/src/scanning/page.rs"],
     },
     Picture {
         file: "docs/design-materials.png",
         how: How::Chart { job: "materials", option: "--out" },
         size: [1300, 930],
-        sources: &["host/study/src/page", "host/design/src/materials/page.rs", "host/design/src/claim.rs"],
+        sources: &["lab/study/src/page", "lab/design/src/materials/page.rs", "lab/design/src/claim.rs"],
     },
     Picture {
         file: "docs/cost.svg",
         how: How::Drawn { example: "cost" },
         size: [960, 460],
-        sources: &["host/examples/cost.rs"],
+        sources: &["lab/examples/cost.rs"],
     },
 ];
 

@@ -166,7 +166,7 @@ fn take_picture(tools: &Tools, store: &mut Store, picture: &Picture) -> Result<(
             eprintln!("{}: example {example}", picture.file);
             let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
             let args =
-                ["run", "--release", "--locked", "--package", "tactomo", "--example", example, "--", picture.file];
+                ["run", "--release", "--locked", "--package", "tactomo-lab", "--example", example, "--", picture.file];
             let run = Command::new(cargo).args(args).current_dir(&tools.root).status()?;
             ensure!(run.success(), "the example {example} has failed");
             format!("what the example `{example}` measures")

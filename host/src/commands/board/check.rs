@@ -15,9 +15,9 @@ use tactomo::scene::SceneName;
 use tactomo::solve::Problem;
 use tactomo_protocol::Settings;
 
-use crate::commands::choice::{DetectorArgs, Model};
-use crate::commands::output::{self, message};
 use crate::commands::source::{self, BoardArgs};
+use tactomo_cli::choice::{DetectorArgs, Model};
+use tactomo_cli::output::{self, message};
 
 /// How often a person who is waited for is told what hinders.
 const REMIND_EVERY: Duration = Duration::from_secs(10);

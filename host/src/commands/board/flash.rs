@@ -8,7 +8,7 @@ use anyhow::{Context, bail, ensure};
 
 use super::elf;
 use super::firmware::{self, Board, Tool};
-use crate::commands::output::message;
+use tactomo_cli::output::message;
 
 /// Puts the firmware on a board, with the tool for its chip: espflash or probe-rs.
 ///

@@ -14,8 +14,8 @@ use self::gather::gather;
 use self::known::Known;
 use self::report::Report;
 use super::Reading;
-use crate::commands::choice::DetectorArgs;
-use crate::commands::output::{self, NewFile, message};
+use tactomo_cli::choice::DetectorArgs;
+use tactomo_cli::output::{self, NewFile, message};
 
 /// Finds which force is behind a contact's conductance, from presses of known force.
 ///

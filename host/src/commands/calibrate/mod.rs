@@ -12,11 +12,11 @@ use std::time::Duration;
 use anyhow::ensure;
 use tactomo::detector::Detector;
 
-use super::choice::DetectorArgs;
-use super::output::{NewFile, message};
 use super::reconstruct::units::Unit;
 use super::record;
 use super::source::{self, BoardArgs};
+use tactomo_cli::choice::DetectorArgs;
+use tactomo_cli::output::{NewFile, message};
 
 /// Fits a detector's description to the detector that was built.
 ///

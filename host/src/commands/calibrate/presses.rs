@@ -13,7 +13,7 @@ use self::gather::{Known, gather};
 use self::report::Report;
 use super::known::{KnownPlace, check_places, places_or_order};
 use super::{Reading, Source};
-use crate::commands::output::{self, NewFile, message};
+use tactomo_cli::output::{self, NewFile, message};
 
 /// Corrects places by presses at known ones, as far as these show errors that run smoothly over the sensor: 16 to 25 are good.
 ///

@@ -13,9 +13,9 @@ use tactomo::solve::Method;
 
 use super::known::{KnownPlace, check_places, check_used, places};
 use super::{Reading, Source};
-use crate::commands::choice::Model;
-use crate::commands::output::{self, NewFile, message};
 use crate::commands::reconstruct::reader::{Input, Reader};
+use tactomo_cli::choice::Model;
+use tactomo_cli::output::{self, NewFile, message};
 
 /// Finds the detector that was built, from one finger rubbed over it: half a minute, everywhere, now light and now firm.
 ///

@@ -20,9 +20,8 @@ use tactomo::solve::{
 use tactomo_protocol::Hello;
 
 use super::units::{self, Unit};
-use crate::commands::choice::{DetectorArgs, Model};
-use crate::commands::learn;
-use crate::commands::output::message;
+use tactomo_cli::choice::{DetectorArgs, Model};
+use tactomo_cli::output::message;
 
 /// What is read, and what solves it.
 pub struct Input<'a> {
@@ -53,7 +52,7 @@ pub struct Input<'a> {
 pub enum Taught<'a> {
     /// A file of presses.
     Presses(&'a Path),
-    /// A file of `tactomo learn`.
+    /// A file of `tactomo-lab learn`.
     Learned(&'a Path),
 }
 
@@ -342,7 +341,7 @@ fn learned(input: &Input, kernel: Arc<Kernel>) -> anyhow::Result<Opened> {
     if input.detector.detector.is_some() || input.detector.material.is_some() {
         bail!("what was learned from presses needs no detector: leave out --detector and --material");
     }
-    message!("{}", learn::sentence(&kernel));
+    message!("{}", kernel.sentence());
     let file = FrameFile::open_by(input.file, Some(kernel.channels()), |table| kernel.readings_of(table))?;
     if file.channels() != kernel.channels() {
         bail!(

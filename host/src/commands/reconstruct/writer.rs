@@ -10,8 +10,8 @@ use tactomo::schema::{self, CONTACT_COLUMNS, EVENT_COLUMNS, FRAME_COLUMNS, Frame
 use tactomo::solve::{FoundContact, FoundShape};
 use tactomo::table::{CsvWriter, NpzWriter, Values};
 
-use super::super::output::{NewFile, unless_closed};
 use super::{Args, Reader};
+use tactomo_cli::output::{NewFile, unless_closed};
 
 /// Where frames go.
 pub struct Writer {

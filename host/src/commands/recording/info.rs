@@ -9,7 +9,7 @@ use tactomo::board::record::Note;
 use tactomo::causes::with_causes;
 use tactomo::date::date_time;
 
-use crate::commands::output;
+use tactomo_cli::output;
 
 /// What is in a recording, as JSON has it.
 #[derive(Serialize)]

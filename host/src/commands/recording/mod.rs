@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::ensure;
 use tactomo::board::record::edit;
 
-use super::output::message;
+use tactomo_cli::output::message;
 
 /// Looks into recordings, cuts pieces out of them and joins them.
 ///

@@ -16,7 +16,7 @@ pub struct Container {
 #[derive(Debug, thiserror::Error)]
 pub enum ContainerError {
     /// They are no such file, or a damaged one.
-    #[error("this is no safetensors file, or it is damaged ({0}): make one with `tactomo learn`")]
+    #[error("this is no safetensors file, or it is damaged ({0}): make one with `tactomo-lab learn`")]
     Format(String),
     /// It is a network that cannot be used.
     #[error(transparent)]
@@ -32,7 +32,7 @@ pub enum ContainerError {
         version: String,
     },
     /// A text or an array that is not there.
-    #[error("`{0}` is missing: the file was not made by `tactomo learn`, or it is damaged")]
+    #[error("`{0}` is missing: the file was not made by `tactomo-lab learn`, or it is damaged")]
     Missing(String),
     /// An array of another shape, or of other numbers.
     #[error("`{name}` has {found}, but {needed} is needed: the file is damaged")]

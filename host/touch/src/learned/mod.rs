@@ -43,7 +43,7 @@ pub enum LearnedError {
         source: io::Error,
     },
     /// It is longer than anything that belongs here.
-    #[error("{path} is longer than {} MB: this is no file of `tactomo learn`", LONGEST >> 20)]
+    #[error("{path} is longer than {} MB: this is no file of `tactomo-lab learn`", LONGEST >> 20)]
     Long {
         /// The file.
         path: PathBuf,

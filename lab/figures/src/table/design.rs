@@ -205,10 +205,10 @@ mod tests {
     #[test]
     fn claims_are_put_as_the_studies_put_them() {
         let sources = [
-            include_str!("../../../../host/design/src/materials/claims.rs"),
-            include_str!("../../../../host/design/src/samples/claims.rs"),
-            include_str!("../../../../host/design/src/bonding/claims.rs"),
-            include_str!("../../../../host/design/src/thickness/mod.rs"),
+            include_str!("../../../design/src/materials/claims.rs"),
+            include_str!("../../../design/src/samples/claims.rs"),
+            include_str!("../../../design/src/bonding/claims.rs"),
+            include_str!("../../../design/src/thickness/mod.rs"),
         ];
         for (job, _, claim, _) in CLAIMS {
             assert!(sources.iter().any(|source| source.contains(&format!("\"{claim}\""))), "{job}: {claim}");

@@ -8,9 +8,9 @@ use tactomo::solve::{Method, Solution};
 use super::Args;
 use super::known::{Known, KnownForce};
 use super::report::ReportedPress;
-use crate::commands::choice::Model;
-use crate::commands::output::message;
 use crate::commands::reconstruct::reader::{Input, Reader};
+use tactomo_cli::choice::Model;
+use tactomo_cli::output::message;
 
 /// What to do where several contacts are found.
 const ONE_TIP: &str =

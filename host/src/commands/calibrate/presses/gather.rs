@@ -10,9 +10,9 @@ use tactomo::solve::{FoundContact, Method};
 
 use super::Args;
 use crate::commands::calibrate::known::{KnownPlace, NEAR_S, check_used};
-use crate::commands::choice::Model;
-use crate::commands::output::message;
 use crate::commands::reconstruct::reader::{Input, Reader};
+use tactomo_cli::choice::Model;
+use tactomo_cli::output::message;
 
 /// Of a press in a recording, so much of its time in the middle is looked at: it comes before, and goes after.
 const MIDDLE: f64 = 0.5;

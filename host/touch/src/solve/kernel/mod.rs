@@ -13,6 +13,7 @@ mod novelty;
 mod points;
 mod presses;
 mod regression;
+mod sentence;
 mod solver;
 
 use self::classes::Classes;

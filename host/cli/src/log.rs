@@ -1,0 +1,188 @@
+//! The log on stderr, in which a warning that comes again and again is said once, then counted.
+
+use std::collections::HashMap;
+use std::fmt::{self, Write as _};
+use std::io::IsTerminal;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use tracing::field::{Field, Visit};
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::fmt::FmtContext;
+use tracing_subscriber::fmt::format::{Format, FormatEvent, FormatFields, Writer};
+use tracing_subscriber::registry::LookupSpan;
+
+use crate::output;
+
+/// A warning that comes again within this time of the last one that was said is counted only.
+const SAID_EVERY: Duration = Duration::from_secs(60);
+/// Different warnings that are known at a time: more than the program has, but for names and numbers in them.
+const MOST_KNOWN: usize = 256;
+
+/// The log; says at its end what is still only counted.
+pub struct Log(Arc<Mutex<Repeats>>);
+
+impl Log {
+    /// Begins to print the log on stderr.
+    pub fn begin() -> Self {
+        let repeats = Arc::new(Mutex::new(Repeats::default()));
+        let colours = std::io::stderr().is_terminal();
+        let format = tracing_subscriber::fmt::format().with_target(false).without_time().with_ansi(colours);
+        tracing_subscriber::fmt()
+            .with_writer(|| output::Stderr)
+            .with_ansi(colours)
+            .event_format(Once { format, repeats: Arc::clone(&repeats) })
+            .init();
+        Self(repeats)
+    }
+}
+
+impl Drop for Log {
+    fn drop(&mut self) {
+        for (message, times) in lock(&self.0).counted() {
+            output::message!("{}: {message}", again(times));
+        }
+    }
+}
+
+fn lock(repeats: &Mutex<Repeats>) -> std::sync::MutexGuard<'_, Repeats> {
+    repeats.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn again(times: u64) -> String {
+    format!("{times} {} more", if times == 1 { "time" } else { "times" })
+}
+
+/// Warnings and errors that were said, and how often each has come since.
+#[derive(Debug, Default)]
+struct Repeats(HashMap<String, Repeat>);
+
+#[derive(Debug)]
+struct Repeat {
+    said: Instant,
+    since: u64,
+}
+
+impl Repeats {
+    /// Takes note of a message: `None` if it is only counted, else how often it came since it was said last.
+    fn take(&mut self, message: &str, now: Instant) -> Option<u64> {
+        if let Some(known) = self.0.get_mut(message) {
+            if now.saturating_duration_since(known.said) < SAID_EVERY {
+                known.since += 1;
+                return None;
+            }
+            known.said = now;
+            return Some(std::mem::take(&mut known.since));
+        }
+        if self.0.len() >= MOST_KNOWN {
+            let oldest = self.0.iter().min_by_key(|(_, repeat)| repeat.said).map(|(message, _)| message.clone());
+            oldest.and_then(|oldest| self.0.remove(&oldest));
+        }
+        self.0.insert(message.to_owned(), Repeat { said: now, since: 0 });
+        Some(0)
+    }
+
+    /// What was counted and not said yet, in the order in which it was said first.
+    fn counted(&mut self) -> Vec<(String, u64)> {
+        let mut counted: Vec<_> = self.0.drain().filter(|(_, repeat)| repeat.since > 0).collect();
+        counted.sort_by_key(|(_, repeat)| repeat.said);
+        counted.into_iter().map(|(message, repeat)| (message, repeat.since)).collect()
+    }
+}
+
+/// Formats events, those of a kind once.
+struct Once {
+    format: Format<tracing_subscriber::fmt::format::Full, ()>,
+    repeats: Arc<Mutex<Repeats>>,
+}
+
+impl<S: Subscriber + for<'a> LookupSpan<'a>, N: for<'a> FormatFields<'a> + 'static> FormatEvent<S, N> for Once {
+    fn format_event(&self, context: &FmtContext<'_, S, N>, mut writer: Writer<'_>, event: &Event<'_>) -> fmt::Result {
+        if *event.metadata().level() > Level::WARN {
+            return self.format.format_event(context, writer, event);
+        }
+        let mut message = Message::default();
+        event.record(&mut message);
+        let Some(since) = lock(&self.repeats).take(&message.0, Instant::now()) else { return Ok(()) };
+        if since == 0 {
+            return self.format.format_event(context, writer, event);
+        }
+        let mut line = String::new();
+        self.format.format_event(context, Writer::new(&mut line), event)?;
+        writeln!(writer, "{} ({} in the meantime)", line.trim_end(), again(since))
+    }
+}
+
+/// The words of an event.
+#[derive(Default)]
+struct Message(String);
+
+impl Visit for Message {
+    fn record_debug(&mut self, _: &Field, value: &dyn fmt::Debug) {
+        // Writing to a string cannot fail.
+        let _ = write!(self.0, "{value:?}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_comes_again_is_counted_and_said_again_after_a_minute() {
+        let mut repeats = Repeats::default();
+        let begin = Instant::now();
+        let at = |seconds: u64| begin + Duration::from_secs(seconds);
+        assert_eq!(repeats.take("refused", at(0)), Some(0));
+        assert!((0..12_880).all(|i| repeats.take("refused", at(i % 4)).is_none()));
+        assert_eq!(repeats.take("electrode 3", at(4)), Some(0), "another one is another one");
+        assert_eq!(repeats.take("refused", at(60)), Some(12_880));
+        assert_eq!(repeats.take("refused", at(61)), None);
+        assert_eq!(repeats.counted(), [("refused".to_owned(), 1)]);
+    }
+
+    #[test]
+    fn the_oldest_are_forgotten() {
+        let mut repeats = Repeats::default();
+        let begin = Instant::now();
+        for i in 0..2 * MOST_KNOWN as u32 {
+            assert_eq!(repeats.take(&format!("warning {i}"), begin + Duration::from_millis(i.into())), Some(0));
+        }
+        assert_eq!(repeats.0.len(), MOST_KNOWN);
+        assert!(repeats.take(&format!("warning {}", 2 * MOST_KNOWN - 1), begin).is_none());
+    }
+
+    #[test]
+    fn the_log_says_a_warning_once() {
+        #[derive(Clone, Default)]
+        struct Written(Arc<Mutex<Vec<u8>>>);
+        impl std::io::Write for Written {
+            fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+                self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
+                Ok(bytes.len())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let (written, repeats) = (Written::default(), Arc::new(Mutex::new(Repeats::default())));
+        let kept = written.clone();
+        let format = tracing_subscriber::fmt::format().with_target(false).without_time().with_ansi(false);
+        let subscriber = tracing_subscriber::fmt()
+            .with_writer(move || kept.clone())
+            .event_format(Once { format, repeats: Arc::clone(&repeats) })
+            .finish();
+        tracing::subscriber::with_default(subscriber, || {
+            for electrode in [3, 5] {
+                (0..9).for_each(|_| tracing::warn!("electrode {electrode} is left out"));
+                (0..2).for_each(|_| tracing::info!("found {electrode}"));
+            }
+        });
+        let text = String::from_utf8(written.0.lock().unwrap().clone()).unwrap();
+        let lines: Vec<_> = text.lines().map(str::trim).collect();
+        let expected = ["WARN electrode 3 is left out", "INFO found 3", "INFO found 3"];
+        assert_eq!(lines[..3], expected, "{text}");
+        assert_eq!(lines.len(), 6, "{text}");
+        assert_eq!(lock(&repeats).counted().len(), 2);
+    }
+}

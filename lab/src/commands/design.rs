@@ -1,0 +1,191 @@
+//! `tactomo-lab design`: from what is wanted to a detector that can be ordered.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::Context;
+use tactomo_board::inputs::{self, Settling};
+use tactomo_design::search::{self, Material, Plan, Wishes};
+use tactomo_physics::detector::{Chosen, Detector, Stack};
+use tactomo_physics::hertz::Skin;
+
+use super::study::watched;
+use tactomo_cli::output::{self, NewFile, message};
+
+/// Finds the detector that meets what you want: foams, thicknesses, electrodes and drive.
+///
+/// Searches all detectors of that size that can be made of the foams at hand, and answers with the
+/// few best and why, what is impossible and which wish to relax, and how far tolerances spoil each.
+/// With --out the best is written as a detector file, ready for `live --simulate --detector`.
+///
+/// Examples:
+///   tactomo-lab design --size 60x60 --largest 3 --two-points 6 --out mine.toml
+///   tactomo-lab design --size 13x60 --smallest 0.1 --largest 10 --compare strip-13x60 --page design.html
+///   tactomo-lab design --size 60x60 --foams my-foams.toml --choose 3 --out mine.toml
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// Width and height, mm
+    #[arg(long, value_name = "WxH", default_value = "60x60")]
+    size: Size,
+    /// Smallest force that has to be seen, N
+    #[arg(long, value_name = "N", default_value_t = 0.05)]
+    smallest: f64,
+    /// Largest force that must not saturate it, N
+    #[arg(long, value_name = "N", default_value_t = 2.5)]
+    largest: f64,
+    /// Error of a place, mm: of one frame of a press in the middle of these forces
+    #[arg(long, value_name = "MM", default_value_t = 0.5)]
+    place: f64,
+    /// Distance of two such presses that have to be told apart, mm [default: a sixth of the shorter side]
+    #[arg(long, value_name = "MM")]
+    two_points: Option<f64>,
+    /// Frames a second
+    #[arg(long, value_name = "NUMBER", default_value_t = 100.0)]
+    frames: f64,
+    /// Electrodes at most: the channels of the board
+    #[arg(long, value_name = "COUNT", default_value_t = 16)]
+    electrodes: usize,
+    /// Diameter of what presses, mm [default: 5, or a fifth of the shorter side if that is less]
+    #[arg(long, value_name = "MM")]
+    tip: Option<f64>,
+    /// Foam at hand, one of the paper's, A to D; give it again for more [default: all four]
+    #[arg(long, value_name = "A..D", conflicts_with = "foams")]
+    foam: Vec<char>,
+    /// Foams at hand: a TOML file with a [[foam]] for each, of name, conductivity_s_per_m, elasticity_pa and thicknesses_m
+    #[arg(long, value_name = "FILE")]
+    foams: Option<PathBuf>,
+    /// A detector to compare with what is found: a preset, or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    compare: Option<Chosen>,
+    /// What that is made of: foam, or stack with the upper one first
+    #[arg(long, value_name = "A..D|STACK", default_value = "A", requires = "compare")]
+    material: Stack,
+    /// Candidates that are tried at most
+    #[arg(long = "try", value_name = "COUNT", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(1..))]
+    most: u32,
+    /// Which of the choices is written
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "out", value_parser = clap::value_parser!(u8).range(1..))]
+    choose: u8,
+    /// Writes the choice as a detector file
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Writes a page with charts of all that can be had, which needs nothing else
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
+    /// Replaces files that exist
+    #[arg(long, visible_alias = "force")]
+    overwrite: bool,
+    /// Seed of the search: the same seed gives the same answer
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Prints the answer as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Width and height (m).
+#[derive(Clone, Copy, Debug)]
+struct Size([f64; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let sides: Option<Vec<f64>> = text.split('x').map(|side| side.trim().parse().ok()).collect();
+        match sides.as_deref() {
+            Some([width_mm, height_mm]) => Ok(Self([width_mm * 1e-3, height_mm * 1e-3])),
+            _ => Err("width and height in millimetres are needed, as in 60x60".to_owned()),
+        }
+    }
+}
+
+/// Searches and answers.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let plan = args.plan()?;
+    let file = NewFile::optional(args.out.as_ref(), args.overwrite)?;
+    let page = NewFile::optional(args.page.as_ref(), args.overwrite)?;
+    let answer = watched(|progress| search::answer(&plan, progress))?;
+    page.map(|page| page.write(search::page(&answer, &output::command_line()))).transpose()?;
+    let settling = answer.choices.iter().map(|choice| settlings(&choice.detector)).collect();
+    let output = Output { answer: &answer, settling };
+    output::print(&if args.json { serde_json::to_string(&output)? } else { output.text() })?;
+    if let (Some(file), Some(path)) = (file, &args.out) {
+        let index = usize::from(args.choose) - 1;
+        let toml = answer.toml(index).with_context(|| {
+            format!("there is no choice {}; there are {} of them", args.choose, answer.choices.len())
+        })?;
+        file.write(toml)?;
+        message!("choice {} is written: tactomo live --simulate --detector {}", args.choose, path.display());
+    }
+    Ok(())
+}
+
+/// What is printed: the answer, and how boards as they are after a reset suit the pads of each choice.
+#[derive(serde::Serialize)]
+struct Output<'a> {
+    #[serde(flatten)]
+    answer: &'a search::Answer,
+    settling: Vec<Vec<Settling>>,
+}
+
+/// How each board, with the settings that it has after a reset, suits the pads of a detector.
+fn settlings(detector: &Detector) -> Vec<Settling> {
+    let pad_ohm = detector.largest_pad_ohm();
+    inputs::BOARDS.iter().filter_map(|board| inputs::settling(board.board, &board.after_reset(), pad_ohm)).collect()
+}
+
+impl Output<'_> {
+    /// The answer as a table, and what the boards need that do not suit.
+    fn text(&self) -> String {
+        let mut lines = vec![search::table(self.answer)];
+        for (choice, settlings) in (1..).zip(&self.settling) {
+            let unsuited = settlings.iter().filter(|settling| !settling.suits);
+            lines.extend(unsuited.map(|settling| format!("choice {choice}: {settling}")));
+        }
+        lines.join("\n")
+    }
+}
+
+impl Args {
+    fn plan(&self) -> anyhow::Result<Plan> {
+        let Size(size_m) = self.size;
+        let side_m = size_m[0].min(size_m[1]);
+        let wishes = Wishes {
+            size_m,
+            smallest_n: self.smallest,
+            largest_n: self.largest,
+            place_m: self.place * 1e-3,
+            two_points_m: self.two_points.map_or(side_m / 6.0, |mm| mm * 1e-3),
+            frames_per_s: self.frames,
+            electrodes: self.electrodes,
+            tip_m: self.tip.map_or((5e-3_f64).min(side_m / 5.0), |mm| mm * 1e-3) / 2.0,
+        };
+        wishes.check()?;
+        let compared = match &self.compare {
+            Some(chosen) => Some((
+                chosen.get()?.in_material(&self.material).map_err(anyhow::Error::msg)?,
+                Skin::from(&self.material),
+            )),
+            None => None,
+        };
+        Ok(Plan { wishes, foams: self.foams()?, most: self.most as usize, compared, seed: self.seed })
+    }
+
+    fn foams(&self) -> anyhow::Result<Vec<Material>> {
+        if let Some(path) = &self.foams {
+            return Ok(Material::read(path)?);
+        }
+        let all = Material::of_paper();
+        if self.foam.is_empty() {
+            return Ok(all);
+        }
+        let of = |letter: &char| {
+            let found = all.iter().find(|foam| foam.name == letter.to_string()).cloned();
+            found.with_context(|| {
+                format!("there is no foam {letter}: A, B, C and D are known; others go into a file for --foams")
+            })
+        };
+        self.foam.iter().map(of).collect()
+    }
+}

@@ -1,0 +1,43 @@
+//! The commands, one file each: its arguments and what it does.
+
+mod design;
+mod learn;
+mod score;
+mod stability;
+mod study;
+mod tradeoff;
+mod validate;
+
+use clap::{Parser, Subcommand};
+
+/// Measures solvers, designs detectors, and learns from presses; `tactomo` is the program for the sensor itself.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Tradeoff(tradeoff::Args),
+    Stability(stability::Args),
+    Study(study::Args),
+    Validate(validate::Args),
+    Design(Box<design::Args>),
+    Learn(learn::Args),
+    Score(score::Args),
+}
+
+/// Runs the command that was asked for.
+pub fn run(cli: Cli) -> anyhow::Result<()> {
+    match cli.command {
+        Command::Tradeoff(args) => tradeoff::run(&args),
+        Command::Stability(args) => stability::run(&args),
+        Command::Study(args) => study::run(&args),
+        Command::Validate(args) => validate::run(&args),
+        Command::Design(args) => design::run(&args),
+        Command::Learn(args) => learn::run(&args),
+        Command::Score(args) => score::run(&args),
+    }
+}

@@ -1,0 +1,45 @@
+//! `tactomo-lab stability`: where solvers break.
+
+use tactomo_study::stability::{self, Plan};
+
+use super::study::StudyArgs;
+use tactomo_cli::choice::DetectorArgs;
+use tactomo_cli::output::{self, NewFile, message};
+
+/// Finds where each solver breaks, how, and whether it reports it.
+///
+/// Varied are noise, converter, force, the distance of two contacts and of edges, thickness and
+/// conductivity, each tolerance of the detector, the baseline, faulty electrodes and more; and errors are compared with the
+/// Cramer-Rao bound. Takes some minutes, with --quick about two; --calibrate 0 takes half of that.
+///
+/// Examples:
+///   tactomo-lab stability --quick --out stability.html
+///   tactomo-lab stability --detector strip-13x60 --solver contacts --json
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    #[command(flatten)]
+    detector: DetectorArgs,
+    #[command(flatten)]
+    study: StudyArgs,
+}
+
+/// Runs the study.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let Args { detector, study } = args;
+    let page = NewFile::optional(study.out.as_ref(), study.overwrite)?;
+    let [places, frames] = study.places_and_frames(if study.quick { [1, 2] } else { [3, 2] });
+    let plan = Plan {
+        detector: detector.get()?,
+        methods: study.methods(),
+        places,
+        frames,
+        seed: study.seed,
+        quick: study.quick,
+        as_built: study.as_built,
+        calibrate: study.calibrate(),
+    };
+    let report = stability::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
+    page.map(|page| page.write(stability::page(&report))).transpose()?;
+    Ok(output::print(&if study.json { serde_json::to_string(&report)? } else { stability::table(&report) })?)
+}

@@ -1,0 +1,107 @@
+//! `tactomo-lab study built`: detectors that are not as they are described.
+
+use std::path::PathBuf;
+
+use tactomo_study::built::{self, Plan};
+use tactomo_touch::solve::Method;
+
+use tactomo_cli::choice::{self, DetectorArgs};
+use tactomo_cli::output::{self, NewFile, message};
+
+/// Tries solvers on detectors as built, of which they know the description only.
+///
+/// Detectors are drawn from the tolerances of the description, or come from files of another
+/// program (JSON: `nominal`, `scenes`). Each is pressed by single contacts and by pairs, with
+/// the converter's noise; each press is a cold start.
+///
+/// Examples:
+///   tactomo-lab study built --detectors 20 --presses 12
+///   tactomo-lab study built --tolerances 0.1 --solver auto --json
+///   tactomo-lab study built --rub 300 --known 3
+///   tactomo-lab study built --chart-frames --detectors 4 --solver contacts --out frames.html
+///   tactomo-lab study built --rub 24 --solver contacts tests/reference/built/*.json.gz
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// Files of detectors as built
+    #[arg(value_name = "FILE")]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    detector: DetectorArgs,
+    /// Solver to try; give it again for more [default: auto, contacts and tikhonov]
+    #[arg(long, value_name = "NAME", value_parser = choice::method(), hide_possible_values = true)]
+    solver: Vec<Method>,
+    /// How many detectors are drawn
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "files")]
+    detectors: u32,
+    /// Single presses on each; a quarter as many pairs
+    #[arg(long, default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "files")]
+    presses: u32,
+    /// Takes this share of the description's tolerances
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
+    tolerances: f64,
+    /// Calibrates each detector before, with so many single presses at unknown places; of a file with its first ones, and tries the rest
+    #[arg(long, value_name = "PRESSES", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    rub: u32,
+    /// So many of them are at known places
+    #[arg(long, value_name = "PRESSES", default_value_t = 0, requires = "rub", value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    known: u32,
+    /// Calibrates with 5, 20, 100 and 1000 presses in turn, at three noises of the converter, and compares
+    #[arg(long, conflicts_with_all = ["files", "rub", "known"])]
+    chart_frames: bool,
+    /// Writes a page with the charts of --chart-frames, which needs nothing else
+    #[arg(long, value_name = "FILE", requires = "chart_frames")]
+    out: Option<PathBuf>,
+    /// Replaces the file if it exists
+    #[arg(long, visible_alias = "force", requires = "out")]
+    overwrite: bool,
+    /// First of the seeds of detectors, presses and noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Detectors tried at a time; times are right with one only
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    threads: u8,
+    /// Prints all figures, and every press, as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the study.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let mut detector = args.detector.get()?;
+    detector.tolerances = detector.tolerances.times(args.tolerances);
+    let methods = match args.solver[..] {
+        [] => vec![Method::Auto, Method::Contacts, Method::Tikhonov],
+        _ => args.solver.clone(),
+    };
+    let plan = Plan {
+        detector,
+        files: args.files.clone(),
+        methods,
+        detectors: args.detectors as usize,
+        presses: args.presses as usize,
+        rub: args.rub as usize,
+        known: args.known as usize,
+        threads: usize::from(args.threads),
+        seed: args.seed,
+    };
+    if args.chart_frames {
+        return over_frames(args, &plan);
+    }
+    let report = built::run(&plan, &output::command_line(), &|step| message!("{step}"))?;
+    Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { built::table(&report) })?)
+}
+
+fn over_frames(args: &Args, plan: &Plan) -> anyhow::Result<()> {
+    let page = NewFile::optional(args.out.as_ref(), args.overwrite)?;
+    let report = built::over_frames(plan, &output::command_line(), &|step| message!("{step}"))?;
+    page.map(|page| page.write(built::page(&report))).transpose()?;
+    Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { built::frames_table(&report) })?)
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if (0.0..=10.0).contains(&share) => Ok(share),
+        _ => Err("a number from 0 to 10 is needed".to_owned()),
+    }
+}

@@ -1,0 +1,146 @@
+//! `tactomo-lab validate`: models and solvers against reference cases.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use serde::Serialize;
+use tactomo_physics::causes::with_causes;
+use tactomo_physics::forward::ForwardModel;
+use tactomo_physics::forward::shell::Shell;
+use tactomo_study::case::Case;
+use tactomo_study::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
+use tactomo_touch::solve::{Lambda, Method, Parameter, Problem};
+
+use tactomo_cli::choice::{self, Model};
+use tactomo_cli::output::{self, message};
+
+/// Compares models and solvers with reference cases.
+///
+/// The forward model computes the readings of each case, to compare with the ones in the file;
+/// the solvers find contacts from the readings in the file.
+///
+/// Cases are JSON files, compressed by gzip or not; twelve are in tests/reference/slab (see the README there).
+///
+/// Examples, from the repository's root:
+///   tactomo-lab validate tests/reference/slab/*.json.gz --solver contacts --noise-lsb 1.5 --trials 20
+///   tactomo-lab validate tests/reference/slab/*.json.gz --model slab --solver tikhonov
+#[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
+pub struct Args {
+    /// Case files
+    #[arg(required = true, value_name = "CASE")]
+    cases: Vec<PathBuf>,
+    /// Forward model
+    #[arg(long, value_enum, default_value = "auto")]
+    model: Model,
+    /// Approximate number of nodes of the shell's mesh, to compare readings
+    #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    nodes: u32,
+    /// Quantises the readings and adds noise of this standard deviation (LSB)
+    #[arg(long, value_name = "LSB", value_parser = noise)]
+    noise_lsb: Option<f64>,
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Trials of each solver, with new noise each
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    trials: u32,
+    /// Solver to try; give it again for more [default: all]
+    #[arg(long, value_name = "NAME", value_parser = choice::method(), hide_possible_values = true)]
+    solver: Vec<Method>,
+    /// Lambda of the solvers that have one, as a share of the largest singular value
+    #[arg(long, value_name = "SHARE", value_parser = positive)]
+    lambda: Option<f64>,
+    /// Prints `{cases: [...]}` as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    cases: Vec<CaseReport>,
+}
+
+/// Runs all cases and prints a table or JSON.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let mut report = Report { cases: Vec::with_capacity(args.cases.len()) };
+    for path in &args.cases {
+        let case = Case::read(path)?;
+        report.cases.push(report_case(args, &case).with_context(|| path.display().to_string())?);
+    }
+    let text = if args.json { serde_json::to_string(&report)? } else { table(&report.cases) };
+    Ok(output::print(&text)?)
+}
+
+fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
+    let forward = args.model.build(&case.detector, Some(args.nodes as usize))?;
+    let [forward_error, impedance_error] = forward_errors(case, &*forward)?;
+    // The slab has no mesh to be finer for the comparison.
+    let model: Box<dyn ForwardModel> = match forward.name() {
+        "shell" => Box::new(Shell::new(&case.detector)?),
+        _ => forward,
+    };
+    let lambda = args.lambda.map(|share| Parameter::Lambda(Lambda::Relative(share)));
+    let trials = Trials { noise_lsb: args.noise_lsb, seed: args.seed, count: args.trials as usize };
+    let problem = Problem::new(model);
+    let mut solvers = Vec::new();
+    for method in Method::ALL.iter().filter(|method| args.solver.is_empty() || args.solver.contains(method)) {
+        match method.build_with(&problem, lambda) {
+            Ok(mut solver) => solvers.push(try_solver(case, &mut *solver, &trials)?),
+            // Of all solvers, those that there are for this detector.
+            Err(error) if args.solver.is_empty() => message!("{}: not tried: {}", method.name(), with_causes(&error)),
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Ok(CaseReport {
+        case: case.detector.name.clone(),
+        model: problem.model.name().to_owned(),
+        forward_error,
+        impedance_error,
+        reference_error: case.mesh_error_v / case.readings.largest_v(),
+        solvers,
+    })
+}
+
+fn noise(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(lsb) if (0.0..1e6).contains(&lsb) => Ok(lsb),
+        _ => Err("a number of LSB is needed, 0 or more".to_owned()),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if share > 0.0 && f64::is_finite(share) => Ok(share),
+        _ => Err("a number above 0 is needed".to_owned()),
+    }
+}
+
+/// Errors in per cent of the largest reading or impedance.
+fn table(cases: &[CaseReport]) -> String {
+    let mut lines = vec![format!(
+        "{:<28} {:<6} {:>9} {:>9} {:>9}   {:<18} {:>10} {:>9} {:>12} {:>9}",
+        "case", "model", "reading %", "Z %", "ref. %", "solver", "found/true", "error mm", "conduct. S", "us/frame"
+    )];
+    for case in cases {
+        let forward = format!(
+            "{:<28} {:<6} {:>9.2} {:>9.2} {:>9.2}",
+            case.case,
+            case.model,
+            100.0 * case.forward_error,
+            100.0 * case.impedance_error,
+            100.0 * case.reference_error
+        );
+        for (i, solver) in case.solvers.iter().enumerate() {
+            lines.push(format!("{:<65}   {}", if i == 0 { forward.as_str() } else { "" }, solver_columns(solver)));
+        }
+    }
+    lines.join("\n")
+}
+
+fn solver_columns(report: &SolverReport) -> String {
+    let error = report.position_error_m.map_or_else(|| "-".to_owned(), |error_m| format!("{:.2}", error_m * 1e3));
+    let conductance_s: f64 = report.contacts.iter().map(|contact| contact.conductance_s).sum();
+    let found = format!("{:.1}/{}", report.count_found, report.count_true);
+    format!("{:<18} {found:>10} {error:>9} {conductance_s:>12.2e} {:>9.1}", report.solver, report.frame_us)
+}

@@ -1,0 +1,41 @@
+//! The program as a user calls it: exit codes and messages.
+
+use tactomo_tests::LAB;
+
+#[test]
+fn every_command_has_a_help_with_an_example() {
+    for command in ["tradeoff", "stability", "study", "validate", "design", "learn", "score"] {
+        let output = LAB.run(&[command, "--help"]);
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(output.status.code(), Some(0));
+        assert!(text.contains("Example") && text.contains(&format!("tactomo-lab {command}")), "{command}: {text}");
+    }
+}
+
+#[test]
+fn wrong_use_exits_with_2_and_names_the_argument() {
+    for (args, named) in [
+        (&["study", "contacts", "--scenes", "0"][..], "--scenes"),
+        (&["tradeoff", "--scan", "--solver", "auto"], "--solver"),
+        (&["dance"], "dance"),
+    ] {
+        let (code, message) = LAB.failure(args);
+        assert_eq!(code, Some(2), "{args:?}: {message}");
+        assert!(message.contains(named), "{args:?}: {message}");
+    }
+}
+
+#[test]
+fn what_fails_exits_with_1_and_says_what_to_do() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    let exists = "exists already: give another name, or --overwrite";
+    for (args, named) in [
+        (&["tradeoff", "--quick", "--out", file][..], exists),
+        (&["tradeoff", "--quick", "--picture", file], exists),
+        (&["stability", "--quick", "--out", file], exists),
+        (&["stability", "--quick", "--out", "no/such/a.html"], "cannot write no/such/a.html: No such file"),
+    ] {
+        let message = LAB.refused(args);
+        assert!(message.contains(named), "{args:?}: {message}");
+    }
+}
