@@ -12,9 +12,7 @@ mod commands;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 fn main() -> ExitCode {
-    let cli = commands::Cli::parse();
+    let cli = commands::Cli::read();
     tactomo_cli::run(|| commands::run(cli))
 }

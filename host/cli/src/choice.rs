@@ -54,6 +54,7 @@ impl Model {
 
 /// Which detector.
 #[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Detector")]
 pub struct DetectorArgs {
     /// Detector: name of a preset, or a TOML file; unless given, that of the recording that is read, or square-60
     #[arg(long, value_name = "NAME|FILE")]

@@ -82,6 +82,7 @@ pub struct Args {
 
 /// What becomes of the bytes.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Solver and page")]
 pub struct PictureArgs {
     #[command(flatten)]
     pub detector: DetectorArgs,

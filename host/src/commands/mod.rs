@@ -18,7 +18,9 @@ mod scene;
 mod source;
 mod streams;
 
-use clap::{Parser, Subcommand};
+use std::fmt::Write;
+
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Shows touch on a tomographic tactile sensor, live, from recordings or simulated.
 #[derive(Debug, Parser)]
@@ -43,6 +45,42 @@ enum Command {
     Calibrate(calibrate::Args),
 }
 
+/// Commands by what they are for, as `--help` lists them.
+const TASKS: [(&str, &[&str]); 5] = [
+    ("See", &["live", "replay"]),
+    ("Connect", &["ports", "board"]),
+    ("Record", &["record", "recording", "export"]),
+    ("Calibrate", &["calibrate"]),
+    ("Compute", &["reconstruct", "forward", "detector"]),
+];
+
+impl Cli {
+    /// What was asked for; help and wrong use end the program.
+    pub fn read() -> Self {
+        let command = Self::by_task();
+        Self::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit())
+    }
+
+    /// The commands, with a help that lists them by task.
+    fn by_task() -> clap::Command {
+        let command = Self::command();
+        let mut list = String::new();
+        for (task, names) in TASKS {
+            let _infallible = writeln!(list, "{task}:");
+            for name in names {
+                let about = command.find_subcommand(name).and_then(clap::Command::get_about);
+                let about = about.map(ToString::to_string).unwrap_or_default();
+                let _infallible = writeln!(list, "  {name:12} {about}");
+            }
+            list.push('\n');
+        }
+        let after = "`tactomo COMMAND --help` explains one, with examples; `tactomo-lab` measures solvers and designs detectors.";
+        command.help_template(format!(
+            "{{about}}\n\n{{usage-heading}} {{usage}}\n\n{list}Options:\n{{options}}\n\n{after}"
+        ))
+    }
+}
+
 /// Runs the command that was asked for.
 pub fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
@@ -57,5 +95,20 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Forward(args) => forward::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_lists_every_command_once() {
+        let command = Cli::by_task();
+        command.clone().debug_assert();
+        let mut listed: Vec<&str> = TASKS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        let mut known: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+        (listed.sort_unstable(), known.sort_unstable());
+        assert_eq!(listed, known);
     }
 }

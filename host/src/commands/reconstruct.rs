@@ -41,7 +41,7 @@ pub struct Args {
     /// Forward model
     #[arg(long, value_enum, default_value = "auto")]
     model: Model,
-    /// Solver [default: tikhonov; with --presses or --learned, what they teach]
+    /// Solver [default: auto; with --presses or --learned, what they teach]
     #[arg(long, value_name = "NAME", value_parser = choice::method())]
     solver: Option<Method>,
     /// Lambda of tikhonov, tikhonov-paper, noser or laplace: a share of the largest singular value, or a rule that chooses it for

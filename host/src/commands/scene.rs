@@ -17,6 +17,7 @@ const SEED: u64 = 1;
 
 /// A scene, its hand and faults.
 #[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Simulated touch")]
 pub struct SceneArgs {
     /// What touches: rest, wandering, single, several, wide, ring, line, five-fingers, rolling-ball, moving, changing-force; and the paper's
     /// demonstrations, each on its own detector unless --detector is given: gripper, display, pointer, texture, hand

@@ -23,6 +23,7 @@ const MOUSE_FIRMNESS: f64 = 0.3;
 
 /// A board: on the port that is named, or on whichever USB serial port one is found.
 #[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Board")]
 #[command(group(ArgGroup::new("simulated").args(SceneArgs::NAMES).multiple(true).requires("simulate")))]
 pub struct BoardArgs {
     /// Serial port of the board [default: the USB serial port on which a board answers]
@@ -48,6 +49,7 @@ pub struct BoardArgs {
 
 /// Settings of the scan; what is not given stays as the board has it.
 #[derive(Clone, Copy, Debug, clap::Args)]
+#[command(next_help_heading = "Scan settings")]
 pub struct SettingsArgs {
     /// Wait after grounding an electrode before its readings (us)
     #[arg(long, value_name = "US")]

@@ -22,6 +22,7 @@ use tactomo_cli::output::message;
 
 /// Where answers go besides the page.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Streams")]
 pub struct StreamArgs {
     /// Writes each answer as a line of JSON: to a new file, to stdout with `-`, to all who connect to `tcp:PORT` (of this machine; of
     /// others with `tcp:ADDRESS:PORT`), or as a datagram to `udp:ADDRESS:PORT`. May be given several times. docs/streams.md says what is

@@ -31,7 +31,7 @@ pub struct Input<'a> {
     pub detector: &'a DetectorArgs,
     /// Forward model.
     pub model: Model,
-    /// Solver; unless given that of what is taught, or tikhonov.
+    /// Solver; unless given that of what is taught, or auto, as live has it.
     pub solver: Option<Method>,
     /// Its lambda, if that is not the default.
     pub lambda: Option<Lambda>,
@@ -114,7 +114,7 @@ impl Reader {
     /// Opens the file and makes what solves it.
     pub fn open(input: &Input) -> anyhow::Result<Self> {
         let taught = input.taught.map(Taught::get).transpose()?;
-        let solver = input.solver.or(taught.as_ref().map(Learned::method)).unwrap_or(Method::Tikhonov);
+        let solver = input.solver.or(taught.as_ref().map(Learned::method)).unwrap_or(Method::Auto);
         if let Some(taught) = taught.as_ref().map(Learned::method).filter(|taught| *taught != solver) {
             bail!("what was learned is for the solver {}, not {}: leave out --solver", taught.name(), solver.name());
         }
