@@ -2,7 +2,7 @@
 
 use super::Detector;
 use super::check::{LENGTH_M, Problem, within};
-use super::preset::CONTACT_IMPEDANCE_OHM_M2;
+use super::pad::CONTACT_IMPEDANCE_OHM_M2;
 
 /// Diameter of the paper's dots (m), section IV.C.2.
 pub(super) const DOT_DIAMETER_M: f64 = 0.00722;

@@ -16,7 +16,8 @@ use self::calibration::CalibrationTable;
 use self::electrodes::ElectrodeTable;
 use self::layers::LayerTable;
 use super::check::{LENGTH_M, Problem, within};
-use super::preset::{CONTACT_IMPEDANCE_OHM_M2, DRIVE_V, ON_RESISTANCE_OHM};
+use super::pad::CONTACT_IMPEDANCE_OHM_M2;
+use super::preset::{DRIVE_V, ON_RESISTANCE_OHM};
 use super::{Adc, Correction, Detector, ForceLaw, Outline, Surface, SurfaceError, Tolerances, Unevenness};
 use crate::geometry::area;
 

@@ -4,6 +4,9 @@ use std::f64::consts::PI;
 
 use super::{Detector, Electrode};
 
+/// Contact impedance where none is given (ohm m2).
+pub(super) const CONTACT_IMPEDANCE_OHM_M2: f64 = 1e-5;
+
 impl Detector {
     /// Resistance of an electrode's pad (ohm): that of the current which spreads from it into the layer, `1 / (4 a sigma)` with its radius `a` and the
     /// conductivity at the electrode side (Holm, "Electric Contacts": a round contact on a half-space), and that of the contact itself.

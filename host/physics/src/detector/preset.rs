@@ -1,10 +1,9 @@
 //! Detectors of the paper, by name.
 
 use super::material::FOAMS;
+use super::pad::CONTACT_IMPEDANCE_OHM_M2;
 use super::{Adc, Detector, Electrode, Layer, Outline, Tolerances, Unevenness};
 
-/// Contact impedance where none is given (ohm m2).
-pub(super) const CONTACT_IMPEDANCE_OHM_M2: f64 = 1e-5;
 /// Drive where none is given (V).
 pub(super) const DRIVE_V: f64 = 2.0;
 /// On-resistance where none is given: the ADG726's (ohm).

@@ -7,13 +7,28 @@ use super::mesh::Mesh;
 use crate::forward::ForwardError;
 use crate::geometry;
 use crate::scene::Contact;
-use crate::space::Place;
+use crate::space::{self, Place};
 
 /// Corners of the polygon that stands for a disc, which has the disc's area.
 const CORNERS: usize = 64;
 
 /// Where a disc lies on a surface: its centre there, and the surface's normal, which is nothing on a plane.
 pub(super) type Footing = (Place, Place);
+
+/// The centre of a contact moved up or down onto a curved surface, not along it, and the surface's normal there; on a plane
+/// the centre and no normal. `None` farther than `reach_m` from the surface.
+pub(super) fn footing(mesh: &Mesh, locator: &Locator, centre: Place, reach_m: f64) -> Option<Footing> {
+    if mesh.places_m.is_empty() {
+        return Some((centre, [0.0; 3]));
+    }
+    let near = locator.near(centre, reach_m);
+    let corners = near.into_iter().map(|triangle| mesh.triangles[triangle as usize].map(|node| mesh.place_m(node)));
+    let away_m = |corners: [Place; 3]| space::distance(space::nearest_on_triangle(centre, corners), centre);
+    let (away_m, corners) = corners.map(|corners| (away_m(corners), corners)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let normal = space::normal(corners);
+    let height = space::dot(space::sub(centre, corners[0]), normal) / space::dot(normal, normal);
+    (away_m <= reach_m).then(|| (space::along(centre, -height, normal), normal))
+}
 
 /// Conductance that each node gets (S): the integral of its shape function over the discs, times their conductance per area.
 ///
@@ -23,7 +38,7 @@ pub fn node_conductances_s(mesh: &Mesh, locator: &Locator, contacts: &[Contact])
     let mut conductances_s = vec![0.0; mesh.nodes_m.len()];
     for (index, contact) in contacts.iter().enumerate() {
         check(contact).map_err(|what| ForwardError::Contact { index, what: what.to_owned() })?;
-        let footing = mesh.footing(locator, [contact.x_m, contact.y_m, contact.z_m], contact.radius_m);
+        let footing = footing(mesh, locator, [contact.x_m, contact.y_m, contact.z_m], contact.radius_m);
         let density_s_per_m2 = contact.conductance_s / disc_m2(contact.radius_m, CORNERS);
         let touches = footing.is_some_and(|footing| {
             cover(mesh, locator, footing, (contact.radius_m, CORNERS), |node, integral_m2| {

@@ -11,7 +11,8 @@ use std::collections::{HashMap, HashSet};
 use std::f64::consts::{PI, TAU};
 
 use self::plane::{Circle, Plane};
-use super::mesh::{Mesh, PadRings};
+use super::mesh::Mesh;
+use super::rings::PadRings;
 use crate::detector::{Electrode, Surface, edges_of};
 use crate::space::{self, Place};
 

@@ -13,9 +13,11 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::amd;
 
-use super::system::Singular;
-
 const ROOT: u32 = u32::MAX;
+
+/// The matrix cannot be factorised: it is not positive definite to rounding.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Singular;
 
 /// Elements of the inverse of a symmetric positive definite matrix.
 pub struct Inverse {

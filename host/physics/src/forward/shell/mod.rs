@@ -9,6 +9,8 @@ mod facets;
 mod inverse;
 mod locate;
 mod mesh;
+mod meshing;
+mod rings;
 mod spots;
 #[cfg(test)]
 mod spots_tests;
@@ -23,11 +25,11 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use faer::Mat;
 use nalgebra::DMatrix;
 
-use self::inverse::Inverse;
+use self::inverse::{Inverse, Singular};
 use self::locate::Locator;
 pub use self::mesh::Mesh;
 use self::spots::{ShellSpots, SpotTable};
-use self::system::{Factor, Singular, System};
+use self::system::{Factor, System};
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::driving::DrivingLayer;
 use super::spots::SpotFields;

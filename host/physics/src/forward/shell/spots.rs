@@ -13,7 +13,7 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix};
 
 use super::Shell;
-use super::contact::{cover, disc_m2};
+use super::contact::{cover, disc_m2, footing};
 use super::locate::Locator;
 use super::mesh::Mesh;
 use crate::forward::ForwardError;
@@ -176,7 +176,7 @@ impl Stencil {
 /// Weights of the mean over a disc about a place, and the part of it that is on the detector.
 fn covered(mesh: &Mesh, locator: &Locator, place_m: Place, radius_m: f64) -> (Vec<(u32, f64)>, f64) {
     let mut all = Vec::new();
-    if let Some(footing) = mesh.footing(locator, place_m, radius_m) {
+    if let Some(footing) = footing(mesh, locator, place_m, radius_m) {
         cover(mesh, locator, footing, (radius_m, CORNERS), |node, integral_m2| all.push((node, integral_m2)));
     }
     let area_m2: f64 = all.iter().map(|(_, integral_m2)| integral_m2).sum();

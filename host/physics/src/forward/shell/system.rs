@@ -9,7 +9,7 @@ use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use nalgebra::DMatrix;
 
-use super::inverse::Inverse;
+use super::inverse::{Inverse, Singular};
 use super::mesh::Mesh;
 use crate::geometry::cross;
 
@@ -28,10 +28,6 @@ pub struct Factor {
     nodes: usize,
     factor: Llt<u32, f64>,
 }
-
-/// The matrix cannot be factorised: it is not positive definite to rounding.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Singular;
 
 impl System {
     /// Assembles the matrix; `sheet_s` gives the sheet conductance (S) of a triangle, `pad_impedance_ohm_m2`

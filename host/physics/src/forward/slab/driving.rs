@@ -19,7 +19,6 @@ use std::ops::{AddAssign, SubAssign};
 use nalgebra::{DMatrix, DVector};
 
 use super::layers::{self, Response};
-use super::pads::Mode;
 use super::spline::Grid;
 use crate::detector::Layer;
 use crate::forward::driving::DrivingLayer;
@@ -30,6 +29,14 @@ const OWN_END: f64 = 30.0;
 
 /// `k a` at which modes from them to the gap end: what is left out is 1e-3 of a sheet resistance, at the rim of a point.
 const GAP_END: f64 = 9.4;
+
+/// One mode of the fields across the slab: half waves along both sides.
+pub(super) struct Mode {
+    pub m: usize,
+    pub n: usize,
+    /// Of its field on the top, for a mean of one over what the current enters by.
+    pub amplitude: f64,
+}
 
 /// The layers of a detector and what lies on them.
 #[derive(Clone, Copy, Debug)]

@@ -13,7 +13,7 @@ use nalgebra::{Cholesky, DMatrix};
 use realfft::RealFftPlanner;
 
 use super::disc::{DiscBasis, DiscSelf};
-use super::driving::Covered;
+use super::driving::{Covered, Mode};
 use super::from_corner;
 use super::green::SurfaceGreen;
 use super::spline::Grid;
@@ -165,14 +165,6 @@ pub(super) struct PadFields {
     table: Vec<f32>,
     /// Between the electrodes (ohm): `n x n`.
     pub electrodes_ohm: DMatrix<f64>,
-}
-
-/// One mode of the fields across the slab: half waves along both sides.
-pub(super) struct Mode {
-    pub m: usize,
-    pub n: usize,
-    /// Of its field on the top, for a mean of one over what the current enters by.
-    pub amplitude: f64,
 }
 
 impl PadFields {

@@ -6,20 +6,11 @@ use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 use faer::{MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
-use super::glue::{Unknown, kept};
+use super::glue::{Face, Unknown, kept};
 use super::join::Joined;
 use crate::forward::slab::Slab;
 use crate::forward::{ForwardError, ForwardModel};
 use crate::scene::Contact;
-
-/// A face of a dot.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Face {
-    /// On the upper layer's bottom.
-    Upper,
-    /// On the lower layer's top.
-    Lower,
-}
 
 /// The dots of a [`Slab`], to ask for the currents through them.
 pub struct DotCurrents<'a> {

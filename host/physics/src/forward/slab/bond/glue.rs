@@ -9,8 +9,16 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::current::Face;
 use crate::forward::slab::disc::{Density, DiscBasis, DiscSelf, LOCAL_ORDERS, MAX_ORDER, radial_terms};
+
+/// A face of a dot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Face {
+    /// On the upper layer's bottom.
+    Upper,
+    /// On the lower layer's top.
+    Lower,
+}
 
 /// What a dot is made of.
 pub(super) struct Glue<'a> {

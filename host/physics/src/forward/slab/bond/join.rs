@@ -11,8 +11,8 @@ use super::Dots;
 use super::glue::Joint;
 use super::transform::means;
 use crate::forward::slab::disc::DiscBasis;
-use crate::forward::slab::driving::Covered;
-use crate::forward::slab::pads::{Eliminated, Mode, Pad, PadFields, modes, pad_modes, smallest_m, table_grid, uniform};
+use crate::forward::slab::driving::{Covered, Mode};
+use crate::forward::slab::pads::{Eliminated, Pad, PadFields, modes, pad_modes, smallest_m, table_grid, uniform};
 use crate::forward::slab::spline::Grid;
 use crate::forward::slab::uneven::{Uneven, UnevenPlace};
 

@@ -30,7 +30,8 @@ mod transform;
 use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 
-pub use self::current::{DotCurrent, DotCurrents, Face};
+pub use self::current::{DotCurrent, DotCurrents};
+pub use self::glue::Face;
 use self::glue::{Glue, Joint};
 pub(super) use self::join::Stacks;
 use super::disc::{DiscBasis, DiscSelf};

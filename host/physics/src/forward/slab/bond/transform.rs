@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 
 use crate::forward::slab::disc::DiscBasis;
-use crate::forward::slab::pads::Mode;
+use crate::forward::slab::driving::Mode;
 use crate::forward::slab::spline::Grid;
 
 /// `modes x (discs x densities)`, for discs of one radius about places from the corner (m).
