@@ -7,8 +7,6 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{ElectrodeWatch, Problem};
 
-use super::judge;
-use super::report::Report;
 use super::touch::{Mean, is_pressed, level_v, median};
 
 /// Places that a fingertip presses.
@@ -159,11 +157,6 @@ impl Check {
         if !self.is_pressed(&self.touch(readings), true) {
             self.ask = Ask::Finger(finger);
         }
-    }
-
-    /// What has come out, as far as the check went. Looking for exchanged wires takes some 100 ms.
-    pub fn report(&mut self, board: &str) -> Report {
-        judge::report(self, board)
     }
 }
 

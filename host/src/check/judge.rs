@@ -19,17 +19,18 @@ const FOLLOWS: f64 = 0.2;
 /// Presses of a fingertip that have to show the same exchange of wires.
 const SHOWN: usize = 2;
 
-/// What has come out.
-pub fn report(check: &mut Check, board: &str) -> Report {
-    let exchanged = exchanged(check);
-    if let Some(pair) = exchanged {
-        check.watch.conclude(Look::Exchanged, Some(pair));
+impl Check {
+    /// What has come out, as far as the check went. Looking for exchanged wires takes some 100 ms.
+    pub fn report(&mut self, board: &str) -> Report {
+        if let Some(pair) = exchanged(self) {
+            self.watch.conclude(Look::Exchanged, Some(pair));
+        }
+        let electrodes = (0..self.detector.electrodes.len()).map(|e| electrode(self, board, e)).collect();
+        let mut report = Report { electrodes, presses: self.presses.len(), notes: Vec::new(), sound: false };
+        report.notes = advice::notes(self, &report);
+        report.sound = report.faulty().next().is_none() && report.presses == 1 + FINGERS;
+        report
     }
-    let electrodes = (0..check.detector.electrodes.len()).map(|e| electrode(check, board, e)).collect();
-    let mut report = Report { electrodes, presses: check.presses.len(), notes: Vec::new(), sound: false };
-    report.notes = advice::notes(check, &report);
-    report.sound = report.faulty().next().is_none() && report.presses == 1 + FINGERS;
-    report
 }
 
 /// The two wires that are exchanged, as presses of a fingertip at different places show.

@@ -16,6 +16,7 @@ mod slab;
 pub mod spots;
 mod spread;
 mod through;
+mod uneven_place;
 
 use std::sync::Arc;
 

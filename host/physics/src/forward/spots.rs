@@ -4,7 +4,7 @@
 //! conductance: what the current's spread over the contact adds is a few per cent. So many places can be looked at, before contacts
 //! are fitted with [`ForwardModel::impedance_ohm`](super::ForwardModel::impedance_ohm).
 
-use super::slab::UnevenPlace;
+use super::uneven_place::UnevenPlace;
 use crate::geometry::Point;
 use crate::space::Place;
 

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use super::script::FINGERTIPS;
+use super::hand::FINGERTIPS;
 use super::{Hand, SceneName, Shape, Touch};
 use crate::detector::Detector;
 use crate::geometry::Point;

@@ -7,6 +7,9 @@ use crate::detector::Detector;
 use crate::geometry::Point;
 use crate::hertz::{Beyond, Hertz, Imprint};
 
+/// Fingertips of a hand laid down: from the middle finger's root, in shares of the shorter side, thumb first.
+pub(super) const FINGERTIPS: [Point; 5] = [[-0.30, -0.12], [-0.20, 0.20], [-0.02, 0.28], [0.14, 0.22], [0.29, 0.05]];
+
 /// Conductance of a press of firmness 1, in sheet conductances: well beyond where the linear theory ends.
 const FIRMEST: f64 = 2.0;
 /// Radius of that press, as a share of the detector's shorter side.

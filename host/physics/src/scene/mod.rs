@@ -2,12 +2,14 @@
 
 mod demonstration;
 mod hand;
+mod name;
 mod script;
 mod touch;
 
 pub use self::demonstration::TEXTURE_HZ;
 pub use self::hand::{Fingertip, Hand};
-pub use self::script::{Scene, SceneName};
+pub use self::name::SceneName;
+pub use self::script::Scene;
 pub use self::touch::{Shape, Touch};
 
 /// A disc of contact between driving layer and detector.

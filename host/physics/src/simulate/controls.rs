@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-use super::board::{SimulationError, finer_model};
+use super::model::{SimulationError, finer_model};
 use super::{Fault, Foam, Measurement};
 use crate::detector::Detector;
 use crate::forward::ForwardModel;

@@ -11,17 +11,19 @@ mod fault;
 mod foam;
 mod measure;
 mod measurement;
+mod model;
 mod noise;
 
 use crate::readings::Readings;
 
-pub use board::{Simulation, SimulationError, driving_layer, finer_model};
+pub use board::Simulation;
 pub use built::{CannotDraw, as_built, drawn, try_drawn};
 pub use controls::Controls;
 pub use fault::{Fault, FaultError};
 pub use foam::{Foam, Pressed};
 pub use measure::{code, measured};
 pub use measurement::Measurement;
+pub use model::{SimulationError, driving_layer, finer_model};
 pub use noise::Noise;
 
 /// What the simulated board measures.

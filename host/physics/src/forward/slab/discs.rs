@@ -5,10 +5,10 @@ use nalgebra::DMatrix;
 use super::cut::CutDisc;
 use super::disc::DiscBasis;
 use super::pads::between;
-use super::uneven::UnevenPlace;
 use super::{Slab, from_corner};
 use crate::forward::ForwardError;
 use crate::forward::contact::{ContactSystem, Contacted};
+use crate::forward::uneven_place::UnevenPlace;
 use crate::scene::Contact;
 
 /// Degree of the densities that the kernel's changes are taken for.

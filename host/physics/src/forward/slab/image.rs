@@ -9,8 +9,9 @@ use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
 use super::pads::PadFields;
-use super::uneven::{Uneven, UnevenPlace, uneven_ohm};
+use super::uneven::{Uneven, uneven_ohm};
 use crate::forward::ImageMesh;
+use crate::forward::uneven_place::UnevenPlace;
 
 /// Modes summed along a side, for each cell of it: what is left out is below 1e-3 of a cell's own impedance.
 const MODES_PER_CELL: usize = 16;

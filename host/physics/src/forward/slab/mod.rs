@@ -41,7 +41,6 @@ use self::pads::{PadFields, PadPoints};
 use self::spots::SlabSpots;
 use self::stacks::{bottom_surface, split_m, stacks, top_surface, widest_m};
 use self::uneven::Uneven;
-pub(super) use self::uneven::UnevenPlace;
 use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::driving::DrivingLayer;
 use super::spots::SpotFields;

@@ -23,6 +23,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::layers::{Response, response};
 use crate::detector::{Layer, Unevenness, cosines};
+use crate::forward::uneven_place::UnevenPlace;
 
 /// Points along a side, for each half wave of the highest mode, where `q` is integrated.
 const POINTS_PER_MODE: usize = 4;
@@ -43,28 +44,11 @@ pub(super) struct Uneven {
     top: DMatrix<f64>,
 }
 
-/// A place of the top, or of the bottom, as unevenness changes the fields on that side.
-#[derive(Clone, Debug)]
-pub(in crate::forward) struct UnevenPlace {
-    /// `1 / sqrt(s)`.
-    pub(super) inverse_root: f64,
-    modes: DVector<f64>,
-    /// Correction of its own current's field, by modes (ohm).
-    fields: DVector<f64>,
-}
-
 /// The kernel of the top between two places of an uneven slab, from that of the even one (ohm), which it is without unevenness.
 pub(super) fn uneven_ohm(even_ohm: f64, here: Option<&UnevenPlace>, there: Option<&UnevenPlace>) -> f64 {
     match (here, there) {
         (Some(here), Some(there)) => (even_ohm + here.correction_ohm(there)) * here.inverse_root * there.inverse_root,
         _ => even_ohm,
-    }
-}
-
-impl UnevenPlace {
-    /// The correction between two places of the top (ohm), without the roots.
-    pub fn correction_ohm(&self, other: &Self) -> f64 {
-        self.modes.dot(&other.fields)
     }
 }
 

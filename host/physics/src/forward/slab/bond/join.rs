@@ -14,7 +14,8 @@ use crate::forward::slab::disc::DiscBasis;
 use crate::forward::slab::driving::{Covered, Mode};
 use crate::forward::slab::pads::{Eliminated, Pad, PadFields, modes, pad_modes, smallest_m, table_grid, uniform};
 use crate::forward::slab::spline::Grid;
-use crate::forward::slab::uneven::{Uneven, UnevenPlace};
+use crate::forward::slab::uneven::Uneven;
+use crate::forward::uneven_place::UnevenPlace;
 
 /// Correction that is left out, as a share of the largest one of a mode.
 const NEGLIGIBLE: f64 = 1e-5;

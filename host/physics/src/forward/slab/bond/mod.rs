@@ -39,8 +39,8 @@ use super::driving::Covered;
 use super::from_corner;
 use super::green::{Image, SurfaceGreen};
 use super::stacks::{bottom_surface, split_m, top_surface};
-use super::uneven::UnevenPlace;
 use crate::detector::Bond;
+use crate::forward::uneven_place::UnevenPlace;
 
 /// Distances of two dots' middles, in radii, up to which the near part between them has the points of a basis of so many degrees more.
 const MORE_DEGREES: [(f64, usize); 3] = [(2.06, 6), (2.3, 4), (2.7, 2)];
