@@ -5,19 +5,21 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What is looked at, from the repository's root on.
-const LOOKED_AT: [&str; 12] = [
+const LOOKED_AT: [&str; 14] = [
     ".cargo",
     ".ci",
     ".github",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
     "README.md",
     "docs",
     "firmware",
     "host",
+    "lab",
     "protocol",
     "rust-toolchain.toml",
     "tests",
     "tools",
-    "touch-core",
 ];
 /// What a toolchain's name follows, in scripts and in TOML.
 const BEFORE_A_NAME: [&str; 7] = ["+", "\"", "'", "install ", "toolchain ", "toolchain=", "channel: "];

@@ -36,7 +36,7 @@ const TRIES: u32 = 5;
 /// A started board that sends no frame for this long, and the time of its slowest frame, is [mute](Session::is_mute): by then it was asked
 /// again twice, and a chip that had just restarted would have answered.
 pub const MUTE_AFTER: Duration = Duration::from_secs(4);
-/// No board takes longer for a conversion: the slowest, the ESP32-C3, takes about 40 us (docs/hardware.md).
+/// No board takes longer for a conversion: the slowest, the ESP32-C3, takes about 40 us (docs/firmware.md).
 const CONVERSION: Duration = Duration::from_micros(50);
 
 /// What a [mute](Session::is_mute) board means and what to do, for people.

@@ -257,7 +257,7 @@ fn frames_at(board: BoardModel, volts: f64, seed: u64) -> Vec<Frame> {
 
 #[test]
 fn boards_scan_as_fast_as_their_budgets_say() {
-    // Settle, conversions and the firmware's work of sixteen rows (`docs/hardware.md`).
+    // Settle, conversions and the firmware's work of sixteen rows (`docs/firmware.md`).
     let budgets_us = [(BoardModel::Ideal, 832.0), (BoardModel::Esp32, 2386.0), (BoardModel::Esp32c3, 15_098.0)];
     for (board, budget_us) in budgets_us {
         let mut host = model(board, 1, Rising(0.5, 0.0));

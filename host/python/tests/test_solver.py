@@ -36,7 +36,7 @@ def test_contacts_are_objects_rows_or_touches(detector):
 
 def test_a_simulator_measures_with_noise_by_another_model(detector, simulator):
     volts, exact = simulator.voltages([PRESS]), tactomo.forward(detector, [PRESS])
-    # The finer model differs, by less than models differ from independent ones: docs/physics.md.
+    # The finer model differs, by less than models differ from independent ones: docs/validation.md.
     assert 0 < np.abs(volts - exact).max() < 0.012 * exact.max()
     noise_v = simulator.readings([PRESS]) - volts
     # Readings of all but the grounded electrode are noisy; the floor of the converter cuts noise at zero.

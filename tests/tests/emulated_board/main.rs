@@ -154,8 +154,8 @@ fn a_frame_costs_the_same_in_every_run() -> Result<()> {
     // What the simulated boards take for a frame, and what the page says, is what was measured.
     let taken = tactomo::board::simulated::FRAME_INSTRUCTIONS;
     assert_eq!(instructions, taken, "host/board/src/simulated/model.rs");
-    let page = include_str!("../../../docs/hardware.md");
+    let page = include_str!("../../../docs/firmware.md");
     let told = format!("{} {:03}", taken / 1000, taken % 1000);
-    assert_eq!(page.matches(&format!("{told} instructions")).count(), 3, "docs/hardware.md");
+    assert_eq!(page.matches(&format!("{told} instructions")).count(), 3, "docs/firmware.md");
     Ok(())
 }

@@ -154,7 +154,7 @@ static ESP32C3: Figures = Figures {
     name: "esp32c3 (simulated)",
     link: "simulated ESP32-C3",
     wiring: Wiring::Latched,
-    // The wait after each change of half B comes on top of it (`docs/hardware.md`).
+    // The wait after each change of half B comes on top of it (`docs/firmware.md`).
     conversion_ns: 38_000,
     // At 160 MHz.
     row_work_ns: ROW_CYCLES * 1000 / 160,

@@ -282,7 +282,7 @@ mod tests {
         errors
     }
 
-    /// The figures of `docs/hardware.md`: readings up to 1.35 V.
+    /// What `docs/hardware.md` says of strapping pins: readings up to 1.35 V.
     #[test]
     fn strapping_resistors_need_a_capacitor_across_them_and_no_wait_replaces_it() {
         let volts = pressed();

@@ -19,7 +19,7 @@ const TOGETHER: f64 = 0.02;
 /// What a wish counts that is not met at all, as a logarithm.
 const NOT_AT_ALL: f64 = -20.0;
 
-/// The ESP32's budget, docs/hardware.md: seconds for a conversion, a ground's settling, and the firmware's work for a frame of 256 conversions; bytes of a frame beside
+/// The ESP32's budget, docs/firmware.md: seconds for a conversion, a ground's settling, and the firmware's work for a frame of 256 conversions; bytes of a frame beside
 /// the readings; bytes a second at 921 600 baud.
 const CONVERSION_S: f64 = 10e-6;
 const SETTLE_S: f64 = 20e-6;
@@ -161,7 +161,7 @@ impl Rating {
     }
 }
 
-/// Frames a second of so many electrodes on an ESP32: what the wire or the converter allows, whichever is less (docs/hardware.md).
+/// Frames a second of so many electrodes on an ESP32: what the wire or the converter allows, whichever is less (docs/firmware.md).
 pub fn frames_per_s(electrodes: usize) -> f64 {
     let conversions = electrodes.pow(2) as f64;
     let scan_s = conversions * (CONVERSION_S + WORK_S) + electrodes as f64 * SETTLE_S;
@@ -185,7 +185,7 @@ mod tests {
         let rating = rating();
         assert!((rating.largest_n.unwrap() - 2.1).abs() < 0.05, "{rating:?}");
         assert!(rating.smallest_n.unwrap() < 1e-3 && rating.place_m.unwrap() < 1e-3);
-        // docs/hardware.md: 230 frames/s over the wire.
+        // docs/firmware.md: 230 frames/s over the wire.
         assert!((rating.frames_per_s - 230.0).abs() < 1.0, "{}", rating.frames_per_s);
         assert!(rating.meets(&wishes(), None));
         assert_eq!(rating.tightest(&wishes()), Wish::Largest);

@@ -1,4 +1,4 @@
-//! Frames a second of simulated boards: docs/hardware.md, README.
+//! Frames a second of simulated boards: docs/firmware.md, README.
 
 use super::figure;
 use crate::figure::Figure;

@@ -1,4 +1,4 @@
-//! The forward models against the reference readings: docs/physics.md.
+//! The forward models against the reference readings: docs/validation.md.
 
 use super::figure;
 use super::reference::CASES;

@@ -1,4 +1,4 @@
-//! Errors on the reference readings: docs/solvers.md, docs/physics.md.
+//! Errors on the reference readings: docs/measured.md, docs/validation.md.
 
 use super::figure;
 use crate::figure::Figure;

@@ -1,4 +1,4 @@
-//! Solvers on random scenes and detectors as built, and their times: docs/solvers.md, README.
+//! Solvers on random scenes and detectors as built, and their times: docs/solvers.md, docs/measured.md, README.
 
 use super::figure;
 use crate::figure::Figure;

@@ -67,7 +67,7 @@ fn cubes_agree() {
     }
 }
 
-/// Prints the figures of docs/physics.md.
+/// Prints the figures of docs/validation.md.
 #[test]
 #[ignore = "takes minutes: cubes of 0.25 mm"]
 fn cubes_agree_the_better_the_finer() {
