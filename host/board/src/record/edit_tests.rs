@@ -3,7 +3,7 @@
 use super::*;
 use crate::frames::FrameFile;
 use tactomo_physics::detector::Detector;
-use tactomo_protocol::{FrameHead, MAX_WIRE, encode_frame, encode_hello};
+use tactomo_protocol::{BoardMessage, FrameHead, MAX_WIRE, encode_board, encode_frame};
 
 fn path(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("tactomo-{}-edit-{name}", std::process::id()))
@@ -18,7 +18,7 @@ fn packet(sequence: u16) -> Vec<u8> {
 
 fn hello() -> Vec<u8> {
     let mut wire = [0; MAX_WIRE];
-    let length = encode_hello(&Hello::example(4), &mut wire).unwrap();
+    let length = encode_board(&BoardMessage::Hello(Hello::example(4)), &mut wire).unwrap();
     wire[..length].to_vec()
 }
 
