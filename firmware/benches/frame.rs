@@ -10,7 +10,7 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use tactomo_firmware::mux::{LatchLines, Latched, Transparent};
 use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Mux, Parts, Sampler, Serial, TimedOut};
-use tactomo_protocol::{Command, MAX_COMMAND, Request, Settings, VERSION, encode_request};
+use tactomo_protocol::{Command, MAX_COMMAND, Request, Settings, encode_request};
 
 fn main() {
     divan::main();
@@ -84,7 +84,7 @@ fn commands(average_log2: u8) -> Vec<u8> {
         .flat_map(|command| {
             let mut packet = [0; MAX_COMMAND];
             let request = Request { tag: 1, command };
-            let length = encode_request(&request, VERSION, &mut packet).unwrap_or_default();
+            let length = encode_request(&request, &mut packet).unwrap_or_default();
             packet.into_iter().take(length)
         })
         .collect()

@@ -3,7 +3,7 @@
 use heapless::String;
 use tactomo_protocol::{
     BoardMessage, Command, CommandReceiver, DecodeError, Fault, Hello, MAX_ELECTRODES, MIN_ELECTRODES, Plan, Request,
-    Settings, VERSION, frame, scope, wire_bytes,
+    Settings, frame, scope, wire_bytes,
 };
 
 use crate::inbox::Inbox;
@@ -311,7 +311,6 @@ impl<L: Serial, C: Chip, const WIRE: usize> Attended<C> for Line<'_, L, WIRE> {
 
 fn hello(identity: &Identity, select_us: u16) -> Hello {
     Hello {
-        version: VERSION,
         answers: 0,
         firmware_version: cut(identity.firmware_version),
         board: cut(identity.board),

@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Hello, Kind, Log, Request};
-use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_WIRE, Scope, VERSION, cobs, v1, v2};
+use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_WIRE, Scope, VERSION, cobs};
 
 /// Why bytes between two zeros are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -12,11 +12,11 @@ pub enum DecodeError {
     /// Not a packet: noise, boot text, half a packet, or one with a flipped bit.
     #[error("not a whole packet")]
     Corrupt,
-    /// A whole packet in a version of the protocol that the receiver does not know.
-    #[error("the peer speaks version {0} of the protocol, this side version {VERSION}: update the older of the two")]
+    /// A whole packet in another version of the protocol.
+    #[error("the peer speaks version {0} of the protocol, this side version {VERSION}")]
     Version(u8),
-    /// A whole packet whose body breaks the rules of its version.
-    #[error("a whole packet that its version of the protocol does not know")]
+    /// A whole packet whose kind or body breaks the rules of the protocol.
+    #[error("a whole packet that breaks the rules of the protocol")]
     Body,
 }
 
@@ -41,7 +41,7 @@ pub struct Receiver<const N: usize> {
     counters: Counters,
 }
 
-/// The host's receiver, which knows versions 1 and 2 of the protocol too.
+/// The host's receiver.
 pub type BoardReceiver = Receiver<MAX_WIRE>;
 /// The board's receiver.
 pub type CommandReceiver = Receiver<MAX_COMMAND>;
@@ -124,27 +124,23 @@ impl CommandReceiver {
     }
 }
 
-/// Checks the CRC; returns the version, the kind's bits and the body.
-fn open(packet: &[u8]) -> Result<(u8, u8, &[u8]), DecodeError> {
+/// Checks the CRC and the version; returns the kind's bits and the body.
+fn open(packet: &[u8]) -> Result<(u8, &[u8]), DecodeError> {
     let (content, crc) = packet.split_last_chunk::<CRC_BYTES>().ok_or(DecodeError::Corrupt)?;
     let (head, body) = content.split_first().ok_or(DecodeError::Corrupt)?;
     if CRC.checksum(content) != u32::from_le_bytes(*crc) {
         return Err(DecodeError::Corrupt);
     }
-    Ok((head >> 4, head & 15, body))
+    match head >> 4 {
+        VERSION => Ok((head & 15, body)),
+        version => Err(DecodeError::Version(version)),
+    }
 }
 
 fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
-    let (version, kind, body) = open(packet)?;
-    if ![v1::VERSION, v2::VERSION, VERSION].contains(&version) {
-        return Err(DecodeError::Version(version));
-    }
-    let kind = Kind::from_bits(kind).ok_or(DecodeError::Body)?;
-    if version == v1::VERSION {
-        return v1::board_message(kind, body);
-    }
-    Ok(match kind {
-        Kind::Hello => BoardMessage::Hello(hello(version, body)?),
+    let (kind, body) = open(packet)?;
+    Ok(match Kind::from_bits(kind).ok_or(DecodeError::Body)? {
+        Kind::Hello => BoardMessage::Hello(hello(body)?),
         Kind::Frame => BoardMessage::Frame(frame(body).ok_or(DecodeError::Body)?),
         Kind::Log => BoardMessage::Log(log(body)?),
         Kind::Fault => BoardMessage::Fault(from_postcard(body)?),
@@ -152,23 +148,17 @@ fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
     })
 }
 
-fn hello(version: u8, body: &[u8]) -> Result<Hello, DecodeError> {
-    let hello = match version {
-        v2::VERSION => v2::hello(body)?,
-        _ => Hello { version, ..from_postcard(body)? },
-    };
+fn hello(body: &[u8]) -> Result<Hello, DecodeError> {
+    let hello: Hello = from_postcard(body)?;
     if hello.is_valid() { Ok(hello) } else { Err(DecodeError::Body) }
 }
 
-pub(crate) fn log(body: &[u8]) -> Result<Log, DecodeError> {
+fn log(body: &[u8]) -> Result<Log, DecodeError> {
     Vec::from_slice(body).map(Log).map_err(|_| DecodeError::Body)
 }
 
 fn request(packet: &[u8]) -> Result<Request, DecodeError> {
-    let (version, kind, body) = open(packet)?;
-    if version != VERSION {
-        return Err(DecodeError::Version(version));
-    }
+    let (kind, body) = open(packet)?;
     if kind != Kind::Command as u8 {
         return Err(DecodeError::Body);
     }
@@ -177,7 +167,7 @@ fn request(packet: &[u8]) -> Result<Request, DecodeError> {
 }
 
 /// The whole of `body`, nothing left over.
-pub(crate) fn from_postcard<'a, T: serde::Deserialize<'a>>(body: &'a [u8]) -> Result<T, DecodeError> {
+fn from_postcard<'a, T: serde::Deserialize<'a>>(body: &'a [u8]) -> Result<T, DecodeError> {
     match postcard::take_from_bytes(body) {
         Ok((value, [])) => Ok(value),
         _ => Err(DecodeError::Body),

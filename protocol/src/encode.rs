@@ -7,8 +7,8 @@
 use serde::Serialize;
 
 use crate::frame::{self, FrameHead, HEAD_BYTES};
-use crate::message::{BoardMessage, Hello, Kind, Request};
-use crate::{CRC, CRC_BYTES, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, Scope, VERSION, cobs, v1, v2, wire_bytes};
+use crate::message::{BoardMessage, Kind, Request};
+use crate::{CRC, CRC_BYTES, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, Scope, VERSION, cobs, wire_bytes};
 
 /// Longest postcard body with room to spare; a [`Fault`](crate::Fault) with the longest text takes 98 bytes, a request 106.
 const MAX_BODY: usize = 160;
@@ -36,15 +36,12 @@ pub enum EncodeError {
     /// More than [`MAX_LOG`] bytes of log in one packet.
     #[error("{0} bytes of log do not fit one packet")]
     LogLength(usize),
-    /// A [`Hello`] that [is not valid](Hello::is_valid).
+    /// A [`Hello`](crate::Hello) that [is not valid](crate::Hello::is_valid).
     #[error("a value of Hello is out of range")]
     Hello,
     /// The tag 0, which means that nobody asked.
     #[error("a command needs a tag other than 0")]
     Tag,
-    /// Something that this version of the protocol has no word for.
-    #[error("version {0} of the protocol has no word for it")]
-    NotInVersion(u8),
 }
 
 /// Encodes a board's message into `out`, the closing zero included; returns its length in bytes.
@@ -54,41 +51,22 @@ pub enum EncodeError {
 pub fn encode_board(message: &BoardMessage, out: &mut [u8]) -> Result<usize, EncodeError> {
     match message {
         BoardMessage::Hello(hello) if !hello.is_valid() => Err(EncodeError::Hello),
-        BoardMessage::Hello(hello) => encode_body(VERSION, Kind::Hello, hello, out),
+        BoardMessage::Hello(hello) => encode_body(Kind::Hello, hello, out),
         BoardMessage::Frame(frame) => encode_rows(frame.head, &frame.scope, &frame.readings, out),
         BoardMessage::Log(log) => encode_log(&log.0, out),
-        BoardMessage::Fault(fault) => encode_body(VERSION, Kind::Fault, fault, out),
+        BoardMessage::Fault(fault) => encode_body(Kind::Fault, fault, out),
     }
 }
 
-/// Encodes a Hello into `out` in the version in which it came, so that a recording says what the board said; returns its length in bytes.
+/// Encodes a command into `out` ([`MAX_COMMAND`](crate::MAX_COMMAND) bytes suffice); returns its length in bytes.
 ///
 /// # Errors
-/// [`EncodeError`] if `out` is too short or the Hello breaks a limit of the protocol.
-pub fn encode_hello(hello: &Hello, out: &mut [u8]) -> Result<usize, EncodeError> {
-    match hello.version {
-        _ if !hello.is_valid() => Err(EncodeError::Hello),
-        VERSION => encode_body(VERSION, Kind::Hello, hello, out),
-        v1::VERSION => v1::encode_hello(hello, out),
-        v2::VERSION => v2::encode_hello(hello, out),
-        version => Err(EncodeError::NotInVersion(version)),
+/// [`EncodeError::Full`] if `out` is too short, [`EncodeError::Tag`] if the tag is 0.
+pub fn encode_request(request: &Request, out: &mut [u8]) -> Result<usize, EncodeError> {
+    if request.tag == 0 {
+        return Err(EncodeError::Tag);
     }
-}
-
-/// Encodes a command into `out` ([`MAX_COMMAND`](crate::MAX_COMMAND) bytes suffice) in a version of the protocol; returns its length in bytes.
-/// Version 1 has no tags.
-///
-/// # Errors
-/// [`EncodeError::Full`] if `out` is too short, [`EncodeError::Tag`] if the tag is 0, [`EncodeError::NotInVersion`] if there is no such
-/// version, or it cannot say it: there are no plans in version 1, and no `select_us` and `discarded` in versions 1 and 2.
-pub fn encode_request(request: &Request, version: u8, out: &mut [u8]) -> Result<usize, EncodeError> {
-    match version {
-        _ if request.tag == 0 => Err(EncodeError::Tag),
-        VERSION => encode_body(VERSION, Kind::Command, request, out),
-        v1::VERSION => v1::encode_command(&request.command, out),
-        v2::VERSION => v2::encode_request(request, out),
-        version => Err(EncodeError::NotInVersion(version)),
-    }
+    encode_body(Kind::Command, request, out)
 }
 
 /// Encodes a whole frame into `out` straight from its readings; returns its length in bytes.
@@ -115,7 +93,7 @@ pub fn encode_rows(head: FrameHead, scope: &Scope, readings: &[u16], out: &mut [
     }
     let width = frame::width(readings);
     let length = HEAD_BYTES + scope.byte_count() + frame::packed_bytes(width, readings.len());
-    write(VERSION, Kind::Frame, length, out, |body| {
+    write(Kind::Frame, length, out, |body| {
         let (start, rest) = body.split_at_mut(HEAD_BYTES);
         start.copy_from_slice(&head.to_bytes(width));
         frame::pack(readings, width, scope.write(rest));
@@ -130,34 +108,23 @@ pub fn encode_log(bytes: &[u8], out: &mut [u8]) -> Result<usize, EncodeError> {
     if bytes.len() > MAX_LOG {
         return Err(EncodeError::LogLength(bytes.len()));
     }
-    write(VERSION, Kind::Log, bytes.len(), out, |body| body.copy_from_slice(bytes))
+    write(Kind::Log, bytes.len(), out, |body| body.copy_from_slice(bytes))
 }
 
 /// Encodes a message whose body is in postcard.
-pub(crate) fn encode_body(
-    version: u8,
-    kind: Kind,
-    body: &impl Serialize,
-    out: &mut [u8],
-) -> Result<usize, EncodeError> {
+fn encode_body(kind: Kind, body: &impl Serialize, out: &mut [u8]) -> Result<usize, EncodeError> {
     let mut buffer = [0; MAX_BODY];
     let bytes = postcard::to_slice(body, &mut buffer).map_err(|_| EncodeError::Full)?;
-    write(version, kind, bytes.len(), out, |body| body.copy_from_slice(bytes))
+    write(kind, bytes.len(), out, |body| body.copy_from_slice(bytes))
 }
 
 /// Writes a whole packet, whose `body` bytes `fill` writes; returns its length in bytes, the closing zero included.
-fn write(
-    version: u8,
-    kind: Kind,
-    body: usize,
-    out: &mut [u8],
-    fill: impl FnOnce(&mut [u8]),
-) -> Result<usize, EncodeError> {
+fn write(kind: Kind, body: usize, out: &mut [u8], fill: impl FnOnce(&mut [u8])) -> Result<usize, EncodeError> {
     let packet = 1 + body + CRC_BYTES;
     let out = out.get_mut(..wire_bytes(packet)).ok_or(EncodeError::Full)?;
     let start = cobs::overhead(packet);
     let (content, crc) = out[start..start + packet].split_at_mut(1 + body);
-    content[0] = version << 4 | kind as u8;
+    content[0] = VERSION << 4 | kind as u8;
     fill(&mut content[1..]);
     crc.copy_from_slice(&CRC.checksum(content).to_le_bytes());
     let length = cobs::stuff(&mut out[..start + packet], start);

@@ -20,11 +20,11 @@
 //!
 //! ```
 //! use tactomo_protocol::{
-//!     BoardMessage, BoardReceiver, Command, Fault, MAX_COMMAND, Request, VERSION, encode_board, encode_request,
+//!     BoardMessage, BoardReceiver, Command, Fault, MAX_COMMAND, Request, encode_board, encode_request,
 //! };
 //!
 //! let mut command = [0; MAX_COMMAND];
-//! let length = encode_request(&Request { tag: 7, command: Command::Start }, VERSION, &mut command)?;
+//! let length = encode_request(&Request { tag: 7, command: Command::Start }, &mut command)?;
 //! assert_eq!(command[..length], [0x08, 0x38, 0x07, 0x01, 0x6B, 0xCB, 0x7F, 0xED, 0x00]);
 //!
 //! let mut line = *b"ets Jul 29 2019\r\n\0.............";
@@ -54,22 +54,20 @@ pub mod encode;
 pub mod frame;
 pub mod message;
 pub mod scope;
-mod v1;
-mod v2;
 
 pub use decode::{BoardReceiver, CommandReceiver, Counters, DecodeError, Receiver};
-pub use encode::{EncodeError, encode_board, encode_frame, encode_hello, encode_log, encode_request, encode_rows};
+pub use encode::{EncodeError, encode_board, encode_frame, encode_log, encode_request, encode_rows};
 pub use frame::{Frame, FrameHead, Status};
 pub use message::{
     BoardMessage, Command, ConverterErrors, Fault, Hello, Kind, Log, MAX_LOG, MAX_RANGES, Range, Request, Settings,
 };
 pub use scope::{MAX_PLAN_ROWS, MAX_ROWS, Plan, Scope};
 
-/// Version of the protocol that this crate speaks: 1 to 15. Hosts understand boards of versions 1 and 2 too.
+/// Version of the protocol that this crate speaks: 1 to 15. Boards and hosts refuse every other.
 pub const VERSION: u8 = 3;
 /// Most electrodes that a frame can carry.
 pub const MAX_ELECTRODES: usize = 32;
-/// Fewest electrodes that a frame can carry (in version 1, fewer would make a frame's length ambiguous).
+/// Fewest electrodes that a frame can carry.
 pub const MIN_ELECTRODES: usize = 4;
 /// Most readings in a frame: every electrode under every ground.
 pub const MAX_READINGS: usize = MAX_ELECTRODES * MAX_ELECTRODES;

@@ -3,8 +3,6 @@
 use heapless::{String, Vec};
 use serde::{Deserialize, Serialize};
 
-#[cfg(feature = "test-support")]
-use crate::VERSION;
 use crate::frame::Frame;
 use crate::{MAX_ELECTRODES, MIN_ELECTRODES, Plan, coding};
 
@@ -53,10 +51,7 @@ pub enum BoardMessage {
 /// Who the board is, what its readings mean, and what it does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
-    /// Version of the protocol in which it came: the one in the packet's head, and not a part of the body.
-    #[serde(skip)]
-    pub version: u8,
-    /// Tag of the command that this answers; 0 if nobody asked: the board has just started. Always 0 in version 1.
+    /// Tag of the command that this answers; 0 if nobody asked: the board has just started.
     pub answers: u8,
     /// Version of the firmware, such as `0.1.0`.
     #[serde(deserialize_with = "coding::text")]
@@ -74,7 +69,7 @@ pub struct Hello {
     pub drive_mv: u16,
     /// Settings in force.
     pub settings: Settings,
-    /// Whether the board sends frames. Not told in version 1.
+    /// Whether the board sends frames.
     pub is_streaming: bool,
     /// What the converters can see, from electrode 0 on.
     #[serde(deserialize_with = "coding::list")]
@@ -119,7 +114,6 @@ impl Hello {
     /// What a board with an ESP32 says, of so many electrodes: 12 bits of 3.3 V, a drive of 2 V. For tests.
     pub fn example(electrodes: u8) -> Self {
         Self {
-            version: VERSION,
             answers: 0,
             firmware_version: "0.1.0".try_into().unwrap_or_default(),
             board: "test".try_into().unwrap_or_default(),
@@ -176,9 +170,9 @@ pub struct Settings {
     /// Frames a second at most; 0 means as fast as the board can.
     pub max_frames_per_s: u16,
     /// Wait between bringing an electrode to the converter and its first conversion, in microseconds (us). A board on which every electrode has
-    /// an input of its own does not wait. 0 to 10000; not told in versions 1 and 2: 0.
+    /// an input of its own does not wait. 0 to 10000.
     pub select_us: u16,
-    /// Conversions of each electrode in each row that are thrown away before those that count: 0 to 15; not told in versions 1 and 2: 0.
+    /// Conversions of each electrode in each row that are thrown away before those that count: 0 to 15.
     pub discarded: u8,
 }
 
@@ -224,7 +218,7 @@ pub enum Fault {
     AdcStuck,
     /// A command with settings out of range; the old ones stay.
     BadSettings {
-        /// Tag of the command. Always 0 in version 1.
+        /// Tag of the command.
         answers: u8,
     },
     /// A command in another version of the protocol; the board speaks the one in this packet's head.

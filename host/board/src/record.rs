@@ -17,9 +17,6 @@
 //! one whose CRC is right, and [counts](Loss) what is damaged and what it left out. Where only bytes within a chunk are damaged, they are handed
 //! out all the same: packets of the protocol have checksums of their own, and those beside the damage are whole. Up to 64 KiB before the
 //! magic that are none of the recording are passed over.
-//!
-//! Version 1, which is still read, had one header (two bytes of length, JSON, CRC-32 of version, length and JSON) and chunks without the
-//! four bytes at their front.
 
 pub mod edit;
 mod format;
@@ -52,7 +49,7 @@ use tactomo_physics::detector::TomlError;
 
 /// What a recording begins with.
 pub const MAGIC: [u8; 8] = *b"\x89TCTO\r\n\x1a";
-/// The version that is written.
+/// Version of the format.
 const VERSION: u8 = 2;
 
 /// Why a recording cannot be read or kept.
@@ -72,9 +69,10 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
-    /// A newer format.
+    /// Another version of the format.
     #[error(
-        "{path} is a recording in version {found} of the format; this program reads versions 1 and {VERSION}: update it"
+        "{path} is a recording in version {found} of the format, and this program reads version {VERSION}: use the program that \
+         recorded it"
     )]
     Version {
         /// The file.
@@ -111,6 +109,17 @@ pub enum RecordError {
         /// How long the recording is (s).
         seconds: f64,
     },
+}
+
+/// A recording of a board that spoke another version of the protocol.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "its board spoke version {found} of the protocol, and this program reads version {version}: use the program that recorded it",
+    version = tactomo_protocol::VERSION
+)]
+pub struct OtherProtocol {
+    /// The version that it spoke.
+    pub found: u8,
 }
 
 /// Bytes of a file that tell whether it is a recording.

@@ -9,17 +9,14 @@ mod requested;
 
 use std::time::{Duration, Instant};
 
-use tactomo_protocol::{Command, Fault, Hello, Plan, Request, Settings, VERSION};
+use tactomo_protocol::{Command, Fault, Hello, Plan, Request, Settings};
 
 use self::pace::Paces;
 use self::plan::PlanWish;
 
-pub use greet::{GreetError, Outgoing, explain, greet, send};
+pub use greet::{GreetError, explain, greet, send};
 pub use plan::PlanState;
 pub use requested::{Refusal, RequestedSettings};
-
-/// The version of the protocol whose answers name no command, which boards with the oldest firmware speak.
-const OLD_VERSION: u8 = 1;
 
 /// Time between two askings for Hello.
 const ASK_EVERY: Duration = Duration::from_millis(250);
@@ -55,13 +52,9 @@ struct Pending {
 
 /// The talk with one board, from the opening of its link on. One command at a time is on its way.
 ///
-/// A board of version 2 or 3 names the command that it answers, so an answer to an earlier one is known as such. Any Hello of a board of version 1 may
-/// be an old one: the one of the board's start, or the answer to an earlier question. There, settings count as taken when a Hello shows them, and as
-/// refused after [`Fault::BadSettings`], or silence about settings that were sent several times.
+/// A board names the command that it answers, so an answer to an earlier one is known as such.
 #[derive(Debug)]
 pub struct Session {
-    /// The version of the protocol to speak.
-    version: u8,
     /// Tag of the last command.
     tag: u8,
     requested: RequestedSettings,
@@ -92,7 +85,6 @@ impl Session {
     /// The talk with a board of which nothing is known yet.
     pub fn new(requested: RequestedSettings) -> Self {
         Self {
-            version: VERSION,
             tag: 0,
             requested,
             settings_due: false,
@@ -129,9 +121,6 @@ impl Session {
             // It may arrive all the same.
             self.plan.forget();
         }
-        if self.version == OLD_VERSION {
-            self.plan.not_offered();
-        }
     }
 
     /// Whether a board has said who it is, by itself or in answer to what it was asked.
@@ -164,10 +153,10 @@ impl Session {
     }
 
     /// The command to send now, if any.
-    pub fn command(&mut self, now: Instant) -> Option<Outgoing> {
+    pub fn command(&mut self, now: Instant) -> Option<Request> {
         let request = self.next_request(now)?;
         self.heard = Some(now);
-        Some(Outgoing { version: self.version, request })
+        Some(request)
     }
 
     fn next_request(&mut self, now: Instant) -> Option<Request> {
@@ -196,7 +185,7 @@ impl Session {
     fn due(&mut self, now: Instant) -> Option<Command> {
         let silence = self.is_silent(now).then_some(Command::Hello);
         let Some(hello) = &self.hello else { return silence };
-        let wanted = self.requested.in_version(self.version).over(hello.settings);
+        let wanted = self.requested.over(hello.settings);
         let is_other = wanted != hello.settings || self.settings_in_doubt;
         self.settings_due &= is_other;
         let due = [
@@ -208,22 +197,17 @@ impl Session {
         due.or(silence)
     }
 
-    /// Gives a command a tag, and waits for its answer: in version 1 only settings have one that is sure to come.
+    /// Gives a command a tag, and waits for its answer.
     fn ask(&mut self, command: Command, now: Instant) -> Request {
         self.tag = self.tag.checked_add(1).unwrap_or(1);
-        let is_settings = matches!(command, Command::Configure(_));
-        self.settings_in_doubt |= is_settings;
+        self.settings_in_doubt |= matches!(command, Command::Configure(_));
         self.paces.sent(&command, now);
         if command == Command::Start {
             self.started = true;
             self.waiting_since.get_or_insert(now);
         }
         let request = Request { tag: self.tag, command };
-        if self.version != OLD_VERSION || is_settings {
-            self.pending = Some(Pending { request: request.clone(), tries: 1, sent: now });
-        } else if request.command == Command::Start {
-            self.start_due = false;
-        }
+        self.pending = Some(Pending { request: request.clone(), tries: 1, sent: now });
         request
     }
 
@@ -234,12 +218,6 @@ impl Session {
 
     /// Takes a Hello: an answer, an old one, or that of a board that has started anew and has to be told everything again.
     pub fn hello(&mut self, hello: &Hello, now: Instant) {
-        if hello.version != self.version {
-            self.speak(hello.version);
-        }
-        if self.version == OLD_VERSION {
-            return self.untagged_hello(hello, now);
-        }
         if hello.answers == 0 {
             return self.board_has_started(hello, now);
         }
@@ -297,48 +275,9 @@ impl Session {
         self.hello = Some(hello.clone());
     }
 
-    /// A Hello of version 1.
-    fn untagged_hello(&mut self, hello: &Hello, now: Instant) {
-        self.heard = Some(now);
-        let wanted = self.requested.in_version(self.version).over(hello.settings);
-        let sent = self.pending.as_ref().map(|pending| &pending.request.command);
-        if hello.settings == wanted {
-            self.paces.restart(&Command::Configure(wanted));
-            self.pending = None;
-            (self.settings_due, self.settings_in_doubt) = (false, false);
-        } else if sent != Some(&Command::Configure(wanted)) {
-            self.pending = None;
-            self.settings_due = true;
-        }
-        self.plan.not_offered();
-        self.start_due = true;
-        self.hello = Some(hello.clone());
-    }
-
-    /// Begins anew in this version of the protocol.
-    fn speak(&mut self, version: u8) {
-        tracing::debug!("the board speaks version {version} of the protocol");
-        if self.requested.in_version(version) != self.requested {
-            tracing::warn!(
-                "the board's firmware is too old for a select time or discarded conversions: flash it with `tactomo board flash`"
-            );
-        }
-        self.version = version;
-        (self.hello, self.pending, self.heard) = (None, None, None);
-        (self.settings_in_doubt, self.start_due) = (false, false);
-        if version == OLD_VERSION { self.plan.not_offered() } else { self.plan.forget() }
-    }
-
     /// Takes note of a fault that the board reports; returns whether it was an answer, and no news for people.
     pub fn fault(&mut self, fault: &Fault) -> bool {
         match *fault {
-            Fault::UnknownVersion(version) => {
-                // An answer to what was said before the version changed is no reason to change it again.
-                if version == self.version {
-                    self.speak(if version == OLD_VERSION { VERSION } else { version - 1 });
-                }
-                return true;
-            }
             Fault::BadSettings { answers } if self.is_answer(answers) => {}
             Fault::BadPlan { answers } if self.is_answer(answers) => {}
             _ => return false,
@@ -353,7 +292,7 @@ impl Session {
 
     /// Whether what names this tag answers the command that is on its way.
     fn is_answer(&self, answers: u8) -> bool {
-        self.pending.as_ref().is_some_and(|pending| pending.request.tag == answers || self.version == OLD_VERSION)
+        self.pending.as_ref().is_some_and(|pending| pending.request.tag == answers)
     }
 
     /// Gives up the command that is on its way. A board that cannot be started is [mute](Self::is_mute).
@@ -376,8 +315,6 @@ impl Session {
         }
         self.requested = RequestedSettings::default();
         (self.settings_due, self.settings_in_doubt) = (false, false);
-        // A board of version 1 says nothing of whether it has been started.
-        self.start_due |= self.version == OLD_VERSION;
     }
 
     fn plan_refused(&mut self, how: &str) {
@@ -390,10 +327,6 @@ impl Session {
         if self.started {
             self.heard = Some(now);
             self.waiting_since = None;
-        }
-        if self.version == OLD_VERSION {
-            // Its only answer to Start.
-            self.paces.restart(&Command::Start);
         }
     }
 

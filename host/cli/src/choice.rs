@@ -135,7 +135,7 @@ impl DetectorArgs {
     }
 }
 
-/// The detector that a recording was taken from; of an old one, which has only its name, the preset of that name.
+/// The detector that a recording was taken from; the default one where its header is lost.
 fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
     let open = |source| RecordError::Open { path: path.to_owned(), source };
     if let Some(found) = RecordReader::open(path)?.detector_found().map_err(open)?
@@ -147,19 +147,12 @@ fn recorded(path: &Path, header: &Header) -> anyhow::Result<Detector> {
     if let Some(detector) = header.detector(path)? {
         return Ok(detector);
     }
-    let (path, name) = (path.display(), &header.detector);
-    if name.is_empty() {
-        message!(
-            "{path}: its header is lost or does not name the detector, so it is read as {}; --detector chooses another one",
-            Detector::DEFAULT
-        );
-        return Detector::preset(Detector::DEFAULT).context("the default detector is no preset");
-    }
-    let preset = Detector::preset(name).with_context(|| {
-        format!("{path} was recorded on {name}, but by an older program, which kept only that name: give the detector's file with --detector")
-    })?;
-    message!("{path} has only the name of its detector: the preset {name} is used; --detector chooses another one");
-    Ok(preset)
+    message!(
+        "{}: its header is lost or does not hold the detector, so it is read as {}; --detector chooses another one",
+        path.display(),
+        Detector::DEFAULT
+    );
+    Detector::preset(Detector::DEFAULT).context("the default detector is no preset")
 }
 
 /// A contact from `x_mm,y_mm,radius_mm,conductance_s`, with `z_mm` after `y_mm` on a curved detector.

@@ -1,16 +1,15 @@
 //! The log on stderr, in which a warning that comes again and again is said once, then counted.
 
 use std::collections::HashMap;
-use std::fmt::{self, Write as _};
-use std::io::IsTerminal;
+use std::fmt;
+use std::io::{IsTerminal, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use tracing::field::{Field, Visit};
-use tracing::{Event, Level, Subscriber};
-use tracing_subscriber::fmt::FmtContext;
-use tracing_subscriber::fmt::format::{Format, FormatEvent, FormatFields, Writer};
-use tracing_subscriber::registry::LookupSpan;
+use tracing::level_filters::LevelFilter;
+use tracing::span::{Attributes, Id, Record};
+use tracing::{Event, Level, Metadata, Subscriber};
 
 use crate::output;
 
@@ -27,12 +26,9 @@ impl Log {
     pub fn begin() -> Self {
         let repeats = Arc::new(Mutex::new(Repeats::default()));
         let colours = std::io::stderr().is_terminal();
-        let format = tracing_subscriber::fmt::format().with_target(false).without_time().with_ansi(colours);
-        tracing_subscriber::fmt()
-            .with_writer(|| output::Stderr)
-            .with_ansi(colours)
-            .event_format(Once { format, repeats: Arc::clone(&repeats) })
-            .init();
+        let printer = Printer { out: Mutex::new(output::Stderr), colours, repeats: Arc::clone(&repeats) };
+        // It fails where a log has begun before, which goes on then.
+        drop(tracing::subscriber::set_global_default(printer));
         Self(repeats)
     }
 }
@@ -45,8 +41,8 @@ impl Drop for Log {
     }
 }
 
-fn lock(repeats: &Mutex<Repeats>) -> std::sync::MutexGuard<'_, Repeats> {
-    repeats.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock<T>(shared: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn again(times: u64) -> String {
@@ -90,37 +86,79 @@ impl Repeats {
     }
 }
 
-/// Formats events, those of a kind once.
-struct Once {
-    format: Format<tracing_subscriber::fmt::format::Full, ()>,
+/// Prints events from INFO on, a line each: its level and its words. The program has no spans.
+struct Printer<W> {
+    out: Mutex<W>,
+    colours: bool,
     repeats: Arc<Mutex<Repeats>>,
 }
 
-impl<S: Subscriber + for<'a> LookupSpan<'a>, N: for<'a> FormatFields<'a> + 'static> FormatEvent<S, N> for Once {
-    fn format_event(&self, context: &FmtContext<'_, S, N>, mut writer: Writer<'_>, event: &Event<'_>) -> fmt::Result {
-        if *event.metadata().level() > Level::WARN {
-            return self.format.format_event(context, writer, event);
-        }
+impl<W: Write + Send + 'static> Subscriber for Printer<W> {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        *metadata.level() <= Level::INFO
+    }
+
+    fn max_level_hint(&self) -> Option<LevelFilter> {
+        Some(LevelFilter::INFO)
+    }
+
+    fn event(&self, event: &Event<'_>) {
+        let level = *event.metadata().level();
         let mut message = Message::default();
         event.record(&mut message);
-        let Some(since) = lock(&self.repeats).take(&message.0, Instant::now()) else { return Ok(()) };
-        if since == 0 {
-            return self.format.format_event(context, writer, event);
-        }
-        let mut line = String::new();
-        self.format.format_event(context, Writer::new(&mut line), event)?;
-        writeln!(writer, "{} ({} in the meantime)", line.trim_end(), again(since))
+        let is_warning = level <= Level::WARN;
+        let since = if is_warning { lock(&self.repeats).take(&message.0, Instant::now()) } else { Some(0) };
+        let Some(since) = since else { return };
+        let note = if since == 0 { String::new() } else { format!(" ({} in the meantime)", again(since)) };
+        let line = match self.colours {
+            true => format!("\x1b[{}m{level:>5}\x1b[0m {}{note}\n", colour(level), message.0),
+            false => format!("{level:>5} {}{note}\n", message.0),
+        };
+        // Nobody can be told that the log cannot be written.
+        drop(lock(&self.out).write_all(line.as_bytes()));
+    }
+
+    fn new_span(&self, _: &Attributes<'_>) -> Id {
+        Id::from_u64(1)
+    }
+
+    fn record(&self, _: &Id, _: &Record<'_>) {}
+    fn record_follows_from(&self, _: &Id, _: &Id) {}
+    fn enter(&self, _: &Id) {}
+    fn exit(&self, _: &Id) {}
+}
+
+/// Number of a level's colour in a terminal: red, yellow, green.
+fn colour(level: Level) -> u8 {
+    match level {
+        Level::ERROR => 31,
+        Level::WARN => 33,
+        _ => 32,
     }
 }
 
-/// The words of an event.
+/// The words of an event. What a terminal would obey is written out: boards and files have a say in them.
 #[derive(Default)]
 struct Message(String);
 
+impl Message {
+    fn push(&mut self, text: &str) {
+        for c in text.chars() {
+            match c {
+                '\n' | '\t' => self.0.push(c),
+                c if c.is_control() => self.0.extend(c.escape_default()),
+                c => self.0.push(c),
+            }
+        }
+    }
+}
+
 impl Visit for Message {
-    fn record_debug(&mut self, _: &Field, value: &dyn fmt::Debug) {
-        // Writing to a string cannot fail.
-        let _ = write!(self.0, "{value:?}");
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        match field.name() {
+            "message" => self.push(&format!("{value:?}")),
+            name => self.push(&format!(" {name}={value:?}")),
+        }
     }
 }
 
@@ -167,20 +205,18 @@ mod tests {
         }
         let (written, repeats) = (Written::default(), Arc::new(Mutex::new(Repeats::default())));
         let kept = written.clone();
-        let format = tracing_subscriber::fmt::format().with_target(false).without_time().with_ansi(false);
-        let subscriber = tracing_subscriber::fmt()
-            .with_writer(move || kept.clone())
-            .event_format(Once { format, repeats: Arc::clone(&repeats) })
-            .finish();
-        tracing::subscriber::with_default(subscriber, || {
+        let printer = Printer { out: Mutex::new(kept), colours: false, repeats: Arc::clone(&repeats) };
+        tracing::subscriber::with_default(printer, || {
             for electrode in [3, 5] {
                 (0..9).for_each(|_| tracing::warn!("electrode {electrode} is left out"));
-                (0..2).for_each(|_| tracing::info!("found {electrode}"));
+                (0..2).for_each(|_| tracing::info!("found {electrode}\x1b[2J"));
+                tracing::debug!("nobody reads this");
             }
         });
         let text = String::from_utf8(written.0.lock().unwrap().clone()).unwrap();
-        let lines: Vec<_> = text.lines().map(str::trim).collect();
-        let expected = ["WARN electrode 3 is left out", "INFO found 3", "INFO found 3"];
+        let lines: Vec<_> = text.lines().collect();
+        let found = " INFO found 3\\u{1b}[2J";
+        let expected = [" WARN electrode 3 is left out", found, found];
         assert_eq!(lines[..3], expected, "{text}");
         assert_eq!(lines.len(), 6, "{text}");
         assert_eq!(lock(&repeats).counted().len(), 2);

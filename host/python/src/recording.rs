@@ -60,10 +60,9 @@ impl Recording {
     }
 }
 
-/// The detector of a header; of an old one, which has only its name, the preset of that name.
+/// The detector of a header.
 fn recorded(path: &Path, header: &tactomo::board::record::Header) -> PyResult<Described> {
-    let told = header.detector(path).map_err(raised)?;
-    told.or_else(|| Described::preset(&header.detector)).ok_or_else(|| {
+    header.detector(path).map_err(raised)?.ok_or_else(|| {
         refused(format!("{}: its header does not say which detector it is of: give one as `detector`", path.display()))
     })
 }

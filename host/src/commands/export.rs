@@ -17,7 +17,6 @@ use tactomo::sink::Delivery;
 use tactomo::sink::channels::Messages;
 use tactomo::sink::lines::Fields;
 use tactomo::sink::mcap::McapFile;
-use tactomo::sink::parquet::ParquetWriter;
 use tactomo::solve::{Lambda, Method, Solution};
 
 use super::reconstruct::reader::{Input, Reader};
@@ -34,7 +33,6 @@ use tactomo_cli::output::{NewFile, ProgressBar, message};
 /// Examples:
 ///   tactomo export touch.tactomo --to mcap --out touch.mcap
 ///   tactomo export touch.tactomo --to npz --fields all --out touch.npz
-///   tactomo export touch.tactomo --to parquet --out touch.parquet
 ///   tactomo export touch.tactomo --to csv --solver contacts --detector calibrated.toml --out touch.csv
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -63,8 +61,8 @@ pub struct Args {
     /// Frames at the start whose mean is the baseline, and which are not solved [default: the baseline that live takes]
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     rest: Option<u32>,
-    /// What jsonl and npz have: only `contacts`; also what to know of the `answer`; its `image`; the `readings`; or `all`. An MCAP file and a
-    /// Parquet file have all [default: answer]
+    /// What jsonl and npz have: only `contacts`; also what to know of the `answer`; its `image`; the `readings`; or `all`. An MCAP file has
+    /// all [default: answer]
     #[arg(long, value_name = "FIELDS")]
     fields: Option<Fields>,
     /// Makes a pointer of a contact, as live --pointer does: its motion, presses and clicks are the frames' events
@@ -86,8 +84,6 @@ enum Form {
     Csv,
     /// JSON Lines: an object a frame, as live --stream writes them
     Jsonl,
-    /// A table with a frame a row, contacts and readings as lists, for pandas, Polars or DuckDB
-    Parquet,
 }
 
 impl Form {
@@ -96,7 +92,6 @@ impl Form {
         match self {
             Self::Mcap => Some("an MCAP file"),
             Self::Csv => Some("a CSV table"),
-            Self::Parquet => Some("a Parquet file"),
             Self::Npz | Self::Jsonl => None,
         }
     }
@@ -105,12 +100,8 @@ impl Form {
 /// What is written to.
 enum Out {
     Mcap(Box<McapFile<BufWriter<File>>>, NewFile),
-    Parquet(Box<ParquetWriter>, NewFile),
     Table(Writer),
 }
-
-/// What a Parquet file has.
-const ALL: Fields = Fields { answer: true, image: true, readings: true };
 
 /// Solves and writes all frames.
 pub fn run(args: &Args) -> anyhow::Result<()> {
@@ -206,12 +197,6 @@ impl Out {
             Form::Npz => FileForm::Npz,
             Form::Csv => FileForm::Csv,
             Form::Jsonl => FileForm::JsonLines,
-            Form::Parquet => {
-                let detector = reader.measured().context("a Parquet file needs a detector")?;
-                let about: Vec<_> = streams::about(detector, source).into_iter().collect();
-                let writer = ParquetWriter::new(file.create()?, about).context("cannot begin the Parquet file")?;
-                return Ok(Self::Parquet(Box::new(writer), file));
-            }
             Form::Mcap => {
                 let (detector, mesh) = reader.measured().zip(reader.mesh()).context("an MCAP file needs a detector")?;
                 let messages = Messages::new(detector, mesh.clone(), reader.usual_radius_m());
@@ -225,10 +210,6 @@ impl Out {
     fn write(&mut self, delivery: &Delivery, fields: Fields, number: u64) -> anyhow::Result<()> {
         match self {
             Self::Mcap(mcap, _) => mcap.write(delivery).context("cannot write the MCAP file"),
-            Self::Parquet(parquet, _) => {
-                let report = FrameReport { frame: Some(number), ..ALL.of(delivery) };
-                parquet.write(&report).context("cannot write the Parquet file")
-            }
             Self::Table(writer) => {
                 let report = FrameReport { frame: Some(number), ..fields.of(delivery) };
                 writer.write(&report).map(drop)
@@ -240,10 +221,6 @@ impl Out {
         match self {
             Self::Mcap(mcap, file) => {
                 mcap.finish().context("cannot write the MCAP file")?;
-                file.finish()
-            }
-            Self::Parquet(parquet, file) => {
-                parquet.finish().context("cannot write the Parquet file")?;
                 file.finish()
             }
             Self::Table(writer) => writer.finish(reader.mesh()),

@@ -15,7 +15,7 @@ use tactomo_board::baseline::Baseline;
 use tactomo_board::board_log::BoardLog;
 use tactomo_board::link::SourceError;
 use tactomo_board::measured::Mismatch;
-use tactomo_board::record::{RecordError, Recorder, Ring};
+use tactomo_board::record::{OtherProtocol, RecordError, Recorder, Ring};
 use tactomo_board::session::{self, GreetError, RequestedSettings};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ForwardError;
@@ -206,6 +206,14 @@ pub enum LiveError {
         link: String,
         /// Why.
         error: GreetError,
+    },
+    /// The recording is in another version of the protocol.
+    #[error("{link}: {other}")]
+    Recorded {
+        /// Name of the link.
+        link: String,
+        /// Which version.
+        other: OtherProtocol,
     },
     /// The board has said Hello, and the time is over without a frame.
     #[error("{link}: {}", session::MUTE)]

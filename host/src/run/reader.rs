@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use tactomo_board::identity;
 use tactomo_board::link::{Control, Link, Source};
 use tactomo_board::measured::{self, Volts};
+use tactomo_board::record::OtherProtocol;
 use tactomo_board::sequence::Sequence;
 use tactomo_board::session::{self, GreetError};
 use tactomo_physics::causes::with_causes;
@@ -246,9 +247,7 @@ impl Reader {
                         tracing::warn!("the board says: {}", session::explain(&fault));
                     }
                 }
-                Err(error @ DecodeError::Version(_)) => {
-                    return Err(LiveError::Greet { link: link.name(), error: GreetError::Version(error) });
-                }
+                Err(DecodeError::Version(found)) => return Err(other_protocol(link.name(), found, talk.answers)),
                 Err(_) => {}
             }
         }
@@ -426,6 +425,14 @@ impl Reader {
 /// Whether two Hellos say the same, whichever commands they answer.
 fn is_same(one: &Hello, other: &Hello) -> bool {
     *one == Hello { answers: one.answers, is_streaming: one.is_streaming, ..other.clone() }
+}
+
+/// What bytes in another version of the protocol mean: of a board, or of a recording, which does not answer.
+fn other_protocol(link: String, found: u8, answers: bool) -> LiveError {
+    match answers {
+        true => LiveError::Greet { link, error: GreetError::Version { found } },
+        false => LiveError::Recorded { link, other: OtherProtocol { found } },
+    }
 }
 
 fn lost(link: &dyn Link, error: io::Error, comes_back: bool) -> Result<End, LiveError> {

@@ -9,7 +9,6 @@ pub mod foxglove;
 pub mod lines;
 pub mod mcap;
 pub mod page;
-pub mod parquet;
 mod running;
 pub mod stream;
 mod tcp;

@@ -95,7 +95,7 @@ fn a_link_that_cannot_come_back_is_an_error() {
 #[test]
 fn a_board_of_a_newer_protocol_is_refused() {
     let error = tactomo::run::run(&mut opened(Says(newer_hello())), plan(), ends().0).unwrap_err();
-    let LiveError::Greet { error: GreetError::Version(_), .. } = &error else { panic!("{error:?}") };
+    let LiveError::Greet { error: GreetError::Version { found: NEWER }, .. } = &error else { panic!("{error:?}") };
     assert!(error.to_string().contains(&format!("version {NEWER}")), "{error}");
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of its contacts [`CONTACT_COLUMNS`], those of its shape
 //! [`SHAPE_COLUMNS`]; a column that is added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
-//! newtons, `_v` volts, `_us` microseconds. `sigma_` is a standard error, and `force_deviation_n` that of the force. What is not known is absent in JSON, empty in CSV, null in Parquet, and in arrays NaN, -1 of an
+//! newtons, `_v` volts, `_us` microseconds. `sigma_` is a standard error, and `force_deviation_n` that of the force. What is not known is absent in JSON, empty in CSV, and in arrays NaN, -1 of an
 //! integer and false of a flag.
 
 use serde::Serialize;
@@ -177,10 +177,10 @@ impl FrameColumn {
 }
 
 /// Names of the text columns that follow the numbers in tables.
-pub const TEXT_COLUMNS: [&str; 3] = ["excluded", "choice", "events"];
+const TEXT_COLUMNS: [&str; 3] = ["excluded", "choice", "events"];
 
 /// Electrodes left out, with blanks between them, what was chosen, and what the pointer did, as in JSON.
-pub fn texts(frame: &FrameReport) -> [String; TEXT_COLUMNS.len()] {
+fn texts(frame: &FrameReport) -> [String; TEXT_COLUMNS.len()] {
     let excluded = frame.flags.map(|flags| flags.excluded.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
     // Names and finite numbers are always JSON.
     let events = || serde_json::to_string(frame.events).unwrap_or_default();

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use libfuzzer_sys::fuzz_target;
 use tactomo_protocol::{
     BoardMessage, BoardReceiver, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Log, MAX_WIRE, Plan, Range,
-    Request, Scope, Settings, VERSION, encode_board, encode_hello, encode_request,
+    Request, Scope, Settings, encode_board, encode_request,
 };
 
 /// Packets in a stream at most.
@@ -23,15 +23,11 @@ static PACKETS_SENT: LazyLock<Vec<(Sent, Vec<u8>)>> = LazyLock::new(|| {
     let mut sent = Vec::new();
     let mut out = [0; MAX_WIRE];
     for message in board_messages() {
-        let encoded = match &message {
-            BoardMessage::Hello(hello) => encode_hello(hello, &mut out),
-            message => encode_board(message, &mut out),
-        };
-        let length = encoded.expect("within the limits");
+        let length = encode_board(&message, &mut out).expect("within the limits");
         sent.push((Sent::Board(message), out[..length].to_vec()));
     }
     for request in requests() {
-        let length = encode_request(&request, VERSION, &mut out).expect("within the limits");
+        let length = encode_request(&request, &mut out).expect("within the limits");
         sent.push((Sent::Host(request), out[..length].to_vec()));
     }
     sent
@@ -39,10 +35,7 @@ static PACKETS_SENT: LazyLock<Vec<(Sent, Vec<u8>)>> = LazyLock::new(|| {
 
 const SETTINGS: Settings =
     Settings { settle_us: 300, average_log2: 2, max_frames_per_s: 0, select_us: 35, discarded: 1 };
-/// What versions 1 and 2 know of them.
-const OLD_SETTINGS: Settings = Settings { select_us: 0, discarded: 0, ..SETTINGS };
 
-/// Messages of this version, and a Hello of each earlier one.
 fn board_messages() -> Vec<BoardMessage> {
     let frame = |sequence, scope: Option<Scope>, readings: &[u16]| {
         let head = FrameHead { sequence, time_us: 7 * u32::from(sequence), ..FrameHead::default() };
@@ -50,7 +43,6 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Frame(Frame { head, scope, readings: readings.iter().copied().collect() })
     };
     let hello = Hello {
-        version: VERSION,
         answers: 3,
         firmware_version: "0.1.0".try_into().expect("short"),
         board: "esp32".try_into().expect("short"),
@@ -63,8 +55,6 @@ fn board_messages() -> Vec<BoardMessage> {
         ranges: [Range::of_codes(16, 12)].into_iter().collect(),
     };
     vec![
-        BoardMessage::Hello(Hello { version: 1, answers: 0, settings: OLD_SETTINGS, ..hello.clone() }),
-        BoardMessage::Hello(Hello { version: 2, settings: OLD_SETTINGS, ..hello.clone() }),
         BoardMessage::Hello(hello),
         frame(1, Scope::whole(4), &std::array::from_fn::<u16, 16, _>(|i| i as u16)),
         frame(0, Scope::whole(8), &[0; 64]),

@@ -4,7 +4,7 @@ use heapless::Vec as Fixed;
 use proptest::prelude::*;
 use tactomo_protocol::{
     BoardMessage, BoardReceiver, Command, CommandReceiver, ConverterErrors, Counters, DecodeError, Fault, Frame,
-    FrameHead, Hello, Log, MAX_COMMAND, MAX_WIRE, Plan, Range, Request, Scope, Settings, Status, VERSION, encode_board,
+    FrameHead, Hello, Log, MAX_COMMAND, MAX_WIRE, Plan, Range, Request, Scope, Settings, Status, encode_board,
     encode_request,
 };
 
@@ -57,7 +57,6 @@ fn any_hello() -> impl Strategy<Value = BoardMessage> {
         |(firmware_version, board, shape, adc_full_scale_mv, drive_mv, settings, answers, is_streaming)| {
             let (electrodes, adc_bits, ranges) = shape;
             BoardMessage::Hello(Hello {
-                version: VERSION,
                 answers,
                 firmware_version,
                 board,
@@ -159,7 +158,6 @@ pub fn hello() -> Hello {
     let range = |electrodes, floor, ceiling| Range { electrodes, floor, ceiling, errors };
     let ranges = [range(6, 142, 3100), range(10, 128, 3080)];
     Hello {
-        version: VERSION,
         answers: 7,
         firmware_version: "0.1.0".try_into().unwrap(),
         board: "esp32".try_into().unwrap(),
@@ -181,7 +179,7 @@ pub fn board_wire(message: &BoardMessage) -> Vec<u8> {
 
 pub fn request_wire(request: &Request) -> Vec<u8> {
     let mut out = [0; MAX_COMMAND];
-    let length = encode_request(request, VERSION, &mut out).expect("every command fits");
+    let length = encode_request(request, &mut out).expect("every command fits");
     out[..length].to_vec()
 }
 

@@ -5,5 +5,3 @@ mod common;
 mod limits;
 mod properties;
 mod specification;
-mod version1;
-mod version2;

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use proptest::sample::Index;
-use tactomo_protocol::{Counters, EncodeError, MAX_COMMAND, VERSION, encode_board, encode_request};
+use tactomo_protocol::{Counters, EncodeError, MAX_COMMAND, encode_board, encode_request};
 
 use crate::common::{board_message, board_wire, receive_board, receive_command, request, request_wire};
 
@@ -114,7 +114,7 @@ proptest! {
         prop_assert_eq!(encode_board(&message, &mut out), Err(EncodeError::Full));
         let wire = request_wire(&request);
         let mut out = vec![0; missing.index(wire.len())];
-        prop_assert_eq!(encode_request(&request, VERSION, &mut out), Err(EncodeError::Full));
+        prop_assert_eq!(encode_request(&request, &mut out), Err(EncodeError::Full));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use defmt_decoder::{DecodeError, Table};
 use tactomo::board::link::Link;
 use tactomo::board::link::serial::{DEFAULT_BAUD, SerialLink};
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, Counters, Frame, Hello, MAX_COMMAND, Request, VERSION, encode_request,
+    BoardMessage, BoardReceiver, Command, Counters, Frame, Hello, MAX_COMMAND, Request, encode_request,
 };
 
 /// Longest wait for anything, on a machine under load.
@@ -44,7 +44,7 @@ impl Host {
     pub fn send(&mut self, command: &Command) -> Result<()> {
         let mut bytes = [0; MAX_COMMAND];
         let request = Request { tag: 1, command: command.clone() };
-        let length = encode_request(&request, VERSION, &mut bytes)?;
+        let length = encode_request(&request, &mut bytes)?;
         Ok(self.link.write_all(&bytes[..length])?)
     }
 

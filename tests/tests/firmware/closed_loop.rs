@@ -8,7 +8,7 @@ use tactomo::detector::{Adc, Detector};
 use tactomo::readings::Readings;
 use tactomo::simulate::Physics;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, Frame, Hello, MAX_COMMAND, Request, Settings, Status, VERSION, encode_request,
+    BoardMessage, BoardReceiver, Command, Frame, Hello, MAX_COMMAND, Request, Settings, Status, encode_request,
 };
 
 /// Longest wait for what a test waits for.
@@ -56,7 +56,7 @@ impl Host {
 
     fn send(&mut self, command: Command) {
         let mut packet = [0; MAX_COMMAND];
-        let length = encode_request(&Request { tag: 1, command }, VERSION, &mut packet).unwrap();
+        let length = encode_request(&Request { tag: 1, command }, &mut packet).unwrap();
         self.board.write_all(&packet[..length]).unwrap();
     }
 

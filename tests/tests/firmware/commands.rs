@@ -171,7 +171,7 @@ fn a_newer_host_is_told_by_number_and_not_obeyed() {
 /// A command as another version of the protocol would send it: head, checksum and framing are the same in every version.
 fn in_version(version: u8, command: Command) -> Vec<u8> {
     let mut packet = [0; MAX_COMMAND];
-    let length = encode_request(&Request { tag: 1, command }, VERSION, &mut packet).unwrap();
+    let length = encode_request(&Request { tag: 1, command }, &mut packet).unwrap();
     let mut content = cobs::decode_vec(&packet[..length - 1]).unwrap();
     content.truncate(content.len() - 4);
     content[0] = version << 4 | content[0] & 15;

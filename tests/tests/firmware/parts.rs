@@ -9,7 +9,7 @@ use embedded_hal_mock::eh1::delay::NoopDelay;
 use tactomo_firmware::mux::Mux;
 use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Parts, Sampler, Serial, TimedOut};
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, Fault, Frame, Hello, MAX_COMMAND, Request, VERSION, encode_request,
+    BoardMessage, BoardReceiver, Command, Fault, Frame, Hello, MAX_COMMAND, Request, encode_request,
 };
 
 /// Time of one conversion of the test's converter (us).
@@ -246,14 +246,14 @@ impl Outside {
 
     pub fn send_tagged(&self, tag: u8, command: Command) {
         let mut packet = [0; MAX_COMMAND];
-        let length = encode_request(&Request { tag, command }, VERSION, &mut packet).unwrap();
+        let length = encode_request(&Request { tag, command }, &mut packet).unwrap();
         self.send_bytes(&packet[..length]);
     }
 
     /// Sends a command of which nothing is there yet when the board looks next.
     pub fn send_while_waiting(&self, command: Command) {
         let mut packet = [0; MAX_COMMAND];
-        let length = encode_request(&Request { tag: 1, command }, VERSION, &mut packet).unwrap();
+        let length = encode_request(&Request { tag: 1, command }, &mut packet).unwrap();
         let mut wire = self.wire.borrow_mut();
         wire.soon = packet[..length].to_vec();
         wire.pulls = 0;

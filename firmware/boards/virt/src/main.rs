@@ -16,7 +16,7 @@ use core::panic::PanicInfo;
 use embedded_hal::delay::DelayNs;
 use tactomo_firmware::mux::Transparent;
 use tactomo_firmware::{Activity, Adc, Board16, Chip, Identity, Parts, Serial, log};
-use tactomo_protocol::{Command, Fault, MAX_COMMAND, Request as HostRequest, VERSION, encode_request};
+use tactomo_protocol::{Command, Fault, MAX_COMMAND, Request as HostRequest, encode_request};
 
 use crate::detector::{AddressLine, TableSampler, address_lines};
 use crate::gauge::Gauge;
@@ -117,7 +117,7 @@ impl Line {
         // SAFETY: taken once, here.
         let uart = Uart::nowhere(unsafe { &mut *nowhere });
         let start = HostRequest { tag: 1, command: Command::Start };
-        let command_length = encode_request(&start, VERSION, &mut command).unwrap_or(0);
+        let command_length = encode_request(&start, &mut command).unwrap_or(0);
         Self { uart, command, command_length }
     }
 }

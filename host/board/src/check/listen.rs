@@ -117,9 +117,8 @@ impl Listening {
                         listening.receive(input)?;
                         return Ok(listening);
                     }
-                    // A board of another version of the protocol says so, and is asked in its own.
                     Ok(BoardMessage::Fault(fault)) => drop(session.fault(&fault)),
-                    Err(error @ DecodeError::Version(_)) => return Err(version(&*link, error)),
+                    Err(DecodeError::Version(found)) => return Err(version(&*link, found)),
                     _ => {}
                 }
             }
@@ -202,7 +201,7 @@ impl Listening {
                         self.faults.push(fault);
                     }
                 }
-                Err(error @ DecodeError::Version(_)) => return Err(version(&*self.link, error)),
+                Err(DecodeError::Version(found)) => return Err(version(&*self.link, found)),
                 Ok(BoardMessage::Log(_)) | Err(_) => {}
             }
         }
@@ -224,6 +223,6 @@ fn exchange(link: &mut dyn Link, session: &mut Session, buffer: &mut [u8]) -> Re
     sent.and_then(|()| link.read(buffer)).map_err(|source| ListenError::Link { link: link.name(), source })
 }
 
-fn version(link: &dyn Link, error: DecodeError) -> ListenError {
-    ListenError::Version { link: link.name(), error: GreetError::Version(error) }
+fn version(link: &dyn Link, found: u8) -> ListenError {
+    ListenError::Version { link: link.name(), error: GreetError::Version { found } }
 }

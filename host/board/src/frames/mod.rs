@@ -13,7 +13,7 @@ use tactomo_protocol::Hello;
 pub use self::recorded::{Recorded, RecordingLoss};
 pub use self::survey::Survey;
 use crate::baseline::Baseline;
-use crate::record::{self, RecordError};
+use crate::record::{self, OtherProtocol, RecordError};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_table::{Array, Table, TableError};
 
@@ -121,6 +121,14 @@ pub enum FramesError {
         path: PathBuf,
         /// What the system says.
         source: io::Error,
+    },
+    /// A recording in another version of the protocol.
+    #[error("{path}: {other}")]
+    Protocol {
+        /// The file.
+        path: PathBuf,
+        /// Which version.
+        other: OtherProtocol,
     },
     /// A recording that does not say what its readings mean.
     #[error(

@@ -5,11 +5,11 @@ use std::fmt;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use tactomo_protocol::{BoardMessage, BoardReceiver, Frame, Hello};
+use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Frame, Hello};
 
 use super::{FileFrame, FramesError};
 use crate::measured::Volts;
-use crate::record::{Entry, Header, Loss, Note, RecordReader};
+use crate::record::{Entry, Header, Loss, Note, OtherProtocol, RecordReader};
 use crate::sequence::Sequence;
 
 /// A recording.
@@ -120,7 +120,13 @@ impl Recorded {
             }
             let mut input = &chunk[..];
             while let Some(message) = receiver.receive(&mut input) {
-                let Ok(BoardMessage::Hello(board)) = message else { continue };
+                let board = match message {
+                    Ok(BoardMessage::Hello(board)) => board,
+                    Err(DecodeError::Version(found)) => {
+                        return Err(FramesError::Protocol { path: path.to_owned(), other: OtherProtocol { found } });
+                    }
+                    _ => continue,
+                };
                 let rest = input.to_vec();
                 let mut recorded = Self {
                     path: path.to_owned(),
@@ -330,6 +336,17 @@ mod tests {
             // What is missing at the very beginning or end has no frame after it to say so; the file does.
             prop_assert!(loss.missing_frames + times.len() as u64 == 80 || loss.file.is_any());
         }
+    }
+
+    #[test]
+    fn a_recording_in_another_version_of_the_protocol_is_refused() {
+        // A packet of version 4: the example of docs/protocol.md.
+        let newer = vec![0x08, 0x40, 0xC0, 0xDE, 0x4F, 0x7C, 0x4A, 0x25, 0x00];
+        let refusal = recorded("newer", &[b"boot text\0".to_vec(), newer]).err();
+        assert!(matches!(refusal, Some(FramesError::Protocol { other: OtherProtocol { found: 4 }, .. })));
+        let message = refusal.map(|error| error.to_string()).unwrap_or_default();
+        assert!(message.contains("version 4") && message.contains("version 3"), "{message}");
+        assert!(message.contains("use the program that recorded it"), "{message}");
     }
 
     #[test]

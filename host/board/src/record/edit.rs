@@ -6,10 +6,10 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use tactomo_protocol::{BoardMessage, BoardReceiver, Hello};
+use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Hello};
 
 use super::packets::FirstPacket;
-use super::{Header, Note, RecordError, RecordReader, RecordWriter};
+use super::{Header, Note, OtherProtocol, RecordError, RecordReader, RecordWriter};
 
 /// Time between the end of a recording and the start of the one that is joined on (us).
 const PAUSE_US: u64 = 1000;
@@ -39,6 +39,14 @@ pub enum EditError {
         to_s: f64,
         /// Time of the last bytes (s).
         length_s: f64,
+    },
+    /// A recording in another version of the protocol, in which the board's Hello is not found.
+    #[error("{path}: {other}")]
+    Protocol {
+        /// The file.
+        path: PathBuf,
+        /// Which version.
+        other: OtherProtocol,
     },
     /// Recordings of different detectors.
     #[error(
@@ -121,7 +129,9 @@ pub fn cut(recording: &Path, span_s: RangeInclusive<f64>, out: &Path) -> Result<
         }
         last_us = entry.time_us;
         match (entry.note, entry.time_us < from_us) {
-            (None, true) => before.pass(&bytes),
+            (None, true) => {
+                before.pass(&bytes).map_err(|other| EditError::Protocol { path: recording.to_owned(), other })?;
+            }
             (Some(note), false) if !matches!(note, Note::Detector { .. }) => {
                 let output = open_at(&mut output, &reader, from_us, out, &before)?;
                 output.note(entry.time_us - from_us, &note)?;
@@ -177,13 +187,16 @@ struct Before {
 }
 
 impl Before {
-    fn pass(&mut self, mut bytes: &[u8]) {
+    fn pass(&mut self, mut bytes: &[u8]) -> Result<(), OtherProtocol> {
         self.first.pass(bytes);
         while let Some(message) = self.receiver.receive(&mut bytes) {
-            if let Ok(BoardMessage::Hello(hello)) = message {
-                self.hello = Some(hello);
+            match message {
+                Ok(BoardMessage::Hello(hello)) => self.hello = Some(hello),
+                Err(DecodeError::Version(found)) => return Err(OtherProtocol { found }),
+                _ => {}
             }
         }
+        Ok(())
     }
 }
 

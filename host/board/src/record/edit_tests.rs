@@ -3,7 +3,7 @@
 use super::*;
 use crate::frames::FrameFile;
 use tactomo_physics::detector::Detector;
-use tactomo_protocol::{FrameHead, MAX_WIRE, encode_frame, encode_hello};
+use tactomo_protocol::{BoardMessage, FrameHead, MAX_WIRE, encode_board, encode_frame};
 
 fn path(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("tactomo-{}-edit-{name}", std::process::id()))
@@ -18,7 +18,7 @@ fn packet(sequence: u16) -> Vec<u8> {
 
 fn hello() -> Vec<u8> {
     let mut wire = [0; MAX_WIRE];
-    let length = encode_hello(&Hello::example(4), &mut wire).unwrap();
+    let length = encode_board(&BoardMessage::Hello(Hello::example(4)), &mut wire).unwrap();
     wire[..length].to_vec()
 }
 
@@ -69,12 +69,25 @@ fn a_piece_has_its_frames_its_marks_and_its_time() {
     assert_eq!(frames, (13..25).map(|number| (u64::from(number - 13), number)).collect::<Vec<_>>());
     assert_eq!(notes, [(0.002, Note::mark("slipped"))]);
     let header = RecordReader::open(&to).unwrap().header().clone();
-    assert_eq!(header.started(), Duration::from_secs(1_700_000_000), "whole seconds, as the recording has them");
+    assert_eq!(header.started(), Duration::from_millis(1_700_000_000_008));
     let refused = cut(&from, 3.0..=4.0, &path("nothing")).unwrap_err().to_string();
     assert!(refused.contains("nothing from 3 s to 4 s") && refused.contains("0.100 s"), "{refused}");
     assert!(!path("nothing").exists());
     assert!(matches!(cut(&from, 0.0..=1.0, &to), Err(EditError::Record(RecordError::Open { .. }))), "it is there");
     [from, to].iter().for_each(|path| std::fs::remove_file(path).unwrap());
+}
+
+#[test]
+fn no_piece_is_cut_from_a_recording_in_another_version_of_the_protocol() {
+    let [from, to] = ["other-version", "other-version-piece"].map(path);
+    let mut writer = RecordWriter::new(File::create(&from).unwrap(), &header("square-60")).unwrap();
+    // A packet of version 4: the example of docs/protocol.md.
+    writer.write(0, &[0x08, 0x40, 0xC0, 0xDE, 0x4F, 0x7C, 0x4A, 0x25, 0x00]).unwrap();
+    writer.write(1_000_000, b"more").unwrap();
+    let refused = cut(&from, 0.5..=2.0, &to).unwrap_err();
+    assert!(matches!(refused, EditError::Protocol { other: OtherProtocol { found: 4 }, .. }), "{refused:?}");
+    assert!(!to.exists());
+    std::fs::remove_file(from).unwrap();
 }
 
 #[test]

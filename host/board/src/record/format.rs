@@ -1,4 +1,4 @@
-//! Chunks as bytes, in both versions of the format.
+//! Chunks as bytes.
 
 use super::VERSION;
 
@@ -11,10 +11,10 @@ const MAX_LEB128: usize = 10;
 /// Bytes of a chunk beside those that it holds, at most.
 pub(super) const MAX_OVERHEAD: usize = MARK.len() + 1 + 2 * MAX_LEB128 + CRC_BYTES;
 const CRC_BYTES: usize = 4;
-/// What every chunk of version 2 begins with; its kind follows.
+/// What every chunk begins with; its kind follows.
 pub(super) const MARK: [u8; 3] = *b"\xa5Tc";
 
-pub(super) static CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISO_HDLC);
+static CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISO_HDLC);
 
 /// What a chunk holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,13 +43,6 @@ impl Kind {
     }
 }
 
-/// Version of a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Version {
-    One,
-    Two,
-}
-
 /// A chunk that begins at the front of some bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Chunk {
@@ -75,67 +68,50 @@ pub(super) enum Parsed {
     Nothing,
 }
 
-impl Version {
-    /// Looks for a chunk at the front of `bytes`.
-    pub(super) fn parse(self, bytes: &[u8]) -> Parsed {
-        let Some(kind) = self.kind(bytes) else {
-            let may_be = self == Self::Two
-                && bytes.len() <= MARK.len()
-                && MARK.starts_with(&bytes[..bytes.len().min(MARK.len())]);
-            return if may_be { Parsed::Short(MARK.len() + 1) } else { Parsed::Nothing };
-        };
-        let start = if self == Self::Two { MARK.len() + 1 } else { 0 };
-        let number =
-            |at: usize| leb128(bytes.get(at..).unwrap_or_default()).map(|(value, length)| (value, at + length));
-        let (time_us, at) = match number(start) {
-            Ok(found) => found,
-            Err(parsed) => return parsed.within(bytes.len()),
-        };
-        let (count, at) = match number(at) {
-            Ok(found) => found,
-            Err(parsed) => return parsed.within(bytes.len()),
-        };
-        if count > kind.longest() as u64 {
-            return Parsed::Nothing;
-        }
-        let end = at + count as usize;
-        let length = end + CRC_BYTES;
-        let Some(crc) = bytes.get(end..length) else { return Parsed::Short(length) };
-        let chunk = Chunk { kind, time_us, bytes: at..end, length };
-        if crc == self.checksum(&bytes[..end]).to_le_bytes() { Parsed::Whole(chunk) } else { Parsed::Damaged(chunk) }
+/// Looks for a chunk at the front of `bytes`.
+pub(super) fn parse(bytes: &[u8]) -> Parsed {
+    let Some(kind) = kind(bytes) else {
+        let may_be = bytes.len() <= MARK.len() && MARK.starts_with(bytes);
+        return if may_be { Parsed::Short(MARK.len() + 1) } else { Parsed::Nothing };
+    };
+    let number = |at: usize| leb128(bytes.get(at..).unwrap_or_default()).map(|(value, length)| (value, at + length));
+    let (time_us, at) = match number(MARK.len() + 1) {
+        Ok(found) => found,
+        Err(parsed) => return parsed.within(bytes.len()),
+    };
+    let (count, at) = match number(at) {
+        Ok(found) => found,
+        Err(parsed) => return parsed.within(bytes.len()),
+    };
+    if count > kind.longest() as u64 {
+        return Parsed::Nothing;
     }
-
-    fn kind(self, bytes: &[u8]) -> Option<Kind> {
-        match self {
-            Self::One => Some(Kind::Data),
-            Self::Two => {
-                let letter = bytes.strip_prefix(&MARK)?.first()?;
-                [Kind::Header, Kind::Data, Kind::Note].into_iter().find(|kind| kind.letter() == *letter)
-            }
-        }
-    }
-
-    fn checksum(self, bytes: &[u8]) -> u32 {
-        let mut digest = CRC.digest();
-        if self == Self::Two {
-            digest.update(&[VERSION]);
-        }
-        digest.update(bytes);
-        digest.finalize()
-    }
-
-    /// Bytes from the second of `bytes` on in which no chunk begins for sure.
-    pub(super) fn skip(self, bytes: &[u8]) -> usize {
-        let rest = bytes.get(1..).unwrap_or_default();
-        match self {
-            Self::One => 1,
-            // Part of a mark may be at the very end.
-            Self::Two => 1 + rest.iter().position(|byte| *byte == MARK[0]).unwrap_or(rest.len()),
-        }
-    }
+    let end = at + count as usize;
+    let length = end + CRC_BYTES;
+    let Some(crc) = bytes.get(end..length) else { return Parsed::Short(length) };
+    let chunk = Chunk { kind, time_us, bytes: at..end, length };
+    if crc == checksum(&bytes[..end]).to_le_bytes() { Parsed::Whole(chunk) } else { Parsed::Damaged(chunk) }
 }
 
-/// Puts a chunk of version 2 behind what is in `out`.
+fn kind(bytes: &[u8]) -> Option<Kind> {
+    let letter = bytes.strip_prefix(&MARK)?.first()?;
+    [Kind::Header, Kind::Data, Kind::Note].into_iter().find(|kind| kind.letter() == *letter)
+}
+
+fn checksum(bytes: &[u8]) -> u32 {
+    let mut digest = CRC.digest();
+    digest.update(&[VERSION]);
+    digest.update(bytes);
+    digest.finalize()
+}
+
+/// Bytes from the second of `bytes` on in which no chunk begins for sure. Part of a mark may be at the very end.
+pub(super) fn skip(bytes: &[u8]) -> usize {
+    let rest = bytes.get(1..).unwrap_or_default();
+    1 + rest.iter().position(|byte| *byte == MARK[0]).unwrap_or(rest.len())
+}
+
+/// Puts a chunk behind what is in `out`.
 pub(super) fn put_chunk(kind: Kind, time_us: u64, bytes: &[u8], out: &mut Vec<u8>) {
     let start = out.len();
     out.extend(MARK);
@@ -143,7 +119,7 @@ pub(super) fn put_chunk(kind: Kind, time_us: u64, bytes: &[u8], out: &mut Vec<u8
     put_leb128(time_us, out);
     put_leb128(bytes.len() as u64, out);
     out.extend_from_slice(bytes);
-    let crc = Version::Two.checksum(&out[start..]);
+    let crc = checksum(&out[start..]);
     out.extend(crc.to_le_bytes());
 }
 
@@ -174,7 +150,7 @@ fn leb128(bytes: &[u8]) -> Result<(u64, usize), NoNumber> {
     Err(if bytes.len() < MAX_LEB128 { NoNumber::Cut } else { NoNumber::TooLong })
 }
 
-pub(super) fn put_leb128(mut value: u64, out: &mut Vec<u8>) {
+fn put_leb128(mut value: u64, out: &mut Vec<u8>) {
     while value >= 0x80 {
         out.push(value as u8 | 0x80);
         value >>= 7;

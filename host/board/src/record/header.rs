@@ -14,7 +14,7 @@ use super::RecordError;
 pub struct Header {
     /// Name of the detector it was taken from; empty if that is not known.
     pub detector: String,
-    /// That detector as TOML; recordings of version 1 do not have it.
+    /// That detector as TOML; `None` in place of a header that is lost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub detector_toml: Option<String>,
     /// The surface of a curved detector as the text of an OBJ file, in place of the file that the TOML names.
@@ -24,9 +24,8 @@ pub struct Header {
     pub source: String,
     /// Seconds since 1970 at its start (s).
     pub started_unix_s: u64,
-    /// The same in microseconds (us), to line recordings up with others; older ones do not have it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub started_unix_us: Option<u64>,
+    /// Microseconds since 1970 at its start (us), to line recordings up with others.
+    pub started_unix_us: u64,
     /// Whatever else a person wants to remember.
     #[serde(default)]
     pub notes: String,
@@ -41,7 +40,7 @@ impl Header {
             surface_obj: detector.surface.as_ref().map(|surface| surface.to_obj()),
             source,
             started_unix_s,
-            started_unix_us: None,
+            started_unix_us: started_unix_s * 1_000_000,
             notes: String::new(),
         }
     }
@@ -60,18 +59,16 @@ impl Header {
     /// The same for a recording that begins so much later.
     pub fn started_later(self, by: Duration) -> Self {
         let started = self.started();
-        let had_micros = self.started_unix_us.is_some();
-        let later = self.started_at(started + by);
-        Self { started_unix_us: later.started_unix_us.filter(|_| had_micros), ..later }
+        self.started_at(started + by)
     }
 
     /// Time from 1970 to its start.
     pub fn started(&self) -> Duration {
-        self.started_unix_us.map_or(Duration::from_secs(self.started_unix_s), Duration::from_micros)
+        Duration::from_micros(self.started_unix_us)
     }
 
     fn started_at(self, since_1970: Duration) -> Self {
-        Self { started_unix_s: since_1970.as_secs(), started_unix_us: Some(since_1970.as_micros() as u64), ..self }
+        Self { started_unix_s: since_1970.as_secs(), started_unix_us: since_1970.as_micros() as u64, ..self }
     }
 
     /// The detector that the recording was taken from; `None` if the header does not hold it. `path` is the recording, for errors.
@@ -87,12 +84,8 @@ impl Header {
         detector.map(Some).map_err(|source| RecordError::Detector { path: path.to_owned(), source })
     }
 
-    /// Whether `detector` is the one of the recording, whatever is known of its forces and corrected in its answers; where the header holds only a name, whether
-    /// that is the same.
+    /// Whether `detector` is the one of the recording, whatever is known of its forces and corrected in its answers.
     pub fn is_of(&self, detector: &Detector) -> bool {
-        if self.detector_toml.is_none() {
-            return self.detector == detector.name;
-        }
         let bare = |detector: &Detector| {
             let header = Self::of(&Detector { force: None, correction: None, ..detector.clone() }, String::new(), 0);
             (header.detector_toml, header.surface_obj)

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
-use super::format::{Kind, MAX_CHUNK, MAX_OVERHEAD, Parsed, Version};
+use super::format::{Kind, MAX_CHUNK, MAX_OVERHEAD, Parsed};
 use super::scan::{find_whole, is_one_chunk, parse};
 use super::start::{Opened, Refused};
 use super::window::Window;
@@ -18,7 +18,6 @@ const LAST_BYTES: u64 = 4 * (MAX_CHUNK + MAX_OVERHEAD) as u64;
 #[derive(Debug)]
 pub struct RecordReader<R: Read> {
     window: Window<R>,
-    version: Version,
     header: Header,
     loss: Loss,
     /// Where the first chunk of data is, or what is damaged before it.
@@ -57,15 +56,14 @@ impl<R: Read> RecordReader<R> {
     pub fn new(input: R, path: &Path) -> Result<Self, RecordError> {
         let mut window = Window::new(input);
         let path = || path.to_owned();
-        let Opened { version, header, damage, junk_bytes } =
-            Opened::new(&mut window).map_err(|refused| match refused {
-                Refused::NotARecording => RecordError::NotARecording { path: path() },
-                Refused::Version(found) => RecordError::Version { path: path(), found },
-                Refused::Io(source) => RecordError::Open { path: path(), source },
-            })?;
+        let Opened { header, damage, junk_bytes } = Opened::new(&mut window).map_err(|refused| match refused {
+            Refused::NotARecording => RecordError::NotARecording { path: path() },
+            Refused::Version(found) => RecordError::Version { path: path(), found },
+            Refused::Io(source) => RecordError::Open { path: path(), source },
+        })?;
         let loss = Loss { header: damage, junk_bytes, ..Loss::default() };
         let first = window.offset();
-        Ok(Self { window, version, header, loss, first, counted: BTreeSet::new(), time_us: 0 })
+        Ok(Self { window, header, loss, first, counted: BTreeSet::new(), time_us: 0 })
     }
 
     /// What the recording says about itself.
@@ -100,9 +98,9 @@ impl<R: Read> RecordReader<R> {
     pub fn next_entry(&mut self, bytes: &mut Vec<u8>) -> io::Result<Option<Entry>> {
         loop {
             let begin = self.window.offset();
-            let (chunk, is_whole) = match parse(&mut self.window, self.version)? {
+            let (chunk, is_whole) = match parse(&mut self.window)? {
                 Parsed::Whole(chunk) => (chunk, true),
-                Parsed::Damaged(chunk) if is_one_chunk(&mut self.window, self.version, chunk.length)? => {
+                Parsed::Damaged(chunk) if is_one_chunk(&mut self.window, chunk.length)? => {
                     self.count(begin + chunk.length as u64, |loss| loss.damaged_places += 1);
                     (chunk, false)
                 }
@@ -140,7 +138,7 @@ impl<R: Read> RecordReader<R> {
         if self.window.ahead(1)?.is_empty() {
             return Ok(false);
         }
-        let found = find_whole(&mut self.window, self.version)?;
+        let found = find_whole(&mut self.window)?;
         let passed = self.window.offset() - begin;
         self.count(self.window.offset(), |loss| match found {
             None if may_be_cut => loss.tail_bytes += passed,
@@ -192,7 +190,7 @@ impl<R: Read + Seek> RecordReader<R> {
         // Behind the headers, which are two and as long as the note is, there is at most the chunk under way.
         self.window.go_to(length.saturating_sub(LAST_BYTES + self.first).max(self.first))?;
         let mut found = None;
-        while let Some(chunk) = find_whole(&mut self.window, self.version)? {
+        while let Some(chunk) = find_whole(&mut self.window)? {
             if chunk.kind == Kind::Note {
                 let note = serde_json::from_slice(&self.window.held()[chunk.bytes.clone()]).ok();
                 found = note.filter(|note| matches!(note, Note::Detector { .. })).or(found);
@@ -207,7 +205,7 @@ impl<R: Read + Seek> RecordReader<R> {
     fn last_from(&mut self, from: u64) -> io::Result<Option<u64>> {
         let mut last = None;
         self.window.go_to(from)?;
-        while let Some(chunk) = find_whole(&mut self.window, self.version)? {
+        while let Some(chunk) = find_whole(&mut self.window)? {
             last = Some(chunk.time_us);
             self.window.skip(chunk.length);
         }
@@ -223,14 +221,14 @@ impl<R: Read + Seek> RecordReader<R> {
         while high - low > LAST_BYTES {
             let middle = low + (high - low) / 2;
             self.window.go_to(middle)?;
-            match find_whole(&mut self.window, self.version)? {
+            match find_whole(&mut self.window)? {
                 Some(chunk) if chunk.time_us < time_us && self.window.offset() < high => low = self.window.offset(),
                 _ => high = middle,
             }
         }
         self.window.go_to(low)?;
         self.time_us = time_us;
-        while let Some(chunk) = find_whole(&mut self.window, self.version)? {
+        while let Some(chunk) = find_whole(&mut self.window)? {
             if chunk.kind == Kind::Data && chunk.time_us >= time_us {
                 break;
             }

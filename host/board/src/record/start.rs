@@ -2,7 +2,7 @@
 
 use std::io::{self, Read};
 
-use super::format::{CRC, Chunk, Kind, MAX_HEADER, MAX_OVERHEAD, Parsed, Version};
+use super::format::{self, Chunk, Kind, MAX_HEADER, MAX_OVERHEAD, Parsed};
 use super::scan::{find_whole, parse};
 use super::window::Window;
 use super::{Header, HeaderDamage, MAGIC, VERSION};
@@ -14,7 +14,6 @@ pub(super) const MOST_JUNK: usize = 64 << 10;
 
 /// What the start of a file says.
 pub(super) struct Opened {
-    pub version: Version,
     pub header: Header,
     pub damage: HeaderDamage,
     /// Bytes before the magic.
@@ -24,7 +23,7 @@ pub(super) struct Opened {
 /// Why a file is not opened.
 pub(super) enum Refused {
     NotARecording,
-    /// Of a version that is not known.
+    /// Of another version.
     Version(u8),
     Io(io::Error),
 }
@@ -55,41 +54,31 @@ impl Opened {
         let is_whole = start[at..].starts_with(&MAGIC);
         window.skip(at + START);
         let opened = Self::read(window, found)?.ok_or(match found {
-            1 | VERSION => Refused::NotARecording,
+            VERSION => Refused::NotARecording,
             found => Refused::Version(found),
         })?;
         let damage = if is_whole { opened.damage } else { opened.damage.max(HeaderDamage::Repaired) };
         Ok(Self { damage, junk_bytes: at as u64, ..opened })
     }
 
-    /// Reads the header behind a version, and goes on to the first chunk; `None` if this is no version that is known, or there is
-    /// neither a header nor a chunk.
+    /// Reads the headers behind the byte `found`, which should be the version, and goes on to the first chunk; `None` if there is
+    /// neither a header nor a chunk, or this is another version.
     fn read<R: Read>(window: &mut Window<R>, found: u8) -> io::Result<Option<Self>> {
-        let version_damage = |right| if found == right { HeaderDamage::None } else { HeaderDamage::Repaired };
-        if found != 1
-            && let Some((header, damage)) = two_headers(window)?
-        {
-            let damage = damage.max(version_damage(VERSION));
-            return Ok(Some(Self { version: Version::Two, header, damage, junk_bytes: 0 }));
+        let is_ours = found == VERSION;
+        if let Some((header, damage)) = two_headers(window)? {
+            let damage = if is_ours { damage } else { damage.max(HeaderDamage::Repaired) };
+            return Ok(Some(Self { header, damage, junk_bytes: 0 }));
         }
-        if let Some((header, length)) = one_header(window)? {
-            window.skip(length);
-            return Ok(Some(Self { version: Version::One, header, damage: version_damage(1), junk_bytes: 0 }));
+        if !is_ours || find_whole(window)?.is_none() {
+            return Ok(None);
         }
-        let version = match found {
-            1 => Version::One,
-            VERSION => Version::Two,
-            _ => return Ok(None),
-        };
-        let found = find_whole(window, version)?;
-        let header = Header::default();
-        Ok(found.map(|_| Self { version, header, damage: HeaderDamage::Lost, junk_bytes: 0 }))
+        Ok(Some(Self { header: Header::default(), damage: HeaderDamage::Lost, junk_bytes: 0 }))
     }
 }
 
-/// The two headers of version 2, of which one may be damaged; goes on behind them. `None` if both are, or it is another version.
+/// The two headers, of which one may be damaged; goes on behind them. `None` if both are, or it is another version.
 fn two_headers<R: Read>(window: &mut Window<R>) -> io::Result<Option<(Header, HeaderDamage)>> {
-    let first = parse(window, Version::Two)?;
+    let first = parse(window)?;
     if let Parsed::Whole(chunk) = &first {
         let Some(header) = header_in(window, chunk) else { return Ok(None) };
         window.skip(chunk.length);
@@ -99,8 +88,8 @@ fn two_headers<R: Read>(window: &mut Window<R>) -> io::Result<Option<(Header, He
     let begin = window.ahead(2 * (MAX_HEADER + MAX_OVERHEAD))?;
     let mut at = 0;
     while at < begin.len() {
-        at += Version::Two.skip(&begin[at..]);
-        match Version::Two.parse(begin.get(at..).unwrap_or_default()) {
+        at += format::skip(&begin[at..]);
+        match format::parse(begin.get(at..).unwrap_or_default()) {
             Parsed::Whole(chunk) if chunk.kind == Kind::Header => {
                 window.skip(at);
                 let header = header_in(window, &chunk);
@@ -116,7 +105,7 @@ fn two_headers<R: Read>(window: &mut Window<R>) -> io::Result<Option<(Header, He
 
 /// Goes on behind the second header, which is as long as the first.
 fn skip_copy<R: Read>(window: &mut Window<R>, length: usize) -> io::Result<HeaderDamage> {
-    match parse(window, Version::Two)? {
+    match parse(window)? {
         Parsed::Whole(chunk) if chunk.kind == Kind::Header => {
             window.skip(chunk.length);
             Ok(HeaderDamage::None)
@@ -133,18 +122,4 @@ fn skip_copy<R: Read>(window: &mut Window<R>, length: usize) -> io::Result<Heade
 
 fn header_in<R: Read>(window: &Window<R>, chunk: &Chunk) -> Option<Header> {
     (chunk.kind == Kind::Header).then(|| serde_json::from_slice(&window.held()[chunk.bytes.clone()]).ok())?
-}
-
-/// The header of version 1 and its length in the file, if its checksum is right.
-fn one_header<R: Read>(window: &mut Window<R>) -> io::Result<Option<(Header, usize)>> {
-    let Some(&[low, high]) = window.ahead(2)?.first_chunk() else { return Ok(None) };
-    let end = 2 + usize::from(u16::from_le_bytes([low, high]));
-    let bytes = window.ahead(end + 4)?;
-    let Some(crc) = bytes.get(end..end + 4) else { return Ok(None) };
-    let mut digest = CRC.digest();
-    digest.update(&[1]);
-    digest.update(&bytes[..end]);
-    let is_whole = digest.finalize().to_le_bytes() == crc;
-    let header = if is_whole { serde_json::from_slice(&bytes[2..end]).ok() } else { None };
-    Ok(header.map(|header| (header, end + 4)))
 }

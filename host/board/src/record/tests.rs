@@ -5,7 +5,6 @@ use std::path::Path;
 
 use proptest::prelude::*;
 
-use super::format::{CRC, put_leb128};
 use super::*;
 
 type Chunks = Vec<(u64, Vec<u8>)>;
@@ -15,6 +14,7 @@ fn header() -> Header {
         detector: "square-60".into(),
         source: "test".into(),
         started_unix_s: 1,
+        started_unix_us: 1_000_000,
         notes: "ä".into(),
         ..Header::default()
     }
@@ -29,26 +29,6 @@ fn written(chunks: &Chunks) -> (Vec<u8>, Vec<usize>) {
         ends.push(writer.get_ref().len());
     }
     (writer.out, ends)
-}
-
-/// The same as version 1 had it.
-fn written_in_version_1(chunks: &Chunks) -> (Vec<u8>, Vec<usize>) {
-    let closed = |mut bytes: Vec<u8>| {
-        bytes.extend(CRC.checksum(&bytes).to_le_bytes());
-        bytes
-    };
-    let json = serde_json::to_vec(&header()).unwrap();
-    let mut file = [&MAGIC[..], &closed([&[1][..], &(json.len() as u16).to_le_bytes(), &json].concat())].concat();
-    let mut ends = vec![file.len()];
-    for (time_us, bytes) in chunks {
-        let mut chunk = Vec::new();
-        put_leb128(*time_us, &mut chunk);
-        put_leb128(bytes.len() as u64, &mut chunk);
-        chunk.extend(bytes);
-        file.extend(closed(chunk));
-        ends.push(file.len());
-    }
-    (file, ends)
 }
 
 fn open(file: &[u8]) -> Result<RecordReader<Cursor<&[u8]>>, RecordError> {
@@ -84,13 +64,21 @@ fn long_reads_are_cut_and_come_back_whole() {
 }
 
 #[test]
-fn other_files_and_newer_recordings_are_refused() {
+fn other_files_and_recordings_of_other_versions_are_refused() {
     let refusal = |file: &[u8]| open(file).unwrap_err();
     assert!(matches!(refusal(b"a letter to somebody"), RecordError::NotARecording { .. }));
     assert!(matches!(refusal(b""), RecordError::NotARecording { .. }));
     assert!(matches!(refusal(&MAGIC), RecordError::NotARecording { .. }));
-    let newer = [&MAGIC[..], &[3], b"whatever it may be"].concat();
-    assert!(refusal(&newer).to_string().contains("version 3"));
+    for version in [1, 3] {
+        let other = [&MAGIC[..], &[version], b"whatever it may be"].concat();
+        assert_eq!(
+            refusal(&other).to_string(),
+            format!(
+                "some.file is a recording in version {version} of the format, and this program reads version 2: use the program that \
+                 recorded it"
+            )
+        );
+    }
 }
 
 #[test]
@@ -137,9 +125,8 @@ fn the_detector_is_in_the_recording_a_curved_one_with_its_surface() {
         assert!(format!("{error} {source}").contains("may name another one"), "{error} {source}");
     }
 
-    let old = open(&written_in_version_1(&Vec::new()).0).unwrap().header().clone();
-    assert!(old.detector(Path::new("x")).unwrap().is_none(), "the name alone tells no detector");
-    let wrong = Header { detector_toml: Some("drive_v = \"two\"".into()), ..old };
+    assert!(self::header().detector(Path::new("x")).unwrap().is_none(), "the name alone tells no detector");
+    let wrong = Header { detector_toml: Some("drive_v = \"two\"".into()), ..self::header() };
     let error = wrong.detector(Path::new("some.file")).unwrap_err().to_string();
     assert!(error.contains("some.file") && error.contains("--detector"), "{error}");
 }
@@ -160,28 +147,26 @@ fn assert_others_survive(kept: &Chunks, chunks: &Chunks, victim: Option<usize>) 
 proptest! {
     #[test]
     fn what_is_written_is_read(chunks in any_chunks(0..8)) {
-        for file in [written(&chunks).0, written_in_version_1(&chunks).0] {
-            prop_assert_eq!(read(&file), Some((chunks.clone(), Loss::default())));
-            let reader = open(&file).unwrap();
-            prop_assert_eq!(reader.header(), &header());
-        }
+        let file = written(&chunks).0;
+        let reader = open(&file).unwrap();
+        prop_assert_eq!(reader.header(), &header());
+        prop_assert_eq!(read(&file), Some((chunks, Loss::default())));
     }
 
     #[test]
     fn a_file_that_was_cut_keeps_every_whole_chunk(chunks in any_chunks(0..8), cut in any::<prop::sample::Index>()) {
         let copy = (written(&Vec::new()).0.len() - MAGIC.len() - 1) / 2;
-        for (version, (file, ends)) in [(1, written_in_version_1(&chunks)), (2, written(&chunks))] {
-            let cut = cut.index(file.len() + 1);
-            let whole = ends.iter().filter(|end| **end <= cut).count();
-            let Some(last_end) = whole.checked_sub(1).map(|last| ends[last]) else {
-                let expects_none = version == 1 || cut < ends[0] - copy;
-                prop_assert_eq!(read(&file[..cut]).map(|read| read.0), (!expects_none).then(Vec::new), "cut inside the header");
-                continue;
-            };
-            let (kept, loss) = read(&file[..cut]).unwrap();
-            prop_assert_eq!(&kept[..], &chunks[..whole - 1]);
-            prop_assert_eq!(loss, Loss { tail_bytes: (cut - last_end) as u64, ..Loss::default() });
-        }
+        let (file, ends) = written(&chunks);
+        let cut = cut.index(file.len() + 1);
+        let whole = ends.iter().filter(|end| **end <= cut).count();
+        let Some(last_end) = whole.checked_sub(1).map(|last| ends[last]) else {
+            let expects_none = cut < ends[0] - copy;
+            prop_assert_eq!(read(&file[..cut]).map(|read| read.0), (!expects_none).then(Vec::new), "cut inside the header");
+            return Ok(());
+        };
+        let (kept, loss) = read(&file[..cut]).unwrap();
+        prop_assert_eq!(&kept[..], &chunks[..whole - 1]);
+        prop_assert_eq!(loss, Loss { tail_bytes: (cut - last_end) as u64, ..Loss::default() });
     }
 
     #[test]
@@ -190,20 +175,19 @@ proptest! {
         at in any::<prop::sample::Index>(),
         bit in 0..8u32,
     ) {
-        for (mut file, ends) in [written(&chunks), written_in_version_1(&chunks)] {
-            let at = at.index(file.len());
-            file[at] ^= 1u8 << bit;
-            let victim = ends.iter().position(|end| at < *end).unwrap_or_default().checked_sub(1);
-            let (kept, loss) = read(&file).unwrap();
-            assert_others_survive(&kept, &chunks, victim)?;
-            prop_assert!(loss.is_any(), "at {} of {}", at, file.len());
-            match victim {
-                None => prop_assert!(loss.header != HeaderDamage::None && loss.damaged_places == 0, "{:?}", loss),
-                // A last chunk that claims to be longer than the file looks like one that was cut.
-                Some(victim) => prop_assert!(
-                    loss.damaged_places == 1 || victim + 1 == chunks.len() && loss.tail_bytes > 0, "{:?}", loss
-                ),
-            }
+        let (mut file, ends) = written(&chunks);
+        let at = at.index(file.len());
+        file[at] ^= 1u8 << bit;
+        let victim = ends.iter().position(|end| at < *end).unwrap_or_default().checked_sub(1);
+        let (kept, loss) = read(&file).unwrap();
+        assert_others_survive(&kept, &chunks, victim)?;
+        prop_assert!(loss.is_any(), "at {} of {}", at, file.len());
+        match victim {
+            None => prop_assert!(loss.header != HeaderDamage::None && loss.damaged_places == 0, "{:?}", loss),
+            // A last chunk that claims to be longer than the file looks like one that was cut.
+            Some(victim) => prop_assert!(
+                loss.damaged_places == 1 || victim + 1 == chunks.len() && loss.tail_bytes > 0, "{:?}", loss
+            ),
         }
     }
 
@@ -212,19 +196,18 @@ proptest! {
         chunks in any_chunks(2..10),
         flips in prop::collection::vec((any::<prop::sample::Index>(), 0..8u32), 1..6),
     ) {
-        for (mut file, ends) in [written(&chunks), written_in_version_1(&chunks)] {
-            let mut victims = Vec::new();
-            for (at, bit) in &flips {
-                let at = ends[0] + at.index(file.len() - ends[0]);
-                file[at] ^= 1u8 << bit;
-                victims.push(ends.iter().position(|end| at < *end).unwrap_or_default() - 1);
-            }
-            let (kept, loss) = read(&file).unwrap();
-            let survive = chunks.iter().enumerate().all(|(i, chunk)| victims.contains(&i) || kept.contains(chunk));
-            prop_assert!(survive, "{} of {} kept, {:?} damaged", kept.len(), chunks.len(), victims);
-            // Two flips may undo each other.
-            prop_assert!(loss.is_any() || kept == chunks);
+        let (mut file, ends) = written(&chunks);
+        let mut victims = Vec::new();
+        for (at, bit) in &flips {
+            let at = ends[0] + at.index(file.len() - ends[0]);
+            file[at] ^= 1u8 << bit;
+            victims.push(ends.iter().position(|end| at < *end).unwrap_or_default() - 1);
         }
+        let (kept, loss) = read(&file).unwrap();
+        let survive = chunks.iter().enumerate().all(|(i, chunk)| victims.contains(&i) || kept.contains(chunk));
+        prop_assert!(survive, "{} of {} kept, {:?} damaged", kept.len(), chunks.len(), victims);
+        // Two flips may undo each other.
+        prop_assert!(loss.is_any() || kept == chunks);
     }
 
     #[test]
@@ -234,17 +217,16 @@ proptest! {
         junk in prop::collection::vec(any::<u8>(), 0..100),
         taken in 0..60usize,
     ) {
-        for (mut file, ends) in [written(&chunks), written_in_version_1(&chunks)] {
-            let at = ends[0] + at.index(file.len() - ends[0]);
-            let victim = ends.iter().position(|end| at < *end).unwrap_or_default() - 1;
-            // Within one chunk, so that it is known which.
-            let taken = taken.min(ends[victim + 1] - at);
-            file.splice(at..at + taken, junk.iter().copied());
-            let (kept, _) = read(&file).unwrap();
-            let others: Chunks = [&chunks[..victim], &chunks[victim + 1..]].concat();
-            let found = others.iter().all(|chunk| kept.contains(chunk));
-            prop_assert!(found, "{} of {} kept", kept.len(), chunks.len());
-        }
+        let (mut file, ends) = written(&chunks);
+        let at = ends[0] + at.index(file.len() - ends[0]);
+        let victim = ends.iter().position(|end| at < *end).unwrap_or_default() - 1;
+        // Within one chunk, so that it is known which.
+        let taken = taken.min(ends[victim + 1] - at);
+        file.splice(at..at + taken, junk.iter().copied());
+        let (kept, _) = read(&file).unwrap();
+        let others: Chunks = [&chunks[..victim], &chunks[victim + 1..]].concat();
+        let found = others.iter().all(|chunk| kept.contains(chunk));
+        prop_assert!(found, "{} of {} kept", kept.len(), chunks.len());
     }
 
     #[test]
@@ -252,29 +234,27 @@ proptest! {
         chunks in any_chunks(0..5),
         junk in prop::collection::vec(any::<u8>(), 1..3000),
     ) {
-        for file in [written(&chunks).0, written_in_version_1(&chunks).0] {
-            let before = [&junk[..], &file].concat();
-            prop_assert!(is_recording(&before));
-            let loss = Loss { junk_bytes: junk.len() as u64, ..Loss::default() };
-            prop_assert_eq!(read(&before), Some((chunks.clone(), loss)));
-            let mut reader = open(&before).unwrap();
-            reader.seek(0).unwrap();
-            prop_assert_eq!(rest(&mut reader), chunks.clone());
-        }
+        let file = written(&chunks).0;
+        let before = [&junk[..], &file].concat();
+        prop_assert!(is_recording(&before));
+        let loss = Loss { junk_bytes: junk.len() as u64, ..Loss::default() };
+        prop_assert_eq!(read(&before), Some((chunks.clone(), loss)));
+        let mut reader = open(&before).unwrap();
+        reader.seek(0).unwrap();
+        prop_assert_eq!(rest(&mut reader), chunks.clone());
     }
 
     #[test]
     fn any_bytes_are_read_without_panic(tail in prop::collection::vec(any::<u8>(), 0..2000), to_us in any::<u64>()) {
         prop_assert!(read(&tail).is_none());
-        for mut file in [written(&Vec::new()).0, written_in_version_1(&Vec::new()).0] {
-            file.extend(&tail);
-            let (chunks, _) = read(&file).unwrap();
-            prop_assert!(chunks.iter().map(|chunk| chunk.1.len()).sum::<usize>() <= tail.len());
-            let mut reader = open(&file).unwrap();
-            reader.last_time_us().unwrap();
-            reader.seek(to_us).unwrap();
-            prop_assert!(rest(&mut reader).len() <= chunks.len());
-        }
+        let mut file = written(&Vec::new()).0;
+        file.extend(&tail);
+        let (chunks, _) = read(&file).unwrap();
+        prop_assert!(chunks.iter().map(|chunk| chunk.1.len()).sum::<usize>() <= tail.len());
+        let mut reader = open(&file).unwrap();
+        reader.last_time_us().unwrap();
+        reader.seek(to_us).unwrap();
+        prop_assert!(rest(&mut reader).len() <= chunks.len());
     }
 
     #[test]
@@ -285,25 +265,24 @@ proptest! {
         damage in prop::option::of(any::<prop::sample::Index>()),
     ) {
         let chunks: Chunks = (0..count).map(|i| (i * 1000, vec![i as u8; length])).collect();
-        for (mut file, ends) in [written(&chunks), written_in_version_1(&chunks)] {
-            let to = to.index(chunks.len() + 1) as u64;
-            let victim = damage.map(|damage| damage.index(chunks.len()));
-            if let Some(victim) = victim {
-                file[ends[victim]] ^= 0x10; // Mark or time.
-            }
-            let mut reader = open(&file).unwrap();
-            let last = chunks.iter().enumerate().rev().find(|(i, _)| Some(*i) != victim).map(|(_, chunk)| chunk.0);
-            prop_assert_eq!(reader.last_time_us().unwrap(), last);
-            reader.seek(to * 1000).unwrap();
-            let mut bytes = Vec::new();
-            let expected = chunks.iter().enumerate().find(|(i, _)| *i as u64 >= to && Some(*i) != victim);
-            prop_assert_eq!(reader.next_into(&mut bytes).unwrap(), expected.map(|(_, chunk)| chunk.0));
-            reader.rewind().unwrap();
-            prop_assert!(rest(&mut reader).len() + 1 >= chunks.len());
-            let loss = reader.loss();
-            reader.rewind().unwrap();
-            rest(&mut reader);
-            prop_assert_eq!(reader.loss(), loss, "what is read again is not counted again");
+        let (mut file, ends) = written(&chunks);
+        let to = to.index(chunks.len() + 1) as u64;
+        let victim = damage.map(|damage| damage.index(chunks.len()));
+        if let Some(victim) = victim {
+            file[ends[victim]] ^= 0x10; // Mark or time.
         }
+        let mut reader = open(&file).unwrap();
+        let last = chunks.iter().enumerate().rev().find(|(i, _)| Some(*i) != victim).map(|(_, chunk)| chunk.0);
+        prop_assert_eq!(reader.last_time_us().unwrap(), last);
+        reader.seek(to * 1000).unwrap();
+        let mut bytes = Vec::new();
+        let expected = chunks.iter().enumerate().find(|(i, _)| *i as u64 >= to && Some(*i) != victim);
+        prop_assert_eq!(reader.next_into(&mut bytes).unwrap(), expected.map(|(_, chunk)| chunk.0));
+        reader.rewind().unwrap();
+        prop_assert!(rest(&mut reader).len() + 1 >= chunks.len());
+        let loss = reader.loss();
+        reader.rewind().unwrap();
+        rest(&mut reader);
+        prop_assert_eq!(reader.loss(), loss, "what is read again is not counted again");
     }
 }

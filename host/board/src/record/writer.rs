@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use tactomo_protocol::{Hello, MAX_WIRE, encode_hello};
+use tactomo_protocol::{BoardMessage, Hello, MAX_WIRE, encode_board};
 
 use super::format::{Kind, MAX_CHUNK, MAX_HEADER, put_chunk};
 use super::{Header, MAGIC, Note, VERSION};
@@ -67,8 +67,8 @@ impl<W: Write> RecordWriter<W> {
     /// If `out` takes no bytes.
     pub fn hello(&mut self, hello: &Hello) -> io::Result<()> {
         let mut wire = [0; MAX_WIRE];
-        let length =
-            encode_hello(hello, &mut wire).map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
+        let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire)
+            .map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
         self.write(0, &wire[..length])?;
         self.write(0, &wire[..length])
     }

@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Fault, Hello, MAX_COMMAND, Request, encode_request};
+use tactomo_protocol::{
+    BoardMessage, BoardReceiver, DecodeError, Fault, Hello, MAX_COMMAND, Request, VERSION, encode_request,
+};
 
 use super::{RequestedSettings, Session};
 use crate::link::Link;
@@ -29,35 +31,32 @@ pub enum GreetError {
         /// The command that was sent last.
         sent: u8,
     },
-    /// The board's version of the protocol is not known here.
-    #[error("this board cannot be used: {0}")]
-    Version(DecodeError),
+    /// The board speaks another version of the protocol.
+    #[error(
+        "this board speaks version {found} of the protocol, this program version {VERSION}: flash the firmware of this program with \
+         `tactomo board flash`"
+    )]
+    Version {
+        /// The version that it speaks.
+        found: u8,
+    },
     /// The link broke.
     #[error("the link broke: {0}")]
     Link(String),
 }
 
-/// A command, and the version of the protocol in which the board understands it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Outgoing {
-    /// 1 or 2.
-    pub version: u8,
-    /// The command and its tag.
-    pub request: Request,
-}
-
 /// Asks the board on `link` for Hello until it answers.
 ///
 /// # Errors
-/// [`GreetError`] if it does not before `deadline`, or not in a version of the protocol that is known here.
+/// [`GreetError`] if it does not before `deadline`, or in another version of the protocol.
 pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError> {
     let begin = Instant::now();
     let mut receiver = BoardReceiver::default();
     let mut session = Session::new(RequestedSettings::default());
     let mut buffer = [0; 512];
     while Instant::now() < deadline {
-        if let Some(command) = session.command(Instant::now()) {
-            send(link, &command).map_err(|error| GreetError::Link(error.to_string()))?;
+        if let Some(request) = session.command(Instant::now()) {
+            send(link, &request).map_err(|error| GreetError::Link(error.to_string()))?;
         }
         let count = link.read(&mut buffer).map_err(|error| GreetError::Link(error.to_string()))?;
         let mut input = &buffer[..count];
@@ -65,7 +64,7 @@ pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError
             match message {
                 Ok(BoardMessage::Hello(hello)) => return Ok(hello),
                 Ok(BoardMessage::Fault(fault)) => drop(session.fault(&fault)),
-                Err(error @ DecodeError::Version(_)) => return Err(GreetError::Version(error)),
+                Err(DecodeError::Version(found)) => return Err(GreetError::Version { found }),
                 _ => {}
             }
         }
@@ -78,9 +77,9 @@ pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError
 ///
 /// # Errors
 /// If the link does not take it.
-pub fn send(link: &mut dyn Link, command: &Outgoing) -> std::io::Result<()> {
+pub fn send(link: &mut dyn Link, request: &Request) -> std::io::Result<()> {
     let mut wire = [0; MAX_COMMAND];
-    let length = encode_request(&command.request, command.version, &mut wire).map_err(std::io::Error::other)?;
+    let length = encode_request(request, &mut wire).map_err(std::io::Error::other)?;
     // A zero ends whatever noise the board may have got before.
     link.write_all(&[0])?;
     link.write_all(&wire[..length])

@@ -9,7 +9,7 @@ pub enum PlanState {
     Pending,
     /// The board scans so.
     InForce,
-    /// The board does not take it, or did not answer, or speaks a version of the protocol that has no plans; it goes on as it was.
+    /// The board does not take it, or did not answer; it goes on as it was.
     Refused,
 }
 
@@ -53,14 +53,6 @@ impl PlanWish {
     pub(super) fn refused(&mut self) {
         self.is_refused = true;
         self.wanted = self.in_force.clone().unwrap_or_default();
-    }
-
-    /// The board cannot be told any plan, and scans whole frames.
-    pub(super) fn not_offered(&mut self) {
-        self.in_force = Some(Plan::default());
-        if self.due().is_some() {
-            self.refused();
-        }
     }
 
     /// The plan that the board scans, as far as is known.

@@ -4,9 +4,6 @@ use std::fmt;
 
 use tactomo_protocol::Settings;
 
-/// The first version of the protocol in which a board can be told of the select time and of discarded conversions.
-const FIRST_WITH_SELECT: u8 = 3;
-
 /// Settings of the scan that the user asks for; what is `None` stays as the board has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RequestedSettings {
@@ -32,11 +29,6 @@ impl RequestedSettings {
             select_us: later.select_us.or(self.select_us),
             discarded: later.discarded.or(self.discarded),
         }
-    }
-
-    /// These, but for what a board that speaks this version of the protocol has no word for.
-    pub(super) fn in_version(self, version: u8) -> Self {
-        if version >= FIRST_WITH_SELECT { self } else { Self { select_us: None, discarded: None, ..self } }
     }
 
     /// Whether a board may take them.

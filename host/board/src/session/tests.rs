@@ -1,4 +1,4 @@
-//! What boards say, and what the session says to that, in all versions of the protocol.
+//! What boards say, and what the session says to that.
 
 mod any_order;
 
@@ -12,11 +12,6 @@ fn with_settle(settle_us: u16) -> Settings {
     Settings { settle_us, ..Settings::default() }
 }
 
-/// A Hello of version 1.
-fn old_hello(settings: Settings) -> Hello {
-    Hello { version: 1, settings, ..Hello::example(16) }
-}
-
 /// A Hello that answers the command with this tag; 0 for that of a board's start.
 fn hello(answers: u8, settings: Settings, is_streaming: bool) -> Hello {
     Hello { answers, settings, is_streaming, ..Hello::example(16) }
@@ -28,7 +23,7 @@ fn four_rows() -> Plan {
 
 /// What the session says now, and its tag.
 fn said(session: &mut Session, now: Instant) -> Option<(u8, Command)> {
-    session.command(now).map(|outgoing| (outgoing.request.tag, outgoing.request.command))
+    session.command(now).map(|request| (request.tag, request.command))
 }
 
 fn command(session: &mut Session, now: Instant) -> Option<Command> {
@@ -75,61 +70,6 @@ fn hello_is_asked_for_until_it_comes_and_then_the_board_is_started() {
         Some(Command::Hello),
         "a silent board is asked again"
     );
-}
-
-#[test]
-fn a_board_of_version_1_is_spoken_to_in_version_1() {
-    let now = Instant::now();
-    let versions = |session: &mut Session, at| session.command(at).map(|out| (out.version, out.request.command));
-    let mut session = Session::new(settle(70));
-    assert_eq!(versions(&mut session, now), Some((3, Command::Hello)));
-    assert!(session.fault(&Fault::UnknownVersion(3)), "no news for people");
-    assert_eq!(versions(&mut session, now), Some((2, Command::Hello)), "at once");
-    assert!(session.fault(&Fault::UnknownVersion(3)), "the answer to what was sent before");
-    assert!(session.fault(&Fault::UnknownVersion(2)));
-    assert_eq!(versions(&mut session, now), Some((1, Command::Hello)), "at once");
-    session.hello(&old_hello(Settings::default()), now);
-    assert_eq!(versions(&mut session, now), Some((1, Command::Configure(with_settle(70)))));
-    session.hello(&old_hello(with_settle(70)), now);
-    assert_eq!(versions(&mut session, now), Some((1, Command::Start)));
-    assert_eq!(versions(&mut session, now), None, "which such a board does not answer");
-
-    let mut session = Session::new(RequestedSettings::default());
-    session.hello(&old_hello(Settings::default()), now);
-    assert_eq!(versions(&mut session, now), Some((1, Command::Start)), "its Hello alone tells");
-    session.hello(&hello(0, Settings::default(), false), now);
-    assert_eq!(
-        versions(&mut session, now),
-        Some((3, Command::Scan(Plan::default()))),
-        "it came back with newer firmware"
-    );
-    assert!(session.fault(&Fault::UnknownVersion(3)));
-    assert!(session.fault(&Fault::UnknownVersion(2)));
-    assert_eq!(versions(&mut session, now), Some((1, Command::Hello)));
-    assert!(session.fault(&Fault::UnknownVersion(1)));
-    assert_eq!(versions(&mut session, now), Some((3, Command::Hello)));
-}
-
-/// It is told what its version has words for, and the rest is left out: it is neither asked for again and again nor a broken link.
-#[test]
-fn a_board_of_version_2_is_told_all_but_its_select_time() {
-    let now = Instant::now();
-    let requested = RequestedSettings { select_us: Some(35), discarded: Some(1), ..settle(70) };
-    let mut session = Session::new(requested);
-    let Some(Outgoing { version: 3, .. }) = session.command(now) else { panic!("it is asked in the newest version") };
-    assert!(session.fault(&Fault::UnknownVersion(3)));
-    let older = |answers, settings| Hello { version: 2, ..hello(answers, settings, false) };
-    let Some(Outgoing { version: 2, request }) = session.command(now) else { panic!("then in its own") };
-    session.hello(&older(request.tag, Settings::default()), now);
-    let Some(Outgoing { version: 2, request }) = session.command(now) else { panic!("its settings") };
-    assert_eq!(request.command, Command::Configure(with_settle(70)));
-    session.hello(&older(request.tag, with_settle(70)), now);
-    let next = session.command(now).map(|outgoing| outgoing.request.command);
-    assert_eq!((next, session.refusal()), (Some(Command::Scan(Plan::default())), None));
-    // With newer firmware it is told everything.
-    session.hello(&hello(0, Settings::default(), false), now);
-    let wanted = Settings { select_us: 35, discarded: 1, ..with_settle(70) };
-    assert_eq!(command(&mut session, now), Some(Command::Configure(wanted)));
 }
 
 #[test]
@@ -237,7 +177,7 @@ fn a_board_that_restarts_gets_everything_again() {
 }
 
 #[test]
-fn a_plan_is_taken_or_refused_or_not_offered_at_all() {
+fn a_plan_is_taken_or_refused_or_never_answered() {
     let now = Instant::now();
     let mut session = streaming(RequestedSettings::default(), now);
     assert_eq!(session.plan_state(), PlanState::InForce, "whole frames");
@@ -260,16 +200,6 @@ fn a_plan_is_taken_or_refused_or_not_offered_at_all() {
     let steps = (0..100).map(|step| now + REPEAT_EVERY * step / 4);
     let sent = steps.filter(|at| self::command(&mut session, *at) == Some(Command::Scan(four_rows()))).count();
     assert_eq!((sent, session.plan_state()), (TRIES as usize, PlanState::Refused));
-
-    let mut session = Session::new(RequestedSettings::default());
-    session.request_plan(Some(four_rows()));
-    session.hello(&old_hello(Settings::default()), now);
-    assert_eq!(session.plan_state(), PlanState::Refused);
-    session.request_plan(None);
-    assert_eq!(session.plan_state(), PlanState::InForce);
-    session.request_plan(Some(four_rows()));
-    assert_eq!(session.plan_state(), PlanState::Refused);
-    assert_eq!(self::command(&mut session, now), Some(Command::Start));
 }
 
 /// A board that answers each command at once in its own way, for so long in steps of a millisecond: how many commands it got.
@@ -344,47 +274,6 @@ fn an_earlier_hosts_stream_is_joined_and_its_plan_ended() {
 }
 
 #[test]
-fn settings_of_version_1_are_sent_and_an_old_hello_is_no_refusal() {
-    let now = Instant::now();
-    let mut session = Session::new(settle(70));
-    session.hello(&old_hello(Settings::default()), now);
-    assert_eq!(command(&mut session, now), Some(Command::Configure(with_settle(70))));
-    session.hello(&old_hello(Settings::default()), now); // The answer to a question that was asked before.
-    assert_eq!(command(&mut session, now), None, "they are on their way");
-    session.hello(&old_hello(with_settle(70)), now);
-    assert_eq!(command(&mut session, now), Some(Command::Start));
-    assert_eq!(session.refusal(), None);
-}
-
-#[test]
-fn settings_that_a_board_of_version_1_calls_bad_or_never_confirms_are_refused_in_plain_words() {
-    let now = Instant::now();
-    let mut session = Session::new(settle(70));
-    session.hello(&old_hello(Settings::default()), now);
-    session.command(now);
-    assert!(session.fault(&Fault::BadSettings { answers: 0 }));
-    assert_eq!(command(&mut session, now), Some(Command::Start), "the board goes on as it is");
-    let refusal = session.refusal().unwrap().to_string();
-    assert_eq!(refusal, "the board keeps a settle time of 20 us instead of 70 us");
-    session.hello(&old_hello(Settings::default()), now);
-    assert_eq!(command(&mut session, now), Some(Command::Start), "what is refused is not asked for again");
-
-    let mut session = Session::new(settle(70));
-    session.hello(&old_hello(Settings::default()), now);
-    let mut sent = 0;
-    let started = (0..100).map(|step| now + REPEAT_EVERY * step / 4).find(|at| match command(&mut session, *at) {
-        Some(Command::Configure(_)) => {
-            sent += 1;
-            session.hello(&old_hello(Settings::default()), *at);
-            false
-        }
-        command => command == Some(Command::Start),
-    });
-    assert_eq!((sent, started), (TRIES, Some(now + REPEAT_EVERY * TRIES)));
-    assert!(session.refusal().is_some());
-}
-
-#[test]
 fn every_setting_that_is_refused_is_named() {
     let wanted = Settings { settle_us: 70, average_log2: 3, max_frames_per_s: 100, select_us: 35, discarded: 1 };
     let refusal = Refusal { wanted, kept: Settings::default(), is_said: true }.to_string();
@@ -394,18 +283,6 @@ fn every_setting_that_is_refused_is_named() {
          frames a second as it can instead of at most 100 frames a second, and a select time of 0 us instead of 35 us, and 0 discarded \
          conversions instead of 1"
     );
-}
-
-#[test]
-fn a_board_of_version_1_that_says_hello_by_itself_is_started_again() {
-    let now = Instant::now();
-    let mut session = Session::new(RequestedSettings::default());
-    session.hello(&old_hello(Settings::default()), now);
-    session.command(now);
-    session.frame(now);
-    assert_eq!(session.command(now + SILENCE / 2), None);
-    session.hello(&old_hello(Settings::default()), now);
-    assert_eq!(command(&mut session, now), Some(Command::Start));
 }
 
 #[test]
@@ -434,8 +311,11 @@ fn a_board_that_answers_and_sends_no_frames_is_mute_until_one_comes() {
 fn slow_scans_are_waited_for() {
     let begin = Instant::now();
     let mut session = Session::new(RequestedSettings::default());
-    session.hello(&old_hello(Settings { average_log2: 8, settle_us: u16::MAX, ..Settings::default() }), begin);
-    session.command(begin);
+    let settings = Settings { average_log2: 8, settle_us: u16::MAX, ..Settings::default() };
+    session.hello(&hello(0, settings, false), begin);
+    while let Some((tag, command)) = said(&mut session, begin) {
+        session.hello(&hello(tag, settings, command == Command::Start), begin);
+    }
     // 65536 conversions of 50 us and 16 settle times of 65.5 ms: 4.3 s.
     assert!(!session.is_mute(begin + Duration::from_secs(8)) && session.is_mute(begin + Duration::from_secs(9)));
 }

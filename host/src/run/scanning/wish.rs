@@ -82,9 +82,7 @@ impl PlanAsk {
         }
         let is_refused = self.plan.is_some() && session.plan_state() == PlanState::Refused;
         if is_refused && !self.is_refused {
-            tracing::warn!(
-                "the board takes no scan plans, so it goes on with whole frames: its firmware is older than this program"
-            );
+            tracing::warn!("the board does not take the scan plan, so it goes on with whole frames");
         }
         self.is_refused = is_refused;
         self.wish.set_refused(is_refused);

@@ -12,7 +12,7 @@ use tactomo_firmware::{
     Activity, Adc, Board16, Chip, ConverterPair, Identity, Mux, Parts, Serial, SideBySide, TimedOut,
 };
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, Fault, Frame, MAX_COMMAND, Request, Settings, Status, VERSION, encode_request,
+    BoardMessage, BoardReceiver, Command, Fault, Frame, MAX_COMMAND, Request, Settings, Status, encode_request,
 };
 
 use super::{Converters, MAX_LOOKS, Units};
@@ -145,7 +145,7 @@ fn board(state: &Rc<State>, settings: Settings) -> (FakeBoard, Rc<core::cell::Re
     let mut line = Line::default();
     for command in [Command::Configure(settings), Command::Start] {
         let mut packet = [0; MAX_COMMAND];
-        let length = encode_request(&Request { tag: 1, command }, VERSION, &mut packet).expect("a command");
+        let length = encode_request(&Request { tag: 1, command }, &mut packet).expect("a command");
         line.to_board.extend(&packet[..length]);
     }
     let sent = Rc::clone(&line.sent);

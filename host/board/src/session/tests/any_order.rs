@@ -1,4 +1,4 @@
-//! Any order of what a board may say, in all versions of the protocol.
+//! Any order of what a board may say.
 
 use std::collections::VecDeque;
 
@@ -8,7 +8,6 @@ use super::*;
 
 /// A board that obeys, or does not, and whose messages come in the order of a line, late.
 struct Board {
-    version: u8,
     settings: Settings,
     plan: Plan,
     streaming: bool,
@@ -17,31 +16,22 @@ struct Board {
 }
 
 impl Board {
-    fn new(version: u8) -> Self {
+    fn new() -> Self {
         let (settings, plan) = (Settings::default(), Plan::default());
-        Self { version, settings, plan, streaming: false, line: VecDeque::new() }
+        Self { settings, plan, streaming: false, line: VecDeque::new() }
     }
 
     fn restart(&mut self) {
-        *self = Self { line: std::mem::take(&mut self.line), ..Self::new(self.version) };
+        *self = Self { line: std::mem::take(&mut self.line), ..Self::new() };
     }
 
     fn say_hello(&mut self, answers: u8, at: u64) {
         // What was sent earlier arrives earlier.
         let at = self.line.back().map_or(at, |last| at.max(last.0));
-        let message = match self.version {
-            1 => old_hello(self.settings),
-            2 => Hello { version: 2, ..hello(answers, self.settings, self.streaming) },
-            _ => hello(answers, self.settings, self.streaming),
-        };
-        self.line.push_back((at, message));
+        self.line.push_back((at, hello(answers, self.settings, self.streaming)));
     }
 
-    fn obey(&mut self, Outgoing { version, request }: Outgoing, at: u64) {
-        if version != self.version {
-            return self.say_hello(0, at); // Only to a board of an older version, and as good as the fault.
-        }
-        let has_answer = version != 1 || matches!(request.command, Command::Hello | Command::Configure(_));
+    fn obey(&mut self, request: Request, at: u64) {
         match request.command {
             Command::Hello => {}
             Command::Configure(settings) => self.settings = settings,
@@ -49,9 +39,7 @@ impl Board {
             Command::Start => self.streaming = true,
             Command::Stop => self.streaming = false,
         }
-        if has_answer {
-            self.say_hello(request.tag, at);
-        }
+        self.say_hello(request.tag, at);
     }
 }
 
@@ -59,8 +47,6 @@ impl Board {
 #[derive(Clone, Debug)]
 enum Event {
     Nothing,
-    /// A board of version 1 says Hello once more.
-    Hello,
     /// It starts anew.
     Restart,
     /// It loses the next command.
@@ -82,7 +68,6 @@ fn any_request() -> impl Strategy<Value = RequestedSettings> {
 fn any_event() -> impl Strategy<Value = Event> {
     prop_oneof![
         8 => Just(Event::Nothing),
-        1 => Just(Event::Hello),
         1 => Just(Event::Restart),
         1 => Just(Event::Deaf),
         1 => Just(Event::Dumb),
@@ -97,29 +82,26 @@ proptest! {
     /// Steps of 20 ms; after the events, eight seconds in which nothing more happens.
     #[test]
     fn whatever_order_hellos_come_in_the_board_does_what_was_asked_for_last_and_nobody_cries_wolf(
-        version in 1..=3u8,
         first in any_request(),
         events in prop::collection::vec(any_event(), 0..60),
         delays in prop::collection::vec(0..12u64, 500),
     ) {
         let begin = Instant::now();
-        let (mut session, mut board, mut wanted) = (Session::new(first), Board::new(version), first);
+        let (mut session, mut board, mut wanted) = (Session::new(first), Board::new(), first);
         let mut plan = Plan::default();
         board.say_hello(0, 0);
         let mut deaf = false;
         for step in 0..460u64 {
             let now = begin + Duration::from_millis(20 * step);
             match events.get(step as usize).unwrap_or(&Event::Nothing) {
-                Event::Hello if version == 1 => board.say_hello(0, step + delays[step as usize]),
-                Event::Nothing | Event::Hello => {}
+                Event::Nothing => {}
                 Event::Restart => {
                     board.restart();
                     board.say_hello(0, step + delays[step as usize]);
                 }
                 Event::Deaf => deaf = true,
-                // A board of version 1 that loses the Hello of its start may go unnoticed as long as settings are confirmed.
-                Event::Dumb if version == 1 => {}
-                // Nor may one of version 2, as long as its settings are those that it starts with: its plan is not in its Hello.
+                // The Hello of a start is never lost: a restart would go unnoticed as long as the settings are those that the board starts
+                // with, since its plan is not in its Hello.
                 Event::Dumb => {
                     if let Some(answer) = board.line.pop_back_if(|(_, hello)| hello.answers != 0) {
                         drop(answer);
@@ -146,11 +128,10 @@ proptest! {
             }
             prop_assert_eq!(session.refusal(), None, "step {}", step);
         }
-        prop_assert_eq!(board.settings, wanted.in_version(version).over(board.settings));
+        prop_assert_eq!(board.settings, wanted.over(board.settings));
         prop_assert!(board.streaming);
-        let expected = if version == 1 && !plan.is_whole() { PlanState::Refused } else { PlanState::InForce };
-        prop_assert_eq!(session.plan_state(), expected);
-        prop_assert_eq!(board.plan, if version == 1 { Plan::default() } else { plan });
+        prop_assert_eq!(session.plan_state(), PlanState::InForce);
+        prop_assert_eq!(board.plan, plan);
         let now = begin + Duration::from_millis(20 * 460);
         prop_assert!(!session.is_mute(now));
     }
