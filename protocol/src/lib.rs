@@ -13,7 +13,7 @@
 //! | 4 | CRC-32 (ISO-HDLC, as in zlib) of head and body, little-endian |
 //!
 //! Only head, CRC and COBS are promised to every future version: that is enough for a receiver to recognise a newer peer
-//! and to refuse it by name ([`DecodeError::Version`]) instead of misreading it. `docs/protocol.md` is the whole specification, with
+//! and to refuse it by name ([`DecodeError::Version`]) instead of misreading it. `docs/protocol.md` is the whole specification, and `docs/protocol-examples.md` has
 //! examples that are tested against this crate.
 //!
 //! A host asks, and gets the answer through a line that said something else before:

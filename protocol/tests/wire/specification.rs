@@ -1,4 +1,4 @@
-//! The examples in docs/protocol.md are what the crate sends and takes.
+//! The examples in docs/protocol-examples.md are what the crate sends and takes.
 //!
 //! Each is a block marked `wire`: who sends it and what a receiver makes of it, then the bytes in hexadecimal.
 
@@ -11,7 +11,7 @@ use tactomo_protocol::{
 
 use crate::common::{board_wire, hello, packet, receive_board, receive_command, request_wire};
 
-const PAGE: &str = include_str!("../../../docs/protocol.md");
+const PAGE: &str = include_str!("../../../docs/protocol-examples.md");
 
 /// What a receiver makes of the bytes, and the bytes.
 type Example = (String, Vec<u8>);
@@ -117,7 +117,7 @@ fn page_text(examples: &[Example]) -> String {
 #[test]
 fn the_examples_are_what_is_sent() {
     let expected = expected();
-    assert!(examples() == expected, "docs/protocol.md should have these examples:\n\n{}", page_text(&expected));
+    assert!(examples() == expected, "docs/protocol-examples.md should have these examples:\n\n{}", page_text(&expected));
 }
 
 #[test]

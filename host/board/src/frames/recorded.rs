@@ -340,7 +340,7 @@ mod tests {
 
     #[test]
     fn a_recording_in_another_version_of_the_protocol_is_refused() {
-        // A packet of version 4: the example of docs/protocol.md.
+        // A packet of version 4: the example of docs/protocol-examples.md.
         let newer = vec![0x08, 0x40, 0xC0, 0xDE, 0x4F, 0x7C, 0x4A, 0x25, 0x00];
         let refusal = recorded("newer", &[b"boot text\0".to_vec(), newer]).err();
         assert!(matches!(refusal, Some(FramesError::Protocol { other: OtherProtocol { found: 4 }, .. })));
