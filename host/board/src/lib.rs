@@ -15,3 +15,4 @@ pub mod record;
 pub mod sequence;
 pub mod session;
 pub mod simulated;
+pub mod source;

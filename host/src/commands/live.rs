@@ -7,9 +7,9 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context, anyhow};
-use tactomo::board::link::Source;
 use tactomo::board::record::Header;
 use tactomo::board::session::RequestedSettings;
+use tactomo::board::source::Source;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;

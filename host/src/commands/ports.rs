@@ -1,7 +1,8 @@
 //! `tactomo ports`: which serial ports there are, and which have a board.
 
-use tactomo::board::link::discover::{self, Probe};
+use tactomo::board::link::ports::ports;
 use tactomo::board::link::serial::DEFAULT_BAUD;
+use tactomo::board::source::discover::{self, Probe};
 use tactomo_protocol::Hello;
 
 use tactomo_cli::output::{self, message};
@@ -22,7 +23,7 @@ pub struct Args {
 
 /// Prints one line for each serial port.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let ports = discover::ports();
+    let ports = ports();
     if ports.is_empty() {
         message!("no serial ports: is the board plugged in, with a cable that carries data?");
         return Ok(());

@@ -8,11 +8,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tactomo_board::identity;
-use tactomo_board::link::{Control, Link, Source};
+use tactomo_board::link::{Control, Link};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::OtherProtocol;
 use tactomo_board::sequence::Sequence;
 use tactomo_board::session::{self, GreetError};
+use tactomo_board::source::Source;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::SceneName;

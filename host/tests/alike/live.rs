@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
-use tactomo::board::link::Opened;
 use tactomo::board::record::{Header, Recorder};
 use tactomo::board::simulated::{Options, SimulatedBoard};
+use tactomo::board::source::Opened;
 use tactomo::run::plan::{Ends, Plan, Solving, Summary};
 use tactomo::run::{Listener, Snapshot, TouchEvent};
 use tactomo::scene::{Hand, Scene, SceneName, Touch};

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 
 use tactomo::board::baseline::{Baseline, FRAMES};
-use tactomo::board::link::{Control, ControlError, Link, Source, SourceError};
+use tactomo::board::link::{Control, ControlError, Link};
+use tactomo::board::source::{Source, SourceError};
 use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, MakeSolver, Plan, Solving};
 use tactomo::run::{Request, Snapshot};

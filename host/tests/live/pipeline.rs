@@ -4,9 +4,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tactomo::board::identity::identity;
-use tactomo::board::link::{Control, Link, Opened, Recording};
+use tactomo::board::link::{Control, Link};
 use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::{GreetError, RequestedSettings, greet};
+use tactomo::board::source::{Opened, Recording};
 use tactomo::detector::{Calibration, Detector};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;

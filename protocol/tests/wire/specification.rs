@@ -117,7 +117,11 @@ fn page_text(examples: &[Example]) -> String {
 #[test]
 fn the_examples_are_what_is_sent() {
     let expected = expected();
-    assert!(examples() == expected, "docs/protocol-examples.md should have these examples:\n\n{}", page_text(&expected));
+    assert!(
+        examples() == expected,
+        "docs/protocol-examples.md should have these examples:\n\n{}",
+        page_text(&expected)
+    );
 }
 
 #[test]

@@ -8,8 +8,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use tactomo::board::link::Opened;
 use tactomo::board::simulated::{Options, SimulatedBoard};
+use tactomo::board::source::Opened;
 use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, LiveError, Plan, Solving, Summary};
 use tactomo::run::{Snapshot, Statistics};

@@ -5,9 +5,9 @@ use std::thread::{self, JoinHandle};
 use super::BOOT_TEXT;
 use super::board::Board;
 use tactomo::board::check::{Counted, ListenError, Listening};
-use tactomo::board::link::NamedPort;
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::session::RequestedSettings;
+use tactomo::board::source::NamedPort;
 use tactomo_protocol::{BoardMessage, Command, Fault};
 
 fn look(board: &Board) -> JoinHandle<Result<Listening, ListenError>> {

@@ -6,8 +6,8 @@ use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use tactomo::board::link::NamedPort;
 use tactomo::board::link::serial::DEFAULT_BAUD;
+use tactomo::board::source::NamedPort;
 use tactomo::detector::Detector;
 use tactomo::run::plan::{Ends, LiveError, Plan, Summary};
 use tactomo::run::{Request, Snapshot};

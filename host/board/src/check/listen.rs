@@ -8,10 +8,11 @@ use tactomo_physics::readings::Readings;
 use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Fault, Frame, Hello};
 
 use super::Heard;
-use crate::link::{Link, Source, SourceError};
+use crate::link::Link;
 use crate::measured::Volts;
 use crate::sequence::Sequence;
 use crate::session::{self, GreetError, RequestedSettings, Session};
+use crate::source::{Source, SourceError};
 
 /// How long a board has to say Hello: opening the port may have reset it, and then it boots first.
 const PATIENCE: Duration = Duration::from_secs(6);

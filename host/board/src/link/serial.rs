@@ -126,7 +126,7 @@ fn explain(port: &str, baud: u32, error: serialport::Error) -> PortError {
 
 /// Which serial ports there are, as a sentence.
 fn there() -> String {
-    let names: Vec<String> = super::discover::ports().into_iter().map(|port| port.name).collect();
+    let names: Vec<String> = super::ports::ports().into_iter().map(|port| port.name).collect();
     match names.as_slice() {
         [] => "this machine has none; is the board plugged in, and is its cable one for data?".to_owned(),
         names => format!("there is {}", names.join(", ")),

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use tactomo::board::link::{AnyBoard, NamedPort, Opened, Recording, Source};
 use tactomo::board::record::RecordReader;
 use tactomo::board::simulated::{BoardModel, Options, SimulatedBoard};
+use tactomo::board::source::{AnyBoard, NamedPort, Opened, Recording, Source};
 use tactomo::detector::Detector as Described;
 use tactomo::scene::{Hand, Scene, SceneName};
 use tactomo::simulate::{self, Fault, Simulation};

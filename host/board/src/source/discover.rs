@@ -1,29 +1,18 @@
-//! Which serial ports there are, and which of them have a board.
+//! Which serial ports have a board.
 
 use std::thread;
 use std::time::{Duration, Instant};
 
-use serialport::SerialPortType;
 use tactomo_physics::causes::with_causes;
 use tactomo_protocol::Hello;
 
-use super::Link;
-use super::serial::{PortError, SerialLink};
+use crate::link::Link;
+use crate::link::ports::{Port, ports};
+use crate::link::serial::{PortError, SerialLink};
 use crate::session::{self, GreetError};
 
 /// How long a board has to say Hello: opening may have reset it, and then it boots first.
 const PATIENCE: Duration = Duration::from_secs(3);
-
-/// A serial port of this machine.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Port {
-    /// Such as `/dev/ttyUSB0`.
-    pub name: String,
-    /// Whether it is at the end of a USB cable.
-    pub usb: bool,
-    /// What the USB device calls itself, if it does.
-    pub product: Option<String>,
-}
 
 /// What a port answered when it was asked for Hello.
 #[derive(Debug)]
@@ -54,28 +43,6 @@ pub enum ProbeError {
 pub struct NoBoard {
     /// What was tried, port by port.
     tried: String,
-}
-
-/// The serial ports of this machine, by name.
-pub fn ports() -> Vec<Port> {
-    // The library panics where the system has no such folder, as in some containers.
-    if cfg!(target_os = "linux") && !std::path::Path::new("/sys/class/tty").is_dir() {
-        return Vec::new();
-    }
-    let found = serialport::available_ports().unwrap_or_else(|error| {
-        tracing::warn!("cannot list the serial ports: {}", with_causes(&error));
-        Vec::new()
-    });
-    let mut ports: Vec<Port> = found.into_iter().map(|info| port(info.port_name, info.port_type)).collect();
-    ports.sort_by(|a, b| a.name.cmp(&b.name));
-    ports
-}
-
-fn port(name: String, kind: SerialPortType) -> Port {
-    match kind {
-        SerialPortType::UsbPort(usb) => Port { name, usb: true, product: usb.product },
-        _ => Port { name, usb: false, product: None },
-    }
 }
 
 /// Asks all `ports` for Hello, at the same time; the answers come in their order.
