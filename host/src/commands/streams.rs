@@ -14,7 +14,7 @@ use tactomo::sink::channels::Messages;
 use tactomo::sink::door::Door;
 use tactomo::sink::foxglove;
 use tactomo::sink::lines::Fields;
-use tactomo::sink::stream::{Form, Target};
+use tactomo::sink::target::{Form, Target};
 use tactomo::solve::{ContactSettings, Problem};
 
 use super::scene;

@@ -10,7 +10,7 @@ use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, Latest, Method, SolveError};
 
 use super::inbox::{Rows, Taken};
-use super::maker::Order;
+use super::order::Order;
 
 /// Time for which rows that have waited are followed one after the other. A row of a contact takes 0.1 ms; of one that is as wide as a third of
 /// the detector, whose fields vary over it, 1 ms to 2 ms, which is more than there is from one to the next: 64 had waited then, and answers

@@ -11,8 +11,8 @@ use tactomo_physics::readings::Readings;
 use tactomo_protocol::Status;
 use tactomo_touch::solve::{Lead, Look, Method, Parts, Solver, Still};
 
-use super::calibration::{Calibrate, Outcome};
-use super::maker::Made;
+use super::calibration::messages::{Calibrate, Outcome};
+use super::order::Made;
 
 /// Frames of rows that wait at most: 50 ms of an ESP32's.
 const MOST_ROWS: usize = 64;

@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::thread;
 
 use tactomo_physics::causes::with_causes;
-use tactomo_physics::detector::Detector;
-use tactomo_touch::solve::{FaultyElectrodes, Method, Solver};
+use tactomo_touch::solve::{Method, Solver};
 
 use super::inbox::{Event, Inbox};
+use super::order::{Made, Order};
 use super::plan::{BoxError, MakeSolver, Solving};
 
 /// Which solver is in use, and what comes of the wish for another.
@@ -19,23 +19,6 @@ pub struct SolverState {
     pub making: Option<Method>,
     /// Why the one that was asked for last cannot be made.
     pub refused: Option<String>,
-}
-
-/// What a solver is made for.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Order {
-    /// Its method.
-    pub method: Method,
-    /// The detector, as measured.
-    pub detector: Arc<Detector>,
-    /// Electrodes that are left out, and why.
-    pub faulty: FaultyElectrodes,
-}
-
-/// A solver that was ordered, or why there is none.
-pub struct Made {
-    order: Order,
-    solver: Result<Box<dyn Solver>, BoxError>,
 }
 
 /// A solver, and what it was ordered for.
@@ -132,6 +115,9 @@ impl Maker {
 mod tests {
     use std::sync::{Mutex, PoisonError, mpsc};
     use std::time::Duration;
+
+    use tactomo_physics::detector::Detector;
+    use tactomo_touch::solve::FaultyElectrodes;
 
     use super::*;
     use tactomo_board::baseline::Baseline;

@@ -14,6 +14,7 @@ mod inbox;
 mod keeping;
 mod maker;
 mod notice;
+mod order;
 pub mod plan;
 mod reader;
 mod scanned;
@@ -23,7 +24,8 @@ mod statistics;
 mod talk;
 
 pub use self::event::{Listener, TouchEvent};
-pub use self::maker::{Order, SolverState};
+pub use self::maker::SolverState;
+pub use self::order::Order;
 pub use self::reader::run;
 pub use self::scanned::Scan;
 

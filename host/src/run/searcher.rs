@@ -9,7 +9,7 @@ use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{Lead, Look, Searcher};
 
 use super::inbox::{Event, Inbox, Searched};
-use super::maker::Order;
+use super::order::Order;
 use super::plan::LookAtWires;
 
 /// What the thread is asked.

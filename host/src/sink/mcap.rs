@@ -14,7 +14,7 @@ use mcap::{Compression, McapError, WriteOptions, Writer};
 use super::channels::{Channel, Messages};
 use super::feed::{Delivery, Keeps};
 use super::running::{Sink, Sinks};
-use super::stream::{DISK_PATIENCE, StreamError};
+use super::target::{DISK_PATIENCE, StreamError};
 
 /// Longest that answers wait in memory: what a kill costs at most.
 const CHUNK_LASTS: Duration = Duration::from_millis(500);

@@ -11,6 +11,7 @@ pub mod mcap;
 pub mod page;
 mod running;
 pub mod stream;
+pub mod target;
 mod tcp;
 mod thin;
 mod udp;

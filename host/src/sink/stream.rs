@@ -1,133 +1,19 @@
 //! Streams of JSON Lines: to a file, to stdout, to whoever connects, or in datagrams.
 
-use std::fmt;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use super::address::Address;
 use super::door::Limits;
 use super::feed::{Delivery, Keeps};
 use super::lines::Fields;
 use super::running::{PATIENCE, Sink, Sinks};
+use super::target::{DISK_PATIENCE, Form, StreamError, Target};
 use super::{tcp, udp};
 
 /// Longest that a line waits in the buffer of a file.
 const FLUSH_EVERY: Duration = Duration::from_millis(20);
-/// Longest wait for a disk at the end.
-pub(super) const DISK_PATIENCE: Duration = Duration::from_secs(10);
-
-/// Where a stream goes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Target {
-    /// To stdout.
-    Stdout,
-    /// Into a new file.
-    File(PathBuf),
-    /// To all who connect to this port.
-    Tcp(Address),
-    /// To an address, each line as a datagram.
-    Udp(Address),
-}
-
-/// `-`, `tcp:PORT`, `tcp:ADDRESS:PORT`, `udp:ADDRESS:PORT`, or else a file.
-impl FromStr for Target {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':') {
-            _ if text == "-" => Ok(Self::Stdout),
-            Some(("tcp", address)) => Address::with_port(address).map(Self::Tcp),
-            Some(("udp", address)) => Address::with_port(address).map(Self::Udp),
-            _ => Ok(Self::File(text.into())),
-        }
-    }
-}
-
-impl fmt::Display for Target {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Stdout => write!(f, "stdout"),
-            Self::File(path) => write!(f, "{}", path.display()),
-            Self::Tcp(address) => write!(f, "tcp:{address}"),
-            Self::Udp(address) => write!(f, "udp:{address}"),
-        }
-    }
-}
-
-/// What a stream carries.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Form {
-    /// Fields of a line.
-    pub fields: Fields,
-    /// Lines a second at most; all of them if that is not said.
-    pub most_per_s: Option<f64>,
-}
-
-/// Why there is no stream.
-#[derive(Debug, thiserror::Error)]
-pub enum StreamError {
-    /// The file cannot be made, or is there already.
-    #[error("cannot write the stream {path} (it has to be a new file, or `-` for stdout)")]
-    Create {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The same of an MCAP file.
-    #[error("cannot write {path} (an MCAP file has to be a new one)")]
-    Mcap {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// Another program listens there.
-    #[error("port {address} for {what} is busy: give it another port, or end the program that listens there")]
-    Busy {
-        /// What was to listen: a stream, Foxglove.
-        what: &'static str,
-        /// Where.
-        address: Address,
-    },
-    /// An address that this machine does not have, or that nobody has.
-    #[error("cannot use {address} for {what} (give it an address that this machine can reach, or only a port)")]
-    Address {
-        /// What was to use it.
-        what: &'static str,
-        /// Where.
-        address: Address,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// No thread.
-    #[error("cannot start a thread for {name}")]
-    Thread {
-        /// The stream.
-        name: String,
-        /// What the system says.
-        source: io::Error,
-    },
-}
-
-impl StreamError {
-    pub(super) fn address(what: &'static str, address: &Address) -> impl Fn(io::Error) -> Self {
-        let address = address.clone();
-        move |source| match source.kind() {
-            io::ErrorKind::AddrInUse => Self::Busy { what, address: address.clone() },
-            _ => Self::Address { what, address: address.clone(), source },
-        }
-    }
-
-    pub(super) fn thread(name: &str) -> impl Fn(io::Error) -> Self {
-        let name = name.to_owned();
-        move |source| Self::Thread { name: name.clone(), source }
-    }
-}
-
 impl Sinks {
     /// Adds a stream; one that listens says where, since it may have been given any port.
     ///
@@ -202,6 +88,7 @@ mod tests {
 
     use super::*;
     use crate::run::TouchEvent;
+    use crate::sink::address::Address;
 
     #[derive(Clone, Default)]
     struct Shared(Arc<Mutex<Vec<u8>>>);

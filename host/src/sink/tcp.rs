@@ -15,7 +15,7 @@ use super::door::Limits;
 use super::feed::{Keeps, Next, Tail, Taps};
 use super::lines::Fields;
 use super::running::{PATIENCE, Sinks};
-use super::stream::{Form, StreamError};
+use super::target::{Form, StreamError};
 use super::web::within;
 use tactomo_physics::causes::with_causes;
 

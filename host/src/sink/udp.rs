@@ -7,7 +7,7 @@ use super::address::Address;
 use super::feed::Delivery;
 use super::lines::Fields;
 use super::running::Sink;
-use super::stream::StreamError;
+use super::target::StreamError;
 
 /// Lines as datagrams.
 pub(super) struct Datagrams {

@@ -4,13 +4,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::calibrate::{Frame, Rub, RubSettings, rub};
 
-use super::Outcome;
+use super::messages::{Fitted, Outcome};
 use crate::date::today;
 use crate::run::inbox::{Event, Inbox};
 
@@ -27,13 +27,6 @@ pub(super) struct Task {
     pub before: usize,
     pub is_last: bool,
     pub cancelled: Arc<AtomicBool>,
-}
-
-/// A fit that has ended.
-pub(in crate::run) struct Fitted {
-    pub is_last: bool,
-    pub fit: Result<Rub, String>,
-    pub took: Duration,
 }
 
 /// Begins a fit; it comes through the inbox, under the number of its rub.

@@ -3,6 +3,7 @@
 
 mod collected;
 mod fit;
+pub(super) mod messages;
 mod save;
 
 use std::path::PathBuf;
@@ -18,7 +19,10 @@ use tactomo_touch::solve::FoundContact;
 
 use self::collected::Collected;
 pub use self::collected::Coverage;
-use self::fit::{Fitted, Task};
+use self::fit::Task;
+pub use self::messages::Calibrate;
+use self::messages::Fitted;
+pub(super) use self::messages::Outcome;
 use super::inbox::{Event, Inbox};
 
 /// Cells with frames, light and firm ones counted apart, before the first fit: fewer do not spread over a detector.
@@ -35,22 +39,6 @@ const NEVER_WHOLE: u64 = 500;
 const TOLD: usize = 3;
 /// Time between two pictures of how it is: a person sees that at once.
 const SHOWN_EVERY: Duration = Duration::from_millis(80);
-
-/// What a person asks of a calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Calibrate {
-    /// Collects frames; after the end, more of them.
-    Begin,
-    /// Ends collecting, and fits what there is.
-    Finish,
-    /// Writes what was found to a new file.
-    Save,
-    /// Goes on with the detector that was found.
-    Use,
-    /// Forgets it.
-    End,
-}
 
 /// How far a calibration is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,12 +72,6 @@ pub struct Calibrating {
     pub saved: Option<PathBuf>,
     /// Whether the picture uses the detector that was found.
     pub used: bool,
-}
-
-/// What comes of work in another thread.
-pub(super) enum Outcome {
-    Fitted(Box<Fitted>),
-    Saved(Result<PathBuf, String>),
 }
 
 /// A calibration under way, in the follower.

@@ -26,7 +26,7 @@ use super::channels::Messages;
 use super::door::Door;
 use super::feed::Taps;
 use super::running::{PATIENCE, Sinks};
-use super::stream::StreamError;
+use super::target::StreamError;
 use super::web;
 use tactomo_physics::causes::with_causes;
 
