@@ -5,9 +5,9 @@ use tactomo_physics::geometry::distance;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
-use super::metrics::mean;
 use super::paper::{Imaged, PaperSolver};
 use super::press::{MIDDLE, nine_places};
+use super::rank::mean;
 
 /// Images whose centroids are on average within this share of the width of the middle say "the middle", wherever the contact is.
 const CENTRAL_OF_WIDTH: f64 = 0.01;

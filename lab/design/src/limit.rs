@@ -128,7 +128,7 @@ impl Spread {
             errors_m[below] + rest * (errors_m.get(below + 1).unwrap_or(&errors_m[below]) - errors_m[below])
         };
         let squares_m2: Vec<f64> = errors_m.iter().map(|error_m| error_m.powi(2)).collect();
-        Some(Self { median_m: quantile(0.5), p90_m: quantile(0.9), rms_m: super::metrics::mean(&squares_m2)?.sqrt() })
+        Some(Self { median_m: quantile(0.5), p90_m: quantile(0.9), rms_m: super::rank::mean(&squares_m2)?.sqrt() })
     }
 }
 

@@ -100,11 +100,6 @@ impl Sweep {
     }
 }
 
-/// Mean of some values; `None` of none.
-pub fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::press::{CONDUCTIVITIES_S_PER_M, in_decades};

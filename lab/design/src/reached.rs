@@ -78,7 +78,7 @@ impl Presses {
 
     fn reached(&self) -> Reached {
         Reached {
-            place_m: super::metrics::mean(&self.squares_m2).map(f64::sqrt),
+            place_m: super::rank::mean(&self.squares_m2).map(f64::sqrt),
             found: self.squares_m2.len() as f64 / self.all.max(1) as f64,
         }
     }

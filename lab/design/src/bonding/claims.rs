@@ -25,7 +25,7 @@ pub(super) fn of(rows: &[Row]) -> Vec<Claim> {
         });
         let each: Vec<f64> = pairs.iter().filter_map(|pairs| spearman(pairs)).collect();
         let conditions = pairs.iter().map(Vec::len).sum();
-        Trend { of: of.to_owned(), correlation: super::super::metrics::mean(&each), conditions }
+        Trend { of: of.to_owned(), correlation: super::super::rank::mean(&each), conditions }
     };
     vec![
         Claim::of_trends(

@@ -212,7 +212,7 @@ impl<'a> Map<'a> {
                 let values: Vec<f64> =
                     row.filter_map(figure).map(|value| if value < 0.0 { -(-value).ln() } else { value }).collect();
                 let is_enough = 2 * values.len() >= self.conductivities_s_per_m.len();
-                super::super::metrics::mean(&values).filter(|_| is_enough).map(|mean| (*bottom, mean))
+                super::super::rank::mean(&values).filter(|_| is_enough).map(|mean| (*bottom, mean))
             };
             let means = self.conductivities_s_per_m.iter().filter_map(mean);
             means.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(bottom, _)| bottom)

@@ -15,8 +15,8 @@ use tactomo_touch::metrics::Matching;
 use tactomo_touch::solve::Method;
 
 use super::claim::{Basis, Trend, Verdict};
-use super::metrics::mean;
 use super::press::{COMPARED_S_PER_M, nine_places};
+use super::rank::mean;
 use super::{Claim, Course, DesignError, Heading, Press, Progress};
 
 /// Thicknesses (m), and conductivity (S/m), section III.B.

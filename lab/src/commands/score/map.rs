@@ -5,7 +5,8 @@ use std::fmt::Write;
 use serde::Serialize;
 use tactomo_study::page::colour;
 
-use super::report::Missed;
+/// A press at a place (m), and how far from it it was found (m).
+pub type Missed = ([f64; 2], f64);
 
 /// Presses in a cell, about.
 const PRESSES_EACH: f64 = 5.0;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use tactomo_touch::solve::{Press, Presses, Strength};
 
-use super::map::{Cell, Map};
+use super::map::{Cell, Map, Missed};
 
 /// Presses, and what was read of each.
 pub struct Scored<'a> {
@@ -16,9 +16,6 @@ pub struct Scored<'a> {
     /// How strengths were measured, if they can be compared.
     pub strength: Option<Strength>,
 }
-
-/// A press at a place (m), and how far from it it was found (m).
-pub type Missed = ([f64; 2], f64);
 
 /// What the errors come to.
 #[derive(Clone, Debug, Serialize)]

@@ -1,33 +1,11 @@
 //! Errors as they are, beside what they are in terms of a solver's own harmless error.
 
 use super::breakdown::CellReport;
-use super::sweep::SweepReport;
+use super::report::{ErrorCurve, ErrorRange, SweepReport};
 use crate::score::quantiles;
 
 /// Errors at which the shares of points beyond them are given (m).
 const ERRORS_M: [f64; 12] = [1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2];
-
-/// Errors of a solver over a sweep (m), with contacts missed and invented; `None` where no point has one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct ErrorRange {
-    /// At the harmless point.
-    pub harmless_m: Option<f64>,
-    /// The median over the points.
-    pub median_m: Option<f64>,
-    /// The largest.
-    pub largest_m: Option<f64>,
-}
-
-/// How often a solver's error is beyond a limit, over the points of all sweeps.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct ErrorCurve {
-    /// The solver.
-    pub solver: String,
-    /// How many points there are.
-    pub count: usize,
-    /// Error (m), and the share of the points at which that of the solver is larger, or at which it refuses.
-    pub points: Vec<[f64; 2]>,
-}
 
 impl ErrorRange {
     /// Over cells in the order of their points.
@@ -79,7 +57,7 @@ impl ErrorCurve {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::{PointReport, SolverRow};
+    use super::super::report::{PointReport, SolverRow};
     use super::*;
 
     fn cell(error_mm: f64) -> Option<CellReport> {

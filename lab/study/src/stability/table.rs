@@ -1,6 +1,6 @@
 //! The report as a table.
 
-use super::errors::ErrorCurve;
+use super::report::ErrorCurve;
 use super::page::as_built;
 use super::{ErrorRange, Report, SolverRow};
 
