@@ -1,33 +1,11 @@
 //! Arrays on their way in and out.
 
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use tactomo::detector::Detector;
 use tactomo::readings::{Likely, Readings, check_volts};
 
 use crate::error::refused;
-use crate::live::TouchEvent;
-use crate::recording::Frame;
-
-/// Readings of a frame: an array `(n, n)` or `(n * n,)` of whatever numbers (V), or a frame or an event that has some.
-pub fn readings(given: &Bound<'_, PyAny>) -> PyResult<Readings> {
-    if let Ok(array) = given.cast::<PyArrayDyn<f64>>() {
-        return of_array(&array.try_readonly()?);
-    }
-    if let Ok(frame) = given.cast::<Frame>() {
-        return Ok(frame.get().readings().clone());
-    }
-    if let Ok(event) = given.cast::<TouchEvent>() {
-        return Ok(event.get().touch().clone());
-    }
-    let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = given.extract()?;
-    of_array(&array)
-}
-
-/// Frames of readings: an array `(frames, n, n)`, `(frames, n * n)`, or a list of what [`readings`] takes.
-pub fn frames(given: &Bound<'_, PyAny>) -> PyResult<Vec<Readings>> {
-    given.try_iter()?.map(|frame| readings(&frame?)).collect()
-}
 
 /// Refuses readings that cannot be volts of a detector, with what they may be.
 pub fn require_volts<'a>(all: impl IntoIterator<Item = &'a Readings>, detector: &Detector) -> PyResult<()> {
@@ -40,7 +18,8 @@ pub fn require_volts<'a>(all: impl IntoIterator<Item = &'a Readings>, detector: 
     })
 }
 
-fn of_array(array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Readings> {
+/// Readings of a frame: an array `(n, n)` or `(n * n,)` (V).
+pub fn of_array(array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Readings> {
     let view = array.as_array();
     // Of the view: numpy's own slice is in the order of the memory, which may be by columns.
     let volts = view.as_slice().map_or_else(|| view.iter().copied().collect(), <[f64]>::to_vec);

@@ -13,6 +13,7 @@ use tactomo::detector::{CalibratedParameter, Calibration as Found, Detector as D
 use crate::array;
 use crate::detector::Detector;
 use crate::error::{raised, refused};
+use crate::given;
 
 /// What a calibration found of a detector: its quantities as they are, with standard errors.
 ///
@@ -80,7 +81,7 @@ impl Calibration {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let mut frames: Vec<Frame> =
-            array::frames(readings)?.into_iter().map(|readings| Frame { readings, known_m: None }).collect();
+            given::frames(readings)?.into_iter().map(|readings| Frame { readings, known_m: None }).collect();
         array::require_volts(frames.iter().map(|frame| &frame.readings), &detector.0)?;
         for (index, x_m, y_m) in known {
             let count = frames.len();

@@ -8,6 +8,7 @@ mod calibration;
 mod detector;
 mod error;
 mod forward;
+mod given;
 mod json;
 mod live;
 mod mesh;

@@ -5,9 +5,10 @@ use std::sync::{Mutex, PoisonError};
 use pyo3::prelude::*;
 use tactomo::solve::{Guard, Lambda, Method, Parameter, ParameterKind, Problem, Solver as Solves};
 
-use crate::array::{readings, require_volts};
+use crate::array::require_volts;
 use crate::detector::Detector;
 use crate::error::{raised, refused};
+use crate::given::readings;
 use crate::mesh::Mesh;
 use crate::solution::Solution;
 

@@ -39,7 +39,7 @@ pub fn page(report: &Report) -> String {
 
 /// A row for each solver, a column for each sweep.
 fn overview(report: &Report) -> String {
-    let title = format!("{}{}: first break of each solver", report.detector, as_built(report));
+    let title = format!("{}{}: first break of each solver", report.detector, report.whose());
     let note = "The mildest point of each sweep that breaks a solver: its error is above 15 % of the mean distance of electrodes and twice its own at \
                 the harmless point, or it miscounts, slows down or answers with no finite number. Where it holds: its error in mm at the harmless \
                 point and its largest, for what is off by 5 mm from the start holds up to 10.";
@@ -245,18 +245,13 @@ fn curve(curve: &BoundCurve) -> Series {
     }
 }
 
-/// What to say after the detector's name.
-pub(super) fn as_built(report: &Report) -> String {
-    report.as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}"))
-}
-
 fn footer(report: &Report) -> String {
     format!(
         "<h2>How it was measured</h2>\n<p class=\"note\">Detector {}{}; {} places at each point, {} frames at each; seed {}. A light contact is 0.03 sheet \
          conductances, a firm one 0.3. Readings come from a finer model than any that is inverted, with the converter's noise and steps. A contact is \
          missed or invented if it has no partner within the mean distance of electrodes, {:.1} mm. Each solver has its defaults.</p>\n{}",
         report.detector,
-        as_built(report),
+        report.whose(),
         report.places,
         report.frames,
         report.seed,

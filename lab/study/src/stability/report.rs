@@ -31,6 +31,13 @@ pub struct Report {
     pub bounds: BoundReport,
 }
 
+impl Report {
+    /// What to say after the detector's name.
+    pub(super) fn whose(&self) -> String {
+        self.as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}"))
+    }
+}
+
 /// What came out of a sweep.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct SweepReport {

@@ -1,7 +1,6 @@
 //! The report as a table.
 
 use super::report::ErrorCurve;
-use super::page::as_built;
 use super::{ErrorRange, Report, SolverRow};
 
 /// Errors up to which the points are counted at the end (m).
@@ -10,7 +9,7 @@ const WITHIN_M: [f64; 4] = [2e-4, 1e-3, 2e-3, 5e-3];
 /// Lines for a terminal: for each sweep, each solver's errors, where it breaks, and how.
 pub fn table(report: &Report) -> String {
     let mut lines = vec![
-        format!("{}{}: where solvers break, and whether they flag it themselves", report.detector, as_built(report)),
+        format!("{}{}: where solvers break, and whether they flag it themselves", report.detector, report.whose()),
         format!("{:<27}error, mm: harmless, median, largest", ""),
     ];
     for sweep in &report.sweeps {
