@@ -7,6 +7,7 @@ mod complete;
 mod contacts;
 mod correct;
 mod evidence;
+pub(crate) mod fit;
 mod follow;
 mod guard;
 mod health;

@@ -8,11 +8,12 @@ mod slopes;
 
 use std::sync::Arc;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use self::slopes::Slopes;
 use super::target::{Target, dot};
 use crate::solve::Problem;
+use crate::solve::fit::least_squares::{Damping, NormalEquations, Schedule, Trial, covariance};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardModel, readings_v};
@@ -45,10 +46,7 @@ const TRUE: f64 = 0.5;
 /// Widest radius of a disc, in halves of the side of a square of the detector's area, or of its outline's shorter side: what is wider
 /// is an image's business.
 const WIDEST: f64 = 0.6;
-/// Tries of one step, each damped ten times more.
-const TRIES: usize = 6;
-const FIRST_DAMPING: f64 = 1e-3;
-const LEAST_DAMPING: f64 = 1e-7;
+const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-7, tries: 6 };
 /// Smallest and largest conductance, in sheet conductances.
 pub(super) const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
 /// Smallest radius, in usual ones.
@@ -109,7 +107,7 @@ pub(super) fn widest_m(problem: &Problem) -> f64 {
 impl DiscFit {
     /// Covariance of the parameters, [`PARAMETERS`] for each contact; `None` where they are not determined.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        Some(Cholesky::new(self.normal.clone())?.inverse())
+        covariance(&self.normal)
     }
 
     /// Unit vectors of the directions that the parameters of a contact's place are along, and their unit (m).
@@ -186,17 +184,17 @@ impl DiscFitter<'_> {
     }
 
     fn descend(&self, mut fit: DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
-        let mut damping = FIRST_DAMPING;
+        let mut damping = Damping::new(SCHEDULE);
         for _ in 0..effort.steps {
-            let gradient = self.gradient(&fit, target);
-            let possible = Cholesky::new(fit.normal.clone()).map(|factor| gradient.dot(&factor.solve(&gradient)));
+            let equations = NormalEquations { matrix: fit.normal.clone(), gradient: self.gradient(&fit, target) };
+            let possible = equations.step(0.0).map(|step| equations.gradient.dot(&step));
             // A fit that is far off is wrong: it need not be wrong to many digits.
             let enough = effort.gain.max(effort.share * (fit.objective() - target.count() as f64));
             if possible.is_some_and(|possible| possible < enough) {
                 fit.settled = true;
                 break;
             }
-            let Some((next, expected)) = self.step(&fit, target, &gradient, &mut damping) else {
+            let Some((next, expected)) = self.step(&fit, target, &equations, &mut damping) else {
                 // The derivatives may be too old for a step that lowers anything.
                 if fit.contacts != fit.slopes.at {
                     fit = self.anew(fit.contacts, target)?;
@@ -219,25 +217,16 @@ impl DiscFitter<'_> {
         &self,
         fit: &DiscFit,
         target: &Target,
-        gradient: &DVector<f64>,
-        damping: &mut f64,
+        equations: &NormalEquations,
+        damping: &mut Damping,
     ) -> Option<(DiscFit, f64)> {
-        for _ in 0..TRIES {
-            let mut damped = fit.normal.clone();
-            (0..damped.nrows()).for_each(|i| damped[(i, i)] *= 1.0 + *damping);
-            if let Some(step) = Cholesky::new(damped).map(|factor| factor.solve(gradient)) {
-                let expected = 2.0 * step.dot(gradient) - step.dot(&(&fit.normal * &step));
-                let contacts = self.moved(fit, step.as_slice());
-                if let Some(next) = self.next(fit, contacts, target)
-                    && next.objective() <= fit.objective()
-                {
-                    *damping = (*damping * 0.1).max(LEAST_DAMPING);
-                    return Some((next, expected));
-                }
+        damping.step(equations, |step| {
+            let contacts = self.moved(fit, step.as_slice());
+            match self.next(fit, contacts, target) {
+                Some(next) if next.objective() <= fit.objective() => Trial::Accepted((next, equations.gain(step))),
+                _ => Trial::Rejected,
             }
-            *damping *= 10.0;
-        }
-        None
+        })
     }
 
     /// A fit at other contacts: with the derivatives that there are, unless it is far from where they were taken.
@@ -276,7 +265,7 @@ impl DiscFitter<'_> {
 
     /// Covariance of a fit's parameters if its errors were those of another target; `None` where they are not determined.
     pub fn covariance(&self, fit: &DiscFit, target: &Target) -> Option<DMatrix<f64>> {
-        Some(Cholesky::new(self.normal(&fit.slopes, target))?.inverse())
+        covariance(&self.normal(&fit.slopes, target))
     }
 
     fn normal(&self, slopes: &Slopes, target: &Target) -> DMatrix<f64> {

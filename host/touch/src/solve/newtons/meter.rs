@@ -12,10 +12,11 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use crate::solve::contacts::network::{LoadedSpot, Network, Solved};
 use crate::solve::evidence::misfit_limit;
+use crate::solve::fit::least_squares::{LeastSquares, NormalEquations, Schedule, covariance, minimise};
 use crate::solve::{ContactSettings, FoundContact, Problem};
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::readings::{Readings, Says};
@@ -28,9 +29,7 @@ const LONGEST: f64 = 2.0;
 /// A step below this share of its standard error, or below this (of a logarithm), is the last.
 const SMALL: f64 = 0.01;
 const SETTLED: f64 = 1e-4;
-/// First damping, as a share of the diagonal, and tries of a step.
-const DAMPING: f64 = 1e-3;
-const TRIES: usize = 5;
+const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-9, tries: 5 };
 /// Smallest and largest conductance, in sheet conductances: what is lighter is nothing, what is firmer makes no difference.
 const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
 /// Share of what is left beyond noise that a resistance may have taken up. With places 0 to 8 mm off, on the detector and on one that is 12 %
@@ -92,56 +91,21 @@ impl Meter {
             return None;
         }
         let spots = contacts.iter().map(|contact| self.fields.spot([contact.x_m, contact.y_m, contact.z_m]));
-        let mut spots: Vec<LoadedSpot> = spots.map(|spot| LoadedSpot { spot, ohm: 0.0 }).collect();
+        let spots: Vec<LoadedSpot> = spots.map(|spot| LoadedSpot { spot, ohm: 0.0 }).collect();
         // From what the solver found, which makes no difference but to the time.
         let start = |contact: &FoundContact| {
             let own_s = contact.conductance_s.clamp(CONDUCTANCES[0] * self.sheet_s, CONDUCTANCES[1] * self.sheet_s);
             self.held((self.constriction_ohm + 1.0 / own_s).ln())
         };
-        let mut fit = self.look(contacts.iter().map(start).collect(), &mut spots, readings)?;
-        let mut damping = DAMPING;
-        for _ in 0..STEPS {
-            match self.step(&fit, &mut spots, readings, &mut damping) {
-                Some((next, true)) => fit = next,
-                Some((next, false)) => {
-                    fit = next;
-                    break;
-                }
-                None => break,
-            }
-        }
-        let deviations = self.deviations(&fit, &spots, readings)?;
+        let mut descent = Descent { meter: self, spots, readings };
+        let start = descent.look(contacts.iter().map(start).collect())?;
+        let fit = minimise(&mut descent, start, STEPS, SCHEDULE).at;
+        let deviations = self.deviations(&fit, readings)?;
         let measured = fit.logs.iter().zip(&deviations).map(|(log, deviation)| {
             let conductance_s = (-log).exp();
             Measured { conductance_s, deviation_s: deviation * conductance_s }
         });
         Some(measured.collect())
-    }
-
-    /// A step that lowers what is left, and whether another may do so.
-    fn step(&self, fit: &Fit, spots: &mut [LoadedSpot], readings: &Readings, damping: &mut f64) -> Option<(Fit, bool)> {
-        let slopes = self.slopes(fit, readings);
-        let (normal, gradient) = normal(&slopes, &fit.residuals);
-        let before: f64 = squares(&fit.residuals);
-        for _ in 0..TRIES {
-            let mut damped = normal.clone();
-            (0..damped.nrows()).for_each(|i| damped[(i, i)] *= 1.0 + *damping);
-            let step = Cholesky::new(damped)?.solve(&gradient);
-            if step.dot(&gradient) < SMALL * SMALL {
-                return None;
-            }
-            let logs = fit.logs.iter().zip(&step).map(|(log, step)| self.held(log + step.clamp(-LONGEST, LONGEST)));
-            if let Some(next) = self.look(logs.collect(), spots, readings)
-                && squares(&next.residuals) <= before
-            {
-                *damping = (*damping * 0.1).max(1e-9);
-                let moved = |k: usize| (next.logs[k] - fit.logs[k]).abs();
-                let goes_on = (0..step.len()).any(|k| moved(k) > SETTLED && moved(k) * normal[(k, k)].sqrt() > SMALL);
-                return Some((next, goes_on));
-            }
-            *damping *= 10.0;
-        }
-        None
     }
 
     /// Whether a reading tells a conductance.
@@ -188,15 +152,15 @@ impl Meter {
 
     /// Standard errors of the logarithms: by noise, and by what the spots leave of the readings beyond it, as wrong places and a wrong
     /// detector do: some of that lies along what a resistance changes, and is taken for it.
-    fn deviations(&self, fit: &Fit, spots: &[LoadedSpot], readings: &Readings) -> Option<Vec<f64>> {
-        let (normal, _) = normal(&self.slopes(fit, readings), &fit.residuals);
+    fn deviations(&self, fit: &Fit, readings: &Readings) -> Option<Vec<f64>> {
+        let normal = equations(&self.slopes(fit, readings), &fit.residuals).matrix;
         let n = readings.electrodes();
         let counted = (0..n * n).filter(|index| self.counts(readings, index / n, index % n)).count();
-        let freedom = counted.saturating_sub(spots.len()).max(1) as f64;
+        let freedom = counted.saturating_sub(fit.logs.len()).max(1) as f64;
         let beyond_noise = (squares(&fit.residuals) - freedom * misfit_limit(freedom)).max(0.0);
-        let covariance = Cholesky::new(normal)?.inverse();
+        let covariance = covariance(&normal)?;
         let variance = |k: usize| covariance[(k, k)] * (1.0 + TAKEN * TAKEN * beyond_noise);
-        Some((0..spots.len()).map(|k| variance(k).sqrt()).collect())
+        Some((0..fit.logs.len()).map(|k| variance(k).sqrt()).collect())
     }
 
     /// The logarithm of a resistance within what makes sense.
@@ -206,16 +170,59 @@ impl Meter {
     }
 }
 
+/// Contacts whose resistances are on their way to the readings.
+struct Descent<'a> {
+    meter: &'a Meter,
+    spots: Vec<LoadedSpot>,
+    readings: &'a Readings,
+}
+
+impl Descent<'_> {
+    fn look(&mut self, logs: Vec<f64>) -> Option<Fit> {
+        self.meter.look(logs, &mut self.spots, self.readings)
+    }
+}
+
+impl LeastSquares for Descent<'_> {
+    type Point = Fit;
+
+    fn sum(&self, at: &Fit) -> f64 {
+        squares(&at.residuals)
+    }
+
+    fn equations(&self, at: &Fit) -> NormalEquations {
+        equations(&self.meter.slopes(at, self.readings), &at.residuals)
+    }
+
+    fn moved(&mut self, from: &Fit, step: &DVector<f64>) -> Option<Fit> {
+        let logs = from.logs.iter().zip(step).map(|(log, step)| self.meter.held(log + step.clamp(-LONGEST, LONGEST)));
+        self.look(logs.collect())
+    }
+
+    fn is_better(before: f64, after: f64) -> bool {
+        after <= before
+    }
+
+    fn is_negligible(&self, _at: &Fit, equations: &NormalEquations, step: &DVector<f64>) -> bool {
+        step.dot(&equations.gradient) < SMALL * SMALL
+    }
+
+    fn goes_on(&self, before: &Fit, after: &Fit, equations: &NormalEquations) -> bool {
+        let moved = |k: usize| (after.logs[k] - before.logs[k]).abs();
+        (0..before.logs.len()).any(|k| moved(k) > SETTLED && moved(k) * equations.matrix[(k, k)].sqrt() > SMALL)
+    }
+}
+
 fn squares(residuals: &[f64]) -> f64 {
     residuals.iter().map(|residual| residual * residual).sum()
 }
 
-/// `J^T J` and `J^T r`.
-fn normal(slopes: &[Vec<f64>], residuals: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+/// Normal equations of derivatives, a row for each parameter, and residuals.
+fn equations(slopes: &[Vec<f64>], residuals: &[f64]) -> NormalEquations {
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let normal = DMatrix::from_fn(slopes.len(), slopes.len(), |i, j| product(&slopes[i], &slopes[j]));
+    let matrix = DMatrix::from_fn(slopes.len(), slopes.len(), |i, j| product(&slopes[i], &slopes[j]));
     let gradient = DVector::from_fn(slopes.len(), |i, _| product(&slopes[i], residuals));
-    (normal, gradient)
+    NormalEquations { matrix, gradient }
 }
 
 #[cfg(test)]

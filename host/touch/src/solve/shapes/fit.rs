@@ -3,11 +3,12 @@
 //! With `F` the potentials under the nodes that conduct, a parameter `p` changes the impedances by `-F' diag(dC/dp) F`. The change of the
 //! nodes' conductances `C` is the difference of two strips, which costs next to nothing.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::strip::{Course, Ground, Strip};
 use crate::solve::contacts::Target;
 use crate::solve::evidence::Evidence;
+use crate::solve::fit::least_squares::{LeastSquares, Minimum, NormalEquations, Schedule, covariance, minimise};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ContactFields, ForwardModel, readings_v};
 use tactomo_physics::geometry::Point;
@@ -17,9 +18,8 @@ const DIFFERENCE: f64 = 1e-5;
 /// Longest step of a coordinate, in mean distances of electrodes, and of a logarithm.
 const LONGEST: f64 = 0.5;
 const LONGEST_LOG: f64 = 0.5;
-/// First damping, as a share of the diagonal; tries of one step, and the share of the sum that a step gains below which it is the last.
-const DAMPING: f64 = 1e-3;
-const TRIES: usize = 5;
+const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-6, tries: 5 };
+/// Share of the sum that a step gains below which it is the last.
 const SMALL: f64 = 2e-3;
 /// Narrowest strip, in usual widths: below, the readings no longer tell.
 const NARROWEST: f64 = 0.02;
@@ -97,6 +97,37 @@ pub(super) struct Look {
     pub residuals: DVector<f64>,
 }
 
+/// A fitter on its way to a target.
+struct Descent<'a> {
+    fitter: &'a StripFitter<'a>,
+    target: &'a Target,
+}
+
+impl LeastSquares for Descent<'_> {
+    type Point = Look;
+
+    fn sum(&self, at: &Look) -> f64 {
+        at.residuals.norm_squared()
+    }
+
+    fn equations(&self, at: &Look) -> NormalEquations {
+        NormalEquations::of(&self.fitter.slopes(&at.laid, self.target), &at.residuals)
+    }
+
+    fn moved(&mut self, from: &Look, step: &DVector<f64>) -> Option<Look> {
+        let laid = self.fitter.lay(self.fitter.moved(&from.laid.strip, step.as_slice()))?;
+        Some(self.fitter.look(laid, self.target))
+    }
+
+    fn is_negligible(&self, at: &Look, equations: &NormalEquations, step: &DVector<f64>) -> bool {
+        equations.gain(step) < SMALL * self.sum(at)
+    }
+
+    fn goes_on(&self, before: &Look, after: &Look, _equations: &NormalEquations) -> bool {
+        self.sum(before) - self.sum(after) >= SMALL * self.sum(before)
+    }
+}
+
 impl StripFitter<'_> {
     /// A strip on the model; `None` if it makes no sense there.
     pub fn lay(&self, strip: Strip) -> Option<Laid> {
@@ -109,55 +140,11 @@ impl StripFitter<'_> {
 
     /// The nearest minimum from a start, in at most so many steps.
     pub fn fit(&self, start: Laid, target: &Target, steps: usize) -> StripFit {
-        let mut look = self.look(start, target);
-        let (mut damping, mut settled, mut normal) = (DAMPING, false, None);
-        for _ in 0..steps {
-            let slopes = self.slopes(&look.laid, target);
-            let (matrix, gradient) = (slopes.tr_mul(&slopes), slopes.tr_mul(&look.residuals));
-            let next = self.step(&look, target, (&matrix, &gradient), &mut damping);
-            normal = Some(matrix);
-            let Some(next) = next else {
-                settled = true;
-                break;
-            };
-            let (before, after) = (look.residuals.norm_squared(), next.residuals.norm_squared());
-            look = next;
-            if before - after < SMALL * before {
-                settled = true;
-                break;
-            }
-        }
+        let start = self.look(start, target);
+        let found = minimise(&mut Descent { fitter: self, target }, start, steps, SCHEDULE);
+        let Minimum { at: look, matrix, settled } = found;
         let cost = look.residuals.rows(0, look.laid.volts.len()).norm_squared();
-        let covariance = normal.and_then(Cholesky::new).map(|factor| factor.inverse());
-        StripFit { laid: look.laid, cost, covariance, settled }
-    }
-
-    /// A step that lowers the sum; `None` if there is none, or none that would lower it much.
-    fn step(
-        &self,
-        look: &Look,
-        target: &Target,
-        (normal, gradient): (&DMatrix<f64>, &DVector<f64>),
-        damping: &mut f64,
-    ) -> Option<Look> {
-        let now = look.residuals.norm_squared();
-        for _ in 0..TRIES {
-            let mut damped = normal.clone();
-            (0..damped.nrows()).for_each(|i| damped[(i, i)] *= 1.0 + *damping);
-            if let Some(step) = Cholesky::new(damped).map(|factor| factor.solve(gradient)) {
-                let foretold = 2.0 * step.dot(gradient) - step.dot(&(normal * &step));
-                if foretold < SMALL * now {
-                    return None;
-                }
-                let next = self.lay(self.moved(&look.laid.strip, step.as_slice())).map(|laid| self.look(laid, target));
-                if let Some(next) = next.filter(|next| next.residuals.norm_squared() < now) {
-                    *damping = (*damping * 0.1).max(1e-6);
-                    return Some(next);
-                }
-            }
-            *damping *= 10.0;
-        }
-        None
+        StripFit { laid: look.laid, cost, covariance: matrix.as_ref().and_then(covariance), settled }
     }
 
     pub fn look(&self, laid: Laid, target: &Target) -> Look {

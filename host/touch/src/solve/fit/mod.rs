@@ -1,0 +1,3 @@
+//! Fitting numbers to readings.
+
+pub(crate) mod least_squares;
