@@ -47,7 +47,7 @@ pub use self::methods::comparisons::{Bsbl, Nonnegative, Tv};
 pub use self::methods::contacts::{ContactSettings, Contacts};
 pub use self::methods::image::{Nonlinear, NonlinearSettings};
 pub use self::methods::kernel::KernelSolver;
-pub use self::methods::linear::{Tikhonov, Tsvd, Variant};
+pub use self::methods::linear::{Tikhonov, Variant};
 pub use self::methods::network::NetworkSolver;
 pub use self::pipeline::guard::Guard;
 pub use self::pipeline::method::{Family, Method, Parameter, ParameterKind};

@@ -172,7 +172,7 @@ impl Spectrum<'_> {
 }
 
 /// The share of a coefficient that Tikhonov's image keeps.
-pub fn kept(value: f64, lambda: f64) -> f64 {
+fn kept(value: f64, lambda: f64) -> f64 {
     let square = value * value;
     if square > 0.0 { square / (square + lambda * lambda) } else { 0.0 }
 }
@@ -202,13 +202,23 @@ pub enum Rule {
     LCurve,
     /// [`Lambda::Gcv`].
     Gcv,
+    /// Singular values below this are left out, in place of a lambda.
+    Truncated(f64),
 }
 
 impl Rule {
+    /// The share of a coefficient with such a singular value that an image keeps.
+    pub fn kept(self, value: f64, lambda: f64) -> f64 {
+        match self {
+            Self::Truncated(least) => f64::from(u8::from(value >= least)),
+            _ => kept(value, lambda),
+        }
+    }
+
     /// The lambda for the readings of a frame.
     pub fn lambda(self, spectrum: &Spectrum) -> f64 {
         match self {
-            Self::Given(lambda) => lambda,
+            Self::Given(lambda) | Self::Truncated(lambda) => lambda,
             Self::Discrepancy(factor) => spectrum.by_discrepancy(factor),
             Self::LCurve => spectrum.least(|lambda| -spectrum.curvature(lambda)),
             Self::Gcv => spectrum.least(|lambda| spectrum.cross_validation(lambda)),
@@ -218,7 +228,7 @@ impl Rule {
     /// What was chosen and why, if the readings chose it.
     pub fn choice(self, spectrum: &Spectrum, lambda: f64, left_v2: f64) -> Option<Choice> {
         let rule = match self {
-            Self::Given(_) => return None,
+            Self::Given(_) | Self::Truncated(_) => return None,
             Self::Discrepancy(_) => "discrepancy",
             Self::LCurve => "corner of the L-curve",
             Self::Gcv => "generalised cross validation",

@@ -12,7 +12,7 @@ use crate::solve::methods::comparisons::{Bsbl, Nonnegative, Tv};
 use crate::solve::methods::contacts::{ContactSettings, Contacts};
 use crate::solve::methods::image::{Nonlinear, NonlinearSettings};
 use crate::solve::methods::kernel::KernelSolver;
-use crate::solve::methods::linear::{Tikhonov, Tsvd, Variant};
+use crate::solve::methods::linear::{Tikhonov, Variant};
 use crate::solve::methods::network::NetworkSolver;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
@@ -264,8 +264,9 @@ const TABLE: [Row; 13] = [
         family: Family::Linear,
         parameter: Some(ParameterKind::SingularShare),
         build: |problem, parameter| {
-            let share = if let Some(Parameter::SingularShare(share)) = parameter { share } else { Tsvd::SHARE };
-            Ok(Box::new(Tsvd::new(&problem.jacobian, share)))
+            let share =
+                if let Some(Parameter::SingularShare(share)) = parameter { share } else { Tikhonov::SINGULAR_SHARE };
+            Ok(Box::new(Tikhonov::truncated(&problem.jacobian, share)))
         },
     },
     Row {
