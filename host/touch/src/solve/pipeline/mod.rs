@@ -11,6 +11,7 @@
 
 pub(crate) mod guard;
 pub(crate) mod method;
+pub(crate) mod parameter;
 pub(crate) mod without;
 
 use std::borrow::Cow;
