@@ -1,4 +1,4 @@
-//! Any solver, without the electrodes that cannot be right.
+//! Any solver, watched: it goes on without the electrodes that its readings show to be wrong.
 
 use super::method::Method;
 use super::without::without;
