@@ -8,7 +8,7 @@
 
 Fine-tuning takes data of the calibrated detector (the example's DETECTOR is then the calibration's file) and `--from network.safetensors`.
 
-The network (`host/touch/src/solve/network/` runs it) reads the features of a frame (`features` below), three hidden layers, and has heads for
+The network (`host/touch/src/learned/network/` runs it) reads the features of a frame (`features` below), three hidden layers, and has heads for
 an image, a map of contacts, their number, the total conductance, and the features themselves: what it cannot give back it never saw. The square's
 eight symmetries multiply the frames. All seeds are fixed.
 """
@@ -26,7 +26,7 @@ from safetensors.numpy import load_file, save_file
 VERSION = "1"
 SIDE = 32
 MOST = 5
-# Smallest `1 - V / Vcc` that a ratio is taken of, as in `solve/balance.rs`.
+# Smallest `1 - V / Vcc` that a ratio is taken of, as in `solve/fit/balance.rs`.
 SMALLEST = 1e-3
 # Classes of the number of contacts: 0 to 5, and one shape.
 CLASSES = MOST + 2

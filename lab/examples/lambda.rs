@@ -12,7 +12,7 @@ use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, measured};
-use tactomo_touch::solve::{Lambda, Solver, Tikhonov, Tsvd, Variant};
+use tactomo_touch::solve::{Lambda, Solver, Tikhonov, Variant};
 
 /// Conductance of a contact in sheet conductances: within the linear theory, and far beyond.
 const FIRMNESS: [f64; 2] = [0.02, 1.0];
@@ -79,7 +79,7 @@ fn main() -> Result<()> {
 /// A linear method by its name.
 fn solver(name: &str, jacobian: &Jacobian, lambda: Lambda) -> Result<Box<dyn Solver>> {
     Ok(match (name, lambda) {
-        ("tsvd", Lambda::Relative(share)) => Box::new(Tsvd::new(jacobian, share)),
+        ("tsvd", Lambda::Relative(share)) => Box::new(Tikhonov::truncated(jacobian, share)),
         ("noser", lambda) => Box::new(Tikhonov::noser(jacobian, lambda)),
         ("laplace", lambda) => Box::new(Tikhonov::laplace_with(jacobian, lambda)?),
         (_, lambda) => Box::new(Tikhonov::new(jacobian, lambda, Variant::Balanced)),

@@ -17,6 +17,7 @@ use tactomo_physics::scene::Contact;
 use super::contact::{CONDUCTANCE, Moves, OF_PRESS, Press};
 use super::slopes::{At, Slopes, as_read};
 use super::{CalibrateError, Step};
+use crate::solve::fit::least_squares::NormalEquations;
 use tactomo_physics::threads::map;
 
 /// Error of the slab as a share of `Vcc - V`: against readings of an independent program, but for what pads' own impedances take up, 0.07 %.
@@ -197,15 +198,14 @@ impl Bundle {
         let columns: Vec<_> = changes_v.iter().map(|change_v| weights.component_mul(change_v)).collect();
         let slopes = DMatrix::from_columns(&columns);
         let by_conductance_v = changes_v[CONDUCTANCE].as_slice().to_vec();
-        let mut own = slopes.tr_mul(&slopes);
-        let mut slope = slopes.tr_mul(&residual);
+        let mut equations = NormalEquations::of(&slopes, &residual);
         let mut cost = residual.norm_squared();
         for (k, (off, per)) in press.prior(contact).into_iter().enumerate() {
-            own[(k, k)] += per * per;
-            slope[k] -= off * per;
+            equations.matrix[(k, k)] += per * per;
+            equations.gradient[k] -= off * per;
             cost += off * off;
         }
-        Some(OfContact { impedance_ohm, weights, predicted, by_conductance_v, residual, slopes, own, slope, cost })
+        Some(OfContact { impedance_ohm, weights, predicted, by_conductance_v, residual, slopes, equations, cost })
     }
 
     /// Changes of readings by each of the detector's parameters, in deviations of both.
@@ -227,9 +227,9 @@ impl Bundle {
     fn of_press(&self, press: &Press, slopes: &Slopes, model_error: f64) -> Option<OfPress> {
         let contact = self.of_contact(&*self.model, press, &press.contact, model_error)?;
         let of_detector = self.by_detector(&press.contact, &contact, slopes);
-        let factor = Cholesky::new(contact.own)?;
+        let factor = Cholesky::new(contact.equations.matrix)?;
         let coupling = factor.solve(&contact.slopes.tr_mul(&of_detector));
-        let step = factor.solve(&contact.slope);
+        let step = factor.solve(&contact.equations.gradient);
         let information = of_detector.tr_mul(&(&of_detector - &contact.slopes * &coupling));
         let slope = of_detector.tr_mul(&(contact.residual - &contact.slopes * &step));
         Some(OfPress { cost: contact.cost, information, slope, step, coupling })
@@ -319,9 +319,9 @@ impl Bundle {
     /// The step of the detector with a damping, within what a step may be.
     fn damped(&self, normal: &Normal, damping: f64) -> Option<DVector<f64>> {
         let count = self.parameters.len();
-        let mut system = &normal.information + DMatrix::identity(count, count);
-        (0..count).for_each(|k| system[(k, k)] *= 1.0 + damping);
-        let step = Cholesky::new(system)?.solve(&(&normal.slope - &self.steps));
+        // The prior of each parameter: zero, with a standard deviation of one.
+        let matrix = &normal.information + DMatrix::identity(count, count);
+        let step = NormalEquations { matrix, gradient: &normal.slope - &self.steps }.step(damping)?;
         let excess = |((parameter, deviation), step): (&(Parameter, f64), &f64)| {
             let most = if parameter.is_log() { LARGEST_LOG / deviation } else { LARGEST_DEVIATIONS };
             step.abs() / most
@@ -337,10 +337,8 @@ impl Bundle {
         let mut damping = 1e-3;
         for _ in 0..REFITS {
             let Some(of) = self.of_contact(model, press, &best.0, self.model_error()) else { break };
-            let mut system = of.own.clone();
-            (0..OF_PRESS).for_each(|k| system[(k, k)] *= 1.0 + damping);
-            let Some(factor) = Cholesky::new(system) else { break };
-            let moved = best.0.moved(&factor.solve(&of.slope), model.detector());
+            let Some(step) = of.equations.step(damping) else { break };
+            let moved = best.0.moved(&step, model.detector());
             let cost = self.cost(model, press, &moved);
             let bettered_by = best.1 - cost;
             if bettered_by > 0.0 {
@@ -371,7 +369,7 @@ impl Bundle {
         let of_detector = self.by_detector(contact, &of, slopes);
         let detector = Cholesky::new(of_detector.tr_mul(&of_detector) + precision)?;
         let cross = of_detector.tr_mul(&of.slopes);
-        let own = Cholesky::new(&of.own - cross.tr_mul(&detector.solve(&cross)))?.inverse();
+        let own = Cholesky::new(&of.equations.matrix - cross.tr_mul(&detector.solve(&cross)))?.inverse();
         Some((0..2).map(|axis| own[(axis, axis)]).sum::<f64>().sqrt())
     }
 
@@ -409,9 +407,8 @@ struct OfContact {
     by_conductance_v: Vec<f64>,
     residual: DVector<f64>,
     slopes: DMatrix<f64>,
-    /// Normal equations with what is known before.
-    own: DMatrix<f64>,
-    slope: DVector<f64>,
+    /// With what is known before.
+    equations: NormalEquations,
     cost: f64,
 }
 

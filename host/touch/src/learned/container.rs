@@ -20,7 +20,7 @@ pub enum ContainerError {
     Format(String),
     /// It is a network that cannot be used.
     #[error(transparent)]
-    Network(#[from] crate::solve::NetworkError),
+    Network(#[from] super::network::NetworkError),
     /// It is of another kind, or of another version of this program.
     #[error(
         "a `{kind}` of version {version} is not known to this program: learn it anew, or use the program that made it"

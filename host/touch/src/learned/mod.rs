@@ -5,6 +5,8 @@
 //! variant of [`Learned`], which reads itself, checking everything, for nothing of a file is trusted; and a method whose solver takes it from the [`Problem`](crate::solve::Problem) that it is made for.
 
 mod container;
+pub(crate) mod kernel;
+pub(crate) mod network;
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -13,7 +15,8 @@ use std::sync::Arc;
 
 pub(crate) use self::container::wrong;
 pub use self::container::{Container, ContainerError};
-use crate::solve::{Kernel, Method, Network};
+use self::kernel::Kernel;
+use self::network::Network;
 
 /// Longest file that is read (bytes).
 const LONGEST: u64 = 1 << 27;
@@ -100,14 +103,6 @@ impl Learned {
         container.bytes()
     }
 
-    /// The method that uses it.
-    pub fn method(&self) -> Method {
-        match self {
-            Self::Kernel(_) => Method::Kernel,
-            Self::Network(_) => Method::Network,
-        }
-    }
-
     /// Readings that it needs.
     pub fn channels(&self) -> usize {
         match self {
@@ -126,7 +121,7 @@ impl From<Kernel> for Learned {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::{Presses, Strength};
+    use crate::solve::{Method, Presses, Strength};
     use proptest::prelude::*;
 
     fn kernel(strength: Option<Strength>) -> Kernel {
@@ -157,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_network_is_known_by_its_kind() {
-        let file = include_bytes!("../solve/network/square-60.safetensors");
+        let file = include_bytes!("network/square-60.safetensors");
         let learned = Learned::parse(file).unwrap();
         assert_eq!((learned.method(), learned.channels()), (Method::Network, 256));
         let cut = Learned::parse(&file[..file.len() - 1]).unwrap_err().to_string();

@@ -1,265 +1,59 @@
-//! From readings back to touch: one file a method, one trait.
+//! From readings back to touch.
+//!
+//! ```text
+//! answer    what a solver says: Solution, FoundContact, Flags, errors          -> nobody
+//! fit       least squares, evidence, lambda, the linear theory                 -> answer
+//! before    complete, still, latest: readings to readings                      -> fit
+//! problem   what solvers are made for: a detector with its models              -> before, what was learned
+//! solver    what a method is to those who run it: one trait, and two halves    -> answer
+//! after     track, force, correct: solutions to solutions                      -> answer, fit, problem
+//! health    which electrodes cannot be right                                   -> answer
+//! methods   contacts | shapes | image | linear | network | kernel | comparisons
+//!           -> answer, fit, problem, solver; contacts also -> before, after: they average frames and number contacts by themselves
+//!           auto, which chooses among contacts, shapes and image               -> these too
+//! pipeline  before -> method -> after: the page to read first                  -> all of these
+//! ```
+//!
+//! Methods know none of each other, but for `auto`. `tests/rooms.rs` is this plan as code, and holds every arrow.
 
-mod auto;
-mod balance;
-mod bsbl;
-mod complete;
-mod contacts;
-mod correct;
-mod evidence;
-mod follow;
-mod guard;
+mod after;
+pub(crate) mod answer;
+mod before;
+pub(crate) mod fit;
 mod health;
-mod interpolate;
-mod kernel;
-mod lambda;
-mod laplace;
-mod latest;
-mod linear;
-mod locate;
-mod method;
-mod network;
-mod newtons;
-mod nonlinear;
-mod nonnegative;
-mod noser;
+mod methods;
+mod pipeline;
 mod problem;
 #[cfg(test)]
 mod samples;
-mod shapes;
-mod still;
-mod tikhonov;
-mod track;
-mod tsvd;
-mod tv;
-mod watch;
+mod solver;
 
-pub use self::auto::Auto;
-pub use self::bsbl::Bsbl;
-pub use self::contacts::{ContactSettings, Contacts};
 #[cfg(test)]
-pub(crate) use self::correct::Corrector;
-use self::follow::Direct;
-pub use self::follow::{Followed, Follower, Lead, Parts, Searcher};
-pub use self::guard::{Guard, without};
-pub use self::health::{ElectrodeFault, faulty_electrodes};
-pub(crate) use self::health::{Pair as PairOfLoads, loads};
-pub use self::interpolate::Interpolation;
-pub use self::kernel::{Kernel, KernelSolver, Press, Presses, PressesError, Strength, TeachError};
-pub use self::lambda::Lambda;
-use self::lambda::Spectrum;
-pub use self::latest::Latest;
-pub use self::method::{Family, Method, Parameter, ParameterKind};
-pub use self::network::{Network, NetworkError, NetworkSolver};
-pub use self::nonlinear::{Nonlinear, NonlinearSettings};
-pub use self::nonnegative::Nonnegative;
+pub(crate) use self::after::correct::Corrector;
+pub use self::answer::{
+    Calibrated, Choice, ElectrodeFault, Flags, FoundContact, FoundLine, FoundRing, FoundShape, LineUncertainty,
+    RingUncertainty, Solution, SolveError, Uncertainty, check,
+};
+pub use self::before::latest::Latest;
+pub use self::before::still::Still;
+pub(crate) use self::before::still::rounding_v;
+pub use self::fit::interpolate::Interpolation;
+pub use self::fit::lambda::Lambda;
+pub use self::health::electrodes::faulty_electrodes;
+pub(crate) use self::health::electrodes::{Pair as PairOfLoads, loads};
+pub use self::health::watch::{ElectrodeWatch, FaultyElectrodes, Look};
+pub use self::methods::auto::Auto;
+pub use self::methods::comparisons::{Bsbl, Nonnegative, Tv};
+pub use self::methods::contacts::{ContactSettings, Contacts};
+pub use self::methods::image::{Nonlinear, NonlinearSettings};
+pub use self::methods::kernel::KernelSolver;
+pub use self::methods::linear::{Tikhonov, Variant};
+pub use self::methods::network::NetworkSolver;
+pub use self::pipeline::guard::Guard;
+pub use self::pipeline::method::{Family, Method};
+pub use self::pipeline::parameter::{Parameter, ParameterKind};
+pub use self::pipeline::without::without;
 pub use self::problem::{LearnedElsewhere, Problem};
-pub use self::shapes::{FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty};
-pub use self::still::Still;
-pub(crate) use self::still::rounding_v;
-pub use self::tikhonov::{Tikhonov, Variant};
-pub use self::tsvd::Tsvd;
-pub use self::tv::Tv;
-pub use self::watch::{ElectrodeWatch, FaultyElectrodes, Look};
-use tactomo_physics::readings::Readings;
-
-/// A method that reads touch from the readings of a frame.
-pub trait Solver: Send + 'static {
-    /// Name on the command line.
-    fn name(&self) -> &'static str;
-
-    /// What the readings, less the baseline, say of the contacts.
-    ///
-    /// # Errors
-    /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
-    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError>;
-
-    /// What rows of readings that come `elapsed_s` (s) after those before say, the others of which say [nothing](tactomo_physics::readings::Says);
-    /// `latest` are the latest of all. A solver that does not go by rows takes those.
-    ///
-    /// # Errors
-    /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
-    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
-        let _ = (rows, elapsed_s);
-        self.solve(latest)
-    }
-
-    /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.
-    fn reset(&mut self) {}
-
-    /// The halves of it that a live picture runs side by side: by default all of it in the follower.
-    fn split(self: Box<Self>) -> Parts {
-        Parts { follower: Box::new(Direct(self)), searcher: None }
-    }
-}
-
-/// What a solver found.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Solution {
-    /// Contact conductance per area at each node of the model's image mesh (S/m2), if the method makes an image. A density,
-    /// so that it does not change where the mesh is finer; times the nodes' areas, it is conductance (S).
-    pub image_s_per_m2: Option<Vec<f32>>,
-    /// Contacts found. Where a shape or, by a solver that chooses, an image is the answer, the contacts that would explain the readings best
-    /// are kept beside it: [`is_contacts`](Self::is_contacts) tells.
-    pub contacts: Vec<FoundContact>,
-    /// The one shape that explains the readings, if a solver that knows shapes chose it; then the image is that of the shape.
-    pub shape: Option<FoundShape>,
-    /// How far the readings are from those of what was found: root mean square, in standard deviations of the noise; if the
-    /// method predicts readings. About 1 where noise is all that is left.
-    pub residual: Option<f64>,
-    /// What to know before this is believed.
-    pub flags: Flags,
-    /// What a calibration would bring, where [`Flags::calibrate`] asks for one.
-    pub calibrated: Option<Calibrated>,
-    /// Probability that as many contacts touch as were found, against other numbers of contacts; of a method that weighs them. `None` where the
-    /// answer [is doubtful](Flags::is_doubtful).
-    pub certainty: Option<f64>,
-    /// What was chosen and why, by a solver that chooses.
-    pub choice: Option<Choice>,
-}
-
-impl Solution {
-    /// Whether the contacts are the answer, not beside it: no shape and no image.
-    pub fn is_contacts(&self) -> bool {
-        self.shape.is_none() && self.image_s_per_m2.is_none()
-    }
-}
-
-/// What to know before a solution is believed.
-#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Flags {
-    /// Readings are at an end of the converter's range, or contacts conduct so well that more would change nothing.
-    pub saturated: bool,
-    /// The readings are not what the model can give for what was found, by more than noise and the model's own error.
-    pub misfit: bool,
-    /// The method stopped before its end, to keep a limit of time or steps.
-    pub unfinished: bool,
-    /// The readings are those of a detector that differs from the one described, within its tolerances: a calibration would tell more.
-    pub calibrate: bool,
-    /// Electrodes that were left out.
-    pub excluded: Vec<usize>,
-    /// What is wrong with each of those, in their order.
-    pub faults: Vec<ElectrodeFault>,
-}
-
-impl Flags {
-    /// Whether the answer does not explain the readings, or is not the last word: then nothing can be said of how sure it is.
-    pub fn is_doubtful(&self) -> bool {
-        self.misfit || self.unfinished
-    }
-}
-
-/// Standard error of a place, of the least known contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Calibrated {
-    /// As it is now (m).
-    pub now_m: f64,
-    /// On a detector that is known exactly (m).
-    pub calibrated_m: f64,
-}
-
-/// What a solver chose.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Choice {
-    /// The model of the scene: `nothing`, `2 contacts`, `line`, `ring`, `image`.
-    pub what: String,
-    /// Why, with the figures that decided.
-    pub why: String,
-}
-
-/// One contact found. Its names outside of the program are those of [`crate::schema`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FoundContact {
-    /// Centre, x (m).
-    pub x_m: f64,
-    /// Centre, y (m).
-    pub y_m: f64,
-    /// Centre, z (m): on a curved detector; zero on a flat one.
-    pub z_m: f64,
-    /// Conductance (S); zero where it is not known, of a solver that was taught something else (see
-    /// [`known_conductance_s`](Self::known_conductance_s)).
-    pub conductance_s: f64,
-    /// Conductance (S) of it in series with the current that crowds under it, its spreading resistance: of a firm contact readings give that far
-    /// better than either. Of a method that fits contacts.
-    pub apparent_conductance_s: Option<f64>,
-    /// Radius (m), where the readings tell it.
-    pub radius_m: Option<f64>,
-    /// Force (N): on a detector with a law of force, or of a solver that was taught forces.
-    pub force_n: Option<f64>,
-    /// Depth (m) that it is pressed in: of a solver that was taught depths.
-    pub depth_m: Option<f64>,
-    /// Standard error of the force (N), of a law of force.
-    pub force_deviation_n: Option<f64>,
-    /// Whether the force is beyond the largest that the law of force can tell: then it may be more.
-    pub force_beyond_maximum: Option<bool>,
-    /// Standard errors, of a method that knows them.
-    pub uncertainty: Option<Uncertainty>,
-    /// The same number from frame to frame for the same contact, of a method that follows contacts.
-    pub id: Option<u32>,
-}
-
-/// Standard errors of a contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Uncertainty {
-    /// Of x (m).
-    pub x_m: f64,
-    /// Of y (m).
-    pub y_m: f64,
-    /// Correlation of the errors of x and y, -1 to 1.
-    pub correlation: f64,
-    /// Of the conductance (S).
-    pub conductance_s: f64,
-}
-
-impl FoundContact {
-    /// A contact on a flat detector.
-    pub fn flat(x_m: f64, y_m: f64, conductance_s: f64) -> Self {
-        Self { x_m, y_m, conductance_s, ..Self::default() }
-    }
-
-    /// Its conductance (S), where that is known: nothing that touches has none.
-    pub fn known_conductance_s(&self) -> Option<f64> {
-        (self.conductance_s != 0.0).then_some(self.conductance_s)
-    }
-}
-
-/// Why a solver cannot answer.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SolveError {
-    /// Readings of another number of electrodes.
-    #[error("readings of {found} electrodes, but the detector has {expected}")]
-    Electrodes {
-        /// In the readings.
-        found: usize,
-        /// In the detector.
-        expected: usize,
-    },
-    /// A reading that is not a number.
-    #[error("the reading of electrode {e} with electrode {g} grounded is not a finite number")]
-    NotFinite {
-        /// Grounded electrode.
-        g: usize,
-        /// Electrode read.
-        e: usize,
-    },
-}
-
-/// Checks that there is a finite number for each pair of `electrodes`.
-///
-/// # Errors
-/// [`SolveError`], which says what is wrong.
-pub fn check(readings: &Readings, electrodes: usize) -> Result<(), SolveError> {
-    check_count(readings, electrodes)?;
-    match readings.volts().iter().position(|volts| !volts.is_finite()) {
-        Some(index) => Err(SolveError::NotFinite { g: index / electrodes, e: index % electrodes }),
-        None => Ok(()),
-    }
-}
-
-/// Checks that there is a number for each pair of `electrodes`.
-fn check_count(readings: &Readings, electrodes: usize) -> Result<(), SolveError> {
-    match readings.electrodes() == electrodes {
-        true => Ok(()),
-        false => Err(SolveError::Electrodes { found: readings.electrodes(), expected: electrodes }),
-    }
-}
+pub use self::solver::{Followed, Follower, Lead, Parts, Searcher, Solver};
+pub use crate::learned::kernel::{Kernel, Press, Presses, PressesError, Strength, TeachError};
+pub use crate::learned::network::{Network, NetworkError};

@@ -12,9 +12,8 @@ use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Join
 use tactomo_physics::readings::Readings;
 use tactomo_physics::threads;
 
-use super::Method;
-use super::complete::Completer;
 use crate::learned::Learned;
+use crate::solve::before::complete::Completer;
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
 #[derive(Clone)]
@@ -91,11 +90,6 @@ impl Problem {
     /// What was learned on the sensor itself.
     pub fn learned(&self) -> Option<&Learned> {
         self.learned.as_ref()
-    }
-
-    /// Whether a method takes what was learned on the sensor itself.
-    pub fn is_learned(&self, method: Method) -> bool {
-        self.learned().is_some_and(|learned| learned.method() == method)
     }
 
     /// The same with drive voltage, multiplexer and converter of `detector`, and with what is not known of it.
@@ -179,6 +173,11 @@ impl Problem {
     pub fn spacing_m(&self) -> f64 {
         let area_m2: f64 = self.jacobian.image_mesh.node_areas_m2.iter().sum();
         (area_m2 / self.detector().electrodes.len().max(1) as f64).sqrt()
+    }
+
+    /// Radius of contacts that is usual (m), a fingertip's: a sixth of the mean distance of electrodes.
+    pub fn usual_radius_m(&self) -> f64 {
+        self.spacing_m() / 6.0
     }
 
     /// The problem through some of its electrodes, in this order, with some of all its electrodes joined. Joined electrodes are one:

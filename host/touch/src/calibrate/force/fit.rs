@@ -10,9 +10,10 @@
 //! taken to be anything, by a factor of `e` or so ([`OUTLIERS`], [`WIDE`]): a press slipped, a figure mistyped. Probabilities of that and the scatter
 //! are found in turns with the parameters (expectation and maximisation), which makes a likelihood of it that laws are compared by.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::{Candidate, Direction, ForcePress, Law};
+use crate::solve::fit::least_squares::{LeastSquares, NormalEquations, Schedule, covariance, minimise};
 
 /// Share of presses that may be anything, and how far off they are (of `ln S`).
 const OUTLIERS: f64 = 0.05;
@@ -29,9 +30,7 @@ const LEAST: f64 = 1e-6;
 /// Turns of expectation and maximisation, and steps in each.
 const TURNS: usize = 200;
 const STEPS: usize = 30;
-/// First damping, as a share of the diagonal, and tries of a step.
-const DAMPING: f64 = 1e-3;
-const TRIES: usize = 8;
+const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-9, tries: 8 };
 /// What a turn has to gain (of -2 ln likelihood), or the sum of squares as a share of it, to be followed by another.
 const SMALL: f64 = 1e-9;
 /// Presses that a start looks at: slopes are those of all pairs.
@@ -236,12 +235,7 @@ impl Mixture<'_> {
 
     /// The parameters, then the scatter, that these probabilities make likeliest.
     fn maximise(&mut self) {
-        let mut damping = DAMPING;
-        for _ in 0..STEPS {
-            if !self.step(&mut damping) {
-                break;
-            }
-        }
+        self.parameters = minimise(self, self.parameters, STEPS, SCHEDULE).at;
         // Where sum p (r^2 / u^2 - 1 / u) with u = s^2 + v is zero, as a fixed point.
         let (mut above, mut below) = (0.0, 0.0);
         for (index, point) in self.points.iter().enumerate() {
@@ -252,40 +246,15 @@ impl Mixture<'_> {
         self.scatter = (above / below.max(f64::MIN_POSITIVE)).max(0.0).sqrt().max(SMALLEST_SCATTER);
     }
 
-    /// A damped step, if there is one that lowers the sum of squares.
-    fn step(&mut self, damping: &mut f64) -> bool {
-        let (normal, gradient) = self.normal();
-        let now = self.squares(&self.parameters);
-        for _ in 0..TRIES {
-            let mut damped = normal.clone();
-            (0..damped.nrows()).for_each(|i| damped[(i, i)] += *damping * normal[(i, i)] + f64::MIN_POSITIVE);
-            if let Some(factor) = Cholesky::new(damped) {
-                let next = self.parameters.moved(&factor.solve(&gradient));
-                let then = self.squares(&next);
-                if then < now {
-                    (self.parameters, *damping) = (next, (*damping * 0.1).max(1e-9));
-                    return now - then > SMALL * now;
-                }
-            }
-            *damping *= 10.0;
-        }
-        false
-    }
-
-    fn normal(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let size = self.parameters.count();
-        let (mut normal, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
+    fn normal(&self, parameters: &Parameters) -> NormalEquations {
+        let size = parameters.count();
+        let (mut matrix, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
         for (index, point) in self.points.iter().enumerate() {
-            let slopes = DVector::from_vec(self.parameters.slopes(point));
-            normal.ger(self.weight(index), &slopes, &slopes, 1.0);
-            gradient.axpy(self.weight(index) * self.parameters.residual(point), &slopes, 1.0);
+            let slopes = DVector::from_vec(parameters.slopes(point));
+            matrix.ger(self.weight(index), &slopes, &slopes, 1.0);
+            gradient.axpy(self.weight(index) * parameters.residual(point), &slopes, 1.0);
         }
-        (normal, gradient)
-    }
-
-    fn squares(&self, parameters: &Parameters) -> f64 {
-        let square = |(index, point): (usize, &Point)| self.weight(index) * parameters.residual(point).powi(2);
-        self.points.iter().enumerate().map(square).sum()
+        NormalEquations { matrix, gradient }
     }
 
     fn finish(mut self) -> Option<Fitted> {
@@ -297,7 +266,7 @@ impl Mixture<'_> {
         }
         // Parameters take up scatter: the rest is from so many fewer presses.
         let allowance = kept / (kept - size as f64);
-        let covariance = Cholesky::new(self.normal().0)?.inverse() * allowance;
+        let covariance = covariance(&self.normal(&self.parameters).matrix)? * allowance;
         Some(Fitted {
             bic: likelihood + (size + 1) as f64 * count.ln(),
             form: self.parameters.form,
@@ -306,6 +275,31 @@ impl Mixture<'_> {
             scatter: self.scatter * allowance.sqrt(),
             agree: self.agree,
         })
+    }
+}
+
+impl LeastSquares for Mixture<'_> {
+    type Point = Parameters;
+
+    fn sum(&self, at: &Parameters) -> f64 {
+        let square = |(index, point): (usize, &Point)| self.weight(index) * at.residual(point).powi(2);
+        self.points.iter().enumerate().map(square).sum()
+    }
+
+    fn equations(&self, at: &Parameters) -> NormalEquations {
+        let mut equations = self.normal(at);
+        // A parameter that no press tells stays where it is.
+        (0..at.count()).for_each(|i| equations.matrix[(i, i)] += f64::MIN_POSITIVE);
+        equations
+    }
+
+    fn moved(&mut self, from: &Parameters, step: &DVector<f64>) -> Option<Parameters> {
+        Some(from.moved(step))
+    }
+
+    fn goes_on(&self, before: &Parameters, after: &Parameters, _equations: &NormalEquations) -> bool {
+        let now = self.sum(before);
+        now - self.sum(after) > SMALL * now
     }
 }
 

@@ -1,0 +1,128 @@
+//! Which explanation of a frame is believed, and when none is good enough.
+//!
+//! All of them are compared by the same readings, whitened by the same errors ([`super::target::Target`]).
+
+/// By how much each parameter has to lower the sum of squares: the Bayesian information criterion for 256 readings asks for
+/// 5.5; this leaves room for the many places that are looked at.
+const PRICE: f64 = 7.0;
+/// Standard deviations of the mean square beyond which readings do not fit: noise alone is there a few times in a million frames.
+const DEVIATIONS: f64 = 5.0;
+/// The same beyond which it is worth the time to look for another explanation: once in some hundred frames.
+const DEVIATIONS_OF_A_DOUBT: f64 = 3.0;
+/// What follows explains a frame as long as its sum of squares is below this times what the last search left.
+const WORSE: f64 = 1.3;
+/// Weight of the newest frame in the running mean of the sum of squares, and its rise that asks for a new search: many frames show what
+/// one frame's noise hides.
+const NEWEST: f64 = 0.1;
+const RISE: f64 = 0.12;
+
+/// What an explanation leaves of a frame, and what it takes for that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Evidence {
+    /// Sum of squares of the whitened residuals.
+    pub cost: f64,
+    /// What it costs to say so much, in squares.
+    pub price: f64,
+    /// Numbers that the readings determine.
+    pub parameters: f64,
+}
+
+impl Evidence {
+    /// Of so many parameters, each of which has the same price.
+    pub fn of(cost: f64, parameters: usize) -> Self {
+        let parameters = parameters as f64;
+        Self { cost, price: PRICE * parameters, parameters }
+    }
+
+    /// The sum of squares with the price: of two explanations the lower one is believed.
+    pub fn score(&self) -> f64 {
+        self.cost + self.price
+    }
+
+    /// Whether more is left of so many readings than noise and the model's error make.
+    pub fn is_misfit(&self, readings: usize) -> bool {
+        self.exceeds(1.0, DEVIATIONS, readings)
+    }
+
+    /// Whether more is left than noise alone makes, whose variance is this share of that of the errors: a model that is righter than it claims
+    /// could do better.
+    pub fn may_be_better(&self, noise_share: f64, readings: usize) -> bool {
+        self.exceeds(noise_share, DEVIATIONS_OF_A_DOUBT, readings)
+    }
+
+    fn exceeds(&self, share: f64, deviations: f64, readings: usize) -> bool {
+        let freedom = (readings as f64 - self.parameters).max(1.0);
+        self.cost > share * freedom * limit(deviations, freedom)
+    }
+}
+
+/// Mean square of what is left, in what noise and model error make, above which readings do not fit.
+pub(crate) fn misfit_limit(freedom: f64) -> f64 {
+    limit(DEVIATIONS, freedom)
+}
+
+/// The mean of `freedom` squares of normal numbers is 1, and its variance two over their number.
+fn limit(deviations: f64, freedom: f64) -> f64 {
+    1.0 + deviations * (2.0 / freedom.max(1.0)).sqrt()
+}
+
+/// Watches whether what is followed goes on to explain the frames.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Watch {
+    searched: f64,
+    mean: f64,
+}
+
+impl Watch {
+    /// Begins with what a search has left, in this frame and in its own.
+    pub fn new(now: Evidence, searched: Evidence, readings: usize) -> Self {
+        Self { searched: searched.cost.max(readings as f64 - searched.parameters), mean: now.cost }
+    }
+
+    /// Takes the next frame; whether a search may explain it better.
+    pub fn has_lost(&mut self, now: Evidence, readings: usize) -> bool {
+        self.mean += NEWEST * (now.cost - self.mean);
+        self.mean > (1.0 + RISE) * self.searched || self.is_worse(now, readings)
+    }
+
+    /// Whether a frame by itself is explained much worse than the searched one.
+    pub fn is_worse(&self, now: Evidence, readings: usize) -> bool {
+        now.cost > (WORSE * self.searched).max(readings as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tactomo_physics::simulate::Noise;
+
+    fn evidence(cost: f64, parameters: usize) -> Evidence {
+        Evidence::of(cost, parameters)
+    }
+
+    #[test]
+    fn noise_fits_and_a_little_more_does_not() {
+        let mut noise = Noise::new(5);
+        let mut cost = |scale: f64| evidence((0..240).map(|_| (scale * noise.normal()).powi(2)).sum(), 0);
+        assert!((0..2000).all(|_| !cost(1.0).is_misfit(240)));
+        assert!((0..2000).filter(|_| cost(1.35).is_misfit(240)).count() > 1900);
+        // Fewer readings say less.
+        assert!(misfit_limit(20.0) > 2.0 && misfit_limit(240.0) < 1.5);
+    }
+
+    #[test]
+    fn a_parameter_has_to_be_worth_its_price() {
+        assert!(evidence(240.0, 6).score() < evidence(230.0, 9).score());
+        assert!(evidence(240.0, 6).score() > evidence(210.0, 9).score());
+    }
+
+    #[test]
+    fn frames_that_are_worse_at_once_or_on_the_whole_are_lost() {
+        let begun = evidence(250.0, 6);
+        let watch = Watch::new(begun, begun, 256);
+        assert!(!watch.clone().has_lost(evidence(300.0, 6), 256));
+        assert!(watch.clone().has_lost(evidence(400.0, 6), 256));
+        let mut slow = watch;
+        assert_eq!((0..40).position(|_| slow.has_lost(evidence(300.0, 6), 256)), Some(8));
+    }
+}

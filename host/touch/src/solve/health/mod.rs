@@ -1,0 +1,4 @@
+//! Which electrodes cannot be right.
+
+pub(crate) mod electrodes;
+pub(crate) mod watch;

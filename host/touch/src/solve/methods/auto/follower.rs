@@ -1,0 +1,311 @@
+//! The fast half: follows whichever model was chosen last, and contacts beside it.
+
+use super::words::{as_contacts, as_whole, nothing};
+use super::{
+    ContactFollower, Evidence, Explained, Found, Nonlinear, ShapeFollower, Solution, SolveError, Target, Whole,
+    image_evidence,
+};
+use crate::solve::answer::{FoundContact, check};
+use crate::solve::before::still::{Mean, Still};
+use crate::solve::methods::image::Descent;
+use crate::solve::methods::shapes::StripFit;
+use crate::solve::solver::{Followed, Follower, Lead};
+use tactomo_physics::detector::Detector;
+use tactomo_physics::readings::Readings;
+
+/// After so many frames with an image, contacts and shapes are tried again; doubled each time, up to the second.
+const PATIENCE: [u32; 2] = [2, 64];
+
+/// Follows whichever model was chosen last.
+pub(super) struct AutoFollower {
+    electrodes: usize,
+    /// What stands still is averaged, for all models alike.
+    still: Still,
+    contacts: Option<ContactFollower>,
+    shapes: Option<ShapeFollower>,
+    image: Nonlinear,
+    answer: Answer,
+    /// Frames for which nothing is searched while an image is the answer, and how many it will be next time.
+    skip: u32,
+    patience: u32,
+}
+
+/// What the answer is, and why it is not contacts.
+#[derive(Clone, Debug, Default)]
+enum Answer {
+    #[default]
+    Contacts,
+    Shape(String),
+    Image(String),
+}
+
+impl Answer {
+    fn why(&self) -> Option<&str> {
+        match self {
+            Self::Contacts => None,
+            Self::Shape(why) | Self::Image(why) => Some(why),
+        }
+    }
+}
+
+impl AutoFollower {
+    pub fn new(
+        detector: &Detector,
+        contacts: Option<ContactFollower>,
+        shapes: Option<ShapeFollower>,
+        image: Nonlinear,
+    ) -> Self {
+        let (electrodes, still) = (detector.electrodes.len(), Still::new(detector.adc.deviation_v()));
+        Self { electrodes, still, contacts, shapes, image, answer: Answer::Contacts, skip: 0, patience: PATIENCE[0] }
+    }
+
+    /// What the errors of averaged readings are like, by what `found` or else what is followed was compared by; `None` if the model has no contacts.
+    fn target(&self, mean: &Mean, found: Option<&Found>) -> Result<Option<Target>, SolveError> {
+        let of = |contacts: &ContactFollower| {
+            let error = found.and_then(Found::error).or(contacts.error());
+            contacts.finder().target_of(mean, error)
+        };
+        self.contacts.as_ref().map(of).transpose()
+    }
+
+    /// The latest readings while contacts go by rows, told for them as they are now.
+    fn latest(&self) -> Option<Mean> {
+        self.contacts.as_ref().and_then(ContactFollower::latest)
+    }
+
+    /// Derivatives of the readings by the parameters of the contacts that are followed (V).
+    fn slopes_v(contacts: Option<&ContactFollower>) -> &[Vec<f64>] {
+        contacts.map_or(&[], ContactFollower::slopes_v)
+    }
+
+    /// Brings the contacts to the frame; as what they are if they are the answer.
+    fn follow_contacts(&mut self, readings: &Readings, target: Option<&Target>) -> Followed {
+        let (Some(contacts), Some(target)) = (&mut self.contacts, target) else {
+            let search = !self.image.is_rest(readings);
+            return Followed { solution: nothing(Solution::default(), search), search };
+        };
+        let search = contacts.follow(target);
+        Followed { solution: as_contacts(contacts.solution(target), search), search }
+    }
+
+    fn follow_shape(&mut self, target: &Target, why: &str) -> Option<Followed> {
+        let shapes = self.shapes.as_mut()?;
+        let search = shapes.follow(target);
+        let solution = shapes.solution(target)?;
+        Some(Followed { solution: as_whole(solution, why), search })
+    }
+
+    fn follow_image(&mut self, readings: &Readings, why: &str) -> Result<Followed, SolveError> {
+        let (solution, is_lost) = self.image.follow(readings)?;
+        let search = is_lost || self.skip == 0;
+        self.skip = self.skip.saturating_sub(1);
+        Ok(Followed { solution: as_whole(solution, why), search })
+    }
+
+    /// A shape or an image with the contacts beside it.
+    fn beside(&mut self, mut followed: Followed, target: Option<&Target>) -> Followed {
+        if let (Some(contacts), Some(target)) = (&mut self.contacts, target) {
+            contacts.follow(target);
+            followed.search |= contacts.finder().is_outdated(target);
+            followed.solution.contacts = contacts.solution(target).contacts;
+        }
+        followed
+    }
+
+    /// Goes on from a shape that was found, if it explains the frame better than the one that is followed; what that leaves.
+    fn adopt_shape(&mut self, found: Option<&StripFit>, target: &Target) -> Option<Evidence> {
+        let shapes = self.shapes.as_mut()?;
+        shapes.follow(target);
+        if let Some(found) = found {
+            shapes.adopt(found, target);
+        }
+        shapes.evidence()
+    }
+
+    /// The same of an image.
+    fn adopt_image(
+        &mut self,
+        found: Option<Descent>,
+        readings: &Readings,
+        target: &Target,
+    ) -> Result<Option<Evidence>, SolveError> {
+        self.image.follow(readings)?;
+        let before = (image_evidence(&self.image, readings, target)?, self.image.descent().cloned());
+        let Some(found) = found else { return Ok(before.0) };
+        self.image.go_on_from(Some(found));
+        self.image.follow(readings)?;
+        let after = image_evidence(&self.image, readings, target)?;
+        if lower(before.0, after).is_some_and(|lowest| Some(lowest) != after) {
+            self.image.go_on_from(before.1);
+            return Ok(before.0);
+        }
+        Ok(after)
+    }
+
+    /// Makes one of the models that were brought to a frame the answer, and lets go of the others.
+    fn take(&mut self, answer: Answer) {
+        if !matches!(answer, Answer::Shape(_))
+            && let Some(shapes) = &mut self.shapes
+        {
+            shapes.let_go();
+        }
+        match &answer {
+            Answer::Image(_) => {
+                self.skip = self.patience;
+                self.patience = (2 * self.patience).min(PATIENCE[1]);
+            }
+            _ => {
+                self.image.go_on_from(None);
+                (self.skip, self.patience) = (0, PATIENCE[0]);
+            }
+        }
+        self.answer = answer;
+    }
+
+    /// The answer to a frame that it was brought to, with the contacts beside it; `search` is whether contacts have to be searched again.
+    fn answered(&mut self, readings: &Readings, target: &Target, search: bool) -> Result<Followed, SolveError> {
+        let contacts = self.contacts.as_mut().map(|contacts| contacts.solution(target)).unwrap_or_default();
+        let (whole, search) = match (&self.answer, &self.shapes) {
+            (Answer::Shape(why), Some(shapes)) => {
+                (shapes.solution(target).map(|shape| as_whole(shape, why)), shapes.has_lost(target))
+            }
+            (Answer::Image(why), _) => (Some(as_whole(self.image.solution(readings)?, why)), self.skip == 0),
+            _ => (None, search),
+        };
+        let search = search || self.contacts.as_ref().is_some_and(|contacts| contacts.finder().is_outdated(target));
+        let solution = match whole {
+            Some(whole) => Solution { contacts: contacts.contacts, ..whole },
+            None => as_contacts(contacts, search),
+        };
+        Ok(Followed { solution, search })
+    }
+
+    /// Goes on from an image where the model has no contacts.
+    fn adopt_alone(&mut self, whole: Option<(Whole, String)>, readings: &Readings) -> Result<Followed, SolveError> {
+        if let Some((Whole::Image(descent), why)) = whole {
+            self.image.go_on_from(Some(*descent));
+            self.take(Answer::Image(why));
+        }
+        self.follow_mean(&Mean::of_frame(readings))
+    }
+
+    fn follow_mean(&mut self, mean: &Mean) -> Result<Followed, SolveError> {
+        let readings = &mean.readings;
+        let target = self.target(mean, None)?;
+        if !matches!(self.answer, Answer::Contacts) && self.image.is_rest(readings) {
+            // The contacts beside it explain nothing of that.
+            self.contacts.iter_mut().for_each(ContactFollower::let_go);
+            self.take(Answer::Contacts);
+        }
+        let whole = match (self.answer.clone(), &target) {
+            (Answer::Shape(why), Some(target)) => self.follow_shape(target, &why),
+            (Answer::Image(why), _) => Some(self.follow_image(readings, &why)?),
+            _ => None,
+        };
+        match whole {
+            Some(followed) => Ok(self.beside(followed, target.as_ref())),
+            None => {
+                let is_gone = !matches!(self.answer, Answer::Contacts);
+                self.take(Answer::Contacts);
+                let followed = self.follow_contacts(readings, target.as_ref());
+                Ok(Followed { search: followed.search || is_gone, ..followed })
+            }
+        }
+    }
+}
+
+/// The one of lower score.
+fn lower(one: Option<Evidence>, other: Option<Evidence>) -> Option<Evidence> {
+    one.into_iter().chain(other).min_by(|a, b| a.score().total_cmp(&b.score()))
+}
+
+impl Follower for AutoFollower {
+    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
+        check(readings, self.electrodes)?;
+        self.still.add_beside(readings, Self::slopes_v(self.contacts.as_ref()));
+        self.follow_mean(&self.still.mean_or(readings))
+    }
+
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        match (&self.answer, &mut self.contacts) {
+            (Answer::Contacts, Some(contacts)) => {
+                self.still.reset();
+                let Followed { solution, search } = contacts.follow_rows(rows, elapsed_s)?;
+                Ok(Followed { solution: as_contacts(solution, search), search })
+            }
+            _ => self.follow(latest),
+        }
+    }
+
+    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+        check(readings, self.electrodes)?;
+        let lead: Explained = lead.known();
+        match self.latest() {
+            Some(latest) => self.still.add(&latest.readings),
+            None => self.still.add_beside(readings, Self::slopes_v(self.contacts.as_ref())),
+        }
+        self.contacts.iter_mut().for_each(|contacts| contacts.searched_in(lead.mean.as_ref()));
+        let mean = self.still.mean_or(readings);
+        let readings = &mean.readings;
+        let Some(target) = self.target(&mean, lead.contacts.as_deref())? else {
+            return self.adopt_alone(lead.whole, readings);
+        };
+        // What is followed and what was found some frames ago are all brought to this frame: the lowest score is believed. Where no
+        // reading stands out there may be a very light contact still.
+        let Explained { contacts: found, whole, mean: searched } = lead;
+        let frames = searched.map_or(1, |mean| mean.frames);
+        let whole = whole.filter(|_| !self.image.is_rest(readings));
+        let search =
+            self.contacts.as_mut().is_some_and(|contacts| contacts.adopt(found.map(|found| *found), frames, &target));
+        let (shape, image, new_why) = match whole {
+            Some((Whole::Shape(fit), why)) => (Some(fit), None, Some(why)),
+            Some((Whole::Image(descent), why)) => (None, Some(*descent), Some(why)),
+            None => (None, None, None),
+        };
+        let why = new_why.or_else(|| self.answer.why().map(str::to_owned)).unwrap_or_default();
+        let by_contacts = self.contacts.as_ref().map(|contacts| contacts.evidence(&target));
+        let by_shape = self.adopt_shape(shape.as_deref(), &target);
+        let by_image = self.adopt_image(image, readings, &target)?;
+        let best = lower(lower(by_contacts, by_shape), by_image);
+        self.take(match best {
+            best if best == by_contacts => Answer::Contacts,
+            best if best == by_shape => Answer::Shape(why),
+            _ => Answer::Image(why),
+        });
+        self.answered(readings, &target, search)
+    }
+
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        let contacts = self.contacts.as_ref().filter(|_| matches!(self.answer, Answer::Contacts))?;
+        contacts.telling_grounds(count)
+    }
+
+    fn lead(&self) -> Lead {
+        let whole = match &self.answer {
+            Answer::Contacts => None,
+            Answer::Shape(why) => {
+                let shape = self.shapes.as_ref().and_then(ShapeFollower::found).cloned();
+                shape.map(|fit| (Whole::Shape(Box::new(fit)), why.clone()))
+            }
+            Answer::Image(why) => {
+                self.image.descent().cloned().map(|descent| (Whole::Image(Box::new(descent)), why.clone()))
+            }
+        };
+        let contacts = self.contacts.as_ref().and_then(ContactFollower::found).map(Box::new);
+        Lead::of(Explained { contacts, whole, mean: self.latest().or_else(|| self.still.mean()) })
+    }
+
+    fn inherit(&mut self, before: &[FoundContact]) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.inherit(before);
+        }
+    }
+
+    fn reset(&mut self) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.reset();
+        }
+        self.still.reset();
+        self.take(Answer::Contacts);
+    }
+}

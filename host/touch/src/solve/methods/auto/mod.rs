@@ -1,0 +1,109 @@
+//! No more model than the scene needs.
+//!
+//! Nothing, one contact, two, up to six, a line, a ring, an image: what explains the readings at the lowest price ([`Evidence`]) is the
+//! answer, and the solution says which and why. What is known is followed from frame to frame, which costs least, and searched anew
+//! only when it no longer explains the readings, or now and then.
+
+mod follower;
+mod searcher;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use std::sync::Arc;
+
+use self::follower::AutoFollower;
+use self::searcher::AutoSearcher;
+use crate::solve::answer::{Solution, SolveError};
+use crate::solve::before::still::Mean;
+use crate::solve::fit::evidence::Evidence;
+use crate::solve::fit::target::Target;
+use crate::solve::methods::contacts::{ContactFinder, ContactFollower, ContactSearcher, ContactSettings, Found};
+use crate::solve::methods::image::{Complexity, Descent, Nonlinear, NonlinearSettings};
+use crate::solve::methods::shapes::{ShapeFinder, ShapeFollower, StripFit};
+use crate::solve::problem::Problem;
+use crate::solve::solver::{Follower, Parts, Solver, follow_and_search, follow_rows_and_search};
+use tactomo_physics::forward::ForwardError;
+use tactomo_physics::readings::Readings;
+
+/// Chooses the model of the scene.
+pub struct Auto {
+    follower: AutoFollower,
+    searcher: AutoSearcher,
+}
+
+/// What explained a frame, for another frame to go on from.
+#[derive(Clone, Debug, Default)]
+struct Explained {
+    /// Contacts: the answer, or what is kept beside it.
+    contacts: Option<Box<Found>>,
+    /// What explains the frame better than they do, and why it is believed.
+    whole: Option<(Whole, String)>,
+    /// The mean of the frames up to it as far as they stood still.
+    mean: Option<Mean>,
+}
+
+/// What touches as one, rather than as contacts.
+#[derive(Clone, Debug)]
+enum Whole {
+    /// A line or a ring.
+    Shape(Box<StripFit>),
+    /// An image.
+    Image(Box<Descent>),
+}
+
+impl Auto {
+    /// Makes it ready for a problem.
+    ///
+    /// # Errors
+    /// [`ForwardError`] if the model cannot be had on a coarser image.
+    pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
+        // A model without fields of single contacts has images only.
+        let contacts = ContactFinder::new(problem, ContactSettings::of(problem)).ok().map(Arc::new);
+        let shapes = match contacts {
+            Some(_) => ShapeFinder::new(problem)?.map(Arc::new),
+            None => None,
+        };
+        let image = Nonlinear::new(problem, NonlinearSettings::default())?;
+        let follower = AutoFollower::new(
+            problem.detector(),
+            contacts.clone().map(ContactFollower::new),
+            shapes.clone().map(ShapeFollower::new),
+            image.clone(),
+        );
+        let searcher = AutoSearcher::new(contacts, shapes, image);
+        Ok(Self { follower, searcher })
+    }
+}
+
+impl Solver for Auto {
+    fn name(&self) -> &'static str {
+        "auto"
+    }
+
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
+        follow_and_search(&mut self.follower, &mut self.searcher, readings)
+    }
+
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        follow_rows_and_search(&mut self.follower, &mut self.searcher, (rows, latest), elapsed_s)
+    }
+
+    fn reset(&mut self) {
+        self.follower.reset();
+        self.searcher.reset();
+    }
+
+    fn split(self: Box<Self>) -> Parts {
+        Parts { follower: Box::new(self.follower), searcher: Some(Box::new(self.searcher)) }
+    }
+}
+
+/// What an image leaves of a frame, by the errors that contacts are judged by; `None` without an image.
+fn image_evidence(image: &Nonlinear, readings: &Readings, target: &Target) -> Result<Option<Evidence>, SolveError> {
+    let explains = image.explains(readings)?;
+    Ok(explains.map(|(volts, Complexity { determined, price })| {
+        let cost = target.cost(&volts);
+        Evidence { cost, price, parameters: determined }
+    }))
+}

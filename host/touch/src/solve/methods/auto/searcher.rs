@@ -1,0 +1,161 @@
+//! The thorough half: which model explains a frame at the lowest price.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use super::words::instead_of;
+use super::{
+    ContactFinder, ContactSearcher, Evidence, Explained, Found, Nonlinear, ShapeFinder, Solution, SolveError, Target,
+    Whole, image_evidence,
+};
+use crate::solve::before::still::Mean;
+use crate::solve::methods::shapes::StripFit;
+use crate::solve::solver::{Lead, Searcher};
+use tactomo_physics::readings::Readings;
+
+/// So many contacts may stand for something else, if they leave more than noise does.
+const SUSPICIOUS: usize = 3;
+
+/// By how much the score of a shape has to be lower than that of contacts on a detector that is not known exactly. Two contacts on one of
+/// those were a line by 2; lines and rings, on three others, were so by 23 or more.
+const CLEARLY: f64 = 10.0;
+
+/// Chooses the model.
+pub(super) struct AutoSearcher {
+    finder: Option<Arc<ContactFinder>>,
+    shapes: Option<Arc<ShapeFinder>>,
+    image: Nonlinear,
+}
+
+impl AutoSearcher {
+    pub fn new(finder: Option<Arc<ContactFinder>>, shapes: Option<Arc<ShapeFinder>>, image: Nonlinear) -> Self {
+        Self { finder, shapes, image }
+    }
+
+    pub fn reset(&mut self) {
+        self.image.go_on_from(None);
+    }
+
+    /// The line or ring that explains a frame better than contacts, if there may be one.
+    fn shape(
+        &self,
+        contacts: (&Solution, Evidence),
+        from: Option<&(Whole, String)>,
+        target: &Target,
+    ) -> Option<StripFit> {
+        let (solution, evidence) = contacts;
+        let from = match from {
+            Some((Whole::Shape(fit), _)) => Some(&**fit),
+            _ => None,
+        };
+        let shapes = self.shapes.as_ref()?;
+        let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
+        let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
+        // What is not known of a detector makes explanations more alike than their evidence tells.
+        let margin = if target.error().is_some() || target.is_provisional() { CLEARLY } else { 0.0 };
+        (shape.evidence().score() < evidence.score() - margin).then_some(shape)
+    }
+
+    /// The line or ring that explains a frame of a detector that is not known exactly, where the contacts so far do not: each more
+    /// of them takes longer than to look for it.
+    fn early(
+        &self,
+        searcher: &ContactSearcher,
+        contacts: &Found,
+        from: Option<&(Whole, String)>,
+        mean: &Mean,
+    ) -> Option<StripFit> {
+        let finder = self.finder.as_ref()?;
+        let target = finder.target_of(mean, Some(contacts.error()?)).ok()?;
+        let evidence = finder.evidence_of_found(contacts);
+        if !evidence.is_misfit(target.count()) || is_partial(&target) {
+            return None;
+        }
+        let solution = searcher.solution(contacts, mean).ok()?;
+        let shape = self.shape((&solution, evidence), from, &target)?;
+        (!shape.evidence().is_misfit(target.count())).then_some(shape)
+    }
+
+    /// The image that explains a frame, from the one that was followed if it was one.
+    fn image(&mut self, from: Option<(Whole, String)>, readings: &Readings) -> Result<Option<Whole>, SolveError> {
+        self.image.go_on_from(match from {
+            Some((Whole::Image(descent), _)) => Some(*descent),
+            _ => None,
+        });
+        self.image.begin(readings)?;
+        Ok(self.image.descent().cloned().map(|descent| Whole::Image(Box::new(descent))))
+    }
+
+    /// All that there is to know without contacts.
+    fn image_alone(&mut self, from: Explained, readings: &Readings) -> Result<Explained, SolveError> {
+        if self.image.is_rest(readings) {
+            return Ok(Explained::default());
+        }
+        let why = "this model has no fields of single contacts".to_owned();
+        let whole = self.image(from.whole, readings)?.map(|image| (image, why));
+        Ok(Explained { whole, ..Explained::default() })
+    }
+
+    /// What explains the frame as a whole better than contacts do, if anything.
+    fn whole(
+        &mut self,
+        (contacts, solution): (Evidence, &Solution),
+        from: Option<(Whole, String)>,
+        target: &Target,
+        readings: &Readings,
+    ) -> Result<Option<Whole>, SolveError> {
+        if self.image.is_rest(readings) || is_partial(target) {
+            return Ok(None);
+        }
+        let shape = self.shape((solution, contacts), from.as_ref(), target);
+        let best = shape.as_ref().map_or(contacts, StripFit::evidence);
+        let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
+        // Of a provisional target nothing is claimed that another model could do better than.
+        let noise_share = if target.is_provisional() { 1.0 } else { (target.noise_v / target.deviation_v()).powi(2) };
+        let is_doubtful = solution.contacts.len() >= SUSPICIOUS && best.may_be_better(noise_share, target.count());
+        if !(is_doubtful || best.is_misfit(target.count())) {
+            return Ok(shape);
+        }
+        let image = self.image(from, readings)?;
+        let evidence = image_evidence(&self.image, readings, target)?;
+        let is_better = evidence.is_some_and(|evidence| evidence.score() < best.score());
+        Ok(if is_better { image } else { shape })
+    }
+}
+
+/// Whether so few rows were read that any shape explains them.
+fn is_partial(target: &Target) -> bool {
+    2 * target.known() < target.readings().volts().len()
+}
+
+impl Searcher for AutoSearcher {
+    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
+        let mut from: Explained = from.known();
+        let mean = from.mean.take().unwrap_or_else(|| Mean::of_frame(readings));
+        let readings = &mean.readings;
+        let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings).map(Lead::of) };
+        let Explained { contacts, whole: from, .. } = from;
+        let contacts = contacts.filter(|_| from.is_none());
+        let searcher = ContactSearcher::new(Arc::clone(&finder));
+        let mut early = None;
+        let mut better = |better: Found| {
+            early = self.early(&searcher, &better, from.as_ref(), &mean);
+            // A picture does not change to contacts that may not explain it.
+            if early.is_none() && from.is_none() {
+                found(Lead::of(Explained { contacts: Some(Box::new(better)), whole: None, mean: Some(mean.clone()) }));
+            }
+            if early.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let contacts = searcher.contacts(contacts.map(|found| *found), &mean, &mut better)?;
+        let Some((contacts, solution)) = contacts else {
+            return Ok(Lead::of(Explained { mean: Some(mean), ..Explained::default() }));
+        };
+        let target = finder.target_of(&mean, contacts.error())?;
+        let whole = match early {
+            Some(shape) => Some(Whole::Shape(Box::new(shape))),
+            None => self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?,
+        };
+        let whole = whole.map(|whole| (whole, instead_of(&solution)));
+        Ok(Lead::of(Explained { contacts: Some(Box::new(contacts)), whole, mean: Some(mean) }))
+    }
+}

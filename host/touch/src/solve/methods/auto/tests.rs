@@ -1,0 +1,213 @@
+//! Tests of the choice between contacts, shapes and images.
+
+use std::f64::consts::FRAC_PI_2;
+
+use super::*;
+use crate::solve::answer::{FoundContact, Solution};
+use crate::solve::solver::Lead;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v, touched_impedance_ohm};
+use tactomo_physics::scene::{Contact, Shape, Touch};
+use tactomo_physics::simulate::{Noise, measured};
+
+struct Bench {
+    detector: Detector,
+    fine: Slab,
+    auto: Auto,
+    noise: Noise,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
+        detector.adc.noise_lsb = 1.5;
+        let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
+        let auto = Auto::new(&Problem::new(slab)).unwrap();
+        let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap().on_image(3000);
+        Self { detector, fine, auto, noise: Noise::new(11) }
+    }
+
+    fn solve(&mut self, exact: &Readings) -> Solution {
+        self.auto.solve(&measured(exact, &self.detector.adc, &mut self.noise)).unwrap()
+    }
+
+    fn touched(&mut self, contacts: &[Contact]) -> Solution {
+        let readings = self.measured(contacts);
+        self.auto.solve(&readings).unwrap()
+    }
+
+    fn measured(&mut self, contacts: &[Contact]) -> Readings {
+        let exact = readings_v(&self.fine.impedance_ohm(contacts).unwrap(), &self.detector);
+        measured(&exact, &self.detector.adc, &mut self.noise)
+    }
+
+    /// Readings of shapes at places (m), of conductances in sheet conductances.
+    fn shaped(&mut self, shapes: &[([f64; 2], Shape, f64)]) -> Readings {
+        let sheet_s = self.detector.sheet_conductance_s();
+        let touch =
+            |(at_m, shape, sheets): &([f64; 2], Shape, f64)| Touch::flat(*at_m, shape.clone(), sheets * sheet_s);
+        let touches: Vec<_> = shapes.iter().map(touch).collect();
+        let exact = readings_v(&touched_impedance_ohm(&self.fine, &touches).unwrap(), &self.detector);
+        measured(&exact, &self.detector.adc, &mut self.noise)
+    }
+
+    /// The frame of a square: no line, no ring, no few discs.
+    fn frame(&mut self) -> Readings {
+        let side = |turn: u8| {
+            let angle_rad = 0.2 + f64::from(turn) * FRAC_PI_2;
+            let (sin, cos) = angle_rad.sin_cos();
+            ([-0.018 * sin, 0.018 * cos], Shape::Line { length_m: 0.036, width_m: 0.003, angle_rad }, 1.0)
+        };
+        self.shaped(&[side(0), side(1), side(2), side(3)])
+    }
+
+    fn problem(&self) -> Problem {
+        let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&self.detector).unwrap());
+        Problem::new(slab)
+    }
+}
+
+fn what(solution: &Solution) -> &str {
+    solution.choice.as_ref().map_or("", |choice| &choice.what)
+}
+
+#[test]
+fn it_takes_no_more_than_the_scene_needs() {
+    let mut bench = Bench::new();
+    let rest = bench.solve(&Readings::from_fn(16, |_, _| 0.0));
+    assert_eq!((what(&rest), rest.contacts.len()), ("nothing", 0));
+    let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
+    let one = bench.touched(&[a]);
+    assert_eq!((what(&one), one.contacts.len()), ("1 contact", 1));
+    let two = bench.touched(&[a, b]);
+    assert_eq!((what(&two), two.contacts.len()), ("2 contacts", 2));
+    let frame = bench.frame();
+    let image = bench.auto.solve(&frame).unwrap();
+    assert_eq!((what(&image), image.image_s_per_m2.is_some()), ("image", true), "{:?}", image.choice);
+    assert!(image.shape.is_none() && image.contacts.len() > 2, "contacts are kept beside it: {image:?}");
+    let again = bench.touched(&[a]);
+    assert_eq!(what(&again), "1 contact", "the image no longer explains anything");
+}
+
+#[test]
+fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
+    let mut bench = Bench::new();
+    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut searcher = searcher.unwrap();
+    let moved =
+        |x_m: f64| [Contact::flat(0.008 + x_m, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009 + x_m, 0.0025, 5e-4)];
+    let first = bench.measured(&moved(0.0));
+    let before = follower.follow(&first).unwrap();
+    assert!(before.search && before.solution.flags.unfinished && before.solution.contacts.is_empty());
+    let lead = searcher.search(follower.lead(), &first, &mut |_| {}).unwrap();
+    // The answer comes when the contacts are 3 mm further on.
+    let after = follower.adopt(lead, &bench.measured(&moved(0.003))).unwrap();
+    assert_eq!((what(&after.solution), after.search), ("2 contacts", false), "{after:?}");
+    let ids: Vec<_> = after.solution.contacts.iter().map(|contact| contact.id).collect();
+    for step in 0..20 {
+        let truth = moved(0.003 + 1e-4 * f64::from(step));
+        let next = follower.follow(&bench.measured(&truth)).unwrap();
+        assert_eq!((what(&next.solution), next.search), ("2 contacts", false), "{next:?}");
+        assert_eq!(next.solution.contacts.iter().map(|contact| contact.id).collect::<Vec<_>>(), ids);
+        for contact in truth {
+            let off_m = |found: &FoundContact| (found.x_m - contact.x_m).hypot(found.y_m - contact.y_m);
+            assert!(next.solution.contacts.iter().any(|found| off_m(found) < 3e-4), "{next:?}");
+        }
+    }
+    let lifted = follower.follow(&bench.measured(&moved(0.005)[..1])).unwrap();
+    assert_eq!(
+        (what(&lifted.solution), lifted.search),
+        ("1 contact", false),
+        "a finger that lifts is gone at once: {lifted:?}"
+    );
+}
+
+#[test]
+fn a_search_of_the_past_does_not_replace_what_explains_the_present() {
+    let mut bench = Bench::new();
+    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut searcher = searcher.unwrap();
+    let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
+    let past = searcher.search(Lead::default(), &bench.measured(&[a]), &mut |_| {}).unwrap();
+    let present = bench.measured(&[a, b]);
+    let lead = searcher.search(Lead::default(), &present, &mut |_| {}).unwrap();
+    follower.adopt(lead, &present).unwrap();
+    let kept = follower.adopt(past, &bench.measured(&[a, b])).unwrap();
+    assert_eq!(what(&kept.solution), "2 contacts");
+}
+
+#[test]
+fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
+    let mut bench = Bench::new();
+    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut searcher = searcher.unwrap();
+    let a = [Contact::flat(0.01, 0.004, 0.0025, 3e-4)];
+    let frame = bench.frame();
+    let image = searcher.search(Lead::default(), &frame, &mut |_| {}).unwrap();
+    let contact = searcher.search(Lead::default(), &bench.measured(&a), &mut |_| {}).unwrap();
+    follower.adopt(contact.clone(), &bench.measured(&a)).unwrap();
+    let kept = follower.adopt(image.clone(), &bench.measured(&a)).unwrap();
+    assert_eq!(what(&kept.solution), "1 contact");
+    follower.reset();
+    follower.adopt(image, &frame).unwrap();
+    let kept = follower.adopt(contact, &frame).unwrap();
+    assert_eq!(what(&kept.solution), "image");
+}
+
+#[test]
+fn a_contact_whose_readings_all_hide_in_the_noise_is_found() {
+    let mut bench = Bench::new();
+    let light = [Contact::flat(0.004, -0.009, 0.0025, 1.2e-6)];
+    let readings = bench.measured(&light);
+    assert!(readings.largest_v() < 5.0 * bench.detector.adc.deviation_v(), "{}", readings.largest_v());
+    let solution = bench.auto.solve(&readings).unwrap();
+    assert_eq!(what(&solution), "1 contact", "{solution:?}");
+}
+
+#[test]
+fn shapes_are_shapes_with_contacts_beside_them() {
+    let mut bench = Bench::new();
+    let line = Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 };
+    let ring = Shape::Ring { radius_m: 0.013, width_m: 0.003 };
+    for (shape, name) in [(line, "line"), (ring, "ring")] {
+        let readings = bench.shaped(&[([0.002, -0.003], shape.clone(), 1.5)]);
+        let solution = bench.auto.solve(&readings).unwrap();
+        assert_eq!(what(&solution), name);
+        assert_eq!(solution.shape.map(|shape| shape.name()), Some(name));
+        assert!(
+            !solution.flags.misfit && !solution.contacts.is_empty() && !solution.is_contacts(),
+            "{:?}",
+            solution.choice
+        );
+        let ids: Vec<_> = solution.contacts.iter().map(|contact| contact.id).collect();
+        let readings = bench.shaped(&[([0.002, -0.003], shape, 1.5)]);
+        let next = bench.auto.solve(&readings).unwrap();
+        assert_eq!((what(&next), next.contacts.iter().map(|contact| contact.id).collect::<Vec<_>>()), (name, ids));
+    }
+    let one = bench.touched(&[Contact::flat(0.01, 0.004, 0.0025, 3e-4)]);
+    assert_eq!((what(&one), one.shape, one.image_s_per_m2.is_none()), ("1 contact", None, true));
+    let readings = bench.shaped(&[([0.002, -0.003], Shape::Ring { radius_m: 0.013, width_m: 0.003 }, 1.5)]);
+    assert_eq!(what(&bench.auto.solve(&readings).unwrap()), "ring");
+    let gone = bench.solve(&Readings::from_fn(16, |_, _| 0.0));
+    assert_eq!((what(&gone), gone.contacts.len()), ("nothing", 0));
+}
+
+#[test]
+fn a_shape_and_contacts_of_the_past_do_not_replace_each_other() {
+    let mut bench = Bench::new();
+    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut searcher = searcher.unwrap();
+    let pair = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
+    let bar = [([0.002, -0.003], Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 }, 1.5)];
+    let line = searcher.search(Lead::default(), &bench.shaped(&bar), &mut |_| {}).unwrap();
+    let contacts = searcher.search(Lead::default(), &bench.measured(&pair), &mut |_| {}).unwrap();
+    follower.adopt(contacts.clone(), &bench.measured(&pair)).unwrap();
+    let kept = follower.adopt(line.clone(), &bench.measured(&pair)).unwrap();
+    assert!(kept.solution.is_contacts() && !kept.search, "{kept:?}");
+    follower.reset();
+    follower.adopt(line, &bench.shaped(&bar)).unwrap();
+    let kept = follower.adopt(contacts, &bench.shaped(&bar)).unwrap();
+    assert_eq!((what(&kept.solution), kept.search), ("line", false));
+    let lifted = follower.follow(&bench.measured(&pair)).unwrap();
+    assert!(lifted.search, "two fingers are no bar");
+}

@@ -1,0 +1,379 @@
+//! Least squares of a few discs: Levenberg and Marquardt's method on their places, conductances and radii, with the forward model
+//! itself.
+//!
+//! Derivatives are kept as long as the discs are near to where they were taken: then a step costs one answer of the forward model,
+//! and a very small one none, as the readings follow the derivatives.
+
+mod slopes;
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use self::slopes::Slopes;
+use crate::solve::fit::least_squares::{Damping, NormalEquations, Schedule, Trial, covariance};
+use crate::solve::fit::target::{Target, dot};
+use crate::solve::problem::Problem;
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::spots::SpotFields;
+use tactomo_physics::forward::{ForwardModel, readings_v};
+use tactomo_physics::scene::Contact;
+use tactomo_physics::space::{self, Place};
+
+/// Parameters of a disc: its place along two directions in radii, logarithm of the conductance of the contact with the crowded current
+/// under it, logarithm of the radius.
+///
+/// A firm disc that is narrower and conducts better acts nearly as before: what counts is the resistance `A = 1/C + S r0 / r`, where `S`,
+/// of the crowded current under the disc of radius `r0`, is found from the derivatives by conductance and radius. In `A` and `r` the
+/// readings are nearly linear, and the valley of fits that are nearly as good is straight.
+pub(super) const PARAMETERS: usize = 4;
+/// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
+pub(super) const CONDUCTANCE_DEVIATION: f64 = 4.0;
+/// Longest way in a step, in radii, and longest changes of the logarithms of a conductance and of a radius: where contacts are too
+/// few, a fit would make them as wide as it can, at the highest cost.
+const LONGEST_WAY: f64 = 2.0;
+const LONGEST_CONDUCTANCE: f64 = 1.0;
+const LONGEST_RADIUS: f64 = 0.25;
+/// What the readings' curvature makes of the way from where derivatives were taken, in standard deviations: up to the first, readings are
+/// taken as linear; up to the second, the derivatives serve for steps, if no parameter has changed by more than the third and by so
+/// many of its standard errors.
+const LINEAR: f64 = 0.1;
+const NEAR: f64 = 3.0;
+const NEAR_AT_MOST: f64 = 0.4;
+const SIGNIFICANT: f64 = 3.0;
+/// Share of the expected gain that a step has to bring, or derivatives are taken anew.
+const TRUE: f64 = 0.5;
+/// Widest radius of a disc, in halves of the side of a square of the detector's area, or of its outline's shorter side: what is wider
+/// is an image's business.
+const WIDEST: f64 = 0.6;
+const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-7, tries: 6 };
+/// Smallest and largest conductance, in sheet conductances.
+pub(super) const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
+/// Smallest radius, in usual ones.
+const NARROWEST: f64 = 0.05;
+
+/// Discs that fit best.
+#[derive(Clone, Debug)]
+pub(super) struct DiscFit {
+    pub contacts: Vec<Contact>,
+    /// Readings that they predict (V).
+    pub volts: Vec<f64>,
+    /// Sum of squares of the weighted residuals, without what was known before.
+    pub cost: f64,
+    /// Sum of squares of the parameters' deviations from what was known before.
+    pub known: f64,
+    slopes: Arc<Slopes>,
+    /// `J^T W^2 J` with what was known before.
+    pub normal: DMatrix<f64>,
+    /// Whether more steps would change nothing.
+    pub settled: bool,
+}
+
+/// How far a fit goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    /// Steps at most.
+    pub steps: usize,
+    /// Ends where a step is expected to lower the sum of squares by less,
+    pub gain: f64,
+    /// or by less than this share of what noise does not explain.
+    pub share: f64,
+}
+
+/// What disc fits need beside the target.
+pub(super) struct DiscFitter<'a> {
+    pub model: &'a dyn ForwardModel,
+    pub usual_radius_m: f64,
+    /// Standard deviation of the logarithm of a radius before anything is read.
+    pub radius_deviation: f64,
+    pub sheet_s: f64,
+    /// Variance of each coordinate of a place (m2) before anything is read.
+    pub place_variance_m2: f64,
+    /// Where a disc may be.
+    pub fields: &'a dyn SpotFields,
+    /// Widest radius (m).
+    pub widest_m: f64,
+    /// The detector as measured.
+    pub detector: &'a Detector,
+}
+
+/// Widest radius of a disc on a detector (m).
+pub(super) fn widest_m(problem: &Problem) -> f64 {
+    let area_m2: f64 = problem.jacobian.image_mesh.node_areas_m2.iter().sum();
+    let [width_m, height_m] = problem.detector().outline.size_m();
+    0.5 * WIDEST * area_m2.sqrt().min(width_m).min(height_m)
+}
+
+impl DiscFit {
+    /// Covariance of the parameters, [`PARAMETERS`] for each contact; `None` where they are not determined.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        covariance(&self.normal)
+    }
+
+    /// Unit vectors of the directions that the parameters of a contact's place are along, and their unit (m).
+    pub fn along(&self, k: usize) -> ([Place; 2], f64) {
+        (self.slopes.along[k], self.slopes.at[k].radius_m)
+    }
+
+    /// Resistance of the crowded current under a contact over its own.
+    pub fn exchange(&self, k: usize) -> f64 {
+        let (before, now) = (self.slopes.at[k], self.contacts[k]);
+        self.slopes.exchange[k] * now.conductance_s / before.conductance_s * before.radius_m / now.radius_m
+    }
+
+    /// Units of the places' parameters (m), a contact each.
+    pub fn units_m(&self) -> Vec<f64> {
+        self.slopes.at.iter().map(|contact| contact.radius_m).collect()
+    }
+
+    /// How far other contacts are from these, in the parameters.
+    pub fn way_to(&self, contacts: &[Contact]) -> Vec<f64> {
+        let (from, to) = (self.slopes.offset(&self.contacts), self.slopes.offset(contacts));
+        to.iter().zip(from).map(|(to, from)| to - from).collect()
+    }
+
+    /// Derivatives of the readings by all parameters (V).
+    pub fn slopes_v(&self) -> &[Vec<f64>] {
+        &self.slopes.by
+    }
+
+    /// What the curvature of the readings makes of an offset, in standard deviations: a change by one radius, or of a logarithm by one,
+    /// changes derivatives by about themselves.
+    fn bend(&self, offset: &[f64]) -> f64 {
+        let of = |(i, offset): (usize, &f64)| 0.5 * offset * offset * self.normal[(i, i)].sqrt();
+        offset.iter().enumerate().map(of).fold(0.0, f64::max)
+    }
+
+    /// The same of the crowded current alone, if its resistance were `S (1 - ln(r / r0))` in place of `S r0 / r`: of a firm contact little else
+    /// resists. It may be less, so that derivatives serve for steps all the same.
+    fn bend_of_crowding(&self, offset: &[f64]) -> f64 {
+        let of = |(k, exchange): (usize, &f64)| {
+            let (resistance, radius) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
+            let share = exchange / (1.0 + exchange);
+            0.5 * offset[radius] * offset[radius] * share * self.normal[(resistance, resistance)].sqrt()
+        };
+        self.slopes.exchange.iter().enumerate().map(of).fold(0.0, f64::max)
+    }
+
+    /// Whether an offset is too far for the derivatives to serve. A light contact that noise moves about is not: what the derivatives are
+    /// wrong by is little against its standard error.
+    fn is_far(&self, offset: &[f64]) -> bool {
+        let is_long = |(i, offset): (usize, &f64)| {
+            offset.abs() > NEAR_AT_MOST && offset.abs() * self.normal[(i, i)].sqrt() > SIGNIFICANT
+        };
+        self.bend(offset) > NEAR || offset.iter().enumerate().any(is_long)
+    }
+
+    /// What the fit lowers: both sums of squares.
+    fn objective(&self) -> f64 {
+        self.cost + self.known
+    }
+}
+
+impl DiscFitter<'_> {
+    /// The nearest minimum from a start; `None` if the start makes no sense.
+    pub fn fit(&self, start: Vec<Contact>, target: &Target, effort: Effort) -> Option<DiscFit> {
+        let start = start.into_iter().map(|contact| self.held(contact)).collect();
+        self.descend(self.anew(start, target)?, target, effort)
+    }
+
+    /// The nearest minimum for other readings from a fit to some.
+    pub fn go_on(&self, from: &DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
+        let (contacts, volts) = (from.contacts.clone(), from.volts.clone());
+        self.descend(self.at(contacts, volts, Arc::clone(&from.slopes), target)?, target, effort)
+    }
+
+    fn descend(&self, mut fit: DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
+        let mut damping = Damping::new(SCHEDULE);
+        for _ in 0..effort.steps {
+            let equations = NormalEquations { matrix: fit.normal.clone(), gradient: self.gradient(&fit, target) };
+            let possible = equations.step(0.0).map(|step| equations.gradient.dot(&step));
+            // A fit that is far off is wrong: it need not be wrong to many digits.
+            let enough = effort.gain.max(effort.share * (fit.objective() - target.count() as f64));
+            if possible.is_some_and(|possible| possible < enough) {
+                fit.settled = true;
+                break;
+            }
+            let Some((next, expected)) = self.step(&fit, target, &equations, &mut damping) else {
+                // The derivatives may be too old for a step that lowers anything.
+                if fit.contacts != fit.slopes.at {
+                    fit = self.anew(fit.contacts, target)?;
+                    continue;
+                }
+                fit.settled = true;
+                break;
+            };
+            let gained = fit.objective() - next.objective();
+            fit = next;
+            if gained < TRUE * expected && fit.contacts != fit.slopes.at {
+                fit = self.anew(fit.contacts, target)?;
+            }
+        }
+        Some(fit)
+    }
+
+    /// A step that lowers what is left, and by how much it was expected to; `None` if there is none.
+    fn step(
+        &self,
+        fit: &DiscFit,
+        target: &Target,
+        equations: &NormalEquations,
+        damping: &mut Damping,
+    ) -> Option<(DiscFit, f64)> {
+        damping.step(equations, |step| {
+            let contacts = self.moved(fit, step.as_slice());
+            match self.next(fit, contacts, target) {
+                Some(next) if next.objective() <= fit.objective() => Trial::Accepted((next, equations.gain(step))),
+                _ => Trial::Rejected,
+            }
+        })
+    }
+
+    /// A fit at other contacts: with the derivatives that there are, unless it is far from where they were taken.
+    pub fn next(&self, fit: &DiscFit, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
+        let offset = fit.slopes.offset(&contacts);
+        if fit.is_far(&offset) {
+            return self.anew(contacts, target);
+        }
+        let volts = match fit.bend(&offset).max(fit.bend_of_crowding(&offset)) < LINEAR {
+            true => {
+                let mut volts = fit.slopes.volts.clone();
+                for (slope, offset) in fit.slopes.by.iter().zip(&offset) {
+                    volts.iter_mut().zip(slope).for_each(|(volts, slope)| *volts += offset * slope);
+                }
+                volts
+            }
+            false => self.volts(&contacts)?,
+        };
+        let (cost, known) = (target.cost(&volts), self.known(&contacts));
+        let (slopes, normal) = (Arc::clone(&fit.slopes), fit.normal.clone());
+        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, settled: false })
+    }
+
+    /// A fit with derivatives taken where it is.
+    fn anew(&self, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
+        let slopes = Arc::new(self.slopes(contacts)?);
+        let (contacts, volts) = (slopes.at.clone(), slopes.volts.clone());
+        self.at(contacts, volts, slopes, target)
+    }
+
+    fn at(&self, contacts: Vec<Contact>, volts: Vec<f64>, slopes: Arc<Slopes>, target: &Target) -> Option<DiscFit> {
+        let (cost, known) = (target.cost(&volts), self.known(&contacts));
+        let normal = self.normal(&slopes, target);
+        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, settled: false })
+    }
+
+    /// Covariance of a fit's parameters if its errors were those of another target; `None` where they are not determined.
+    pub fn covariance(&self, fit: &DiscFit, target: &Target) -> Option<DMatrix<f64>> {
+        covariance(&self.normal(&fit.slopes, target))
+    }
+
+    fn normal(&self, slopes: &Slopes, target: &Target) -> DMatrix<f64> {
+        let target = target.at(&slopes.volts);
+        let whitened: Vec<_> = slopes.by.iter().map(|slope| target.whitened(slope)).collect();
+        let size = whitened.len();
+        let mut normal = DMatrix::zeros(size, size);
+        for i in 0..size {
+            for j in 0..=i {
+                let product = dot(&whitened[i], &whitened[j]);
+                (normal[(i, j)], normal[(j, i)]) = (product, product);
+            }
+        }
+        for (k, contact) in slopes.at.iter().enumerate() {
+            let place = contact.radius_m * contact.radius_m / self.place_variance_m2;
+            (0..2).for_each(|i| normal[(PARAMETERS * k + i, PARAMETERS * k + i)] += place);
+            let weight = CONDUCTANCE_DEVIATION.powi(-2);
+            let [by_first, by_second] = by_parameters(slopes.exchange[k]);
+            let (c, r) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
+            normal[(c, c)] += by_first * by_first * weight;
+            normal[(c, r)] += by_first * by_second * weight;
+            normal[(r, c)] += by_first * by_second * weight;
+            normal[(r, r)] += by_second * by_second * weight + self.radius_deviation.powi(-2);
+        }
+        normal
+    }
+
+    /// Half of the negative derivative of what the fit lowers.
+    fn gradient(&self, fit: &DiscFit, target: &Target) -> DVector<f64> {
+        let mut residuals = target.residuals(&fit.volts);
+        target.whiten_transposed(&mut residuals);
+        let mut gradient: Vec<_> = fit.slopes.by.iter().map(|slope| dot(slope, &residuals)).collect();
+        for (k, contact) in fit.contacts.iter().enumerate() {
+            let [conductance, radius] = self.unusual(contact);
+            let pull = conductance / CONDUCTANCE_DEVIATION;
+            let [by_first, by_second] = by_parameters(fit.slopes.exchange[k]);
+            gradient[PARAMETERS * k + 2] -= by_first * pull;
+            gradient[PARAMETERS * k + 3] -= by_second * pull + radius / self.radius_deviation;
+        }
+        gradient.into()
+    }
+
+    /// How far a contact's conductance and radius are from what is usual, in standard deviations.
+    fn unusual(&self, contact: &Contact) -> [f64; 2] {
+        [
+            (contact.conductance_s / self.sheet_s).ln() / CONDUCTANCE_DEVIATION,
+            (contact.radius_m / self.usual_radius_m).ln() / self.radius_deviation,
+        ]
+    }
+
+    fn known(&self, contacts: &[Contact]) -> f64 {
+        contacts.iter().flat_map(|contact| self.unusual(contact)).map(|deviation| deviation * deviation).sum()
+    }
+
+    /// Readings of the forward model (V).
+    pub fn volts(&self, contacts: &[Contact]) -> Option<Vec<f64>> {
+        let impedance_ohm = self.model.impedance_ohm(contacts).ok()?;
+        Some(readings_v(&impedance_ohm, self.detector).volts().to_vec())
+    }
+
+    /// Contacts after a step in their parameters.
+    pub fn moved(&self, fit: &DiscFit, step: &[f64]) -> Vec<Contact> {
+        let (steps, _) = step.as_chunks::<PARAMETERS>();
+        let moved = |(k, contact): (usize, &Contact)| {
+            let unit = fit.slopes.at[k];
+            self.stepped(contact, unit.radius_m, fit.exchange(k), &steps[k])
+        };
+        fit.contacts.iter().enumerate().map(moved).collect()
+    }
+
+    /// A contact after a step in its parameters: the unit of its place (m), and the resistance of the crowded current under it
+    /// over its own.
+    fn stepped(&self, contact: &Contact, unit_m: f64, exchange: f64, step: &[f64; PARAMETERS]) -> Contact {
+        let [first, second, by_s, by_m] = step;
+        let shorten = (LONGEST_WAY / first.hypot(*second)).min(1.0) * unit_m;
+        let factor = |log: f64, longest: f64| log.clamp(-longest, longest).exp();
+        let (from_m, along) = self.fields.footing(place_m(contact));
+        let to_m = space::along(space::along(from_m, shorten * first, along[0]), shorten * second, along[1]);
+        let ([x_m, y_m, z_m], _) = self.fields.footing(to_m);
+        let wider = factor(*by_m, LONGEST_RADIUS);
+        // Of the contact's own, in what it was: no step makes it much better at once.
+        let ohm = (1.0 + exchange) / factor(*by_s, LONGEST_CONDUCTANCE) - exchange / wider;
+        let ohm = ohm.max((-LONGEST_CONDUCTANCE).exp());
+        self.held(Contact {
+            x_m,
+            y_m,
+            z_m,
+            conductance_s: contact.conductance_s / ohm,
+            radius_m: wider * contact.radius_m,
+        })
+    }
+
+    /// A contact with conductance and radius held within what makes sense.
+    pub fn held(&self, contact: Contact) -> Contact {
+        let [least, most] = CONDUCTANCES.map(|sheets| sheets * self.sheet_s);
+        Contact {
+            conductance_s: contact.conductance_s.clamp(least, most),
+            radius_m: contact.radius_m.clamp(NARROWEST * self.usual_radius_m, self.widest_m),
+            ..contact
+        }
+    }
+}
+
+/// Derivatives of the logarithm of a conductance by the last two parameters.
+pub(super) fn by_parameters(exchange: f64) -> [f64; 2] {
+    [1.0 + exchange, -exchange]
+}
+
+pub(super) fn place_m(contact: &Contact) -> Place {
+    [contact.x_m, contact.y_m, contact.z_m]
+}

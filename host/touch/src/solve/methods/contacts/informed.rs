@@ -1,0 +1,206 @@
+//! The search on a detector that is not known exactly.
+//!
+//! What readings may be off by together depends on the scene, and a little on the detector that it makes likely
+//! ([`ApproximationError`]). So a fit and its target are brought to agree, for a single contact first: a second one would stand for
+//! what the detector differs by. Explanations with targets of their own are compared by the evidence with the determinant of
+//! their readings' error.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use super::discs::DiscFit;
+use super::search::COLD;
+use super::{Better, ContactFinder, Explanation};
+use crate::solve::fit::approximation::{ApproximationError, Linearised};
+use crate::solve::fit::target::Target;
+use tactomo_physics::forward::readings_v;
+use tactomo_physics::scene::Contact;
+
+/// How often a fit and what its readings may be off by are brought nearer to each other, at most.
+const RENEWALS: usize = 6;
+/// Mean square of what a fit leaves, above which it is the contacts that are wrong.
+const HOPELESS: f64 = 5.0;
+/// How often more contacts are looked for, at most.
+const GROWTHS: usize = 3;
+
+/// An explanation with the target that it was found by.
+#[derive(Clone)]
+pub(super) struct Informed {
+    pub explanation: Explanation,
+    pub target: Target,
+}
+
+impl ContactFinder {
+    /// What explains a frame, from what explains it so far if that leads there, else from nothing. Each better explanation on the way
+    /// goes to `better`, which may end the search.
+    pub(super) fn search(
+        &self,
+        from: Option<&Explanation>,
+        target: &Target,
+        better: &mut Better<'_>,
+    ) -> Option<Explanation> {
+        if self.problem.nuisance().is_none() {
+            return self.search_exact(from, target, better);
+        }
+        // What was found before anything was known of the readings' errors is told with them first: to bring it to them takes a while.
+        let provisional = from.filter(|from| from.error.is_none());
+        if let Some(judged) = provisional.and_then(|from| self.informed_as_is(from, target))
+            && better(&judged).is_break()
+        {
+            return Some(judged);
+        }
+        let followed = from.and_then(|from| self.caught_up(from, target));
+        let grown = followed.map(|followed| self.grown(followed, better));
+        if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.explanation.fit, &grown.target)) {
+            return Some(grown.explanation.clone());
+        }
+        let anew = self.alone(target).map(|one| match better(&one.explanation) {
+            ControlFlow::Break(()) => one,
+            ControlFlow::Continue(()) => self.grown(one, better),
+        });
+        let all = [grown, anew].into_iter().flatten();
+        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.explanation)
+    }
+
+    /// The best single contact, if anything stands out.
+    pub(super) fn alone(&self, target: &Target) -> Option<Informed> {
+        let target = self.informed(target, &self.begun(target)?, None)?;
+        let one = self.one(&target)?;
+        let settled = self.settled(Informed { explanation: Explanation::of(one, &target), target });
+        // Places that seemed worse with another detector may now be better.
+        let again = self.one(&settled.target)?;
+        let again = Informed { explanation: Explanation::of(again, &settled.target), target: settled.target.clone() };
+        Some(self.better_informed(settled, again))
+    }
+
+    /// An explanation as it is, by what its readings may be off by together.
+    fn informed_as_is(&self, from: &Explanation, target: &Target) -> Option<Explanation> {
+        let target = self.informed(target, &from.fit.contacts, None)?;
+        self.judged(from.clone(), &target)
+    }
+
+    fn caught_up(&self, from: &Explanation, target: &Target) -> Option<Informed> {
+        let near = from.error.as_ref().and_then(|error| error.linearised.clone());
+        let target = self.informed(target, &from.fit.contacts, near.as_ref())?;
+        let fit = self.disc_fitter().go_on(&from.fit, &target, COLD)?;
+        Some(self.settled(Informed { explanation: Explanation::of(fit, &target), target }))
+    }
+
+    /// Brings a fit and what its readings may be off by to agree.
+    fn settled(&self, mut found: Informed) -> Informed {
+        for renewal in 0..RENEWALS {
+            let Informed { explanation, target } = &found;
+            // What contacts are missing for says nothing of the detector.
+            let is_hopeless = explanation.fit.cost > HOPELESS * target.count() as f64;
+            if is_hopeless && renewal > 0 {
+                break;
+            }
+            let nearer = if is_hopeless { None } else { self.nearer_detector(&explanation.fit, target) };
+            let is_settled = target.error().is_none_or(|error| error.is_settled(&explanation.fit.volts));
+            if nearer.is_none() && is_settled {
+                break;
+            }
+            let near = nearer.or_else(|| explanation.error.as_ref()?.linearised.clone());
+            let contacts = &explanation.fit.contacts;
+            let renewed = self.informed(target, contacts, near.as_ref());
+            let fitted = renewed.and_then(|target| {
+                let fit = self.disc_fitter().fit(contacts.clone(), &target, COLD)?;
+                let explanation = Explanation { fit, error: target.error().cloned(), ..explanation.clone() };
+                Some(Informed { explanation, target })
+            });
+            let Some(fitted) = fitted else { break };
+            found = fitted;
+        }
+        found
+    }
+
+    /// More contacts as long as the evidence for them grows, then whatever other set of them is more likely.
+    fn grown(&self, first: Informed, better: &mut Better<'_>) -> Informed {
+        let (mut best, more) = self.one_by_one(first, better);
+        for _ in 0..if more.is_break() { 0 } else { GROWTHS } {
+            let fit = &best.explanation.fit;
+            let starts = self.pairs(fit, &best.target);
+            let grown = self.grow(fit.clone(), starts, &best.target, &mut |_| ControlFlow::Continue(()));
+            let is_other = grown.fit.contacts.len() != fit.contacts.len();
+            let grown = self.settled(Informed { explanation: grown, target: best.target.clone() });
+            let is_better = self.whole_evidence(&grown) > self.whole_evidence(&best);
+            if is_better {
+                best = grown;
+                if better(&best.explanation).is_break() {
+                    break;
+                }
+            } else if !is_other {
+                // The same contacts, with what is known of their count.
+                best.explanation.certainty = grown.explanation.certainty;
+            }
+            if !(is_better && is_other) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// One contact more at a time, each with what its readings may be off by, while there are too few.
+    fn one_by_one(&self, first: Informed, better: &mut Better<'_>) -> (Informed, ControlFlow<()>) {
+        let (mut best, mut last) = (first.clone(), first);
+        while self.is_misfit(&best.explanation.fit, &best.target) {
+            let Informed { explanation: Explanation { fit, .. }, target } = last;
+            if fit.contacts.len() >= self.settings.most {
+                break;
+            }
+            let starts = self.pairs(&fit, &target);
+            let Some(more) = self.one_more(&fit, starts, &target) else { break };
+            last = self.settled(Informed { explanation: Explanation::of(more, &target), target });
+            if self.whole_evidence(&last) > self.whole_evidence(&best) {
+                best = last.clone();
+                if better(&best.explanation).is_break() {
+                    return (best, ControlFlow::Break(()));
+                }
+            } else if last.explanation.fit.contacts.len() > best.explanation.fit.contacts.len() + 1 {
+                break;
+            }
+        }
+        (best, ControlFlow::Continue(()))
+    }
+
+    fn better_informed(&self, one: Informed, other: Informed) -> Informed {
+        if self.whole_evidence(&other) > self.whole_evidence(&one) { other } else { one }
+    }
+
+    /// Logarithm of the evidence, with the determinant that explanations of one target have in common.
+    fn whole_evidence(&self, found: &Informed) -> f64 {
+        self.evidence(&found.explanation.fit) - 0.5 * found.target.ln_determinant()
+    }
+
+    /// The same target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
+    /// if the detector is known exactly, or contacts make no sense.
+    fn informed(&self, target: &Target, contacts: &[Contact], near: Option<&Arc<Linearised>>) -> Option<Target> {
+        let detector = self.problem.detector();
+        let nuisance = self.problem.nuisance()?;
+        let mut patterns_v = nuisance.patterns_v(contacts, detector).ok()?;
+        let made_for = readings_v(&self.problem.model.impedance_ohm(contacts).ok()?, detector);
+        let of_board = self.errors.patterns_v(&made_for);
+        let columns = patterns_v.ncols();
+        patterns_v = patterns_v.resize_horizontally(columns + of_board.ncols(), 0.0);
+        patterns_v.columns_mut(columns, of_board.ncols()).copy_from(&of_board);
+        target.mask(&mut patterns_v);
+        let least_v = self.errors.least_v(made_for.largest_v());
+        let made_for = made_for.volts().to_vec();
+        let error = ApproximationError::of(&patterns_v, nuisance.directions(), made_for, least_v);
+        Some(target.with(match near {
+            Some(near) => error.about(near, near.detector.readings_v(contacts, detector).ok()?.volts()),
+            None => error,
+        }))
+    }
+
+    /// The detector that a fit makes most likely, if it is far from where the target is linear.
+    fn nearer_detector(&self, fit: &DiscFit, target: &Target) -> Option<Arc<Linearised>> {
+        let (nuisance, error) = (self.problem.nuisance()?, target.error()?);
+        let steps = target.steps(&fit.volts);
+        if !error.is_far(&steps, target.deviation_v()) {
+            return None;
+        }
+        let detector = nuisance.similar(&steps).ok()?;
+        Some(Arc::new(Linearised { steps, detector }))
+    }
+}

@@ -1,0 +1,89 @@
+//! Contacts from one frame to the next, and which of them are still there.
+
+use super::discs::{DiscFit, Effort, PARAMETERS};
+use super::{ContactFinder, Explanation};
+use crate::solve::fit::target::Target;
+use tactomo_physics::scene::Contact;
+
+/// From the frame before.
+const WARM: Effort = Effort { steps: 2, gain: 0.2, share: 0.0 };
+/// From some frames ago.
+const CAUGHT_UP: Effort = Effort { steps: 6, gain: 0.2, share: 0.0 };
+/// A contact is lost when the logarithm of its conductance is known no better than this, and it is light.
+const WEAK: f64 = 0.3;
+/// Share of the conductance of the frame before, below which a contact may be let go.
+const LIFTED: f64 = 0.6;
+
+impl ContactFinder {
+    /// An explanation of some frames ago, brought to this one.
+    pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+        let fit = self.disc_fitter().go_on(&found.fit, target, CAUGHT_UP)?;
+        Some(Explanation { fit, error: target.error().cloned(), ..found })
+    }
+
+    /// An explanation of this frame, by what another target says of the readings' errors.
+    pub(super) fn judged(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+        let fit = self.disc_fitter().go_on(&found.fit, target, Effort { steps: 0, ..WARM })?;
+        Some(Explanation { fit, error: target.error().cloned(), ..found })
+    }
+
+    /// The explanation, or what is left of it without the contacts that may not be there if that is more likely; `None` if nothing is.
+    pub(super) fn without_weak(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+        if target.is_silent() {
+            return None;
+        }
+        let weak = self.weak(&found.fit);
+        if weak.is_empty() && !self.is_misfit(&found.fit, target) {
+            return Some(found);
+        }
+        let evidence = self.evidence(&found.fit);
+        if self.evidence_of_nothing(target) > evidence {
+            return None;
+        }
+        let kept =
+            found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
+        let kept: Vec<_> = kept.collect();
+        if weak.is_empty() || kept.is_empty() {
+            return Some(found);
+        }
+        match self.disc_fitter().fit(kept, target, WARM) {
+            Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, certainty: None, ..found }),
+            _ => Some(found),
+        }
+    }
+
+    /// The same contacts in the next frame, less those that were let go; `None` if that makes no sense.
+    pub(super) fn follow(&self, last: &Explanation, target: &Target) -> Option<Explanation> {
+        let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
+        let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
+        let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
+        Some(Explanation { fit, certainty, error: last.error.clone() })
+    }
+
+    /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each
+    /// step, however light the contact is to become.
+    fn without_lifted(&self, before: &DiscFit, fit: DiscFit, target: &Target) -> DiscFit {
+        let is_lighter = |(now, before): &(&Contact, &Contact)| now.conductance_s < LIFTED * before.conductance_s;
+        let kept = fit.contacts.iter().zip(&before.contacts).filter(|pair| !is_lighter(pair)).map(|(now, _)| *now);
+        let kept: Vec<_> = kept.collect();
+        if kept.is_empty() || kept.len() == fit.contacts.len() {
+            return fit;
+        }
+        match self.disc_fitter().fit(kept, target, WARM) {
+            Some(fewer) if self.evidence(&fewer) > self.evidence(&fit) => fewer,
+            _ => fit,
+        }
+    }
+
+    /// Contacts so weak that they may not be there. The conductance of a firm one is not known well either: more of it would change
+    /// little.
+    pub(super) fn weak(&self, fit: &DiscFit) -> Vec<usize> {
+        let covariance = fit.covariance();
+        let is_weak = |k: &usize| {
+            let log = PARAMETERS * k + 2;
+            let is_unsure = covariance.as_ref().is_none_or(|all| all[(log, log)] > WEAK * WEAK);
+            is_unsure && fit.contacts[*k].conductance_s < self.sheet_s
+        };
+        (0..fit.contacts.len()).filter(is_weak).collect()
+    }
+}

@@ -1,0 +1,374 @@
+//! A few contacts fitted to the full contact physics, off any grid.
+//!
+//! Each contact is a disc with a place, a conductance and a radius. Discs are fitted with the forward model itself ([`discs`]), one
+//! more at a time from where it would explain most ([`scan`], in which contacts are [spots](crate::solve::fit::spots) of a small network), as long as
+//! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
+
+mod bank;
+#[cfg(test)]
+mod coverage_tests;
+mod discs;
+mod doubt;
+mod evidence;
+mod exchange;
+mod focus;
+mod informed;
+mod keep;
+#[cfg(test)]
+mod motion_tests;
+#[cfg(test)]
+mod places_tests;
+mod rows;
+mod scan;
+mod search;
+mod solver;
+mod staying;
+#[cfg(test)]
+mod tests;
+
+use std::ops::ControlFlow;
+use std::sync::{Arc, OnceLock};
+
+use nalgebra::DMatrix;
+
+use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
+use self::evidence::Prior;
+use self::exchange::{Logs, Usual};
+use self::scan::Scan;
+pub use self::solver::Contacts;
+pub(crate) use self::solver::{ContactFollower, ContactSearcher};
+use crate::solve::answer::{Calibrated, Flags, FoundContact, Solution, SolveError, Uncertainty, check};
+use crate::solve::before::still;
+use crate::solve::before::still::{Mean, Still};
+use crate::solve::fit::approximation::ApproximationError;
+use crate::solve::fit::evidence::{Evidence, misfit_limit};
+use crate::solve::fit::spots::Network;
+use crate::solve::fit::target::{Errors, Target};
+use crate::solve::problem::Problem;
+use tactomo_physics::forward::spots::SpotFields;
+use tactomo_physics::forward::{ForwardError, ForwardModel};
+use tactomo_physics::readings::Readings;
+
+/// Places of the scan.
+const SCAN_PLACES: usize = 600;
+/// Conductance of a contact in sheet conductances above which it is taken as saturated.
+const SATURATED: f64 = 270.0;
+/// Readings above this share of the converter's range, or of the drive, say nothing.
+const FULL: f64 = 0.995;
+/// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
+const KNOWN: f64 = 0.2;
+
+/// Error of a detector as built, as a share of the largest reading, as long as no more is known of it: one contact leaves 0.044 in the
+/// median of 100 presses on ten detectors drawn from the usual tolerances of `square-60`. With 0.05, places are off by 1.0 standard
+/// error in the median, and 95 % by less than 3.3.
+const UNKNOWN: f64 = 0.05;
+
+/// Factor on the standard errors of places from which a calibration is worth to be asked for.
+const WORTH: f64 = 2.0;
+
+/// How contacts are fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSettings {
+    /// Most contacts.
+    pub most: usize,
+    /// Usual radius of contacts (m): what is known of it before anything is read, a fingertip's or that of the indenter.
+    pub radius_m: f64,
+    /// Standard deviation of the logarithm of a radius: 0.7 is a factor of two or so.
+    pub radius_deviation: f64,
+    /// Error of the forward model, as a share of the largest reading.
+    pub model_error: f64,
+    /// Error of the model's, or the builder's, impedance of a pad, as a share of it.
+    pub pad_error: f64,
+}
+
+impl ContactSettings {
+    /// For fingers on a detector: contacts of a sixth of the mean distance of its electrodes.
+    pub fn of(problem: &Problem) -> Self {
+        // Against three times its nodes, a shell of 2000 is off by 0.0005 (curved) to 0.002 (0.4 mm of square-60), in the root of
+        // the mean square and but for the pads' own impedances; the slab by 0.0002 to 0.0005.
+        let model_error = if problem.model.name() == "shell" { 0.0015 } else { 0.0003 };
+        // Five fingers and a palm.
+        Self { most: 6, radius_m: problem.usual_radius_m(), radius_deviation: 0.7, model_error, pad_error: 0.03 }
+    }
+}
+
+/// What finds contacts: the same for all frames, and shared by the threads that follow and search.
+pub(crate) struct ContactFinder {
+    problem: Problem,
+    /// To look where contacts may be.
+    rough: Arc<dyn ForwardModel>,
+    settings: ContactSettings,
+    network: Network,
+    fields: Box<dyn SpotFields>,
+    scan: Scan,
+    sheet_s: f64,
+    spacing_m: f64,
+    /// Widest radius of a disc (m).
+    widest_m: f64,
+    errors: Errors,
+    prior: Prior,
+    /// The grounds that see a contact come; made when they are asked for first.
+    watching: OnceLock<Vec<usize>>,
+}
+
+/// Contacts that explain a frame, for another frame to go on from.
+#[derive(Clone, Debug)]
+pub(crate) struct Found(Explanation);
+
+/// Contacts that explain a frame.
+#[derive(Clone, Debug)]
+struct Explanation {
+    fit: DiscFit,
+    /// Probability of their count, among the counts that were tried; none once it has changed without a search.
+    certainty: Option<f64>,
+    /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
+    error: Option<Arc<ApproximationError>>,
+}
+
+/// Takes each better explanation on the way of a search, and ends it if nothing more is wanted.
+type Better<'a> = dyn FnMut(&Explanation) -> ControlFlow<()> + 'a;
+
+impl Found {
+    /// What the readings may be off by together, by which it was compared with others.
+    pub fn error(&self) -> Option<&Arc<ApproximationError>> {
+        self.0.error.as_ref()
+    }
+}
+
+impl Explanation {
+    /// A fit whose count was not compared with others.
+    fn of(fit: DiscFit, target: &Target) -> Self {
+        Self { fit, certainty: None, error: target.error().cloned() }
+    }
+
+    /// A fit, with the logarithms of the evidence for each count.
+    fn new(fit: DiscFit, by_count: &[f64], target: &Target) -> Self {
+        let of = by_count[fit.contacts.len()];
+        let all: f64 = by_count.iter().map(|other| (other - of).exp()).sum();
+        let certainty = Some(1.0 / all).filter(|share| share.is_finite());
+        Self { fit, certainty, error: target.error().cloned() }
+    }
+}
+
+impl ContactFinder {
+    /// Makes it ready for a problem.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the model has no spots.
+    pub fn new(problem: &Problem, settings: ContactSettings) -> Result<Self, ForwardError> {
+        let detector = problem.detector();
+        let fields = problem.model.spots(settings.radius_m).ok_or_else(|| ForwardError::Detector {
+            detector: detector.name.clone(),
+            what: format!("the {} has no fields of single contacts", problem.model.name()),
+        })?;
+        let network = Network::new(detector, problem.model.electrode_fields_ohm());
+        Ok(Self {
+            scan: Scan::new(&*fields, &network, SCAN_PLACES),
+            network,
+            fields,
+            errors: Errors {
+                noise_v: detector.adc.deviation_v(),
+                rounding_v: still::rounding_v(&detector.adc),
+                model: settings.model_error,
+                detector: (!detector.unknowns().directions.is_empty()).then_some(UNKNOWN),
+                pad: settings.pad_error,
+                drive_v: detector.drive_v,
+                full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
+                converters: detector.converters.clone().into(),
+                converter_of: detector.electrodes.iter().map(|pad| pad.converter).collect(),
+            },
+            sheet_s: detector.sheet_conductance_s(),
+            spacing_m: problem.spacing_m(),
+            widest_m: discs::widest_m(problem),
+            prior: Prior {
+                area_m2: problem.jacobian.image_mesh.node_areas_m2.iter().sum(),
+                radius_deviation: settings.radius_deviation,
+            },
+            watching: OnceLock::new(),
+            rough: problem.model.rough().unwrap_or_else(|| Arc::clone(&problem.model)),
+            problem: problem.clone(),
+            settings,
+        })
+    }
+
+    /// Checks that readings can be those of the detector.
+    ///
+    /// # Errors
+    /// [`SolveError`] if they cannot.
+    pub fn check(&self, readings: &Readings) -> Result<(), SolveError> {
+        check(readings, self.network.electrodes())
+    }
+
+    /// What the mean of some frames is fitted as; `error` is what they may be off by together, if the detector is not known exactly.
+    ///
+    /// # Errors
+    /// [`SolveError`] if they cannot be those of the detector.
+    pub fn target_of(&self, mean: &Mean, error: Option<&Arc<ApproximationError>>) -> Result<Target, SolveError> {
+        self.check(&mean.readings)?;
+        Ok(match error {
+            Some(_) => Target::of_mean(&mean.readings, mean.frames, &self.errors, error),
+            None => Target::provisional(&mean.readings, mean.frames, &self.errors),
+        })
+    }
+
+    /// What the mean of some frames is searched in: what they may be off by together is found with the contacts, once that can be.
+    ///
+    /// # Errors
+    /// [`SolveError`] if they cannot be those of the detector.
+    pub fn target_to_search(&self, mean: &Mean) -> Result<Target, SolveError> {
+        if self.problem.nuisance().is_none() {
+            return self.target_of(mean, None);
+        }
+        self.check(&mean.readings)?;
+        Ok(Target::of_mean(&mean.readings, mean.frames, &self.errors, None))
+    }
+
+    /// Whether it is known by now what the readings of a provisional target may be off by together.
+    pub fn is_outdated(&self, target: &Target) -> bool {
+        target.is_provisional() && self.knows_unknowns()
+    }
+
+    /// Whether it is known by now what readings may be off by together.
+    pub fn knows_unknowns(&self) -> bool {
+        self.problem.made_already().is_some()
+    }
+
+    /// What averages frames that stand still.
+    pub fn still(&self) -> Still {
+        Still::new(self.errors.noise_v)
+    }
+
+    /// What is known where there is no contact.
+    pub fn nothing(&self, target: &Target) -> Solution {
+        // No voltage of a board is far beyond its drive.
+        let held = |volts: &f64| volts.clamp(-2.0 * self.errors.drive_v, 2.0 * self.errors.drive_v);
+        let readings = target.readings();
+        let n = readings.electrodes();
+        let touch_v = (0..n * n).map(|i| readings.touch_v(i / n, i % n));
+        let squares: f64 = touch_v.map(|volts| (held(&volts) / target.noise_v).powi(2)).sum();
+        let residual = Some((squares / target.count().max(1) as f64).sqrt());
+        Solution { residual, ..Solution::default() }
+    }
+
+    /// Readings that are left to noise, which is the sum of squares that noise alone leaves.
+    fn freedom(&self, fit: &DiscFit, target: &Target) -> f64 {
+        target.count().saturating_sub(PARAMETERS * fit.contacts.len()).max(1) as f64
+    }
+
+    /// Whether more is left than noise and model error leave.
+    fn is_misfit(&self, fit: &DiscFit, target: &Target) -> bool {
+        let freedom = self.freedom(fit, target);
+        fit.cost > freedom * misfit_limit(freedom)
+    }
+
+    /// What contacts leave of the frames, and what they take for that.
+    pub fn evidence_of_found(&self, found: &Found) -> Evidence {
+        self.evidence_of(&found.0.fit)
+    }
+
+    /// What a fit leaves, and what its contacts take for that: in squares, what the logarithm of their evidence has besides.
+    fn evidence_of(&self, fit: &DiscFit) -> Evidence {
+        let parameters = (PARAMETERS * fit.contacts.len()) as f64;
+        Evidence { cost: fit.cost, price: -2.0 * self.evidence(fit) - fit.cost, parameters }
+    }
+
+    /// What a fit leaves whose sum of squares is `cost`: root mean square, in standard deviations of the noise.
+    fn residual(&self, fit: &DiscFit, cost: f64, target: &Target) -> f64 {
+        (cost / self.freedom(fit, target)).sqrt() * target.deviation_v() / target.noise_v
+    }
+
+    /// An explanation as a solution, but for the certainty of its count: whoever answers knows whether it is an answer.
+    fn solution(&self, found: &Explanation, target: &Target) -> Solution {
+        let fit = &found.fit;
+        let covariance = fit.covariance();
+        let logs: Vec<_> = (0..fit.contacts.len()).map(|k| self.logs(fit, k, covariance.as_ref())).collect();
+        let mut contacts: Vec<_> =
+            logs.iter().enumerate().map(|(k, logs)| self.contact(fit, k, covariance.as_ref().zip(*logs))).collect();
+        self.add_unseen_scale(fit, &mut contacts);
+        // A standard error more and it is as good as perfect.
+        let perfect = (SATURATED * self.sheet_s).ln();
+        let is_perfect = |logs: &Option<Logs>| {
+            logs.is_some_and(|Logs { conductance: [mean, deviation], .. }| mean + deviation > perfect)
+        };
+        let calibrated = self.calibrated(fit, target);
+        let flags = Flags {
+            saturated: target.is_saturated() || logs.iter().any(is_perfect),
+            misfit: self.is_misfit(fit, target),
+            unfinished: !fit.settled || target.is_provisional(),
+            calibrate: calibrated.is_some(),
+            ..Flags::default()
+        };
+        let residual = Some(self.residual(fit, fit.cost, target));
+        Solution { contacts, residual, flags, calibrated, ..Solution::default() }
+    }
+
+    /// A contact of a fit with its standard errors: of a place no more than that of one anywhere on the detector.
+    fn contact(&self, fit: &DiscFit, k: usize, known: Option<(&DMatrix<f64>, Logs)>) -> FoundContact {
+        let contact = fit.contacts[k];
+        let conductance_s = known.map_or(contact.conductance_s, |(_, logs)| logs.conductance[0].exp());
+        let most_m = self.problem.detector().outline.size_m().map(|side_m| side_m / 12f64.sqrt());
+        let uncertainty = known.map(|(covariance, logs)| {
+            let place = place_uncertainty(fit, k, covariance);
+            let conductance_s = conductance_s * logs.conductance[1];
+            Uncertainty { conductance_s, x_m: place.x_m.min(most_m[0]), y_m: place.y_m.min(most_m[1]), ..place }
+        });
+        let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
+        FoundContact {
+            z_m: contact.z_m,
+            apparent_conductance_s: Some(contact.conductance_s / (1.0 + fit.exchange(k))),
+            uncertainty,
+            radius_m: radius.map(|[mean, _]| mean.exp()),
+            ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)
+        }
+    }
+
+    /// Adds to the standard errors of conductances what of the detector no readings tell from them.
+    fn add_unseen_scale(&self, fit: &DiscFit, contacts: &mut [FoundContact]) {
+        let Some(nuisance) = self.problem.made_already() else { return };
+        for (contact, deviation) in contacts.iter_mut().zip(nuisance.conductance_deviations(&fit.contacts)) {
+            let conductance_s = contact.conductance_s;
+            let uncertainty = contact.uncertainty.iter_mut();
+            uncertainty.for_each(|known| known.conductance_s = known.conductance_s.hypot(conductance_s * deviation));
+        }
+    }
+
+    /// What a calibration would bring, if the detector as described leaves more of the readings than noise and the model's own error do, and
+    /// that is what places are not known better for.
+    fn calibrated(&self, fit: &DiscFit, target: &Target) -> Option<Calibrated> {
+        let exact = target.as_exact(&self.errors)?;
+        let freedom = self.freedom(fit, &exact);
+        let is_off = exact.cost(&fit.volts) > freedom * misfit_limit(freedom);
+        let known = self.disc_fitter().covariance(fit, &exact)?;
+        let largest_m = |covariance: &DMatrix<f64>| {
+            let of = |k: usize| place_uncertainty(fit, k, covariance);
+            (0..fit.contacts.len()).map(of).map(|place| place.x_m.max(place.y_m)).fold(0.0, f64::max)
+        };
+        let [now_m, calibrated_m] = [&fit.covariance()?, &known].map(largest_m);
+        (is_off && now_m > WORTH * calibrated_m).then_some(Calibrated { now_m, calibrated_m })
+    }
+
+    /// What the readings say of a contact's conductance and radius.
+    fn logs(&self, fit: &DiscFit, k: usize, covariance: Option<&DMatrix<f64>>) -> Option<Logs> {
+        let usual = Usual {
+            conductance_s: self.sheet_s,
+            most_s: CONDUCTANCES[1] * self.sheet_s,
+            radius_m: self.settings.radius_m,
+            radius_deviation: self.settings.radius_deviation,
+        };
+        usual.logs(fit, k, covariance?)
+    }
+}
+
+/// Standard errors of a contact's place.
+fn place_uncertainty(fit: &DiscFit, k: usize, covariance: &DMatrix<f64>) -> Uncertainty {
+    let of = |i: usize, j: usize| covariance[(PARAMETERS * k + i, PARAMETERS * k + j)];
+    let (along, unit_m) = fit.along(k);
+    // Directions along the surface to x and y.
+    let parts = |axis: usize| [along[0][axis], along[1][axis]];
+    let between = |a: [f64; 2], b: [f64; 2]| {
+        (0..4).map(|index| (index / 2, index % 2)).map(|(i, j)| a[i] * b[j] * of(i, j)).sum::<f64>()
+    };
+    let [x, y] = [0, 1].map(|axis| between(parts(axis), parts(axis)).max(0.0).sqrt());
+    let correlation = (between(parts(0), parts(1)) / (x * y).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
+    Uncertainty { x_m: x * unit_m, y_m: y * unit_m, correlation, conductance_s: 0.0 }
+}

@@ -1,0 +1,177 @@
+//! Contacts followed by rows of readings as they come, of scans that read some rows at a time.
+//!
+//! What is followed was searched in all readings. From then on each frame of a few rows moves it by what is new in them ([`Bank`]). What
+//! all readings are off by together, as those of a detector that is not known exactly are, was found with the contacts, and is taken off.
+
+use super::bank::{Bank, Rows};
+use super::discs::{DiscFit, DiscFitter, Effort};
+use super::staying::Staying;
+use super::{ContactFinder, Explanation};
+use crate::solve::fit::target::{Errors, Target, dot};
+use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Share of what readings are off by that remains when a contact has moved on.
+const REMAINS: f64 = 0.2;
+/// Steps of a frame at most, and the way, in radii or logarithms, that needs no further one.
+const STEPS: usize = 3;
+const SMALL: f64 = 0.1;
+/// Standard deviations of the sum of squares over what noise leaves, at which rows do not fit, and frames in a row after which a search is
+/// worth it: a contact that comes leaves hundreds.
+const UNFIT: f64 = 5.0;
+const FRAMES: u32 = 3;
+/// Logarithm of the odds by which frames of late have to speak for no contact before it is let go.
+const GONE: f64 = 12.0;
+
+/// Of a contact that has just come.
+const GLIMPSE: Effort = Effort { steps: 4, gain: 1.0, share: 0.05 };
+
+/// What is known besides the contacts that are followed.
+#[derive(Clone, Debug)]
+pub(super) struct RowState {
+    bank: Bank,
+    /// What model and board are off by goes into the parameters however many rows come.
+    staying: Staying,
+    /// What all readings are off by (V); none of a detector that is as described.
+    off_v: Vec<f64>,
+    /// Frames in a row that do not fit.
+    unfit: u32,
+    /// Logarithm of the odds for there being nothing, of late.
+    gone: f64,
+}
+
+/// What has come of a frame.
+pub(super) enum Step {
+    /// The contacts, and whether they have to be searched.
+    Followed(Explanation, Box<RowState>, bool),
+    /// Nothing touches any more.
+    Gone,
+    /// They could not be brought to the frame.
+    Lost,
+}
+
+impl RowState {
+    /// From an explanation by all readings of `target`.
+    pub fn new(found: &Explanation, target: &Target) -> Self {
+        let off_v = if target.error().is_some() { target.likely_off_v(&found.fit.volts) } else { Vec::new() };
+        Self {
+            bank: Bank::new(found.fit.normal.clone()),
+            staying: Staying::new(&found.fit, target),
+            off_v,
+            unfit: 0,
+            gone: 0.0,
+        }
+    }
+
+    /// Whether what is followed fits the newest rows.
+    pub fn fits(&self) -> bool {
+        self.unfit == 0
+    }
+
+    /// Whether what is followed is believed to move.
+    pub fn moves(&self) -> bool {
+        self.bank.moves()
+    }
+
+    /// What all readings are off by (V); nothing of a detector that is as described.
+    pub fn off_v(&self) -> &[f64] {
+        &self.off_v
+    }
+}
+
+impl ContactFinder {
+    /// What rows are fitted as, less what all readings are off by; where that is not known yet of a detector, each by itself may be.
+    pub(super) fn target_of_rows(&self, rows: &Readings, off_v: &[f64]) -> Target {
+        if off_v.is_empty() {
+            return Target::provisional(rows, 1, &self.errors);
+        }
+        let mut less = rows.clone();
+        less.volts_mut().iter_mut().zip(off_v).for_each(|(volts, off)| *volts -= off);
+        let root_v = (dot(off_v, off_v) / off_v.len() as f64).sqrt();
+        let model = self.errors.model.hypot(REMAINS * root_v / rows.largest_v().max(root_v));
+        Target::of_mean(&less, 1, &Errors { model, ..self.errors.clone() }, None)
+    }
+
+    /// Brings contacts to rows that come `elapsed_s` (s) after those before.
+    pub(super) fn step(&self, last: Explanation, mut state: RowState, target: &Target, elapsed_s: f64) -> Step {
+        if state.bank.predict(elapsed_s, &last.fit.units_m()).is_none() {
+            return Step::Lost;
+        }
+        let Some(mut fit) = self.moved_by(last.fit.clone(), &mut state.bank, target) else { return Step::Lost };
+        let counted = target.at(&fit.volts).count() as f64;
+        let noise = counted + UNFIT * (2.0 * counted).sqrt();
+        state.unfit = if fit.cost > noise { state.unfit + 1 } else { 0 };
+        // What is gone is told by the rows alone: what they say for it is what a contact of that kind would have taken off.
+        state.gone = (state.gone + 0.5 * (fit.cost - target.cost_of_nothing())).max(0.0);
+        if state.gone > GONE || self.is_vanishing(&fit) {
+            return Step::Gone;
+        }
+        let search = state.unfit >= FRAMES;
+        state.staying.add(&fit, target, &self.errors, self.spacing_m);
+        let known = state.bank.information();
+        let stays = state.staying.covariance(&fit);
+        let told = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
+        (fit.normal, fit.settled) = (told().unwrap_or_else(|| known.clone()), true);
+        Step::Followed(Explanation { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
+    }
+
+    /// A first, rough contact in rows where something stands out.
+    pub(super) fn glimpsed(&self, target: &Target) -> Option<Explanation> {
+        let begun = self.begun(target)?;
+        let rough = DiscFitter { model: &*self.rough, ..self.disc_fitter() };
+        let first = rough.fit(begun, target, GLIMPSE)?;
+        let fit = self.disc_fitter().fit(first.contacts, target, Effort { steps: 1, ..GLIMPSE })?;
+        Some(Explanation::of(fit, target))
+    }
+
+    /// Whether what is followed has become so light that it cannot be told from nothing.
+    fn is_vanishing(&self, fit: &DiscFit) -> bool {
+        let least_s = VANISHING * self.sheet_s;
+        fit.contacts.iter().all(|contact| contact.conductance_s < least_s)
+    }
+
+    /// A fit moved to what its filters believe after the rows of a target.
+    fn moved_by(&self, mut fit: DiscFit, bank: &mut Bank, target: &Target) -> Option<DiscFit> {
+        let fitter = self.disc_fitter();
+        for step in 0..STEPS {
+            let units_m = fit.units_m();
+            let mut tried = bank.clone();
+            let way = tried.update(&rows_of(&fit, target))?;
+            let contacts: Vec<Contact> = fitter.moved(&fit, way.as_slice());
+            let next = fitter.next(&fit, contacts, target)?;
+            // A step that was too long or led beyond what makes sense was cut: the filters know what is left of it.
+            let gone = DVector::from_vec(fit.way_to(&next.contacts));
+            if step + 1 == STEPS || way.amax() < SMALL {
+                tried.shift(&(&gone - way));
+                tried.rescale(&units_m, &next.units_m());
+                *bank = tried;
+                return Some(next);
+            }
+            // A long way: once more from there, where the readings are linear.
+            bank.shift(&gone);
+            bank.rescale(&units_m, &next.units_m());
+            fit = next;
+        }
+        None
+    }
+}
+
+/// Conductance, in sheet conductances, below which nothing is told from a contact: a hundredth of the lightest that is found well.
+const VANISHING: f64 = 1e-5;
+
+/// What the rows of a target say at the contacts of a fit.
+fn rows_of(fit: &DiscFit, target: &Target) -> Rows {
+    let residuals = target.residuals(&fit.volts);
+    let active = target.at(&fit.volts);
+    let slopes: Vec<Vec<f64>> = fit.slopes_v().iter().map(|slope| active.whitened(slope)).collect();
+    let size = slopes.len();
+    let mut information = DMatrix::zeros(size, size);
+    for (i, j) in (0..size).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+        let product = dot(&slopes[i], &slopes[j]);
+        (information[(i, j)], information[(j, i)]) = (product, product);
+    }
+    let pull = DVector::from_iterator(size, slopes.iter().map(|slope| dot(slope, &residuals)));
+    Rows { information, pull, cost: dot(&residuals, &residuals) }
+}

@@ -1,0 +1,396 @@
+//! Contacts from frame to frame: followed, and searched where following does not explain the readings.
+
+mod by_rows;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use super::discs::DiscFit;
+use super::doubt::Doubt;
+use super::rows::RowState;
+use super::{ContactFinder, ContactSettings, Explanation, Found};
+use crate::solve::after::track::Tracker;
+use crate::solve::answer::{Calibrated, FoundContact, Solution, SolveError};
+use crate::solve::before::latest::Latest;
+use crate::solve::before::still::{Mean, Still};
+use crate::solve::fit::approximation::ApproximationError;
+use crate::solve::fit::evidence::Evidence;
+use crate::solve::fit::target::Target;
+use crate::solve::problem::Problem;
+use crate::solve::solver::{
+    Followed, Follower, Lead, Parts, Searcher, Solver, follow_and_search, follow_rows_and_search,
+};
+use tactomo_physics::forward::ForwardError;
+use tactomo_physics::readings::Readings;
+
+/// The sum of squares may be this times what the last search would leave of as many frames.
+const WORSE: f64 = 1.3;
+/// A scene that has not changed is searched again with so many times the frames: many frames show what one frame's noise hides.
+const MORE: usize = 2;
+
+/// Fits contacts.
+pub struct Contacts {
+    follower: FrameFollower,
+}
+
+/// Follows contacts in the mean of the frames that stand still.
+struct FrameFollower {
+    still: Still,
+    contacts: ContactFollower,
+}
+
+/// Follows contacts from frame to frame.
+pub(crate) struct ContactFollower {
+    finder: Arc<ContactFinder>,
+    last: Option<Explanation>,
+    searched: Searched,
+    /// Whether what is followed could not be brought to the newest frame.
+    is_stale: bool,
+    /// What is known besides by rows, since all readings were explained last.
+    rows: Option<Box<RowState>>,
+    /// The latest of each reading, while rows come.
+    latest: Option<Latest>,
+    /// Whether what is followed was found in some of the rows only.
+    is_glimpsed: bool,
+    /// Time since a search changed the number of contacts (s), until one does not: rows from before were told for other contacts' motion.
+    recounted_s: Option<f64>,
+    doubt: Doubt,
+    /// Time for which no row has said more than that its readings are below the converter's range (s).
+    silent_s: f64,
+    /// Whether it was found when what the readings may be off by together was not known yet.
+    is_provisional: bool,
+    /// What a calibration would bring, as all readings told of what is followed.
+    calibrated: Option<Calibrated>,
+    tracker: Tracker,
+    /// The tracker before this frame: a frame that has several answers is one frame.
+    before: Tracker,
+}
+
+/// What explained a frame, for another frame to go on from.
+#[derive(Clone, Debug, Default)]
+struct Explained {
+    contacts: Option<Box<Found>>,
+    /// The mean of the frames up to it as far as they stood still.
+    mean: Option<Mean>,
+}
+
+impl Explained {
+    fn new(contacts: Option<Found>, mean: Option<Mean>) -> Self {
+        Self { contacts: contacts.map(Box::new), mean }
+    }
+}
+
+/// What the last search has left.
+#[derive(Clone, Copy, Debug, Default)]
+struct Searched {
+    /// Sum of squares over what noise leaves.
+    excess: f64,
+    /// Frames in whose mean it has searched.
+    frames: usize,
+}
+
+/// Searches contacts.
+pub(crate) struct ContactSearcher {
+    finder: Arc<ContactFinder>,
+}
+
+impl Contacts {
+    /// Makes it ready for a problem.
+    ///
+    /// # Errors
+    /// [`ForwardError::Detector`] if the model has no spots.
+    pub fn new(problem: &Problem, settings: ContactSettings) -> Result<Self, ForwardError> {
+        let contacts = ContactFollower::new(Arc::new(ContactFinder::new(problem, settings)?));
+        Ok(Self { follower: FrameFollower { still: contacts.finder.still(), contacts } })
+    }
+
+    /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
+    pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
+        self.follower.contacts.finder.left_by_one(readings)
+    }
+
+    /// Share of readings that one contact leaves, as far as a look at every place tells, in some 10 us; of readings some of which are bounds, in some
+    /// 300 us.
+    pub(crate) fn roughly_left_by_one(&self, readings: &Readings) -> f64 {
+        self.follower.contacts.finder.roughly_left_by_one(readings)
+    }
+
+    #[cfg(test)]
+    pub(super) fn finder(&self) -> &ContactFinder {
+        &self.follower.contacts.finder
+    }
+}
+
+impl ContactFollower {
+    /// Follows nothing yet.
+    pub fn new(finder: Arc<ContactFinder>) -> Self {
+        let tracker = Tracker::new(finder.spacing_m);
+        let searched = Searched::default();
+        let before = tracker.clone();
+        Self {
+            finder,
+            last: None,
+            searched,
+            is_stale: false,
+            rows: None,
+            latest: None,
+            is_glimpsed: false,
+            recounted_s: None,
+            doubt: Doubt::default(),
+            silent_s: 0.0,
+            is_provisional: false,
+            calibrated: None,
+            before,
+            tracker,
+        }
+    }
+
+    /// What finds the contacts.
+    pub fn finder(&self) -> &Arc<ContactFinder> {
+        &self.finder
+    }
+
+    /// What is followed.
+    pub fn found(&self) -> Option<Found> {
+        self.last.clone().map(Found)
+    }
+
+    /// Derivatives of the readings by the parameters of what is followed (V).
+    pub fn slopes_v(&self) -> &[Vec<f64>] {
+        self.last.as_ref().map_or(&[], |last| last.fit.slopes_v())
+    }
+
+    /// What the readings of what is followed may be off by together.
+    pub fn error(&self) -> Option<&Arc<ApproximationError>> {
+        self.last.as_ref().and_then(|last| last.error.as_ref())
+    }
+
+    /// Brings the contacts to the next frame; whether they have to be searched.
+    pub fn follow(&mut self, target: &Target) -> bool {
+        let search = self.step_frame(target);
+        let fits = |last: &Explanation| !self.finder.is_misfit(&last.fit, target);
+        self.doubt.whole(!self.is_stale && self.last.as_ref().map_or(!search, fits));
+        search
+    }
+
+    fn step_frame(&mut self, target: &Target) -> bool {
+        self.before = self.tracker.clone();
+        (self.rows, self.latest) = (None, None);
+        let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
+        let Some(moved) = self.finder.follow(&last, target) else {
+            (self.last, self.is_stale) = (Some(last), true);
+            return true;
+        };
+        self.is_stale = false;
+        let Some(found) = self.finder.without_weak(moved, target) else { return self.finder.stands_out(target) };
+        let search = found.fit.cost > self.enough(&found.fit, target)
+            || target.frames >= MORE * self.searched.frames
+            || target.is_stale(&found.fit.volts)
+            || self.finder.is_outdated(target);
+        self.last = Some(found);
+        search
+    }
+
+    /// Takes what a search has found in the mean of some frames, if it explains this frame better than what is followed; whether the search has to be repeated, because
+    /// what it has found does not explain this frame as well as its own.
+    pub fn adopt(&mut self, found: Option<Found>, frames: usize, target: &Target) -> bool {
+        self.tracker = self.before.clone();
+        let expected_v = self.expected_v().map(<[f64]>::to_vec);
+        let count = |found: &Option<Explanation>| found.as_ref().map_or(0, |found| found.fit.contacts.len());
+        let before = count(&self.last);
+        let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
+        let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
+        self.last = self.last.take().and_then(|last| self.finder.judged(last, target));
+        let evidence = |found: &Option<Explanation>| {
+            let of = |found: &Explanation| self.finder.evidence(&found.fit);
+            found.as_ref().map_or_else(|| self.finder.evidence_of_nothing(target), of)
+        };
+        if self.is_stale || evidence(&caught_up) >= evidence(&self.last) {
+            (self.last, self.is_stale) = (caught_up, false);
+        }
+        self.recounted_s = (count(&self.last) != before).then_some(0.0);
+        self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(last, target)));
+        if let Some(mut latest) = self.latest.take() {
+            latest.exchange(expected_v.as_deref(), self.expected_v());
+            self.latest = Some(latest);
+        }
+        self.is_provisional = target.is_provisional();
+        self.calibrated = self.last.as_ref().and_then(|last| self.finder.calibrated(&last.fit, target));
+        let Some(last) = &self.last else { return self.finder.stands_out(target) };
+        self.searched =
+            Searched { excess: (left.min(last.fit.cost) - self.finder.freedom(&last.fit, target)).max(0.0), frames };
+        last.fit.cost > self.enough(&last.fit, target) || self.finder.is_outdated(target)
+    }
+
+    /// Sum of squares up to which what is followed explains the mean of some frames: what is not noise stands out by their number.
+    fn enough(&self, fit: &DiscFit, target: &Target) -> f64 {
+        let more = target.frames as f64 / self.searched.frames.max(1) as f64;
+        WORSE * (self.finder.freedom(fit, target) + more * self.searched.excess)
+    }
+
+    /// What is left of the frames that were followed last, and what that takes; of nothing, all of it.
+    pub fn evidence(&self, target: &Target) -> Evidence {
+        let nothing = || Evidence::of(target.cost_of_nothing(), 0);
+        self.last.as_ref().map_or_else(nothing, |last| self.finder.evidence_of(&last.fit))
+    }
+
+    /// Numbers contacts on from those that were found before.
+    pub fn inherit(&mut self, before: &[FoundContact]) {
+        self.tracker.inherit(before);
+        self.before = self.tracker.clone();
+    }
+
+    /// What is followed, as a solution, with the numbers that contacts keep.
+    pub fn solution(&mut self, target: &Target) -> Solution {
+        let mut solution =
+            self.last.as_ref().map_or_else(|| self.finder.nothing(target), |found| self.finder.solution(found, target));
+        solution.flags.unfinished |= self.is_stale;
+        // Among explanations none of which explains the readings, or of which better ones are still sought, the share of one says nothing.
+        let certainty = self.last.as_ref().and_then(|found| found.certainty);
+        solution.certainty = certainty.filter(|_| !solution.flags.is_doubtful());
+        self.tracker.follow(&mut solution.contacts);
+        solution
+    }
+
+    /// Follows nothing for a time, and keeps the numbers of contacts.
+    pub fn let_go(&mut self) {
+        (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
+        self.doubt = Doubt::default();
+        self.rows = None;
+    }
+
+    /// Forgets all.
+    pub fn reset(&mut self) {
+        self.let_go();
+        self.latest = None;
+        self.tracker.reset();
+        self.before = self.tracker.clone();
+    }
+}
+
+impl FrameFollower {
+    fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
+        self.contacts.finder.target_of(&self.still.mean_or(readings), self.contacts.error())
+    }
+}
+
+impl Follower for FrameFollower {
+    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
+        self.contacts.finder.check(readings)?;
+        self.still.add_beside(readings, self.contacts.slopes_v());
+        let target = self.target(readings)?;
+        let search = self.contacts.follow(&target);
+        Ok(Followed { solution: self.contacts.solution(&target), search })
+    }
+
+    fn follow_rows(&mut self, rows: &Readings, _latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        self.still.reset();
+        self.contacts.follow_rows(rows, elapsed_s)
+    }
+
+    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+        let lead: Explained = lead.known();
+        self.contacts.finder.check(readings)?;
+        match self.contacts.latest() {
+            Some(latest) => self.still.add(&latest.readings),
+            None => self.still.add_beside(readings, self.contacts.slopes_v()),
+        }
+        self.contacts.searched_in(lead.mean.as_ref());
+        let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
+        let target = self.contacts.finder.target_of(&self.still.mean_or(readings), error)?;
+        let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
+        let search = self.contacts.adopt(lead.contacts.map(|found| *found), frames, &target);
+        Ok(Followed { solution: self.contacts.solution(&target), search })
+    }
+
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        self.contacts.telling_grounds(count)
+    }
+
+    fn lead(&self) -> Lead {
+        let mean = self.contacts.latest().or_else(|| self.still.mean());
+        Lead::of(Explained::new(self.contacts.found(), mean))
+    }
+
+    fn inherit(&mut self, before: &[FoundContact]) {
+        self.contacts.inherit(before);
+    }
+
+    fn reset(&mut self) {
+        self.still.reset();
+        self.contacts.reset();
+    }
+}
+
+impl ContactSearcher {
+    /// Searches with what a follower follows with.
+    pub fn new(finder: Arc<ContactFinder>) -> Self {
+        Self { finder }
+    }
+
+    /// What contacts are in the mean of some frames, as a solution.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    pub fn solution(&self, found: &Found, mean: &Mean) -> Result<Solution, SolveError> {
+        let target = self.finder.target_of(mean, found.error())?;
+        Ok(self.finder.solution(&found.0, &target))
+    }
+
+    /// The contacts that explain the mean of some frames, and the solution that they are; `None` if nothing touches. Better ones on the way there go
+    /// to `found`, which may end the search.
+    pub fn contacts(
+        &self,
+        from: Option<Found>,
+        mean: &Mean,
+        found: &mut dyn FnMut(Found) -> ControlFlow<()>,
+    ) -> Result<Option<(Found, Solution)>, SolveError> {
+        let target = self.finder.target_to_search(mean)?;
+        let mut better = |better: &Explanation| found(Found(better.clone()));
+        let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
+        found
+            .map(|found| {
+                let found = Found(found);
+                Ok((found.clone(), self.solution(&found, mean)?))
+            })
+            .transpose()
+    }
+}
+
+impl Searcher for ContactSearcher {
+    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
+        let from: Explained = from.known();
+        let mean = from.mean.unwrap_or_else(|| Mean::of_frame(readings));
+        let mut better = |better| {
+            found(Lead::of(Explained::new(Some(better), Some(mean.clone()))));
+            ControlFlow::Continue(())
+        };
+        let found = self.contacts(from.contacts.map(|found| *found), &mean, &mut better)?.map(|(found, _)| found);
+        Ok(Lead::of(Explained::new(found, Some(mean))))
+    }
+}
+
+impl Solver for Contacts {
+    fn name(&self) -> &'static str {
+        "contacts"
+    }
+
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
+        let mut searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
+        follow_and_search(&mut self.follower, &mut searcher, readings)
+    }
+
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        let mut searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
+        follow_rows_and_search(&mut self.follower, &mut searcher, (rows, latest), elapsed_s)
+    }
+
+    fn reset(&mut self) {
+        self.follower.reset();
+    }
+
+    fn split(self: Box<Self>) -> Parts {
+        let searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
+        Parts { follower: Box::new(self.follower), searcher: Some(Box::new(searcher)) }
+    }
+}

@@ -1,0 +1,188 @@
+//! What a method is to those who run it: a solver, or its two halves.
+//!
+//! One half follows what is known from frame to frame, fast, and one searches thoroughly, slowly. Offline they take turns on every frame. Live, each
+//! has a thread of its own: the follower answers at the board's rate, and goes on from what a search has found once that explains the present better.
+
+use std::any::Any;
+use std::sync::Arc;
+
+use crate::solve::answer::{FoundContact, Solution, SolveError};
+use tactomo_physics::readings::Readings;
+
+/// A method that reads touch from the readings of a frame.
+pub trait Solver: Send + 'static {
+    /// Name on the command line.
+    fn name(&self) -> &'static str;
+
+    /// What the readings, less the baseline, say of the contacts.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
+    fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError>;
+
+    /// What rows of readings that come `elapsed_s` (s) after those before say, the others of which say [nothing](tactomo_physics::readings::Says);
+    /// `latest` are the latest of all. A solver that does not go by rows takes those.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector the solver was made for.
+    fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
+        let _ = (rows, elapsed_s);
+        self.solve(latest)
+    }
+
+    /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.
+    fn reset(&mut self) {}
+
+    /// The halves of it that a live picture runs side by side: by default all of it in the follower.
+    fn split(self: Box<Self>) -> Parts {
+        Parts { follower: Box::new(Direct(self)), searcher: None }
+    }
+}
+
+/// Follows what is known from frame to frame.
+pub trait Follower: Send {
+    /// The answer for the next frame.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError>;
+
+    /// The answer for rows of readings that come `elapsed_s` (s) after those before, the others of which say
+    /// [nothing](tactomo_physics::readings::Says); `latest` are the latest of all, which are taken by a follower that does not go by rows.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        let _ = (rows, elapsed_s);
+        self.follow(latest)
+    }
+
+    /// Goes on from what a search has found, if that explains these readings better than what is followed; the answer for these
+    /// readings, which are those of the frame that was followed last, or of the next one.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError>;
+
+    /// The grounds whose rows tell most of what is followed, so many of them, some perhaps more than once; where nothing touches, those that
+    /// see a touch come. `None` where whole frames tell it best.
+    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        let _ = count;
+        None
+    }
+
+    /// What is followed: where a search may begin.
+    fn lead(&self) -> Lead;
+
+    /// Numbers contacts on from those that another follower found before.
+    fn inherit(&mut self, before: &[FoundContact]) {
+        let _ = before;
+    }
+
+    /// Forgets the frames before.
+    fn reset(&mut self);
+}
+
+/// Searches what explains a frame.
+pub trait Searcher: Send {
+    /// What explains `readings`, or the mean that `from` has of them and of those before; `from` is what was followed up to now, and
+    /// explains them partly. What is better than nothing on the way there goes to `found`.
+    ///
+    /// # Errors
+    /// [`SolveError`] if the readings cannot be those of the detector.
+    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError>;
+}
+
+/// The answer of a follower.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Followed {
+    /// What is known now.
+    pub solution: Solution,
+    /// Whether a search may find something better.
+    pub search: bool,
+}
+
+/// The halves of a solver.
+pub struct Parts {
+    /// Answers at once.
+    pub follower: Box<dyn Follower>,
+    /// Answers thoroughly; none where the follower's answers are.
+    pub searcher: Option<Box<dyn Searcher>>,
+}
+
+impl Parts {
+    /// All of a solver in the follower: every answer is thorough.
+    pub fn whole(solver: Box<dyn Solver>) -> Self {
+        Self { follower: Box::new(Direct(solver)), searcher: None }
+    }
+}
+
+/// What a frame was explained by, for another frame to go on from. What is inside only the method knows whose half made it.
+#[derive(Clone, Debug, Default)]
+pub struct Lead(Option<Arc<dyn Any + Send + Sync>>);
+
+impl Lead {
+    /// A lead of a method's own kind.
+    pub(crate) fn of<T: Any + Send + Sync>(known: T) -> Self {
+        Self(Some(Arc::new(known)))
+    }
+
+    /// What is known, if it is of this kind; else nothing.
+    pub(crate) fn known<T: Any + Send + Sync + Clone + Default>(self) -> T {
+        self.0.and_then(|known| known.downcast().ok()).map(Arc::unwrap_or_clone).unwrap_or_default()
+    }
+}
+
+/// One frame by both halves, one after the other: the thorough answer.
+pub(crate) fn follow_and_search(
+    follower: &mut dyn Follower,
+    searcher: &mut dyn Searcher,
+    readings: &Readings,
+) -> Result<Solution, SolveError> {
+    let followed = follower.follow(readings)?;
+    if !followed.search {
+        return Ok(followed.solution);
+    }
+    let lead = searcher.search(follower.lead(), readings, &mut |_| {})?;
+    Ok(follower.adopt(lead, readings)?.solution)
+}
+
+/// The same for rows of readings.
+pub(crate) fn follow_rows_and_search(
+    follower: &mut dyn Follower,
+    searcher: &mut dyn Searcher,
+    (rows, latest): (&Readings, &Readings),
+    elapsed_s: f64,
+) -> Result<Solution, SolveError> {
+    let followed = follower.follow_rows(rows, latest, elapsed_s)?;
+    if !followed.search {
+        return Ok(followed.solution);
+    }
+    let lead = searcher.search(follower.lead(), latest, &mut |_| {})?;
+    Ok(follower.adopt(lead, latest)?.solution)
+}
+
+/// A solver whose every answer is thorough, as a follower.
+pub(crate) struct Direct<S: ?Sized>(pub Box<S>);
+
+impl<S: Solver + ?Sized> Follower for Direct<S> {
+    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
+        Ok(Followed { solution: self.0.solve(readings)?, search: false })
+    }
+
+    fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
+        Ok(Followed { solution: self.0.solve_rows(rows, latest, elapsed_s)?, search: false })
+    }
+
+    fn adopt(&mut self, _lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+        self.follow(readings)
+    }
+
+    fn lead(&self) -> Lead {
+        Lead::default()
+    }
+
+    fn reset(&mut self) {
+        self.0.reset();
+    }
+}
