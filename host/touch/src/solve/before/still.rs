@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::solve::fit::target::dot;
+use crate::solve::fit::dot::dot;
 use tactomo_physics::detector::Adc;
 use tactomo_physics::readings::{Readings, Says};
 

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::target::dot;
+use super::dot::dot;
 use tactomo_physics::forward::Similar;
 
 /// Share of the variance of noise below which a direction is left out.

@@ -2,6 +2,7 @@
 
 pub(crate) mod approximation;
 pub(crate) mod balance;
+pub(crate) mod dot;
 pub(crate) mod evidence;
 pub(crate) mod interpolate;
 pub(crate) mod lambda;

@@ -11,8 +11,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use self::slopes::Slopes;
+use crate::solve::fit::dot::dot;
 use crate::solve::fit::least_squares::{Damping, NormalEquations, Schedule, Trial, covariance};
-use crate::solve::fit::target::{Target, dot};
+use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::spots::SpotFields;

@@ -10,7 +10,8 @@ use nalgebra::{Cholesky, DMatrix};
 use super::ContactFinder;
 use super::discs::{DiscFit, PARAMETERS};
 use crate::scanning::spread;
-use crate::solve::fit::target::{Target, dot};
+use crate::solve::fit::dot::dot;
+use crate::solve::fit::target::Target;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::readings::Readings;
 

@@ -7,7 +7,8 @@ use super::bank::{Bank, Rows};
 use super::discs::{DiscFit, DiscFitter, Effort};
 use super::staying::Staying;
 use super::{ContactFinder, Explanation};
-use crate::solve::fit::target::{Errors, Target, dot};
+use crate::solve::fit::dot::dot;
+use crate::solve::fit::target::{Errors, Target};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 

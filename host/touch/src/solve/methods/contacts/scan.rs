@@ -6,8 +6,9 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::discs::DiscFit;
 use crate::solve::fit::balance;
+use crate::solve::fit::dot::dot;
 use crate::solve::fit::spots::{LoadedSpot, Network};
-use crate::solve::fit::target::{Target, dot};
+use crate::solve::fit::target::Target;
 use tactomo_physics::forward::spots::{Spot, SpotFields};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::space;

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{DiscFitter, PARAMETERS, place_m};
-use crate::solve::fit::target::dot;
+use crate::solve::fit::dot::dot;
 use tactomo_physics::forward::readings_v;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::space::Place;
