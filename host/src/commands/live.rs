@@ -63,8 +63,7 @@ pub struct Args {
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Which rows the board scans: `whole` frames; `four` grounds far apart; `adaptive`, what the scene needs at the moment, which
-    /// gives some thousand answers a second where a slow line carries 230 whole frames; or a list of electrodes to ground, such as
-    /// 0,5,10,15
+    /// gives five times as many answers a second as whole frames on the ESP32's line; or a list of electrodes to ground, such as 0,5,10,15
     #[arg(long, value_name = "PLAN", default_value_t = ScanChoice::Whole, conflicts_with = "replay")]
     pub scan: ScanChoice,
     /// Ends this many seconds after the board said Hello

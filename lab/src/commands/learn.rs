@@ -16,8 +16,8 @@ use tactomo_cli::output::{self, NewFile, message};
 ///
 /// PRESSES is CSV with named columns: `x_m`, `y_m`, perhaps `z_m`, and perhaps `force_n`, `depth_m` or
 /// `conductance_s`, the first of which is learned too. All other columns are channels (V, less
-/// those at rest), but for those that count or tell the time (`id`, `index`, `frame`, `time_s`)
-/// and those in another unit (`..._mm`, `..._deg`). Or NPZ, with arrays of these names, a number a
+/// those at rest), but for those that count or tell the time (such as `id`, `press_id`, `frame`,
+/// `time_s`) and those in a unit that no reading has (such as `..._mm`, `..._n`, `..._deg`). Or NPZ, with arrays of these names, a number a
 /// press, and `readings_v`, a row a press. Some hundreds of presses are good.
 ///
 /// What is learned is told with its error on presses that are left out one after the other, and

@@ -136,7 +136,7 @@ impl Settings {
     fn requested(self) -> Result<RequestedSettings, &'static str> {
         let Self { settle_us, average_log2, max_frames_per_s, select_us, discarded } = self;
         let asked = RequestedSettings { settle_us, average_log2, max_frames_per_s, select_us, discarded };
-        let refusal = "a board averages at most 256 conversions, discards at most 15 and selects in at most 10000 us";
+        let refusal = "a board averages at most 256 conversions, discards at most 15, and waits at most 10000 us after it selects an electrode";
         if asked.is_valid() { Ok(asked) } else { Err(refusal) }
     }
 }
