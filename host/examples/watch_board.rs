@@ -22,7 +22,7 @@ struct Print;
 
 impl Listener for Print {
     fn touched(&mut self, event: &Arc<TouchEvent>) {
-        for contact in event.solution.contacts.iter().filter(|_| event.sequence % 50 == 0) {
+        for contact in event.solution.contacts.iter().filter(|_| event.sequence.is_multiple_of(50)) {
             println!("{:7.3} s  {:6.2} {:6.2} mm", event.time_s(), 1e3 * contact.x_m, 1e3 * contact.y_m);
         }
     }
