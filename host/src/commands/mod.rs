@@ -108,7 +108,8 @@ mod tests {
         command.clone().debug_assert();
         let mut listed: Vec<&str> = TASKS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
         let mut known: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
-        (listed.sort_unstable(), known.sort_unstable());
+        listed.sort_unstable();
+        known.sort_unstable();
         assert_eq!(listed, known);
     }
 }
