@@ -52,7 +52,7 @@ pub struct Args {
     /// Foam at hand, one of the paper's, A to D; give it again for more [default: all four]
     #[arg(long, value_name = "A..D", conflicts_with = "foams")]
     foam: Vec<char>,
-    /// Foams at hand: a TOML file with a [[foam]] for each, of name, conductivity_s_per_m, elasticity_pa and thicknesses_m
+    /// Foams at hand: a TOML file with a `[[foam]]` for each, of name, conductivity_s_per_m, elasticity_pa and thicknesses_m
     #[arg(long, value_name = "FILE")]
     foams: Option<PathBuf>,
     /// A detector to compare with what is found: a preset, or a TOML file
