@@ -154,30 +154,6 @@ fn a_detector_goes_through_its_file_into_the_model() {
 }
 
 #[test]
-fn the_study_of_contacts_has_a_row_for_each_class_and_shows_the_worst_scene() {
-    let args = ["study", "contacts", "--detector", "square-60", "--scenes", "5", "--worst", "1"];
-    let output = TACTOMO.run(&args);
-    let text = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{text}");
-    for class in [
-        "1 contact ",
-        "5 contacts ",
-        "all ",
-        "contrast above 100",
-        "in corners",
-        "radius above 3.5 mm",
-        "above 1 sheet",
-    ] {
-        assert_eq!(text.lines().filter(|line| line.starts_with(class)).count(), 1, "{class}: {text}");
-    }
-    assert!(text.contains("on square-60: ") && text.contains(" visible, "), "{text}");
-    let output = TACTOMO.run(&[&args[..], &["--json"]].concat());
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!((&report["rows"][5]["class"], &report["rows"][5]["scenes"]["scenes"]), (&"all".into(), &5.into()));
-    assert_eq!(report["worst"].as_array().map(Vec::len), Some(1));
-}
-
-#[test]
 fn scenes_faults_and_noise_repeat_with_their_seed() {
     let measured = |seed| {
         let faults = ["--fault", "open:3", "--fault", "contact-spread:0.3", "--fault", "uneven:0.2"];

@@ -72,7 +72,8 @@ fn tables_of_every_kind_give_the_same_contacts() {
     writer.add("other", &[1], &[1.0]).unwrap();
     writer.add("readings_v", &[2, 16, 16], &frames.concat()).unwrap();
     writer.finish().unwrap();
-    let [from_text, from_archive] = [&text, &archive].map(|file| lines(&[file.name(), "--lambda", "gcv"]));
+    let [from_text, from_archive] =
+        [&text, &archive].map(|file| lines(&[file.name(), "--solver", "tikhonov", "--lambda", "gcv"]));
     assert_eq!(from_text.len(), 2);
     assert_eq!(from_text[0]["contacts"], Value::Array(Vec::new()));
     assert_found(&from_text[1]);
@@ -170,7 +171,8 @@ fn what_is_found_goes_into_files() {
     let file = Temporary::with("in.csv", csv(&[vec![0.0; 256], readings()]));
     let [table, archive] = ["out.csv", "out.npz"].map(Temporary::new);
     for out in [&table, &archive] {
-        let output = TACTOMO.run(&["reconstruct", file.name(), "--images", "--out", out.name()]);
+        let output =
+            TACTOMO.run(&["reconstruct", file.name(), "--solver", "tikhonov", "--images", "--out", out.name()]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(output.stdout.is_empty());
         assert!(String::from_utf8_lossy(&output.stderr).contains("tikhonov: 2 frames, median"));
@@ -364,7 +366,7 @@ fn wrong_files_are_told() {
     let typo =
         Temporary::with("typo.csv", csv(&[vec![0.1; 256], vec![0.1; 256]]).replacen("0.1,0.1,0.1", "0.1,0.1,O.1", 1));
     let broken = Temporary::with("broken.npz", b"PK\x03\x04 and no more");
-    let recording = Temporary::with("cut.tactomo", b"\x89TCTO\r\n\x1a\x01");
+    let recording = Temporary::with("cut.tactomo", b"\x89TCTO\r\n\x1a\x02");
     let told = |file: &str, more: &[&str]| {
         let output = TACTOMO.run(&[&["reconstruct", file], more].concat());
         assert_eq!(output.status.code(), Some(1));

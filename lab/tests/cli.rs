@@ -39,3 +39,26 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
         assert!(message.contains(named), "{args:?}: {message}");
     }
 }
+
+#[test]
+fn the_study_of_contacts_has_a_row_for_each_class_and_shows_the_worst_scene() {
+    let args = ["study", "contacts", "--detector", "square-60", "--scenes", "5", "--worst", "1"];
+    let output = LAB.run(&args);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    for class in [
+        "1 contact ",
+        "5 contacts ",
+        "all ",
+        "contrast above 100",
+        "in corners",
+        "radius above 3.5 mm",
+        "above 1 sheet",
+    ] {
+        assert_eq!(text.lines().filter(|line| line.starts_with(class)).count(), 1, "{class}: {text}");
+    }
+    assert!(text.contains("on square-60: ") && text.contains(" visible, "), "{text}");
+    let report = LAB.json(&[&args[..], &["--json"]].concat());
+    assert_eq!((&report["rows"][5]["class"], &report["rows"][5]["scenes"]["scenes"]), (&"all".into(), &5.into()));
+    assert_eq!(report["worst"].as_array().map(Vec::len), Some(1));
+}

@@ -8,7 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tactomo_board::identity;
-use tactomo_board::link::{Control, Link};
+use tactomo_board::link::{Control, Link, Playing};
 use tactomo_board::measured::{self, Volts};
 use tactomo_board::record::OtherProtocol;
 use tactomo_board::sequence::Sequence;
@@ -248,7 +248,7 @@ impl Reader {
                         tracing::warn!("the board says: {}", session::explain(&fault));
                     }
                 }
-                Err(DecodeError::Version(found)) => return Err(other_protocol(link.name(), found, talk.answers)),
+                Err(DecodeError::Version(found)) => return Err(other_protocol(link, found)),
                 Err(_) => {}
             }
         }
@@ -429,10 +429,11 @@ fn is_same(one: &Hello, other: &Hello) -> bool {
 }
 
 /// What bytes in another version of the protocol mean: of a board, or of a recording, which does not answer.
-fn other_protocol(link: String, found: u8, answers: bool) -> LiveError {
-    match answers {
-        true => LiveError::Greet { link, error: GreetError::Version { found } },
-        false => LiveError::Recorded { link, other: OtherProtocol { found } },
+fn other_protocol(link: &dyn Link, found: u8) -> LiveError {
+    let (is_recording, link) = (matches!(link.playing(), Playing::Recording { .. }), link.name());
+    match is_recording {
+        true => LiveError::Recorded { link, other: OtherProtocol { found } },
+        false => LiveError::Greet { link, error: GreetError::Version { found } },
     }
 }
 

@@ -404,7 +404,10 @@ fn solver(method: Method, lambda: Option<Lambda>, problem: &Problem) -> anyhow::
     match lambda.map(Parameter::Lambda) {
         None => Ok(Box::new(Guard::new(method, problem)?)),
         Some(_) if method.parameter() != Some(ParameterKind::Lambda) => {
-            bail!("the solver {} has no lambda: leave out --lambda", method.name())
+            bail!(
+                "the solver {} has no lambda: leave out --lambda, or give a --solver that has one, such as tikhonov",
+                method.name()
+            )
         }
         lambda => Ok(method.build_with(problem, lambda)?),
     }
