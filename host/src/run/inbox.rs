@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_protocol::Status;
-use tactomo_touch::solve::{Lead, Look, Method, Parts, Solver, Still};
+use tactomo_touch::solve::{AdaptiveMean, Lead, Look, Method, Parts, Solver};
 
 use super::calibration::messages::{Calibrate, Outcome};
 use super::order::Made;
@@ -130,7 +130,7 @@ struct State {
     events: std::collections::VecDeque<Event>,
     pending: Option<Taken>,
     /// The frames since the last one was taken.
-    still: Option<Still>,
+    still: Option<AdaptiveMean>,
     ready: bool,
     closed: bool,
 }
@@ -247,7 +247,7 @@ impl State {
             self.pending = Some(frame);
             return;
         }
-        let mut still = self.still.take().filter(|_| before.is_some()).unwrap_or_else(|| Still::new(noise_v));
+        let mut still = self.still.take().filter(|_| before.is_some()).unwrap_or_else(|| AdaptiveMean::new(noise_v));
         still.add(&frame.newest);
         if let Some(before) = before {
             frame.came += before.came;

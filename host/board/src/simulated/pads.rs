@@ -34,12 +34,13 @@ pub(super) struct Pads {
 
 enum Motion {
     /// Stands still for the length of a scan.
-    Scan(Option<Still>),
+    Scan(Option<Held>),
     /// Between two steps of time.
     Steps(Option<Step>),
 }
 
-struct Still {
+/// Readings of the moment at which a scan began, held while it lasts.
+struct Held {
     ground: u8,
     groundings: u64,
     readings: Readings,
@@ -63,7 +64,7 @@ impl Pads {
         let first_ns = *self.first_ns.get_or_insert(moment.grounded_ns);
         let (ground, electrode) = (usize::from(moment.ground), usize::from(electrode));
         let above_ground_v = match &mut self.motion {
-            Motion::Scan(still) => still_at(still, &mut *self.physics, first_ns, moment).at(ground, electrode),
+            Motion::Scan(held) => held_at(held, &mut *self.physics, first_ns, moment).at(ground, electrode),
             Motion::Steps(step) => {
                 let since_ns = moment.now_ns.saturating_sub(first_ns);
                 let [begin, end] = &step_at(step, &mut *self.physics, since_ns / STEP_NS).ends;
@@ -77,19 +78,14 @@ impl Pads {
 }
 
 /// Asks anew, for the moment of grounding, where a scan begins: where an electrode is grounded that does not follow the one before.
-fn still_at<'a>(
-    still: &'a mut Option<Still>,
-    physics: &mut dyn Physics,
-    first_ns: u64,
-    moment: Moment,
-) -> &'a Readings {
+fn held_at<'a>(held: &'a mut Option<Held>, physics: &mut dyn Physics, first_ns: u64, moment: Moment) -> &'a Readings {
     let Moment { ground, groundings, grounded_ns, .. } = moment;
-    let goes_on = still.take().filter(|last| last.groundings == groundings || last.ground < ground);
+    let goes_on = held.take().filter(|last| last.groundings == groundings || last.ground < ground);
     let readings = match goes_on {
         Some(last) => last.readings,
         None => physics.readings_v(seconds(grounded_ns.saturating_sub(first_ns))),
     };
-    &still.insert(Still { ground, groundings, readings }).readings
+    &held.insert(Held { ground, groundings, readings }).readings
 }
 
 fn step_at<'a>(step: &'a mut Option<Step>, physics: &mut dyn Physics, index: u64) -> &'a Step {

@@ -3,7 +3,7 @@
 //! ```text
 //! answer    what a solver says: Solution, FoundContact, Flags, errors          -> nobody
 //! fit       least squares, evidence, lambda, the linear theory                 -> answer
-//! before    complete, still, latest: readings to readings                      -> fit
+//! before    complete, adaptive_mean, latest: readings to readings                      -> fit
 //! problem   what solvers are made for: a detector with its models              -> before, what was learned
 //! solver    what a method is to those who run it: one trait, and two halves    -> answer
 //! after     track, force, correct: solutions to solutions                      -> answer, fit, problem
@@ -34,9 +34,9 @@ pub use self::answer::{
     Calibrated, Choice, ElectrodeFault, Flags, FoundContact, FoundLine, FoundRing, FoundShape, LineUncertainty,
     RingUncertainty, Solution, SolveError, Uncertainty, check,
 };
+pub use self::before::adaptive_mean::AdaptiveMean;
+pub(crate) use self::before::adaptive_mean::rounding_v;
 pub use self::before::latest::Latest;
-pub use self::before::still::Still;
-pub(crate) use self::before::still::rounding_v;
 pub use self::fit::interpolate::Interpolation;
 pub use self::fit::lambda::Lambda;
 pub use self::health::electrodes::faulty_electrodes;

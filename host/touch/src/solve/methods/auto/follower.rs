@@ -6,7 +6,7 @@ use super::{
     image_evidence,
 };
 use crate::solve::answer::{FoundContact, check};
-use crate::solve::before::still::{Mean, Still};
+use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::methods::image::Descent;
 use crate::solve::methods::shapes::StripFit;
 use crate::solve::solver::{Followed, Follower, Lead};
@@ -20,7 +20,7 @@ const PATIENCE: [u32; 2] = [2, 64];
 pub(super) struct AutoFollower {
     electrodes: usize,
     /// What stands still is averaged, for all models alike.
-    still: Still,
+    average: AdaptiveMean,
     contacts: Option<ContactFollower>,
     shapes: Option<ShapeFollower>,
     image: Nonlinear,
@@ -55,8 +55,8 @@ impl AutoFollower {
         shapes: Option<ShapeFollower>,
         image: Nonlinear,
     ) -> Self {
-        let (electrodes, still) = (detector.electrodes.len(), Still::new(detector.adc.deviation_v()));
-        Self { electrodes, still, contacts, shapes, image, answer: Answer::Contacts, skip: 0, patience: PATIENCE[0] }
+        let (electrodes, average) = (detector.electrodes.len(), AdaptiveMean::new(detector.adc.deviation_v()));
+        Self { electrodes, average, contacts, shapes, image, answer: Answer::Contacts, skip: 0, patience: PATIENCE[0] }
     }
 
     /// What the errors of averaged readings are like, by what `found` or else what is followed was compared by; `None` if the model has no contacts.
@@ -222,14 +222,14 @@ fn lower(one: Option<Evidence>, other: Option<Evidence>) -> Option<Evidence> {
 impl Follower for AutoFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         check(readings, self.electrodes)?;
-        self.still.add_beside(readings, Self::slopes_v(self.contacts.as_ref()));
-        self.follow_mean(&self.still.mean_or(readings))
+        self.average.add_beside(readings, Self::slopes_v(self.contacts.as_ref()));
+        self.follow_mean(&self.average.mean_or(readings))
     }
 
     fn follow_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
         match (&self.answer, &mut self.contacts) {
             (Answer::Contacts, Some(contacts)) => {
-                self.still.reset();
+                self.average.reset();
                 let Followed { solution, search } = contacts.follow_rows(rows, elapsed_s)?;
                 Ok(Followed { solution: as_contacts(solution, search), search })
             }
@@ -241,11 +241,11 @@ impl Follower for AutoFollower {
         check(readings, self.electrodes)?;
         let lead: Explained = lead.known();
         match self.latest() {
-            Some(latest) => self.still.add(&latest.readings),
-            None => self.still.add_beside(readings, Self::slopes_v(self.contacts.as_ref())),
+            Some(latest) => self.average.add(&latest.readings),
+            None => self.average.add_beside(readings, Self::slopes_v(self.contacts.as_ref())),
         }
         self.contacts.iter_mut().for_each(|contacts| contacts.searched_in(lead.mean.as_ref()));
-        let mean = self.still.mean_or(readings);
+        let mean = self.average.mean_or(readings);
         let readings = &mean.readings;
         let Some(target) = self.target(&mean, lead.contacts.as_deref())? else {
             return self.adopt_alone(lead.whole, readings);
@@ -292,7 +292,7 @@ impl Follower for AutoFollower {
             }
         };
         let contacts = self.contacts.as_ref().and_then(ContactFollower::found).map(Box::new);
-        Lead::of(Explained { contacts, whole, mean: self.latest().or_else(|| self.still.mean()) })
+        Lead::of(Explained { contacts, whole, mean: self.latest().or_else(|| self.average.mean()) })
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {
@@ -305,7 +305,7 @@ impl Follower for AutoFollower {
         if let Some(contacts) = &mut self.contacts {
             contacts.reset();
         }
-        self.still.reset();
+        self.average.reset();
         self.take(Answer::Contacts);
     }
 }

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use self::follower::AutoFollower;
 use self::searcher::AutoSearcher;
 use crate::solve::answer::{Solution, SolveError};
-use crate::solve::before::still::Mean;
+use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::fit::evidence::Evidence;
 use crate::solve::fit::target::Target;
 use crate::solve::methods::contacts::{ContactFinder, ContactFollower, ContactSearcher, ContactSettings, Found};

@@ -8,7 +8,7 @@ use super::{
     ContactFinder, ContactSearcher, Evidence, Explained, Found, Nonlinear, ShapeFinder, Solution, SolveError, Target,
     Whole, image_evidence,
 };
-use crate::solve::before::still::Mean;
+use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::methods::shapes::StripFit;
 use crate::solve::solver::{Lead, Searcher};
 use tactomo_physics::readings::Readings;

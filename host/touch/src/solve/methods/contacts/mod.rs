@@ -38,8 +38,8 @@ use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(crate) use self::solver::{ContactFollower, ContactSearcher};
 use crate::solve::answer::{Calibrated, Flags, FoundContact, Solution, SolveError, Uncertainty, check};
-use crate::solve::before::still;
-use crate::solve::before::still::{Mean, Still};
+use crate::solve::before::adaptive_mean;
+use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::fit::approximation::ApproximationError;
 use crate::solve::fit::evidence::{Evidence, misfit_limit};
 use crate::solve::fit::spots::Network;
@@ -168,7 +168,7 @@ impl ContactFinder {
             fields,
             errors: Errors {
                 noise_v: detector.adc.deviation_v(),
-                rounding_v: still::rounding_v(&detector.adc),
+                rounding_v: adaptive_mean::rounding_v(&detector.adc),
                 model: settings.model_error,
                 detector: (!detector.unknowns().directions.is_empty()).then_some(UNKNOWN),
                 pad: settings.pad_error,
@@ -234,8 +234,8 @@ impl ContactFinder {
     }
 
     /// What averages frames that stand still.
-    pub fn still(&self) -> Still {
-        Still::new(self.errors.noise_v)
+    pub fn adaptive_mean(&self) -> AdaptiveMean {
+        AdaptiveMean::new(self.errors.noise_v)
     }
 
     /// What is known where there is no contact.

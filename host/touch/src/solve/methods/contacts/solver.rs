@@ -11,8 +11,8 @@ use super::rows::RowState;
 use super::{ContactFinder, ContactSettings, Explanation, Found};
 use crate::solve::after::track::Tracker;
 use crate::solve::answer::{Calibrated, FoundContact, Solution, SolveError};
+use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::before::latest::Latest;
-use crate::solve::before::still::{Mean, Still};
 use crate::solve::fit::approximation::ApproximationError;
 use crate::solve::fit::evidence::Evidence;
 use crate::solve::fit::target::Target;
@@ -35,7 +35,7 @@ pub struct Contacts {
 
 /// Follows contacts in the mean of the frames that stand still.
 struct FrameFollower {
-    still: Still,
+    average: AdaptiveMean,
     contacts: ContactFollower,
 }
 
@@ -101,7 +101,7 @@ impl Contacts {
     /// [`ForwardError::Detector`] if the model has no spots.
     pub fn new(problem: &Problem, settings: ContactSettings) -> Result<Self, ForwardError> {
         let contacts = ContactFollower::new(Arc::new(ContactFinder::new(problem, settings)?));
-        Ok(Self { follower: FrameFollower { still: contacts.finder.still(), contacts } })
+        Ok(Self { follower: FrameFollower { average: contacts.finder.adaptive_mean(), contacts } })
     }
 
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
@@ -270,21 +270,21 @@ impl ContactFollower {
 
 impl FrameFollower {
     fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
-        self.contacts.finder.target_of(&self.still.mean_or(readings), self.contacts.error())
+        self.contacts.finder.target_of(&self.average.mean_or(readings), self.contacts.error())
     }
 }
 
 impl Follower for FrameFollower {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
-        self.still.add_beside(readings, self.contacts.slopes_v());
+        self.average.add_beside(readings, self.contacts.slopes_v());
         let target = self.target(readings)?;
         let search = self.contacts.follow(&target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
     }
 
     fn follow_rows(&mut self, rows: &Readings, _latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
-        self.still.reset();
+        self.average.reset();
         self.contacts.follow_rows(rows, elapsed_s)
     }
 
@@ -292,12 +292,12 @@ impl Follower for FrameFollower {
         let lead: Explained = lead.known();
         self.contacts.finder.check(readings)?;
         match self.contacts.latest() {
-            Some(latest) => self.still.add(&latest.readings),
-            None => self.still.add_beside(readings, self.contacts.slopes_v()),
+            Some(latest) => self.average.add(&latest.readings),
+            None => self.average.add_beside(readings, self.contacts.slopes_v()),
         }
         self.contacts.searched_in(lead.mean.as_ref());
         let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
-        let target = self.contacts.finder.target_of(&self.still.mean_or(readings), error)?;
+        let target = self.contacts.finder.target_of(&self.average.mean_or(readings), error)?;
         let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
         let search = self.contacts.adopt(lead.contacts.map(|found| *found), frames, &target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
@@ -308,7 +308,7 @@ impl Follower for FrameFollower {
     }
 
     fn lead(&self) -> Lead {
-        let mean = self.contacts.latest().or_else(|| self.still.mean());
+        let mean = self.contacts.latest().or_else(|| self.average.mean());
         Lead::of(Explained::new(self.contacts.found(), mean))
     }
 
@@ -317,7 +317,7 @@ impl Follower for FrameFollower {
     }
 
     fn reset(&mut self) {
-        self.still.reset();
+        self.average.reset();
         self.contacts.reset();
     }
 }

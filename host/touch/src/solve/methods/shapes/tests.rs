@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::fit::KNOWN;
 use super::*;
-use crate::solve::before::still::Mean;
+use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::methods::contacts::{ContactFinder, ContactSettings};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Slab, readings_v, touched_impedance_ohm};

@@ -2,8 +2,8 @@
 
 use super::ContactFollower;
 use crate::solve::answer::SolveError;
+use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::before::latest::Latest;
-use crate::solve::before::still::Mean;
 use crate::solve::fit::target::Target;
 use crate::solve::methods::contacts::doubt::Doubt;
 use crate::solve::methods::contacts::rows::{RowState, Step};

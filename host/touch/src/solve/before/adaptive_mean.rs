@@ -1,4 +1,4 @@
-//! Averages what stands still, and knows when it moves.
+//! The mean of frames of a scene that stands still, over a window that adapts: change detection ends it where the scene moves.
 //!
 //! The mean of `m` still frames has the noise of one over the root of `m`. If a contact moves slowly, that mean lags behind it by `m / 2`
 //! frames, and no test on those `m` frames can tell before the lag is several standard errors: the difference of two halves has the
@@ -50,7 +50,7 @@ pub(crate) struct Mean {
 
 /// Averages frames as long as they differ by no more than noise.
 #[derive(Clone, Debug)]
-pub struct Still {
+pub struct AdaptiveMean {
     /// Standard deviation of a reading (V).
     noise_v: f64,
     /// Sums of the readings up to each frame that is remembered, the oldest first, after what they begin with (V).
@@ -87,7 +87,7 @@ impl Mean {
     }
 }
 
-impl Still {
+impl AdaptiveMean {
     /// Begins with nothing; `noise_v` is the standard deviation of a reading (V).
     pub fn new(noise_v: f64) -> Self {
         let noise_v = noise_v.max(f64::MIN_POSITIVE.sqrt());
@@ -306,13 +306,13 @@ mod tests {
     const READINGS: usize = 256;
 
     /// Frames of a scene that moves along some derivatives.
-    struct Bench {
+    struct MovingScene {
         random: fastrand::Rng,
         slopes_v: Vec<Vec<f64>>,
-        still: Still,
+        average: AdaptiveMean,
     }
 
-    impl Bench {
+    impl MovingScene {
         /// The place of the contact is known to 0.1 by one frame, the strength to 0.01.
         fn new(seed: u64) -> Self {
             let mut random = fastrand::Rng::with_seed(seed);
@@ -321,7 +321,7 @@ mod tests {
                 (0..READINGS).map(|_| scale * (random.f64() - 0.5)).collect::<Vec<_>>()
             };
             let slopes_v = vec![slope_v(0.1), slope_v(0.1), slope_v(0.01), slope_v(1.0)];
-            Self { random, slopes_v, still: Still::new(NOISE_V) }
+            Self { random, slopes_v, average: AdaptiveMean::new(NOISE_V) }
         }
 
         fn frame(&mut self, moved: f64) -> Readings {
@@ -333,42 +333,42 @@ mod tests {
 
         fn add(&mut self, moved: f64) {
             let volts = self.frame(moved);
-            self.still.add_beside(&volts, &self.slopes_v);
+            self.average.add_beside(&volts, &self.slopes_v);
         }
 
         /// Error of the mean along the place, in what noise makes of it.
         fn error(&self, moved: f64) -> f64 {
             let slope = &self.slopes_v[0];
             let truth = slope.iter().map(|slope| 0.5 + moved * slope);
-            let left: Vec<_> = self.still.mean_v().iter().zip(truth).map(|(mean, truth)| mean - truth).collect();
-            let deviation = NOISE_V * dot(slope, slope).sqrt() / (self.still.count() as f64).sqrt();
+            let left: Vec<_> = self.average.mean_v().iter().zip(truth).map(|(mean, truth)| mean - truth).collect();
+            let deviation = NOISE_V * dot(slope, slope).sqrt() / (self.average.count() as f64).sqrt();
             dot(slope, &left) / deviation
         }
     }
 
     #[test]
     fn still_frames_are_averaged_and_a_move_begins_anew() {
-        let mut bench = Bench::new(4);
+        let mut scene = MovingScene::new(4);
         for count in 1..=16 {
-            bench.add(0.0);
-            assert_eq!(bench.still.count(), count);
+            scene.add(0.0);
+            assert_eq!(scene.average.count(), count);
         }
-        let error_v = (bench.still.mean_v().iter().map(|volts| (volts - 0.5).powi(2)).sum::<f64>() / 256.0).sqrt();
+        let error_v = (scene.average.mean_v().iter().map(|volts| (volts - 0.5).powi(2)).sum::<f64>() / 256.0).sqrt();
         assert!((0.85..1.15).contains(&(4.0 * error_v / NOISE_V)), "a quarter of the noise: {error_v}");
-        bench.add(2.0);
-        assert_eq!(bench.still.count(), 1, "20 standard deviations");
-        (0..9).for_each(|_| bench.add(2.0));
-        assert_eq!(bench.still.count(), 2, "what has just moved may move on slowly");
+        scene.add(2.0);
+        assert_eq!(scene.average.count(), 1, "20 standard deviations");
+        (0..9).for_each(|_| scene.add(2.0));
+        assert_eq!(scene.average.count(), 2, "what has just moved may move on slowly");
     }
 
     #[test]
     fn a_still_scene_is_seldom_taken_to_move() {
         let mut counts = Vec::new();
         for seed in 0..8 {
-            let mut bench = Bench::new(seed);
+            let mut scene = MovingScene::new(seed);
             counts.extend((0..2000).map(|_| {
-                bench.add(0.0);
-                bench.still.count() as f64
+                scene.add(0.0);
+                scene.average.count() as f64
             }));
         }
         let mean = counts.iter().sum::<f64>() / counts.len() as f64;
@@ -381,11 +381,11 @@ mod tests {
         for speed in [1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 10.0].map(|deviations| 0.1 * deviations) {
             let (mut squares, mut inside, mut frames) = (0.0, 0, 0);
             for seed in 0..6 {
-                let mut bench = Bench::new(seed);
+                let mut scene = MovingScene::new(seed);
                 for frame in 0..1500 {
                     let moved = speed * f64::from(frame);
-                    bench.add(moved);
-                    let error = bench.error(moved);
+                    scene.add(moved);
+                    let error = scene.error(moved);
                     squares += error * error;
                     inside += u32::from(error.abs() < 1.0);
                     frames += 1;
@@ -398,37 +398,42 @@ mod tests {
 
     #[test]
     fn a_known_contact_is_seen_to_move_where_all_readings_hide_it() {
-        let mut bench = Bench::new(5);
-        let mut blind = Still::new(NOISE_V);
+        let mut scene = MovingScene::new(5);
+        let mut blind = AdaptiveMean::new(NOISE_V);
         // Half a standard deviation of its place.
-        let frames: Vec<_> = (0..200).map(|frame| bench.frame(if frame < 100 { 0.0 } else { 0.05 })).collect();
+        let frames: Vec<_> = (0..200).map(|frame| scene.frame(if frame < 100 { 0.0 } else { 0.05 })).collect();
         for frame in &frames {
             blind.add(frame);
-            bench.still.add_beside(frame, &bench.slopes_v);
+            scene.average.add_beside(frame, &scene.slopes_v);
         }
-        assert!(bench.still.frames() <= 130 && blind.frames() == 200, "{} {}", bench.still.frames(), blind.frames());
+        assert!(
+            scene.average.frames() <= 130 && blind.frames() == 200,
+            "{} {}",
+            scene.average.frames(),
+            blind.frames()
+        );
     }
 
     #[test]
     fn the_same_readings_again_are_one_observation() {
-        let mut bench = Bench::new(6);
-        let (first, second) = (bench.frame(0.0), bench.frame(0.0));
-        (0..20).for_each(|_| bench.still.add_beside(&first, &bench.slopes_v));
-        assert_eq!((bench.still.count(), bench.still.mean_readings()), (1, Some(first.clone())));
-        bench.still.add(&second);
-        assert_eq!(bench.still.count(), 2);
+        let mut scene = MovingScene::new(6);
+        let (first, second) = (scene.frame(0.0), scene.frame(0.0));
+        (0..20).for_each(|_| scene.average.add_beside(&first, &scene.slopes_v));
+        assert_eq!((scene.average.count(), scene.average.mean_readings()), (1, Some(first.clone())));
+        scene.average.add(&second);
+        assert_eq!(scene.average.count(), 2);
         // What is the same but for what it says is another observation.
-        bench.still.add(&second.clone().saying(|g, e| if g == e { Says::AtMost } else { Says::Voltage }));
-        assert_eq!(bench.still.count(), 3);
+        scene.average.add(&second.clone().saying(|g, e| if g == e { Says::AtMost } else { Says::Voltage }));
+        assert_eq!(scene.average.count(), 3);
     }
 
     #[test]
     fn other_readings_begin_anew() {
-        let mut still = Still::new(NOISE_V);
-        assert_eq!((still.count(), still.mean()), (0, None));
-        (0..5).for_each(|frame| still.add(&Readings::from_fn(4, |_, _| 0.5 + 1e-5 * f64::from(frame))));
-        still.add(&Readings::from_fn(3, |_, _| 0.5));
-        assert_eq!((still.count(), still.mean_v().len()), (1, 9));
+        let mut average = AdaptiveMean::new(NOISE_V);
+        assert_eq!((average.count(), average.mean()), (0, None));
+        (0..5).for_each(|frame| average.add(&Readings::from_fn(4, |_, _| 0.5 + 1e-5 * f64::from(frame))));
+        average.add(&Readings::from_fn(3, |_, _| 0.5));
+        assert_eq!((average.count(), average.mean_v().len()), (1, 9));
     }
 
     #[test]
