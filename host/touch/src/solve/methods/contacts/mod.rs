@@ -4,7 +4,6 @@
 //! more at a time from where it would explain most ([`scan`], in which contacts are [spots](crate::solve::fit::spots) of a small network), as long as
 //! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
 
-mod bank;
 #[cfg(test)]
 mod coverage_tests;
 mod discs;
@@ -16,13 +15,14 @@ mod informed;
 mod keep;
 #[cfg(test)]
 mod motion_tests;
+mod multiple_models;
 #[cfg(test)]
 mod places_tests;
 mod rows;
 mod scan;
 mod search;
 mod solver;
-mod staying;
+mod systematic_error;
 #[cfg(test)]
 mod tests;
 

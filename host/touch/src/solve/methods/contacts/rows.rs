@@ -1,11 +1,11 @@
 //! Contacts followed by rows of readings as they come, of scans that read some rows at a time.
 //!
-//! What is followed was searched in all readings. From then on each frame of a few rows moves it by what is new in them ([`Bank`]). What
+//! What is followed was searched in all readings. From then on each frame of a few rows moves it by what is new in them ([`MultipleModels`]). What
 //! all readings are off by together, as those of a detector that is not known exactly are, was found with the contacts, and is taken off.
 
-use super::bank::{Bank, Rows};
 use super::discs::{DiscFit, DiscFitter, Effort};
-use super::staying::Staying;
+use super::multiple_models::{MultipleModels, Rows};
+use super::systematic_error::SystematicError;
 use super::{ContactFinder, Explanation};
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::target::{Errors, Target};
@@ -32,9 +32,9 @@ const GLIMPSE: Effort = Effort { steps: 4, gain: 1.0, share: 0.05 };
 /// What is known besides the contacts that are followed.
 #[derive(Clone, Debug)]
 pub(super) struct RowState {
-    bank: Bank,
+    filters: MultipleModels,
     /// What model and board are off by goes into the parameters however many rows come.
-    staying: Staying,
+    systematic_error: SystematicError,
     /// What all readings are off by (V); none of a detector that is as described.
     off_v: Vec<f64>,
     /// Frames in a row that do not fit.
@@ -58,8 +58,8 @@ impl RowState {
     pub fn new(found: &Explanation, target: &Target) -> Self {
         let off_v = if target.error().is_some() { target.likely_off_v(&found.fit.volts) } else { Vec::new() };
         Self {
-            bank: Bank::new(found.fit.normal.clone()),
-            staying: Staying::new(&found.fit, target),
+            filters: MultipleModels::new(found.fit.normal.clone()),
+            systematic_error: SystematicError::new(&found.fit, target),
             off_v,
             unfit: 0,
             gone: 0.0,
@@ -73,7 +73,7 @@ impl RowState {
 
     /// Whether what is followed is believed to move.
     pub fn moves(&self) -> bool {
-        self.bank.moves()
+        self.filters.moves()
     }
 
     /// What all readings are off by (V); nothing of a detector that is as described.
@@ -97,10 +97,10 @@ impl ContactFinder {
 
     /// Brings contacts to rows that come `elapsed_s` (s) after those before.
     pub(super) fn step(&self, last: Explanation, mut state: RowState, target: &Target, elapsed_s: f64) -> Step {
-        if state.bank.predict(elapsed_s, &last.fit.units_m()).is_none() {
+        if state.filters.predict(elapsed_s, &last.fit.units_m()).is_none() {
             return Step::Lost;
         }
-        let Some(mut fit) = self.moved_by(last.fit.clone(), &mut state.bank, target) else { return Step::Lost };
+        let Some(mut fit) = self.moved_by(last.fit.clone(), &mut state.filters, target) else { return Step::Lost };
         let counted = target.at(&fit.volts).count() as f64;
         let noise = counted + UNFIT * (2.0 * counted).sqrt();
         state.unfit = if fit.cost > noise { state.unfit + 1 } else { 0 };
@@ -110,9 +110,9 @@ impl ContactFinder {
             return Step::Gone;
         }
         let search = state.unfit >= FRAMES;
-        state.staying.add(&fit, target, &self.errors, self.spacing_m);
-        let known = state.bank.information();
-        let stays = state.staying.covariance(&fit);
+        state.systematic_error.add(&fit, target, &self.errors, self.spacing_m);
+        let known = state.filters.information();
+        let stays = state.systematic_error.covariance(&fit);
         let told = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
         (fit.normal, fit.settled) = (told().unwrap_or_else(|| known.clone()), true);
         Step::Followed(Explanation { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
@@ -134,11 +134,11 @@ impl ContactFinder {
     }
 
     /// A fit moved to what its filters believe after the rows of a target.
-    fn moved_by(&self, mut fit: DiscFit, bank: &mut Bank, target: &Target) -> Option<DiscFit> {
+    fn moved_by(&self, mut fit: DiscFit, filters: &mut MultipleModels, target: &Target) -> Option<DiscFit> {
         let fitter = self.disc_fitter();
         for step in 0..STEPS {
             let units_m = fit.units_m();
-            let mut tried = bank.clone();
+            let mut tried = filters.clone();
             let way = tried.update(&rows_of(&fit, target))?;
             let contacts: Vec<Contact> = fitter.moved(&fit, way.as_slice());
             let next = fitter.next(&fit, contacts, target)?;
@@ -147,12 +147,12 @@ impl ContactFinder {
             if step + 1 == STEPS || way.amax() < SMALL {
                 tried.shift(&(&gone - way));
                 tried.rescale(&units_m, &next.units_m());
-                *bank = tried;
+                *filters = tried;
                 return Some(next);
             }
             // A long way: once more from there, where the readings are linear.
-            bank.shift(&gone);
-            bank.rescale(&units_m, &next.units_m());
+            filters.shift(&gone);
+            filters.rescale(&units_m, &next.units_m());
             fit = next;
         }
         None

@@ -27,9 +27,9 @@ const OWN: f64 = 0.3;
 /// 0.12 mm where they were found, and by 0.3 and 0.5 mm a sixth and a third of a distance from there.
 const MOVED_ON: f64 = 0.2;
 
-/// What stays of errors. Places are in m, whatever the units of a fit's parameters.
+/// The part of the contacts' covariance that frames do not average out. Places are in m, whatever the units of a fit's parameters.
 #[derive(Clone, Debug)]
-pub(super) struct Staying {
+pub(super) struct SystematicError {
     information: DMatrix<f64>,
     /// `A` (1/V): a row for each parameter.
     pulls: DMatrix<f64>,
@@ -46,7 +46,7 @@ struct Searched {
     covariance: DMatrix<f64>,
 }
 
-impl Staying {
+impl SystematicError {
     /// Of contacts that were found in the readings of `target`.
     pub fn new(fit: &DiscFit, target: &Target) -> Self {
         let units = units(fit);

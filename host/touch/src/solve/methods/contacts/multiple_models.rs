@@ -10,11 +10,11 @@
 //! `Q` is how far a contact may go between two frames. Nobody knows whether it stands or runs, so there are several filters, from still to
 //! fast, on the same derivatives, and the one whose predictions were most likely of late is believed (static multiple models: Bar-Shalom, Li
 //! and Kirubarajan, Estimation with applications to tracking and navigation, 2001, 11.6). A still contact is averaged over a fifth of a
-//! second, one that runs is taken from the newest rows alone, and no speed has to be told. A filter that was less likely by far goes on from
+//! second, one that runs is taken from the newest rows alone, and no speed has to be given. A filter that was less likely by far goes on from
 //! the one that is believed.
 //!
-//! Limits: what is the same in every frame counts as noise of each row; what it adds to the covariance is told elsewhere
-//! (`contacts::staying`).
+//! Limits: what is the same in every frame counts as noise of each row; what it adds to the covariance is elsewhere
+//! (`contacts::systematic_error`).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -48,16 +48,16 @@ const BEHIND: f64 = 15.0;
 /// Longest time between frames that a contact is carried over (s).
 const LONGEST_S: f64 = 0.1;
 
-/// Filters of some contacts.
+/// A filter for each way in which contacts may move, and which of them is believed.
 #[derive(Clone, Debug)]
-pub(super) struct Bank {
+pub(super) struct MultipleModels {
     filters: [Filter; MOTIONS.len()],
     best: usize,
     /// Time since it began (s).
     age_s: f64,
 }
 
-/// What one of them knows.
+/// The filter of one way to move.
 #[derive(Clone, Debug)]
 struct Filter {
     /// Its mean, from the contacts that are believed, in their parameters.
@@ -78,7 +78,7 @@ pub(super) struct Rows {
     pub cost: f64,
 }
 
-impl Bank {
+impl MultipleModels {
     /// Begins with what a fit knows: the information on the parameters of its contacts.
     pub fn new(information: DMatrix<f64>) -> Self {
         let filter = Filter { mean: DVector::zeros(information.nrows()), information, likelihood: 0.0 };
@@ -186,19 +186,23 @@ mod tests {
     const FRAME_S: f64 = 7e-4;
 
     /// One contact whose place, in x and y, resistance and radius each frame measures with such deviations, in its parameters.
-    struct Bench {
-        bank: Bank,
+    struct MeasuredContact {
+        filters: MultipleModels,
         random: fastrand::Rng,
         believed: [f64; PARAMETERS],
     }
 
     const DEVIATIONS: [f64; PARAMETERS] = [0.04, 0.04, 0.02, 0.1];
 
-    impl Bench {
+    impl MeasuredContact {
         fn new(seed: u64) -> Self {
             let information =
                 DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| if i == j { DEVIATIONS[i].powi(-2) } else { 0.0 });
-            Self { bank: Bank::new(information), random: fastrand::Rng::with_seed(seed), believed: [0.0; PARAMETERS] }
+            Self {
+                filters: MultipleModels::new(information),
+                random: fastrand::Rng::with_seed(seed),
+                believed: [0.0; PARAMETERS],
+            }
         }
 
         fn normal(&mut self) -> f64 {
@@ -206,7 +210,7 @@ mod tests {
         }
 
         fn frame(&mut self, truth: [f64; PARAMETERS]) -> [f64; PARAMETERS] {
-            self.bank.predict(FRAME_S, &UNIT_M).unwrap();
+            self.filters.predict(FRAME_S, &UNIT_M).unwrap();
             let left: Vec<f64> =
                 (0..PARAMETERS).map(|i| (truth[i] - self.believed[i]) / DEVIATIONS[i] + self.normal()).collect();
             let rows = Rows {
@@ -216,7 +220,7 @@ mod tests {
                 pull: DVector::from_fn(PARAMETERS, |i, _| left[i] / DEVIATIONS[i]),
                 cost: left.iter().map(|left| left * left).sum(),
             };
-            let step = self.bank.update(&rows).unwrap();
+            let step = self.filters.update(&rows).unwrap();
             (0..PARAMETERS).for_each(|i| self.believed[i] += step[i]);
             self.believed
         }
@@ -235,35 +239,36 @@ mod tests {
 
     #[test]
     fn a_still_contact_is_averaged_and_a_fast_one_is_followed() {
-        let still: f64 = (0..8).map(|seed| Bench::new(seed).error(0.0, 600)).sum::<f64>() / 8.0;
+        let still: f64 = (0..8).map(|seed| MeasuredContact::new(seed).error(0.0, 600)).sum::<f64>() / 8.0;
         assert!(still < 0.2 * DEVIATIONS[0], "{still}");
         for speed_m_per_s in [0.05, 0.2, 0.5, 1.0] {
-            let moving: f64 = (0..8).map(|seed| Bench::new(seed).error(speed_m_per_s, 300)).sum::<f64>() / 8.0;
+            let moving: f64 =
+                (0..8).map(|seed| MeasuredContact::new(seed).error(speed_m_per_s, 300)).sum::<f64>() / 8.0;
             assert!(moving < 1.1 * DEVIATIONS[0], "{speed_m_per_s} m/s: {moving}");
         }
     }
 
     #[test]
     fn a_contact_that_starts_is_followed_within_some_frames() {
-        let mut bench = Bench::new(3);
-        (0..400).for_each(|_| _ = bench.frame([0.0; PARAMETERS]));
-        assert!(bench.bank.is_still());
+        let mut contact = MeasuredContact::new(3);
+        (0..400).for_each(|_| _ = contact.frame([0.0; PARAMETERS]));
+        assert!(contact.filters.is_still());
         let mut last = 0.0;
         for frame in 0..20 {
             let x = 0.3 * FRAME_S * f64::from(frame) / UNIT_M[0];
-            last = bench.frame([x, 0.0, 0.0, 0.0])[0] - x;
+            last = contact.frame([x, 0.0, 0.0, 0.0])[0] - x;
         }
-        assert!(last.abs() < 4.0 * DEVIATIONS[0] && !bench.bank.is_still(), "{last}");
+        assert!(last.abs() < 4.0 * DEVIATIONS[0] && !contact.filters.is_still(), "{last}");
     }
 
     #[test]
     fn units_change_nothing() {
-        let (mut one, mut other) = (Bench::new(5), Bench::new(5));
-        other.bank.rescale(&UNIT_M, &[5e-3]);
-        other.bank.rescale(&[5e-3], &UNIT_M);
+        let (mut one, mut other) = (MeasuredContact::new(5), MeasuredContact::new(5));
+        other.filters.rescale(&UNIT_M, &[5e-3]);
+        other.filters.rescale(&[5e-3], &UNIT_M);
         for frame in 0..20 {
             let truth = [0.01 * f64::from(frame), 0.0, 0.1, 0.0];
-            let found = [&mut one, &mut other].map(|bench| bench.frame(truth));
+            let found = [&mut one, &mut other].map(|contact| contact.frame(truth));
             assert!((0..PARAMETERS).all(|i| (found[0][i] - found[1][i]).abs() < 1e-9), "{found:?}");
         }
     }
