@@ -225,7 +225,7 @@ impl FollowLoop {
             && let Some(follower) = &board.follower
         {
             self.wants_search = false;
-            self.search.search(follower.lead(), solved.touch.clone());
+            self.search.search(follower.hypothesis(), solved.touch.clone());
         }
         self.notice.keep_fresh();
     }
@@ -397,7 +397,7 @@ impl FollowLoop {
             && self.pause.is_over(&solution, now)
             && let Some(follower) = &board.follower
         {
-            self.search.search(follower.lead(), solved.touch.clone());
+            self.search.search(follower.hypothesis(), solved.touch.clone());
         }
         let telling = |count: usize| board.follower.as_ref()?.telling_grounds(count);
         self.planner.consider(&self.wish, &board.detector, (!solution.contacts.is_empty(), self.conversions), telling);

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_protocol::Status;
-use tactomo_touch::solve::{AdaptiveMean, Lead, Look, Method, Parts, Solver};
+use tactomo_touch::solve::{AdaptiveMean, Hypothesis, Look, Method, Parts, Solver};
 
 use super::calibration::messages::{Calibrate, Outcome};
 use super::order::Made;
@@ -112,7 +112,7 @@ pub struct Searched {
     /// The epoch in which it was asked for.
     pub epoch: u64,
     /// What it has found.
-    pub lead: Lead,
+    pub lead: Hypothesis,
     /// Whether it has ended with that.
     pub is_last: bool,
 }

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{Lead, Look, Searcher};
+use tactomo_touch::solve::{Hypothesis, Look, Searcher};
 
 use super::inbox::{Event, Inbox, Searched};
 use super::order::Order;
@@ -17,7 +17,7 @@ enum Job {
     /// To search with another solver's half from now on.
     Solver(Option<Box<dyn Searcher>>),
     /// To search what explains readings.
-    Search { epoch: u64, from: Lead, readings: Readings },
+    Search { epoch: u64, from: Hypothesis, readings: Readings },
 }
 
 /// The searching thread, seen from the follower: it does one thing at a time. It ends by itself once this is dropped, and nobody waits for what it still
@@ -58,7 +58,7 @@ impl SearchThread {
     }
 
     /// Searches what explains `readings`, of which `from` explains a part.
-    pub fn search(&mut self, from: Lead, readings: Readings) {
+    pub fn search(&mut self, from: Hypothesis, readings: Readings) {
         self.busy = self.send(Job::Search { epoch: self.epoch, from, readings });
     }
 
@@ -83,7 +83,7 @@ impl SearchThread {
     }
 
     /// Takes what has come from it: the lead, unless it is of no use by now.
-    pub fn receive(&mut self, searched: Searched) -> Option<Lead> {
+    pub fn receive(&mut self, searched: Searched) -> Option<Hypothesis> {
         self.busy &= !searched.is_last;
         (searched.epoch == self.epoch).then_some(searched.lead)
     }

@@ -62,7 +62,7 @@ pub trait Follower: Send {
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
-    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError>;
+    fn adopt(&mut self, hypothesis: Hypothesis, readings: &Readings) -> Result<Followed, SolveError>;
 
     /// The grounds whose rows tell most of what is followed, so many of them, some perhaps more than once; where nothing touches, those that
     /// see a touch come. `None` where whole frames tell it best.
@@ -72,7 +72,7 @@ pub trait Follower: Send {
     }
 
     /// What is followed: where a search may begin.
-    fn lead(&self) -> Lead;
+    fn hypothesis(&self) -> Hypothesis;
 
     /// Numbers contacts on from those that another follower found before.
     fn inherit(&mut self, before: &[FoundContact]) {
@@ -90,7 +90,12 @@ pub trait Searcher: Send {
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
-    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError>;
+    fn search(
+        &mut self,
+        from: Hypothesis,
+        readings: &Readings,
+        found: &mut dyn FnMut(Hypothesis),
+    ) -> Result<Hypothesis, SolveError>;
 }
 
 /// The answer of a follower.
@@ -117,12 +122,12 @@ impl Parts {
     }
 }
 
-/// What a frame was explained by, for another frame to go on from. What is inside only the method knows whose half made it.
+/// What explains a frame, handed from the search to the tracker and back. What is inside only the method knows whose half made it.
 #[derive(Clone, Debug, Default)]
-pub struct Lead(Option<Arc<dyn Any + Send + Sync>>);
+pub struct Hypothesis(Option<Arc<dyn Any + Send + Sync>>);
 
-impl Lead {
-    /// A lead of a method's own kind.
+impl Hypothesis {
+    /// A hypothesis of a method's own kind.
     pub(crate) fn of<T: Any + Send + Sync>(known: T) -> Self {
         Self(Some(Arc::new(known)))
     }
@@ -143,8 +148,8 @@ pub(crate) fn follow_and_search(
     if !followed.search {
         return Ok(followed.solution);
     }
-    let lead = searcher.search(follower.lead(), readings, &mut |_| {})?;
-    Ok(follower.adopt(lead, readings)?.solution)
+    let hypothesis = searcher.search(follower.hypothesis(), readings, &mut |_| {})?;
+    Ok(follower.adopt(hypothesis, readings)?.solution)
 }
 
 /// The same for rows of readings.
@@ -158,8 +163,8 @@ pub(crate) fn follow_rows_and_search(
     if !followed.search {
         return Ok(followed.solution);
     }
-    let lead = searcher.search(follower.lead(), latest, &mut |_| {})?;
-    Ok(follower.adopt(lead, latest)?.solution)
+    let hypothesis = searcher.search(follower.hypothesis(), latest, &mut |_| {})?;
+    Ok(follower.adopt(hypothesis, latest)?.solution)
 }
 
 /// A solver whose every answer is thorough, as a follower.
@@ -174,12 +179,12 @@ impl<S: Solver + ?Sized> Follower for Direct<S> {
         Ok(Followed { solution: self.0.solve_rows(rows, latest, elapsed_s)?, search: false })
     }
 
-    fn adopt(&mut self, _lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+    fn adopt(&mut self, _hypothesis: Hypothesis, readings: &Readings) -> Result<Followed, SolveError> {
         self.follow(readings)
     }
 
-    fn lead(&self) -> Lead {
-        Lead::default()
+    fn hypothesis(&self) -> Hypothesis {
+        Hypothesis::default()
     }
 
     fn reset(&mut self) {

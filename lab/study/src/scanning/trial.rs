@@ -126,7 +126,7 @@ impl<'a> Bench<'a> {
             return Ok(followed.solution);
         }
         self.since_search_s = 0.0;
-        let lead = self.parts.follower.lead();
+        let lead = self.parts.follower.hypothesis();
         let lead = match &mut self.parts.searcher {
             Some(searcher) => searcher.search(lead, readings, &mut |_| {})?,
             None => lead,

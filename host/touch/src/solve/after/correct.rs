@@ -237,8 +237,8 @@ mod tests {
             let Parts { mut follower, searcher } = Method::Auto.build(problem).unwrap().split();
             follower.inherit(before);
             follower.follow(&readings).unwrap();
-            let lead = searcher.unwrap().search(follower.lead(), &readings, &mut |_| {}).unwrap();
-            follower.adopt(lead, &readings).unwrap().solution.contacts[0]
+            let hypothesis = searcher.unwrap().search(follower.hypothesis(), &readings, &mut |_| {}).unwrap();
+            follower.adopt(hypothesis, &readings).unwrap().solution.contacts[0]
         };
         assert_corrected(&live(&corrected, &[]), &live(&plain, &[]), "live");
         let guarded =

@@ -98,8 +98,8 @@ mod tests {
             let Parts { mut follower, searcher } = method.build(&problem).unwrap().split();
             let mut followed = follower.follow(&readings).unwrap();
             if let Some(mut searcher) = searcher {
-                let lead = searcher.search(follower.lead(), &readings, &mut |_| {}).unwrap();
-                followed = follower.adopt(lead, &readings).unwrap();
+                let hypothesis = searcher.search(follower.hypothesis(), &readings, &mut |_| {}).unwrap();
+                followed = follower.adopt(hypothesis, &readings).unwrap();
             }
             let [contact] = followed.solution.contacts[..] else { panic!("{}", method.name()) };
             found.push(contact.force_n.unwrap());

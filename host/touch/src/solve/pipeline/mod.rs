@@ -22,7 +22,7 @@ use crate::solve::after::correct::Corrector;
 use crate::solve::after::force::Scale;
 use crate::solve::answer::{FoundContact, Solution, SolveError, check_count};
 use crate::solve::problem::Problem;
-use crate::solve::solver::{Followed, Follower, Lead, Parts, Searcher, Solver};
+use crate::solve::solver::{Followed, Follower, Hypothesis, Parts, Searcher, Solver};
 use tactomo_physics::readings::Readings;
 
 /// What is done to readings before a method has them, and to its answers after. Cheap to clone.
@@ -156,9 +156,9 @@ impl Follower for Staged<dyn Follower> {
         Ok(self.stages.after_following(&rows, followed))
     }
 
-    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+    fn adopt(&mut self, hypothesis: Hypothesis, readings: &Readings) -> Result<Followed, SolveError> {
         let seen = self.stages.seen(readings)?;
-        let followed = self.half.adopt(lead, &*self.stages.before(&seen)?)?;
+        let followed = self.half.adopt(hypothesis, &*self.stages.before(&seen)?)?;
         Ok(self.stages.after_following(&seen, followed))
     }
 
@@ -170,8 +170,8 @@ impl Follower for Staged<dyn Follower> {
         })
     }
 
-    fn lead(&self) -> Lead {
-        self.half.lead()
+    fn hypothesis(&self) -> Hypothesis {
+        self.half.hypothesis()
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {
@@ -188,7 +188,12 @@ impl Follower for Staged<dyn Follower> {
 }
 
 impl Searcher for Staged<dyn Searcher> {
-    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
+    fn search(
+        &mut self,
+        from: Hypothesis,
+        readings: &Readings,
+        found: &mut dyn FnMut(Hypothesis),
+    ) -> Result<Hypothesis, SolveError> {
         let seen = self.stages.seen(readings)?;
         self.half.search(from, &*self.stages.before(&seen)?, found)
     }

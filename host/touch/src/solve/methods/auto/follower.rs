@@ -2,14 +2,14 @@
 
 use super::words::{as_contacts, as_whole, nothing};
 use super::{
-    ContactFollower, Evidence, Explained, Found, Nonlinear, ShapeFollower, Solution, SolveError, Target, Whole,
-    image_evidence,
+    ContactFollower, ContactHypothesis, Evidence, FrameHypothesis, Nonlinear, ShapeFollower, Solution, SolveError,
+    Target, Whole, image_evidence,
 };
 use crate::solve::answer::{FoundContact, check};
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::methods::image::Descent;
 use crate::solve::methods::shapes::StripFit;
-use crate::solve::solver::{Followed, Follower, Lead};
+use crate::solve::solver::{Followed, Follower, Hypothesis};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 
@@ -60,9 +60,9 @@ impl AutoFollower {
     }
 
     /// What the errors of averaged readings are like, by what `found` or else what is followed was compared by; `None` if the model has no contacts.
-    fn target(&self, mean: &Mean, found: Option<&Found>) -> Result<Option<Target>, SolveError> {
+    fn target(&self, mean: &Mean, found: Option<&ContactHypothesis>) -> Result<Option<Target>, SolveError> {
         let of = |contacts: &ContactFollower| {
-            let error = found.and_then(Found::error).or(contacts.error());
+            let error = found.and_then(ContactHypothesis::error).or(contacts.error());
             contacts.finder().target_of(mean, error)
         };
         self.contacts.as_ref().map(of).transpose()
@@ -237,22 +237,22 @@ impl Follower for AutoFollower {
         }
     }
 
-    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
+    fn adopt(&mut self, hypothesis: Hypothesis, readings: &Readings) -> Result<Followed, SolveError> {
         check(readings, self.electrodes)?;
-        let lead: Explained = lead.known();
+        let hypothesis: FrameHypothesis = hypothesis.known();
         match self.latest() {
             Some(latest) => self.average.add(&latest.readings),
             None => self.average.add_beside(readings, Self::slopes_v(self.contacts.as_ref())),
         }
-        self.contacts.iter_mut().for_each(|contacts| contacts.searched_in(lead.mean.as_ref()));
+        self.contacts.iter_mut().for_each(|contacts| contacts.searched_in(hypothesis.mean.as_ref()));
         let mean = self.average.mean_or(readings);
         let readings = &mean.readings;
-        let Some(target) = self.target(&mean, lead.contacts.as_deref())? else {
-            return self.adopt_alone(lead.whole, readings);
+        let Some(target) = self.target(&mean, hypothesis.contacts.as_deref())? else {
+            return self.adopt_alone(hypothesis.whole, readings);
         };
         // What is followed and what was found some frames ago are all brought to this frame: the lowest score is believed. Where no
         // reading stands out there may be a very light contact still.
-        let Explained { contacts: found, whole, mean: searched } = lead;
+        let FrameHypothesis { contacts: found, whole, mean: searched } = hypothesis;
         let frames = searched.map_or(1, |mean| mean.frames);
         let whole = whole.filter(|_| !self.image.is_rest(readings));
         let search =
@@ -280,7 +280,7 @@ impl Follower for AutoFollower {
         contacts.telling_grounds(count)
     }
 
-    fn lead(&self) -> Lead {
+    fn hypothesis(&self) -> Hypothesis {
         let whole = match &self.answer {
             Answer::Contacts => None,
             Answer::Shape(why) => {
@@ -292,7 +292,7 @@ impl Follower for AutoFollower {
             }
         };
         let contacts = self.contacts.as_ref().and_then(ContactFollower::found).map(Box::new);
-        Lead::of(Explained { contacts, whole, mean: self.latest().or_else(|| self.average.mean()) })
+        Hypothesis::of(FrameHypothesis { contacts, whole, mean: self.latest().or_else(|| self.average.mean()) })
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {

@@ -18,7 +18,9 @@ use crate::solve::answer::{Solution, SolveError};
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::fit::evidence::Evidence;
 use crate::solve::fit::target::Target;
-use crate::solve::methods::contacts::{ContactFinder, ContactFollower, ContactSearcher, ContactSettings, Found};
+use crate::solve::methods::contacts::{
+    ContactFinder, ContactFollower, ContactHypothesis, ContactSearcher, ContactSettings,
+};
 use crate::solve::methods::image::{Complexity, Descent, Nonlinear, NonlinearSettings};
 use crate::solve::methods::shapes::{ShapeFinder, ShapeFollower, StripFit};
 use crate::solve::problem::Problem;
@@ -32,11 +34,11 @@ pub struct Auto {
     searcher: AutoSearcher,
 }
 
-/// What explained a frame, for another frame to go on from.
+/// What is inside a [`Hypothesis`](crate::solve::solver::Hypothesis) of this method.
 #[derive(Clone, Debug, Default)]
-struct Explained {
+struct FrameHypothesis {
     /// Contacts: the answer, or what is kept beside it.
-    contacts: Option<Box<Found>>,
+    contacts: Option<Box<ContactHypothesis>>,
     /// What explains the frame better than they do, and why it is believed.
     whole: Option<(Whole, String)>,
     /// The mean of the frames up to it as far as they stood still.

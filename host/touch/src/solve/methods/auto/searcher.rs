@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use super::words::instead_of;
 use super::{
-    ContactFinder, ContactSearcher, Evidence, Explained, Found, Nonlinear, ShapeFinder, Solution, SolveError, Target,
-    Whole, image_evidence,
+    ContactFinder, ContactHypothesis, ContactSearcher, Evidence, FrameHypothesis, Nonlinear, ShapeFinder, Solution,
+    SolveError, Target, Whole, image_evidence,
 };
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::methods::shapes::StripFit;
-use crate::solve::solver::{Lead, Searcher};
+use crate::solve::solver::{Hypothesis, Searcher};
 use tactomo_physics::readings::Readings;
 
 /// So many contacts may stand for something else, if they leave more than noise does.
@@ -61,7 +61,7 @@ impl AutoSearcher {
     fn early(
         &self,
         searcher: &ContactSearcher,
-        contacts: &Found,
+        contacts: &ContactHypothesis,
         from: Option<&(Whole, String)>,
         mean: &Mean,
     ) -> Option<StripFit> {
@@ -87,13 +87,13 @@ impl AutoSearcher {
     }
 
     /// All that there is to know without contacts.
-    fn image_alone(&mut self, from: Explained, readings: &Readings) -> Result<Explained, SolveError> {
+    fn image_alone(&mut self, from: FrameHypothesis, readings: &Readings) -> Result<FrameHypothesis, SolveError> {
         if self.image.is_rest(readings) {
-            return Ok(Explained::default());
+            return Ok(FrameHypothesis::default());
         }
         let why = "this model has no fields of single contacts".to_owned();
         let whole = self.image(from.whole, readings)?.map(|image| (image, why));
-        Ok(Explained { whole, ..Explained::default() })
+        Ok(FrameHypothesis { whole, ..FrameHypothesis::default() })
     }
 
     /// What explains the frame as a whole better than contacts do, if anything.
@@ -129,26 +129,35 @@ fn is_partial(target: &Target) -> bool {
 }
 
 impl Searcher for AutoSearcher {
-    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
-        let mut from: Explained = from.known();
+    fn search(
+        &mut self,
+        from: Hypothesis,
+        readings: &Readings,
+        found: &mut dyn FnMut(Hypothesis),
+    ) -> Result<Hypothesis, SolveError> {
+        let mut from: FrameHypothesis = from.known();
         let mean = from.mean.take().unwrap_or_else(|| Mean::of_frame(readings));
         let readings = &mean.readings;
-        let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings).map(Lead::of) };
-        let Explained { contacts, whole: from, .. } = from;
+        let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings).map(Hypothesis::of) };
+        let FrameHypothesis { contacts, whole: from, .. } = from;
         let contacts = contacts.filter(|_| from.is_none());
         let searcher = ContactSearcher::new(Arc::clone(&finder));
         let mut early = None;
-        let mut better = |better: Found| {
+        let mut better = |better: ContactHypothesis| {
             early = self.early(&searcher, &better, from.as_ref(), &mean);
             // A picture does not change to contacts that may not explain it.
             if early.is_none() && from.is_none() {
-                found(Lead::of(Explained { contacts: Some(Box::new(better)), whole: None, mean: Some(mean.clone()) }));
+                found(Hypothesis::of(FrameHypothesis {
+                    contacts: Some(Box::new(better)),
+                    whole: None,
+                    mean: Some(mean.clone()),
+                }));
             }
             if early.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let contacts = searcher.contacts(contacts.map(|found| *found), &mean, &mut better)?;
         let Some((contacts, solution)) = contacts else {
-            return Ok(Lead::of(Explained { mean: Some(mean), ..Explained::default() }));
+            return Ok(Hypothesis::of(FrameHypothesis { mean: Some(mean), ..FrameHypothesis::default() }));
         };
         let target = finder.target_of(&mean, contacts.error())?;
         let whole = match early {
@@ -156,6 +165,6 @@ impl Searcher for AutoSearcher {
             None => self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?,
         };
         let whole = whole.map(|whole| (whole, instead_of(&solution)));
-        Ok(Lead::of(Explained { contacts: Some(Box::new(contacts)), whole, mean: Some(mean) }))
+        Ok(Hypothesis::of(FrameHypothesis { contacts: Some(Box::new(contacts)), whole, mean: Some(mean) }))
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::*;
 use crate::solve::answer::{FoundContact, Solution};
-use crate::solve::solver::Lead;
+use crate::solve::solver::Hypothesis;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v, touched_impedance_ohm};
 use tactomo_physics::scene::{Contact, Shape, Touch};
@@ -99,9 +99,9 @@ fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
     let first = bench.measured(&moved(0.0));
     let before = follower.follow(&first).unwrap();
     assert!(before.search && before.solution.flags.unfinished && before.solution.contacts.is_empty());
-    let lead = searcher.search(follower.lead(), &first, &mut |_| {}).unwrap();
+    let hypothesis = searcher.search(follower.hypothesis(), &first, &mut |_| {}).unwrap();
     // The answer comes when the contacts are 3 mm further on.
-    let after = follower.adopt(lead, &bench.measured(&moved(0.003))).unwrap();
+    let after = follower.adopt(hypothesis, &bench.measured(&moved(0.003))).unwrap();
     assert_eq!((what(&after.solution), after.search), ("2 contacts", false), "{after:?}");
     let ids: Vec<_> = after.solution.contacts.iter().map(|contact| contact.id).collect();
     for step in 0..20 {
@@ -128,10 +128,10 @@ fn a_search_of_the_past_does_not_replace_what_explains_the_present() {
     let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
     let mut searcher = searcher.unwrap();
     let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
-    let past = searcher.search(Lead::default(), &bench.measured(&[a]), &mut |_| {}).unwrap();
+    let past = searcher.search(Hypothesis::default(), &bench.measured(&[a]), &mut |_| {}).unwrap();
     let present = bench.measured(&[a, b]);
-    let lead = searcher.search(Lead::default(), &present, &mut |_| {}).unwrap();
-    follower.adopt(lead, &present).unwrap();
+    let hypothesis = searcher.search(Hypothesis::default(), &present, &mut |_| {}).unwrap();
+    follower.adopt(hypothesis, &present).unwrap();
     let kept = follower.adopt(past, &bench.measured(&[a, b])).unwrap();
     assert_eq!(what(&kept.solution), "2 contacts");
 }
@@ -143,8 +143,8 @@ fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
     let mut searcher = searcher.unwrap();
     let a = [Contact::flat(0.01, 0.004, 0.0025, 3e-4)];
     let frame = bench.frame();
-    let image = searcher.search(Lead::default(), &frame, &mut |_| {}).unwrap();
-    let contact = searcher.search(Lead::default(), &bench.measured(&a), &mut |_| {}).unwrap();
+    let image = searcher.search(Hypothesis::default(), &frame, &mut |_| {}).unwrap();
+    let contact = searcher.search(Hypothesis::default(), &bench.measured(&a), &mut |_| {}).unwrap();
     follower.adopt(contact.clone(), &bench.measured(&a)).unwrap();
     let kept = follower.adopt(image.clone(), &bench.measured(&a)).unwrap();
     assert_eq!(what(&kept.solution), "1 contact");
@@ -199,8 +199,8 @@ fn a_shape_and_contacts_of_the_past_do_not_replace_each_other() {
     let mut searcher = searcher.unwrap();
     let pair = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
     let bar = [([0.002, -0.003], Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 }, 1.5)];
-    let line = searcher.search(Lead::default(), &bench.shaped(&bar), &mut |_| {}).unwrap();
-    let contacts = searcher.search(Lead::default(), &bench.measured(&pair), &mut |_| {}).unwrap();
+    let line = searcher.search(Hypothesis::default(), &bench.shaped(&bar), &mut |_| {}).unwrap();
+    let contacts = searcher.search(Hypothesis::default(), &bench.measured(&pair), &mut |_| {}).unwrap();
     follower.adopt(contacts.clone(), &bench.measured(&pair)).unwrap();
     let kept = follower.adopt(line.clone(), &bench.measured(&pair)).unwrap();
     assert!(kept.solution.is_contacts() && !kept.search, "{kept:?}");

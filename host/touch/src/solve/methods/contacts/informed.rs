@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use super::discs::DiscFit;
 use super::search::COLD;
-use super::{Better, ContactFinder, Explanation};
+use super::{Better, ContactFinder, ContactHypothesis};
 use crate::solve::fit::approximation::{ApproximationError, Linearised};
 use crate::solve::fit::target::Target;
 use tactomo_physics::forward::readings_v;
@@ -26,7 +26,7 @@ const GROWTHS: usize = 3;
 /// An explanation with the target that it was found by.
 #[derive(Clone)]
 pub(super) struct Informed {
-    pub explanation: Explanation,
+    pub hypothesis: ContactHypothesis,
     pub target: Target,
 }
 
@@ -35,10 +35,10 @@ impl ContactFinder {
     /// goes to `better`, which may end the search.
     pub(super) fn search(
         &self,
-        from: Option<&Explanation>,
+        from: Option<&ContactHypothesis>,
         target: &Target,
         better: &mut Better<'_>,
-    ) -> Option<Explanation> {
+    ) -> Option<ContactHypothesis> {
         if self.problem.nuisance().is_none() {
             return self.search_exact(from, target, better);
         }
@@ -51,62 +51,63 @@ impl ContactFinder {
         }
         let followed = from.and_then(|from| self.caught_up(from, target));
         let grown = followed.map(|followed| self.grown(followed, better));
-        if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.explanation.fit, &grown.target)) {
-            return Some(grown.explanation.clone());
+        if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.hypothesis.fit, &grown.target)) {
+            return Some(grown.hypothesis.clone());
         }
-        let anew = self.alone(target).map(|one| match better(&one.explanation) {
+        let anew = self.alone(target).map(|one| match better(&one.hypothesis) {
             ControlFlow::Break(()) => one,
             ControlFlow::Continue(()) => self.grown(one, better),
         });
         let all = [grown, anew].into_iter().flatten();
-        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.explanation)
+        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.hypothesis)
     }
 
     /// The best single contact, if anything stands out.
     pub(super) fn alone(&self, target: &Target) -> Option<Informed> {
         let target = self.informed(target, &self.begun(target)?, None)?;
         let one = self.one(&target)?;
-        let settled = self.settled(Informed { explanation: Explanation::of(one, &target), target });
+        let settled = self.settled(Informed { hypothesis: ContactHypothesis::of(one, &target), target });
         // Places that seemed worse with another detector may now be better.
         let again = self.one(&settled.target)?;
-        let again = Informed { explanation: Explanation::of(again, &settled.target), target: settled.target.clone() };
+        let again =
+            Informed { hypothesis: ContactHypothesis::of(again, &settled.target), target: settled.target.clone() };
         Some(self.better_informed(settled, again))
     }
 
     /// An explanation as it is, by what its readings may be off by together.
-    fn informed_as_is(&self, from: &Explanation, target: &Target) -> Option<Explanation> {
+    fn informed_as_is(&self, from: &ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
         let target = self.informed(target, &from.fit.contacts, None)?;
         self.judged(from.clone(), &target)
     }
 
-    fn caught_up(&self, from: &Explanation, target: &Target) -> Option<Informed> {
+    fn caught_up(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
         let near = from.error.as_ref().and_then(|error| error.linearised.clone());
         let target = self.informed(target, &from.fit.contacts, near.as_ref())?;
         let fit = self.disc_fitter().go_on(&from.fit, &target, COLD)?;
-        Some(self.settled(Informed { explanation: Explanation::of(fit, &target), target }))
+        Some(self.settled(Informed { hypothesis: ContactHypothesis::of(fit, &target), target }))
     }
 
     /// Brings a fit and what its readings may be off by to agree.
     fn settled(&self, mut found: Informed) -> Informed {
         for renewal in 0..RENEWALS {
-            let Informed { explanation, target } = &found;
+            let Informed { hypothesis, target } = &found;
             // What contacts are missing for says nothing of the detector.
-            let is_hopeless = explanation.fit.cost > HOPELESS * target.count() as f64;
+            let is_hopeless = hypothesis.fit.cost > HOPELESS * target.count() as f64;
             if is_hopeless && renewal > 0 {
                 break;
             }
-            let nearer = if is_hopeless { None } else { self.nearer_detector(&explanation.fit, target) };
-            let is_settled = target.error().is_none_or(|error| error.is_settled(&explanation.fit.volts));
+            let nearer = if is_hopeless { None } else { self.nearer_detector(&hypothesis.fit, target) };
+            let is_settled = target.error().is_none_or(|error| error.is_settled(&hypothesis.fit.volts));
             if nearer.is_none() && is_settled {
                 break;
             }
-            let near = nearer.or_else(|| explanation.error.as_ref()?.linearised.clone());
-            let contacts = &explanation.fit.contacts;
+            let near = nearer.or_else(|| hypothesis.error.as_ref()?.linearised.clone());
+            let contacts = &hypothesis.fit.contacts;
             let renewed = self.informed(target, contacts, near.as_ref());
             let fitted = renewed.and_then(|target| {
                 let fit = self.disc_fitter().fit(contacts.clone(), &target, COLD)?;
-                let explanation = Explanation { fit, error: target.error().cloned(), ..explanation.clone() };
-                Some(Informed { explanation, target })
+                let hypothesis = ContactHypothesis { fit, error: target.error().cloned(), ..hypothesis.clone() };
+                Some(Informed { hypothesis, target })
             });
             let Some(fitted) = fitted else { break };
             found = fitted;
@@ -118,20 +119,20 @@ impl ContactFinder {
     fn grown(&self, first: Informed, better: &mut Better<'_>) -> Informed {
         let (mut best, more) = self.one_by_one(first, better);
         for _ in 0..if more.is_break() { 0 } else { GROWTHS } {
-            let fit = &best.explanation.fit;
+            let fit = &best.hypothesis.fit;
             let starts = self.pairs(fit, &best.target);
             let grown = self.grow(fit.clone(), starts, &best.target, &mut |_| ControlFlow::Continue(()));
             let is_other = grown.fit.contacts.len() != fit.contacts.len();
-            let grown = self.settled(Informed { explanation: grown, target: best.target.clone() });
+            let grown = self.settled(Informed { hypothesis: grown, target: best.target.clone() });
             let is_better = self.whole_evidence(&grown) > self.whole_evidence(&best);
             if is_better {
                 best = grown;
-                if better(&best.explanation).is_break() {
+                if better(&best.hypothesis).is_break() {
                     break;
                 }
             } else if !is_other {
                 // The same contacts, with what is known of their count.
-                best.explanation.certainty = grown.explanation.certainty;
+                best.hypothesis.certainty = grown.hypothesis.certainty;
             }
             if !(is_better && is_other) {
                 break;
@@ -143,20 +144,20 @@ impl ContactFinder {
     /// One contact more at a time, each with what its readings may be off by, while there are too few.
     fn one_by_one(&self, first: Informed, better: &mut Better<'_>) -> (Informed, ControlFlow<()>) {
         let (mut best, mut last) = (first.clone(), first);
-        while self.is_misfit(&best.explanation.fit, &best.target) {
-            let Informed { explanation: Explanation { fit, .. }, target } = last;
+        while self.is_misfit(&best.hypothesis.fit, &best.target) {
+            let Informed { hypothesis: ContactHypothesis { fit, .. }, target } = last;
             if fit.contacts.len() >= self.settings.most {
                 break;
             }
             let starts = self.pairs(&fit, &target);
             let Some(more) = self.one_more(&fit, starts, &target) else { break };
-            last = self.settled(Informed { explanation: Explanation::of(more, &target), target });
+            last = self.settled(Informed { hypothesis: ContactHypothesis::of(more, &target), target });
             if self.whole_evidence(&last) > self.whole_evidence(&best) {
                 best = last.clone();
-                if better(&best.explanation).is_break() {
+                if better(&best.hypothesis).is_break() {
                     return (best, ControlFlow::Break(()));
                 }
-            } else if last.explanation.fit.contacts.len() > best.explanation.fit.contacts.len() + 1 {
+            } else if last.hypothesis.fit.contacts.len() > best.hypothesis.fit.contacts.len() + 1 {
                 break;
             }
         }
@@ -169,7 +170,7 @@ impl ContactFinder {
 
     /// Logarithm of the evidence, with the determinant that explanations of one target have in common.
     fn whole_evidence(&self, found: &Informed) -> f64 {
-        self.evidence(&found.explanation.fit) - 0.5 * found.target.ln_determinant()
+        self.evidence(&found.hypothesis.fit) - 0.5 * found.target.ln_determinant()
     }
 
     /// The same target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`

@@ -1,7 +1,7 @@
 //! Contacts from one frame to the next, and which of them are still there.
 
 use super::discs::{DiscFit, Effort, PARAMETERS};
-use super::{ContactFinder, Explanation};
+use super::{ContactFinder, ContactHypothesis};
 use crate::solve::fit::target::Target;
 use tactomo_physics::scene::Contact;
 
@@ -16,19 +16,19 @@ const LIFTED: f64 = 0.6;
 
 impl ContactFinder {
     /// An explanation of some frames ago, brought to this one.
-    pub(super) fn catch_up(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+    pub(super) fn catch_up(&self, found: ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
         let fit = self.disc_fitter().go_on(&found.fit, target, CAUGHT_UP)?;
-        Some(Explanation { fit, error: target.error().cloned(), ..found })
+        Some(ContactHypothesis { fit, error: target.error().cloned(), ..found })
     }
 
     /// An explanation of this frame, by what another target says of the readings' errors.
-    pub(super) fn judged(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+    pub(super) fn judged(&self, found: ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
         let fit = self.disc_fitter().go_on(&found.fit, target, Effort { steps: 0, ..WARM })?;
-        Some(Explanation { fit, error: target.error().cloned(), ..found })
+        Some(ContactHypothesis { fit, error: target.error().cloned(), ..found })
     }
 
     /// The explanation, or what is left of it without the contacts that may not be there if that is more likely; `None` if nothing is.
-    pub(super) fn without_weak(&self, found: Explanation, target: &Target) -> Option<Explanation> {
+    pub(super) fn without_weak(&self, found: ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
         if target.is_silent() {
             return None;
         }
@@ -47,17 +47,17 @@ impl ContactFinder {
             return Some(found);
         }
         match self.disc_fitter().fit(kept, target, WARM) {
-            Some(fit) if self.evidence(&fit) > evidence => Some(Explanation { fit, certainty: None, ..found }),
+            Some(fit) if self.evidence(&fit) > evidence => Some(ContactHypothesis { fit, certainty: None, ..found }),
             _ => Some(found),
         }
     }
 
     /// The same contacts in the next frame, less those that were let go; `None` if that makes no sense.
-    pub(super) fn follow(&self, last: &Explanation, target: &Target) -> Option<Explanation> {
+    pub(super) fn follow(&self, last: &ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
         let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
         let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
         let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
-        Some(Explanation { fit, certainty, error: last.error.clone() })
+        Some(ContactHypothesis { fit, certainty, error: last.error.clone() })
     }
 
     /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each

@@ -113,11 +113,7 @@ pub(crate) struct ContactFinder {
 
 /// Contacts that explain a frame, for another frame to go on from.
 #[derive(Clone, Debug)]
-pub(crate) struct Found(Explanation);
-
-/// Contacts that explain a frame.
-#[derive(Clone, Debug)]
-struct Explanation {
+pub(crate) struct ContactHypothesis {
     fit: DiscFit,
     /// Probability of their count, among the counts that were tried; none once it has changed without a search.
     certainty: Option<f64>,
@@ -126,16 +122,14 @@ struct Explanation {
 }
 
 /// Takes each better explanation on the way of a search, and ends it if nothing more is wanted.
-type Better<'a> = dyn FnMut(&Explanation) -> ControlFlow<()> + 'a;
+type Better<'a> = dyn FnMut(&ContactHypothesis) -> ControlFlow<()> + 'a;
 
-impl Found {
+impl ContactHypothesis {
     /// What the readings may be off by together, by which it was compared with others.
     pub fn error(&self) -> Option<&Arc<ApproximationError>> {
-        self.0.error.as_ref()
+        self.error.as_ref()
     }
-}
 
-impl Explanation {
     /// A fit whose count was not compared with others.
     fn of(fit: DiscFit, target: &Target) -> Self {
         Self { fit, certainty: None, error: target.error().cloned() }
@@ -262,8 +256,8 @@ impl ContactFinder {
     }
 
     /// What contacts leave of the frames, and what they take for that.
-    pub fn evidence_of_found(&self, found: &Found) -> Evidence {
-        self.evidence_of(&found.0.fit)
+    pub fn evidence_of_found(&self, found: &ContactHypothesis) -> Evidence {
+        self.evidence_of(&found.fit)
     }
 
     /// What a fit leaves, and what its contacts take for that: in squares, what the logarithm of their evidence has besides.
@@ -278,7 +272,7 @@ impl ContactFinder {
     }
 
     /// An explanation as a solution, but for the certainty of its count: whoever answers knows whether it is an answer.
-    fn solution(&self, found: &Explanation, target: &Target) -> Solution {
+    fn solution(&self, found: &ContactHypothesis, target: &Target) -> Solution {
         let fit = &found.fit;
         let covariance = fit.covariance();
         let logs: Vec<_> = (0..fit.contacts.len()).map(|k| self.logs(fit, k, covariance.as_ref())).collect();

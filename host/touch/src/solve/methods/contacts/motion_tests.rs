@@ -119,8 +119,8 @@ fn a_scene_that_stands_still_is_searched_only_when_its_frames_have_doubled() {
         let Followed { search, .. } = follower.follow(&frame).unwrap();
         if search {
             searched += 1;
-            let lead = searcher.search(follower.lead(), &frame, &mut |_| ()).unwrap();
-            assert!(!follower.adopt(lead, &frame).unwrap().search);
+            let hypothesis = searcher.search(follower.hypothesis(), &frame, &mut |_| ()).unwrap();
+            assert!(!follower.adopt(hypothesis, &frame).unwrap().search);
         }
     }
     assert!((6..9).contains(&searched), "{searched}: with 1, 2, 4, 8, 16, 32 frames");

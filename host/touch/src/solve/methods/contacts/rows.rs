@@ -6,7 +6,7 @@
 use super::discs::{DiscFit, DiscFitter, Effort};
 use super::multiple_models::{MultipleModels, Rows};
 use super::systematic_error::SystematicError;
-use super::{ContactFinder, Explanation};
+use super::{ContactFinder, ContactHypothesis};
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::target::{Errors, Target};
 use tactomo_physics::readings::Readings;
@@ -46,7 +46,7 @@ pub(super) struct RowState {
 /// What has come of a frame.
 pub(super) enum Step {
     /// The contacts, and whether they have to be searched.
-    Followed(Explanation, Box<RowState>, bool),
+    Followed(ContactHypothesis, Box<RowState>, bool),
     /// Nothing touches any more.
     Gone,
     /// They could not be brought to the frame.
@@ -55,7 +55,7 @@ pub(super) enum Step {
 
 impl RowState {
     /// From an explanation by all readings of `target`.
-    pub fn new(found: &Explanation, target: &Target) -> Self {
+    pub fn new(found: &ContactHypothesis, target: &Target) -> Self {
         let off_v = if target.error().is_some() { target.likely_off_v(&found.fit.volts) } else { Vec::new() };
         Self {
             filters: MultipleModels::new(found.fit.normal.clone()),
@@ -96,7 +96,7 @@ impl ContactFinder {
     }
 
     /// Brings contacts to rows that come `elapsed_s` (s) after those before.
-    pub(super) fn step(&self, last: Explanation, mut state: RowState, target: &Target, elapsed_s: f64) -> Step {
+    pub(super) fn step(&self, last: ContactHypothesis, mut state: RowState, target: &Target, elapsed_s: f64) -> Step {
         if state.filters.predict(elapsed_s, &last.fit.units_m()).is_none() {
             return Step::Lost;
         }
@@ -115,16 +115,16 @@ impl ContactFinder {
         let stays = state.systematic_error.covariance(&fit);
         let told = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
         (fit.normal, fit.settled) = (told().unwrap_or_else(|| known.clone()), true);
-        Step::Followed(Explanation { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
+        Step::Followed(ContactHypothesis { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
     }
 
     /// A first, rough contact in rows where something stands out.
-    pub(super) fn glimpsed(&self, target: &Target) -> Option<Explanation> {
+    pub(super) fn glimpsed(&self, target: &Target) -> Option<ContactHypothesis> {
         let begun = self.begun(target)?;
         let rough = DiscFitter { model: &*self.rough, ..self.disc_fitter() };
         let first = rough.fit(begun, target, GLIMPSE)?;
         let fit = self.disc_fitter().fit(first.contacts, target, Effort { steps: 1, ..GLIMPSE })?;
-        Some(Explanation::of(fit, target))
+        Some(ContactHypothesis::of(fit, target))
     }
 
     /// Whether what is followed has become so light that it cannot be told from nothing.

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use super::discs::{DiscFit, DiscFitter, Effort, place_m};
 use super::scan::Looks;
-use super::{Better, ContactFinder, Explanation};
+use super::{Better, ContactFinder, ContactHypothesis};
 use crate::solve::fit::spots::LoadedSpot;
 use crate::solve::fit::target::Target;
 use tactomo_physics::readings::Readings;
@@ -80,10 +80,10 @@ impl ContactFinder {
     /// explanation on the way goes to `better`; to the end, as it takes little.
     pub(super) fn search_exact(
         &self,
-        from: Option<&Explanation>,
+        from: Option<&ContactHypothesis>,
         target: &Target,
         better: &mut Better<'_>,
-    ) -> Option<Explanation> {
+    ) -> Option<ContactHypothesis> {
         let grown = from.and_then(|from| self.disc_fitter().go_on(&from.fit, target, COLD));
         let grown = grown.map(|fit| self.grow(fit, Vec::new(), target, better));
         if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.fit, target)) {
@@ -150,11 +150,11 @@ impl ContactFinder {
         mut starts: Vec<Vec<Contact>>,
         target: &Target,
         better: &mut Better<'_>,
-    ) -> Explanation {
+    ) -> ContactHypothesis {
         let mut by_count = vec![f64::NEG_INFINITY; self.settings.most + 1];
         let mut last = first.clone();
         let mut best = self.noted(first.clone(), &mut by_count);
-        let _ = better(&Explanation::new(first.clone(), &by_count, target));
+        let _ = better(&ContactHypothesis::new(first.clone(), &by_count, target));
         best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
         while last.contacts.len() < self.settings.most {
             let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
@@ -162,7 +162,7 @@ impl ContactFinder {
             last = more.0.clone();
             if more.1 > best.1 {
                 best = more;
-                let _ = better(&Explanation::new(best.0.clone(), &by_count, target));
+                let _ = better(&ContactHypothesis::new(best.0.clone(), &by_count, target));
             } else if !self.is_misfit(&best.0, target) || last.contacts.len() > best.0.contacts.len() + 1 {
                 break;
             }
@@ -173,7 +173,7 @@ impl ContactFinder {
             }
             let Some(other) = self.swapped(&best, target).map(|other| self.noted(other, &mut by_count)) else { break };
             best = other;
-            let _ = better(&Explanation::new(best.0.clone(), &by_count, target));
+            let _ = better(&ContactHypothesis::new(best.0.clone(), &by_count, target));
         }
         if self.is_misfit(&best.0, target) {
             best = self.noted(self.released(best.0, target), &mut by_count);
@@ -184,7 +184,7 @@ impl ContactFinder {
             }
             best = fewer;
         }
-        Explanation::new(best.0, &by_count, target)
+        ContactHypothesis::new(best.0, &by_count, target)
     }
 
     /// The more likely one.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::discs::DiscFit;
 use super::doubt::Doubt;
 use super::rows::RowState;
-use super::{ContactFinder, ContactSettings, Explanation, Found};
+use super::{ContactFinder, ContactHypothesis, ContactSettings};
 use crate::solve::after::track::Tracker;
 use crate::solve::answer::{Calibrated, FoundContact, Solution, SolveError};
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
@@ -18,7 +18,7 @@ use crate::solve::fit::evidence::Evidence;
 use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
 use crate::solve::solver::{
-    Followed, Follower, Lead, Parts, Searcher, Solver, follow_and_search, follow_rows_and_search,
+    Followed, Follower, Hypothesis, Parts, Searcher, Solver, follow_and_search, follow_rows_and_search,
 };
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
@@ -42,7 +42,7 @@ struct FrameFollower {
 /// Follows contacts from frame to frame.
 pub(crate) struct ContactFollower {
     finder: Arc<ContactFinder>,
-    last: Option<Explanation>,
+    last: Option<ContactHypothesis>,
     searched: Searched,
     /// Whether what is followed could not be brought to the newest frame.
     is_stale: bool,
@@ -66,16 +66,16 @@ pub(crate) struct ContactFollower {
     before: Tracker,
 }
 
-/// What explained a frame, for another frame to go on from.
+/// What is inside a [`Hypothesis`](crate::solve::solver::Hypothesis) of this method.
 #[derive(Clone, Debug, Default)]
-struct Explained {
-    contacts: Option<Box<Found>>,
+struct FrameHypothesis {
+    contacts: Option<Box<ContactHypothesis>>,
     /// The mean of the frames up to it as far as they stood still.
     mean: Option<Mean>,
 }
 
-impl Explained {
-    fn new(contacts: Option<Found>, mean: Option<Mean>) -> Self {
+impl FrameHypothesis {
+    fn new(contacts: Option<ContactHypothesis>, mean: Option<Mean>) -> Self {
         Self { contacts: contacts.map(Box::new), mean }
     }
 }
@@ -151,8 +151,8 @@ impl ContactFollower {
     }
 
     /// What is followed.
-    pub fn found(&self) -> Option<Found> {
-        self.last.clone().map(Found)
+    pub fn found(&self) -> Option<ContactHypothesis> {
+        self.last.clone()
     }
 
     /// Derivatives of the readings by the parameters of what is followed (V).
@@ -168,7 +168,7 @@ impl ContactFollower {
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
         let search = self.step_frame(target);
-        let fits = |last: &Explanation| !self.finder.is_misfit(&last.fit, target);
+        let fits = |last: &ContactHypothesis| !self.finder.is_misfit(&last.fit, target);
         self.doubt.whole(!self.is_stale && self.last.as_ref().map_or(!search, fits));
         search
     }
@@ -193,16 +193,16 @@ impl ContactFollower {
 
     /// Takes what a search has found in the mean of some frames, if it explains this frame better than what is followed; whether the search has to be repeated, because
     /// what it has found does not explain this frame as well as its own.
-    pub fn adopt(&mut self, found: Option<Found>, frames: usize, target: &Target) -> bool {
+    pub fn adopt(&mut self, found: Option<ContactHypothesis>, frames: usize, target: &Target) -> bool {
         self.tracker = self.before.clone();
         let expected_v = self.expected_v().map(<[f64]>::to_vec);
-        let count = |found: &Option<Explanation>| found.as_ref().map_or(0, |found| found.fit.contacts.len());
+        let count = |found: &Option<ContactHypothesis>| found.as_ref().map_or(0, |found| found.fit.contacts.len());
         let before = count(&self.last);
-        let left = found.as_ref().map_or(0.0, |Found(found)| found.fit.cost);
-        let caught_up = found.and_then(|Found(found)| self.finder.catch_up(found, target));
+        let left = found.as_ref().map_or(0.0, |found| found.fit.cost);
+        let caught_up = found.and_then(|found| self.finder.catch_up(found, target));
         self.last = self.last.take().and_then(|last| self.finder.judged(last, target));
-        let evidence = |found: &Option<Explanation>| {
-            let of = |found: &Explanation| self.finder.evidence(&found.fit);
+        let evidence = |found: &Option<ContactHypothesis>| {
+            let of = |found: &ContactHypothesis| self.finder.evidence(&found.fit);
             found.as_ref().map_or_else(|| self.finder.evidence_of_nothing(target), of)
         };
         if self.is_stale || evidence(&caught_up) >= evidence(&self.last) {
@@ -288,18 +288,18 @@ impl Follower for FrameFollower {
         self.contacts.follow_rows(rows, elapsed_s)
     }
 
-    fn adopt(&mut self, lead: Lead, readings: &Readings) -> Result<Followed, SolveError> {
-        let lead: Explained = lead.known();
+    fn adopt(&mut self, hypothesis: Hypothesis, readings: &Readings) -> Result<Followed, SolveError> {
+        let hypothesis: FrameHypothesis = hypothesis.known();
         self.contacts.finder.check(readings)?;
         match self.contacts.latest() {
             Some(latest) => self.average.add(&latest.readings),
             None => self.average.add_beside(readings, self.contacts.slopes_v()),
         }
-        self.contacts.searched_in(lead.mean.as_ref());
-        let error = lead.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
+        self.contacts.searched_in(hypothesis.mean.as_ref());
+        let error = hypothesis.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
         let target = self.contacts.finder.target_of(&self.average.mean_or(readings), error)?;
-        let frames = lead.mean.as_ref().map_or(1, |mean| mean.frames);
-        let search = self.contacts.adopt(lead.contacts.map(|found| *found), frames, &target);
+        let frames = hypothesis.mean.as_ref().map_or(1, |mean| mean.frames);
+        let search = self.contacts.adopt(hypothesis.contacts.map(|found| *found), frames, &target);
         Ok(Followed { solution: self.contacts.solution(&target), search })
     }
 
@@ -307,9 +307,9 @@ impl Follower for FrameFollower {
         self.contacts.telling_grounds(count)
     }
 
-    fn lead(&self) -> Lead {
+    fn hypothesis(&self) -> Hypothesis {
         let mean = self.contacts.latest().or_else(|| self.average.mean());
-        Lead::of(Explained::new(self.contacts.found(), mean))
+        Hypothesis::of(FrameHypothesis::new(self.contacts.found(), mean))
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {
@@ -332,41 +332,41 @@ impl ContactSearcher {
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
-    pub fn solution(&self, found: &Found, mean: &Mean) -> Result<Solution, SolveError> {
+    pub fn solution(&self, found: &ContactHypothesis, mean: &Mean) -> Result<Solution, SolveError> {
         let target = self.finder.target_of(mean, found.error())?;
-        Ok(self.finder.solution(&found.0, &target))
+        Ok(self.finder.solution(found, &target))
     }
 
     /// The contacts that explain the mean of some frames, and the solution that they are; `None` if nothing touches. Better ones on the way there go
     /// to `found`, which may end the search.
     pub fn contacts(
         &self,
-        from: Option<Found>,
+        from: Option<ContactHypothesis>,
         mean: &Mean,
-        found: &mut dyn FnMut(Found) -> ControlFlow<()>,
-    ) -> Result<Option<(Found, Solution)>, SolveError> {
+        found: &mut dyn FnMut(ContactHypothesis) -> ControlFlow<()>,
+    ) -> Result<Option<(ContactHypothesis, Solution)>, SolveError> {
         let target = self.finder.target_to_search(mean)?;
-        let mut better = |better: &Explanation| found(Found(better.clone()));
-        let found = self.finder.search(from.map(|Found(from)| from).as_ref(), &target, &mut better);
-        found
-            .map(|found| {
-                let found = Found(found);
-                Ok((found.clone(), self.solution(&found, mean)?))
-            })
-            .transpose()
+        let mut better = |better: &ContactHypothesis| found(better.clone());
+        let found = self.finder.search(from.as_ref(), &target, &mut better);
+        found.map(|found| Ok((found.clone(), self.solution(&found, mean)?))).transpose()
     }
 }
 
 impl Searcher for ContactSearcher {
-    fn search(&mut self, from: Lead, readings: &Readings, found: &mut dyn FnMut(Lead)) -> Result<Lead, SolveError> {
-        let from: Explained = from.known();
+    fn search(
+        &mut self,
+        from: Hypothesis,
+        readings: &Readings,
+        found: &mut dyn FnMut(Hypothesis),
+    ) -> Result<Hypothesis, SolveError> {
+        let from: FrameHypothesis = from.known();
         let mean = from.mean.unwrap_or_else(|| Mean::of_frame(readings));
         let mut better = |better| {
-            found(Lead::of(Explained::new(Some(better), Some(mean.clone()))));
+            found(Hypothesis::of(FrameHypothesis::new(Some(better), Some(mean.clone()))));
             ControlFlow::Continue(())
         };
         let found = self.contacts(from.contacts.map(|found| *found), &mean, &mut better)?.map(|(found, _)| found);
-        Ok(Lead::of(Explained::new(found, Some(mean))))
+        Ok(Hypothesis::of(FrameHypothesis::new(found, Some(mean))))
     }
 }
 
