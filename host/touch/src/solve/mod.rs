@@ -6,7 +6,7 @@
 //! before    complete, adaptive_mean, latest: readings to readings                      -> fit
 //! problem   what solvers are made for: a detector with its models              -> before, what was learned
 //! solver    what a method is to those who run it: one trait, and two halves    -> answer
-//! after     track, force, correct: solutions to solutions                      -> answer, fit, problem
+//! after     associate, force, correct: solutions to solutions                  -> answer, fit, problem
 //! health    which electrodes cannot be right                                   -> answer
 //! methods   contacts | shapes | image | linear | network | kernel | comparisons
 //!           -> answer, fit, problem, solver; contacts also -> before, after: they average frames and number contacts by themselves

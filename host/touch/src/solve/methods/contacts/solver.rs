@@ -9,7 +9,7 @@ use super::discs::DiscFit;
 use super::doubt::Doubt;
 use super::rows::RowState;
 use super::{ContactFinder, ContactHypothesis, ContactSettings};
-use crate::solve::after::track::Tracker;
+use crate::solve::after::association::Association;
 use crate::solve::answer::{Calibrated, FoundContact, Solution, SolveError};
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::before::latest::Latest;
@@ -61,9 +61,9 @@ pub(crate) struct ContactFollower {
     is_provisional: bool,
     /// What a calibration would bring, as all readings told of what is followed.
     calibrated: Option<Calibrated>,
-    tracker: Tracker,
-    /// The tracker before this frame: a frame that has several answers is one frame.
-    before: Tracker,
+    association: Association,
+    /// As it was before this frame: a frame that has several answers is one frame.
+    before: Association,
 }
 
 /// What is inside a [`Hypothesis`](crate::solve::solver::Hypothesis) of this method.
@@ -124,9 +124,9 @@ impl Contacts {
 impl ContactFollower {
     /// Follows nothing yet.
     pub fn new(finder: Arc<ContactFinder>) -> Self {
-        let tracker = Tracker::new(finder.spacing_m);
+        let association = Association::new(finder.spacing_m);
         let searched = Searched::default();
-        let before = tracker.clone();
+        let before = association.clone();
         Self {
             finder,
             last: None,
@@ -141,7 +141,7 @@ impl ContactFollower {
             is_provisional: false,
             calibrated: None,
             before,
-            tracker,
+            association,
         }
     }
 
@@ -174,7 +174,7 @@ impl ContactFollower {
     }
 
     fn step_frame(&mut self, target: &Target) -> bool {
-        self.before = self.tracker.clone();
+        self.before = self.association.clone();
         (self.rows, self.latest) = (None, None);
         let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
         let Some(moved) = self.finder.follow(&last, target) else {
@@ -194,7 +194,7 @@ impl ContactFollower {
     /// Takes what a search has found in the mean of some frames, if it explains this frame better than what is followed; whether the search has to be repeated, because
     /// what it has found does not explain this frame as well as its own.
     pub fn adopt(&mut self, found: Option<ContactHypothesis>, frames: usize, target: &Target) -> bool {
-        self.tracker = self.before.clone();
+        self.association = self.before.clone();
         let expected_v = self.expected_v().map(<[f64]>::to_vec);
         let count = |found: &Option<ContactHypothesis>| found.as_ref().map_or(0, |found| found.fit.contacts.len());
         let before = count(&self.last);
@@ -236,8 +236,8 @@ impl ContactFollower {
 
     /// Numbers contacts on from those that were found before.
     pub fn inherit(&mut self, before: &[FoundContact]) {
-        self.tracker.inherit(before);
-        self.before = self.tracker.clone();
+        self.association.inherit(before);
+        self.before = self.association.clone();
     }
 
     /// What is followed, as a solution, with the numbers that contacts keep.
@@ -248,7 +248,7 @@ impl ContactFollower {
         // Among explanations none of which explains the readings, or of which better ones are still sought, the share of one says nothing.
         let certainty = self.last.as_ref().and_then(|found| found.certainty);
         solution.certainty = certainty.filter(|_| !solution.flags.is_doubtful());
-        self.tracker.follow(&mut solution.contacts);
+        self.association.number(&mut solution.contacts);
         solution
     }
 
@@ -263,8 +263,8 @@ impl ContactFollower {
     pub fn reset(&mut self) {
         self.let_go();
         self.latest = None;
-        self.tracker.reset();
-        self.before = self.tracker.clone();
+        self.association.reset();
+        self.before = self.association.clone();
     }
 }
 

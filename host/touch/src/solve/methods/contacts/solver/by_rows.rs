@@ -76,7 +76,7 @@ impl ContactFollower {
 
     /// Brings the contacts to rows of readings; the rows as they were fitted, and whether the contacts have to be searched.
     fn step(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
-        self.before = self.tracker.clone();
+        self.before = self.association.clone();
         let off_v = |state: &Option<Box<RowState>>| state.as_ref().map_or(Vec::new(), |state| state.off_v().to_vec());
         let off_v = off_v(&self.rows);
         let is_known = self.finder.knows_unknowns() && !(self.is_provisional && self.last.is_some());

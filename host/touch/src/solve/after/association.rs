@@ -1,4 +1,4 @@
-//! The same number for the same contact from frame to frame.
+//! Data association: a contact keeps its number from frame to frame.
 
 use crate::solve::answer::FoundContact;
 use tactomo_physics::space::{self, Place};
@@ -10,9 +10,9 @@ const NEWEST: f64 = 0.2;
 /// Frames for which a contact that is lost is expected to go on as it went. Longer, its velocity says less than where it was.
 const COASTS: f64 = 12.0;
 
-/// Follows contacts by their places.
+/// Associates the contacts of a frame with those of frames before, by their places (nearest neighbours first).
 #[derive(Clone, Debug)]
-pub struct Tracker {
+pub struct Association {
     /// A contact is nearer than this to where it is expected (m).
     reach_m: f64,
     tracks: Vec<Track>,
@@ -48,7 +48,7 @@ impl Track {
     }
 }
 
-impl Tracker {
+impl Association {
     /// For contacts that are within `reach_m` (m) of where their velocity brings them.
     pub fn new(reach_m: f64) -> Self {
         Self { reach_m, tracks: Vec::new(), next: 1 }
@@ -56,7 +56,7 @@ impl Tracker {
 
     /// Numbers the contacts of the next frame. The nearest pairs of known and found contacts are taken for the same first, then those
     /// with contacts that were lost a moment ago; what is left of the found ones is new.
-    pub fn follow(&mut self, contacts: &mut [FoundContact]) {
+    pub fn number(&mut self, contacts: &mut [FoundContact]) {
         contacts.iter_mut().for_each(|contact| contact.id = None);
         let mut seen = vec![false; self.tracks.len()];
         self.pair(contacts, &mut seen, |track| track.missed == 0);
@@ -117,47 +117,47 @@ fn place_m(contact: &FoundContact) -> Place {
 mod tests {
     use super::*;
 
-    fn ids(tracker: &mut Tracker, x_m: &[f64]) -> Vec<u32> {
+    fn ids(association: &mut Association, x_m: &[f64]) -> Vec<u32> {
         let mut contacts: Vec<_> = x_m.iter().map(|x_m| FoundContact::flat(*x_m, 0.0, 1e-3)).collect();
-        tracker.follow(&mut contacts);
+        association.number(&mut contacts);
         contacts.iter().filter_map(|contact| contact.id).collect()
     }
 
     #[test]
     fn contacts_keep_their_numbers_while_they_move_come_and_go() {
-        let mut tracker = Tracker::new(0.010);
-        assert_eq!(ids(&mut tracker, &[0.0, 0.030]), [1, 2]);
-        assert_eq!(ids(&mut tracker, &[0.028, 0.004]), [2, 1], "in another order");
-        assert_eq!(ids(&mut tracker, &[0.027]), [2]);
-        assert_eq!(ids(&mut tracker, &[0.045, 0.026]), [3, 2], "one that is where none was is new");
-        tracker.reset();
-        assert_eq!(ids(&mut tracker, &[0.004]), [1]);
+        let mut association = Association::new(0.010);
+        assert_eq!(ids(&mut association, &[0.0, 0.030]), [1, 2]);
+        assert_eq!(ids(&mut association, &[0.028, 0.004]), [2, 1], "in another order");
+        assert_eq!(ids(&mut association, &[0.027]), [2]);
+        assert_eq!(ids(&mut association, &[0.045, 0.026]), [3, 2], "one that is where none was is new");
+        association.reset();
+        assert_eq!(ids(&mut association, &[0.004]), [1]);
     }
 
     #[test]
     fn a_contact_that_is_lost_for_a_moment_keeps_its_number() {
-        let mut tracker = Tracker::new(0.010);
-        assert_eq!(ids(&mut tracker, &[0.0, 0.030]), [1, 2]);
-        (0..KEPT).for_each(|_| assert_eq!(ids(&mut tracker, &[0.030]), [2]));
-        assert_eq!(ids(&mut tracker, &[0.030, 0.001]), [2, 1], "lost for a moment");
-        (0..=KEPT).for_each(|_| assert_eq!(ids(&mut tracker, &[0.030]), [2]));
-        assert_eq!(ids(&mut tracker, &[0.030, 0.001]), [2, 3], "lost for long");
+        let mut association = Association::new(0.010);
+        assert_eq!(ids(&mut association, &[0.0, 0.030]), [1, 2]);
+        (0..KEPT).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
+        assert_eq!(ids(&mut association, &[0.030, 0.001]), [2, 1], "lost for a moment");
+        (0..=KEPT).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
+        assert_eq!(ids(&mut association, &[0.030, 0.001]), [2, 3], "lost for long");
         // What is seen goes on before what is lost comes back, however near.
-        assert_eq!(ids(&mut tracker, &[0.002]), [3]);
-        (0..5).for_each(|_| assert_eq!(ids(&mut tracker, &[0.004, 0.031]), [3, 2]));
+        assert_eq!(ids(&mut association, &[0.002]), [3]);
+        (0..5).for_each(|_| assert_eq!(ids(&mut association, &[0.004, 0.031]), [3, 2]));
     }
 
     #[test]
     fn contacts_that_pass_each_other_keep_their_numbers() {
-        let mut tracker = Tracker::new(0.010);
+        let mut association = Association::new(0.010);
         // 1 mm between frames; where they meet, two fingers are one contact for some frames.
         for step in 0..40 {
             let way_m = 0.001 * f64::from(step);
             let both = [way_m, 0.040 - way_m];
             let is_one = (both[0] - both[1]).abs() < 0.005;
             match is_one {
-                true => drop(ids(&mut tracker, &[0.020])),
-                false => assert_eq!(ids(&mut tracker, &both), [1, 2], "step {step}"),
+                true => drop(ids(&mut association, &[0.020])),
+                false => assert_eq!(ids(&mut association, &both), [1, 2], "step {step}"),
             }
         }
     }
