@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tactomo_board::baseline::Baseline;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{ElectrodeWatch, Followed, Follower, Latest, Method, SolveError};
+use tactomo_touch::solve::{ElectrodeWatch, Followed, Latest, Method, SolveError, Tracker};
 
 use super::inbox::{Rows, Taken};
 use super::order::Order;
@@ -25,7 +25,7 @@ pub(super) struct BoardState {
     pub baseline: Baseline,
     pub watch: ElectrodeWatch,
     /// `None` until the first solver is made.
-    pub follower: Option<Box<dyn Follower>>,
+    pub follower: Option<Box<dyn Tracker>>,
     /// Board time of the rows before (us).
     rows_us: Option<u64>,
 }

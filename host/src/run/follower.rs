@@ -323,7 +323,7 @@ impl FollowLoop {
     fn change_solver(&mut self, made: Made) -> Result<(), LiveError> {
         match (self.maker.receive(made), &mut self.board) {
             (Ok(Some((order, solver))), Some(board)) if order.detector == board.detector => {
-                let Parts { mut follower, searcher } = self.inbox.parts_of(solver);
+                let Parts { tracker: mut follower, search: searcher } = self.inbox.parts_of(solver);
                 follower.inherit(&self.found);
                 self.search.change_solver(searcher);
                 board.follower = Some(follower);

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{Hypothesis, Look, Searcher};
+use tactomo_touch::solve::{Hypothesis, Look, Search};
 
 use super::inbox::{Event, Inbox, Searched};
 use super::order::Order;
@@ -15,7 +15,7 @@ use super::plan::LookAtWires;
 /// What the thread is asked.
 enum Job {
     /// To search with another solver's half from now on.
-    Solver(Option<Box<dyn Searcher>>),
+    Solver(Option<Box<dyn Search>>),
     /// To search what explains readings.
     Search { epoch: u64, from: Hypothesis, readings: Readings },
 }
@@ -42,7 +42,7 @@ impl SearchThread {
     }
 
     /// Searches with this half from now on; what is still searched with another is thrown away.
-    pub fn change_solver(&mut self, half: Option<Box<dyn Searcher>>) {
+    pub fn change_solver(&mut self, half: Option<Box<dyn Search>>) {
         self.forget();
         self.send(Job::Solver(half));
     }
@@ -100,7 +100,7 @@ impl SearchThread {
 }
 
 fn work(jobs: &Receiver<Job>, inbox: &Inbox) {
-    let mut half: Option<Box<dyn Searcher>> = None;
+    let mut half: Option<Box<dyn Search>> = None;
     while let Ok(job) = jobs.recv() {
         if inbox.is_closed() {
             return;

@@ -1,7 +1,7 @@
 //! Which grounds to scan.
 //!
 //! A wire carries so many rows a second, whatever they are. Most of them are best spent on the few grounds that tell most of what touches
-//! ([`Follower::telling_grounds`](crate::solve::Follower::telling_grounds)), some on all others in turn, for what is new.
+//! ([`Tracker::telling_grounds`](crate::solve::Tracker::telling_grounds)), some on all others in turn, for what is new.
 
 use tactomo_physics::detector::Detector;
 

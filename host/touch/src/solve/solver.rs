@@ -1,7 +1,7 @@
 //! What a method is to those who run it: a solver, or its two halves.
 //!
 //! One half follows what is known from frame to frame, fast, and one searches thoroughly, slowly. Offline they take turns on every frame. Live, each
-//! has a thread of its own: the follower answers at the board's rate, and goes on from what a search has found once that explains the present better.
+//! has a thread of its own: the tracker answers at the board's rate, and goes on from what a search has found once that explains the present better.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -33,14 +33,14 @@ pub trait Solver: Send + 'static {
     /// Forgets the frames before, from which some solvers start: the next answer is that of a new solver.
     fn reset(&mut self) {}
 
-    /// The halves of it that a live picture runs side by side: by default all of it in the follower.
+    /// The halves of it that a live picture runs side by side: by default all of it in the tracker.
     fn split(self: Box<Self>) -> Parts {
-        Parts { follower: Box::new(Direct(self)), searcher: None }
+        Parts { tracker: Box::new(Direct(self)), search: None }
     }
 }
 
 /// Follows what is known from frame to frame.
-pub trait Follower: Send {
+pub trait Tracker: Send {
     /// The answer for the next frame.
     ///
     /// # Errors
@@ -48,7 +48,7 @@ pub trait Follower: Send {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError>;
 
     /// The answer for rows of readings that come `elapsed_s` (s) after those before, the others of which say
-    /// [nothing](tactomo_physics::readings::Says); `latest` are the latest of all, which are taken by a follower that does not go by rows.
+    /// [nothing](tactomo_physics::readings::Says); `latest` are the latest of all, which are taken by a tracker that does not go by rows.
     ///
     /// # Errors
     /// [`SolveError`] if the readings cannot be those of the detector.
@@ -74,7 +74,7 @@ pub trait Follower: Send {
     /// What is followed: where a search may begin.
     fn hypothesis(&self) -> Hypothesis;
 
-    /// Numbers contacts on from those that another follower found before.
+    /// Numbers contacts on from those that another tracker found before.
     fn inherit(&mut self, before: &[FoundContact]) {
         let _ = before;
     }
@@ -84,7 +84,7 @@ pub trait Follower: Send {
 }
 
 /// Searches what explains a frame.
-pub trait Searcher: Send {
+pub trait Search: Send {
     /// What explains `readings`, or the mean that `from` has of them and of those before; `from` is what was followed up to now, and
     /// explains them partly. What is better than nothing on the way there goes to `found`.
     ///
@@ -98,7 +98,7 @@ pub trait Searcher: Send {
     ) -> Result<Hypothesis, SolveError>;
 }
 
-/// The answer of a follower.
+/// The answer of a tracker.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Followed {
     /// What is known now.
@@ -110,15 +110,15 @@ pub struct Followed {
 /// The halves of a solver.
 pub struct Parts {
     /// Answers at once.
-    pub follower: Box<dyn Follower>,
-    /// Answers thoroughly; none where the follower's answers are.
-    pub searcher: Option<Box<dyn Searcher>>,
+    pub tracker: Box<dyn Tracker>,
+    /// Answers thoroughly; none where the tracker's answers are.
+    pub search: Option<Box<dyn Search>>,
 }
 
 impl Parts {
-    /// All of a solver in the follower: every answer is thorough.
+    /// All of a solver in the tracker: every answer is thorough.
     pub fn whole(solver: Box<dyn Solver>) -> Self {
-        Self { follower: Box::new(Direct(solver)), searcher: None }
+        Self { tracker: Box::new(Direct(solver)), search: None }
     }
 }
 
@@ -140,37 +140,37 @@ impl Hypothesis {
 
 /// One frame by both halves, one after the other: the thorough answer.
 pub(crate) fn follow_and_search(
-    follower: &mut dyn Follower,
-    searcher: &mut dyn Searcher,
+    tracker: &mut dyn Tracker,
+    search: &mut dyn Search,
     readings: &Readings,
 ) -> Result<Solution, SolveError> {
-    let followed = follower.follow(readings)?;
+    let followed = tracker.follow(readings)?;
     if !followed.search {
         return Ok(followed.solution);
     }
-    let hypothesis = searcher.search(follower.hypothesis(), readings, &mut |_| {})?;
-    Ok(follower.adopt(hypothesis, readings)?.solution)
+    let hypothesis = search.search(tracker.hypothesis(), readings, &mut |_| {})?;
+    Ok(tracker.adopt(hypothesis, readings)?.solution)
 }
 
 /// The same for rows of readings.
 pub(crate) fn follow_rows_and_search(
-    follower: &mut dyn Follower,
-    searcher: &mut dyn Searcher,
+    tracker: &mut dyn Tracker,
+    search: &mut dyn Search,
     (rows, latest): (&Readings, &Readings),
     elapsed_s: f64,
 ) -> Result<Solution, SolveError> {
-    let followed = follower.follow_rows(rows, latest, elapsed_s)?;
+    let followed = tracker.follow_rows(rows, latest, elapsed_s)?;
     if !followed.search {
         return Ok(followed.solution);
     }
-    let hypothesis = searcher.search(follower.hypothesis(), latest, &mut |_| {})?;
-    Ok(follower.adopt(hypothesis, latest)?.solution)
+    let hypothesis = search.search(tracker.hypothesis(), latest, &mut |_| {})?;
+    Ok(tracker.adopt(hypothesis, latest)?.solution)
 }
 
-/// A solver whose every answer is thorough, as a follower.
+/// A solver whose every answer is thorough, as a tracker.
 pub(crate) struct Direct<S: ?Sized>(pub Box<S>);
 
-impl<S: Solver + ?Sized> Follower for Direct<S> {
+impl<S: Solver + ?Sized> Tracker for Direct<S> {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         Ok(Followed { solution: self.0.solve(readings)?, search: false })
     }

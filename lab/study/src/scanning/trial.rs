@@ -80,9 +80,9 @@ impl<'a> Bench<'a> {
         let times = frame(plan.rows, electrodes);
         let mut converter = Converter::new(self.detector, seed);
         let mut latest = Latest::new(electrodes);
-        self.parts.follower.reset();
+        self.parts.tracker.reset();
         self.since_search_s = f64::INFINITY;
-        let follower = &self.parts.follower;
+        let follower = &self.parts.tracker;
         let telling = |count: usize| follower.telling_grounds(count).unwrap_or_default();
         let mut grounds = Grounds::new(plan.choice, plan.rows, self.detector, telling);
         let (mut start_s, mut elapsed_s, mut answers) = (0.0, times.period_s, Vec::new());
@@ -99,7 +99,7 @@ impl<'a> Bench<'a> {
             let solution =
                 solution.map_err(|error| StudyError::Solve { solver: Method::Contacts.name().into(), error })?;
             let arrived_s = start_s + times.age_s;
-            let telling = |count: usize| self.parts.follower.telling_grounds(count).unwrap_or_default();
+            let telling = |count: usize| self.parts.tracker.telling_grounds(count).unwrap_or_default();
             let is_new = grounds.consider(arrived_s, !solution.contacts.is_empty(), telling);
             answers.push(Answer::of(solution, rows, start_s, &times));
             elapsed_s = times.period_s + if is_new { TAKEN_OVER_S } else { 0.0 };
@@ -110,13 +110,13 @@ impl<'a> Bench<'a> {
 
     /// What a whole frame says.
     fn whole(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        let followed = self.parts.follower.follow(readings)?;
+        let followed = self.parts.tracker.follow(readings)?;
         self.thorough(followed, readings)
     }
 
     /// What rows say.
     fn rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
-        let followed = self.parts.follower.follow_rows(rows, latest, elapsed_s)?;
+        let followed = self.parts.tracker.follow_rows(rows, latest, elapsed_s)?;
         self.thorough(followed, latest)
     }
 
@@ -126,12 +126,12 @@ impl<'a> Bench<'a> {
             return Ok(followed.solution);
         }
         self.since_search_s = 0.0;
-        let lead = self.parts.follower.hypothesis();
-        let lead = match &mut self.parts.searcher {
+        let lead = self.parts.tracker.hypothesis();
+        let lead = match &mut self.parts.search {
             Some(searcher) => searcher.search(lead, readings, &mut |_| {})?,
             None => lead,
         };
-        Ok(self.parts.follower.adopt(lead, readings)?.solution)
+        Ok(self.parts.tracker.adopt(lead, readings)?.solution)
     }
 }
 

@@ -234,11 +234,11 @@ mod tests {
         let (corrected, plain) = (problem(Some(correction())), problem(None));
         let readings = readings(CONTACT);
         let live = |problem: &Problem, before: &[FoundContact]| {
-            let Parts { mut follower, searcher } = Method::Auto.build(problem).unwrap().split();
-            follower.inherit(before);
-            follower.follow(&readings).unwrap();
-            let hypothesis = searcher.unwrap().search(follower.hypothesis(), &readings, &mut |_| {}).unwrap();
-            follower.adopt(hypothesis, &readings).unwrap().solution.contacts[0]
+            let Parts { mut tracker, search } = Method::Auto.build(problem).unwrap().split();
+            tracker.inherit(before);
+            tracker.follow(&readings).unwrap();
+            let hypothesis = search.unwrap().search(tracker.hypothesis(), &readings, &mut |_| {}).unwrap();
+            tracker.adopt(hypothesis, &readings).unwrap().solution.contacts[0]
         };
         assert_corrected(&live(&corrected, &[]), &live(&plain, &[]), "live");
         let guarded =

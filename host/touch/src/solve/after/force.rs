@@ -95,11 +95,11 @@ mod tests {
         let (problem, readings) = (problem(Some(law())), readings(CONTACT));
         let mut found = Vec::new();
         for method in [Method::Auto, Method::Contacts, Method::Bsbl] {
-            let Parts { mut follower, searcher } = method.build(&problem).unwrap().split();
-            let mut followed = follower.follow(&readings).unwrap();
-            if let Some(mut searcher) = searcher {
-                let hypothesis = searcher.search(follower.hypothesis(), &readings, &mut |_| {}).unwrap();
-                followed = follower.adopt(hypothesis, &readings).unwrap();
+            let Parts { mut tracker, search } = method.build(&problem).unwrap().split();
+            let mut followed = tracker.follow(&readings).unwrap();
+            if let Some(mut search) = search {
+                let hypothesis = search.search(tracker.hypothesis(), &readings, &mut |_| {}).unwrap();
+                followed = tracker.adopt(hypothesis, &readings).unwrap();
             }
             let [contact] = followed.solution.contacts[..] else { panic!("{}", method.name()) };
             found.push(contact.force_n.unwrap());

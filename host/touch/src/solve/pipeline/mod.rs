@@ -22,7 +22,7 @@ use crate::solve::after::correct::Corrector;
 use crate::solve::after::force::Scale;
 use crate::solve::answer::{FoundContact, Solution, SolveError, check_count};
 use crate::solve::problem::Problem;
-use crate::solve::solver::{Followed, Follower, Hypothesis, Parts, Searcher, Solver};
+use crate::solve::solver::{Followed, Hypothesis, Parts, Search, Solver, Tracker};
 use tactomo_physics::readings::Readings;
 
 /// What is done to readings before a method has them, and to its answers after. Cheap to clone.
@@ -133,14 +133,14 @@ impl Solver for Staged<dyn Solver> {
     }
 
     fn split(self: Box<Self>) -> Parts {
-        let Parts { follower, searcher } = self.half.split();
+        let Parts { tracker, search } = self.half.split();
         let stages = self.stages.clone();
-        let searcher = searcher.map(|half| Box::new(Staged::new(stages, half)) as Box<dyn Searcher>);
-        Parts { follower: Box::new(Staged::new(self.stages, follower)), searcher }
+        let search = search.map(|half| Box::new(Staged::new(stages, half)) as Box<dyn Search>);
+        Parts { tracker: Box::new(Staged::new(self.stages, tracker)), search }
     }
 }
 
-impl Follower for Staged<dyn Follower> {
+impl Tracker for Staged<dyn Tracker> {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         let seen = self.stages.seen(readings)?;
         let followed = self.half.follow(&*self.stages.before(&seen)?)?;
@@ -187,7 +187,7 @@ impl Follower for Staged<dyn Follower> {
     }
 }
 
-impl Searcher for Staged<dyn Searcher> {
+impl Search for Staged<dyn Search> {
     fn search(
         &mut self,
         from: Hypothesis,

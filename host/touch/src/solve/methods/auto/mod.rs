@@ -4,34 +4,34 @@
 //! answer, and the solution says which and why. What is known is followed from frame to frame, which costs least, and searched anew
 //! only when it no longer explains the readings, or now and then.
 
-mod follower;
-mod searcher;
+mod search;
 #[cfg(test)]
 mod tests;
+mod tracker;
 mod words;
 
 use std::sync::Arc;
 
-use self::follower::AutoFollower;
-use self::searcher::AutoSearcher;
+use self::search::AutoSearch;
+use self::tracker::AutoTracker;
 use crate::solve::answer::{Solution, SolveError};
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::fit::evidence::Evidence;
 use crate::solve::fit::target::Target;
 use crate::solve::methods::contacts::{
-    ContactFinder, ContactFollower, ContactHypothesis, ContactSearcher, ContactSettings,
+    ContactFinder, ContactHypothesis, ContactSearch, ContactSettings, ContactTracker,
 };
 use crate::solve::methods::image::{Complexity, Descent, Nonlinear, NonlinearSettings};
-use crate::solve::methods::shapes::{ShapeFinder, ShapeFollower, StripFit};
+use crate::solve::methods::shapes::{ShapeFinder, ShapeTracker, StripFit};
 use crate::solve::problem::Problem;
-use crate::solve::solver::{Follower, Parts, Solver, follow_and_search, follow_rows_and_search};
+use crate::solve::solver::{Parts, Solver, Tracker, follow_and_search, follow_rows_and_search};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
 /// Chooses the model of the scene.
 pub struct Auto {
-    follower: AutoFollower,
-    searcher: AutoSearcher,
+    tracker: AutoTracker,
+    search: AutoSearch,
 }
 
 /// What is inside a [`Hypothesis`](crate::solve::solver::Hypothesis) of this method.
@@ -67,14 +67,14 @@ impl Auto {
             None => None,
         };
         let image = Nonlinear::new(problem, NonlinearSettings::default())?;
-        let follower = AutoFollower::new(
+        let tracker = AutoTracker::new(
             problem.detector(),
-            contacts.clone().map(ContactFollower::new),
-            shapes.clone().map(ShapeFollower::new),
+            contacts.clone().map(ContactTracker::new),
+            shapes.clone().map(ShapeTracker::new),
             image.clone(),
         );
-        let searcher = AutoSearcher::new(contacts, shapes, image);
-        Ok(Self { follower, searcher })
+        let search = AutoSearch::new(contacts, shapes, image);
+        Ok(Self { tracker, search })
     }
 }
 
@@ -84,20 +84,20 @@ impl Solver for Auto {
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        follow_and_search(&mut self.follower, &mut self.searcher, readings)
+        follow_and_search(&mut self.tracker, &mut self.search, readings)
     }
 
     fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
-        follow_rows_and_search(&mut self.follower, &mut self.searcher, (rows, latest), elapsed_s)
+        follow_rows_and_search(&mut self.tracker, &mut self.search, (rows, latest), elapsed_s)
     }
 
     fn reset(&mut self) {
-        self.follower.reset();
-        self.searcher.reset();
+        self.tracker.reset();
+        self.search.reset();
     }
 
     fn split(self: Box<Self>) -> Parts {
-        Parts { follower: Box::new(self.follower), searcher: Some(Box::new(self.searcher)) }
+        Parts { tracker: Box::new(self.tracker), search: Some(Box::new(self.search)) }
     }
 }
 

@@ -92,21 +92,21 @@ fn it_takes_no_more_than_the_scene_needs() {
 #[test]
 fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
     let mut bench = Bench::new();
-    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
-    let mut searcher = searcher.unwrap();
+    let Parts { mut tracker, search } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut search = search.unwrap();
     let moved =
         |x_m: f64| [Contact::flat(0.008 + x_m, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009 + x_m, 0.0025, 5e-4)];
     let first = bench.measured(&moved(0.0));
-    let before = follower.follow(&first).unwrap();
+    let before = tracker.follow(&first).unwrap();
     assert!(before.search && before.solution.flags.unfinished && before.solution.contacts.is_empty());
-    let hypothesis = searcher.search(follower.hypothesis(), &first, &mut |_| {}).unwrap();
+    let hypothesis = search.search(tracker.hypothesis(), &first, &mut |_| {}).unwrap();
     // The answer comes when the contacts are 3 mm further on.
-    let after = follower.adopt(hypothesis, &bench.measured(&moved(0.003))).unwrap();
+    let after = tracker.adopt(hypothesis, &bench.measured(&moved(0.003))).unwrap();
     assert_eq!((what(&after.solution), after.search), ("2 contacts", false), "{after:?}");
     let ids: Vec<_> = after.solution.contacts.iter().map(|contact| contact.id).collect();
     for step in 0..20 {
         let truth = moved(0.003 + 1e-4 * f64::from(step));
-        let next = follower.follow(&bench.measured(&truth)).unwrap();
+        let next = tracker.follow(&bench.measured(&truth)).unwrap();
         assert_eq!((what(&next.solution), next.search), ("2 contacts", false), "{next:?}");
         assert_eq!(next.solution.contacts.iter().map(|contact| contact.id).collect::<Vec<_>>(), ids);
         for contact in truth {
@@ -114,7 +114,7 @@ fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
             assert!(next.solution.contacts.iter().any(|found| off_m(found) < 3e-4), "{next:?}");
         }
     }
-    let lifted = follower.follow(&bench.measured(&moved(0.005)[..1])).unwrap();
+    let lifted = tracker.follow(&bench.measured(&moved(0.005)[..1])).unwrap();
     assert_eq!(
         (what(&lifted.solution), lifted.search),
         ("1 contact", false),
@@ -125,32 +125,32 @@ fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
 #[test]
 fn a_search_of_the_past_does_not_replace_what_explains_the_present() {
     let mut bench = Bench::new();
-    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
-    let mut searcher = searcher.unwrap();
+    let Parts { mut tracker, search } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut search = search.unwrap();
     let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
-    let past = searcher.search(Hypothesis::default(), &bench.measured(&[a]), &mut |_| {}).unwrap();
+    let past = search.search(Hypothesis::default(), &bench.measured(&[a]), &mut |_| {}).unwrap();
     let present = bench.measured(&[a, b]);
-    let hypothesis = searcher.search(Hypothesis::default(), &present, &mut |_| {}).unwrap();
-    follower.adopt(hypothesis, &present).unwrap();
-    let kept = follower.adopt(past, &bench.measured(&[a, b])).unwrap();
+    let hypothesis = search.search(Hypothesis::default(), &present, &mut |_| {}).unwrap();
+    tracker.adopt(hypothesis, &present).unwrap();
+    let kept = tracker.adopt(past, &bench.measured(&[a, b])).unwrap();
     assert_eq!(what(&kept.solution), "2 contacts");
 }
 
 #[test]
 fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
     let mut bench = Bench::new();
-    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
-    let mut searcher = searcher.unwrap();
+    let Parts { mut tracker, search } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut search = search.unwrap();
     let a = [Contact::flat(0.01, 0.004, 0.0025, 3e-4)];
     let frame = bench.frame();
-    let image = searcher.search(Hypothesis::default(), &frame, &mut |_| {}).unwrap();
-    let contact = searcher.search(Hypothesis::default(), &bench.measured(&a), &mut |_| {}).unwrap();
-    follower.adopt(contact.clone(), &bench.measured(&a)).unwrap();
-    let kept = follower.adopt(image.clone(), &bench.measured(&a)).unwrap();
+    let image = search.search(Hypothesis::default(), &frame, &mut |_| {}).unwrap();
+    let contact = search.search(Hypothesis::default(), &bench.measured(&a), &mut |_| {}).unwrap();
+    tracker.adopt(contact.clone(), &bench.measured(&a)).unwrap();
+    let kept = tracker.adopt(image.clone(), &bench.measured(&a)).unwrap();
     assert_eq!(what(&kept.solution), "1 contact");
-    follower.reset();
-    follower.adopt(image, &frame).unwrap();
-    let kept = follower.adopt(contact, &frame).unwrap();
+    tracker.reset();
+    tracker.adopt(image, &frame).unwrap();
+    let kept = tracker.adopt(contact, &frame).unwrap();
     assert_eq!(what(&kept.solution), "image");
 }
 
@@ -195,19 +195,19 @@ fn shapes_are_shapes_with_contacts_beside_them() {
 #[test]
 fn a_shape_and_contacts_of_the_past_do_not_replace_each_other() {
     let mut bench = Bench::new();
-    let Parts { mut follower, searcher } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
-    let mut searcher = searcher.unwrap();
+    let Parts { mut tracker, search } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut search = search.unwrap();
     let pair = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
     let bar = [([0.002, -0.003], Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 }, 1.5)];
-    let line = searcher.search(Hypothesis::default(), &bench.shaped(&bar), &mut |_| {}).unwrap();
-    let contacts = searcher.search(Hypothesis::default(), &bench.measured(&pair), &mut |_| {}).unwrap();
-    follower.adopt(contacts.clone(), &bench.measured(&pair)).unwrap();
-    let kept = follower.adopt(line.clone(), &bench.measured(&pair)).unwrap();
+    let line = search.search(Hypothesis::default(), &bench.shaped(&bar), &mut |_| {}).unwrap();
+    let contacts = search.search(Hypothesis::default(), &bench.measured(&pair), &mut |_| {}).unwrap();
+    tracker.adopt(contacts.clone(), &bench.measured(&pair)).unwrap();
+    let kept = tracker.adopt(line.clone(), &bench.measured(&pair)).unwrap();
     assert!(kept.solution.is_contacts() && !kept.search, "{kept:?}");
-    follower.reset();
-    follower.adopt(line, &bench.shaped(&bar)).unwrap();
-    let kept = follower.adopt(contacts, &bench.shaped(&bar)).unwrap();
+    tracker.reset();
+    tracker.adopt(line, &bench.shaped(&bar)).unwrap();
+    let kept = tracker.adopt(contacts, &bench.shaped(&bar)).unwrap();
     assert_eq!((what(&kept.solution), kept.search), ("line", false));
-    let lifted = follower.follow(&bench.measured(&pair)).unwrap();
+    let lifted = tracker.follow(&bench.measured(&pair)).unwrap();
     assert!(lifted.search, "two fingers are no bar");
 }

@@ -189,19 +189,19 @@ impl Bench {
         let course = Course::new(press, &self.told, model);
         let mut chip = Chip::drawn(&self.told, model.detector(), press.seed);
         let solver = Contacts::new(&self.problem, ContactSettings::of(&self.problem)).unwrap();
-        let Parts { mut follower, searcher } = Box::new(solver).split();
-        let (mut searcher, mut latest) = (searcher.unwrap(), Latest::new(n));
+        let Parts { mut tracker, search } = Box::new(solver).split();
+        let (mut search, mut latest) = (search.unwrap(), Latest::new(n));
         let mut attention = Attention::new(FOCUS);
         let (mut plan, mut begun, mut touches) = (Vec::new(), 0, false);
         for frame in 0..=JUDGED[1] {
-            if attention.consider(FRAME_S * frame as f64, touches, |count| follower.telling_grounds(count)) {
+            if attention.consider(FRAME_S * frame as f64, touches, |count| tracker.telling_grounds(count)) {
                 (plan, begun) = (with_others(attention.grounds().unwrap_or(&[]), n, usize::MAX), ROWS * frame);
             }
             let grounds: Vec<usize> = (0..ROWS).map(|row| plan[(ROWS * frame + row - begun) % plan.len()]).collect();
             let rows = chip.frame(&grounds, |row, g, e| course.volts(course.way_m(frame, row as f64), g, e));
             latest.add(&rows, FRAME_S, None);
             let all = latest.readings(f64::MAX, None);
-            let solution = follow_rows_and_search(&mut *follower, &mut *searcher, (&rows, &all), FRAME_S).unwrap();
+            let solution = follow_rows_and_search(&mut *tracker, &mut *search, (&rows, &all), FRAME_S).unwrap();
             touches = !solution.contacts.is_empty();
             if JUDGED.contains(&frame) {
                 let middle_m = course.way_m(frame, 0.5 * (ROWS - 1) as f64);

@@ -36,7 +36,7 @@ use self::evidence::Prior;
 use self::exchange::{Logs, Usual};
 use self::scan::Scan;
 pub use self::solver::Contacts;
-pub(crate) use self::solver::{ContactFollower, ContactSearcher};
+pub(crate) use self::solver::{ContactSearch, ContactTracker};
 use crate::solve::answer::{Calibrated, Flags, FoundContact, Solution, SolveError, Uncertainty, check};
 use crate::solve::before::adaptive_mean;
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};

@@ -110,17 +110,17 @@ fn contacts_that_come_and_go_beside_a_still_one_are_noticed_at_once() {
 fn a_scene_that_stands_still_is_searched_only_when_its_frames_have_doubled() {
     let mut bench = Bench::new();
     bench.touch(&[contact(0.010, 0.004, 0.3), contact(-0.012, -0.009, 0.05)]);
-    let Parts { mut follower, searcher } =
+    let Parts { mut tracker, search: searcher } =
         Box::new(Contacts::new(&PROBLEM, ContactSettings::of(&PROBLEM)).unwrap()).split();
     let mut searcher = searcher.unwrap();
     let mut searched = 0;
     for _ in 0..300 {
         let frame = bench.frame();
-        let Followed { search, .. } = follower.follow(&frame).unwrap();
+        let Followed { search, .. } = tracker.follow(&frame).unwrap();
         if search {
             searched += 1;
-            let hypothesis = searcher.search(follower.hypothesis(), &frame, &mut |_| ()).unwrap();
-            assert!(!follower.adopt(hypothesis, &frame).unwrap().search);
+            let hypothesis = searcher.search(tracker.hypothesis(), &frame, &mut |_| ()).unwrap();
+            assert!(!tracker.adopt(hypothesis, &frame).unwrap().search);
         }
     }
     assert!((6..9).contains(&searched), "{searched}: with 1, 2, 4, 8, 16, 32 frames");

@@ -18,7 +18,7 @@ use crate::solve::fit::evidence::Evidence;
 use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
 use crate::solve::solver::{
-    Followed, Follower, Hypothesis, Parts, Searcher, Solver, follow_and_search, follow_rows_and_search,
+    Followed, Hypothesis, Parts, Search, Solver, Tracker, follow_and_search, follow_rows_and_search,
 };
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
@@ -30,17 +30,17 @@ const MORE: usize = 2;
 
 /// Fits contacts.
 pub struct Contacts {
-    follower: FrameFollower,
+    tracker: FrameTracker,
 }
 
 /// Follows contacts in the mean of the frames that stand still.
-struct FrameFollower {
+struct FrameTracker {
     average: AdaptiveMean,
-    contacts: ContactFollower,
+    contacts: ContactTracker,
 }
 
 /// Follows contacts from frame to frame.
-pub(crate) struct ContactFollower {
+pub(crate) struct ContactTracker {
     finder: Arc<ContactFinder>,
     last: Option<ContactHypothesis>,
     searched: Searched,
@@ -90,7 +90,7 @@ struct Searched {
 }
 
 /// Searches contacts.
-pub(crate) struct ContactSearcher {
+pub(crate) struct ContactSearch {
     finder: Arc<ContactFinder>,
 }
 
@@ -100,28 +100,28 @@ impl Contacts {
     /// # Errors
     /// [`ForwardError::Detector`] if the model has no spots.
     pub fn new(problem: &Problem, settings: ContactSettings) -> Result<Self, ForwardError> {
-        let contacts = ContactFollower::new(Arc::new(ContactFinder::new(problem, settings)?));
-        Ok(Self { follower: FrameFollower { average: contacts.finder.adaptive_mean(), contacts } })
+        let contacts = ContactTracker::new(Arc::new(ContactFinder::new(problem, settings)?));
+        Ok(Self { tracker: FrameTracker { average: contacts.finder.adaptive_mean(), contacts } })
     }
 
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
-        self.follower.contacts.finder.left_by_one(readings)
+        self.tracker.contacts.finder.left_by_one(readings)
     }
 
     /// Share of readings that one contact leaves, as far as a look at every place tells, in some 10 us; of readings some of which are bounds, in some
     /// 300 us.
     pub(crate) fn roughly_left_by_one(&self, readings: &Readings) -> f64 {
-        self.follower.contacts.finder.roughly_left_by_one(readings)
+        self.tracker.contacts.finder.roughly_left_by_one(readings)
     }
 
     #[cfg(test)]
     pub(super) fn finder(&self) -> &ContactFinder {
-        &self.follower.contacts.finder
+        &self.tracker.contacts.finder
     }
 }
 
-impl ContactFollower {
+impl ContactTracker {
     /// Follows nothing yet.
     pub fn new(finder: Arc<ContactFinder>) -> Self {
         let association = Association::new(finder.spacing_m);
@@ -268,13 +268,13 @@ impl ContactFollower {
     }
 }
 
-impl FrameFollower {
+impl FrameTracker {
     fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
         self.contacts.finder.target_of(&self.average.mean_or(readings), self.contacts.error())
     }
 }
 
-impl Follower for FrameFollower {
+impl Tracker for FrameTracker {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         self.contacts.finder.check(readings)?;
         self.average.add_beside(readings, self.contacts.slopes_v());
@@ -322,8 +322,8 @@ impl Follower for FrameFollower {
     }
 }
 
-impl ContactSearcher {
-    /// Searches with what a follower follows with.
+impl ContactSearch {
+    /// Searches with what a tracker follows with.
     pub fn new(finder: Arc<ContactFinder>) -> Self {
         Self { finder }
     }
@@ -352,7 +352,7 @@ impl ContactSearcher {
     }
 }
 
-impl Searcher for ContactSearcher {
+impl Search for ContactSearch {
     fn search(
         &mut self,
         from: Hypothesis,
@@ -376,21 +376,21 @@ impl Solver for Contacts {
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        let mut searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
-        follow_and_search(&mut self.follower, &mut searcher, readings)
+        let mut search = ContactSearch::new(Arc::clone(&self.tracker.contacts.finder));
+        follow_and_search(&mut self.tracker, &mut search, readings)
     }
 
     fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
-        let mut searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
-        follow_rows_and_search(&mut self.follower, &mut searcher, (rows, latest), elapsed_s)
+        let mut search = ContactSearch::new(Arc::clone(&self.tracker.contacts.finder));
+        follow_rows_and_search(&mut self.tracker, &mut search, (rows, latest), elapsed_s)
     }
 
     fn reset(&mut self) {
-        self.follower.reset();
+        self.tracker.reset();
     }
 
     fn split(self: Box<Self>) -> Parts {
-        let searcher = ContactSearcher::new(Arc::clone(&self.follower.contacts.finder));
-        Parts { follower: Box::new(self.follower), searcher: Some(Box::new(searcher)) }
+        let search = ContactSearch::new(Arc::clone(&self.tracker.contacts.finder));
+        Parts { tracker: Box::new(self.tracker), search: Some(Box::new(search)) }
     }
 }

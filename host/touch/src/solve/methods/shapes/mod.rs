@@ -223,12 +223,12 @@ impl ShapeFinder {
 }
 
 /// Follows a line or a ring from frame to frame.
-pub(crate) struct ShapeFollower {
+pub(crate) struct ShapeTracker {
     finder: Arc<ShapeFinder>,
     last: Option<(StripFit, Watch)>,
 }
 
-impl ShapeFollower {
+impl ShapeTracker {
     /// Follows nothing yet.
     pub fn new(finder: Arc<ShapeFinder>) -> Self {
         Self { finder, last: None }

@@ -173,20 +173,20 @@ fn the_image_of_a_shape_conducts_what_it_says() {
 fn a_shape_is_followed_as_it_moves_and_lost_when_it_is_gone() {
     let mut bench = Bench::new();
     let (_, target, fit) = bench.found(&line(1.0), ALONG);
-    let mut follower = ShapeFollower::new(Arc::clone(&bench.finder));
-    follower.adopt(&fit, &target);
-    assert!(!follower.has_lost(&target));
+    let mut tracker = ShapeTracker::new(Arc::clone(&bench.finder));
+    tracker.adopt(&fit, &target);
+    assert!(!tracker.has_lost(&target));
     for step in 1..=20 {
         let angle_rad = 0.6 + 0.02 * f64::from(step);
         let shape = Shape::Line { length_m: 0.034, width_m: 0.003, angle_rad };
         let touch = Touch { centre_m: [0.003, -0.004 + 3e-4 * f64::from(step)], shape, ..line(1.0) };
-        assert!(!follower.follow(&bench.target(&touch)), "step {step}");
+        assert!(!tracker.follow(&bench.target(&touch)), "step {step}");
     }
-    let FoundShape::Line(found) = bench.finder.shape(follower.found().unwrap()) else { panic!() };
+    let FoundShape::Line(found) = bench.finder.shape(tracker.found().unwrap()) else { panic!() };
     let along = [0, 1].map(|axis| found.to_m[axis] - found.from_m[axis]);
     assert!(((along[1] / along[0]).atan() - 1.0).abs() < 0.01, "{found:?}");
     let target = bench.target(&ring(0.5));
-    assert!(follower.follow(&target), "a ring is no line");
+    assert!(tracker.follow(&target), "a ring is no line");
 }
 
 #[test]
@@ -195,16 +195,16 @@ fn a_ring_that_closes_is_let_go_before_it_is_a_disc() {
     let sheet_s = Detector::default().sheet_conductance_s();
     let touch = |radius_m: f64| Touch::flat([0.004, 0.006], Shape::Ring { radius_m, width_m: 0.006 }, sheet_s);
     let (_, target, fit) = bench.found(&touch(0.013), AROUND);
-    let mut follower = ShapeFollower::new(Arc::clone(&bench.finder));
-    follower.adopt(&fit, &target);
+    let mut tracker = ShapeTracker::new(Arc::clone(&bench.finder));
+    tracker.adopt(&fit, &target);
     let mut radius_m = 0.013;
     let mut was_let_go = false;
     while radius_m > 0.004 {
         let target = bench.target(&touch(radius_m));
-        let is_lost = follower.follow(&target);
+        let is_lost = tracker.follow(&target);
         // A search would find it again, perhaps as what it is no longer.
-        follower.adopt(&fit, &target);
-        if let Some(Solution { shape: Some(FoundShape::Ring(found)), .. }) = follower.solution(&target) {
+        tracker.adopt(&fit, &target);
+        if let Some(Solution { shape: Some(FoundShape::Ring(found)), .. }) = tracker.solution(&target) {
             assert!(found.radius_m > 1.5 * found.width_m, "{found:?} of a ring of {radius_m} m");
         } else {
             assert!(is_lost);

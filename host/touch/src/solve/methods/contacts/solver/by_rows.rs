@@ -1,6 +1,6 @@
 //! Contacts brought to rows of readings as they come.
 
-use super::ContactFollower;
+use super::ContactTracker;
 use crate::solve::answer::SolveError;
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::before::latest::Latest;
@@ -13,7 +13,7 @@ use tactomo_physics::readings::Readings;
 /// Rows older than this say nothing to a search (s): all grounds of 32 electrodes are read within.
 const OLDEST_S: f64 = 0.06;
 
-impl ContactFollower {
+impl ContactTracker {
     /// The answer for rows of readings, `elapsed_s` (s) after those before.
     ///
     /// # Errors

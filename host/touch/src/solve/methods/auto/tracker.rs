@@ -2,14 +2,14 @@
 
 use super::words::{as_contacts, as_whole, nothing};
 use super::{
-    ContactFollower, ContactHypothesis, Evidence, FrameHypothesis, Nonlinear, ShapeFollower, Solution, SolveError,
+    ContactHypothesis, ContactTracker, Evidence, FrameHypothesis, Nonlinear, ShapeTracker, Solution, SolveError,
     Target, Whole, image_evidence,
 };
 use crate::solve::answer::{FoundContact, check};
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::methods::image::Descent;
 use crate::solve::methods::shapes::StripFit;
-use crate::solve::solver::{Followed, Follower, Hypothesis};
+use crate::solve::solver::{Followed, Hypothesis, Tracker};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 
@@ -17,12 +17,12 @@ use tactomo_physics::readings::Readings;
 const PATIENCE: [u32; 2] = [2, 64];
 
 /// Follows whichever model was chosen last.
-pub(super) struct AutoFollower {
+pub(super) struct AutoTracker {
     electrodes: usize,
     /// What stands still is averaged, for all models alike.
     average: AdaptiveMean,
-    contacts: Option<ContactFollower>,
-    shapes: Option<ShapeFollower>,
+    contacts: Option<ContactTracker>,
+    shapes: Option<ShapeTracker>,
     image: Nonlinear,
     answer: Answer,
     /// Frames for which nothing is searched while an image is the answer, and how many it will be next time.
@@ -48,11 +48,11 @@ impl Answer {
     }
 }
 
-impl AutoFollower {
+impl AutoTracker {
     pub fn new(
         detector: &Detector,
-        contacts: Option<ContactFollower>,
-        shapes: Option<ShapeFollower>,
+        contacts: Option<ContactTracker>,
+        shapes: Option<ShapeTracker>,
         image: Nonlinear,
     ) -> Self {
         let (electrodes, average) = (detector.electrodes.len(), AdaptiveMean::new(detector.adc.deviation_v()));
@@ -61,7 +61,7 @@ impl AutoFollower {
 
     /// What the errors of averaged readings are like, by what `found` or else what is followed was compared by; `None` if the model has no contacts.
     fn target(&self, mean: &Mean, found: Option<&ContactHypothesis>) -> Result<Option<Target>, SolveError> {
-        let of = |contacts: &ContactFollower| {
+        let of = |contacts: &ContactTracker| {
             let error = found.and_then(ContactHypothesis::error).or(contacts.error());
             contacts.finder().target_of(mean, error)
         };
@@ -70,12 +70,12 @@ impl AutoFollower {
 
     /// The latest readings while contacts go by rows, told for them as they are now.
     fn latest(&self) -> Option<Mean> {
-        self.contacts.as_ref().and_then(ContactFollower::latest)
+        self.contacts.as_ref().and_then(ContactTracker::latest)
     }
 
     /// Derivatives of the readings by the parameters of the contacts that are followed (V).
-    fn slopes_v(contacts: Option<&ContactFollower>) -> &[Vec<f64>] {
-        contacts.map_or(&[], ContactFollower::slopes_v)
+    fn slopes_v(contacts: Option<&ContactTracker>) -> &[Vec<f64>] {
+        contacts.map_or(&[], ContactTracker::slopes_v)
     }
 
     /// Brings the contacts to the frame; as what they are if they are the answer.
@@ -194,7 +194,7 @@ impl AutoFollower {
         let target = self.target(mean, None)?;
         if !matches!(self.answer, Answer::Contacts) && self.image.is_rest(readings) {
             // The contacts beside it explain nothing of that.
-            self.contacts.iter_mut().for_each(ContactFollower::let_go);
+            self.contacts.iter_mut().for_each(ContactTracker::let_go);
             self.take(Answer::Contacts);
         }
         let whole = match (self.answer.clone(), &target) {
@@ -219,7 +219,7 @@ fn lower(one: Option<Evidence>, other: Option<Evidence>) -> Option<Evidence> {
     one.into_iter().chain(other).min_by(|a, b| a.score().total_cmp(&b.score()))
 }
 
-impl Follower for AutoFollower {
+impl Tracker for AutoTracker {
     fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
         check(readings, self.electrodes)?;
         self.average.add_beside(readings, Self::slopes_v(self.contacts.as_ref()));
@@ -284,14 +284,14 @@ impl Follower for AutoFollower {
         let whole = match &self.answer {
             Answer::Contacts => None,
             Answer::Shape(why) => {
-                let shape = self.shapes.as_ref().and_then(ShapeFollower::found).cloned();
+                let shape = self.shapes.as_ref().and_then(ShapeTracker::found).cloned();
                 shape.map(|fit| (Whole::Shape(Box::new(fit)), why.clone()))
             }
             Answer::Image(why) => {
                 self.image.descent().cloned().map(|descent| (Whole::Image(Box::new(descent)), why.clone()))
             }
         };
-        let contacts = self.contacts.as_ref().and_then(ContactFollower::found).map(Box::new);
+        let contacts = self.contacts.as_ref().and_then(ContactTracker::found).map(Box::new);
         Hypothesis::of(FrameHypothesis { contacts, whole, mean: self.latest().or_else(|| self.average.mean()) })
     }
 

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use super::words::instead_of;
 use super::{
-    ContactFinder, ContactHypothesis, ContactSearcher, Evidence, FrameHypothesis, Nonlinear, ShapeFinder, Solution,
+    ContactFinder, ContactHypothesis, ContactSearch, Evidence, FrameHypothesis, Nonlinear, ShapeFinder, Solution,
     SolveError, Target, Whole, image_evidence,
 };
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::methods::shapes::StripFit;
-use crate::solve::solver::{Hypothesis, Searcher};
+use crate::solve::solver::{Hypothesis, Search};
 use tactomo_physics::readings::Readings;
 
 /// So many contacts may stand for something else, if they leave more than noise does.
@@ -21,13 +21,13 @@ const SUSPICIOUS: usize = 3;
 const CLEARLY: f64 = 10.0;
 
 /// Chooses the model.
-pub(super) struct AutoSearcher {
+pub(super) struct AutoSearch {
     finder: Option<Arc<ContactFinder>>,
     shapes: Option<Arc<ShapeFinder>>,
     image: Nonlinear,
 }
 
-impl AutoSearcher {
+impl AutoSearch {
     pub fn new(finder: Option<Arc<ContactFinder>>, shapes: Option<Arc<ShapeFinder>>, image: Nonlinear) -> Self {
         Self { finder, shapes, image }
     }
@@ -60,7 +60,7 @@ impl AutoSearcher {
     /// of them takes longer than to look for it.
     fn early(
         &self,
-        searcher: &ContactSearcher,
+        search: &ContactSearch,
         contacts: &ContactHypothesis,
         from: Option<&(Whole, String)>,
         mean: &Mean,
@@ -71,7 +71,7 @@ impl AutoSearcher {
         if !evidence.is_misfit(target.count()) || is_partial(&target) {
             return None;
         }
-        let solution = searcher.solution(contacts, mean).ok()?;
+        let solution = search.solution(contacts, mean).ok()?;
         let shape = self.shape((&solution, evidence), from, &target)?;
         (!shape.evidence().is_misfit(target.count())).then_some(shape)
     }
@@ -128,7 +128,7 @@ fn is_partial(target: &Target) -> bool {
     2 * target.known() < target.readings().volts().len()
 }
 
-impl Searcher for AutoSearcher {
+impl Search for AutoSearch {
     fn search(
         &mut self,
         from: Hypothesis,
@@ -141,10 +141,10 @@ impl Searcher for AutoSearcher {
         let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings).map(Hypothesis::of) };
         let FrameHypothesis { contacts, whole: from, .. } = from;
         let contacts = contacts.filter(|_| from.is_none());
-        let searcher = ContactSearcher::new(Arc::clone(&finder));
+        let search = ContactSearch::new(Arc::clone(&finder));
         let mut early = None;
         let mut better = |better: ContactHypothesis| {
-            early = self.early(&searcher, &better, from.as_ref(), &mean);
+            early = self.early(&search, &better, from.as_ref(), &mean);
             // A picture does not change to contacts that may not explain it.
             if early.is_none() && from.is_none() {
                 found(Hypothesis::of(FrameHypothesis {
@@ -155,7 +155,7 @@ impl Searcher for AutoSearcher {
             }
             if early.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let contacts = searcher.contacts(contacts.map(|found| *found), &mean, &mut better)?;
+        let contacts = search.contacts(contacts.map(|found| *found), &mean, &mut better)?;
         let Some((contacts, solution)) = contacts else {
             return Ok(Hypothesis::of(FrameHypothesis { mean: Some(mean), ..FrameHypothesis::default() }));
         };
