@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tactomo::board::baseline::Baseline;
 use tactomo::board::frames::FrameFile;
 use tactomo::board::measured::as_measured;
-use tactomo::solve::{Guard, Method, Problem, Solver};
+use tactomo::solve::{FaultTolerant, Method, Problem, Solver};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = PathBuf::from(std::env::args().nth(1).ok_or("give the file of a recording")?);
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let problem = Problem::of(&detector)?;
     let mut baseline = Baseline::new(Arc::clone(&problem.jacobian), 1);
     // It leaves out electrodes that turn out to be broken.
-    let mut solver = Guard::new(Method::Auto, &problem)?;
+    let mut solver = FaultTolerant::new(Method::Auto, &problem)?;
     while let Some(mut frame) = file.next_frame()? {
         frame.note_rest(&mut baseline);
         let used_v = frame.volts.clone();

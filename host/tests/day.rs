@@ -12,7 +12,7 @@ use tactomo::forward::{DrivingLayer, Resolution, Slab, readings_v, touched_imped
 use tactomo::readings::Readings;
 use tactomo::scene::{Shape, Touch};
 use tactomo::simulate::{Noise, measured};
-use tactomo::solve::{FoundContact, Guard, Method, Problem, Solution, Solver};
+use tactomo::solve::{FaultTolerant, FoundContact, Method, Problem, Solution, Solver};
 
 const HOUR_S: f64 = 3600.0;
 const DAY_S: f64 = 24.0 * HOUR_S;
@@ -116,7 +116,7 @@ struct Day {
 fn live_through() -> Day {
     let detector = detector();
     let problem = Problem::of(&detector).unwrap();
-    let mut solver = Guard::new(Method::Auto, &problem).unwrap();
+    let mut solver = FaultTolerant::new(Method::Auto, &problem).unwrap();
     let mut baseline = Baseline::new(Arc::clone(&problem.jacobian), 1);
     let (mut noise, mut day) = (Noise::new(6), Day::default());
     let (mut rest_before, mut last_touched_s) = (vec![0.0; 256], 0.0);

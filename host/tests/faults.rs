@@ -16,8 +16,8 @@ use tactomo::readings::Readings;
 use tactomo::scene::{Hand, Scene, SceneName};
 use tactomo::simulate::{Fault, Measurement, Physics, finer_model};
 use tactomo::solve::{
-    ElectrodeFault, ElectrodeWatch, FaultyElectrodes, FoundContact, FoundShape, Guard, Look, Method, Problem, Solver,
-    without,
+    ElectrodeFault, ElectrodeWatch, FaultTolerant, FaultyElectrodes, FoundContact, FoundShape, Look, Method, Problem,
+    Solver, without,
 };
 use tactomo_protocol::{BoardMessage, BoardReceiver};
 
@@ -234,7 +234,7 @@ fn exchanged_wires_are_named_within_two_seconds_of_presses() {
         let pressing = Pressing { impedances_ohm: impedances_ohm.clone(), wires };
         let is_enough = |frames: &[(f64, Readings)]| frames.last().is_some_and(|(time_s, _)| *time_s > NAMED_WITHIN_S);
         let (problem, frames) = bench.recorded(model, Box::new(pressing), is_enough);
-        let mut guard = Guard::new(Method::Auto, &problem).unwrap();
+        let mut guard = FaultTolerant::new(Method::Auto, &problem).unwrap();
         let named = frames.iter().enumerate().find_map(|(answer, (time_s, readings))| {
             guard.solve(readings).unwrap();
             (!guard.excluded().is_empty()).then_some((answer, *time_s))

@@ -14,7 +14,7 @@ use tactomo::forward::{Resolution, Slab, readings_v};
 use tactomo::readings::Readings;
 use tactomo::scene::Contact;
 use tactomo::simulate::{Noise, measured};
-use tactomo::solve::{Guard, Method, Problem, Solution, SolveError, Solver};
+use tactomo::solve::{FaultTolerant, Method, Problem, Solution, SolveError, Solver};
 
 /// No frame takes longer, on any machine with any load, unoptimised: a method whose steps have no bound takes for ever.
 const BOUND: Duration = Duration::from_secs(60);
@@ -45,7 +45,7 @@ fn solvers(problem: &Problem) -> Vec<Box<dyn Solver>> {
 
 /// A solver as `live` runs it.
 fn guarded(problem: &Problem) -> Box<dyn Solver> {
-    Box::new(Guard::new(Method::Tikhonov, problem).unwrap())
+    Box::new(FaultTolerant::new(Method::Tikhonov, problem).unwrap())
 }
 
 /// Solves within the bound.

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
-use tactomo::solve::{Guard, Lambda, Method, Parameter, ParameterKind, Problem, Solver as Solves};
+use tactomo::solve::{FaultTolerant, Lambda, Method, Parameter, ParameterKind, Problem, Solver as Solves};
 
 use crate::array::require_volts;
 use crate::detector::Detector;
@@ -47,7 +47,7 @@ impl Solver {
         let made = py.detach(|| -> Result<_, _> {
             let problem = Problem::of(&detector)?;
             let solves: Box<dyn Solves> = match lambda.map(Parameter::Lambda) {
-                None => Box::new(Guard::new(method, &problem)?),
+                None => Box::new(FaultTolerant::new(method, &problem)?),
                 lambda => method.build_with(&problem, lambda)?,
             };
             Ok((problem, solves))

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tactomo::board::baseline::Baseline;
 use tactomo::board::frames::FrameFile;
 use tactomo::readings::Readings;
-use tactomo::solve::{Guard, Method, Problem, Solver};
+use tactomo::solve::{FaultTolerant, Method, Problem, Solver};
 
 use crate::SLOW;
 use crate::live::{Answer, Live};
@@ -14,7 +14,7 @@ use crate::live::{Answer, Live};
 /// The answers to the frames that live has answered.
 pub fn answers(problem: &Problem, method: Method, live: &Live) -> Vec<Answer> {
     let detector = problem.detector();
-    let mut solver = Guard::new(method, problem).unwrap();
+    let mut solver = FaultTolerant::new(method, problem).unwrap();
     let mut file = FrameFile::open(&live.recording, None).unwrap();
     let conversions = file.board().unwrap().settings.conversions();
     let mut baseline = Baseline::new(Arc::clone(&problem.jacobian), conversions);

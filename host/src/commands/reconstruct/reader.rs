@@ -13,8 +13,8 @@ use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
 use tactomo::readings::Readings;
 use tactomo::solve::{
-    ContactSettings, Guard, Kernel, Lambda, Latest, Method, Parameter, ParameterKind, Presses, Problem, Solution,
-    Solver,
+    ContactSettings, FaultTolerant, Kernel, Lambda, Latest, Method, Parameter, ParameterKind, Presses, Problem,
+    Solution, Solver,
 };
 
 use tactomo_protocol::Hello;
@@ -402,7 +402,7 @@ fn solved(input: &Input, method: Method, learned: Option<Learned>) -> anyhow::Re
 /// The solver, which leaves out faulty electrodes; or, with a given lambda, of all electrodes.
 fn solver(method: Method, lambda: Option<Lambda>, problem: &Problem) -> anyhow::Result<Box<dyn Solver>> {
     match lambda.map(Parameter::Lambda) {
-        None => Ok(Box::new(Guard::new(method, problem)?)),
+        None => Ok(Box::new(FaultTolerant::new(method, problem)?)),
         Some(_) if method.parameter() != Some(ParameterKind::Lambda) => {
             bail!(
                 "the solver {} has no lambda: leave out --lambda, or give a --solver that has one, such as tikhonov",

@@ -49,7 +49,7 @@ pub use self::methods::image::{Nonlinear, NonlinearSettings};
 pub use self::methods::kernel::KernelSolver;
 pub use self::methods::linear::{Tikhonov, Variant};
 pub use self::methods::network::NetworkSolver;
-pub use self::pipeline::guard::Guard;
+pub use self::pipeline::fault_tolerant::FaultTolerant;
 pub use self::pipeline::method::{Family, Method};
 pub use self::pipeline::parameter::{Parameter, ParameterKind};
 pub use self::pipeline::without::without;

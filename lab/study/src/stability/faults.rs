@@ -4,7 +4,7 @@ use super::sweep::{Bench, Point, Sweep};
 use crate::experiment::StudyError;
 use crate::scenes::SceneKind;
 use tactomo_physics::simulate::Fault;
-use tactomo_touch::solve::{Guard, Method, Solver};
+use tactomo_touch::solve::{FaultTolerant, Method, Solver};
 
 /// A kind of fault: what is wrong with an electrode, and the next one.
 type Kind = (&'static str, &'static str, fn(usize, usize) -> Fault);
@@ -81,7 +81,7 @@ fn without_wrong(mut point: Point, method: Method) -> Result<Point, StudyError> 
 /// Electrodes that the guard finds wrong in frames of a point's first place.
 fn found_wrong(point: &Point, method: Method) -> Result<Vec<usize>, StudyError> {
     let Some(frame) = point.places.first().and_then(|frames| frames.first()) else { return Ok(Vec::new()) };
-    let mut guard = Guard::new(method, &point.experiment.problem)?;
+    let mut guard = FaultTolerant::new(method, &point.experiment.problem)?;
     for frame in point.experiment.frames(&vec![frame.touches.clone(); SEEN], 1)? {
         // It learns nothing from readings that it refuses.
         drop(guard.solve(&frame.readings));

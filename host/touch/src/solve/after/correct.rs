@@ -163,7 +163,7 @@ impl Corrector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::pipeline::guard::Guard;
+    use crate::solve::pipeline::fault_tolerant::FaultTolerant;
     use crate::solve::pipeline::method::Method;
     use crate::solve::problem::Problem;
     use crate::solve::samples::{CONTACT, readings};
@@ -241,9 +241,10 @@ mod tests {
             tracker.adopt(hypothesis, &readings).unwrap().solution.contacts[0]
         };
         assert_corrected(&live(&corrected, &[]), &live(&plain, &[]), "live");
-        let guarded =
-            |problem: &Problem| Guard::new(Method::Contacts, problem).unwrap().solve(&readings).unwrap().contacts[0];
-        assert_corrected(&guarded(&corrected), &guarded(&plain), "guarded");
+        let tolerant = |problem: &Problem| {
+            FaultTolerant::new(Method::Contacts, problem).unwrap().solve(&readings).unwrap().contacts[0]
+        };
+        assert_corrected(&tolerant(&corrected), &tolerant(&plain), "tolerant");
         // Told to be 22 mm from where it is found: only who takes that back knows it again.
         let mut far = correction();
         far.place.as_mut().unwrap().errors_m.fill([0.02, -0.01]);

@@ -48,7 +48,7 @@ impl Scale {
 mod tests {
     use super::*;
     use crate::solve::answer::FoundContact;
-    use crate::solve::pipeline::guard::Guard;
+    use crate::solve::pipeline::fault_tolerant::FaultTolerant;
     use crate::solve::pipeline::method::{Family, Method};
     use crate::solve::samples::{CONTACT, readings};
     use crate::solve::solver::{Parts, Solver};
@@ -108,8 +108,8 @@ mod tests {
         // A wire that is broken: grounded, it takes no current, and all others are at the drive; read, it is anywhere.
         (0..16).filter(|e| *e != 3).for_each(|e| broken.volts_mut()[16 * 3 + e] = 2.0);
         (0..16).filter(|g| *g != 3).for_each(|g| broken.volts_mut()[16 * g + 3] = 0.7);
-        let mut guard = Guard::new(Method::Contacts, &problem).unwrap();
-        let last = (0..20).map(|_| guard.solve(&broken).unwrap()).last().unwrap();
+        let mut solver = FaultTolerant::new(Method::Contacts, &problem).unwrap();
+        let last = (0..20).map(|_| solver.solve(&broken).unwrap()).last().unwrap();
         assert_eq!(last.flags.excluded, [3]);
         found.push(last.contacts[0].force_n.unwrap());
         assert!(found.iter().all(|force_n| (force_n / found[0] - 1.0).abs() < 0.03), "{found:?}");

@@ -7,9 +7,9 @@
 //!    where these say.
 //!
 //! A recording goes the same way as a live sensor. Live, the two halves of a solver run side by side ([`Solver::split`]): each of them is [`Staged`].
-//! A [`Guard`](guard::Guard) watches which electrodes are wrong, and leaves them out.
+//! A [`FaultTolerant`](fault_tolerant::FaultTolerant) watches which electrodes are wrong, and leaves them out.
 
-pub(crate) mod guard;
+pub(crate) mod fault_tolerant;
 pub(crate) mod method;
 pub(crate) mod parameter;
 pub(crate) mod without;

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::solve::pipeline::guard::Guard;
+use crate::solve::pipeline::fault_tolerant::FaultTolerant;
 use crate::solve::pipeline::method::Method;
 use tactomo_physics::detector::{Detector, Tolerances};
 use tactomo_physics::forward::{ForwardModel, Slab, readings_v};
@@ -72,17 +72,17 @@ fn what_it_never_saw_is_flagged() {
 #[test]
 fn without_a_broken_electrode_it_goes_on_with_the_others() {
     let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&Detector::default()).unwrap());
-    let mut guard = Guard::new(Method::Network, &Problem::new(slab)).unwrap();
+    let mut solver = FaultTolerant::new(Method::Network, &Problem::new(slab)).unwrap();
     let mut missed_m = Vec::new();
     for (index, place) in PLACES.into_iter().enumerate() {
         let readings = read(2030 + index as u64, &[place], &["open:5"]);
         let mut last = Solution::default();
-        (0..100).for_each(|_| last = guard.solve(&readings).unwrap());
+        (0..100).for_each(|_| last = solver.solve(&readings).unwrap());
         assert_eq!(last.flags.excluded, [5]);
         // Its count may be wrong then: the firmest is where the contact is.
         let firmest = last.contacts.iter().max_by(|a, b| a.conductance_s.total_cmp(&b.conductance_s)).unwrap();
         missed_m.push((firmest.x_m - place.0).hypot(firmest.y_m - place.1));
-        guard.reset();
+        solver.reset();
     }
     assert!(missed_m.iter().sum::<f64>() < 3e-3 * missed_m.len() as f64, "{missed_m:?}");
 }

@@ -8,21 +8,21 @@ use tactomo_physics::simulate::{Fault, Measurement, drawn};
 
 const CONTACT: Contact = Contact::flat(0.011, -0.006, 0.0025, 6e-4);
 
-/// What the guard leaves out after some frames of a contact on a faulty board, and the last answer.
-fn guarded(method: Method, faults: &[&str], frames: usize) -> (Vec<(usize, ElectrodeFault)>, Solution) {
+/// What is left out after some frames of a contact on a faulty board, and the last answer.
+fn watched(method: Method, faults: &[&str], frames: usize) -> (Vec<(usize, ElectrodeFault)>, Solution) {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
     detector.adc.noise_lsb = 1.5;
     let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
-    let mut guard = Guard::new(method, &Problem::new(slab)).unwrap();
+    let mut solver = FaultTolerant::new(method, &Problem::new(slab)).unwrap();
     let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
     let faults: Vec<Fault> = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     let mut board = Measurement::new(&detector, &faults, 5).unwrap();
     let impedance_ohm = fine.impedance_ohm(&[CONTACT]).unwrap();
     let mut last = Solution::default();
     for _ in 0..frames {
-        last = guard.solve(&board.readings_v(Some(&impedance_ohm))).unwrap();
+        last = solver.solve(&board.readings_v(Some(&impedance_ohm))).unwrap();
     }
-    (guard.excluded().to_vec(), last)
+    (solver.excluded().to_vec(), last)
 }
 
 fn assert_found(solution: &Solution, within_m: f64) {
@@ -32,7 +32,7 @@ fn assert_found(solution: &Solution, within_m: f64) {
 
 #[test]
 fn a_sound_board_keeps_its_electrodes() {
-    let (excluded, last) = guarded(Method::Contacts, &[], 20);
+    let (excluded, last) = watched(Method::Contacts, &[], 20);
     assert_eq!((excluded, last.flags.excluded.clone()), (vec![], vec![]));
     assert_found(&last, 2e-4);
 }
@@ -48,7 +48,7 @@ fn what_is_wrong_is_told_and_left_out() {
         (&["invert:10"], &[(10, ElectrodeFault::Contradicting)]),
     ];
     for (faults, expected) in cases {
-        let (excluded, last) = guarded(Method::Contacts, faults, 20);
+        let (excluded, last) = watched(Method::Contacts, faults, 20);
         assert_eq!(excluded, expected, "{faults:?}");
         assert_eq!(last.flags.excluded, expected.iter().map(|(e, _)| *e).collect::<Vec<_>>());
         assert_found(&last, 2e-4);
@@ -72,27 +72,27 @@ fn contacts_near_shorted_electrodes_stay_where_they_are() {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
     detector.adc.noise_lsb = 1.5;
     let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
-    let mut guard = Guard::new(Method::Contacts, &Problem::new(slab)).unwrap();
+    let mut solver = FaultTolerant::new(Method::Contacts, &Problem::new(slab)).unwrap();
     let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
     let mut board = Measurement::new(&detector, &["short:2,7".parse().unwrap()], 5).unwrap();
-    // Beside the two pads, one after another, once the guard knows.
+    // Beside the two pads, one after another, once that is known.
     let pads = [detector.electrodes[2], detector.electrodes[7]];
     for (turn, pad) in pads.iter().cycle().take(12).enumerate() {
         let way = std::f64::consts::TAU * turn as f64 / 12.0;
         let truth = Contact::flat(pad.x_m + 0.003 * way.cos(), pad.y_m + 0.003 * way.sin(), 0.0025, 6e-4);
         let impedance_ohm = fine.impedance_ohm(&[truth]).unwrap();
         let frames = if turn == 0 { 20 } else { 2 };
-        let last = (0..frames).map(|_| guard.solve(&board.readings_v(Some(&impedance_ohm))).unwrap()).last().unwrap();
+        let last = (0..frames).map(|_| solver.solve(&board.readings_v(Some(&impedance_ohm))).unwrap()).last().unwrap();
         let [found] = last.contacts[..] else { panic!("{truth:?} {:?}", last.contacts) };
         let off_m = (found.x_m - truth.x_m).hypot(found.y_m - truth.y_m);
         assert!(off_m < 5e-4, "{truth:?} {found:?}: {off_m}");
     }
-    assert_eq!(guard.watch.faulty().kept(16).len(), 15);
+    assert_eq!(solver.watch.faulty().kept(16).len(), 15);
 }
 
 #[test]
 fn exchanged_wires_are_found_by_what_the_model_says() {
-    let (excluded, last) = guarded(Method::Contacts, &["swap:5,6"], 20);
+    let (excluded, last) = watched(Method::Contacts, &["swap:5,6"], 20);
     assert_eq!(excluded, [(5, ElectrodeFault::Exchanged), (6, ElectrodeFault::Exchanged)]);
     assert_found(&last, 2e-4);
 }
@@ -161,7 +161,7 @@ fn a_certainty_is_told_of_no_answer_that_is_doubtful() {
     let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
     let impedance_ohm = fine.impedance_ohm(&[CONTACT]).unwrap();
     for method in [Method::Auto, Method::Contacts] {
-        // Without the guard, which would leave out the wires: their readings fit nothing.
+        // By the method alone, since fault tolerance would leave out the wires: their readings fit nothing.
         let mut solver = method.build(&Problem::of(&detector).unwrap()).unwrap();
         for (fault, is_sound) in [("swap:5,6", false), ("gain:4:1.0", true)] {
             solver.reset();
@@ -184,15 +184,15 @@ fn a_certainty_is_told_of_no_answer_that_is_doubtful() {
 fn an_electrode_that_is_healthy_again_comes_back() {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
     detector.adc.noise_lsb = 1.5;
-    let mut guard = Guard::new(Method::Tikhonov, &Problem::of(&detector).unwrap()).unwrap();
+    let mut solver = FaultTolerant::new(Method::Tikhonov, &Problem::of(&detector).unwrap()).unwrap();
     let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
     let firm = fine.impedance_ohm(&[CONTACT]).unwrap();
     let light = fine.impedance_ohm(&[Contact { conductance_s: 1e-5, ..CONTACT }]).unwrap();
     let mut broken = Measurement::new(&detector, &["gain:4:0.8".parse().unwrap()], 5).unwrap();
     let mut sound = Measurement::new(&detector, &[], 6).unwrap();
     let mut excluded_after = |board: &mut Measurement, impedance_ohm: &DMatrix<f64>, frames: usize| {
-        (0..frames).for_each(|_| drop(guard.solve(&board.readings_v(Some(impedance_ohm))).unwrap()));
-        guard.excluded().to_vec()
+        (0..frames).for_each(|_| drop(solver.solve(&board.readings_v(Some(impedance_ohm))).unwrap()));
+        solver.excluded().to_vec()
     };
     assert_eq!(excluded_after(&mut broken, &firm, 20), [(4, ElectrodeFault::Contradicting)]);
     assert_eq!(excluded_after(&mut broken, &light, 500).len(), 1, "a light touch does not show it healthy");

@@ -22,15 +22,15 @@ const ROUGHLY_HEALED: f64 = 0.5;
 
 /// A solver that leaves out electrodes that are open, shorted, exchanged or otherwise wrong, once it has seen that, and takes them back
 /// when they are healthy.
-pub struct Guard {
+pub struct FaultTolerant {
     method: Method,
     problem: Problem,
     solver: Box<dyn Solver>,
     watch: ElectrodeWatch,
 }
 
-impl Guard {
-    /// Guards the solver of a method.
+impl FaultTolerant {
+    /// Watches the solver of a method.
     ///
     /// # Errors
     /// [`ForwardError`] if the solver cannot be made.
@@ -49,7 +49,7 @@ impl Guard {
     }
 
     /// An answer of the solver, without the electrodes that the latest readings show to be wrong.
-    fn guarded(
+    fn watched(
         &mut self,
         readings: &Readings,
         solve: impl Fn(&mut dyn Solver) -> Result<Solution, SolveError>,
@@ -78,17 +78,17 @@ impl Guard {
     }
 }
 
-impl Solver for Guard {
+impl Solver for FaultTolerant {
     fn name(&self) -> &'static str {
         self.solver.name()
     }
 
     fn solve(&mut self, readings: &Readings) -> Result<Solution, SolveError> {
-        self.guarded(readings, |solver| solver.solve(readings))
+        self.watched(readings, |solver| solver.solve(readings))
     }
 
     fn solve_rows(&mut self, rows: &Readings, latest: &Readings, elapsed_s: f64) -> Result<Solution, SolveError> {
-        self.guarded(latest, |solver| solver.solve_rows(rows, latest, elapsed_s))
+        self.watched(latest, |solver| solver.solve_rows(rows, latest, elapsed_s))
     }
 
     fn reset(&mut self) {
