@@ -8,7 +8,7 @@
 
 mod fit;
 mod order;
-mod stands;
+mod plateaus;
 #[cfg(test)]
 mod tests;
 
@@ -16,7 +16,7 @@ use tactomo_physics::detector::{FARTHEST, ForceLaw};
 
 use self::fit::{Fitted, Form, Point};
 pub use self::order::Mistyped;
-pub use self::stands::{Moment, Stand, pairs, stands};
+pub use self::plateaus::{Moment, Plateau, pairs, plateaus};
 
 /// Fewest presses: two or three parameters and a scatter, of which something is left.
 pub const FEWEST: usize = 5;

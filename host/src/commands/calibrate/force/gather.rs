@@ -1,7 +1,7 @@
 //! Presses of a file with their forces: what the solver `contacts` finds in it.
 
 use anyhow::{Context, bail, ensure};
-use tactomo::calibrate::force::{ForcePress, Moment, Stand, pairs, stands};
+use tactomo::calibrate::force::{ForcePress, Moment, Plateau, pairs, plateaus};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::solve::{Method, Solution};
 
@@ -39,7 +39,7 @@ pub fn gather(args: &Args, known: &Known) -> anyhow::Result<Gathered> {
         uncorrected: false,
     })?;
     let presses = match (reader.is_recording(), known) {
-        (true, Known::Presses(forces)) => of_stands(&mut reader, forces)?,
+        (true, Known::Presses(forces)) => of_plateaus(&mut reader, forces)?,
         (true, Known::Sensor(forces)) => of_sensor(&mut reader, forces)?,
         (false, Known::Presses(forces)) => of_rows(&mut reader, forces)?,
         (false, Known::Sensor(_)) => bail!(
@@ -90,10 +90,10 @@ fn warn(reader: &Reader, last: &Solution) {
     }
 }
 
-fn of_stands(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec<ReportedPress>> {
-    let found = stands(&moments(reader)?);
+fn of_plateaus(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec<ReportedPress>> {
+    let found = plateaus(&moments(reader)?);
     let path = reader.path().display();
-    let times = || found.iter().map(|stand| format!("{:.1}", stand.time_s[0])).collect::<Vec<_>>().join(", ");
+    let times = || found.iter().map(|plateau| format!("{:.1}", plateau.time_s[0])).collect::<Vec<_>>().join(", ");
     ensure!(
         found.len() == forces.len(),
         "{path}: {} presses are found, but {} forces are given: one for each press, in their order; presses begin at {} s, and one ends where \
@@ -102,16 +102,16 @@ fn of_stands(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec<R
         forces.len(),
         times()
     );
-    let press = |(index, (stand, known)): (usize, (&Stand, &KnownForce))| {
-        let [from_s, to_s] = stand.time_s;
+    let press = |(index, (plateau, known)): (usize, (&Plateau, &KnownForce))| {
+        let [from_s, to_s] = plateau.time_s;
         ensure!(
-            stand.contacts == 1 && stand.conductance_s > 0.0,
+            plateau.contacts == 1 && plateau.conductance_s > 0.0,
             "{path}: press {} ({from_s:.1} to {to_s:.1} s) has {} contacts: {ONE_TIP}",
             index + 1,
-            stand.contacts
+            plateau.contacts
         );
         let place = format!("{from_s:.1} to {to_s:.1} s");
-        Ok(ReportedPress { press: known.press(stand.conductance_s, stand.deviation_s), place })
+        Ok(ReportedPress { press: known.press(plateau.conductance_s, plateau.deviation_s), place })
     };
     found.iter().zip(forces).enumerate().map(press).collect()
 }

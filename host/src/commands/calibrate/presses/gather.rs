@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use tactomo::calibrate::force::{Moment, stands};
+use tactomo::calibrate::force::{Moment, plateaus};
 use tactomo::calibrate::known::KnownPress;
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::solve::{FoundContact, Method};
@@ -88,7 +88,7 @@ pub fn gather(args: &Args, file: &Path) -> anyhow::Result<Gathered> {
     let found = match (reader.is_recording(), known.is_in_order) {
         (false, _) => of_rows(&mut reader, &known)?,
         (true, false) => of_times(&mut reader, &known)?,
-        (true, true) => of_stands(&mut reader, &known)?,
+        (true, true) => of_plateaus(&mut reader, &known)?,
     };
     if let Some(losses) = reader.losses() {
         message!("warning: {losses}");
@@ -192,7 +192,7 @@ fn standing(frames: &[Vec<FoundContact>]) -> Found {
 }
 
 /// Presses of a recording in their order.
-fn of_stands(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, Found)>> {
+fn of_plateaus(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, Found)>> {
     let (mut moments, mut frames) = (Vec::new(), Vec::new());
     while let Some(frame) = reader.next_frame()? {
         let time_s = frame.time_s.with_context(|| format!("{} has no time", reader.place()))?;
@@ -206,8 +206,8 @@ fn of_stands(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, 
         });
         frames.push(contacts);
     }
-    let found = stands(&moments);
-    let times = || found.iter().map(|stand| format!("{:.1}", stand.time_s[0])).collect::<Vec<_>>().join(", ");
+    let found = plateaus(&moments);
+    let times = || found.iter().map(|plateau| format!("{:.1}", plateau.time_s[0])).collect::<Vec<_>>().join(", ");
     ensure!(
         found.len() == known.places.len(),
         "{}: {} presses are found, but {} places are given: one for each press, in their order; presses begin at {} s, and one ends where \
@@ -217,8 +217,8 @@ fn of_stands(reader: &mut Reader, known: &Known) -> anyhow::Result<Vec<(String, 
         known.places.len(),
         times()
     );
-    let press = |stand: &tactomo::calibrate::force::Stand| {
-        let [from_s, to_s] = stand.time_s;
+    let press = |plateau: &tactomo::calibrate::force::Plateau| {
+        let [from_s, to_s] = plateau.time_s;
         let margin_s = 0.5 * (1.0 - MIDDLE) * (to_s - from_s);
         let middle = from_s + margin_s..=to_s - margin_s;
         let within = moments.iter().zip(&frames).filter(|(moment, _)| middle.contains(&moment.time_s));

@@ -31,9 +31,9 @@ pub struct Moment {
     pub deviation_s: f64,
 }
 
-/// A stretch of time in which something stands on the detector.
+/// A plateau: a stretch of time in which something stands on the detector.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stand {
+pub struct Plateau {
     /// When it begins and ends (s).
     pub time_s: [f64; 2],
     /// Contacts that most of its frames have.
@@ -45,13 +45,13 @@ pub struct Stand {
 }
 
 /// The presses of a recording, in their order.
-pub fn stands(moments: &[Moment]) -> Vec<Stand> {
+pub fn plateaus(moments: &[Moment]) -> Vec<Plateau> {
     let mut known = moments.to_vec();
     let floor_s = FAINTEST * firmest_s(moments);
     for moment in known.iter_mut().filter(|moment| moment.contacts == 1 && moment.conductance_s < floor_s) {
         moment.contacts = 0;
     }
-    stretches(&known).into_iter().filter(|stretch| length_s(stretch) >= SHORTEST_S).map(Stand::of).collect()
+    stretches(&known).into_iter().filter(|stretch| length_s(stretch) >= SHORTEST_S).map(Plateau::of).collect()
 }
 
 /// Presses of a recording against a force sensor: `forces` are times (s) and newtons, times rising.
@@ -82,7 +82,7 @@ pub fn pairs(moments: &[Moment], forces: &[[f64; 2]]) -> Vec<ForcePress> {
     presses
 }
 
-impl Stand {
+impl Plateau {
     fn of(stretch: &[Moment]) -> Self {
         let single: Vec<Moment> = stretch.iter().copied().filter(|moment| moment.contacts == 1).collect();
         let contacts = match 2 * single.len() >= stretch.len() {
@@ -206,14 +206,14 @@ mod tests {
             let k = ((time_s / 2.0) as usize).min(2);
             press(time_s - 2.0 * k as f64 - 0.2, tops_s[k])
         });
-        let found = stands(&all);
+        let found = plateaus(&all);
         assert_eq!(found.len(), 3, "{found:?}");
-        for (k, (stand, top_s)) in found.iter().zip(tops_s).enumerate() {
-            assert!((stand.conductance_s / top_s - 1.0).abs() < 1e-3 && stand.contacts == 1, "{stand:?}");
-            assert!((stand.deviation_s / top_s - 0.01).abs() < 1e-3, "{stand:?}");
+        for (k, (plateau, top_s)) in found.iter().zip(tops_s).enumerate() {
+            assert!((plateau.conductance_s / top_s - 1.0).abs() < 1e-3 && plateau.contacts == 1, "{plateau:?}");
+            assert!((plateau.deviation_s / top_s - 0.01).abs() < 1e-3, "{plateau:?}");
             assert!(
-                (stand.time_s[0] - 2.0 * k as f64 - 0.2).abs() < 0.06
-                    && (stand.time_s[1] - 2.0 * k as f64 - 1.7).abs() < 0.06
+                (plateau.time_s[0] - 2.0 * k as f64 - 0.2).abs() < 0.06
+                    && (plateau.time_s[1] - 2.0 * k as f64 - 1.7).abs() < 0.06
             );
         }
     }
@@ -222,8 +222,8 @@ mod tests {
     fn taps_are_no_presses_and_two_contacts_are_told() {
         let mut all = moments(3.0, |time_s| if (0.5..0.6).contains(&time_s) || time_s > 1.0 { 1e-3 } else { 0.0 });
         all.iter_mut().filter(|moment| moment.time_s > 1.2).for_each(|moment| moment.contacts = 2);
-        let [stand] = stands(&all)[..] else { panic!("{:?}", stands(&all)) };
-        assert_eq!(stand.contacts, 2);
+        let [plateau] = plateaus(&all)[..] else { panic!("{:?}", plateaus(&all)) };
+        assert_eq!(plateau.contacts, 2);
         let faint = moments(3.0, |time_s| {
             if time_s < 1.0 {
                 3e-6
@@ -233,9 +233,9 @@ mod tests {
                 0.0
             }
         });
-        assert_eq!(stands(&faint).len(), 1, "what is that faint is no press");
-        assert_eq!(stands(&moments(1.0, |_| 0.0)), []);
-        assert_eq!(stands(&[]), []);
+        assert_eq!(plateaus(&faint).len(), 1, "what is that faint is no press");
+        assert_eq!(plateaus(&moments(1.0, |_| 0.0)), []);
+        assert_eq!(plateaus(&[]), []);
     }
 
     #[test]
