@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use tactomo::board::baseline::Baseline;
+use tactomo::board::baseline::BaselineTracker;
 use tactomo::board::frames::FrameFile;
 use tactomo::board::measured::as_measured;
 use tactomo::solve::{FaultTolerant, Method, Problem, Solver};
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => described,
     };
     let problem = Problem::of(&detector)?;
-    let mut baseline = Baseline::new(Arc::clone(&problem.jacobian), 1);
+    let mut baseline = BaselineTracker::new(Arc::clone(&problem.jacobian), 1);
     // It leaves out electrodes that turn out to be broken.
     let mut solver = FaultTolerant::new(Method::Auto, &problem)?;
     while let Some(mut frame) = file.next_frame()? {

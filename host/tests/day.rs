@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use tactomo::board::baseline::{Baseline, BaselineState};
+use tactomo::board::baseline::{BaselineState, BaselineTracker};
 use tactomo::detector::Detector;
 use tactomo::forward::{DrivingLayer, Resolution, Slab, readings_v, touched_impedance_ohm};
 use tactomo::readings::Readings;
@@ -117,7 +117,7 @@ fn live_through() -> Day {
     let detector = detector();
     let problem = Problem::of(&detector).unwrap();
     let mut solver = FaultTolerant::new(Method::Auto, &problem).unwrap();
-    let mut baseline = Baseline::new(Arc::clone(&problem.jacobian), 1);
+    let mut baseline = BaselineTracker::new(Arc::clone(&problem.jacobian), 1);
     let (mut noise, mut day) = (Noise::new(6), Day::default());
     let (mut rest_before, mut last_touched_s) = (vec![0.0; 256], 0.0);
     let mut hours = [Hour::new(0), Hour::new(1)];

@@ -4,13 +4,13 @@
 //! what of that arrives through wires and a converter. Nothing here knows of solvers, boards or files of other programs. Units are
 //! SI, and in the names.
 
+pub mod baseline;
 pub mod causes;
 pub mod detector;
 pub mod forward;
 pub mod geometry;
 pub mod hertz;
 pub mod readings;
-pub mod rest;
 pub mod scene;
 pub mod simulate;
 pub mod space;

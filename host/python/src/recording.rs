@@ -6,7 +6,7 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
-use tactomo::board::baseline::Baseline;
+use tactomo::board::baseline::BaselineTracker;
 use tactomo::board::frames::{FileFrame, FrameFile};
 use tactomo::board::record::RecordReader;
 use tactomo::board::{identity, measured};
@@ -114,8 +114,8 @@ impl Recording {
             let jacobian = Arc::clone(&problem.jacobian);
             let conversions = frames.file.board().map_or(1, |board| board.settings.conversions());
             let baseline = match rest {
-                None => Baseline::new(jacobian, conversions),
-                Some(rest) => Baseline::told(jacobian, conversions, rest),
+                None => BaselineTracker::new(jacobian, conversions),
+                Some(rest) => BaselineTracker::given(jacobian, conversions, rest),
             };
             frames.baseline = Some((baseline, rest.unwrap_or(0)));
             Ok(frames)
@@ -187,7 +187,7 @@ pub struct Frames {
     /// As measured, and as used.
     rounds: [Rounds; 2],
     /// The baseline to take off, and how many frames are still to come that are nothing else.
-    baseline: Option<(Baseline, u32)>,
+    baseline: Option<(BaselineTracker, u32)>,
 }
 
 impl Frames {

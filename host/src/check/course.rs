@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tactomo_board::baseline::{self, Baseline, BaselineState};
+use tactomo_board::baseline::{self, BaselineState, BaselineTracker};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{ElectrodeWatch, Problem};
@@ -44,7 +44,7 @@ pub struct Check {
     pub(super) problem: Problem,
     pub(super) detector: Detector,
     ask: Ask,
-    baseline: Baseline,
+    baseline: BaselineTracker,
     resting: Mean,
     /// Inputs that do not rest where the others do.
     pub(super) restless: Vec<usize>,
@@ -62,7 +62,7 @@ impl Check {
     pub fn new(problem: Problem, conversions: u32) -> Self {
         let detector = problem.detector().clone();
         Self {
-            baseline: Baseline::new(Arc::clone(&problem.jacobian), conversions),
+            baseline: BaselineTracker::new(Arc::clone(&problem.jacobian), conversions),
             watch: ElectrodeWatch::new(&detector),
             problem,
             detector,

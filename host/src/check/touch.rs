@@ -3,7 +3,7 @@
 use tactomo_physics::readings::{Readings, Says};
 
 /// Share of the drive that the middle one of the rows reaches at least while something presses, and below which it has let go. Readings at rest
-/// are offsets and leakage, up to 5 % of the drive before the baseline is taken off (see [`Baseline`](tactomo_board::baseline::Baseline)), and
+/// are offsets and leakage, up to 5 % of the drive before the baseline is taken off (see [`BaselineTracker`](tactomo_board::baseline::BaselineTracker)), and
 /// next to nothing after.
 const PRESSED: f64 = 0.05;
 const RELEASED: f64 = 0.02;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tactomo_board::baseline::Baseline;
+use tactomo_board::baseline::BaselineTracker;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
 use tactomo_touch::solve::{ElectrodeWatch, Followed, Latest, Method, SolveError, Tracker};
@@ -22,7 +22,7 @@ pub(super) struct BoardState {
     /// As it is described, and as it is solved for: calibrated, or the same.
     pub description: Arc<Detector>,
     pub detector: Arc<Detector>,
-    pub baseline: Baseline,
+    pub baseline: BaselineTracker,
     pub watch: ElectrodeWatch,
     /// `None` until the first solver is made.
     pub follower: Option<Box<dyn Tracker>>,
@@ -41,7 +41,7 @@ pub(super) struct Noted {
 
 impl BoardState {
     /// Begins with a detector as it is described and as it is solved for.
-    pub fn new(description: Arc<Detector>, detector: Arc<Detector>, baseline: Baseline) -> Self {
+    pub fn new(description: Arc<Detector>, detector: Arc<Detector>, baseline: BaselineTracker) -> Self {
         Self { baseline, watch: ElectrodeWatch::new(&detector), description, detector, follower: None, rows_us: None }
     }
 

@@ -120,7 +120,7 @@ mod tests {
     use tactomo_touch::solve::FaultyElectrodes;
 
     use super::*;
-    use tactomo_board::baseline::Baseline;
+    use tactomo_board::baseline::BaselineTracker;
     use tactomo_physics::readings::Readings;
     use tactomo_touch::solve::{Solution, SolveError};
 
@@ -152,7 +152,7 @@ mod tests {
             method: Method::Auto,
             make,
             look_at_wires: Arc::new(|_, _, _| None),
-            begin_baseline: Arc::new(|_, _| Baseline::over(0, 256)),
+            begin_baseline: Arc::new(|_, _| BaselineTracker::over(0, 256)),
         };
         (Maker::new(solving, Arc::clone(&inbox)), inbox, go)
     }

@@ -11,7 +11,7 @@ use tokio::sync::watch;
 
 use super::scanning::ScanChoice;
 use super::{Latency, Listener, Order, Request, Snapshot};
-use tactomo_board::baseline::Baseline;
+use tactomo_board::baseline::BaselineTracker;
 use tactomo_board::board_log::BoardLog;
 use tactomo_board::measured::Mismatch;
 use tactomo_board::record::{OtherProtocol, RecordError, Recorder, Ring};
@@ -31,7 +31,7 @@ pub type MakeSolver = Arc<dyn Fn(&Order) -> Result<Box<dyn Solver>, BoxError> + 
 /// Looks for exchanged wires in readings (V) less the baseline, with the forward model of an order's detector; called in another thread.
 pub type LookAtWires = Arc<dyn Fn(&Order, Look, &Readings) -> Option<[usize; 2]> + Send + Sync>;
 /// Begins the baseline of a detector as measured, whose readings are means of so many conversions each.
-pub type BeginBaseline = Arc<dyn Fn(&Detector, u32) -> Baseline + Send + Sync>;
+pub type BeginBaseline = Arc<dyn Fn(&Detector, u32) -> BaselineTracker + Send + Sync>;
 /// Begins a recording in a new file, of a board that has said Hello, and of the detector that a calibration has found, if one has.
 pub type BeginRecording = Box<dyn FnMut(&Hello, Option<&Detector>) -> Result<Recorder, RecordError> + Send>;
 /// Any error.
@@ -113,7 +113,7 @@ impl Solving {
                 look.run(&looked_at.of(&order.detector).ok()?, &order.faulty, readings)
             }),
             begin_baseline: Arc::new(move |detector, conversions| {
-                Baseline::new(at_rest.measured_as(detector).jacobian, conversions)
+                BaselineTracker::new(at_rest.measured_as(detector).jacobian, conversions)
             }),
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use tactomo::board::baseline::Baseline;
+use tactomo::board::baseline::BaselineTracker;
 use tactomo::board::frames::FrameFile;
 use tactomo::readings::Readings;
 use tactomo::solve::{FaultTolerant, Method, Problem, Solver};
@@ -17,7 +17,7 @@ pub fn answers(problem: &Problem, method: Method, live: &Live) -> Vec<Answer> {
     let mut solver = FaultTolerant::new(method, problem).unwrap();
     let mut file = FrameFile::open(&live.recording, None).unwrap();
     let conversions = file.board().unwrap().settings.conversions();
-    let mut baseline = Baseline::new(Arc::clone(&problem.jacobian), conversions);
+    let mut baseline = BaselineTracker::new(Arc::clone(&problem.jacobian), conversions);
     let answered: HashSet<u64> = live.answers.iter().map(|answer| answer.sequence).collect();
     let last = answered.iter().max().copied().unwrap_or(0);
     let mut found = std::collections::HashMap::new();

@@ -5,7 +5,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 
-use tactomo::board::baseline::{Baseline, FRAMES};
+use tactomo::board::baseline::{BaselineTracker, FRAMES};
 use tactomo::board::link::{Control, ControlError, Link};
 use tactomo::board::source::{Source, SourceError};
 use tactomo::detector::Detector;
@@ -201,6 +201,6 @@ pub fn solving(make: MakeSolver) -> Solving {
         method: Method::Tikhonov,
         make,
         look_at_wires: Arc::new(|_, _, _| None),
-        begin_baseline: Arc::new(|detector, _| Baseline::over(FRAMES, detector.electrodes.len().pow(2))),
+        begin_baseline: Arc::new(|detector, _| BaselineTracker::over(FRAMES, detector.electrodes.len().pow(2))),
     }
 }

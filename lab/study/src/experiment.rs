@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 use nalgebra::DMatrix;
 
 use super::scenes::electrode_distance_m;
+use tactomo_physics::baseline::{Baseline, BaselinePatterns, BaselineSum, Leakage};
 use tactomo_physics::detector::{Adc, Detector, Problem as Wrong, Tolerances};
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
 use tactomo_physics::readings::Readings;
-use tactomo_physics::rest::{Leakage, Rest, RestPatterns, RestSum};
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Fault, FaultError, Measurement, drawn, finer_model};
 use tactomo_touch::solve::{Problem, SolveError};
@@ -241,21 +241,21 @@ impl Experiment {
     }
 
     /// The baseline: what the first frames are.
-    fn rest(&self, measurement: &mut Measurement) -> Rest {
+    fn rest(&self, measurement: &mut Measurement) -> Baseline {
         // Of a detector that leaks there is something to read even then.
         let rest_ohm = self.rest_ohm.clone().or_else(|| self.truth.impedance_ohm(&[]).ok());
-        let mut sum = RestSum::default();
+        let mut sum = BaselineSum::default();
         for _ in 0..BASELINE_FRAMES {
             sum.add(measurement.readings_v(rest_ohm.as_ref()).volts(), 1);
         }
-        sum.rest(&self.detector.adc, self.detector.ground_v, 1)
+        sum.baseline(&self.detector.adc, self.detector.ground_v, 1)
     }
 
     /// Leakage, and how much of it is in a baseline (sheet conductances); none on a detector that does not leak.
-    fn leakage(&self, rest: &Rest) -> Option<(Leakage, f64)> {
+    fn leakage(&self, rest: &Baseline) -> Option<(Leakage, f64)> {
         self.truth.impedance_ohm(&[]).ok()?;
         let all: Vec<usize> = (0..self.whole.electrodes()).collect();
-        let (patterns, leakage) = (RestPatterns::new(&self.whole, &all), Leakage::new(&self.whole, &all));
+        let (patterns, leakage) = (BaselinePatterns::new(&self.whole, &all), Leakage::new(&self.whole, &all));
         let sheets = leakage.at_rest(&patterns, rest.offset_v());
         (sheets > 0.0).then_some((leakage, sheets))
     }

@@ -6,7 +6,7 @@
 //! leakage as far as they go, but no more of a contact than may be in it in the first place. After a load it is less sure of what it knows,
 //! the longer the less, and learns faster.
 
-use tactomo_physics::rest::RestSum;
+use tactomo_physics::baseline::BaselineSum;
 
 use super::judge::{Change, Judge};
 use super::state::LASTING_S;
@@ -30,7 +30,7 @@ pub(super) struct Following {
     taken_v: Vec<f64>,
     /// Frames that it is worth by now.
     worth: f64,
-    block: RestSum,
+    block: BaselineSum,
     /// When the block began, when the detector was last at rest, and since when it is touched (s).
     begun_s: f64,
     rest_s: f64,
@@ -68,7 +68,7 @@ impl Following {
         match change {
             Change::Touch => self.touch(time_s),
             Change::Less => {
-                self.block = RestSum::default();
+                self.block = BaselineSum::default();
                 if self.less < LESS { Seen::Nothing } else { Seen::Less }
             }
             Change::Rest => {
@@ -86,7 +86,7 @@ impl Following {
 
     /// Something touches: the block is none of rest.
     fn touch(&mut self, time_s: f64) -> Seen {
-        self.block = RestSum::default();
+        self.block = BaselineSum::default();
         let since_s = *self.touched_s.get_or_insert(time_s);
         if time_s < since_s {
             self.touched_s = Some(time_s);

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use tactomo_physics::baseline::{BaselineChange, BaselinePatterns, Leakage};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
-use tactomo_physics::rest::{Leakage, RestChange, RestPatterns};
 
 /// Deviations of its noise that a pattern has to stand out by. It is the largest of some hundred places, in 15 independent directions: 500
 /// frames of noise stay below 5, and 6 is beyond the deviation in all of them in 1 of 600 frames at most.
@@ -38,7 +38,7 @@ const PRESSED: f64 = 0.05;
 #[derive(Clone, Debug)]
 pub(super) struct Judge {
     jacobian: Arc<Jacobian>,
-    patterns: RestPatterns,
+    patterns: BaselinePatterns,
     leakage: Leakage,
     left_out: Vec<usize>,
 }
@@ -68,7 +68,7 @@ pub(super) enum Absolute {
 impl Judge {
     pub fn new(jacobian: Arc<Jacobian>) -> Self {
         let all: Vec<usize> = (0..jacobian.electrodes()).collect();
-        let (patterns, leakage) = (RestPatterns::new(&jacobian, &all), Leakage::new(&jacobian, &all));
+        let (patterns, leakage) = (BaselinePatterns::new(&jacobian, &all), Leakage::new(&jacobian, &all));
         Self { jacobian, patterns, leakage, left_out: Vec::new() }
     }
 
@@ -81,7 +81,7 @@ impl Judge {
         if self.left_out != left_out {
             self.left_out = left_out.to_vec();
             let kept: Vec<usize> = (0..self.jacobian.electrodes()).filter(|e| !left_out.contains(e)).collect();
-            self.patterns = RestPatterns::new(&self.jacobian, &kept);
+            self.patterns = BaselinePatterns::new(&self.jacobian, &kept);
             self.leakage = Leakage::new(&self.jacobian, &kept);
         }
     }
@@ -140,7 +140,7 @@ impl Judge {
     }
 
     /// What a pattern has to exceed in the mean of some frames (V).
-    fn limit_v(&self, found: &RestChange, frames: u32) -> f64 {
+    fn limit_v(&self, found: &BaselineChange, frames: u32) -> f64 {
         let adc = &self.detector().adc;
         let noise_v = (adc.deviation_v() / f64::from(frames.max(1)).sqrt()).max(UNEVEN_CODES * adc.lsb_v());
         DEVIATIONS * found.scatter_v.clamp(noise_v, NOISIER * noise_v + SCATTER_CODES * adc.lsb_v())

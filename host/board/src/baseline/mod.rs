@@ -2,9 +2,9 @@
 //!
 //! Without contact an ideal detector reads 0 V everywhere; a real one has offsets of its converter and perhaps leakage, and both drift. A
 //! baseline is taken at the start, follows what drifts while nothing touches, and never learns a touch: what looks like a contact is told
-//! from offsets and leakage by its pattern ([`RestPatterns`](tactomo_physics::rest::RestPatterns)), in each frame and in the mean of many.
+//! from offsets and leakage by its pattern ([`BaselinePatterns`](tactomo_physics::baseline::BaselinePatterns)), in each frame and in the mean of many.
 //! Under load it stays as it was. What it cannot decide, a person is asked ([`BaselineState::notice`]). Live, of recordings and of tables it
-//! is the same; where a person has said which frames are the baseline ([`Baseline::told`]), it is neither judged nor followed.
+//! is the same; where a person has said which frames are the baseline ([`BaselineTracker::given`]), it is neither judged nor followed.
 
 mod follow;
 mod judge;
@@ -19,9 +19,9 @@ use self::follow::Following;
 use self::judge::{Absolute, Judge};
 use self::rest_rounds::RestRounds;
 pub use self::state::{BaselineState, LASTING_S};
+use tactomo_physics::baseline::{Baseline, BaselineSum};
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::readings::Readings;
-use tactomo_physics::rest::{Rest, RestSum};
 
 /// Frames that are averaged: the noise of their mean is a sixth of a frame's.
 pub const FRAMES: u32 = 32;
@@ -29,10 +29,10 @@ pub const FRAMES: u32 = 32;
 /// Leakage that is looked at under load (sheet conductances): ten times less than costs anything.
 const LEAKAGE: f64 = 5e-4;
 
-/// Readings of a detector that nothing touches.
+/// Knows what a detector reads while nothing touches it: takes it at the start, and follows its drift.
 #[derive(Clone, Debug)]
-pub struct Baseline {
-    rest: Rest,
+pub struct BaselineTracker {
+    baseline: Baseline,
     /// Leakage in it (sheet conductances).
     leakage_sheets: f64,
     taking: Option<Taking>,
@@ -53,13 +53,13 @@ struct Known {
     conversions: u32,
     following: Following,
     /// Whether a person has said which frames the baseline is.
-    is_told: bool,
+    is_given: bool,
 }
 
 /// A baseline that is being taken.
 #[derive(Clone, Debug)]
 struct Taking {
-    sum: RestSum,
+    sum: BaselineSum,
     /// Frames that it is taken from.
     frames: u32,
     /// Whether a person asked for it.
@@ -68,11 +68,11 @@ struct Taking {
 
 impl Taking {
     fn new(frames: u32, asked: bool) -> Self {
-        Self { sum: RestSum::default(), frames, asked }
+        Self { sum: BaselineSum::default(), frames, asked }
     }
 }
 
-impl Baseline {
+impl BaselineTracker {
     /// That of a detector as measured, whose readings are means of so many conversions each. It is zero until the first frames that nothing
     /// presses in.
     pub fn new(jacobian: Arc<Jacobian>, conversions: u32) -> Self {
@@ -81,13 +81,13 @@ impl Baseline {
 
     /// The mean of the first `frames` frames of a detector as measured, whatever they are, because a person says so; of none it stays zero.
     /// What the converter cuts off, and what leakage does under load, is known of it as of any other.
-    pub fn told(jacobian: Arc<Jacobian>, conversions: u32, frames: u32) -> Self {
+    pub fn given(jacobian: Arc<Jacobian>, conversions: u32, frames: u32) -> Self {
         Self::of(jacobian, conversions, frames, true)
     }
 
-    fn of(jacobian: Arc<Jacobian>, conversions: u32, frames: u32, is_told: bool) -> Self {
+    fn of(jacobian: Arc<Jacobian>, conversions: u32, frames: u32, is_given: bool) -> Self {
         let readings = jacobian.electrodes().pow(2);
-        let known = Known { judge: Judge::new(jacobian), conversions, following: Following::default(), is_told };
+        let known = Known { judge: Judge::new(jacobian), conversions, following: Following::default(), is_given };
         Self { known: Some(known), ..Self::over(frames, readings) }
     }
 
@@ -95,7 +95,7 @@ impl Baseline {
     pub fn over(frames: u32, count: usize) -> Self {
         let held = frames == 0;
         Self {
-            rest: Rest::zero(count),
+            baseline: Baseline::zero(count),
             leakage_sheets: 0.0,
             taking: (!held).then(|| Taking::new(frames, false)),
             state: if held { BaselineState::Held } else { BaselineState::Starting },
@@ -131,7 +131,8 @@ impl Baseline {
     /// Takes the mean `readings_v` of `frames` frames at a time of the board (s) into account; whether the state has changed.
     /// Readings of the electrodes `left_out` say nothing.
     pub fn add(&mut self, readings_v: &[f64], frames: u32, time_s: f64, left_out: &[usize]) -> bool {
-        let is_whole = readings_v.len() == self.rest.mean_v().len() && readings_v.iter().all(|volts| volts.is_finite());
+        let is_whole =
+            readings_v.len() == self.baseline.mean_v().len() && readings_v.iter().all(|volts| volts.is_finite());
         if frames == 0 || !is_whole {
             return false;
         }
@@ -149,7 +150,7 @@ impl Baseline {
     /// Takes rows into account, the others of which say nothing: as a frame, once all were read. Whether the state has changed, and the
     /// frame if there is one.
     pub fn add_rows(&mut self, rows: &Readings, time_s: f64, left_out: &[usize]) -> (bool, Option<Readings>) {
-        let Some(round) = self.rounds.add(rows, self.rest.mean_v(), time_s) else { return (false, None) };
+        let Some(round) = self.rounds.add(rows, self.baseline.mean_v(), time_s) else { return (false, None) };
         (self.add(&round.touches_v(), 1, time_s, left_out), Some(round))
     }
 
@@ -162,7 +163,7 @@ impl Baseline {
     fn take(&mut self, mut taking: Taking, readings_v: &[f64], frames: u32, time_s: f64) {
         let asked = taking.asked;
         let judged = |readings_v: &[f64], frames: u32| match &self.known {
-            Some(known) if !known.is_told => known.judge.absolute(readings_v, frames, asked),
+            Some(known) if !known.is_given => known.judge.absolute(readings_v, frames, asked),
             _ => Absolute::Rest,
         };
         // A press that begins in the last of the frames hardly shows in their mean.
@@ -181,18 +182,18 @@ impl Baseline {
         }
     }
 
-    fn hold(&mut self, sum: &RestSum, time_s: f64, state: BaselineState) {
+    fn hold(&mut self, sum: &BaselineSum, time_s: f64, state: BaselineState) {
         (self.state, self.held) = (state, true);
         match &mut self.known {
-            Some(Known { judge, conversions, following, is_told }) => {
-                self.rest = sum.rest(&judge.detector().adc, judge.detector().ground_v, *conversions);
+            Some(Known { judge, conversions, following, is_given }) => {
+                self.baseline = sum.baseline(&judge.detector().adc, judge.detector().ground_v, *conversions);
                 // Of frames that a person has called rest although something presses in them, nothing but the mean is known.
                 let presses = || matches!(judge.absolute(&sum.mean_v(), sum.frames(), true), Absolute::Pressed(_));
-                let is_rest = !*is_told || !presses();
-                self.leakage_sheets = if is_rest { judge.leakage_sheets(self.rest.offset_v()) } else { 0.0 };
-                *following = Following::from(self.rest.mean_v().to_vec(), sum.frames(), time_s);
+                let is_rest = !*is_given || !presses();
+                self.leakage_sheets = if is_rest { judge.leakage_sheets(self.baseline.offset_v()) } else { 0.0 };
+                *following = Following::from(self.baseline.mean_v().to_vec(), sum.frames(), time_s);
             }
-            None => self.rest.set(sum.mean_v(), f64::from(sum.frames())),
+            None => self.baseline.set(sum.mean_v(), f64::from(sum.frames())),
         }
     }
 
@@ -211,16 +212,16 @@ impl Baseline {
 
     /// Follows what drifts while nothing touches.
     fn follow(&mut self, readings_v: &[f64], frames: u32, time_s: f64) {
-        let Some(Known { judge, conversions, following, is_told: false }) = &mut self.known else { return };
-        let seen = following.see(judge, self.rest.mean_v(), readings_v, frames, time_s);
+        let Some(Known { judge, conversions, following, is_given: false }) = &mut self.known else { return };
+        let seen = following.see(judge, self.baseline.mean_v(), readings_v, frames, time_s);
         match seen {
             follow::Seen::Nothing => {}
             follow::Seen::Lasting => self.state = BaselineState::Lasting,
             follow::Seen::Drifted(place_m) => self.state = BaselineState::Drifted(place_m),
             follow::Seen::Less => self.taking = Some(Taking::new(FRAMES, false)),
             follow::Seen::Rest { mean_v, frames } => {
-                self.rest.set(mean_v, frames * f64::from(*conversions));
-                self.leakage_sheets = judge.leakage_sheets(self.rest.offset_v());
+                self.baseline.set(mean_v, frames * f64::from(*conversions));
+                self.leakage_sheets = judge.leakage_sheets(self.baseline.offset_v());
                 if !matches!(self.state, BaselineState::Doubtful(_)) {
                     self.state = BaselineState::Held;
                 }
@@ -237,7 +238,7 @@ impl Baseline {
             touch_v.iter_mut().zip(pairs).for_each(|(touch, (volts, rest))| *touch = volts - rest);
             return;
         }
-        self.rest.subtract(readings_v, touch_v);
+        self.baseline.subtract(readings_v, touch_v);
         if let Some(known) = self.known.as_ref().filter(|_| self.leakage_sheets > LEAKAGE) {
             known.judge.leakage().take_off(touch_v, self.leakage_sheets);
         }

@@ -45,7 +45,7 @@ fn contact_v(sheets: f64) -> Vec<f64> {
 
 /// A detector and its baseline.
 struct Bench {
-    baseline: Baseline,
+    baseline: BaselineTracker,
     noise: Noise,
     /// Offsets of the channels (codes), and readings by leakage (V), which drift by a factor.
     offsets: [f64; 16],
@@ -61,7 +61,7 @@ impl Bench {
     fn new(step_s: f64, leakage: f64) -> Self {
         // From -2.5 to 3.5 codes.
         let offsets = std::array::from_fn(|e| 0.4 * (7 * e % 16) as f64 - 2.5);
-        let baseline = Baseline::new(Arc::clone(&JACOBIAN), 1);
+        let baseline = BaselineTracker::new(Arc::clone(&JACOBIAN), 1);
         let leakage_v = if leakage > 0.0 { leaking_v(&detector(), leakage, &[]) } else { vec![0.0; 256] };
         Self { baseline, noise: Noise::new(4), offsets, leakage_v, factor: 1.0, time_s: 0.0, step_s }
     }
@@ -327,7 +327,8 @@ fn leakage_is_taken_off_under_load_where_a_person_says_what_is_the_baseline() {
     let mut noise = Noise::new(3);
     let adc = detector().adc;
     let mut read_v = |volts: &[f64]| measured(&Readings::from_fn(16, |g, e| volts[16 * g + e]), &adc, &mut noise);
-    let (mut told, mut live) = (Baseline::told(Arc::clone(&JACOBIAN), 1, 40), Baseline::new(Arc::clone(&JACOBIAN), 1));
+    let (mut told, mut live) =
+        (BaselineTracker::given(Arc::clone(&JACOBIAN), 1, 40), BaselineTracker::new(Arc::clone(&JACOBIAN), 1));
     for frame in 0..40 {
         let readings = read_v(&rest_v);
         told.add(readings.volts(), 1, 1e-3 * f64::from(frame), &[]);
@@ -345,7 +346,7 @@ fn leakage_is_taken_off_under_load_where_a_person_says_what_is_the_baseline() {
     left_v.sort_by(f64::total_cmp);
     assert!(left_v[1] - left_v[0] < 1e-3, "{left_v:?}");
     // Frames that something presses in are the baseline too, if a person says so; of leakage they tell nothing.
-    let mut pressed = Baseline::told(Arc::clone(&JACOBIAN), 1, 2);
+    let mut pressed = BaselineTracker::given(Arc::clone(&JACOBIAN), 1, 2);
     (0..2).for_each(|_| _ = pressed.add(&both_v, 1, 0.0, &[]));
     assert_eq!((pressed.leakage_sheets(), pressed.state()), (0.0, BaselineState::Held));
 }
@@ -354,7 +355,7 @@ fn leakage_is_taken_off_under_load_where_a_person_says_what_is_the_baseline() {
 fn what_was_never_cut_off_has_no_hidden_offset() {
     // Readings that something was taken off already: noise about zero, on both sides.
     let mut noise = Noise::new(5);
-    let mut told = Baseline::told(Arc::clone(&JACOBIAN), 1, 64);
+    let mut told = BaselineTracker::given(Arc::clone(&JACOBIAN), 1, 64);
     for _ in 0..64 {
         let readings_v: Vec<f64> = (0..256).map(|_| 1.5e-3 * noise.normal()).collect();
         told.add(&readings_v, 1, 0.0, &[]);
@@ -366,7 +367,7 @@ fn what_was_never_cut_off_has_no_hidden_offset() {
 
 #[test]
 fn frames_that_a_person_says_are_the_baseline_are() {
-    let mut baseline = Baseline::over(2, 4);
+    let mut baseline = BaselineTracker::over(2, 4);
     let mut touch_v = [0.0; 4];
     baseline.add(&[1.0; 4], 1, 0.0, &[]);
     baseline.subtract(&[1.0; 4], &mut touch_v);
@@ -374,6 +375,6 @@ fn frames_that_a_person_says_are_the_baseline_are() {
     assert!(baseline.add(&[2.0; 4], 1, 0.0, &[]));
     baseline.subtract(&[1.0; 4], &mut touch_v);
     assert_eq!((baseline.state(), touch_v), (BaselineState::Held, [-0.5; 4]));
-    Baseline::over(0, 4).subtract(&[1.0; 4], &mut touch_v);
+    BaselineTracker::over(0, 4).subtract(&[1.0; 4], &mut touch_v);
     assert_eq!(touch_v, [1.0; 4]);
 }

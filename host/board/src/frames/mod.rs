@@ -12,7 +12,7 @@ use tactomo_protocol::Hello;
 
 pub use self::recorded::{Recorded, RecordingLoss};
 pub use self::survey::Survey;
-use crate::baseline::Baseline;
+use crate::baseline::BaselineTracker;
 use crate::record::{self, OtherProtocol, RecordError};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_table::{Array, Table, TableError};
@@ -74,7 +74,7 @@ impl FileFrame {
     }
 
     /// Takes it into account for the baseline.
-    pub fn note_rest(&self, baseline: &mut Baseline) {
+    pub fn note_rest(&self, baseline: &mut BaselineTracker) {
         let time_s = self.time_s.unwrap_or_default();
         match self.rows() {
             Some(rows) => _ = baseline.add_rows(&rows, time_s, &[]),
@@ -83,7 +83,7 @@ impl FileFrame {
     }
 
     /// Takes the baseline off its readings.
-    pub fn subtract(&mut self, baseline: &Baseline) {
+    pub fn subtract(&mut self, baseline: &BaselineTracker) {
         let volts = self.volts.clone();
         baseline.subtract(&volts, &mut self.volts);
     }

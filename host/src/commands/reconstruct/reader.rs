@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, anyhow, bail, ensure};
-use tactomo::board::baseline::{Baseline, BaselineState};
+use tactomo::board::baseline::{BaselineState, BaselineTracker};
 use tactomo::board::frames::{FileFrame, FrameFile, RecordingLoss};
 use tactomo::board::{identity, measured};
 use tactomo::detector::{Detector, ForceLaw};
@@ -69,7 +69,7 @@ impl Taught<'_> {
 pub struct Reader {
     path: PathBuf,
     frames: Frames,
-    baseline: Baseline,
+    baseline: BaselineTracker,
     /// Frames that were read.
     count: usize,
     /// Frames still to come that are the baseline and nothing else, because the user said so.
@@ -125,9 +125,9 @@ impl Reader {
         // It is taken as live takes it, while frames are solved.
         let conversions = file.board().map_or(1, |board| board.settings.conversions());
         let baseline = match (&jacobian, input.rest) {
-            (Some(jacobian), None) => Baseline::new(Arc::clone(jacobian), conversions),
-            (Some(jacobian), Some(frames)) => Baseline::told(Arc::clone(jacobian), conversions, frames),
-            (None, frames) => Baseline::over(frames.unwrap_or(0), file.channels()),
+            (Some(jacobian), None) => BaselineTracker::new(Arc::clone(jacobian), conversions),
+            (Some(jacobian), Some(frames)) => BaselineTracker::given(Arc::clone(jacobian), conversions, frames),
+            (None, frames) => BaselineTracker::over(frames.unwrap_or(0), file.channels()),
         };
         let frames = Frames::of(file, input, jacobian.as_ref().map(|jacobian| &jacobian.detector))?;
         let (path, given) = (input.file.to_owned(), input.rest.unwrap_or(0));

@@ -1,8 +1,8 @@
 //! A solver that follows contacts by the frames of a plan, as they arrive.
 
+use tactomo_physics::baseline::{Baseline, BaselineSum};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_physics::rest::{Rest, RestSum};
 use tactomo_physics::simulate::{Noise, code};
 use tactomo_touch::solve::{Followed, FoundContact, Latest, Method, Parts, Solution, SolveError};
 
@@ -51,7 +51,7 @@ pub(super) struct Bench<'a> {
 struct Converter<'a> {
     detector: &'a Detector,
     noise: Noise,
-    rest: Rest,
+    rest: Baseline,
 }
 
 impl<'a> Bench<'a> {
@@ -138,13 +138,13 @@ impl<'a> Bench<'a> {
 impl<'a> Converter<'a> {
     fn new(detector: &'a Detector, seed: u64) -> Self {
         let electrodes = detector.electrodes.len();
-        let mut new = Self { detector, noise: Noise::new(seed), rest: Rest::zero(electrodes * electrodes) };
-        let mut sum = RestSum::default();
+        let mut new = Self { detector, noise: Noise::new(seed), rest: Baseline::zero(electrodes * electrodes) };
+        let mut sum = BaselineSum::default();
         for _ in 0..REST_FRAMES {
             let frame_v: Vec<f64> = (0..electrodes * electrodes).map(|_| new.measured_v(0.0)).collect();
             sum.add(&frame_v, 1);
         }
-        new.rest = sum.rest(&detector.adc, detector.ground_v, 1);
+        new.rest = sum.baseline(&detector.adc, detector.ground_v, 1);
         new
     }
 

@@ -1,8 +1,8 @@
 //! What a detector reads while nothing touches it: offsets of its converter and leakage, and how they are taken off.
 //!
-//! At rest a converter cuts off what noise and offset are below zero, under load it does not. [`Rest`] therefore knows two numbers of each
+//! At rest a converter cuts off what noise and offset are below zero, under load it does not. [`Baseline`] therefore knows two numbers of each
 //! reading, its mean at rest and the offset behind it. Leakage is a conductance in parallel to every contact, of which [`Leakage`] takes off
-//! what is left when its voltages at rest are. [`RestPatterns`] tells offsets, leakage and contacts apart.
+//! what is left when its voltages at rest are. [`BaselinePatterns`] tells offsets, leakage and contacts apart.
 
 mod clipping;
 mod leakage;
@@ -10,7 +10,7 @@ mod patterns;
 
 pub use self::clipping::Clipping;
 pub use self::leakage::Leakage;
-pub use self::patterns::{RestChange, RestPatterns};
+pub use self::patterns::{BaselineChange, BaselinePatterns};
 use crate::detector::Adc;
 use crate::forward::jacobian::Jacobian;
 
@@ -25,7 +25,7 @@ const FLOATING: f64 = 30.0;
 
 /// Sum of frames that nothing touches in.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct RestSum {
+pub struct BaselineSum {
     sum_v: Vec<f64>,
     /// Squares of readings (V2), each as often as its frames.
     squares_v2: Vec<f64>,
@@ -36,9 +36,9 @@ pub struct RestSum {
     lowest_v: f64,
 }
 
-/// What a detector reads at rest.
+/// The baseline: what a detector reads at rest.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rest {
+pub struct Baseline {
     lsb_v: f64,
     /// The converter's zero (V): where the ground is lifted, below that of the readings.
     zero_v: f64,
@@ -47,7 +47,7 @@ pub struct Rest {
     offset_v: Vec<f64>,
 }
 
-impl RestSum {
+impl BaselineSum {
     /// Means that are needed to see how much noise there is.
     const FEWEST: u32 = 8;
 
@@ -75,9 +75,10 @@ impl RestSum {
         self.sum_v.iter().map(|sum| sum / f64::from(self.frames.max(1))).collect()
     }
 
-    /// What a converter reads at rest, whose readings are means of so many conversions each, above a ground of `ground_v` above its zero (V). How much noise there is, the frames tell; of
+    /// The baseline of a converter whose readings are means of so many conversions each, above a ground of `ground_v` above its zero (V). How much
+    /// noise there is, the frames tell; of
     /// few means it is what the converter's description says.
-    pub fn rest(&self, adc: &Adc, ground_v: f64, conversions: u32) -> Rest {
+    pub fn baseline(&self, adc: &Adc, ground_v: f64, conversions: u32) -> Baseline {
         let (mean_v, lsb_v) = (self.mean_v(), adc.lsb_v());
         // Noise that is cut off shows in some of the readings. Where it shows in none they are below the converter's floor, and nothing is known of them.
         let is_hidden = ground_v == 0.0 && self.squares_v2.iter().all(|square_v2| *square_v2 == 0.0);
@@ -91,9 +92,9 @@ impl RestSum {
                 Clipping::of_variance(&means, variance_v2 * f64::from(conversions) / (lsb_v * lsb_v))
             }
         };
-        let mut rest = Rest { lsb_v, zero_v: -ground_v, clipping, mean_v: Vec::new(), offset_v: Vec::new() };
-        rest.set(mean_v, f64::from(self.frames) * f64::from(conversions));
-        rest
+        let mut baseline = Baseline { lsb_v, zero_v: -ground_v, clipping, mean_v: Vec::new(), offset_v: Vec::new() };
+        baseline.set(mean_v, f64::from(self.frames) * f64::from(conversions));
+        baseline
     }
 
     /// Means of the readings that show the converter's noise (V) and the mean variance of one of a frame (V2), if there are enough to tell.
@@ -116,7 +117,7 @@ impl RestSum {
     }
 }
 
-impl Rest {
+impl Baseline {
     /// Readings that are all zero at rest, of a converter whose noise nothing is known of.
     pub fn zero(readings: usize) -> Self {
         let zeros = || vec![0.0; readings];
@@ -178,10 +179,10 @@ mod tests {
         let adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 };
         let mut noise = Noise::new(5);
         let at = |level_lsb: f64| Readings::from_fn(16, |_, _| level_lsb * 1e-3);
-        let mut sum = RestSum::default();
+        let mut sum = BaselineSum::default();
         (0..frames).for_each(|_| sum.add(measured(&at(offset_lsb), &adc, &mut noise).volts(), 1));
         // What the description says of the noise is not needed.
-        let rest = sum.rest(&Adc { noise_lsb: 9.0, ..adc }, 0.0, 1);
+        let rest = sum.baseline(&Adc { noise_lsb: 9.0, ..adc }, 0.0, 1);
         let (mut touch_v, mut all, loaded) = (vec![0.0; 256], vec![0.0; 256], at(offset_lsb + load_lsb));
         for _ in 0..400 {
             let frame = measured(&loaded, &adc, &mut noise);
@@ -200,9 +201,9 @@ mod tests {
 
     #[test]
     fn of_a_converter_that_sees_nothing_at_rest_nothing_is_taken_off() {
-        let mut sum = RestSum::default();
+        let mut sum = BaselineSum::default();
         (0..32).for_each(|_| sum.add(&[0.0; 16], 1));
-        let rest = sum.rest(&Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 5.0 }, 0.0, 1);
+        let rest = sum.baseline(&Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 5.0 }, 0.0, 1);
         let mut touch_v = [0.0; 16];
         rest.subtract(&[0.5; 16], &mut touch_v);
         assert!(touch_v.iter().all(|volts| (volts - 0.5).abs() < 1e-3), "{touch_v:?}");
@@ -240,17 +241,17 @@ mod tests {
         let adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 };
         let (mut noise, mut floating) = (Noise::new(5), Noise::new(6));
         let rest = |floats: bool, noise: &mut Noise, floating: &mut Noise| {
-            let mut sum = RestSum::default();
+            let mut sum = BaselineSum::default();
             for _ in 0..64 {
                 let mut frame = measured(&Readings::from_fn(16, |_, _| 0.0), &adc, noise);
                 let of_channel = frame.volts_mut().iter_mut().skip(3).step_by(16);
                 of_channel.filter(|_| floats).for_each(|volts| *volts = 2.0 + 0.3 * floating.normal());
                 sum.add(frame.volts(), 1);
             }
-            sum.rest(&adc, 0.0, 1)
+            sum.baseline(&adc, 0.0, 1)
         };
         let [sound, broken] = [false, true].map(|floats| rest(floats, &mut noise, &mut floating));
-        let others = |rest: &Rest| {
+        let others = |rest: &Baseline| {
             rest.offset_v().iter().enumerate().filter(|(i, _)| i % 16 != 3).map(|(_, v)| *v).sum::<f64>() / 240.0
         };
         let [sound_v, broken_v] = [sound, broken].map(|rest| others(&rest));
@@ -259,23 +260,23 @@ mod tests {
 
     #[test]
     fn a_mean_alone_is_read_with_the_noise_of_the_description() {
-        let mut sum = RestSum::default();
+        let mut sum = BaselineSum::default();
         sum.add(&[0.6e-3; 4], 64);
-        let rest = sum.rest(&Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 }, 0.0, 1);
+        let rest = sum.baseline(&Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 }, 0.0, 1);
         assert!(rest.offset_v()[2].abs() < 0.03e-3 && rest.mean_v()[2] == 0.6e-3, "{:?}", rest.offset_v());
-        assert_eq!(Rest::zero(2).offset_v(), [0.0; 2]);
+        assert_eq!(Baseline::zero(2).offset_v(), [0.0; 2]);
     }
 
     #[test]
     fn nothing_is_cut_off_where_the_ground_is_lifted() {
         let adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 };
-        let (mut noise, mut sum) = (Noise::new(8), RestSum::default());
+        let (mut noise, mut sum) = (Noise::new(8), BaselineSum::default());
         for _ in 0..64 {
             let frame = measured(&Readings::from_fn(16, |_, _| 0.2495), &adc, &mut noise);
             let above_ground: Vec<f64> = frame.volts().iter().map(|volts| volts - 0.25).collect();
             sum.add(&above_ground, 1);
         }
-        let rest = sum.rest(&adc, 0.25, 1);
+        let rest = sum.baseline(&adc, 0.25, 1);
         let offset_v = rest.offset_v().iter().sum::<f64>() / 256.0;
         assert!((offset_v + 0.5e-3).abs() < 0.1e-3 && rest.offset_v() == rest.mean_v(), "{offset_v}");
     }
@@ -284,7 +285,7 @@ mod tests {
     fn means_of_several_conversions_are_cut_off_as_each_is() {
         // 16 conversions about -1 code.
         let adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 1.5 };
-        let (mut noise, mut sum) = (Noise::new(8), RestSum::default());
+        let (mut noise, mut sum) = (Noise::new(8), BaselineSum::default());
         let low = Readings::from_fn(16, |_, _| -1e-3);
         for _ in 0..64 {
             let mut mean_v = vec![0.0; 256];
@@ -294,7 +295,7 @@ mod tests {
             }
             sum.add(&mean_v, 1);
         }
-        let offsets = sum.rest(&adc, 0.0, 16).offset_v().iter().sum::<f64>() / 256.0;
+        let offsets = sum.baseline(&adc, 0.0, 16).offset_v().iter().sum::<f64>() / 256.0;
         assert!((offsets + 1e-3).abs() < 0.1e-3, "{offsets}");
     }
 }

@@ -16,7 +16,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{RestPatterns, mean_fields_ohm};
+use super::{BaselinePatterns, mean_fields_ohm};
 use crate::forward::jacobian::Jacobian;
 
 /// Rounds of `touch = readings - rest - what the leakage does under that touch`.
@@ -70,7 +70,7 @@ impl Leakage {
 
     /// Leakage in readings at rest (V), in sheet conductances, by the patterns of the same electrodes. The patterns are those of very little:
     /// in truth the current to each electrode passes its resistance too.
-    pub fn at_rest(&self, patterns: &RestPatterns, rest_v: &[f64]) -> f64 {
+    pub fn at_rest(&self, patterns: &BaselinePatterns, rest_v: &[f64]) -> f64 {
         let linear = patterns.explain(rest_v).leakage_sheets.max(0.0);
         let mut sheets = linear;
         for _ in 0..ROUNDS {
@@ -245,7 +245,7 @@ mod tests {
     fn leakage_is_found_from_readings_at_rest() {
         let all: Vec<usize> = (0..16).collect();
         let bench = Bench::new(&all);
-        let patterns = RestPatterns::new(&Jacobian::of(&bench.fine), &all);
+        let patterns = BaselinePatterns::new(&Jacobian::of(&bench.fine), &all);
         for sheets in [0.003, 0.01, 0.05] {
             let found = bench.leakage.at_rest(&patterns, bench.readings(sheets, &[]).volts());
             assert!((found / sheets - 1.0).abs() < 0.005, "{sheets}: {found}");

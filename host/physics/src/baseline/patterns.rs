@@ -15,7 +15,7 @@ const SHORTEST: f64 = 1e-3;
 
 /// Patterns of small changes of a detector's readings.
 #[derive(Clone, Debug)]
-pub struct RestPatterns {
+pub struct BaselinePatterns {
     electrodes: usize,
     kept: Vec<usize>,
     /// Readings by one sheet conductance of leakage (V).
@@ -41,7 +41,7 @@ struct Place {
 
 /// What a small change of readings is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RestChange {
+pub struct BaselineChange {
     /// Conductance of leakage and contact together (sheet conductances), and the length of what it changes besides offsets (V).
     pub total_sheets: f64,
     /// Length of that in the readings (V): of noise its deviation.
@@ -58,7 +58,7 @@ pub struct RestChange {
     pub scatter_v: f64,
 }
 
-impl RestPatterns {
+impl BaselinePatterns {
     /// Those of a detector through some of its electrodes.
     pub fn new(jacobian: &Jacobian, kept: &[usize]) -> Self {
         let electrodes = jacobian.electrodes();
@@ -108,7 +108,7 @@ impl RestPatterns {
     ///
     /// # Panics
     /// If there are not as many as electrodes squared.
-    pub fn explain(&self, change_v: &[f64]) -> RestChange {
+    pub fn explain(&self, change_v: &[f64]) -> BaselineChange {
         assert_eq!(change_v.len(), self.electrodes * self.electrodes, "readings of another number of electrodes");
         let mut left_v = self.pattern(|g, e| change_v[g * self.electrodes + e]);
         self.take_off_offsets(&mut left_v);
@@ -119,7 +119,7 @@ impl RestPatterns {
         let n = self.kept.len();
         let freedom = (n * n).saturating_sub(n + 1 + self.contacts_along.len()).max(1);
         let total_sheets = total_v / self.leakage_length_v.max(f64::MIN_POSITIVE);
-        let nothing = RestChange {
+        let nothing = BaselineChange {
             total_sheets,
             total_v,
             leakage_sheets: total_sheets,
@@ -130,7 +130,7 @@ impl RestPatterns {
         };
         let Some((contact_v, place)) = best else { return nothing };
         let contact_sheets = contact_v / place.length_v;
-        RestChange {
+        BaselineChange {
             leakage_sheets: (total_v - contact_sheets * place.leakage_v) / self.leakage_length_v,
             contact_sheets,
             contact_v,
@@ -230,8 +230,8 @@ mod tests {
         Slab::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap().on_image(900)
     }
 
-    fn patterns(slab: &Slab) -> RestPatterns {
-        RestPatterns::new(&Jacobian::of(slab), &(0..16).collect::<Vec<_>>())
+    fn patterns(slab: &Slab) -> BaselinePatterns {
+        BaselinePatterns::new(&Jacobian::of(slab), &(0..16).collect::<Vec<_>>())
     }
 
     fn sheet_s(slab: &Slab) -> f64 {
@@ -312,7 +312,7 @@ mod tests {
     fn electrodes_that_are_left_out_say_nothing() {
         let slab = slab();
         let kept: Vec<usize> = (0..16).filter(|e| *e != 3).collect();
-        let patterns = RestPatterns::new(&Jacobian::of(&slab), &kept);
+        let patterns = BaselinePatterns::new(&Jacobian::of(&slab), &kept);
         let mut volts = even_v(&slab, 0.01);
         let sound = patterns.explain(&volts);
         volts.iter_mut().enumerate().filter(|(i, _)| i / 16 == 3 || i % 16 == 3).for_each(|(_, volts)| *volts = 0.6);
