@@ -7,8 +7,8 @@
 //! is the same; where a person has said which frames are the baseline ([`BaselineTracker::given`]), it is neither judged nor followed.
 
 mod follow;
-mod judge;
 mod rest_rounds;
+mod rest_test;
 mod state;
 #[cfg(test)]
 mod tests;
@@ -16,8 +16,8 @@ mod tests;
 use std::sync::Arc;
 
 use self::follow::Following;
-use self::judge::{Absolute, Judge};
 use self::rest_rounds::RestRounds;
+use self::rest_test::{Absolute, RestTest};
 pub use self::state::{BaselineState, LASTING_S};
 use tactomo_physics::baseline::{Baseline, BaselineSum};
 use tactomo_physics::forward::jacobian::Jacobian;
@@ -48,7 +48,7 @@ pub struct BaselineTracker {
 /// A detector whose baseline is taken.
 #[derive(Clone, Debug)]
 struct Known {
-    judge: Judge,
+    test: RestTest,
     /// Conversions that a reading is the mean of.
     conversions: u32,
     following: Following,
@@ -87,7 +87,7 @@ impl BaselineTracker {
 
     fn of(jacobian: Arc<Jacobian>, conversions: u32, frames: u32, is_given: bool) -> Self {
         let readings = jacobian.electrodes().pow(2);
-        let known = Known { judge: Judge::new(jacobian), conversions, following: Following::default(), is_given };
+        let known = Known { test: RestTest::new(jacobian), conversions, following: Following::default(), is_given };
         Self { known: Some(known), ..Self::over(frames, readings) }
     }
 
@@ -138,7 +138,7 @@ impl BaselineTracker {
         }
         let before = self.state;
         if let Some(known) = &mut self.known {
-            known.judge.leave_out(left_out);
+            known.test.leave_out(left_out);
         }
         match self.taking.take() {
             Some(taking) => self.take(taking, readings_v, frames, time_s),
@@ -163,7 +163,7 @@ impl BaselineTracker {
     fn take(&mut self, mut taking: Taking, readings_v: &[f64], frames: u32, time_s: f64) {
         let asked = taking.asked;
         let judged = |readings_v: &[f64], frames: u32| match &self.known {
-            Some(known) if !known.is_given => known.judge.absolute(readings_v, frames, asked),
+            Some(known) if !known.is_given => known.test.absolute(readings_v, frames, asked),
             _ => Absolute::Rest,
         };
         // A press that begins in the last of the frames hardly shows in their mean.
@@ -185,12 +185,12 @@ impl BaselineTracker {
     fn hold(&mut self, sum: &BaselineSum, time_s: f64, state: BaselineState) {
         (self.state, self.held) = (state, true);
         match &mut self.known {
-            Some(Known { judge, conversions, following, is_given }) => {
-                self.baseline = sum.baseline(&judge.detector().adc, judge.detector().ground_v, *conversions);
+            Some(Known { test, conversions, following, is_given }) => {
+                self.baseline = sum.baseline(&test.detector().adc, test.detector().ground_v, *conversions);
                 // Of frames that a person has called rest although something presses in them, nothing but the mean is known.
-                let presses = || matches!(judge.absolute(&sum.mean_v(), sum.frames(), true), Absolute::Pressed(_));
+                let presses = || matches!(test.absolute(&sum.mean_v(), sum.frames(), true), Absolute::Pressed(_));
                 let is_rest = !*is_given || !presses();
-                self.leakage_sheets = if is_rest { judge.leakage_sheets(self.baseline.offset_v()) } else { 0.0 };
+                self.leakage_sheets = if is_rest { test.leakage_sheets(self.baseline.offset_v()) } else { 0.0 };
                 *following = Following::from(self.baseline.mean_v().to_vec(), sum.frames(), time_s);
             }
             None => self.baseline.set(sum.mean_v(), f64::from(sum.frames())),
@@ -212,8 +212,8 @@ impl BaselineTracker {
 
     /// Follows what drifts while nothing touches.
     fn follow(&mut self, readings_v: &[f64], frames: u32, time_s: f64) {
-        let Some(Known { judge, conversions, following, is_given: false }) = &mut self.known else { return };
-        let seen = following.see(judge, self.baseline.mean_v(), readings_v, frames, time_s);
+        let Some(Known { test, conversions, following, is_given: false }) = &mut self.known else { return };
+        let seen = following.see(test, self.baseline.mean_v(), readings_v, frames, time_s);
         match seen {
             follow::Seen::Nothing => {}
             follow::Seen::Lasting => self.state = BaselineState::Lasting,
@@ -221,7 +221,7 @@ impl BaselineTracker {
             follow::Seen::Less => self.taking = Some(Taking::new(FRAMES, false)),
             follow::Seen::Rest { mean_v, frames } => {
                 self.baseline.set(mean_v, frames * f64::from(*conversions));
-                self.leakage_sheets = judge.leakage_sheets(self.baseline.offset_v());
+                self.leakage_sheets = test.leakage_sheets(self.baseline.offset_v());
                 if !matches!(self.state, BaselineState::Doubtful(_)) {
                     self.state = BaselineState::Held;
                 }
@@ -240,7 +240,7 @@ impl BaselineTracker {
         }
         self.baseline.subtract(readings_v, touch_v);
         if let Some(known) = self.known.as_ref().filter(|_| self.leakage_sheets > LEAKAGE) {
-            known.judge.leakage().take_off(touch_v, self.leakage_sheets);
+            known.test.leakage().take_off(touch_v, self.leakage_sheets);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Whether readings are those of a detector that nothing touches.
+//! The test for rest: whether readings are those of a detector that nothing touches.
 
 use std::sync::Arc;
 
@@ -34,9 +34,9 @@ const UNLIKE: f64 = 0.2;
 /// Share of the drive above which something presses, whatever a person says.
 const PRESSED: f64 = 0.05;
 
-/// Knows what a detector reads when nothing touches it.
+/// Tests whether readings, or changes of them, are those of a detector that nothing touches.
 #[derive(Clone, Debug)]
-pub(super) struct Judge {
+pub(super) struct RestTest {
     jacobian: Arc<Jacobian>,
     patterns: BaselinePatterns,
     leakage: Leakage,
@@ -65,7 +65,7 @@ pub(super) enum Absolute {
     Pressed(f64),
 }
 
-impl Judge {
+impl RestTest {
     pub fn new(jacobian: Arc<Jacobian>) -> Self {
         let all: Vec<usize> = (0..jacobian.electrodes()).collect();
         let (patterns, leakage) = (BaselinePatterns::new(&jacobian, &all), Leakage::new(&jacobian, &all));
