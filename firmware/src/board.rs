@@ -9,7 +9,7 @@ use tactomo_protocol::{
 use crate::inbox::Inbox;
 use crate::pace::Pace;
 use crate::row::Attended;
-use crate::scan::{Bench, Scan, Scanned};
+use crate::scan::{FrontEnd, Scan, Scanned};
 use crate::uplink::Uplink;
 use crate::{Adc, Chip, Mux, Parts, Sampler, Serial};
 
@@ -261,8 +261,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         let Self { parts, scan, uplink, inbox, .. } = self;
         let Parts { mux, sampler, serial, chip } = parts;
         let line = &mut Line { uplink, serial, inbox };
-        let mut bench = Bench { mux, sampler, chip, line, adc: self.adc, settings: self.hello.settings };
-        match scan.row(&mut bench)? {
+        let mut front_end = FrontEnd { mux, sampler, chip, line, adc: self.adc, settings: self.hello.settings };
+        match scan.row(&mut front_end)? {
             None => Ok(Activity::Row),
             Some(scanned) => {
                 self.send(scanned);
@@ -303,7 +303,7 @@ impl<L: Serial, C: Chip, const WIRE: usize> Attended<C> for Line<'_, L, WIRE> {
         self.uplink.poll(self.serial, chip);
     }
 
-    fn exchange(&mut self, chip: &mut C) {
+    fn transfer(&mut self, chip: &mut C) {
         self.uplink.poll(self.serial, chip);
         self.inbox.fill(self.serial);
     }

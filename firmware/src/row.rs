@@ -44,8 +44,8 @@ pub(crate) trait Attended<C> {
     /// Sends what the line takes at this moment.
     fn push(&mut self, chip: &mut C);
 
-    /// The same, and takes what was received, for there is time.
-    fn exchange(&mut self, chip: &mut C);
+    /// Sends what the line takes, and takes what was received: for moments with time for both.
+    fn transfer(&mut self, chip: &mut C);
 }
 
 /// Longest stretch of a wait in which nobody looks at the line (us): at 921600 baud, 23 bytes of the 128 of a UART's FIFO.
@@ -59,7 +59,7 @@ pub(crate) fn wait<C: Chip>(chip: &mut C, line: &mut impl Attended<C>, mut us: u
         us -= piece;
         if us > 0 {
             chip.feed_watchdog();
-            line.exchange(chip);
+            line.transfer(chip);
         }
     }
 }

@@ -50,7 +50,7 @@ impl Scanned {
 
 /// What the scan measures with, and how.
 #[derive(Debug)]
-pub(crate) struct Bench<'a, M, S, C, A> {
+pub(crate) struct FrontEnd<'a, M, S, C, A> {
     /// Grounds and selects.
     pub mux: &'a mut M,
     /// Converts.
@@ -124,20 +124,20 @@ impl<const READINGS: usize> Scan<READINGS> {
     /// If a pin of the multiplexer cannot be driven; the frame is then abandoned.
     pub(crate) fn row<M: Mux, S: Sampler, C: Chip, A: Attended<C>>(
         &mut self,
-        bench: &mut Bench<M, S, C, A>,
+        front_end: &mut FrontEnd<M, S, C, A>,
     ) -> Result<Option<Scanned>, M::Error> {
         if self.row == 0 {
-            self.begin(bench.chip.now_us());
+            self.begin(front_end.chip.now_us());
         }
         let row = mem::take(&mut self.row);
-        let average_log2 = if self.plan.is_whole() { bench.settings.average_log2 } else { self.plan.average_log2 };
-        bench.mux.ground(self.scope.ground(row))?;
-        let Settings { settle_us, select_us, discarded, .. } = bench.settings;
-        wait(bench.chip, bench.line, settle_us.into());
+        let average_log2 = if self.plan.is_whole() { front_end.settings.average_log2 } else { self.plan.average_log2 };
+        front_end.mux.ground(self.scope.ground(row))?;
+        let Settings { settle_us, select_us, discarded, .. } = front_end.settings;
+        wait(front_end.chip, front_end.line, settle_us.into());
         let mut scanned = ScanRow {
-            mux: bench.mux,
-            chip: bench.chip,
-            line: bench.line,
+            mux: front_end.mux,
+            chip: front_end.chip,
+            line: front_end.line,
             electrodes: self.scope.reads(),
             average_log2,
             select_us,
@@ -147,10 +147,10 @@ impl<const READINGS: usize> Scan<READINGS> {
             status: self.status,
             timed_out: 0,
         };
-        let sampled = bench.sampler.sample_row(&mut scanned);
+        let sampled = front_end.sampler.sample_row(&mut scanned);
         let ScanRow { status, timed_out, .. } = scanned;
         self.status = status;
-        let fraction_bits = bench.adc.fraction_bits(average_log2);
+        let fraction_bits = front_end.adc.fraction_bits(average_log2);
         self.keep(row, timed_out, average_log2 - fraction_bits);
         sampled?;
         let next = row + 1;
