@@ -24,9 +24,9 @@ pub(crate) struct LoadedSpot {
     pub ohm: f64,
 }
 
-/// What does not depend on the contacts.
+/// The model of contacts as spots: what of it does not depend on the contacts.
 #[derive(Clone, Debug)]
-pub(crate) struct Network {
+pub(crate) struct SpotModel {
     /// Fields between the electrodes (ohm).
     pub electrodes_ohm: DMatrix<f64>,
     pub drive_v: f64,
@@ -44,7 +44,7 @@ pub(crate) struct Solved {
     pub loads_ohm: Vec<f64>,
 }
 
-impl Network {
+impl SpotModel {
     pub fn new(detector: &Detector, electrodes_ohm: &DMatrix<f64>) -> Self {
         let electrodes_ohm = electrodes_ohm.clone();
         Self { electrodes_ohm, drive_v: detector.drive_v, on_resistance_ohm: detector.on_resistance_ohm }

@@ -1,7 +1,7 @@
 //! A few contacts fitted to the full contact physics, off any grid.
 //!
 //! Each contact is a disc with a place, a conductance and a radius. Discs are fitted with the forward model itself ([`discs`]), one
-//! more at a time from where it would explain most ([`scan`], in which contacts are [spots](crate::solve::fit::spots) of a small network), as long as
+//! more at a time from where it would explain most ([`scan`], in which contacts are [spots](crate::solve::fit::spots) of a small circuit), as long as
 //! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
 
 #[cfg(test)]
@@ -42,7 +42,7 @@ use crate::solve::before::adaptive_mean;
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::fit::approximation::ApproximationError;
 use crate::solve::fit::evidence::{Evidence, misfit_limit};
-use crate::solve::fit::spots::Network;
+use crate::solve::fit::spots::SpotModel;
 use crate::solve::fit::target::{Errors, Target};
 use crate::solve::problem::Problem;
 use tactomo_physics::forward::spots::SpotFields;
@@ -98,7 +98,7 @@ pub(crate) struct ContactFinder {
     /// To look where contacts may be.
     rough: Arc<dyn ForwardModel>,
     settings: ContactSettings,
-    network: Network,
+    spot_model: SpotModel,
     fields: Box<dyn SpotFields>,
     scan: Scan,
     sheet_s: f64,
@@ -155,10 +155,10 @@ impl ContactFinder {
             detector: detector.name.clone(),
             what: format!("the {} has no fields of single contacts", problem.model.name()),
         })?;
-        let network = Network::new(detector, problem.model.electrode_fields_ohm());
+        let spot_model = SpotModel::new(detector, problem.model.electrode_fields_ohm());
         Ok(Self {
-            scan: Scan::new(&*fields, &network, SCAN_PLACES),
-            network,
+            scan: Scan::new(&*fields, &spot_model, SCAN_PLACES),
+            spot_model,
             fields,
             errors: Errors {
                 noise_v: detector.adc.deviation_v(),
@@ -190,7 +190,7 @@ impl ContactFinder {
     /// # Errors
     /// [`SolveError`] if they cannot.
     pub fn check(&self, readings: &Readings) -> Result<(), SolveError> {
-        check(readings, self.network.electrodes())
+        check(readings, self.spot_model.electrodes())
     }
 
     /// What the mean of some frames is fitted as; `error` is what they may be off by together, if the detector is not known exactly.

@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::discs::DiscFit;
 use crate::solve::fit::balance;
 use crate::solve::fit::dot::dot;
-use crate::solve::fit::spots::{LoadedSpot, Network};
+use crate::solve::fit::spots::{LoadedSpot, SpotModel};
 use crate::solve::fit::target::Target;
 use tactomo_physics::forward::spots::{Spot, SpotFields};
 use tactomo_physics::readings::Readings;
@@ -64,9 +64,9 @@ pub(super) struct Candidate {
 
 impl Scan {
     /// Looks at about so many places.
-    pub fn new(fields: &dyn SpotFields, network: &Network, places: usize) -> Self {
+    pub fn new(fields: &dyn SpotFields, spot_model: &SpotModel, places: usize) -> Self {
         let spots: Vec<_> = fields.places_m(places).into_iter().map(|place_m| fields.spot(place_m)).collect();
-        Self { first: FirstLook::new(&spots, network), spots }
+        Self { first: FirstLook::new(&spots, spot_model), spots }
     }
 
     /// Looks for contacts where there are none yet.
@@ -74,9 +74,9 @@ impl Scan {
     /// Balanced readings of one contact are exactly linear in the fields at its place (`solve::balance`), whatever its force and
     /// whatever the pads' own impedances, so the scan finds it; the rows' mean load is `A - 2 f + E[g][g] + R`, which gives its
     /// resistance `A`. `readings` are those of the target, completed.
-    pub fn at_first(&self, network: &Network, target: &Target, readings: &Readings) -> Looks<'_> {
+    pub fn at_first(&self, spot_model: &SpotModel, target: &Target, readings: &Readings) -> Looks<'_> {
         let mut volts = readings.volts().to_vec();
-        balance::balance(&mut volts, network.electrodes(), network.drive_v);
+        balance::balance(&mut volts, spot_model.electrodes(), spot_model.drive_v);
         Looks {
             patterns: Cow::Borrowed(&self.first.patterns),
             squares: Cow::Borrowed(&self.first.squares),
@@ -87,9 +87,9 @@ impl Scan {
     }
 
     /// Share of the square of balanced `readings` that the best single place leaves: of one contact, what noise and the model's error do.
-    pub fn left_by_one(&self, network: &Network, readings: &Readings) -> f64 {
+    pub fn left_by_one(&self, spot_model: &SpotModel, readings: &Readings) -> f64 {
         let mut volts = readings.volts().to_vec();
-        balance::balance(&mut volts, network.electrodes(), network.drive_v);
+        balance::balance(&mut volts, spot_model.electrodes(), spot_model.drive_v);
         let volts = DVector::from_vec(volts);
         let along = self.first.patterns.tr_mul(&self.first.basis.tr_mul(&volts));
         let gains = along.iter().zip(&self.first.squares).filter(|(along, _)| **along > 0.0);
@@ -103,19 +103,19 @@ impl Scan {
     /// part along `S`, as the fit is at its minimum.
     pub fn beside(
         &self,
-        network: &Network,
+        spot_model: &SpotModel,
         fields: &dyn SpotFields,
         spots: &[LoadedSpot],
         fit: &DiscFit,
         target: &Target,
     ) -> Option<Looks<'_>> {
-        let n = network.electrodes();
-        let solved = network.solve(spots, fields)?;
+        let n = spot_model.electrodes();
+        let solved = spot_model.solve(spots, fields)?;
         let target = target.at(&fit.volts);
         let mut patterns = DMatrix::zeros(n * n, self.spots.len());
         for (mut column, spot) in patterns.column_iter_mut().zip(&self.spots) {
-            let potentials_ohm = network.potentials_ohm(&solved, spots, spot, fields);
-            network.volts_per_s(&solved, &potentials_ohm, column.as_mut_slice());
+            let potentials_ohm = spot_model.potentials_ohm(&solved, spots, spot, fields);
+            spot_model.volts_per_s(&solved, &potentials_ohm, column.as_mut_slice());
             target.whiten(column.as_mut_slice());
         }
         let whitened: Vec<_> = fit.slopes_v().iter().map(|slope| target.whitened(slope)).collect();
@@ -210,12 +210,12 @@ impl Scan {
 }
 
 impl FirstLook {
-    fn new(spots: &[Spot], network: &Network) -> Self {
-        let n = network.electrodes();
-        let pads = &network.electrodes_ohm;
-        let drive_v = network.drive_v;
+    fn new(spots: &[Spot], spot_model: &SpotModel) -> Self {
+        let n = spot_model.electrodes();
+        let pads = &spot_model.electrodes_ohm;
+        let drive_v = spot_model.drive_v;
         // Differences of fields at electrodes, and what is alike for all places.
-        let constant = |g: usize, e: usize| pads[(g, g)] - pads[(e, g)] + network.on_resistance_ohm;
+        let constant = |g: usize, e: usize| pads[(g, g)] - pads[(e, g)] + spot_model.on_resistance_ohm;
         let directions = DMatrix::from_fn(n * n, n, |row, source| {
             let (g, e) = (row / n, row % n);
             match source + 1 == n {
@@ -231,7 +231,7 @@ impl FirstLook {
         let patterns = factor.r() * sources;
         let chosen = patterns.select_columns(&paired(spots.len()));
         let mean_ohm = |spot: &Spot| {
-            let load = |g: usize| pads[(g, g)] - 2.0 * spot.electrodes_ohm[g] + network.on_resistance_ohm;
+            let load = |g: usize| pads[(g, g)] - 2.0 * spot.electrodes_ohm[g] + spot_model.on_resistance_ohm;
             (0..n).map(load).sum::<f64>() / n as f64
         };
         Self {

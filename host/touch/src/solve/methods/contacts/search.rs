@@ -62,12 +62,12 @@ impl ContactFinder {
 
     /// Share of readings that one contact leaves, as far as a look at every place tells: next to no time, and no standard errors.
     pub fn roughly_left_by_one(&self, readings: &Readings) -> f64 {
-        self.scan.left_by_one(&self.network, &self.problem.completed(readings))
+        self.scan.left_by_one(&self.spot_model, &self.problem.completed(readings))
     }
 
     /// A look for contacts where there are none yet.
     fn looks(&self, target: &Target) -> Looks<'_> {
-        self.scan.at_first(&self.network, target, &self.problem.completed(&target.readings()))
+        self.scan.at_first(&self.spot_model, target, &self.problem.completed(&target.readings()))
     }
 
     /// Whether there is any contact at all, as far as single ones tell.
@@ -204,7 +204,7 @@ impl ContactFinder {
     /// The best fit with one more contact, from some starts or from where it would explain most; `None` if the readings ask for none.
     pub(super) fn one_more(&self, fit: &DiscFit, mut starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
         let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
-        let looks = self.scan.beside(&self.network, &*self.fields, &spots, fit, target);
+        let looks = self.scan.beside(&self.spot_model, &*self.fields, &spots, fit, target);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
         let is_worth_a_try = ones.first().is_some_and(|best| best.gain > WORTH_A_TRY);
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
