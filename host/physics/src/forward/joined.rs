@@ -1,6 +1,6 @@
 //! Electrodes whose wires touch.
 //!
-//! Two joined pads exchange a current that makes their potentials differ by no more than the wire's resistance `r` takes. With `d`
+//! Between two joined pads flows a current that makes their potentials differ by no more than the wire's resistance `r` takes. With `d`
 //! the difference of their unit vectors and any fields `N` of the detector, bare or in contact, it is `-d^T N / (d^T N d + r)`
 //! per unit current, so all fields change by a term of rank one: `N - (N d)(N d)^T / (d^T N d + r)`.
 
@@ -22,18 +22,18 @@ impl Joint {
     }
 }
 
-/// Exchanges of current by joints, for fields of a detector between its electrodes.
+/// Currents through joints, for fields of a detector between its electrodes.
 #[derive(Clone, Debug, Default)]
-pub struct Exchanges {
-    /// Current of each exchange at the electrodes (square root of S): `electrodes x joints`.
+pub struct JointCurrents {
+    /// Current of each joint at the electrodes (square root of S): `electrodes x joints`.
     currents: DMatrix<f64>,
     /// Field of each at the electrodes (square root of ohm): `electrodes x joints`.
     fields: DMatrix<f64>,
 }
 
-impl Exchanges {
+impl JointCurrents {
     /// Those of some joints, for the fields between all electrodes (ohm): floating ones, or an impedance matrix. A joint that closes
-    /// a loop of others without resistance exchanges nothing.
+    /// a loop of others without resistance carries nothing.
     ///
     /// # Panics
     /// If there is no such electrode.
@@ -41,7 +41,7 @@ impl Exchanges {
         let n = electrodes_ohm.nrows();
         let mut all = Self { currents: DMatrix::zeros(n, 0), fields: DMatrix::zeros(n, 0) };
         for Joint { electrodes: [a, b], ohm } in joints {
-            // The field of an ampere from one to the other, with the exchanges before.
+            // The field of an ampere from one to the other, with the joints before.
             let mut current = DMatrix::zeros(n, 1);
             current[*a] += 1.0;
             current[*b] -= 1.0;
@@ -61,23 +61,23 @@ impl Exchanges {
         all
     }
 
-    /// Number of exchanges.
+    /// Number of joints that carry a current.
     pub fn count(&self) -> usize {
         self.currents.ncols()
     }
 
-    /// Fields of the exchanges (square root of ohm), `rows x joints`, where those of the electrodes are given: `rows x electrodes`
+    /// Fields of the joints' currents (square root of ohm), `rows x joints`, where those of the electrodes are given: `rows x electrodes`
     /// (ohm). What is to be subtracted between two rows is their product.
     pub fn at(&self, electrodes_ohm: &DMatrix<f64>) -> DMatrix<f64> {
         electrodes_ohm * &self.currents
     }
 
-    /// Fields of the electrodes (ohm), `rows x electrodes`, with the exchanges.
+    /// Fields of the electrodes (ohm), `rows x electrodes`, with the joints' currents.
     pub fn applied(&self, electrodes_ohm: &DMatrix<f64>) -> DMatrix<f64> {
         electrodes_ohm - self.at(electrodes_ohm) * self.fields.transpose()
     }
 
-    /// Fields of the exchanges at a place, and the electrodes' fields there (ohm) changed by them.
+    /// Fields of the joints' currents at a place, and the electrodes' fields there (ohm) changed by them.
     pub(super) fn apply(&self, electrodes_ohm: &mut [f64]) -> Vec<f64> {
         let along = |joint: usize| self.currents.column(joint).iter().zip(&*electrodes_ohm).map(|(a, b)| a * b).sum();
         let at: Vec<f64> = (0..self.count()).map(along).collect();

@@ -26,7 +26,7 @@ pub use self::auto::Auto;
 pub use self::contact::ContactFields;
 pub use self::driving::{ConnectingPoints, DrivingLayer, sheet_drops_ohm};
 pub use self::jacobian_file::JacobianFileError;
-pub use self::joined::{Exchanges, Joint};
+pub use self::joined::{Joint, JointCurrents};
 pub use self::nuisance::{Nuisance, Similar};
 pub use self::patches::Patches;
 pub use self::slab::{DotCurrent, DotCurrents, Face, Resolution, Slab};

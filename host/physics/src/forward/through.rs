@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 
-use super::joined::{Exchanges, Joint};
+use super::joined::{Joint, JointCurrents};
 use super::spots::{Spot, SpotFields};
 use super::{ContactFields, ForwardError, ForwardModel, ImageMesh};
 use crate::detector::Detector;
@@ -21,7 +21,7 @@ pub struct Through {
     kept: Vec<usize>,
     joints: Vec<Joint>,
     /// Of the bare detector.
-    exchanges: Exchanges,
+    joint_currents: JointCurrents,
     detector: Detector,
     /// Made when they are asked for.
     fields_ohm: OnceLock<DMatrix<f64>>,
@@ -35,18 +35,18 @@ impl Through {
     /// If there is no such electrode.
     pub fn new(model: Arc<dyn ForwardModel>, kept: Vec<usize>, joints: Vec<Joint>) -> Self {
         let detector = model.detector().keeping(&kept);
-        let exchanges = Exchanges::new(model.electrode_fields_ohm(), &joints);
-        let electrode_fields_ohm = square(&exchanges.applied(model.electrode_fields_ohm()), &kept);
-        Self { model, kept, joints, exchanges, detector, fields_ohm: OnceLock::new(), electrode_fields_ohm }
+        let joint_currents = JointCurrents::new(model.electrode_fields_ohm(), &joints);
+        let electrode_fields_ohm = square(&joint_currents.applied(model.electrode_fields_ohm()), &kept);
+        Self { model, kept, joints, joint_currents, detector, fields_ohm: OnceLock::new(), electrode_fields_ohm }
     }
 
     /// What is seen of an impedance matrix of all electrodes.
     fn seen(&self, impedance_ohm: &DMatrix<f64>) -> DMatrix<f64> {
-        square(&Exchanges::new(impedance_ohm, &self.joints).applied(impedance_ohm), &self.kept)
+        square(&JointCurrents::new(impedance_ohm, &self.joints).applied(impedance_ohm), &self.kept)
     }
 
     fn seen_fields(&self, all: &ContactFields) -> ContactFields {
-        let nodes_ohm = Exchanges::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);
+        let nodes_ohm = JointCurrents::new(&all.impedance_ohm, &self.joints).applied(&all.nodes_ohm);
         ContactFields { impedance_ohm: self.seen(&all.impedance_ohm), nodes_ohm: nodes_ohm.select_columns(&self.kept) }
     }
 }
@@ -107,7 +107,7 @@ impl ForwardModel for Through {
 
     fn spots(&self, radius_m: f64) -> Option<Box<dyn SpotFields>> {
         let spots = self.model.spots(radius_m)?;
-        Some(Box::new(SpotsThrough { spots, kept: self.kept.clone(), exchanges: self.exchanges.clone() }))
+        Some(Box::new(SpotsThrough { spots, kept: self.kept.clone(), joint_currents: self.joint_currents.clone() }))
     }
 
     fn of_similar(&self, detector: &Detector) -> Result<Arc<dyn ForwardModel>, ForwardError> {
@@ -119,12 +119,12 @@ impl ForwardModel for Through {
     }
 
     fn fields_ohm(&self) -> &DMatrix<f64> {
-        let fields_ohm = || self.exchanges.applied(self.model.fields_ohm()).select_columns(&self.kept);
+        let fields_ohm = || self.joint_currents.applied(self.model.fields_ohm()).select_columns(&self.kept);
         self.fields_ohm.get_or_init(fields_ohm)
     }
 
     fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError> {
-        let at = self.exchanges.at(self.model.fields_ohm());
+        let at = self.joint_currents.at(self.model.fields_ohm());
         Ok(self.model.node_fields_ohm()? - &at * at.transpose())
     }
 
@@ -137,13 +137,13 @@ impl ForwardModel for Through {
 struct SpotsThrough {
     spots: Box<dyn SpotFields>,
     kept: Vec<usize>,
-    exchanges: Exchanges,
+    joint_currents: JointCurrents,
 }
 
 impl SpotFields for SpotsThrough {
     fn spot(&self, place_m: Place) -> Spot {
         let mut spot = self.spots.spot(place_m);
-        spot.joined = self.exchanges.apply(&mut spot.electrodes_ohm);
+        spot.joined = self.joint_currents.apply(&mut spot.electrodes_ohm);
         spot.electrodes_ohm = self.kept.iter().map(|e| spot.electrodes_ohm[*e]).collect();
         spot.own_ohm -= product(&spot.joined, &spot.joined);
         spot

@@ -8,7 +8,7 @@ use std::thread;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
-use tactomo_physics::forward::{Auto, Exchanges, ForwardError, ForwardModel, Joint, Nuisance, Through};
+use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, Joint, JointCurrents, Nuisance, Through};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::threads;
 
@@ -185,11 +185,11 @@ impl Problem {
     pub fn through(&self, kept: &[usize], joints: &[Joint]) -> Self {
         let detector = self.detector().keeping(kept);
         let pads = &self.jacobian.electrode_fields_ohm;
-        let exchanges = Exchanges::new(pads, joints);
+        let joint_currents = JointCurrents::new(pads, joints);
         let jacobian = Jacobian {
             detector,
-            fields_ohm: exchanges.applied(&self.jacobian.fields_ohm).select_columns(kept),
-            electrode_fields_ohm: exchanges.applied(pads).select_rows(kept).select_columns(kept),
+            fields_ohm: joint_currents.applied(&self.jacobian.fields_ohm).select_columns(kept),
+            electrode_fields_ohm: joint_currents.applied(pads).select_rows(kept).select_columns(kept),
             ..(*self.jacobian).clone()
         };
         let model = Through::new(Arc::clone(&self.model), kept.to_vec(), joints.to_vec());

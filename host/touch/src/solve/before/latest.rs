@@ -2,7 +2,7 @@
 //!
 //! Rows that were read some milliseconds ago are those of contacts that have moved since. What they say of others than the contacts that are
 //! followed is still true: so each reading is kept as what it is beside the model's at that time, and told as the model's now with that. It is
-//! the motion of contacts that this follows; where a model is exchanged for another one, or does not fit, nothing has moved.
+//! the motion of contacts that this follows; where a model takes the place of another, or does not fit, nothing has moved.
 
 use tactomo_physics::readings::{Readings, Says};
 
@@ -73,7 +73,7 @@ impl Latest {
     }
 
     /// Goes on with a model that expects `after_v` (V) now in place of one that expects `before_v` (V): the readings stay as they are told.
-    pub fn exchange(&mut self, before_v: Option<&[f64]>, after_v: Option<&[f64]>) {
+    pub fn change_model(&mut self, before_v: Option<&[f64]>, after_v: Option<&[f64]>) {
         for (i, cell) in self.cells.iter_mut().enumerate() {
             cell.volts = cell.now_v(before_v.map(|all| all[i]));
             cell.expected_v = after_v.map(|all| all[i]);
@@ -112,7 +112,7 @@ mod tests {
         latest.add(&row(2, 0.5), 1e-3, Some(&[0.5; 16]));
         let now = latest.readings(1.0, Some(&[0.7; 16]));
         assert!((now.at(1, 3) - 0.8).abs() < 1e-12 && (now.at(2, 3) - 0.7).abs() < 1e-12);
-        latest.exchange(Some(&[0.7; 16]), Some(&[0.2; 16]));
+        latest.change_model(Some(&[0.7; 16]), Some(&[0.2; 16]));
         assert!((latest.readings(1.0, Some(&[0.2; 16])).at(1, 3) - 0.8).abs() < 1e-12, "another model moves nothing");
         assert!((latest.readings(1.0, Some(&[0.3; 16])).at(1, 3) - 0.9).abs() < 1e-12);
         assert!((latest.readings(1.0, None).at(1, 3) - 0.8).abs() < 1e-12);

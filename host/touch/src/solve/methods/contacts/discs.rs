@@ -116,10 +116,10 @@ impl DiscFit {
         (self.slopes.along[k], self.slopes.at[k].radius_m)
     }
 
-    /// Resistance of the crowded current under a contact over its own.
-    pub fn exchange(&self, k: usize) -> f64 {
+    /// Constriction: the resistance of the crowded current under a contact over its own.
+    pub fn constriction(&self, k: usize) -> f64 {
         let (before, now) = (self.slopes.at[k], self.contacts[k]);
-        self.slopes.exchange[k] * now.conductance_s / before.conductance_s * before.radius_m / now.radius_m
+        self.slopes.constriction[k] * now.conductance_s / before.conductance_s * before.radius_m / now.radius_m
     }
 
     /// Units of the places' parameters (m), a contact each.
@@ -148,12 +148,12 @@ impl DiscFit {
     /// The same of the crowded current alone, if its resistance were `S (1 - ln(r / r0))` in place of `S r0 / r`: of a firm contact little else
     /// resists. It may be less, so that derivatives serve for steps all the same.
     fn bend_of_crowding(&self, offset: &[f64]) -> f64 {
-        let of = |(k, exchange): (usize, &f64)| {
+        let of = |(k, constriction): (usize, &f64)| {
             let (resistance, radius) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
-            let share = exchange / (1.0 + exchange);
+            let share = constriction / (1.0 + constriction);
             0.5 * offset[radius] * offset[radius] * share * self.normal[(resistance, resistance)].sqrt()
         };
-        self.slopes.exchange.iter().enumerate().map(of).fold(0.0, f64::max)
+        self.slopes.constriction.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
     /// Whether an offset is too far for the derivatives to serve. A light contact that noise moves about is not: what the derivatives are
@@ -284,7 +284,7 @@ impl DiscFitter<'_> {
             let place = contact.radius_m * contact.radius_m / self.place_variance_m2;
             (0..2).for_each(|i| normal[(PARAMETERS * k + i, PARAMETERS * k + i)] += place);
             let weight = CONDUCTANCE_DEVIATION.powi(-2);
-            let [by_first, by_second] = by_parameters(slopes.exchange[k]);
+            let [by_first, by_second] = by_parameters(slopes.constriction[k]);
             let (c, r) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
             normal[(c, c)] += by_first * by_first * weight;
             normal[(c, r)] += by_first * by_second * weight;
@@ -302,7 +302,7 @@ impl DiscFitter<'_> {
         for (k, contact) in fit.contacts.iter().enumerate() {
             let [conductance, radius] = self.unusual(contact);
             let pull = conductance / CONDUCTANCE_DEVIATION;
-            let [by_first, by_second] = by_parameters(fit.slopes.exchange[k]);
+            let [by_first, by_second] = by_parameters(fit.slopes.constriction[k]);
             gradient[PARAMETERS * k + 2] -= by_first * pull;
             gradient[PARAMETERS * k + 3] -= by_second * pull + radius / self.radius_deviation;
         }
@@ -332,14 +332,14 @@ impl DiscFitter<'_> {
         let (steps, _) = step.as_chunks::<PARAMETERS>();
         let moved = |(k, contact): (usize, &Contact)| {
             let unit = fit.slopes.at[k];
-            self.stepped(contact, unit.radius_m, fit.exchange(k), &steps[k])
+            self.stepped(contact, unit.radius_m, fit.constriction(k), &steps[k])
         };
         fit.contacts.iter().enumerate().map(moved).collect()
     }
 
     /// A contact after a step in its parameters: the unit of its place (m), and the resistance of the crowded current under it
     /// over its own.
-    fn stepped(&self, contact: &Contact, unit_m: f64, exchange: f64, step: &[f64; PARAMETERS]) -> Contact {
+    fn stepped(&self, contact: &Contact, unit_m: f64, constriction: f64, step: &[f64; PARAMETERS]) -> Contact {
         let [first, second, by_s, by_m] = step;
         let shorten = (LONGEST_WAY / first.hypot(*second)).min(1.0) * unit_m;
         let factor = |log: f64, longest: f64| log.clamp(-longest, longest).exp();
@@ -348,7 +348,7 @@ impl DiscFitter<'_> {
         let ([x_m, y_m, z_m], _) = self.fields.footing(to_m);
         let wider = factor(*by_m, LONGEST_RADIUS);
         // Of the contact's own, in what it was: no step makes it much better at once.
-        let ohm = (1.0 + exchange) / factor(*by_s, LONGEST_CONDUCTANCE) - exchange / wider;
+        let ohm = (1.0 + constriction) / factor(*by_s, LONGEST_CONDUCTANCE) - constriction / wider;
         let ohm = ohm.max((-LONGEST_CONDUCTANCE).exp());
         self.held(Contact {
             x_m,
@@ -371,8 +371,8 @@ impl DiscFitter<'_> {
 }
 
 /// Derivatives of the logarithm of a conductance by the last two parameters.
-pub(super) fn by_parameters(exchange: f64) -> [f64; 2] {
-    [1.0 + exchange, -exchange]
+pub(super) fn by_parameters(constriction: f64) -> [f64; 2] {
+    [1.0 + constriction, -constriction]
 }
 
 pub(super) fn place_m(contact: &Contact) -> Place {

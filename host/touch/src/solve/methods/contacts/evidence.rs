@@ -48,7 +48,7 @@ impl Prior {
         let peak = -self.area_m2.ln() - (CONDUCTANCE_DEVIATION * self.radius_deviation * TAU).ln();
         // Places are in units of their own.
         let units: f64 = (0..count).map(|k| 2.0 * fit.along(k).1.ln()).sum();
-        let from_logs: f64 = (0..count).map(|k| fit.exchange(k).ln_1p()).sum();
+        let from_logs: f64 = (0..count).map(|k| fit.constriction(k).ln_1p()).sum();
         let orders: f64 = (1..=count).map(|k| (k as f64).ln()).sum();
         -0.5 * (fit.cost + fit.known)
             + count as f64 * (peak - FEWER)

@@ -23,7 +23,7 @@ const NODES: usize = 150;
 impl ContactFinder {
     /// The grounds whose rows tell most of contacts, so many of them, the best first.
     pub(super) fn telling_grounds(&self, fit: &DiscFit, count: usize) -> Vec<usize> {
-        let n = self.network.electrodes();
+        let n = self.spot_model.electrodes();
         // Near a contact readings are largest, and so is what its pad may be off by: both are in the whitening.
         let readings = Readings::from_fn(n, |g, e| fit.volts[g * n + e]);
         let target = Target::of_mean(&readings, 1, &self.errors, None);
@@ -57,7 +57,7 @@ impl ContactFinder {
 
     /// All grounds, those that follow each other far apart.
     pub(super) fn all_grounds(&self) -> Vec<usize> {
-        spread(self.problem.detector(), self.network.electrodes())
+        spread(self.problem.detector(), self.spot_model.electrodes())
     }
 
     /// Two grounds that see a light contact wherever it comes: those for which it is largest where it is smallest.

@@ -9,10 +9,10 @@ mod coverage_tests;
 mod discs;
 mod doubt;
 mod evidence;
-mod exchange;
 mod focus;
 mod informed;
 mod keep;
+mod marginals;
 #[cfg(test)]
 mod motion_tests;
 mod multiple_models;
@@ -33,7 +33,7 @@ use nalgebra::DMatrix;
 
 use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
 use self::evidence::Prior;
-use self::exchange::{Logs, Usual};
+use self::marginals::{Logs, Usual};
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(crate) use self::solver::{ContactSearch, ContactTracker};
@@ -309,7 +309,7 @@ impl ContactFinder {
         let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
         FoundContact {
             z_m: contact.z_m,
-            apparent_conductance_s: Some(contact.conductance_s / (1.0 + fit.exchange(k))),
+            apparent_conductance_s: Some(contact.conductance_s / (1.0 + fit.constriction(k))),
             uncertainty,
             radius_m: radius.map(|[mean, _]| mean.exp()),
             ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)

@@ -211,7 +211,7 @@ impl ContactTracker {
         self.recounted_s = (count(&self.last) != before).then_some(0.0);
         self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(last, target)));
         if let Some(mut latest) = self.latest.take() {
-            latest.exchange(expected_v.as_deref(), self.expected_v());
+            latest.change_model(expected_v.as_deref(), self.expected_v());
             self.latest = Some(latest);
         }
         self.is_provisional = target.is_provisional();

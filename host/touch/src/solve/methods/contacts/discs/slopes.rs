@@ -8,8 +8,8 @@ use tactomo_physics::forward::readings_v;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::space::Place;
 
-/// Most of the ratio of `S` and `1/C` that is told from errors of the derivatives.
-const MOST_EXCHANGE: f64 = 1e3;
+/// Most of the ratio of `S` and `1/C` that can be distinguished from errors of the derivatives.
+const MOST_CONSTRICTION: f64 = 1e3;
 /// Differences that derivatives are taken over.
 const DIFFERENCE: f64 = 1e-3;
 /// Derivatives of the readings where they were taken.
@@ -22,8 +22,8 @@ pub(super) struct Slopes {
     pub(super) volts: Vec<f64>,
     /// Of the readings (V), for each parameter of each contact.
     pub(super) by: Vec<Vec<f64>>,
-    /// Of each, the resistance of the crowded current under it over the contact's own, `S C`.
-    pub(super) exchange: Vec<f64>,
+    /// Constriction of each: the resistance of the crowded current under it over the contact's own, `S C`.
+    pub(super) constriction: Vec<f64>,
 }
 
 impl Slopes {
@@ -36,7 +36,7 @@ impl Slopes {
                 self.along[k][direction].iter().zip(way).map(|(a, b)| a * b).sum::<f64>() / before.radius_m
             };
             let own = before.conductance_s / now.conductance_s;
-            let ohm = (own + self.exchange[k] * before.radius_m / now.radius_m) / (1.0 + self.exchange[k]);
+            let ohm = (own + self.constriction[k] * before.radius_m / now.radius_m) / (1.0 + self.constriction[k]);
             [along(0), along(1), -ohm.ln(), (now.radius_m / before.radius_m).ln()]
         };
         contacts.iter().enumerate().flat_map(of).collect()
@@ -65,19 +65,19 @@ impl DiscFitter<'_> {
         let volts = readings_v(&impedance_ohm, self.detector).volts().to_vec();
         let by = changes_ohm.iter().zip(&steps).map(|(change, step)| self.slope(&impedance_ohm, change, *step));
         let mut by: Vec<Vec<f64>> = by.collect();
-        let exchange = (0..at.len()).map(|k| {
+        let constriction = (0..at.len()).map(|k| {
             let (by_conductance, by_radius) = by[PARAMETERS * k + 2..PARAMETERS * (k + 1)].split_at_mut(1);
             let (by_conductance, by_radius) = (&mut by_conductance[0], &mut by_radius[0]);
-            let exchange =
-                (dot(by_conductance, by_radius) / dot(by_conductance, by_conductance)).clamp(0.0, MOST_EXCHANGE);
-            by_radius.iter_mut().zip(&*by_conductance).for_each(|(radius, c)| *radius -= exchange * c);
-            by_conductance.iter_mut().for_each(|c| *c *= 1.0 + exchange);
-            exchange
+            let constriction =
+                (dot(by_conductance, by_radius) / dot(by_conductance, by_conductance)).clamp(0.0, MOST_CONSTRICTION);
+            by_radius.iter_mut().zip(&*by_conductance).for_each(|(radius, c)| *radius -= constriction * c);
+            by_conductance.iter_mut().for_each(|c| *c *= 1.0 + constriction);
+            constriction
         });
-        let exchange = exchange.collect();
+        let constriction = constriction.collect();
         let sound = volts.iter().chain(by.iter().flatten()).all(|value| value.is_finite());
         let along = at.iter().map(|contact| self.fields.footing(place_m(contact)).1).collect();
-        sound.then_some(Slopes { at, along, volts, by, exchange })
+        sound.then_some(Slopes { at, along, volts, by, constriction })
     }
 
     /// Derivative of the readings from a small change of the impedances: `V = Vcc (1 - Z[e][g] / L)`, `L = Z[g][g] + R_on`.

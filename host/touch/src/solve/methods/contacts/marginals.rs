@@ -1,4 +1,4 @@
-//! What readings say of a contact's conductance and radius apart.
+//! Marginal distributions of a contact's conductance and radius: what readings say of each apart from the other.
 //!
 //! Of a firm contact they give the resistance of the contact with that of the crowded current under it, `1/C + S`, far better than
 //! either: `C` may be anything from some value on, the better the narrower the contact. So its logarithm is not normally
@@ -39,10 +39,10 @@ impl Usual {
         let start = PARAMETERS * k + 2;
         let of = |i: usize, j: usize| covariance[(start + i, start + j)];
         let posterior = Matrix2::new(of(0, 0), of(0, 1), of(1, 0), of(1, 1));
-        let exchange = fit.exchange(k);
+        let constriction = fit.constriction(k);
         let weights = [CONDUCTANCE_DEVIATION.powi(-2), self.radius_deviation.powi(-2)];
         // Of the likelihood alone: without the prior's curvature, and with what pulls against the prior's slope.
-        let by_conductance = Vector2::from(by_parameters(exchange));
+        let by_conductance = Vector2::from(by_parameters(constriction));
         let by_radius = Vector2::new(0.0, 1.0);
         let prior =
             by_conductance * by_conductance.transpose() * weights[0] + by_radius * by_radius.transpose() * weights[1];
@@ -63,8 +63,8 @@ impl Usual {
             for i in 0..POINTS[0] {
                 let more = slope * square + REACH * deviations[0] * spread(i, POINTS[0]);
                 // Resistance of all and of the contact alone, in what that is at the fit.
-                let all = (1.0 + exchange) * (-more).exp();
-                let own = all - exchange * (-wider).exp();
+                let all = (1.0 + constriction) * (-more).exp();
+                let own = all - constriction * (-wider).exp();
                 if own <= contact.conductance_s / self.most_s {
                     continue;
                 }
