@@ -174,12 +174,12 @@ mod tests {
     use crate::scene::{Shape, Touch};
 
     /// A finer slab than the one whose fields are used, under leakage and discs of so many sheet conductances.
-    struct Bench {
+    struct LeakageTrial {
         fine: Slab,
         leakage: Leakage,
     }
 
-    impl Bench {
+    impl LeakageTrial {
         fn new(kept: &[usize]) -> Self {
             let detector = Detector::preset(Detector::DEFAULT).unwrap();
             let jacobian = Jacobian::of(&Slab::new(&detector).unwrap());
@@ -228,10 +228,10 @@ mod tests {
     #[test]
     fn a_few_hundredths_at_most_are_left_of_what_leakage_does_under_a_touch() {
         let all: Vec<usize> = (0..16).collect();
-        let bench = Bench::new(&all);
+        let trial = LeakageTrial::new(&all);
         for sheets in [0.01, 0.05] {
             for (discs, least_v) in [(&LIGHT[..], 0.0), (&FIRM, 0.01), (&SEVERAL, 0.01)] {
-                let [before_v, after_v] = bench.left_v(sheets, discs, &all);
+                let [before_v, after_v] = trial.left_v(sheets, discs, &all);
                 // Subtracting alone leaves most of it under firm contacts: up to 1.6 V for each sheet conductance of leakage.
                 assert!(
                     before_v > least_v && after_v < 0.03 * before_v + 2e-5,
@@ -244,10 +244,10 @@ mod tests {
     #[test]
     fn leakage_is_found_from_readings_at_rest() {
         let all: Vec<usize> = (0..16).collect();
-        let bench = Bench::new(&all);
-        let patterns = BaselinePatterns::new(&Jacobian::of(&bench.fine), &all);
+        let trial = LeakageTrial::new(&all);
+        let patterns = BaselinePatterns::new(&Jacobian::of(&trial.fine), &all);
         for sheets in [0.003, 0.01, 0.05] {
-            let found = bench.leakage.at_rest(&patterns, bench.readings(sheets, &[]).volts());
+            let found = trial.leakage.at_rest(&patterns, trial.readings(sheets, &[]).volts());
             assert!((found / sheets - 1.0).abs() < 0.005, "{sheets}: {found}");
         }
     }
@@ -255,13 +255,13 @@ mod tests {
     #[test]
     fn at_rest_nothing_changes_and_electrodes_may_be_missing() {
         let kept: Vec<usize> = (0..16).filter(|e| *e != 5).collect();
-        let bench = Bench::new(&kept);
+        let trial = LeakageTrial::new(&kept);
         let mut noise_v: Vec<f64> = (0..256).map(|i| 1e-3 * (f64::from(i) * 1.7).sin()).collect();
         let before_v = noise_v.clone();
-        bench.leakage.take_off(&mut noise_v, 0.02);
+        trial.leakage.take_off(&mut noise_v, 0.02);
         let changed_v = noise_v.iter().zip(&before_v).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(changed_v < 0.2e-3, "{changed_v}");
-        let [before_v, after_v] = bench.left_v(0.02, &FIRM, &kept);
+        let [before_v, after_v] = trial.left_v(0.02, &FIRM, &kept);
         assert!(after_v < 0.1 * before_v, "{before_v} {after_v}");
     }
 }

@@ -8,14 +8,14 @@ use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Measurement, drawn, finer_model};
 
 /// A detector as built with what its board reads of contacts, less what it reads at rest.
-struct Bench {
+struct RubTrial {
     model: Box<dyn tactomo_physics::forward::ForwardModel>,
     board: Measurement,
     rest_v: Vec<f64>,
     random: fastrand::Rng,
 }
 
-impl Bench {
+impl RubTrial {
     fn new(seed: u64) -> Self {
         let built = drawn(&Detector::default(), seed);
         let mut board = Measurement::new(&built, &[], seed).unwrap();
@@ -46,12 +46,12 @@ fn esp32() -> Vec<Range> {
 }
 
 /// Light and firm presses of a rub, as a board reads them less the baseline, and as one with floors reads them, whose baseline is below these.
-fn both_boards(bench: &mut Bench, count: usize) -> Vec<(Contact, [Frame; 2])> {
+fn both_boards(trial: &mut RubTrial, count: usize) -> Vec<(Contact, [Frame; 2])> {
     let mut pressed = |_| {
-        let contact = bench.contacts(1)[0];
-        let contact = Contact { conductance_s: 1e-4 * 30f64.powf(bench.random.f64()), ..contact };
-        let whole = bench.frame(&[contact]);
-        let read = Readings::from_fn(16, |g, e| whole.readings.at(g, e) + bench.rest_v[16 * g + e]);
+        let contact = trial.contacts(1)[0];
+        let contact = Contact { conductance_s: 1e-4 * 30f64.powf(trial.random.f64()), ..contact };
+        let whole = trial.frame(&[contact]);
+        let read = Readings::from_fn(16, |g, e| whole.readings.at(g, e) + trial.rest_v[16 * g + e]);
         (contact, [whole, Frame { readings: read.within(&esp32()), known_m: None }])
     };
     (0..count).map(&mut pressed).collect()
@@ -59,12 +59,12 @@ fn both_boards(bench: &mut Bench, count: usize) -> Vec<(Contact, [Frame; 2])> {
 
 #[test]
 fn what_is_below_a_floor_spoils_no_calibration() {
-    let mut bench = Bench::new(5);
-    let presses = both_boards(&mut bench, 80);
+    let mut trial = RubTrial::new(5);
+    let presses = both_boards(&mut trial, 80);
     let bounds = |frame: &Frame| frame.readings.all_say().iter().filter(|says| **says != Says::Voltage).count();
     let hidden = presses.iter().map(|(_, [_, floored])| bounds(floored)).sum::<usize>();
     assert!(hidden > 80 * 256 / 10, "{hidden}");
-    let tried = both_boards(&mut bench, 24);
+    let tried = both_boards(&mut trial, 24);
     // What a channel reads at rest is in the baseline of one board, and in the other's calibration: each is tried by itself.
     let [whole_m, floored_m] = [0, 1].map(|board| {
         let of_board = |(contact, frames): &(Contact, [Frame; 2])| (*contact, frames[board].clone());
@@ -76,10 +76,10 @@ fn what_is_below_a_floor_spoils_no_calibration() {
 
 #[test]
 fn two_electrodes_that_are_below_the_floor_in_every_frame_are_told() {
-    let mut bench = Bench::new(5);
+    let mut trial = RubTrial::new(5);
     let hidden = |readings: Readings| readings.saying(|g, e| if g + e == 1 { Says::AtMost } else { Says::Voltage });
     let frame = |(_, [whole, _]): (Contact, [Frame; 2])| Frame { readings: hidden(whole.readings), known_m: None };
-    let frames: Vec<_> = both_boards(&mut bench, 20).into_iter().map(frame).collect();
+    let frames: Vec<_> = both_boards(&mut trial, 20).into_iter().map(frame).collect();
     assert_eq!(rubbed(&frames).map(|found| found.single), Err(CalibrateError::Light { touched: 20 }));
 }
 
@@ -103,17 +103,17 @@ fn off_m(detector: &Detector, tried: &[(Contact, Frame)]) -> f64 {
 
 #[test]
 fn presses_at_unknown_places_make_places_right() {
-    let mut bench = Bench::new(5);
+    let mut trial = RubTrial::new(5);
     let mut frames = Vec::new();
     for index in 0..60 {
         // Every tenth is of two fingers.
-        let contacts = bench.contacts(1 + usize::from(index % 10 == 9));
-        frames.push(bench.frame(&contacts));
+        let contacts = trial.contacts(1 + usize::from(index % 10 == 9));
+        frames.push(trial.frame(&contacts));
     }
     let tried: Vec<_> = (0..12)
         .map(|_| {
-            let contacts = bench.contacts(1);
-            (contacts[0], bench.frame(&contacts))
+            let contacts = trial.contacts(1);
+            (contacts[0], trial.frame(&contacts))
         })
         .collect();
     let found = rubbed(&frames).unwrap();
@@ -126,8 +126,8 @@ fn presses_at_unknown_places_make_places_right() {
 
 #[test]
 fn what_readings_do_not_tell_stays_as_uncertain_as_it_is_described() {
-    let mut bench = Bench::new(5);
-    let presses = both_boards(&mut bench, 48);
+    let mut trial = RubTrial::new(5);
+    let presses = both_boards(&mut trial, 48);
     let frames: Vec<_> = presses.into_iter().map(|(_, [whole, _])| whole).collect();
     let found = rubbed(&frames).unwrap();
     let calibration = found.detector.calibration.clone().unwrap();
@@ -150,14 +150,14 @@ fn what_readings_do_not_tell_stays_as_uncertain_as_it_is_described() {
         let deviation = found.uncertainty.unwrap().conductance_s / found.conductance_s;
         ((found.conductance_s / contact.conductance_s).ln() / deviation).abs()
     };
-    let offs: Vec<_> = both_boards(&mut bench, 16).iter().map(|(contact, [whole, _])| off(*contact, whole)).collect();
+    let offs: Vec<_> = both_boards(&mut trial, 16).iter().map(|(contact, [whole, _])| off(*contact, whole)).collect();
     assert!(offs.iter().all(|off| *off < 2.5), "{offs:?}");
 }
 
 #[test]
 fn presses_that_were_not_used_say_whether_it_helped() {
-    let mut bench = Bench::new(5);
-    let frames: Vec<_> = both_boards(&mut bench, 48).into_iter().map(|(_, [whole, _])| whole).collect();
+    let mut trial = RubTrial::new(5);
+    let frames: Vec<_> = both_boards(&mut trial, 48).into_iter().map(|(_, [whole, _])| whole).collect();
     let found = rubbed(&frames).unwrap();
     let held_out = found.held_out.unwrap();
     let [before, after] = held_out.residuals;
@@ -166,8 +166,8 @@ fn presses_that_were_not_used_say_whether_it_helped() {
     // Of a few light presses in one place nothing can be told.
     let few: Vec<_> = (0..8)
         .map(|_| {
-            let [contact] = bench.contacts(1)[..] else { panic!() };
-            bench.frame(&[Contact { x_m: 0.2 * contact.x_m, y_m: 0.2 * contact.y_m, conductance_s: 1e-4, ..contact }])
+            let [contact] = trial.contacts(1)[..] else { panic!() };
+            trial.frame(&[Contact { x_m: 0.2 * contact.x_m, y_m: 0.2 * contact.y_m, conductance_s: 1e-4, ..contact }])
         })
         .collect();
     let found = rubbed(&few).unwrap();
@@ -178,12 +178,12 @@ fn presses_that_were_not_used_say_whether_it_helped() {
 
 #[test]
 fn exchanged_wires_are_found_and_known_places_tell_a_turned_sensor() {
-    let mut bench = Bench::new(6);
+    let mut trial = RubTrial::new(6);
     let turned: Vec<usize> = (0..16).rev().collect();
     let mut frames = Vec::new();
     for index in 0..24 {
-        let contacts = bench.contacts(1);
-        let frame = bench.frame(&contacts);
+        let contacts = trial.contacts(1);
+        let frame = trial.frame(&contacts);
         let known_m = (index < 3).then_some([contacts[0].x_m, contacts[0].y_m]);
         frames.push(Frame { readings: frame.readings.of(&turned), known_m });
     }
@@ -192,9 +192,9 @@ fn exchanged_wires_are_found_and_known_places_tell_a_turned_sensor() {
 
 #[test]
 fn three_known_places_tell_all_eight_ways_that_a_square_can_lie() {
-    let mut bench = Bench::new(8);
-    let contacts: Vec<_> = (0..24).map(|_| bench.contacts(1)[0]).collect();
-    let frames: Vec<_> = contacts.iter().map(|contact| bench.frame(&[*contact])).collect();
+    let mut trial = RubTrial::new(8);
+    let contacts: Vec<_> = (0..24).map(|_| trial.contacts(1)[0]).collect();
+    let frames: Vec<_> = contacts.iter().map(|contact| trial.frame(&[*contact])).collect();
     let detector = Detector::default();
     for (mirrored, turns) in (0..8).map(|way| (way >= 4, way % 4)) {
         let lying = |[x_m, y_m]: [f64; 2]| {
@@ -218,12 +218,12 @@ fn three_known_places_tell_all_eight_ways_that_a_square_can_lie() {
 
 #[test]
 fn what_is_no_rub_says_so() {
-    let mut bench = Bench::new(7);
+    let mut trial = RubTrial::new(7);
     assert_eq!(rubbed(&[]).unwrap_err(), CalibrateError::NoPress { frames: 0 });
     let several: Vec<_> = (0..40)
         .map(|_| {
-            let contacts = bench.contacts(3);
-            bench.frame(&contacts)
+            let contacts = trial.contacts(3);
+            trial.frame(&contacts)
         })
         .collect();
     assert!(matches!(rubbed(&several), Err(CalibrateError::NotSingle { .. })), "{:?}", rubbed(&several).err());

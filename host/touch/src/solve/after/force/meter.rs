@@ -236,7 +236,7 @@ mod tests {
     use tactomo_physics::simulate::{Noise, finer_model, measured};
 
     /// A detector with the model that is inverted, and a finer one.
-    struct Bench {
+    struct MeterTrial {
         detector: Detector,
         meter: Meter,
         finer: Box<dyn ForwardModel>,
@@ -244,7 +244,7 @@ mod tests {
         noise: Noise,
     }
 
-    impl Bench {
+    impl MeterTrial {
         fn new(detector: Detector) -> Self {
             Self {
                 meter: Meter::new(&Problem::of(&detector).unwrap()).unwrap(),
@@ -279,13 +279,13 @@ mod tests {
 
     #[test]
     fn a_press_is_the_same_everywhere() {
-        let mut bench = Bench::new(Detector::default());
+        let mut trial = MeterTrial::new(Detector::default());
         // The middle, over a pad, between pads, over a pad in the corner, 4 and 2 mm from the wall.
         let places_mm = [[0.0, 0.0], [7.5, 7.5], [3.0, -11.0], [22.5, 22.5], [26.0, 3.0], [28.0, -20.0]];
         for (force_n, within) in [(0.003, 0.003), (0.03, 0.006), (0.3, 0.015), (3.0, 0.03)] {
             let found = places_mm.map(|at_mm| {
-                let ball = bench.ball(at_mm, force_n);
-                bench.measured(&[ball], 0.0)[0].conductance_s
+                let ball = trial.ball(at_mm, force_n);
+                trial.measured(&[ball], 0.0)[0].conductance_s
             });
             let off = found.map(|conductance_s| (conductance_s / found[0] - 1.0).abs());
             assert!(off.iter().all(|off| *off < within), "{force_n} N: {off:?}");
@@ -294,10 +294,10 @@ mod tests {
 
     #[test]
     fn firmer_presses_conduct_better_over_four_decades() {
-        let mut bench = Bench::new(Detector::default());
+        let mut trial = MeterTrial::new(Detector::default());
         let measured = [3e-4, 3e-3, 3e-2, 0.3, 3.0].map(|force_n| {
-            let ball = bench.ball([4.0, 9.0], force_n);
-            bench.measured(&[ball], 0.0)[0].conductance_s
+            let ball = trial.ball([4.0, 9.0], force_n);
+            trial.measured(&[ball], 0.0)[0].conductance_s
         });
         // Between the powers of the contact's own, 2/3, and of the constriction, 1/3.
         let powers = [0, 1, 2, 3].map(|k| (measured[k + 1] / measured[k]).log10());
@@ -307,12 +307,12 @@ mod tests {
 
     #[test]
     fn places_that_are_wrong_matter_little_and_are_told_by_the_error() {
-        let mut bench = Bench::new(Detector::default());
+        let mut trial = MeterTrial::new(Detector::default());
         for (at_mm, force_n) in [([0.0, 0.0], 0.03), ([7.5, 7.5], 1.0), ([3.0, -11.0], 0.3), ([17.5, 22.5], 1.0)] {
-            let ball = bench.ball(at_mm, force_n);
-            let [right] = bench.measured(&[ball], 0.0)[..] else { panic!() };
+            let ball = trial.ball(at_mm, force_n);
+            let [right] = trial.measured(&[ball], 0.0)[..] else { panic!() };
             for (off_mm, within) in [(0.2, 0.005), (1.0, 0.03), (4.0, 0.15)] {
-                let [wrong] = bench.measured(&[ball], off_mm)[..] else { panic!() };
+                let [wrong] = trial.measured(&[ball], off_mm)[..] else { panic!() };
                 assert!(
                     (wrong.conductance_s / right.conductance_s - 1.0).abs() < within,
                     "{at_mm:?} {off_mm} mm: {wrong:?}"
@@ -324,16 +324,16 @@ mod tests {
 
     #[test]
     fn standard_errors_hold_what_wrong_places_do() {
-        let mut bench = Bench::new(Detector::default());
+        let mut trial = MeterTrial::new(Detector::default());
         let mut random = fastrand::Rng::with_seed(2);
         let reference = [0.1, 1.0].map(|force_n| {
-            let ball = bench.ball([3.0, 4.0], force_n);
-            bench.measured(&[ball], 0.0)[0].conductance_s
+            let ball = trial.ball([3.0, 4.0], force_n);
+            trial.measured(&[ball], 0.0)[0].conductance_s
         });
         let mut within = [0; 2];
         for k in 0..120 {
-            let ball = bench.ball([0, 1].map(|_| 46.0 * (random.f64() - 0.5)), [0.1, 1.0][k % 2]);
-            let [found] = bench.measured(&[ball], [0.5, 1.0, 2.0, 4.0][k / 2 % 4])[..] else { panic!() };
+            let ball = trial.ball([0, 1].map(|_| 46.0 * (random.f64() - 0.5)), [0.1, 1.0][k % 2]);
+            let [found] = trial.measured(&[ball], [0.5, 1.0, 2.0, 4.0][k / 2 % 4])[..] else { panic!() };
             let off = (found.conductance_s - reference[k % 2]).abs() / found.deviation_s;
             within = [within[0] + usize::from(off < 1.0), within[1] + usize::from(off < 2.0)];
         }
@@ -342,11 +342,11 @@ mod tests {
 
     #[test]
     fn contacts_beside_each_other_are_told_apart() {
-        let mut bench = Bench::new(Detector::default());
+        let mut trial = MeterTrial::new(Detector::default());
         for apart_mm in [6.0, 10.0, 20.0] {
-            let pair = [bench.ball([-apart_mm / 2.0, 3.0], 0.2), bench.ball([apart_mm / 2.0, 3.0], 1.0)];
-            let alone = pair.map(|ball| bench.measured(&[ball], 0.0)[0].conductance_s);
-            let both = bench.measured(&pair, 0.0);
+            let pair = [trial.ball([-apart_mm / 2.0, 3.0], 0.2), trial.ball([apart_mm / 2.0, 3.0], 1.0)];
+            let alone = pair.map(|ball| trial.measured(&[ball], 0.0)[0].conductance_s);
+            let both = trial.measured(&pair, 0.0);
             let off = [0, 1].map(|k| (both[k].conductance_s / alone[k] - 1.0).abs());
             assert!(off.iter().all(|off| *off < 0.02), "{apart_mm} mm: {off:?}");
         }
@@ -354,9 +354,9 @@ mod tests {
 
     #[test]
     fn standard_errors_of_light_contacts_are_those_of_the_noise() {
-        let mut bench = Bench::new(Detector::default());
-        let ball = bench.ball([5.0, -3.0], 2e-5);
-        let found: Vec<Measured> = (0..300).map(|_| bench.measured(&[ball], 0.0)[0]).collect();
+        let mut trial = MeterTrial::new(Detector::default());
+        let ball = trial.ball([5.0, -3.0], 2e-5);
+        let found: Vec<Measured> = (0..300).map(|_| trial.measured(&[ball], 0.0)[0]).collect();
         let mean = found.iter().map(|found| found.conductance_s).sum::<f64>() / 300.0;
         let within = found.iter().filter(|found| (found.conductance_s - mean).abs() < found.deviation_s).count();
         let share = found[0].deviation_s / mean;
@@ -367,7 +367,7 @@ mod tests {
     #[test]
     fn curved_and_thin_detectors_have_a_scale_too() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/detectors/fingertip.toml");
-        let mut curved = Bench::new(Detector::read(file.as_ref()).unwrap());
+        let mut curved = MeterTrial::new(Detector::read(file.as_ref()).unwrap());
         let at = curved.detector.electrodes[5];
         let found = [1e-5, 1e-4, 1e-3].map(|conductance_s| {
             let contact = Contact { z_m: at.z_m, ..Contact::flat(at.x_m, at.y_m, 0.001, conductance_s) };
@@ -376,7 +376,7 @@ mod tests {
         assert!(found.is_sorted() && found[2] > 5.0 * found[0], "{found:?}");
         let thin =
             Detector { layers: vec![tactomo_physics::detector::Layer::uniform(5e-4, 0.2273)], ..Detector::default() };
-        let mut thin = Bench::new(thin);
+        let mut thin = MeterTrial::new(thin);
         let found = [0.003, 0.03, 0.3].map(|force_n| {
             let ball = thin.ball([0.5, 1.0], force_n);
             thin.measured(&[ball], 0.0)[0].conductance_s
@@ -386,15 +386,15 @@ mod tests {
 
     #[test]
     fn what_makes_no_contact_has_no_conductance() {
-        let mut bench = Bench::new(Detector::default());
-        let readings = bench.readings(&[Contact::flat(0.0, 0.0, 0.002, 1e-3)]);
+        let mut trial = MeterTrial::new(Detector::default());
+        let readings = trial.readings(&[Contact::flat(0.0, 0.0, 0.002, 1e-3)]);
         let at = |x_m| FoundContact::flat(x_m, 0.0, 1e-3);
-        assert_eq!(bench.meter.measure(&readings, &[]), None);
-        assert_eq!(bench.meter.measure(&readings, &[at(f64::NAN)]), None);
-        assert_eq!(bench.meter.measure(&readings, &[at(0.0); 17]), None);
+        assert_eq!(trial.meter.measure(&readings, &[]), None);
+        assert_eq!(trial.meter.measure(&readings, &[at(f64::NAN)]), None);
+        assert_eq!(trial.meter.measure(&readings, &[at(0.0); 17]), None);
         // Nothing is there: as good as none is found.
         let nothing = Readings::from_fn(16, |_, _| 0.0);
-        let [none] = bench.meter.measure(&nothing, &[at(0.0)]).unwrap()[..] else { panic!() };
-        assert!(none.conductance_s < 1e-4 * bench.detector.sheet_conductance_s(), "{none:?}");
+        let [none] = trial.meter.measure(&nothing, &[at(0.0)]).unwrap()[..] else { panic!() };
+        assert!(none.conductance_s < 1e-4 * trial.detector.sheet_conductance_s(), "{none:?}");
     }
 }

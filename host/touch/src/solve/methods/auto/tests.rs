@@ -10,14 +10,15 @@ use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v, touch
 use tactomo_physics::scene::{Contact, Shape, Touch};
 use tactomo_physics::simulate::{Noise, measured};
 
-struct Bench {
+/// The solver, with what a finer model of the detector reads.
+struct AutoTrial {
     detector: Detector,
     fine: Slab,
     auto: Auto,
     noise: Noise,
 }
 
-impl Bench {
+impl AutoTrial {
     fn new() -> Self {
         let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         detector.adc.noise_lsb = 1.5;
@@ -73,40 +74,40 @@ fn what(solution: &Solution) -> &str {
 
 #[test]
 fn it_takes_no_more_than_the_scene_needs() {
-    let mut bench = Bench::new();
-    let rest = bench.solve(&Readings::from_fn(16, |_, _| 0.0));
+    let mut trial = AutoTrial::new();
+    let rest = trial.solve(&Readings::from_fn(16, |_, _| 0.0));
     assert_eq!((what(&rest), rest.contacts.len()), ("nothing", 0));
     let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
-    let one = bench.touched(&[a]);
+    let one = trial.touched(&[a]);
     assert_eq!((what(&one), one.contacts.len()), ("1 contact", 1));
-    let two = bench.touched(&[a, b]);
+    let two = trial.touched(&[a, b]);
     assert_eq!((what(&two), two.contacts.len()), ("2 contacts", 2));
-    let frame = bench.frame();
-    let image = bench.auto.solve(&frame).unwrap();
+    let frame = trial.frame();
+    let image = trial.auto.solve(&frame).unwrap();
     assert_eq!((what(&image), image.image_s_per_m2.is_some()), ("image", true), "{:?}", image.choice);
     assert!(image.shape.is_none() && image.contacts.len() > 2, "contacts are kept beside it: {image:?}");
-    let again = bench.touched(&[a]);
+    let again = trial.touched(&[a]);
     assert_eq!(what(&again), "1 contact", "the image no longer explains anything");
 }
 
 #[test]
 fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
-    let mut bench = Bench::new();
-    let Parts { mut tracker, search } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut trial = AutoTrial::new();
+    let Parts { mut tracker, search } = Box::new(Auto::new(&trial.problem()).unwrap()).split();
     let mut search = search.unwrap();
     let moved =
         |x_m: f64| [Contact::flat(0.008 + x_m, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009 + x_m, 0.0025, 5e-4)];
-    let first = bench.measured(&moved(0.0));
+    let first = trial.measured(&moved(0.0));
     let before = tracker.follow(&first).unwrap();
     assert!(before.search && before.solution.flags.unfinished && before.solution.contacts.is_empty());
     let hypothesis = search.search(tracker.hypothesis(), &first, &mut |_| {}).unwrap();
     // The answer comes when the contacts are 3 mm further on.
-    let after = tracker.adopt(hypothesis, &bench.measured(&moved(0.003))).unwrap();
+    let after = tracker.adopt(hypothesis, &trial.measured(&moved(0.003))).unwrap();
     assert_eq!((what(&after.solution), after.search), ("2 contacts", false), "{after:?}");
     let ids: Vec<_> = after.solution.contacts.iter().map(|contact| contact.id).collect();
     for step in 0..20 {
         let truth = moved(0.003 + 1e-4 * f64::from(step));
-        let next = tracker.follow(&bench.measured(&truth)).unwrap();
+        let next = tracker.follow(&trial.measured(&truth)).unwrap();
         assert_eq!((what(&next.solution), next.search), ("2 contacts", false), "{next:?}");
         assert_eq!(next.solution.contacts.iter().map(|contact| contact.id).collect::<Vec<_>>(), ids);
         for contact in truth {
@@ -114,7 +115,7 @@ fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
             assert!(next.solution.contacts.iter().any(|found| off_m(found) < 3e-4), "{next:?}");
         }
     }
-    let lifted = tracker.follow(&bench.measured(&moved(0.005)[..1])).unwrap();
+    let lifted = tracker.follow(&trial.measured(&moved(0.005)[..1])).unwrap();
     assert_eq!(
         (what(&lifted.solution), lifted.search),
         ("1 contact", false),
@@ -124,29 +125,29 @@ fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
 
 #[test]
 fn a_search_of_the_past_does_not_replace_what_explains_the_present() {
-    let mut bench = Bench::new();
-    let Parts { mut tracker, search } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut trial = AutoTrial::new();
+    let Parts { mut tracker, search } = Box::new(Auto::new(&trial.problem()).unwrap()).split();
     let mut search = search.unwrap();
     let [a, b] = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
-    let past = search.search(Hypothesis::default(), &bench.measured(&[a]), &mut |_| {}).unwrap();
-    let present = bench.measured(&[a, b]);
+    let past = search.search(Hypothesis::default(), &trial.measured(&[a]), &mut |_| {}).unwrap();
+    let present = trial.measured(&[a, b]);
     let hypothesis = search.search(Hypothesis::default(), &present, &mut |_| {}).unwrap();
     tracker.adopt(hypothesis, &present).unwrap();
-    let kept = tracker.adopt(past, &bench.measured(&[a, b])).unwrap();
+    let kept = tracker.adopt(past, &trial.measured(&[a, b])).unwrap();
     assert_eq!(what(&kept.solution), "2 contacts");
 }
 
 #[test]
 fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
-    let mut bench = Bench::new();
-    let Parts { mut tracker, search } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut trial = AutoTrial::new();
+    let Parts { mut tracker, search } = Box::new(Auto::new(&trial.problem()).unwrap()).split();
     let mut search = search.unwrap();
     let a = [Contact::flat(0.01, 0.004, 0.0025, 3e-4)];
-    let frame = bench.frame();
+    let frame = trial.frame();
     let image = search.search(Hypothesis::default(), &frame, &mut |_| {}).unwrap();
-    let contact = search.search(Hypothesis::default(), &bench.measured(&a), &mut |_| {}).unwrap();
-    tracker.adopt(contact.clone(), &bench.measured(&a)).unwrap();
-    let kept = tracker.adopt(image.clone(), &bench.measured(&a)).unwrap();
+    let contact = search.search(Hypothesis::default(), &trial.measured(&a), &mut |_| {}).unwrap();
+    tracker.adopt(contact.clone(), &trial.measured(&a)).unwrap();
+    let kept = tracker.adopt(image.clone(), &trial.measured(&a)).unwrap();
     assert_eq!(what(&kept.solution), "1 contact");
     tracker.reset();
     tracker.adopt(image, &frame).unwrap();
@@ -156,22 +157,22 @@ fn an_image_and_contacts_of_the_past_do_not_replace_each_other() {
 
 #[test]
 fn a_contact_whose_readings_all_hide_in_the_noise_is_found() {
-    let mut bench = Bench::new();
+    let mut trial = AutoTrial::new();
     let light = [Contact::flat(0.004, -0.009, 0.0025, 1.2e-6)];
-    let readings = bench.measured(&light);
-    assert!(readings.largest_v() < 5.0 * bench.detector.adc.deviation_v(), "{}", readings.largest_v());
-    let solution = bench.auto.solve(&readings).unwrap();
+    let readings = trial.measured(&light);
+    assert!(readings.largest_v() < 5.0 * trial.detector.adc.deviation_v(), "{}", readings.largest_v());
+    let solution = trial.auto.solve(&readings).unwrap();
     assert_eq!(what(&solution), "1 contact", "{solution:?}");
 }
 
 #[test]
 fn shapes_are_shapes_with_contacts_beside_them() {
-    let mut bench = Bench::new();
+    let mut trial = AutoTrial::new();
     let line = Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 };
     let ring = Shape::Ring { radius_m: 0.013, width_m: 0.003 };
     for (shape, name) in [(line, "line"), (ring, "ring")] {
-        let readings = bench.shaped(&[([0.002, -0.003], shape.clone(), 1.5)]);
-        let solution = bench.auto.solve(&readings).unwrap();
+        let readings = trial.shaped(&[([0.002, -0.003], shape.clone(), 1.5)]);
+        let solution = trial.auto.solve(&readings).unwrap();
         assert_eq!(what(&solution), name);
         assert_eq!(solution.shape.map(|shape| shape.name()), Some(name));
         assert!(
@@ -180,34 +181,34 @@ fn shapes_are_shapes_with_contacts_beside_them() {
             solution.choice
         );
         let ids: Vec<_> = solution.contacts.iter().map(|contact| contact.id).collect();
-        let readings = bench.shaped(&[([0.002, -0.003], shape, 1.5)]);
-        let next = bench.auto.solve(&readings).unwrap();
+        let readings = trial.shaped(&[([0.002, -0.003], shape, 1.5)]);
+        let next = trial.auto.solve(&readings).unwrap();
         assert_eq!((what(&next), next.contacts.iter().map(|contact| contact.id).collect::<Vec<_>>()), (name, ids));
     }
-    let one = bench.touched(&[Contact::flat(0.01, 0.004, 0.0025, 3e-4)]);
+    let one = trial.touched(&[Contact::flat(0.01, 0.004, 0.0025, 3e-4)]);
     assert_eq!((what(&one), one.shape, one.image_s_per_m2.is_none()), ("1 contact", None, true));
-    let readings = bench.shaped(&[([0.002, -0.003], Shape::Ring { radius_m: 0.013, width_m: 0.003 }, 1.5)]);
-    assert_eq!(what(&bench.auto.solve(&readings).unwrap()), "ring");
-    let gone = bench.solve(&Readings::from_fn(16, |_, _| 0.0));
+    let readings = trial.shaped(&[([0.002, -0.003], Shape::Ring { radius_m: 0.013, width_m: 0.003 }, 1.5)]);
+    assert_eq!(what(&trial.auto.solve(&readings).unwrap()), "ring");
+    let gone = trial.solve(&Readings::from_fn(16, |_, _| 0.0));
     assert_eq!((what(&gone), gone.contacts.len()), ("nothing", 0));
 }
 
 #[test]
 fn a_shape_and_contacts_of_the_past_do_not_replace_each_other() {
-    let mut bench = Bench::new();
-    let Parts { mut tracker, search } = Box::new(Auto::new(&bench.problem()).unwrap()).split();
+    let mut trial = AutoTrial::new();
+    let Parts { mut tracker, search } = Box::new(Auto::new(&trial.problem()).unwrap()).split();
     let mut search = search.unwrap();
     let pair = [Contact::flat(0.01, 0.004, 0.0025, 3e-4), Contact::flat(-0.012, -0.009, 0.0025, 5e-4)];
     let bar = [([0.002, -0.003], Shape::Line { length_m: 0.035, width_m: 0.003, angle_rad: 0.7 }, 1.5)];
-    let line = search.search(Hypothesis::default(), &bench.shaped(&bar), &mut |_| {}).unwrap();
-    let contacts = search.search(Hypothesis::default(), &bench.measured(&pair), &mut |_| {}).unwrap();
-    tracker.adopt(contacts.clone(), &bench.measured(&pair)).unwrap();
-    let kept = tracker.adopt(line.clone(), &bench.measured(&pair)).unwrap();
+    let line = search.search(Hypothesis::default(), &trial.shaped(&bar), &mut |_| {}).unwrap();
+    let contacts = search.search(Hypothesis::default(), &trial.measured(&pair), &mut |_| {}).unwrap();
+    tracker.adopt(contacts.clone(), &trial.measured(&pair)).unwrap();
+    let kept = tracker.adopt(line.clone(), &trial.measured(&pair)).unwrap();
     assert!(kept.solution.is_contacts() && !kept.search, "{kept:?}");
     tracker.reset();
-    tracker.adopt(line, &bench.shaped(&bar)).unwrap();
-    let kept = tracker.adopt(contacts, &bench.shaped(&bar)).unwrap();
+    tracker.adopt(line, &trial.shaped(&bar)).unwrap();
+    let kept = tracker.adopt(contacts, &trial.shaped(&bar)).unwrap();
     assert_eq!((what(&kept.solution), kept.search), ("line", false));
-    let lifted = tracker.follow(&bench.measured(&pair)).unwrap();
+    let lifted = tracker.follow(&trial.measured(&pair)).unwrap();
     assert!(lifted.search, "two fingers are no bar");
 }

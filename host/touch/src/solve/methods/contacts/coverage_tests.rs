@@ -123,12 +123,12 @@ struct Course {
 }
 
 impl Course {
-    fn new(press: Press, told: &Detector, model: &Slab) -> Self {
+    fn new(press: Press, described: &Detector, model: &Slab) -> Self {
         let mut random = fastrand::Rng::with_seed(press.seed);
         let [x_m, y_m] = [0, 1].map(|_| 0.044 * (random.f64() - 0.5));
-        let hertz = Hertz::of_sample_a(told);
-        let tip = Fingertip { hertz, force_n: press.force_n, radius_m: Fingertip::fitting_m(told) };
-        let from = Hand::in_newtons(told, tip).tip([x_m, y_m], 1.0, 1.0).disc().unwrap();
+        let hertz = Hertz::of_sample_a(described);
+        let tip = Fingertip { hertz, force_n: press.force_n, radius_m: Fingertip::fitting_m(described) };
+        let from = Hand::in_newtons(described, tip).tip([x_m, y_m], 1.0, 1.0).disc().unwrap();
         let (sin, cos) = (std::f64::consts::TAU * random.f64()).sin_cos();
         let speed_m_per_s = press.speed_m_per_s;
         let mut course = Self { from, direction: [cos, sin], speed_m_per_s, knots: Vec::new() };
@@ -159,35 +159,35 @@ impl Course {
 }
 
 /// What is inverted with, and what is pressed.
-struct Bench {
-    /// As it is known.
-    told: Detector,
+struct CoverageTrial {
+    /// As it is described.
+    described: Detector,
     problem: Problem,
     /// As it may be.
     built: Vec<Slab>,
 }
 
-impl Bench {
+impl CoverageTrial {
     /// On a detector that is as described.
     fn exact(board: Board) -> Self {
-        let told = board.measuring(Detector::preset(Detector::DEFAULT).unwrap()).taken_as_exact();
-        let exact = Slab::with_resolution(&told, Resolution::FINE).unwrap();
-        Self { problem: Problem::of(&told).unwrap(), told, built: vec![exact] }
+        let described = board.measuring(Detector::preset(Detector::DEFAULT).unwrap()).taken_as_exact();
+        let exact = Slab::with_resolution(&described, Resolution::FINE).unwrap();
+        Self { problem: Problem::of(&described).unwrap(), described, built: vec![exact] }
     }
 
     /// On detectors as built, which are known by their tolerances alone.
     fn as_built(board: Board, seeds: std::ops::Range<u64>) -> Self {
-        let told = board.measuring(Detector::preset(Detector::DEFAULT).unwrap());
-        let built = seeds.map(|seed| Slab::with_resolution(&drawn(&told, seed), Resolution::FINE).unwrap());
-        Self { problem: Problem::of(&told).unwrap(), built: built.collect(), told }
+        let described = board.measuring(Detector::preset(Detector::DEFAULT).unwrap());
+        let built = seeds.map(|seed| Slab::with_resolution(&drawn(&described, seed), Resolution::FINE).unwrap());
+        Self { problem: Problem::of(&described).unwrap(), built: built.collect(), described }
     }
 
     /// Follows a press by the rows of an adaptive plan, and judges some of the answers.
     fn follow(&self, press: Press, coverage: &mut Coverage) {
-        let n = self.told.electrodes.len();
+        let n = self.described.electrodes.len();
         let model = &self.built[press.seed as usize % self.built.len()];
-        let course = Course::new(press, &self.told, model);
-        let mut chip = Chip::drawn(&self.told, model.detector(), press.seed);
+        let course = Course::new(press, &self.described, model);
+        let mut chip = Chip::drawn(&self.described, model.detector(), press.seed);
         let solver = Contacts::new(&self.problem, ContactSettings::of(&self.problem)).unwrap();
         let Parts { mut tracker, search } = Box::new(solver).split();
         let (mut search, mut latest) = (search.unwrap(), Latest::new(n));
@@ -259,12 +259,12 @@ impl Coverage {
     /// Of normal errors 68 and 95 % are within one and two standard errors.
     fn check(&self, what: &str) {
         let (one, two, [off_m, claimed_m]) = (self.within(1.0), self.within(2.0), self.roots_m());
-        let told =
+        let report =
             format!("{what}: {one:.2} {two:.2}, off by {off_m:.1e} m of {claimed_m:.1e}, {} missed", self.missed);
-        println!("{told}");
-        assert!(one > 0.6 && two > 0.9, "{told}");
-        assert!(claimed_m < 3.0 * off_m, "{told}");
-        assert!(20 * self.missed <= self.answers, "{told}");
+        println!("{report}");
+        assert!(one > 0.6 && two > 0.9, "{report}");
+        assert!(claimed_m < 3.0 * off_m, "{report}");
+        assert!(20 * self.missed <= self.answers, "{report}");
     }
 }
 
@@ -273,9 +273,9 @@ const BOARDS: [Board; 2] = [Board::Ideal, Board::Esp32];
 #[test]
 fn standard_errors_of_still_contacts_are_true() {
     for board in BOARDS {
-        let bench = Bench::exact(board);
+        let trial = CoverageTrial::exact(board);
         for force_n in [0.05, 3.0] {
-            bench.coverage(force_n, 0.0, 3000..3040).check(&format!("{board:?}, {force_n} N"));
+            trial.coverage(force_n, 0.0, 3000..3040).check(&format!("{board:?}, {force_n} N"));
         }
     }
 }
@@ -283,9 +283,9 @@ fn standard_errors_of_still_contacts_are_true() {
 // With the errors of an ESP32's converters 60 % are within one standard error and 91 % within two, at the very limit of what is asked here.
 #[test]
 fn standard_errors_of_contacts_that_move_are_true_by_an_ideal_converter() {
-    let bench = Bench::exact(Board::Ideal);
-    let slow = bench.coverage(0.5, 0.05, 3000..3030);
-    slow.and(bench.coverage(3.0, 0.2, 3000..3030)).check("moving");
+    let trial = CoverageTrial::exact(Board::Ideal);
+    let slow = trial.coverage(0.5, 0.05, 3000..3030);
+    slow.and(trial.coverage(3.0, 0.2, 3000..3030)).check("moving");
 }
 
 #[test]
@@ -293,8 +293,8 @@ fn standard_errors_on_detectors_as_built_are_true() {
     for board in BOARDS {
         // The presses on a detector are off alike: eight detectors alone were 54 to 62 %, twelve others 63 to 70 %.
         let all = [(30..38, 3000), (50..62, 5000)].map(|(detectors, seed)| {
-            let bench = Bench::as_built(board, detectors);
-            bench.coverage(0.05, 0.0, seed..seed + 24).and(bench.coverage(3.0, 0.0, seed + 24..seed + 48))
+            let trial = CoverageTrial::as_built(board, detectors);
+            trial.coverage(0.05, 0.0, seed..seed + 24).and(trial.coverage(3.0, 0.0, seed + 24..seed + 48))
         });
         let [some, others] = all;
         some.and(others).check(&format!("{board:?} as built"));
@@ -305,6 +305,6 @@ fn standard_errors_on_detectors_as_built_are_true() {
 fn a_stroke_that_lands_running_on_a_detector_as_built_is_one_contact() {
     // The rows of its first look contradict each other: of 160 answers 93 were several contacts before a search that changed their number was
     // repeated, 17 since.
-    let strokes = Bench::as_built(Board::Ideal, 1000..1006).coverage(3.0, 0.2, 10040..10048);
+    let strokes = CoverageTrial::as_built(Board::Ideal, 1000..1006).coverage(3.0, 0.2, 10040..10048);
     assert!(3 * strokes.missed <= strokes.answers, "{} of {} missed", strokes.missed, strokes.answers);
 }

@@ -25,13 +25,13 @@ fn contact(x_m: f64, y_m: f64, sheets: f64) -> Contact {
 }
 
 /// A solver with the frames of one scene after another.
-struct Bench {
+struct MotionTrial {
     solver: Contacts,
     noise: Noise,
     exact: Readings,
 }
 
-impl Bench {
+impl MotionTrial {
     fn new() -> Self {
         let solver = Contacts::new(&PROBLEM, ContactSettings::of(&PROBLEM)).unwrap();
         Self { solver, noise: Noise::new(7), exact: Readings::from_fn(16, |_, _| 0.0) }
@@ -63,26 +63,26 @@ fn is_at(found: &FoundContact, truth: &Contact, within_m: f64) -> bool {
 
 #[test]
 fn standard_errors_shrink_with_frames_until_the_model_is_the_limit() {
-    let mut bench = Bench::new();
-    bench.touch(&[contact(0.007, -0.004, 0.03)]);
-    let sigmas_m: Vec<_> = (0..400).map(|_| sigma_m(&bench.solve())).collect();
+    let mut trial = MotionTrial::new();
+    trial.touch(&[contact(0.007, -0.004, 0.03)]);
+    let sigmas_m: Vec<_> = (0..400).map(|_| sigma_m(&trial.solve())).collect();
     for frames in [2, 4, 9, 16] {
         let shrunk = sigmas_m[0] / sigmas_m[frames - 1] / (frames as f64).sqrt();
         assert!((0.85..1.15).contains(&shrunk), "{frames}: {shrunk}");
     }
     assert!(sigmas_m[0] / sigmas_m[399] > 5.0, "{} {}", sigmas_m[0], sigmas_m[399]);
-    bench.touch(&[contact(0.007, -0.004, 100.0)]);
-    (0..300).for_each(|_| drop(bench.solve()));
-    let firm_m = sigma_m(&bench.solve());
+    trial.touch(&[contact(0.007, -0.004, 100.0)]);
+    (0..300).for_each(|_| drop(trial.solve()));
+    let firm_m = sigma_m(&trial.solve());
     assert!(firm_m > 2e-6, "the model is no better than that: {firm_m}");
 }
 
 #[test]
 fn a_light_contact_is_found_after_some_frames_where_one_is_too_noisy() {
-    let mut bench = Bench::new();
+    let mut trial = MotionTrial::new();
     let truth = contact(-0.010, 0.006, 0.003);
-    bench.touch(&[truth]);
-    let solutions: Vec<_> = (0..64).map(|_| bench.solve()).collect();
+    trial.touch(&[truth]);
+    let solutions: Vec<_> = (0..64).map(|_| trial.solve()).collect();
     let last = solutions.last().unwrap();
     assert!(last.contacts.len() == 1 && is_at(&last.contacts[0], &truth, 2e-3), "{last:?}");
     assert!((0.8..1.25).contains(&last.residual.unwrap()), "in the noise of the mean: {:?}", last.residual);
@@ -91,31 +91,31 @@ fn a_light_contact_is_found_after_some_frames_where_one_is_too_noisy() {
 #[test]
 fn contacts_that_come_and_go_beside_a_still_one_are_noticed_at_once() {
     let [still, other] = [contact(0.010, 0.004, 0.3), contact(-0.012, -0.009, 0.5)];
-    let mut bench = Bench::new();
-    bench.touch(&[still]);
-    (0..100).for_each(|_| drop(bench.solve()));
+    let mut trial = MotionTrial::new();
+    trial.touch(&[still]);
+    (0..100).for_each(|_| drop(trial.solve()));
     for _ in 0..3 {
-        bench.touch(&[still, other]);
-        let came = bench.solve();
+        trial.touch(&[still, other]);
+        let came = trial.solve();
         assert_eq!(came.contacts.len(), 2, "{came:?}");
         assert!([still, other].iter().all(|truth| came.contacts.iter().any(|found| is_at(found, truth, 2e-4))));
-        (0..40).for_each(|_| assert_eq!(bench.solve().contacts.len(), 2));
-        bench.touch(&[still]);
-        let gone: Vec<_> = (0..40).map(|_| bench.solve()).collect();
+        (0..40).for_each(|_| assert_eq!(trial.solve().contacts.len(), 2));
+        trial.touch(&[still]);
+        let gone: Vec<_> = (0..40).map(|_| trial.solve()).collect();
         assert!(gone.iter().all(|solution| solution.contacts.len() == 1 && !solution.flags.misfit), "{:?}", gone[0]);
     }
 }
 
 #[test]
 fn a_scene_that_stands_still_is_searched_only_when_its_frames_have_doubled() {
-    let mut bench = Bench::new();
-    bench.touch(&[contact(0.010, 0.004, 0.3), contact(-0.012, -0.009, 0.05)]);
+    let mut trial = MotionTrial::new();
+    trial.touch(&[contact(0.010, 0.004, 0.3), contact(-0.012, -0.009, 0.05)]);
     let Parts { mut tracker, search: searcher } =
         Box::new(Contacts::new(&PROBLEM, ContactSettings::of(&PROBLEM)).unwrap()).split();
     let mut searcher = searcher.unwrap();
     let mut searched = 0;
     for _ in 0..300 {
-        let frame = bench.frame();
+        let frame = trial.frame();
         let Followed { search, .. } = tracker.follow(&frame).unwrap();
         if search {
             searched += 1;
@@ -130,9 +130,9 @@ fn a_scene_that_stands_still_is_searched_only_when_its_frames_have_doubled() {
 const FLOOR_V: f64 = 0.14;
 
 /// A frame of a board that reads nothing below [`FLOOR_V`].
-fn above_floor(bench: &mut Bench) -> Readings {
+fn above_floor(trial: &mut MotionTrial) -> Readings {
     let n = detector().electrodes.len();
-    let frame = bench.frame();
+    let frame = trial.frame();
     let clipped = Readings::from_fn(n, |g, e| frame.at(g, e).max(FLOOR_V));
     clipped.within(&vec![Range { floor_v: FLOOR_V, ceiling_v: f64::INFINITY }; n])
 }
@@ -144,11 +144,11 @@ fn lifting() -> impl Iterator<Item = f64> {
 
 #[test]
 fn a_contact_that_lifts_below_the_converters_range_is_gone() {
-    let mut bench = Bench::new();
+    let mut trial = MotionTrial::new();
     let mut count = |sheets| {
-        bench.touch(&[contact(0.007, -0.004, sheets)]);
-        let frame = above_floor(&mut bench);
-        bench.solver.solve(&frame).unwrap().contacts.len()
+        trial.touch(&[contact(0.007, -0.004, sheets)]);
+        let frame = above_floor(&mut trial);
+        trial.solver.solve(&frame).unwrap().contacts.len()
     };
     let counts: Vec<_> = lifting().map(&mut count).collect();
     assert!(
@@ -159,12 +159,12 @@ fn a_contact_that_lifts_below_the_converters_range_is_gone() {
 
 #[test]
 fn a_contact_that_lifts_below_the_converters_range_is_gone_in_rows_too() {
-    let mut bench = Bench::new();
+    let mut trial = MotionTrial::new();
     let mut count = |(index, sheets)| {
-        bench.touch(&[contact(0.007, -0.004, sheets)]);
-        let frame = above_floor(&mut bench);
+        trial.touch(&[contact(0.007, -0.004, sheets)]);
+        let frame = above_floor(&mut trial);
         let row = frame.clone().hiding(|ground, _| ground != index % 16);
-        bench.solver.solve_rows(&row, &frame, 2e-3).unwrap().contacts.len()
+        trial.solver.solve_rows(&row, &frame, 2e-3).unwrap().contacts.len()
     };
     let counts: Vec<_> = lifting().enumerate().map(&mut count).collect();
     assert!(

@@ -27,14 +27,14 @@ fn thin() -> Detector {
 }
 
 /// A detector, the finer model that is pressed, and the solver.
-struct Bench {
+struct PlacesTrial {
     detector: Detector,
     fine: Box<dyn ForwardModel>,
     solver: Contacts,
     noise: Noise,
 }
 
-impl Bench {
+impl PlacesTrial {
     fn new(detector: Detector, seed: u64) -> Self {
         let detector = noisy(detector);
         let problem = Problem::new(Auto::new(&detector, None).unwrap().model);
@@ -63,16 +63,16 @@ fn single_contacts_are_found_on_outlines_shells_curved_surfaces_and_dots_of_glue
     for (seed, detector) in [(31, example("l-shape.toml")), (32, example("fingertip.toml")), (33, thin()), (36, glued)]
     {
         let width_m = detector.outline.size_m().into_iter().fold(0.0, f64::max);
-        let mut bench = Bench::new(detector, seed);
+        let mut trial = PlacesTrial::new(detector, seed);
         let mut places = fastrand::Rng::with_seed(seed);
         // A contact on an edge is known less well: it has a test of its own.
-        let mut spread = bench.solver.finder().fields.places_m(300);
-        spread.retain(|place_m| bench.solver.finder().fields.spot(*place_m).share > 0.999);
+        let mut spread = trial.solver.finder().fields.places_m(300);
+        spread.retain(|place_m| trial.solver.finder().fields.spot(*place_m).share > 0.999);
         let mut errors = Vec::new();
         for _ in 0..24 {
-            let truth = bench.contact(spread[places.usize(..spread.len())], 0.5);
-            bench.solver.reset();
-            let solution = bench.press(&[truth]);
+            let truth = trial.contact(spread[places.usize(..spread.len())], 0.5);
+            trial.solver.reset();
+            let solution = trial.press(&[truth]);
             let [found] = solution.contacts[..] else { panic!("{truth:?} {solution:?}") };
             errors.push(off_m(&truth, &found) / width_m);
             assert!(!solution.flags.misfit, "{truth:?} {solution:?}");
@@ -80,15 +80,15 @@ fn single_contacts_are_found_on_outlines_shells_curved_surfaces_and_dots_of_glue
         errors.sort_by(f64::total_cmp);
         let (median, mean) = (errors[errors.len() / 2], errors.iter().sum::<f64>() / errors.len() as f64);
         // One of the 24 on the L is off by 0.08, which makes two thirds of its mean.
-        assert!(median < 0.0025 && mean < 0.006, "{}: {median} {mean} {errors:?}", bench.detector.name);
+        assert!(median < 0.0025 && mean < 0.006, "{}: {median} {mean} {errors:?}", trial.detector.name);
     }
 }
 
 #[test]
 fn two_contacts_on_an_outline_are_two() {
-    let mut bench = Bench::new(example("l-shape.toml"), 34);
-    let truth = [bench.contact([-0.025, 0.02, 0.0], 0.5), bench.contact([0.018, -0.027, 0.0], 0.8)];
-    let solution = bench.press(&truth);
+    let mut trial = PlacesTrial::new(example("l-shape.toml"), 34);
+    let truth = [trial.contact([-0.025, 0.02, 0.0], 0.5), trial.contact([0.018, -0.027, 0.0], 0.8)];
+    let solution = trial.press(&truth);
     assert_eq!(solution.contacts.len(), 2, "{solution:?}");
     for truth in &truth {
         let nearest = solution.contacts.iter().map(|found| off_m(truth, found)).fold(f64::INFINITY, f64::min);
@@ -98,14 +98,14 @@ fn two_contacts_on_an_outline_are_two() {
 
 #[test]
 fn contacts_at_walls_are_found_steadily_where_they_are() {
-    let mut bench = Bench::new(Detector::preset("square-60").unwrap().taken_as_exact(), 35);
+    let mut trial = PlacesTrial::new(Detector::preset("square-60").unwrap().taken_as_exact(), 35);
     for [x_m, y_m] in [[0.0, -0.0295], [0.027, 0.027], [0.03, 0.004]] {
         for sheets in [0.3, 3.0] {
-            let truth = bench.contact([x_m, y_m, 0.0], sheets);
-            bench.solver.reset();
+            let truth = trial.contact([x_m, y_m, 0.0], sheets);
+            trial.solver.reset();
             let (mut ids, mut sum_m) = (Vec::new(), [0.0; 2]);
             for count in 0..100 {
-                let solution = bench.press(&[truth]);
+                let solution = trial.press(&[truth]);
                 let [found] = solution.contacts[..] else { panic!("{truth:?}, frame {count}: {solution:?}") };
                 let sigma = found.uncertainty.unwrap();
                 // At 0.3 sheet conductances noise alone moves a contact across a wall by 1.2 mm of standard error. In a corner a
@@ -133,15 +133,15 @@ fn contacts_at_walls_are_found_steadily_where_they_are() {
 fn radii_are_found_where_the_readings_say_them() {
     let detector = noisy(Detector::preset("square-60").unwrap().taken_as_exact());
     let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
-    let mut bench = Bench::new(detector, 36);
-    bench.fine = Box::new(fine);
+    let mut trial = PlacesTrial::new(detector, 36);
+    trial.fine = Box::new(fine);
     // Firm and wide: the readings say it. A light touch's they do not.
     for (radius_m, sheets, known) in
         [(0.0035, 3.0, true), (0.005, 1.0, true), (0.0018, 3.0, true), (0.0035, 0.02, false)]
     {
-        let truth = Contact { radius_m, ..bench.contact([0.0043, -0.0071, 0.0], sheets) };
-        bench.solver.reset();
-        let solution = bench.press(&[truth]);
+        let truth = Contact { radius_m, ..trial.contact([0.0043, -0.0071, 0.0], sheets) };
+        trial.solver.reset();
+        let solution = trial.press(&[truth]);
         let [found] = solution.contacts[..] else { panic!("{truth:?} {solution:?}") };
         assert_eq!(found.radius_m.is_some(), known, "{truth:?} {found:?}");
         if let Some(found_m) = found.radius_m {
@@ -151,7 +151,7 @@ fn radii_are_found_where_the_readings_say_them() {
         let off_s = (found.conductance_s - truth.conductance_s).abs();
         assert!(off_s < 3.0 * sigma.conductance_s + 0.02 * truth.conductance_s, "{truth:?} {found:?}");
         // Following keeps what was found.
-        let next = bench.press(&[truth]);
+        let next = trial.press(&[truth]);
         assert_eq!(next.contacts[0].radius_m.is_some(), known, "{next:?}");
     }
 }

@@ -12,7 +12,8 @@ use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Shape, Touch};
 use tactomo_physics::simulate::{Noise, finer_model, measured};
 
-struct Bench {
+/// The finders of shapes and of contacts, with what a finer model of the detector reads.
+struct ShapeTrial {
     detector: Detector,
     finder: Arc<ShapeFinder>,
     contacts: ContactFinder,
@@ -20,7 +21,7 @@ struct Bench {
     noise: Noise,
 }
 
-impl Bench {
+impl ShapeTrial {
     fn new() -> Self {
         let detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
         let problem = Problem::new(Box::new(Slab::new(&detector).unwrap()) as Box<dyn ForwardModel>);
@@ -71,9 +72,9 @@ const AROUND: [[f64; 2]; 4] = [[-0.007, 0.003], [0.005, -0.009], [0.015, 0.009],
 
 #[test]
 fn readings_follow_their_derivatives() {
-    let mut bench = Bench::new();
-    let target = bench.target(&line(1.0));
-    let finder = Arc::clone(&bench.finder);
+    let mut trial = ShapeTrial::new();
+    let target = trial.target(&line(1.0));
+    let finder = Arc::clone(&trial.finder);
     let fitter = finder.fitter(&finder.fine);
     let courses =
         [Course::Line([[-0.012, -0.011], [0.016, 0.034]]), Course::Ring { centre_m: [0.004, 0.006], radius_m: 0.012 }];
@@ -99,10 +100,10 @@ fn readings_follow_their_derivatives() {
 
 #[test]
 fn a_line_is_found_within_its_standard_errors() {
-    let mut bench = Bench::new();
+    let mut trial = ShapeTrial::new();
     for sheets in [0.15, 1.0, 3.0] {
         let touch = line(sheets);
-        let (found, target, fit) = bench.found(&touch, ALONG);
+        let (found, target, fit) = trial.found(&touch, ALONG);
         let FoundShape::Line(found) = found else { panic!("{found:?}") };
         assert!(!fit.evidence().is_misfit(target.count()), "{fit:?}");
         let errors = found.uncertainty.unwrap();
@@ -124,10 +125,10 @@ fn a_line_is_found_within_its_standard_errors() {
 
 #[test]
 fn a_ring_is_found_within_its_standard_errors() {
-    let mut bench = Bench::new();
+    let mut trial = ShapeTrial::new();
     for sheets in [0.15, 1.0, 3.0] {
         let touch = ring(sheets);
-        let (found, target, fit) = bench.found(&touch, AROUND);
+        let (found, target, fit) = trial.found(&touch, AROUND);
         let FoundShape::Ring(found) = found else { panic!("{found:?}") };
         assert!(!fit.evidence().is_misfit(target.count()), "{fit:?}");
         let errors = found.uncertainty.unwrap();
@@ -145,24 +146,24 @@ fn a_ring_is_found_within_its_standard_errors() {
 
 #[test]
 fn what_is_beyond_an_edge_is_not_told() {
-    let mut bench = Bench::new();
+    let mut trial = ShapeTrial::new();
     let touch = Touch { centre_m: [0.018, -0.004], ..line(1.0) };
     let shifted = ALONG.map(|[x_m, y_m]| [(x_m + 0.012_f64).min(0.029), y_m]);
-    let (found, ..) = bench.found(&touch, shifted);
+    let (found, ..) = trial.found(&touch, shifted);
     let FoundShape::Line(found) = found else { panic!("{found:?}") };
     let rightmost_m = found.from_m[0].max(found.to_m[0]);
     assert!((rightmost_m - 0.03).abs() < 1e-9, "{found:?}");
-    let image_s = bench.fine.image_mesh().conductances_s(&[touch]).unwrap();
+    let image_s = trial.fine.image_mesh().conductances_s(&[touch]).unwrap();
     let on_it_s: f64 = image_s.iter().sum();
     assert!((found.conductance_s / on_it_s - 1.0).abs() < 0.03, "{found:?} {on_it_s}");
 }
 
 #[test]
 fn the_image_of_a_shape_conducts_what_it_says() {
-    let mut bench = Bench::new();
-    let (shape, target, fit) = bench.found(&ring(1.0), AROUND);
-    let solution = bench.finder.solution(&fit, &target);
-    let areas_m2 = &bench.finder.problem.jacobian.image_mesh.node_areas_m2;
+    let mut trial = ShapeTrial::new();
+    let (shape, target, fit) = trial.found(&ring(1.0), AROUND);
+    let solution = trial.finder.solution(&fit, &target);
+    let areas_m2 = &trial.finder.problem.jacobian.image_mesh.node_areas_m2;
     let image = solution.image_s_per_m2.unwrap();
     let image_s: f64 = image.iter().zip(areas_m2).map(|(density, area_m2)| f64::from(*density) * area_m2).sum();
     assert!((image_s / shape.conductance_s() - 1.0).abs() < 0.01, "{image_s}");
@@ -171,36 +172,36 @@ fn the_image_of_a_shape_conducts_what_it_says() {
 
 #[test]
 fn a_shape_is_followed_as_it_moves_and_lost_when_it_is_gone() {
-    let mut bench = Bench::new();
-    let (_, target, fit) = bench.found(&line(1.0), ALONG);
-    let mut tracker = ShapeTracker::new(Arc::clone(&bench.finder));
+    let mut trial = ShapeTrial::new();
+    let (_, target, fit) = trial.found(&line(1.0), ALONG);
+    let mut tracker = ShapeTracker::new(Arc::clone(&trial.finder));
     tracker.adopt(&fit, &target);
     assert!(!tracker.has_lost(&target));
     for step in 1..=20 {
         let angle_rad = 0.6 + 0.02 * f64::from(step);
         let shape = Shape::Line { length_m: 0.034, width_m: 0.003, angle_rad };
         let touch = Touch { centre_m: [0.003, -0.004 + 3e-4 * f64::from(step)], shape, ..line(1.0) };
-        assert!(!tracker.follow(&bench.target(&touch)), "step {step}");
+        assert!(!tracker.follow(&trial.target(&touch)), "step {step}");
     }
-    let FoundShape::Line(found) = bench.finder.shape(tracker.found().unwrap()) else { panic!() };
+    let FoundShape::Line(found) = trial.finder.shape(tracker.found().unwrap()) else { panic!() };
     let along = [0, 1].map(|axis| found.to_m[axis] - found.from_m[axis]);
     assert!(((along[1] / along[0]).atan() - 1.0).abs() < 0.01, "{found:?}");
-    let target = bench.target(&ring(0.5));
+    let target = trial.target(&ring(0.5));
     assert!(tracker.follow(&target), "a ring is no line");
 }
 
 #[test]
 fn a_ring_that_closes_is_let_go_before_it_is_a_disc() {
-    let mut bench = Bench::new();
+    let mut trial = ShapeTrial::new();
     let sheet_s = Detector::default().sheet_conductance_s();
     let touch = |radius_m: f64| Touch::flat([0.004, 0.006], Shape::Ring { radius_m, width_m: 0.006 }, sheet_s);
-    let (_, target, fit) = bench.found(&touch(0.013), AROUND);
-    let mut tracker = ShapeTracker::new(Arc::clone(&bench.finder));
+    let (_, target, fit) = trial.found(&touch(0.013), AROUND);
+    let mut tracker = ShapeTracker::new(Arc::clone(&trial.finder));
     tracker.adopt(&fit, &target);
     let mut radius_m = 0.013;
     let mut was_let_go = false;
     while radius_m > 0.004 {
-        let target = bench.target(&touch(radius_m));
+        let target = trial.target(&touch(radius_m));
         let is_lost = tracker.follow(&target);
         // A search would find it again, perhaps as what it is no longer.
         tracker.adopt(&fit, &target);
