@@ -54,7 +54,7 @@ impl ContactFinder {
     pub fn left_by_one(&self, readings: &Readings) -> Option<f64> {
         let target = Target::of_mean(readings, 1, &self.errors, None);
         let (cost, count) = match self.alone(&target) {
-            Some(one) => (one.explanation.fit.cost, one.target.count()),
+            Some(one) => (one.hypothesis.fit.cost, one.target.count()),
             None => (self.one(&target)?.cost, target.count()),
         };
         Some(cost / count.max(1) as f64)
