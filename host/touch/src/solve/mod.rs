@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! answer    what a solver says: Solution, FoundContact, Flags, errors          -> nobody
-//! fit       least squares, evidence, lambda, the linear theory                 -> answer
+//! fit       least squares, evidence, policy, the linear theory                 -> answer
 //! before    complete, adaptive_mean, latest: readings to readings                      -> fit
 //! problem   what solvers are made for: a detector with its models              -> before, what was learned
 //! solver    what a method is to those who run it: one trait, and two halves    -> answer

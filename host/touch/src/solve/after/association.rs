@@ -1,14 +1,11 @@
 //! Data association: a contact keeps its number from frame to frame.
 
 use crate::solve::answer::FoundContact;
+use crate::solve::fit::policy;
 use tactomo_physics::space::{self, Place};
 
-/// Frames for which a contact that is lost keeps its number: a tenth of a second of 1200 frames/s.
-const KEPT: u32 = 120;
 /// Weight of the newest way in the mean way of a contact between frames.
-const NEWEST: f64 = 0.2;
-/// Frames for which a contact that is lost is expected to go on as it went. Longer, its velocity says less than where it was.
-const COASTS: f64 = 12.0;
+const NEWEST_WAY: f64 = 0.2;
 
 /// Associates the contacts of a frame with those of frames before, by their places (nearest neighbours first).
 #[derive(Clone, Debug)]
@@ -34,7 +31,7 @@ struct Track {
 impl Track {
     /// Where it is expected in the next frame (m).
     fn expected_m(&self) -> Place {
-        let frames = f64::from(self.missed + 1).min(COASTS);
+        let frames = f64::from(self.missed + 1).min(policy::COASTING_FRAMES);
         std::array::from_fn(|axis| self.place_m[axis] + frames * self.way_m[axis])
     }
 
@@ -42,7 +39,7 @@ impl Track {
     fn see(&mut self, place_m: Place) {
         let frames = f64::from(self.missed + 1);
         for (axis, way_m) in self.way_m.iter_mut().enumerate() {
-            *way_m += NEWEST * ((place_m[axis] - self.place_m[axis]) / frames - *way_m);
+            *way_m += NEWEST_WAY * ((place_m[axis] - self.place_m[axis]) / frames - *way_m);
         }
         (self.place_m, self.missed) = (place_m, 0);
     }
@@ -64,7 +61,7 @@ impl Association {
         for (track, seen) in self.tracks.iter_mut().zip(seen) {
             track.missed += u32::from(!seen);
         }
-        self.tracks.retain(|track| track.missed <= KEPT);
+        self.tracks.retain(|track| track.missed <= policy::LOST_FRAMES);
         for contact in contacts.iter_mut().filter(|contact| contact.id.is_none()) {
             contact.id = Some(self.next);
             self.tracks.push(Track { id: self.next, place_m: place_m(contact), way_m: [0.0; 3], missed: 0 });
@@ -138,9 +135,9 @@ mod tests {
     fn a_contact_that_is_lost_for_a_moment_keeps_its_number() {
         let mut association = Association::new(0.010);
         assert_eq!(ids(&mut association, &[0.0, 0.030]), [1, 2]);
-        (0..KEPT).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
+        (0..policy::LOST_FRAMES).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
         assert_eq!(ids(&mut association, &[0.030, 0.001]), [2, 1], "lost for a moment");
-        (0..=KEPT).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
+        (0..=policy::LOST_FRAMES).for_each(|_| assert_eq!(ids(&mut association, &[0.030]), [2]));
         assert_eq!(ids(&mut association, &[0.030, 0.001]), [2, 3], "lost for long");
         // What is seen goes on before what is lost comes back, however near.
         assert_eq!(ids(&mut association, &[0.002]), [3]);

@@ -3,7 +3,7 @@
 //! The mean of `m` still frames has the noise of one over the root of `m`. If a contact moves slowly, that mean lags behind it by `m / 2`
 //! frames, and no test on those `m` frames can tell before the lag is several standard errors: the difference of two halves has the
 //! deviation `2 s / sqrt(m)`, the lag matters from `s / sqrt(m)` on. Over `n` frames a constant velocity stands out by `n^(3/2)`. So
-//! only the newest [`SHARE`]th of the frames that look still are averaged: what is not seen to move over all of them has moved by a
+//! only the newest [`AVERAGED`]th of the frames that look still are averaged: what is not seen to move over all of them has moved by a
 //! small part of a standard error over these.
 //!
 //! The newest 1, 2, 4, ... frames are compared with those before them (Basseville and Nikiforov, Detection of abrupt changes, 1993;
@@ -17,23 +17,16 @@ use std::f64::consts::PI;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::solve::fit::dot::dot;
+use crate::solve::fit::policy;
 use tactomo_physics::detector::Adc;
 use tactomo_physics::readings::{Readings, Says};
 
 /// Frames that are looked at, at most: a fifth of a second of 1200 frames/s.
-pub(crate) const LONGEST: usize = 256;
+pub(crate) const MOST_FRAMES: usize = 256;
 /// One in so many of the frames that look still is averaged.
-const SHARE: usize = 5;
+const AVERAGED: usize = 5;
 /// First frames that are all averaged, as long as nothing has moved since the beginning.
-const FIRST: usize = 16;
-/// Share of still frames in which a contact is taken to move, by each of the tests of a contact in each window of one frame. Windows
-/// of more frames overlap, and have as many times more.
-const FALSE_ALARMS: f64 = 3e-5;
-/// The same for the first frames to be averaged no longer than others.
-const FALSE_DOUBTS: f64 = 0.003;
-/// Standard deviations by which the mean square of all differences is over what noise leaves, of frames that are not of one scene: of
-/// 256 readings noise alone does so in 1 of 30 000.
-const OTHER: f64 = 4.4;
+const FIRST_FRAMES: usize = 16;
 /// Terms of the series of the error by rounding: they leave out less than 1 %.
 const TERMS: u32 = 50;
 /// Parameters of a contact that are tested together: the place, and the strength with the size.
@@ -126,8 +119,8 @@ impl AdaptiveMean {
     /// Frames that are averaged.
     pub fn count(&self) -> usize {
         let all = self.frames();
-        let at_first = if self.has_moved { 1 } else { FIRST };
-        (all / SHARE).max(all.min(at_first))
+        let at_first = if self.has_moved { 1 } else { FIRST_FRAMES };
+        (all / AVERAGED).max(all.min(at_first))
     }
 
     /// A reading that is a bound in one frame is one in the mean.
@@ -181,7 +174,7 @@ impl AdaptiveMean {
         let zeros = || vec![0.0; volts.len()];
         // After a month of frames the sums are 10^9 V at most, which are right to less than a microvolt.
         let mut sums_v = match self.frames() {
-            LONGEST => self.sums_v.pop_front().unwrap_or_default(),
+            MOST_FRAMES => self.sums_v.pop_front().unwrap_or_default(),
             _ => zeros(),
         };
         if self.sums_v.is_empty() {
@@ -204,13 +197,16 @@ impl AdaptiveMean {
         let all = self.frames();
         for newest in windows(all) {
             let difference = self.difference(newest, moves);
-            let alarm = -2.0 * (FALSE_ALARMS * newest as f64).ln();
+            let alarm = -2.0 * (policy::FALSE_ALARMS * newest as f64).ln();
             // A reading that is no voltage of a board makes sums that nothing can be told from.
-            if difference.overall.is_nan() || difference.overall > OTHER || difference.of_contacts > alarm {
+            if difference.overall.is_nan()
+                || difference.overall > policy::OTHER_SCENE_DEVIATIONS
+                || difference.of_contacts > alarm
+            {
                 self.begin_with_newest(newest);
                 return;
             }
-            self.has_moved |= difference.of_contacts > -2.0 * FALSE_DOUBTS.ln() && newest == all / 2;
+            self.has_moved |= difference.of_contacts > -2.0 * policy::FALSE_DOUBTS.ln() && newest == all / 2;
         }
     }
 

@@ -16,6 +16,7 @@ use std::borrow::Cow;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use crate::solve::fit::balance::LEAST_GAP;
 use crate::solve::fit::linear::Decomposition;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::readings::{Readings, Says};
@@ -24,10 +25,8 @@ use tactomo_physics::readings::{Readings, Says};
 const ROUNDS: usize = 4;
 /// Sweeps for the rows' scales.
 const SWEEPS: usize = 8;
-/// Smallest `1 - V / Vcc` that a logarithm is taken of: below, a reading is at the drive voltage to its noise.
-const SMALLEST: f64 = 1e-3;
 /// Error of the linear theory, as a share of the largest reading: of two firm contacts a hundredth is left of it.
-const MODEL_ERROR: f64 = 0.01;
+const LINEAR_ERROR: f64 = 0.01;
 
 /// Completes readings of a detector.
 pub(crate) struct Completer {
@@ -76,7 +75,7 @@ impl Completer {
     fn known_scales(&self, readings: &Readings) -> Vec<Option<f64>> {
         let n = readings.electrodes();
         let is_pair = |g: usize, e: usize| g != e && [readings.says(g, e), readings.says(e, g)] == [Says::Voltage; 2];
-        let log = |g: usize, e: usize| (1.0 - readings.at(g, e) / self.drive_v).max(SMALLEST).ln();
+        let log = |g: usize, e: usize| (1.0 - readings.at(g, e) / self.drive_v).max(LEAST_GAP).ln();
         let mut logs: Vec<Option<f64>> = (0..n).map(|g| (0..n).any(|e| is_pair(g, e)).then_some(0.0)).collect();
         for _ in 0..SWEEPS {
             for g in 0..n {
@@ -102,7 +101,7 @@ impl Completer {
                 return 1.0;
             }
             let by = |(e, scale): &(usize, f64)| scale + (balanced_v[g * n + e] - balanced_v[e * n + g]) / self.drive_v;
-            (told.iter().map(by).sum::<f64>() / told.len() as f64).max(SMALLEST)
+            (told.iter().map(by).sum::<f64>() / told.len() as f64).max(LEAST_GAP)
         };
         (0..n).map(|g| known[g].unwrap_or_else(|| of(g))).collect()
     }
@@ -125,7 +124,7 @@ impl Completer {
             return None;
         }
         let scale2 = known_v2 * (n * n) as f64 / all_v2;
-        let noise_v2 = self.noise_v.powi(2) + (MODEL_ERROR * values.amax()).powi(2);
+        let noise_v2 = self.noise_v.powi(2) + (LINEAR_ERROR * values.amax()).powi(2);
         let units = self.units.select_rows(&counted);
         let mut normal = units.tr_mul(&units);
         for (i, value) in self.singular_values.iter().enumerate() {

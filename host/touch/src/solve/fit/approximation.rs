@@ -15,14 +15,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::dot::dot;
+use crate::solve::fit::policy;
 use tactomo_physics::forward::Similar;
 
 /// Share of the variance of noise below which a direction is left out.
-const LEAST: f64 = 0.01;
-/// Share of the readings, in the root of the sum of squares, by which those of what is followed may differ from those that the patterns were
-/// made for; and the same where a search ends.
-const STALE: f64 = 0.25;
-const SETTLED: f64 = 0.02;
+const LEAST_VARIANCE: f64 = 0.01;
 /// Share of the noise, in the root of the sum of squares, that may be left out by taking readings as linear.
 const CURVED: f64 = 0.03;
 
@@ -87,7 +84,7 @@ impl ApproximationError {
     /// `least_v`.
     pub fn of(patterns_v: &DMatrix<f64>, steps: usize, made_for: Vec<f64>, least_v: f64) -> Self {
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(patterns_v.tr_mul(patterns_v));
-        let least_v2 = LEAST * least_v * least_v;
+        let least_v2 = LEAST_VARIANCE * least_v * least_v;
         let kept: Vec<_> = (0..eigenvalues.len()).filter(|i| eigenvalues[*i] > least_v2).collect();
         let units = patterns_v * eigenvectors.select_columns(&kept);
         let direction = |(column, i): (usize, &usize)| {
@@ -141,12 +138,12 @@ impl ApproximationError {
 
     /// Whether other readings (V) would have other patterns.
     pub fn is_stale(&self, volts: &[f64]) -> bool {
-        self.is_moved(volts, STALE)
+        self.is_moved(volts, policy::STALE_SHARE)
     }
 
     /// Whether other readings (V) are those that the patterns are of, as near as a search needs.
     pub fn is_settled(&self, volts: &[f64]) -> bool {
-        !self.is_moved(volts, SETTLED)
+        !self.is_moved(volts, policy::SETTLED_SHARE)
     }
 
     fn is_moved(&self, volts: &[f64], share: f64) -> bool {

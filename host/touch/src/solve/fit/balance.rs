@@ -1,7 +1,7 @@
 //! Readings as if a firm contact were a light one.
 
-/// Smallest `1 - V / Vcc` that a ratio is taken of: below, a reading is at the drive voltage to its noise.
-const SMALLEST: f64 = 1e-3;
+/// Smallest `1 - V / Vcc` that a ratio or a logarithm is taken of: below, a reading is at the drive voltage to its noise.
+pub(crate) const LEAST_GAP: f64 = 1e-3;
 
 /// Takes the force out of the readings of a contact, in place (V, row by row, `volts[g * electrodes + e]`).
 ///
@@ -12,7 +12,7 @@ const SMALLEST: f64 = 1e-3;
 /// theory says exactly for one contact, however firm, of conductance `1 / mean D`; for several it is nearer than before.
 /// In the limit of light contacts nothing changes. Returns the rows' scales.
 pub fn balance(volts: &mut [f64], electrodes: usize, drive_v: f64) -> Vec<f64> {
-    let ratio = |volts: &[f64], g: usize, e: usize| (1.0 - volts[g * electrodes + e] / drive_v).max(SMALLEST);
+    let ratio = |volts: &[f64], g: usize, e: usize| (1.0 - volts[g * electrodes + e] / drive_v).max(LEAST_GAP);
     let mut scales = vec![1.0; electrodes];
     for (g, scale) in scales.iter_mut().enumerate() {
         let product: f64 = (0..electrodes).map(|e| ratio(volts, e, g) / ratio(volts, g, e)).product();

@@ -2,19 +2,10 @@
 //!
 //! All of them are compared by the same readings, whitened by the same errors ([`super::target::Target`]).
 
-/// By how much each parameter has to lower the sum of squares: the Bayesian information criterion for 256 readings asks for
-/// 5.5; this leaves room for the many places that are looked at.
-const PRICE: f64 = 7.0;
-/// Standard deviations of the mean square beyond which readings do not fit: noise alone is there a few times in a million frames.
-const DEVIATIONS: f64 = 5.0;
-/// The same beyond which it is worth the time to look for another explanation: once in some hundred frames.
-const DEVIATIONS_OF_A_DOUBT: f64 = 3.0;
-/// What follows explains a frame as long as its sum of squares is below this times what the last search left.
-const WORSE: f64 = 1.3;
-/// Weight of the newest frame in the running mean of the sum of squares, and its rise that asks for a new search: many frames show what
-/// one frame's noise hides.
-const NEWEST: f64 = 0.1;
-const RISE: f64 = 0.12;
+use crate::solve::fit::policy;
+
+/// Weight of the newest frame in the running mean of the sum of squares.
+const NEWEST_FRAME: f64 = 0.1;
 
 /// What an explanation leaves of a frame, and what it takes for that.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +22,7 @@ impl Evidence {
     /// Of so many parameters, each of which has the same price.
     pub fn of(cost: f64, parameters: usize) -> Self {
         let parameters = parameters as f64;
-        Self { cost, price: PRICE * parameters, parameters }
+        Self { cost, price: policy::PARAMETER_PRICE * parameters, parameters }
     }
 
     /// The sum of squares with the price: of two explanations the lower one is believed.
@@ -41,13 +32,13 @@ impl Evidence {
 
     /// Whether more is left of so many readings than noise and the model's error make.
     pub fn is_misfit(&self, readings: usize) -> bool {
-        self.exceeds(1.0, DEVIATIONS, readings)
+        self.exceeds(1.0, policy::MISFIT_DEVIATIONS, readings)
     }
 
     /// Whether more is left than noise alone makes, whose variance is this share of that of the errors: a model that is righter than it claims
     /// could do better.
     pub fn may_be_better(&self, noise_share: f64, readings: usize) -> bool {
-        self.exceeds(noise_share, DEVIATIONS_OF_A_DOUBT, readings)
+        self.exceeds(noise_share, policy::DOUBT_DEVIATIONS, readings)
     }
 
     fn exceeds(&self, share: f64, deviations: f64, readings: usize) -> bool {
@@ -58,7 +49,7 @@ impl Evidence {
 
 /// Mean square of what is left, in what noise and model error make, above which readings do not fit.
 pub(crate) fn misfit_limit(freedom: f64) -> f64 {
-    limit(DEVIATIONS, freedom)
+    limit(policy::MISFIT_DEVIATIONS, freedom)
 }
 
 /// The mean of `freedom` squares of normal numbers is 1, and its variance two over their number.
@@ -81,13 +72,13 @@ impl Watch {
 
     /// Takes the next frame; whether a search may explain it better.
     pub fn has_lost(&mut self, now: Evidence, readings: usize) -> bool {
-        self.mean += NEWEST * (now.cost - self.mean);
-        self.mean > (1.0 + RISE) * self.searched || self.is_worse(now, readings)
+        self.mean += NEWEST_FRAME * (now.cost - self.mean);
+        self.mean > (1.0 + policy::RISE) * self.searched || self.is_worse(now, readings)
     }
 
     /// Whether a frame by itself is explained much worse than the searched one.
     pub fn is_worse(&self, now: Evidence, readings: usize) -> bool {
-        now.cost > (WORSE * self.searched).max(readings as f64)
+        now.cost > (policy::WORSE * self.searched).max(readings as f64)
     }
 }
 

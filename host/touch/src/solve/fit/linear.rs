@@ -11,6 +11,7 @@ use nalgebra::DMatrix;
 use super::balance;
 use crate::solve::answer::{Flags, SolveError, check};
 use crate::solve::fit::lambda::Spectrum;
+use crate::solve::fit::policy;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::readings::Readings;
@@ -108,17 +109,9 @@ pub(crate) fn sources_of_nodes(jacobian: &Jacobian) -> DMatrix<f64> {
     })
 }
 
-/// Readings above this share of the converter's range, or of the drive, say nothing.
-const FULL: f64 = 0.995;
-/// Readings do not fit if more than this share of them is what no image gives; of touches of any shape it was 0.07 at most, of shorted,
-/// exchanged and inverted electrodes more than 0.09.
-const OUTSIDE: f64 = 0.08;
-/// It counts where it is above so many deviations of noise.
-const OUTSIDE_NOISE: f64 = 3.0;
-
 /// Smallest reading (V) that says nothing.
 pub(crate) fn full_v(detector: &Detector) -> f64 {
-    FULL * detector.adc.full_scale_v.min(detector.drive_v)
+    policy::FULL_SHARE * detector.adc.full_scale_v.min(detector.drive_v)
 }
 
 /// Singular images that are added together: a pass over the image costs more than its sums.
@@ -206,7 +199,8 @@ impl LinearImage {
     pub fn flags(&self, readings: &Readings, spectrum: &Spectrum) -> Flags {
         let beyond = |volts: f64| volts.abs() > self.drive_v;
         let outside_v2 = spectrum.noise_v2();
-        let misfit = spectrum.outside() > OUTSIDE && outside_v2.sqrt() > OUTSIDE_NOISE * self.noise_v;
+        let misfit =
+            spectrum.outside() > policy::OUTSIDE_SHARE && outside_v2.sqrt() > policy::OUTSIDE_DEVIATIONS * self.noise_v;
         Flags {
             saturated: readings.largest_v() >= self.full_v,
             misfit: misfit || readings.volts().iter().copied().any(beyond),

@@ -1,17 +1,11 @@
 //! Contacts in an image.
 
 use crate::solve::answer::FoundContact;
+use crate::solve::fit::policy;
 use tactomo_physics::detector::{Detector, Surface};
 use tactomo_physics::forward::ImageMesh;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::space::{self, Place};
-
-/// Readings that stand for no contact: so many standard deviations of noise and quantisation for the largest of them.
-const NOISE_DEVIATIONS: f64 = 5.0;
-/// Height of a further peak over the highest, at least.
-const FURTHER_PEAK: f32 = 0.6;
-/// What stands out around a peak: above this share of it.
-const STANDS_OUT: f32 = 0.7;
 
 /// Sums that run side by side.
 const LANES: usize = 8;
@@ -39,7 +33,7 @@ impl Locator {
             neighbours: Neighbours::of(mesh),
             areas_m2: mesh.node_areas_m2.clone(),
             apart_m: (area_m2 / detector.electrodes.len() as f64).sqrt(),
-            rest_v: NOISE_DEVIATIONS * detector.adc.deviation_v(),
+            rest_v: policy::NO_CONTACT_DEVIATIONS * detector.adc.deviation_v(),
         }
     }
 
@@ -66,7 +60,7 @@ impl Locator {
 
     /// Nodes that are highest within half of `apart_m` and apart from higher peaks, the highest first.
     fn peak_nodes(&self, image: &[f32]) -> Vec<usize> {
-        let mut tops = self.tops(image, FURTHER_PEAK * highest(image));
+        let mut tops = self.tops(image, policy::FURTHER_PEAK_SHARE * highest(image));
         tops.sort_unstable_by(|&a, &b| image[b].total_cmp(&image[a]));
         let mut peaks: Vec<usize> = Vec::new();
         for node in tops {
@@ -114,7 +108,7 @@ impl Locator {
     fn contact_at(&self, image: &[f32], peak: usize, own: impl Fn(usize) -> bool) -> Option<FoundContact> {
         let near_m2 = (0.75 * self.apart_m).powi(2);
         let near = |node: usize| own(node) && self.distance_m2(node, peak) < near_m2;
-        let place = self.centroid(image, near, STANDS_OUT * image[peak])?;
+        let place = self.centroid(image, near, policy::STANDS_OUT_SHARE * image[peak])?;
         Some(FoundContact { conductance_s: self.conductance_s(image, own), ..place })
     }
 

@@ -9,6 +9,7 @@ pub(crate) mod lambda;
 pub(crate) mod least_squares;
 pub(crate) mod linear;
 pub(crate) mod locate;
+pub(crate) mod policy;
 pub(crate) mod spots;
 pub(crate) mod stiffness;
 pub(crate) mod target;

@@ -3,6 +3,7 @@
 use super::method::Method;
 use super::without::without;
 use crate::solve::answer::{ElectrodeFault, Solution, SolveError, check_count};
+use crate::solve::fit::policy;
 use crate::solve::health::watch::{ElectrodeWatch, FaultyElectrodes, Look};
 use crate::solve::methods::contacts::{ContactSettings, Contacts};
 use crate::solve::problem::Problem;
@@ -11,14 +12,8 @@ use tactomo_physics::causes::with_causes;
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 
-/// Mean square of what one contact leaves of the readings with two wires exchanged back, as a share of that before and in what noise
-/// makes, that shows an exchange.
-const HEALED: f64 = 0.1;
-const FITS: f64 = 6.0;
-/// Exchanges that are tried with fits: those that leave least in the linear theory, as long as they leave at most such a share of what is left
-/// without.
+/// Exchanges that are tried with fits: those that leave least in the linear theory.
 const TRIED: usize = 6;
-const ROUGHLY_HEALED: f64 = 0.5;
 
 /// A solver that leaves out electrodes that are open, shorted, exchanged or otherwise wrong, once it has seen that, and takes them back
 /// when they are healthy.
@@ -105,7 +100,7 @@ impl Look {
                 let others = faulty.but(&pair);
                 let kept = others.kept(problem.detector().electrodes.len());
                 let left = one_contact(problem, &kept, &others)?.left_by_one(&readings.of(&kept))?;
-                (left < FITS).then_some(pair)
+                (left < policy::HEALED_MEAN_SQUARE).then_some(pair)
             }
         }
     }
@@ -126,7 +121,7 @@ fn exchanged(problem: &Problem, faulty: &FaultyElectrodes, readings: &Readings) 
         order
     };
     let roughly = |order: &[usize]| contacts.roughly_left_by_one(&readings.of(order));
-    let most = ROUGHLY_HEALED * roughly(&kept);
+    let most = policy::HEALED_SHARE_ROUGHLY * roughly(&kept);
     let pairs = (0..kept.len()).flat_map(|i| (0..i).map(move |j| [j, i]));
     let mut tried: Vec<_> =
         pairs.map(|pair| (roughly(&exchanging(pair)), pair)).filter(|(left, _)| *left < most).collect();
@@ -142,7 +137,8 @@ fn exchanged(problem: &Problem, faulty: &FaultyElectrodes, readings: &Readings) 
     }
     let scored = tried.iter().take(TRIED).filter_map(|(_, pair)| Some((residual(&exchanging(*pair))?, *pair)));
     let (after, pair) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (after < FITS && after < HEALED * before).then_some(pair.map(|place| kept[place]))
+    (after < policy::HEALED_MEAN_SQUARE && after < policy::HEALED_SHARE * before)
+        .then_some(pair.map(|place| kept[place]))
 }
 
 #[cfg(test)]

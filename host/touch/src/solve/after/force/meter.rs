@@ -17,6 +17,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::solve::answer::FoundContact;
 use crate::solve::fit::evidence::misfit_limit;
 use crate::solve::fit::least_squares::{LeastSquares, NormalEquations, Schedule, covariance, minimise};
+use crate::solve::fit::linear::full_v;
+use crate::solve::fit::policy;
 use crate::solve::fit::spots::{LoadedSpot, Network, Solved};
 use crate::solve::problem::Problem;
 use tactomo_physics::forward::spots::SpotFields;
@@ -26,18 +28,14 @@ use tactomo_physics::readings::{Readings, Says};
 const MOST: usize = 16;
 /// Steps, and the longest of a logarithm: light contacts begin far off.
 const STEPS: usize = 40;
-const LONGEST: f64 = 2.0;
+const LONGEST_LOG: f64 = 2.0;
 /// A step below this share of its standard error, or below this (of a logarithm), is the last.
 const SMALL: f64 = 0.01;
-const SETTLED: f64 = 1e-4;
+const SETTLED_LOG: f64 = 1e-4;
 const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-9, tries: 5 };
-/// Smallest and largest conductance, in sheet conductances: what is lighter is nothing, what is firmer makes no difference.
-const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
 /// Share of what is left beyond noise that a resistance may have taken up. With places 0 to 8 mm off, on the detector and on one that is 12 %
 /// thicker and graded, 68 % of 400 presses of 0.03, 0.3 and 2 N each were off by no more than 0.18, 0.40 and 0.58 times it.
 const TAKEN: f64 = 0.6;
-/// Readings above this share of the converter's range, or of the drive, say nothing.
-const FULL: f64 = 0.995;
 
 /// Conductance of a contact with its constriction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +77,7 @@ impl Meter {
             constriction_ohm: 1.0 / (4.0 * top_s_per_m * radius_m) + 1.0 / (2.0 * PI * sheet_s),
             sheet_s,
             noise_v: detector.adc.deviation_v(),
-            full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
+            full_v: full_v(detector),
         })
     }
 
@@ -95,7 +93,9 @@ impl Meter {
         let spots: Vec<LoadedSpot> = spots.map(|spot| LoadedSpot { spot, ohm: 0.0 }).collect();
         // From what the solver found, which makes no difference but to the time.
         let start = |contact: &FoundContact| {
-            let own_s = contact.conductance_s.clamp(CONDUCTANCES[0] * self.sheet_s, CONDUCTANCES[1] * self.sheet_s);
+            let own_s = contact
+                .conductance_s
+                .clamp(policy::CONDUCTANCES_SHEETS[0] * self.sheet_s, policy::CONDUCTANCES_SHEETS[1] * self.sheet_s);
             self.held((self.constriction_ohm + 1.0 / own_s).ln())
         };
         let mut descent = Descent { meter: self, spots, readings };
@@ -166,7 +166,7 @@ impl Meter {
 
     /// The logarithm of a resistance within what makes sense.
     fn held(&self, log: f64) -> f64 {
-        let [least, most] = CONDUCTANCES.map(|sheets| (sheets * self.sheet_s).ln());
+        let [least, most] = policy::CONDUCTANCES_SHEETS.map(|sheets| (sheets * self.sheet_s).ln());
         log.clamp(-most, -least)
     }
 }
@@ -196,7 +196,8 @@ impl LeastSquares for Descent<'_> {
     }
 
     fn moved(&mut self, from: &Fit, step: &DVector<f64>) -> Option<Fit> {
-        let logs = from.logs.iter().zip(step).map(|(log, step)| self.meter.held(log + step.clamp(-LONGEST, LONGEST)));
+        let logs =
+            from.logs.iter().zip(step).map(|(log, step)| self.meter.held(log + step.clamp(-LONGEST_LOG, LONGEST_LOG)));
         self.look(logs.collect())
     }
 
@@ -210,7 +211,7 @@ impl LeastSquares for Descent<'_> {
 
     fn goes_on(&self, before: &Fit, after: &Fit, equations: &NormalEquations) -> bool {
         let moved = |k: usize| (after.logs[k] - before.logs[k]).abs();
-        (0..before.logs.len()).any(|k| moved(k) > SETTLED && moved(k) * equations.matrix[(k, k)].sqrt() > SMALL)
+        (0..before.logs.len()).any(|k| moved(k) > SETTLED_LOG && moved(k) * equations.matrix[(k, k)].sqrt() > SMALL)
     }
 }
 

@@ -9,16 +9,10 @@ use super::{
     SolveError, Target, Whole, image_evidence,
 };
 use crate::solve::before::adaptive_mean::Mean;
+use crate::solve::fit::policy;
 use crate::solve::methods::shapes::StripFit;
 use crate::solve::solver::{Hypothesis, Search};
 use tactomo_physics::readings::Readings;
-
-/// So many contacts may stand for something else, if they leave more than noise does.
-const SUSPICIOUS: usize = 3;
-
-/// By how much the score of a shape has to be lower than that of contacts on a detector that is not known exactly. Two contacts on one of
-/// those were a line by 2; lines and rings, on three others, were so by 23 or more.
-const CLEARLY: f64 = 10.0;
 
 /// Chooses the model.
 pub(super) struct AutoSearch {
@@ -52,7 +46,7 @@ impl AutoSearch {
         let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
         let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
         // What is not known of a detector makes explanations more alike than their evidence tells.
-        let margin = if target.error().is_some() || target.is_provisional() { CLEARLY } else { 0.0 };
+        let margin = if target.error().is_some() || target.is_provisional() { policy::SHAPE_GAIN } else { 0.0 };
         (shape.evidence().score() < evidence.score() - margin).then_some(shape)
     }
 
@@ -112,7 +106,8 @@ impl AutoSearch {
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
         // Of a provisional target nothing is claimed that another model could do better than.
         let noise_share = if target.is_provisional() { 1.0 } else { (target.noise_v / target.deviation_v()).powi(2) };
-        let is_doubtful = solution.contacts.len() >= SUSPICIOUS && best.may_be_better(noise_share, target.count());
+        let is_doubtful =
+            solution.contacts.len() >= policy::SUSPICIOUS_CONTACTS && best.may_be_better(noise_share, target.count());
         if !(is_doubtful || best.is_misfit(target.count())) {
             return Ok(shape);
         }

@@ -7,14 +7,12 @@ use super::{
 };
 use crate::solve::answer::{FoundContact, check};
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
+use crate::solve::fit::policy;
 use crate::solve::methods::image::Descent;
 use crate::solve::methods::shapes::StripFit;
 use crate::solve::solver::{Followed, Hypothesis, Tracker};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-
-/// After so many frames with an image, contacts and shapes are tried again; doubled each time, up to the second.
-const PATIENCE: [u32; 2] = [2, 64];
 
 /// Follows whichever model was chosen last.
 pub(super) struct AutoTracker {
@@ -56,7 +54,16 @@ impl AutoTracker {
         image: Nonlinear,
     ) -> Self {
         let (electrodes, average) = (detector.electrodes.len(), AdaptiveMean::new(detector.adc.deviation_v()));
-        Self { electrodes, average, contacts, shapes, image, answer: Answer::Contacts, skip: 0, patience: PATIENCE[0] }
+        Self {
+            electrodes,
+            average,
+            contacts,
+            shapes,
+            image,
+            answer: Answer::Contacts,
+            skip: 0,
+            patience: policy::IMAGE_PATIENCE[0],
+        }
     }
 
     /// What the errors of averaged readings are like, by what `found` or else what is followed was compared by; `None` if the model has no contacts.
@@ -152,11 +159,11 @@ impl AutoTracker {
         match &answer {
             Answer::Image(_) => {
                 self.skip = self.patience;
-                self.patience = (2 * self.patience).min(PATIENCE[1]);
+                self.patience = (2 * self.patience).min(policy::IMAGE_PATIENCE[1]);
             }
             _ => {
                 self.image.go_on_from(None);
-                (self.skip, self.patience) = (0, PATIENCE[0]);
+                (self.skip, self.patience) = (0, policy::IMAGE_PATIENCE[0]);
             }
         }
         self.answer = answer;

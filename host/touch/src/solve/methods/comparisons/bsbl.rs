@@ -34,11 +34,11 @@ const BUMPS: usize = 900;
 /// Radius of a bump (standard deviation), in mean distances of electrodes.
 const RADIUS: f64 = 0.1;
 /// What the model does not know, as a share of the readings' root mean square.
-const MODEL_ERROR: f64 = 0.003;
+const UNKNOWN_SHARE: f64 = 0.003;
 /// Steps of a frame.
 const STEPS: usize = 40;
 /// A step that changes no variance by more than this share of the largest is the last.
-const SETTLED: f64 = 1e-3;
+const SETTLED_VARIANCE: f64 = 1e-3;
 
 /// Block sparse Bayesian learning.
 pub struct Bsbl {
@@ -150,7 +150,7 @@ impl Bsbl {
                 change = change.max((next - *variance).abs());
                 *variance = if next.is_finite() { next } else { 0.0 };
             }
-            settled = change < SETTLED * largest;
+            settled = change < SETTLED_VARIANCE * largest;
             if settled {
                 break;
             }
@@ -193,7 +193,7 @@ impl Solver for Bsbl {
         let rows = self.rows(readings);
         let is_rest = self.locator.is_rest(readings);
         let size_v = (rows.iter().map(|row| row.norm_squared()).sum::<f64>()).sqrt() / rows.len() as f64;
-        let deviation_v = self.noise_v.hypot(MODEL_ERROR * size_v);
+        let deviation_v = self.noise_v.hypot(UNKNOWN_SHARE * size_v);
         let (amounts, settled) =
             if is_rest { (DVector::zeros(self.shapes.len()), true) } else { self.learn(&rows, deviation_v) };
         let image = self.image(&amounts);

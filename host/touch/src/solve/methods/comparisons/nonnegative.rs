@@ -25,7 +25,7 @@ const STEPS: usize = 40;
 /// Halvings of a step at most.
 const HALVINGS: usize = 20;
 /// A gradient this small against the readings is none.
-const SETTLED: f64 = 1e-9;
+const SETTLED_GRADIENT: f64 = 1e-9;
 
 /// Linear image in which no conductance is negative.
 pub struct Nonnegative {
@@ -94,7 +94,7 @@ impl Nonnegative {
     fn minimise(&self, b: &DVector<f64>) -> (Dual, bool) {
         let mut p = b.clone();
         let mut dual = self.dual(p.clone(), b);
-        let enough = SETTLED * b.norm();
+        let enough = SETTLED_GRADIENT * b.norm();
         for _ in 0..STEPS {
             if dual.gradient.norm() <= enough {
                 return (dual, true);

@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use self::slopes::Slopes;
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::least_squares::{Damping, NormalEquations, Schedule, Trial, covariance};
+use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
 use tactomo_physics::detector::Detector;
@@ -28,8 +29,6 @@ use tactomo_physics::space::{self, Place};
 /// of the crowded current under the disc of radius `r0`, is found from the derivatives by conductance and radius. In `A` and `r` the
 /// readings are nearly linear, and the valley of fits that are nearly as good is straight.
 pub(super) const PARAMETERS: usize = 4;
-/// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
-pub(super) const CONDUCTANCE_DEVIATION: f64 = 4.0;
 /// Longest way in a step, in radii, and longest changes of the logarithms of a conductance and of a radius: where contacts are too
 /// few, a fit would make them as wide as it can, at the highest cost.
 const LONGEST_WAY: f64 = 2.0;
@@ -48,8 +47,6 @@ const TRUE: f64 = 0.5;
 /// is an image's business.
 const WIDEST: f64 = 0.6;
 const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-7, tries: 6 };
-/// Smallest and largest conductance, in sheet conductances.
-pub(super) const CONDUCTANCES: [f64; 2] = [1e-6, 300.0];
 /// Smallest radius, in usual ones.
 const NARROWEST: f64 = 0.05;
 
@@ -283,7 +280,7 @@ impl DiscFitter<'_> {
         for (k, contact) in slopes.at.iter().enumerate() {
             let place = contact.radius_m * contact.radius_m / self.place_variance_m2;
             (0..2).for_each(|i| normal[(PARAMETERS * k + i, PARAMETERS * k + i)] += place);
-            let weight = CONDUCTANCE_DEVIATION.powi(-2);
+            let weight = policy::CONDUCTANCE_DEVIATION.powi(-2);
             let [by_first, by_second] = by_parameters(slopes.constriction[k]);
             let (c, r) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
             normal[(c, c)] += by_first * by_first * weight;
@@ -301,7 +298,7 @@ impl DiscFitter<'_> {
         let mut gradient: Vec<_> = fit.slopes.by.iter().map(|slope| dot(slope, &residuals)).collect();
         for (k, contact) in fit.contacts.iter().enumerate() {
             let [conductance, radius] = self.unusual(contact);
-            let pull = conductance / CONDUCTANCE_DEVIATION;
+            let pull = conductance / policy::CONDUCTANCE_DEVIATION;
             let [by_first, by_second] = by_parameters(fit.slopes.constriction[k]);
             gradient[PARAMETERS * k + 2] -= by_first * pull;
             gradient[PARAMETERS * k + 3] -= by_second * pull + radius / self.radius_deviation;
@@ -312,7 +309,7 @@ impl DiscFitter<'_> {
     /// How far a contact's conductance and radius are from what is usual, in standard deviations.
     fn unusual(&self, contact: &Contact) -> [f64; 2] {
         [
-            (contact.conductance_s / self.sheet_s).ln() / CONDUCTANCE_DEVIATION,
+            (contact.conductance_s / self.sheet_s).ln() / policy::CONDUCTANCE_DEVIATION,
             (contact.radius_m / self.usual_radius_m).ln() / self.radius_deviation,
         ]
     }
@@ -361,7 +358,7 @@ impl DiscFitter<'_> {
 
     /// A contact with conductance and radius held within what makes sense.
     pub fn held(&self, contact: Contact) -> Contact {
-        let [least, most] = CONDUCTANCES.map(|sheets| sheets * self.sheet_s);
+        let [least, most] = policy::CONDUCTANCES_SHEETS.map(|sheets| sheets * self.sheet_s);
         Contact {
             conductance_s: contact.conductance_s.clamp(least, most),
             radius_m: contact.radius_m.clamp(NARROWEST * self.usual_radius_m, self.widest_m),

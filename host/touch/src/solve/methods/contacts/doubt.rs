@@ -3,12 +3,7 @@
 //! Rows move contacts that were found. Where there are others, they are searched in the latest of all rows, which were read over 25 ms: of a hand
 //! that moves these contradict each other, and the search finds what fits none of them. Then frames that were read at once are needed.
 
-/// How much more rows that do not fit count than those that do: noise alone does not make them, and those of the grounds that are scanned most
-/// fit long before the others.
-const WEIGHT: f64 = 5.0;
-/// Time for which rows do not fit, so weighed, less that for which they do, from which they are not enough (s): that of 60 ms of which none fits,
-/// in which all were read twice, and searched.
-const ENOUGH_S: f64 = 0.3;
+use crate::solve::fit::policy;
 
 /// How long rows have not fitted of late (s).
 #[derive(Clone, Copy, Debug, Default)]
@@ -17,18 +12,18 @@ pub(super) struct Doubt(f64);
 impl Doubt {
     /// Rows that come `elapsed_s` (s) after those before fit what is followed, or do not.
     pub fn rows(&mut self, fit: bool, elapsed_s: f64) {
-        let change_s = if fit { -elapsed_s } else { WEIGHT * elapsed_s };
-        self.0 = (self.0 + change_s).clamp(0.0, 2.0 * ENOUGH_S);
+        let change_s = if fit { -elapsed_s } else { policy::UNFIT_WEIGHT * elapsed_s };
+        self.0 = (self.0 + change_s).clamp(0.0, 2.0 * policy::UNFIT_S);
     }
 
     /// A whole frame fits, or does not.
     pub fn whole(&mut self, fits: bool) {
-        self.0 = if fits { 0.0 } else { ENOUGH_S };
+        self.0 = if fits { 0.0 } else { policy::UNFIT_S };
     }
 
     /// Whether whole frames are needed.
     pub fn needs_whole(self) -> bool {
-        self.0 >= ENOUGH_S
+        self.0 >= policy::UNFIT_S
     }
 }
 

@@ -19,7 +19,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::Cholesky;
 
-use super::discs::{CONDUCTANCE_DEVIATION, DiscFit, PARAMETERS};
+use super::discs::{DiscFit, PARAMETERS};
+use crate::solve::fit::policy;
 
 /// What is known of contacts before anything is read.
 #[derive(Clone, Copy, Debug)]
@@ -29,10 +30,6 @@ pub(super) struct Prior {
     /// Standard deviation of the logarithm of a radius.
     pub radius_deviation: f64,
 }
-
-/// One more contact is less likely than one fewer, by the logarithm of this factor, before anything is read: scenes of few contacts are
-/// more common, and places that are looked at are chosen.
-const FEWER: f64 = 1.5;
 
 impl Prior {
     /// Variance of each coordinate of a place that is anywhere on a square of the area (m2).
@@ -45,13 +42,13 @@ impl Prior {
         let Some(factor) = Cholesky::new(fit.normal.clone()) else { return f64::NEG_INFINITY };
         let ln_determinant: f64 = 2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let count = fit.contacts.len();
-        let peak = -self.area_m2.ln() - (CONDUCTANCE_DEVIATION * self.radius_deviation * TAU).ln();
+        let peak = -self.area_m2.ln() - (policy::CONDUCTANCE_DEVIATION * self.radius_deviation * TAU).ln();
         // Places are in units of their own.
         let units: f64 = (0..count).map(|k| 2.0 * fit.along(k).1.ln()).sum();
         let from_logs: f64 = (0..count).map(|k| fit.constriction(k).ln_1p()).sum();
         let orders: f64 = (1..=count).map(|k| (k as f64).ln()).sum();
         -0.5 * (fit.cost + fit.known)
-            + count as f64 * (peak - FEWER)
+            + count as f64 * (peak - policy::FEWER_NATS)
             + units
             + from_logs
             + orders

@@ -12,14 +12,13 @@ use super::discs::DiscFit;
 use super::search::COLD;
 use super::{Better, ContactFinder, ContactHypothesis};
 use crate::solve::fit::approximation::{ApproximationError, Linearised};
+use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use tactomo_physics::forward::readings_v;
 use tactomo_physics::scene::Contact;
 
 /// How often a fit and what its readings may be off by are brought nearer to each other, at most.
 const RENEWALS: usize = 6;
-/// Mean square of what a fit leaves, above which it is the contacts that are wrong.
-const HOPELESS: f64 = 5.0;
 /// How often more contacts are looked for, at most.
 const GROWTHS: usize = 3;
 
@@ -92,7 +91,7 @@ impl ContactFinder {
         for renewal in 0..RENEWALS {
             let Informed { hypothesis, target } = &found;
             // What contacts are missing for says nothing of the detector.
-            let is_hopeless = hypothesis.fit.cost > HOPELESS * target.count() as f64;
+            let is_hopeless = hypothesis.fit.cost > policy::WRONG_MEAN_SQUARE * target.count() as f64;
             if is_hopeless && renewal > 0 {
                 break;
             }

@@ -2,6 +2,7 @@
 
 use super::discs::{DiscFit, Effort, PARAMETERS};
 use super::{ContactFinder, ContactHypothesis};
+use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use tactomo_physics::scene::Contact;
 
@@ -9,10 +10,6 @@ use tactomo_physics::scene::Contact;
 const WARM: Effort = Effort { steps: 2, gain: 0.2, share: 0.0 };
 /// From some frames ago.
 const CAUGHT_UP: Effort = Effort { steps: 6, gain: 0.2, share: 0.0 };
-/// A contact is lost when the logarithm of its conductance is known no better than this, and it is light.
-const WEAK: f64 = 0.3;
-/// Share of the conductance of the frame before, below which a contact may be let go.
-const LIFTED: f64 = 0.6;
 
 impl ContactFinder {
     /// An explanation of some frames ago, brought to this one.
@@ -63,7 +60,8 @@ impl ContactFinder {
     /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each
     /// step, however light the contact is to become.
     fn without_lifted(&self, before: &DiscFit, fit: DiscFit, target: &Target) -> DiscFit {
-        let is_lighter = |(now, before): &(&Contact, &Contact)| now.conductance_s < LIFTED * before.conductance_s;
+        let is_lighter =
+            |(now, before): &(&Contact, &Contact)| now.conductance_s < policy::LIFTED_SHARE * before.conductance_s;
         let kept = fit.contacts.iter().zip(&before.contacts).filter(|pair| !is_lighter(pair)).map(|(now, _)| *now);
         let kept: Vec<_> = kept.collect();
         if kept.is_empty() || kept.len() == fit.contacts.len() {
@@ -81,7 +79,8 @@ impl ContactFinder {
         let covariance = fit.covariance();
         let is_weak = |k: &usize| {
             let log = PARAMETERS * k + 2;
-            let is_unsure = covariance.as_ref().is_none_or(|all| all[(log, log)] > WEAK * WEAK);
+            let is_unsure =
+                covariance.as_ref().is_none_or(|all| all[(log, log)] > policy::WEAK_DEVIATION * policy::WEAK_DEVIATION);
             is_unsure && fit.contacts[*k].conductance_s < self.sheet_s
         };
         (0..fit.contacts.len()).filter(is_weak).collect()

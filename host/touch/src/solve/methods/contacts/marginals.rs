@@ -7,7 +7,8 @@
 //! beyond a spot are its second moments: against the finest slab, the sum of squares of a contact of 2.5 mm and 3 sheet conductances
 //! on `square-60` is 0.2 to 0.35 times the square of the change of that square (mm2) from 2 to 4.6 mm.
 
-use super::discs::{CONDUCTANCE_DEVIATION, DiscFit, PARAMETERS, by_parameters};
+use super::discs::{DiscFit, PARAMETERS, by_parameters};
+use crate::solve::fit::policy;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 /// Points along each parameter, and how far they reach (standard deviations).
@@ -40,7 +41,7 @@ impl Usual {
         let of = |i: usize, j: usize| covariance[(start + i, start + j)];
         let posterior = Matrix2::new(of(0, 0), of(0, 1), of(1, 0), of(1, 1));
         let constriction = fit.constriction(k);
-        let weights = [CONDUCTANCE_DEVIATION.powi(-2), self.radius_deviation.powi(-2)];
+        let weights = [policy::CONDUCTANCE_DEVIATION.powi(-2), self.radius_deviation.powi(-2)];
         // Of the likelihood alone: without the prior's curvature, and with what pulls against the prior's slope.
         let by_conductance = Vector2::from(by_parameters(constriction));
         let by_radius = Vector2::new(0.0, 1.0);

@@ -31,7 +31,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 
-use self::discs::{CONDUCTANCES, DiscFit, PARAMETERS};
+use self::discs::{DiscFit, PARAMETERS};
 use self::evidence::Prior;
 use self::marginals::{Logs, Usual};
 use self::scan::Scan;
@@ -42,6 +42,8 @@ use crate::solve::before::adaptive_mean;
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::fit::approximation::ApproximationError;
 use crate::solve::fit::evidence::{Evidence, misfit_limit};
+use crate::solve::fit::linear::full_v;
+use crate::solve::fit::policy;
 use crate::solve::fit::spots::SpotModel;
 use crate::solve::fit::target::{Errors, Target};
 use crate::solve::problem::Problem;
@@ -51,20 +53,11 @@ use tactomo_physics::readings::Readings;
 
 /// Places of the scan.
 const SCAN_PLACES: usize = 600;
-/// Conductance of a contact in sheet conductances above which it is taken as saturated.
-const SATURATED: f64 = 270.0;
-/// Readings above this share of the converter's range, or of the drive, say nothing.
-const FULL: f64 = 0.995;
-/// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
-const KNOWN: f64 = 0.2;
 
 /// Error of a detector as built, as a share of the largest reading, as long as no more is known of it: one contact leaves 0.044 in the
 /// median of 100 presses on ten detectors drawn from the usual tolerances of `square-60`. With 0.05, places are off by 1.0 standard
 /// error in the median, and 95 % by less than 3.3.
-const UNKNOWN: f64 = 0.05;
-
-/// Factor on the standard errors of places from which a calibration is worth to be asked for.
-const WORTH: f64 = 2.0;
+const UNKNOWN_DETECTOR_SHARE: f64 = 0.05;
 
 /// How contacts are fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,10 +157,10 @@ impl ContactFinder {
                 noise_v: detector.adc.deviation_v(),
                 rounding_v: adaptive_mean::rounding_v(&detector.adc),
                 model: settings.model_error,
-                detector: (!detector.unknowns().directions.is_empty()).then_some(UNKNOWN),
+                detector: (!detector.unknowns().directions.is_empty()).then_some(UNKNOWN_DETECTOR_SHARE),
                 pad: settings.pad_error,
                 drive_v: detector.drive_v,
-                full_v: FULL * detector.adc.full_scale_v.min(detector.drive_v),
+                full_v: full_v(detector),
                 converters: detector.converters.clone().into(),
                 converter_of: detector.electrodes.iter().map(|pad| pad.converter).collect(),
             },
@@ -280,7 +273,7 @@ impl ContactFinder {
             logs.iter().enumerate().map(|(k, logs)| self.contact(fit, k, covariance.as_ref().zip(*logs))).collect();
         self.add_unseen_scale(fit, &mut contacts);
         // A standard error more and it is as good as perfect.
-        let perfect = (SATURATED * self.sheet_s).ln();
+        let perfect = (policy::SATURATED_SHEETS * self.sheet_s).ln();
         let is_perfect = |logs: &Option<Logs>| {
             logs.is_some_and(|Logs { conductance: [mean, deviation], .. }| mean + deviation > perfect)
         };
@@ -306,7 +299,8 @@ impl ContactFinder {
             let conductance_s = conductance_s * logs.conductance[1];
             Uncertainty { conductance_s, x_m: place.x_m.min(most_m[0]), y_m: place.y_m.min(most_m[1]), ..place }
         });
-        let radius = known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < KNOWN);
+        let radius =
+            known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < policy::KNOWN_RADIUS_DEVIATION);
         FoundContact {
             z_m: contact.z_m,
             apparent_conductance_s: Some(contact.conductance_s / (1.0 + fit.constriction(k))),
@@ -338,14 +332,14 @@ impl ContactFinder {
             (0..fit.contacts.len()).map(of).map(|place| place.x_m.max(place.y_m)).fold(0.0, f64::max)
         };
         let [now_m, calibrated_m] = [&fit.covariance()?, &known].map(largest_m);
-        (is_off && now_m > WORTH * calibrated_m).then_some(Calibrated { now_m, calibrated_m })
+        (is_off && now_m > policy::CALIBRATION_WORTH * calibrated_m).then_some(Calibrated { now_m, calibrated_m })
     }
 
     /// What the readings say of a contact's conductance and radius.
     fn logs(&self, fit: &DiscFit, k: usize, covariance: Option<&DMatrix<f64>>) -> Option<Logs> {
         let usual = Usual {
             conductance_s: self.sheet_s,
-            most_s: CONDUCTANCES[1] * self.sheet_s,
+            most_s: policy::CONDUCTANCES_SHEETS[1] * self.sheet_s,
             radius_m: self.settings.radius_m,
             radius_deviation: self.settings.radius_deviation,
         };

@@ -19,6 +19,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::discs::PARAMETERS;
+use crate::solve::fit::policy;
 
 /// How a contact may change: standard deviations of the way (m/s), and of the logarithms of its resistance and radius (1/s), as if each frame
 /// were independent of the one before.
@@ -43,8 +44,6 @@ const MOTIONS: [Motion; 7] = [
 ];
 /// Time over which likelihoods are compared (s).
 const MEMORY_S: f64 = 0.02;
-/// A filter less likely than the best by this logarithm goes on from it: noise alone does that to the right one in 1 of 400.
-const BEHIND: f64 = 15.0;
 /// Longest time between frames that a contact is carried over (s).
 const LONGEST_S: f64 = 0.1;
 
@@ -148,8 +147,8 @@ impl MultipleModels {
         self.best = likelihoods.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(best, _)| best);
         let believed = self.filters[self.best].clone();
         for filter in &mut self.filters {
-            if filter.likelihood < believed.likelihood - BEHIND {
-                let likelihood = believed.likelihood - BEHIND;
+            if filter.likelihood < believed.likelihood - policy::BEHIND_NATS {
+                let likelihood = believed.likelihood - policy::BEHIND_NATS;
                 *filter = Filter { likelihood, ..believed.clone() };
             }
             filter.mean -= &believed.mean;

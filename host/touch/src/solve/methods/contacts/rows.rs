@@ -8,6 +8,7 @@ use super::multiple_models::{MultipleModels, Rows};
 use super::systematic_error::SystematicError;
 use super::{ContactFinder, ContactHypothesis};
 use crate::solve::fit::dot::dot;
+use crate::solve::fit::policy;
 use crate::solve::fit::target::{Errors, Target};
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
@@ -17,14 +18,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 /// Share of what readings are off by that remains when a contact has moved on.
 const REMAINS: f64 = 0.2;
 /// Steps of a frame at most, and the way, in radii or logarithms, that needs no further one.
-const STEPS: usize = 3;
-const SMALL: f64 = 0.1;
-/// Standard deviations of the sum of squares over what noise leaves, at which rows do not fit, and frames in a row after which a search is
-/// worth it: a contact that comes leaves hundreds.
-const UNFIT: f64 = 5.0;
-const FRAMES: u32 = 3;
-/// Logarithm of the odds by which frames of late have to speak for no contact before it is let go.
-const GONE: f64 = 12.0;
+const FRAME_STEPS: usize = 3;
+const SMALL_WAY: f64 = 0.1;
 
 /// Of a contact that has just come.
 const GLIMPSE: Effort = Effort { steps: 4, gain: 1.0, share: 0.05 };
@@ -102,14 +97,14 @@ impl ContactFinder {
         }
         let Some(mut fit) = self.moved_by(last.fit.clone(), &mut state.filters, target) else { return Step::Lost };
         let counted = target.at(&fit.volts).count() as f64;
-        let noise = counted + UNFIT * (2.0 * counted).sqrt();
+        let noise = counted + policy::MISFIT_DEVIATIONS * (2.0 * counted).sqrt();
         state.unfit = if fit.cost > noise { state.unfit + 1 } else { 0 };
         // What is gone is told by the rows alone: what they say for it is what a contact of that kind would have taken off.
         state.gone = (state.gone + 0.5 * (fit.cost - target.cost_of_nothing())).max(0.0);
-        if state.gone > GONE || self.is_vanishing(&fit) {
+        if state.gone > policy::GONE_NATS || self.is_vanishing(&fit) {
             return Step::Gone;
         }
-        let search = state.unfit >= FRAMES;
+        let search = state.unfit >= policy::UNFIT_FRAMES;
         state.systematic_error.add(&fit, target, &self.errors, self.spacing_m);
         let known = state.filters.information();
         let stays = state.systematic_error.covariance(&fit);
@@ -129,14 +124,14 @@ impl ContactFinder {
 
     /// Whether what is followed has become so light that it cannot be told from nothing.
     fn is_vanishing(&self, fit: &DiscFit) -> bool {
-        let least_s = VANISHING * self.sheet_s;
+        let least_s = policy::VANISHING_SHEETS * self.sheet_s;
         fit.contacts.iter().all(|contact| contact.conductance_s < least_s)
     }
 
     /// A fit moved to what its filters believe after the rows of a target.
     fn moved_by(&self, mut fit: DiscFit, filters: &mut MultipleModels, target: &Target) -> Option<DiscFit> {
         let fitter = self.disc_fitter();
-        for step in 0..STEPS {
+        for step in 0..FRAME_STEPS {
             let units_m = fit.units_m();
             let mut tried = filters.clone();
             let way = tried.update(&rows_of(&fit, target))?;
@@ -144,7 +139,7 @@ impl ContactFinder {
             let next = fitter.next(&fit, contacts, target)?;
             // A step that was too long or led beyond what makes sense was cut: the filters know what is left of it.
             let gone = DVector::from_vec(fit.way_to(&next.contacts));
-            if step + 1 == STEPS || way.amax() < SMALL {
+            if step + 1 == FRAME_STEPS || way.amax() < SMALL_WAY {
                 tried.shift(&(&gone - way));
                 tried.rescale(&units_m, &next.units_m());
                 *filters = tried;
@@ -158,9 +153,6 @@ impl ContactFinder {
         None
     }
 }
-
-/// Conductance, in sheet conductances, below which nothing is told from a contact: a hundredth of the lightest that is found well.
-const VANISHING: f64 = 1e-5;
 
 /// What the rows of a target say at the contacts of a fit.
 fn rows_of(fit: &DiscFit, target: &Target) -> Rows {

@@ -167,7 +167,7 @@ impl Scan {
                 let determinant = own_i * own_j - cross * cross;
                 let gain = looks.gain * (a * along_i + b * along[j]) / determinant;
                 if gain > floor {
-                    floor = floor.max(KEPT * gain);
+                    floor = floor.max(KEPT_GAIN * gain);
                     let contacts = vec![(places[i], a / determinant), (places[j], b / determinant)];
                     all.push(Candidate { contacts, gain });
                 }
@@ -250,4 +250,4 @@ fn paired(places: usize) -> Vec<usize> {
 }
 
 /// Pairs with less than this share of the best gain so far are not kept.
-const KEPT: f64 = 0.95;
+const KEPT_GAIN: f64 = 0.95;

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use super::discs::{DiscFit, DiscFitter, Effort, place_m};
 use super::scan::Looks;
 use super::{Better, ContactFinder, ContactHypothesis};
+use crate::solve::fit::policy;
 use crate::solve::fit::spots::LoadedSpot;
 use crate::solve::fit::target::Target;
 use tactomo_physics::readings::Readings;
@@ -24,30 +25,12 @@ const RELEASED: Effort = Effort { steps: 6, gain: 0.2, share: 0.02 };
 /// Starts of one more contact, and how many of them go on.
 const STARTS: usize = 4;
 const FINALISTS: usize = 2;
-/// Gain in the sum of squares, in the linear theory, below which one more contact is not tried.
-const WORTH_A_TRY: f64 = 8.0;
-/// The same for there being any contact at all: noise alone has 1 in 10^7 frames above it.
-const WORTH_FIRST: f64 = 60.0;
-/// Radii that contacts may have while their number is not yet right, in usual ones: too few contacts would be made as wide as may be.
-const PLAUSIBLE: f64 = 3.0;
-/// Starts around a single contact, and the mean square of what it leaves up to which they are tried.
+/// Starts around a single contact.
 const BESIDE: usize = 8;
-const NEARLY: f64 = 5.0;
-/// Radius, in usual ones, above which a contact may be two, and the directions that it is split along.
-const WIDE: f64 = 1.6;
+/// Directions along which a contact that may be two is split.
 const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]];
-/// Standard deviations of the sum of squares over what noise leaves, where another set of contacts is looked for, and by how much the
-/// logarithm of the evidence for it has to be higher.
-const DOUBTFUL: f64 = 1.5;
-const CLEARLY: f64 = 0.5;
-/// Mean square of what a fit with the rough model leaves, where no other start is tried.
-const EXPLAINS: f64 = 1.5;
-/// Mean square of what a fit of wide contacts leaves with the rough model, above which it is wrong with any.
-const HOPELESS: f64 = 50.0;
 /// Places of two fits that are so near, in radii, are taken for one.
 const ALIKE: f64 = 0.3;
-/// Contacts nearer to each other than so many sums of their radii may be one.
-const TOUCHING: f64 = 2.0;
 
 impl ContactFinder {
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
@@ -73,7 +56,7 @@ impl ContactFinder {
     /// Whether there is any contact at all, as far as single ones tell.
     pub fn stands_out(&self, target: &Target) -> bool {
         let looks = self.looks(target);
-        self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= WORTH_FIRST)
+        self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= policy::FIRST_GAIN)
     }
 
     /// What explains a frame of a detector that is as described, from what explains it so far if that leads there, else from nothing. Each better
@@ -110,19 +93,19 @@ impl ContactFinder {
     pub(super) fn begun(&self, target: &Target) -> Option<Vec<Contact>> {
         let looks = self.looks(target);
         let best = self.scan.ones(&looks, 1, self.apart_m()).into_iter().next()?;
-        (best.gain >= WORTH_FIRST).then(|| self.discs_of(&self.scan.start(&looks, &best)))
+        (best.gain >= policy::FIRST_GAIN).then(|| self.discs_of(&self.scan.start(&looks, &best)))
     }
 
     /// The best single contact, if anything stands out.
     pub(super) fn one(&self, target: &Target) -> Option<DiscFit> {
         let looks = self.looks(target);
         let ones = self.scan.ones(&looks, STARTS, self.apart_m());
-        if ones.first().is_none_or(|best| best.gain < WORTH_FIRST) {
+        if ones.first().is_none_or(|best| best.gain < policy::FIRST_GAIN) {
             return None;
         }
         let starts = ones.iter().map(|candidate| self.discs_of(&self.scan.start(&looks, candidate)));
         let best = self.best_of(starts.collect(), target)?;
-        if best.cost > NEARLY * target.count() as f64 {
+        if best.cost > policy::WRONG_MEAN_SQUARE * target.count() as f64 {
             return Some(best);
         }
         let beside = self.best_of(self.beside(&best.contacts[0], best.along(0).0), target);
@@ -131,14 +114,14 @@ impl ContactFinder {
 
     /// A fit with radii free, if it is at the widest that is plausible; else what it is.
     fn released(&self, fit: DiscFit, target: &Target) -> DiscFit {
-        let is_wide = |contact: &Contact| contact.radius_m > 0.99 * PLAUSIBLE * self.settings.radius_m;
+        let is_wide = |contact: &Contact| contact.radius_m > 0.99 * policy::PLAUSIBLE_RADII * self.settings.radius_m;
         if !fit.contacts.iter().any(is_wide) {
             return fit;
         }
         let full = self.disc_fitter();
         let rough = DiscFitter { model: &*self.rough, ..full };
         let free = rough.fit(fit.contacts.clone(), target, ROUGH);
-        let free = free.filter(|free| free.cost < HOPELESS * target.count() as f64);
+        let free = free.filter(|free| free.cost < policy::WRONG_WIDE_MEAN_SQUARE * target.count() as f64);
         let free = free.and_then(|free| full.fit(free.contacts, target, RELEASED));
         free.unwrap_or(fit)
     }
@@ -206,7 +189,7 @@ impl ContactFinder {
         let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
         let looks = self.scan.beside(&self.spot_model, &*self.fields, &spots, fit, target);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
-        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > WORTH_A_TRY);
+        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::ONE_MORE_GAIN);
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
             return None;
         }
@@ -222,7 +205,7 @@ impl ContactFinder {
     fn splits(&self, fit: &DiscFit) -> Vec<Vec<Contact>> {
         let widest =
             (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
-        let is_wide = |k: &usize| fit.contacts[*k].radius_m > WIDE * self.settings.radius_m;
+        let is_wide = |k: &usize| fit.contacts[*k].radius_m > policy::TWO_RADII * self.settings.radius_m;
         let Some(k) = widest.filter(is_wide) else { return Vec::new() };
         let wide = fit.contacts[k];
         let (along, _) = fit.along(k);
@@ -245,9 +228,9 @@ impl ContactFinder {
     /// Whether a fit leaves a little more than noise should, or needs a contact as wide as may be.
     pub(super) fn is_doubtful(&self, fit: &DiscFit, target: &Target) -> bool {
         let freedom = self.freedom(fit, target);
-        let widest_m = 0.95 * PLAUSIBLE * self.settings.radius_m;
+        let widest_m = 0.95 * policy::PLAUSIBLE_RADII * self.settings.radius_m;
         let is_wide = fit.contacts.len() > 1 && fit.contacts.iter().any(|contact| contact.radius_m > widest_m);
-        fit.cost > freedom + DOUBTFUL * (2.0 * freedom).sqrt() || is_wide
+        fit.cost > freedom + policy::OTHER_SET_DEVIATIONS * (2.0 * freedom).sqrt() || is_wide
     }
 
     /// A more likely fit with one of the contacts taken away and put where it explains most.
@@ -263,7 +246,7 @@ impl ContactFinder {
             let rough = DiscFitter { model: &*self.rough, ..self.plausible_fitter() };
             let fewer = rough.fit(others, target, FIRST)?;
             let other = self.one_more(&fewer, Vec::new(), target)?;
-            (self.evidence(&other) > evidence + CLEARLY).then_some(other)
+            (self.evidence(&other) > evidence + policy::OTHER_SET_NATS).then_some(other)
         })
     }
 
@@ -291,7 +274,7 @@ impl ContactFinder {
         let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (a, b)));
         let merged = pairs.filter_map(|(a, b)| {
             let [one, other] = [a, b].map(|k| fit.contacts[k]);
-            let near_m = TOUCHING * (one.radius_m + other.radius_m);
+            let near_m = policy::TOUCHING_SUMS * (one.radius_m + other.radius_m);
             (space::distance(place_m(&one), place_m(&other)) < near_m).then(|| {
                 let mut merged = without(a);
                 merged[b] = self.merged(&one, &other);
@@ -325,7 +308,7 @@ impl ContactFinder {
         let by_objective = |a: &DiscFit, b: &DiscFit| objective(a).total_cmp(&objective(b));
         let mut fits = Vec::with_capacity(starts.len());
         for fit in starts.into_iter().filter_map(|start| rough.fit(start, target, FIRST)) {
-            let explains = fit.cost < EXPLAINS * target.count() as f64;
+            let explains = fit.cost < policy::EXPLAINED_MEAN_SQUARE * target.count() as f64;
             fits.push(fit);
             if explains {
                 break;
@@ -383,7 +366,7 @@ impl ContactFinder {
 
     fn plausible_fitter(&self) -> DiscFitter<'_> {
         let fitter = self.disc_fitter();
-        DiscFitter { widest_m: fitter.widest_m.min(PLAUSIBLE * self.settings.radius_m), ..fitter }
+        DiscFitter { widest_m: fitter.widest_m.min(policy::PLAUSIBLE_RADII * self.settings.radius_m), ..fitter }
     }
 
     pub(super) fn disc_fitter(&self) -> DiscFitter<'_> {

@@ -15,6 +15,7 @@ use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::before::latest::Latest;
 use crate::solve::fit::approximation::ApproximationError;
 use crate::solve::fit::evidence::Evidence;
+use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
 use crate::solve::solver::{
@@ -22,11 +23,6 @@ use crate::solve::solver::{
 };
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
-
-/// The sum of squares may be this times what the last search would leave of as many frames.
-const WORSE: f64 = 1.3;
-/// A scene that has not changed is searched again with so many times the frames: many frames show what one frame's noise hides.
-const MORE: usize = 2;
 
 /// Fits contacts.
 pub struct Contacts {
@@ -184,7 +180,7 @@ impl ContactTracker {
         self.is_stale = false;
         let Some(found) = self.finder.without_weak(moved, target) else { return self.finder.stands_out(target) };
         let search = found.fit.cost > self.enough(&found.fit, target)
-            || target.frames >= MORE * self.searched.frames
+            || target.frames >= policy::MORE_FRAMES * self.searched.frames
             || target.is_stale(&found.fit.volts)
             || self.finder.is_outdated(target);
         self.last = Some(found);
@@ -225,7 +221,7 @@ impl ContactTracker {
     /// Sum of squares up to which what is followed explains the mean of some frames: what is not noise stands out by their number.
     fn enough(&self, fit: &DiscFit, target: &Target) -> f64 {
         let more = target.frames as f64 / self.searched.frames.max(1) as f64;
-        WORSE * (self.finder.freedom(fit, target) + more * self.searched.excess)
+        policy::WORSE * (self.finder.freedom(fit, target) + more * self.searched.excess)
     }
 
     /// What is left of the frames that were followed last, and what that takes; of nothing, all of it.

@@ -19,10 +19,10 @@ use tactomo_physics::space::{Place, distance};
 /// Every so many frames it is reckoned, so that each row of a plan of 32 frames has its turn; and what is left of that after each: about the
 /// time over which a still contact is averaged.
 const LOOKED_AT: u32 = 7;
-const KEPT: f64 = 0.97;
+const KEPT_SHARE: f64 = 0.97;
 /// Share of a model's own error that each reading has by itself. Of `square-60` the slab that is inverted and the finest are apart by
 /// 0.00002 to 0.00006 of the largest reading, but for pads and contact; taken as 0.0003 for any detector.
-const OWN: f64 = 0.3;
+const OWN_SHARE: f64 = 0.3;
 /// Way, in distances of electrodes, after which what readings are off by is no longer what was found. On detectors as built places are off by
 /// 0.12 mm where they were found, and by 0.3 and 0.5 mm a sixth and a third of a distance from there.
 const MOVED_ON: f64 = 0.2;
@@ -75,8 +75,8 @@ impl SystematicError {
         let pulls = pulls(fit, target, &units);
         let slopes = DMatrix::from_fn(pulls.ncols(), units.len(), |reading, i| fit.slopes_v()[i][reading] / units[i]);
         let frames = f64::from(LOOKED_AT);
-        self.information = KEPT * &self.information + frames * &pulls * slopes;
-        self.pulls = KEPT * &self.pulls + frames * pulls;
+        self.information = KEPT_SHARE * &self.information + frames * &pulls * slopes;
+        self.pulls = KEPT_SHARE * &self.pulls + frames * pulls;
         if let Some(covariance) = self.reckoned(fit, target, errors, spacing_m) {
             self.covariance = covariance;
         }
@@ -92,7 +92,7 @@ impl SystematicError {
         }
         let n = fit.volts.len().isqrt();
         let by_patterns = &gains * errors.patterns_v(&Readings::from_fn(n, |g, e| fit.volts[g * n + e]));
-        let own = if target.is_provisional() { 1.0 } else { OWN };
+        let own = if target.is_provisional() { 1.0 } else { OWN_SHARE };
         Some(by_each(own) + &by_patterns * by_patterns.transpose())
     }
 

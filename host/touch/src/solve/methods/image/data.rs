@@ -12,7 +12,7 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::ContactFields;
 
 /// What is added to the squares on diagonals, as a share: readings that are left out may leave an element of `Z` unknown.
-const SMALLEST: f64 = 1e-12;
+const LEAST_DIAGONAL: f64 = 1e-12;
 
 /// Readings at some contacts, reduced to independent data, each of deviation 1.
 pub(super) struct Data {
@@ -64,7 +64,7 @@ impl Data {
                 pulls[g] += by_load(g, e) * left(g, e);
             }
         }
-        let floor = SMALLEST * squares.amax().max(f64::MIN_POSITIVE);
+        let floor = LEAST_DIAGONAL * squares.amax().max(f64::MIN_POSITIVE);
         for (i, j) in (0..n).flat_map(|j| (0..j).map(move |i| (i, j))) {
             let weight = (own(i, j).powi(2) + own(j, i).powi(2) + floor).sqrt();
             let diagonal = [own(i, j) * by_load(i, j) / weight, own(j, i) * by_load(j, i) / weight];

@@ -16,21 +16,18 @@ pub(crate) use self::descent::{Complexity, Descent};
 use crate::solve::answer::{Flags, Solution, SolveError, check};
 use crate::solve::fit::evidence::misfit_limit;
 use crate::solve::fit::interpolate::Interpolation;
+use crate::solve::fit::linear::full_v;
 use crate::solve::fit::locate::Locator;
+use crate::solve::fit::policy;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
 use tactomo_physics::forward::{ForwardError, Patches, readings_v};
 use tactomo_physics::readings::Readings;
 
-/// Readings above this share of the converter's range, or of the drive, say nothing.
-const FULL: f64 = 0.995;
 /// Even contacts that a first frame is compared with: roots of the conductance of a node, in units of the sheet conductance.
 const EVEN: [f64; 12] = [0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.25, 0.5];
 /// Error of the model on the coarse mesh, as a share of the largest reading, that is no misfit.
-const MODEL_ERROR: f64 = 0.0007;
-/// What is left may be so many times what the last fresh start left before the next one: jumping presses leave hundreds of times as much,
-/// a scene that moves 2 mm a frame twice as much.
-const LOST: f64 = 4.0;
+const COARSE_MODEL_ERROR: f64 = 0.0007;
 
 /// How an image is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,7 +93,7 @@ impl Shared {
         let areas_m2 = mesh.node_areas_m2.clone();
         let mean_m2 = areas_m2.iter().sum::<f64>() / areas_m2.len() as f64;
         let unit_s = areas_m2.iter().map(|area_m2| detector.sheet_conductance_s() * area_m2 / mean_m2).collect();
-        let full_v = FULL * detector.adc.full_scale_v.min(detector.drive_v);
+        let full_v = full_v(detector);
         let noise_v = detector.adc.deviation_v();
         let to_image = Interpolation::new(mesh, &problem.jacobian.image_mesh);
         let locator = Locator::new(&problem.jacobian.image_mesh, &detector);
@@ -161,7 +158,7 @@ impl Shared {
 
     /// Mean square of what is left, in what noise makes, above which the readings do not fit.
     fn misfit_limit(&self, target: &Target) -> f64 {
-        let model_v = MODEL_ERROR * target.volts.iter().copied().fold(0.0, f64::max);
+        let model_v = COARSE_MODEL_ERROR * target.volts.iter().copied().fold(0.0, f64::max);
         misfit_limit(target.counted() as f64) * (1.0 + (model_v / self.noise_v).powi(2))
     }
 
@@ -199,7 +196,7 @@ impl Nonlinear {
         let solution = self.shared.solution(&descent, &target);
         let left = self.shared.left(&descent, &target);
         // The warm start has to be given up: what is left is no noise, and much more than a fresh start left.
-        let is_lost = left > self.shared.misfit_limit(&target) && left > LOST * descent.begun;
+        let is_lost = left > self.shared.misfit_limit(&target) && left > policy::IMAGE_WORSE * descent.begun;
         // A first frame of a finger that lands may leave much; what later ones leave counts.
         descent.begun = descent.begun.min(left);
         self.last = Some(descent);

@@ -10,13 +10,11 @@ use crate::learned::network::{Network, NetworkError, Outputs};
 use crate::solve::answer::{Flags, FoundContact, Solution, SolveError, check};
 use crate::solve::fit::linear::full_v;
 use crate::solve::fit::locate::Locator;
+use crate::solve::fit::policy;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
 use tactomo_physics::readings::Readings;
 
-/// What has less than this share of the conductance is no contact: of pairs of like contacts on detectors as built the count is right in 71 %
-/// with it, and in 56 % without. What it leaves out of three is a hundredth of the others.
-const LEAST_SHARE: f64 = 0.01;
 /// Logarithms of total conductances in sheet conductances, which are held between these: no scene that was trained with is outside.
 const TOTALS: [f32; 2] = [-7.0, 4.0];
 
@@ -71,7 +69,7 @@ impl NetworkSolver {
     fn contacts(&self, count: usize, image_s_per_m2: &[f32]) -> Vec<FoundContact> {
         let places_m = peaks::places_m(&self.grid, &self.outputs.map, count);
         let conductances_s = self.grid.conductances_s(image_s_per_m2, &places_m);
-        let least_s = LEAST_SHARE * conductances_s.iter().sum::<f64>();
+        let least_s = policy::NETWORK_LEAST_SHARE * conductances_s.iter().sum::<f64>();
         let contact = |([x_m, y_m], conductance_s): (&[f64; 2], f64)| {
             (conductance_s >= least_s).then(|| FoundContact::flat(*x_m, *y_m, conductance_s))
         };

@@ -16,11 +16,11 @@ use tactomo_physics::geometry::Point;
 /// Differences: of places in usual widths, and of logarithms.
 const DIFFERENCE: f64 = 1e-5;
 /// Longest step of a coordinate, in mean distances of electrodes, and of a logarithm.
-const LONGEST: f64 = 0.5;
+const LONGEST_WAY: f64 = 0.5;
 const LONGEST_LOG: f64 = 0.5;
 const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-6, tries: 5 };
 /// Share of the sum that a step gains below which it is the last.
-const SMALL: f64 = 2e-3;
+const LEAST_GAIN: f64 = 2e-3;
 /// Narrowest strip, in usual widths: below, the readings no longer tell.
 const NARROWEST: f64 = 0.02;
 /// Widest strip, in mean distances of electrodes: what is wider is a disc's or an image's business.
@@ -30,7 +30,7 @@ const LARGEST_RADIUS: f64 = 1.0;
 /// How far a line ends beyond an edge is not known; so far is taken as usual (usual widths), as a standard deviation.
 const BEYOND: f64 = 0.5;
 /// Rows of residuals for what is known before: width, conductance, and each coordinate of a line's ends.
-pub(super) const KNOWN: usize = 6;
+pub(super) const PRIOR_ROWS: usize = 6;
 
 /// A strip that fits best.
 #[derive(Clone, Debug)]
@@ -120,11 +120,11 @@ impl LeastSquares for Descent<'_> {
     }
 
     fn is_negligible(&self, at: &Look, equations: &NormalEquations, step: &DVector<f64>) -> bool {
-        equations.gain(step) < SMALL * self.sum(at)
+        equations.gain(step) < LEAST_GAIN * self.sum(at)
     }
 
     fn goes_on(&self, before: &Look, after: &Look, _equations: &NormalEquations) -> bool {
-        self.sum(before) - self.sum(after) >= SMALL * self.sum(before)
+        self.sum(before) - self.sum(after) >= LEAST_GAIN * self.sum(before)
     }
 }
 
@@ -157,8 +157,8 @@ impl StripFitter<'_> {
     }
 
     /// How far the ends of a line are beyond the edges, in deviations.
-    fn beyond(&self, strip: &Strip) -> [f64; KNOWN - 2] {
-        let Course::Line(ends_m) = strip.course else { return [0.0; KNOWN - 2] };
+    fn beyond(&self, strip: &Strip) -> [f64; PRIOR_ROWS - 2] {
+        let Course::Line(ends_m) = strip.course else { return [0.0; PRIOR_ROWS - 2] };
         std::array::from_fn(|coordinate| {
             let (at_m, axis) = (ends_m[coordinate / 2][coordinate % 2], coordinate % 2);
             let inside_m = at_m.clamp(self.usual.bounds_m[0][axis], self.usual.bounds_m[1][axis]);
@@ -170,7 +170,7 @@ impl StripFitter<'_> {
     pub fn slopes(&self, laid: &Laid, target: &Target) -> DMatrix<f64> {
         let (layout, readings) = (laid.strip.layout(), laid.volts.len());
         let target = target.at(&laid.volts);
-        let mut slopes = DMatrix::zeros(readings + KNOWN, laid.strip.parameters());
+        let mut slopes = DMatrix::zeros(readings + PRIOR_ROWS, laid.strip.parameters());
         let touched: Vec<_> = (0..laid.image_s.len()).filter(|node| laid.image_s[*node] > 0.0).collect();
         for (parameter, mut slope) in slopes.column_iter_mut().enumerate() {
             let is_place = parameter < layout.coordinates;
@@ -212,7 +212,7 @@ impl StripFitter<'_> {
     fn moved(&self, strip: &Strip, step: &[f64]) -> Strip {
         let coordinates = strip.layout().coordinates;
         let limit =
-            |parameter: usize| if parameter < coordinates { LONGEST * self.usual.spacing_m } else { LONGEST_LOG };
+            |parameter: usize| if parameter < coordinates { LONGEST_WAY * self.usual.spacing_m } else { LONGEST_LOG };
         let limited = step.iter().enumerate().map(|(parameter, step)| step.clamp(-limit(parameter), limit(parameter)));
         strip.moved(&limited.collect::<Vec<_>>())
     }

@@ -26,6 +26,7 @@ use self::found::found_shape;
 use self::strip::{Course, Ground, Strip};
 use crate::solve::answer::{Flags, FoundContact, FoundShape, Solution};
 use crate::solve::fit::evidence::{Evidence, Watch};
+use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
@@ -37,24 +38,14 @@ const COLD_STEPS: usize = 20;
 const WARM_STEPS: usize = 2;
 /// Nodes of the mesh that shapes are searched on, as a share of the model's.
 const COARSE: f64 = 0.4;
-/// What leaves so many times the rival's score after the first steps, and after all on that mesh, is given up.
-const HOPELESS: f64 = 4.0;
-const NEAR: f64 = 2.0;
-/// Shortest line and smallest ring, in mean distances of electrodes: discs of 6 mm on `square-60` are as well explained by rings of 4 mm.
-const SHORTEST: f64 = 0.7;
-const SMALLEST: f64 = 0.35;
 /// A strip with such a share on the detector is all on it: what nodes make of it is right to some thousandths.
 const WHOLE: f64 = 0.995;
 /// Differences of places, in usual widths, and of logarithms.
 const DIFFERENCE: f64 = 1e-4;
-/// A single contact of so many mean distances of electrodes in radius may be a ring.
-const WIDE: f64 = 0.4;
 /// Usual width of a strip, in mean distances of electrodes: between those of a ruler's edge and of a finger on `square-60`.
 const WIDTH: f64 = 0.25;
-/// Standard deviations of the logarithms of width and conductance before anything is read, as of the radius and conductance of discs: the
-/// width is usual to a factor of two, of the conductance nearly nothing is known.
+/// Standard deviation of the logarithm of the width before anything is read, as of the radius of discs: it is usual to a factor of two.
 const WIDTH_DEVIATION: f64 = 0.7;
-const CONDUCTANCE_DEVIATION: f64 = 4.0;
 /// A contact of more sheet conductances counts as one of so many where a fit starts.
 const MOST_WEIGHT: f64 = 2.0;
 
@@ -97,7 +88,7 @@ impl ShapeFinder {
             width_m: WIDTH * spacing_m,
             width_deviation: WIDTH_DEVIATION,
             conductance_s: detector.sheet_conductance_s(),
-            conductance_deviation: CONDUCTANCE_DEVIATION,
+            conductance_deviation: policy::CONDUCTANCE_DEVIATION,
             spacing_m,
             bounds_m: geometry::bounds(&mesh.nodes_m),
         };
@@ -127,14 +118,14 @@ impl ShapeFinder {
         let mut kinds: Vec<_> = [lines, rings]
             .into_iter()
             .filter_map(|begun| begun.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost)))
-            .filter(|best| best.cost < HOPELESS * rival)
+            .filter(|best| best.cost < policy::SHAPE_BEGUN_RIVALS * rival)
             .map(|best| coarse.fit(best.laid, target, COLD_STEPS))
-            .filter(|best| best.evidence().score() < NEAR * rival)
+            .filter(|best| best.evidence().score() < policy::SHAPE_RIVALS * rival)
             .collect();
         let lowest = |a: &StripFit, b: &StripFit| a.evidence().score().total_cmp(&b.evidence().score());
         kinds.sort_unstable_by(lowest);
         let best = kinds.first()?.evidence().score();
-        kinds.retain(|other| other.evidence().score() < NEAR * best);
+        kinds.retain(|other| other.evidence().score() < policy::SHAPE_RIVALS * best);
         let fits = kinds.iter().filter_map(|fit| self.catch_up(fit, target));
         fits.filter(|fit| self.is_clear(fit.strip())).min_by(lowest)
     }
@@ -143,8 +134,8 @@ impl ShapeFinder {
     fn is_clear(&self, strip: &Strip) -> bool {
         let spacing_m = self.usual.spacing_m;
         match strip.course {
-            Course::Line(_) => strip.course.length_m() > (2.0 * strip.width_m).max(SHORTEST * spacing_m),
-            Course::Ring { radius_m, .. } => radius_m > (1.5 * strip.width_m).max(SMALLEST * spacing_m),
+            Course::Line(_) => strip.course.length_m() > (2.0 * strip.width_m).max(policy::SHORTEST_LINE * spacing_m),
+            Course::Ring { radius_m, .. } => radius_m > (1.5 * strip.width_m).max(policy::SMALLEST_RING * spacing_m),
         }
     }
 
@@ -152,7 +143,7 @@ impl ShapeFinder {
     pub fn may_be(&self, contacts: &[FoundContact]) -> bool {
         match contacts {
             [] => false,
-            [one] => one.radius_m.is_some_and(|radius_m| radius_m > WIDE * self.usual.spacing_m),
+            [one] => one.radius_m.is_some_and(|radius_m| radius_m > policy::RING_RADIUS * self.usual.spacing_m),
             _ => true,
         }
     }

@@ -82,7 +82,7 @@ fn readings_follow_their_derivatives() {
         let strip = Strip { course, width_m: 0.003, conductance_s: 1e-3 };
         let laid = fitter.lay(strip).unwrap();
         let slopes = fitter.slopes(&laid, &target);
-        assert_eq!(slopes.nrows(), 256 + KNOWN);
+        assert_eq!(slopes.nrows(), 256 + PRIOR_ROWS);
         for parameter in 0..strip.parameters() {
             let is_place = parameter < strip.layout().coordinates;
             let step = if is_place { 2e-6 } else { 1e-3 };
