@@ -51,7 +51,7 @@ pub trait Sampler {
     /// costs one bound an electrode, whatever the averaging, and the converter is [restarted](Self::restart). Other forms do so too.
     ///
     /// # Errors
-    /// Those of [`Row::select`].
+    /// As [`Row::select`] has them.
     fn sample_row<R: Row>(&mut self, row: &mut R) -> Result<(), R::Error> {
         let mut electrodes = row.electrodes();
         let mut electrode = 0;

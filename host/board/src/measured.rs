@@ -112,7 +112,7 @@ impl Volts {
         Self { per_code, electrodes: board.electrodes, ranges, ground_v: 0.0 }
     }
 
-    /// The same above a ground that is lifted by `ground_v` (V).
+    /// How codes become volts above a ground that is lifted by `ground_v` (V).
     pub fn above(mut self, ground_v: f64) -> Self {
         let more_v = ground_v - self.ground_v;
         for range in &mut self.ranges {

@@ -71,7 +71,7 @@ pub fn disc(centre: Point, radius_m: f64, corners: usize) -> Vec<Point> {
     turned_disc(centre, radius_m, corners, 0.0)
 }
 
-/// The same, turned counter-clockwise by an angle.
+/// A regular polygon with the area of the disc that it stands for, turned counter-clockwise by an angle.
 pub fn turned_disc(centre: Point, radius_m: f64, corners: usize, turn: f64) -> Vec<Point> {
     let step = TAU / corners as f64;
     let to_corner_m = radius_m * (2.0 * PI / (corners as f64 * step.sin())).sqrt();

@@ -13,12 +13,13 @@ pub fn cores() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// The same on at most so many threads.
+/// What a function makes of each, in their order, on at most so many threads.
 pub fn map_on<T: Sync, R: Send>(cores: usize, all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
     work(cores, all, &AtomicBool::new(false), &|_| {}, function).into_iter().flatten().collect()
 }
 
-/// The same on all cores until `stop` is set: `None` of what was not begun by then. `done` is told, on any of the threads, how many are done.
+/// What a function makes of each, in their order, on all cores until `stop` is set: `None` of what was not begun by then. `done` gets, on any of
+/// the threads, how many are done.
 pub fn map_until<T: Sync, R: Send>(
     all: &[T],
     stop: &AtomicBool,

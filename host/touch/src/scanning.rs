@@ -12,7 +12,7 @@ pub const FOCUS: usize = 3;
 const OTHERS: usize = 4;
 /// Time between two choices (s), at least: to take another plan over costs a board a millisecond or two.
 pub const PAUSE_S: f64 = 0.04;
-/// The same where a touch comes or goes.
+/// Time between two choices (s), at least, where a touch comes or goes.
 pub const SHORT_PAUSE_S: f64 = 0.005;
 /// Time for which whole frames are scanned at least (s) where rows do not tell what touches. It doubles up to the longest each time that rows, tried
 /// again, do not tell it soon after.
@@ -87,7 +87,7 @@ impl Attention {
     }
 }
 
-/// The same grounds in another order are the same choice.
+/// Whether two choices are alike: grounds in another order are the same choice.
 fn are_same(some: &Option<Vec<usize>>, others: &Option<Vec<usize>>) -> bool {
     let sorted = |grounds: &Option<Vec<usize>>| {
         let mut grounds = grounds.clone();

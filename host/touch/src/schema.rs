@@ -90,7 +90,7 @@ pub struct FrameReport<'a> {
     /// Readings as measured (V), if they are wanted: electrode `e` while `g` is grounded at `g n + e`; `null` where nothing was read.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "volts")]
     pub readings_v: Option<&'a Readings>,
-    /// The same as they are used (V), if they are wanted: one near an end of its converter's range is the bound there.
+    /// Readings as they are used (V), if they are wanted, in that order: one near an end of its converter's range is the bound there.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "volts")]
     pub used_v: Option<&'a Readings>,
     /// What the solver got (V), in that order: the mean of the last frames as far as they stood still, less the baseline.
@@ -119,7 +119,7 @@ fn is_none_or_zero(count: &Option<u64>) -> bool {
 }
 
 impl<'a> FrameReport<'a> {
-    /// That of a solution without its image; whoever knows them adds numbers and times.
+    /// The report of a solution without its image; whoever knows them adds numbers and times.
     pub fn of(solution: &'a Solution) -> Self {
         Self {
             contacts: &solution.contacts,

@@ -14,7 +14,7 @@ pub const ESP32_ELECTRODES: [u8; 2] = [6, 10];
 /// share the total error of the chip's data sheet after calibration. The figures of the simulated boards are the same, and their sources
 /// are beside those (`host/board/src/simulated/model.rs`).
 const ESP32_ERRORS: ConverterErrors = ConverterErrors { noise_uv: 5000, gain_ppm: 10_000, bow_uv: 12_000 };
-/// The same of chips whose calibration is a curve: ESP32-C3 and C6.
+/// How far calibrated readings are from the voltages of chips whose calibration is a curve: ESP32-C3 and C6.
 const CURVE_ERRORS: ConverterErrors = ConverterErrors { noise_uv: 5000, gain_ppm: 5000, bow_uv: 5000 };
 
 /// What the ESP32's two ADCs read, each by its own calibration, which makes millivolts of a code.

@@ -73,8 +73,8 @@ impl Taking {
 }
 
 impl BaselineTracker {
-    /// That of a detector as measured, whose readings are means of so many conversions each. It is zero until the first frames that nothing
-    /// presses in.
+    /// Takes and follows the baseline of a detector as measured, whose readings are means of so many conversions each. It is zero until the first
+    /// frames that nothing presses in.
     pub fn new(jacobian: Arc<Jacobian>, conversions: u32) -> Self {
         Self::of(jacobian, conversions, FRAMES, false)
     }

@@ -57,7 +57,7 @@ pub(super) enum Change {
 /// What readings are that nothing is known of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Absolute {
-    /// Those of rest.
+    /// The readings of a detector at rest.
     Rest,
     /// They may be, but look like a light touch at x and y (m).
     Doubtful([f64; 2]),

@@ -47,7 +47,7 @@ pub struct FileFrame {
     pub lost_before: u64,
     /// Readings (V) in the order of the channels, as they are [used](crate::measured::Volts::used); of a detector row by row.
     pub volts: Vec<f64>,
-    /// The same as measured (V).
+    /// Readings as measured (V), in the order of the channels.
     pub measured_v: Vec<f64>,
     /// What each says; empty where all are voltages.
     pub says: Vec<Says>,
@@ -68,7 +68,7 @@ impl FileFrame {
         Some(readings.hiding(|g, e| self.says.get(g * n + e) == Some(&Says::Nothing)))
     }
 
-    /// The same if some were not read: rows of a scan; `None` of a whole frame.
+    /// The readings of a frame of which some were not read, rows of a scan; `None` of a whole frame.
     pub fn rows(&self) -> Option<Readings> {
         self.says.contains(&Says::Nothing).then(|| self.readings()).flatten()
     }
@@ -152,7 +152,7 @@ impl FrameFile {
         Self::open_by(path, expected, |table| table.array(&READINGS))
     }
 
-    /// The same with another rule which readings of a table are meant.
+    /// Opens a file of frames, with another rule which readings of a table are meant.
     ///
     /// # Errors
     /// [`FramesError`], which says what is wrong with the file; also as `readings` does.

@@ -47,7 +47,7 @@ impl Input {
         self.pad_v = pad_v;
     }
 
-    /// The same, of an input that is brought to another pad, of such a resistance (ohm).
+    /// Lets the time pass until `now_s`, when the input is brought to another pad, of such a resistance (ohm) and voltage.
     pub fn change_to(&mut self, now_s: f64, pad_v: f64, pad_ohm: f64) {
         self.follow(now_s, pad_v);
         self.pad_ohm = pad_ohm;

@@ -45,18 +45,18 @@ impl Header {
         }
     }
 
-    /// The same for a recording that begins now.
+    /// The header of a recording that begins now.
     pub fn now(detector: &Detector, source: String) -> Self {
         Self::of(detector, source, 0).started_ago(Duration::ZERO)
     }
 
-    /// The same for a recording that began so long ago.
+    /// The header, of a recording that began so long ago.
     pub fn started_ago(self, ago: Duration) -> Self {
         let started = SystemTime::now().checked_sub(ago).and_then(|start| start.duration_since(UNIX_EPOCH).ok());
         self.started_at(started.unwrap_or_default())
     }
 
-    /// The same for a recording that begins so much later.
+    /// The header, of a recording that begins so much later.
     pub fn started_later(self, by: Duration) -> Self {
         let started = self.started();
         self.started_at(started + by)

@@ -91,7 +91,7 @@ impl<R: Read> RecordReader<R> {
         }
     }
 
-    /// The same for the next chunk or note, whichever comes first.
+    /// Reads the next chunk or note, whichever comes first; its bytes take the place of those in `bytes`. `None` at the end.
     ///
     /// # Errors
     /// If the file cannot be read.

@@ -95,7 +95,7 @@ impl Recorder {
         Self::since(Instant::now(), path, header, hello)
     }
 
-    /// The same for bytes of which the first came at `began`, some time ago.
+    /// Begins a recording of bytes of which the first came at `began`, some time ago.
     pub(super) fn since(began: Instant, path: &Path, header: &Header, hello: &Hello) -> Result<Self, RecordError> {
         let open = |source| RecordError::Open { path: path.to_owned(), source };
         let mut writer = Self::file(path, header).map_err(open)?;
@@ -150,7 +150,7 @@ impl Recorder {
     /// Sets down a note at `made`; never waits.
     ///
     /// # Errors
-    /// Those of [`push`](Self::push).
+    /// As [`push`](Self::push) has them.
     pub fn note(&mut self, note: Note, made: Instant) -> Result<(), RecordError> {
         if matches!(note, Note::Detector { .. }) {
             self.found = Some(note.clone());

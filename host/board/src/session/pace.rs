@@ -46,7 +46,7 @@ impl Paces {
         }
     }
 
-    /// That of a command; questions have a pace of their own.
+    /// The pace of a command; questions have one of their own.
     fn of(&mut self, command: &Command) -> Option<&mut Pace> {
         match command {
             Command::Configure(_) => Some(&mut self.settings),

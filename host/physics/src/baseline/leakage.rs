@@ -46,7 +46,7 @@ pub struct Leakage {
 }
 
 impl Leakage {
-    /// That of a detector through some of its electrodes.
+    /// The leakage of a detector, seen through some of its electrodes.
     pub fn new(jacobian: &Jacobian, kept: &[usize]) -> Self {
         let sheet_s = jacobian.detector.sheet_conductance_s();
         let means_ohm = mean_fields_ohm(jacobian);

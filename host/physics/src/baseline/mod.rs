@@ -124,7 +124,7 @@ impl Baseline {
         Self { lsb_v: 1.0, zero_v: 0.0, clipping: Clipping::new(0.0), mean_v: zeros(), offset_v: zeros() }
     }
 
-    /// The same noise with other mean readings (V), of so many conversions each.
+    /// Takes other mean readings (V), of so many conversions each, with the noise as it was.
     pub fn set(&mut self, mean_v: Vec<f64>, conversions: f64) {
         let clear_v = self.zero_v + CLEAR * self.clipping.deviation() * self.lsb_v;
         let offset_v = |mean_v: &f64| match *mean_v < clear_v {

@@ -59,7 +59,7 @@ pub struct BaselineChange {
 }
 
 impl BaselinePatterns {
-    /// Those of a detector through some of its electrodes.
+    /// The patterns of a detector, seen through some of its electrodes.
     pub fn new(jacobian: &Jacobian, kept: &[usize]) -> Self {
         let electrodes = jacobian.electrodes();
         let sheet_s = jacobian.detector.sheet_conductance_s();

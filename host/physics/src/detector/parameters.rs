@@ -70,7 +70,7 @@ impl Parameter {
         }
     }
 
-    /// The same of another electrode, if it is one's.
+    /// This quantity of another electrode, if it is one's.
     #[must_use]
     pub fn with_electrode(self, e: usize) -> Self {
         match self {

@@ -28,7 +28,7 @@ impl Auto {
         Self::under(detector, shell_nodes, DrivingLayer::default())
     }
 
-    /// The same with a driving layer that need not be ideal.
+    /// Chooses the shell or the slab, with a driving layer that need not be ideal.
     ///
     /// # Errors
     /// As for [`new`](Self::new).

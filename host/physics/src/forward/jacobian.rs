@@ -25,7 +25,7 @@ pub struct Jacobian {
 }
 
 impl Jacobian {
-    /// That of a model.
+    /// The linear theory of a model.
     pub fn of(model: &dyn ForwardModel) -> Self {
         Self {
             model: model.name().to_owned(),

@@ -32,7 +32,7 @@ pub struct JointCurrents {
 }
 
 impl JointCurrents {
-    /// Those of some joints, for the fields between all electrodes (ohm): floating ones, or an impedance matrix. A joint that closes
+    /// The currents through some joints, for the fields between all electrodes (ohm): floating ones, or an impedance matrix. A joint that closes
     /// a loop of others without resistance carries nothing.
     ///
     /// # Panics

@@ -77,14 +77,15 @@ pub trait ForwardModel: Send + Sync {
         Ok((before, changes))
     }
 
-    /// The same detector with contacts a few times cheaper and readings off by up to a per cent or so, to look where they may be; `None`
+    /// A model of the same detector with contacts a few times cheaper and readings off by up to a per cent or so, to look where they may be; `None`
     /// if there is no such thing.
     fn rough(&self) -> Option<Arc<dyn ForwardModel>> {
         None
     }
 
-    /// The same detector at a resolution at which detectors that are [similar](Self::of_similar) are a few times cheaper to make: readings are
-    /// off by up to a per cent or so, and their changes from one to the other by a few per cent, those with pads' own impedances by a sixth. `None` if there is no such thing.
+    /// A model of the same detector at a resolution at which detectors that are [similar](Self::of_similar) are a few times cheaper to make:
+    /// readings are off by up to a per cent or so, and their changes from one to the other by a few per cent, those with pads' own impedances by a
+    /// sixth. `None` if there is no such thing.
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if it cannot be modelled so.
@@ -120,13 +121,13 @@ pub trait ForwardModel: Send + Sync {
     /// Places of the image that this model is inverted on.
     fn image_mesh(&self) -> &ImageMesh;
 
-    /// The same model with images of about so many nodes.
+    /// This model, with images of about so many nodes.
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if there is no such model of the detector.
     fn on_image_of(&self, nodes: usize) -> Result<Box<dyn ForwardModel>, ForwardError>;
 
-    /// The same kind of model of a detector that is nearly the same, at as little cost as can be: derivatives by what a detector is made of.
+    /// A model of this kind of a detector that is nearly the same, at as little cost as can be: derivatives by what a detector is made of.
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if there is no such model of the detector.
@@ -139,14 +140,15 @@ pub trait ForwardModel: Send + Sync {
     /// that is the same for all `e` and `x`; electrodes as floating equipotential pads.
     fn fields_ohm(&self) -> &DMatrix<f64>;
 
-    /// The same fields between the image's nodes (ohm): `nodes x nodes`, symmetric, of a current over a node's cell the mean over another.
-    /// For images of a few hundred nodes: it has as many elements as their square.
+    /// Neumann fields of the bare detector between the image's nodes (ohm): `nodes x nodes`, symmetric, of a current over a node's cell the mean
+    /// over another. For images of a few hundred nodes: it has as many elements as their square.
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if the model cannot give them.
     fn node_fields_ohm(&self) -> Result<DMatrix<f64>, ForwardError>;
 
-    /// The same fields at the electrodes themselves (ohm): `electrodes x electrodes`, symmetric, same constant.
+    /// Neumann fields of the bare detector at the electrodes themselves (ohm): `electrodes x electrodes`, symmetric, up to the constant of
+    /// [`fields_ohm`](Self::fields_ohm).
     fn electrode_fields_ohm(&self) -> &DMatrix<f64>;
 }
 

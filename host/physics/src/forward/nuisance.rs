@@ -157,8 +157,8 @@ impl Nuisance {
         Ok(Some(Self { model: Arc::clone(model), parameters, directions, pads_ohm }))
     }
 
-    /// The same seen through some of the electrodes, in this order, with some of all of them joined: `through` is the model so seen. What belongs
-    /// to electrodes that are left out is left out.
+    /// The nuisance parameters, seen through some of the electrodes, in this order, with some of all of them joined: `through` is the model so
+    /// seen. What belongs to electrodes that are left out is left out.
     ///
     /// # Errors
     /// [`ForwardError::Detector`] if a detector that is a little different cannot be modelled.

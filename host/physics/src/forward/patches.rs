@@ -15,7 +15,7 @@ pub struct Patches {
 }
 
 impl Patches {
-    /// Those of a model's image.
+    /// The patches of a model's image.
     ///
     /// # Errors
     /// As for [`ForwardModel::node_fields_ohm`].

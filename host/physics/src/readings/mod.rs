@@ -66,7 +66,7 @@ impl Readings {
         Self { electrodes, volts, says: Vec::new() }
     }
 
-    /// The same, each of which says what a function of ground and electrode tells.
+    /// These readings, each of which says what a function of ground and electrode gives.
     pub fn saying(mut self, mut says: impl FnMut(usize, usize) -> Says) -> Self {
         let n = self.electrodes;
         self.says = (0..n * n).map(|i| says(i / n, i % n)).collect();
@@ -76,7 +76,7 @@ impl Readings {
         self
     }
 
-    /// The same by converters of such ranges, one an electrode: readings at an end of the range are bounds. An electrode beyond them has no
+    /// These readings by converters of such ranges, one an electrode: readings at an end of the range are bounds. An electrode beyond them has no
     /// range, and what was not read still says [nothing](Says::Nothing).
     pub fn within(mut self, ranges: &[Range]) -> Self {
         let n = self.electrodes.max(1);
@@ -92,7 +92,7 @@ impl Readings {
         self.saying(|g, e| says[g * n + e])
     }
 
-    /// The same where some were not read.
+    /// These readings, some of which were not read.
     pub fn hiding(self, is_unread: impl Fn(usize, usize) -> bool) -> Self {
         let says = self.says.clone();
         let n = self.electrodes;

@@ -61,7 +61,7 @@ impl Hand {
         }
     }
 
-    /// The same on a detector of such mechanics, for [demonstrations](SceneName::detector), which always press in newtons.
+    /// This hand on a detector of such mechanics, for [demonstrations](SceneName::detector), which always press in newtons.
     pub fn on(self, hertz: Hertz) -> Self {
         Self { hertz, ..self }
     }

@@ -44,7 +44,7 @@ impl Simulation {
         })
     }
 
-    /// The same, with scene and foam so many times faster than the board that measures them.
+    /// This simulation, with scene and foam so many times faster than the board that measures them.
     pub fn at_speed(self, time_factor: f64) -> Self {
         Self { time_factor, ..self }
     }

@@ -108,7 +108,7 @@ pub(super) fn tells_enough(readings: &Readings) -> bool {
 }
 
 impl Centred {
-    /// That of an impedance matrix with such noise in each element; `None` of none.
+    /// The centred form of an impedance matrix with such noise in each element; `None` of none.
     fn of(impedance: &DMatrix<f64>, noise: f64) -> Option<Self> {
         let matrix = between_others(impedance);
         let norm = matrix.norm();

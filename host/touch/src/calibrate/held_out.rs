@@ -30,7 +30,7 @@ const USUAL: usize = 24;
 /// Parts of each side that have to be pressed in.
 const PARTS: usize = 3;
 
-/// The same before and after, of presses that were not used.
+/// What the detector as described, and the one found, leave of presses that were not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldOut {
     /// How many.

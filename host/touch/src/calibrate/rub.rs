@@ -50,7 +50,7 @@ pub struct Rub {
     pub single: usize,
     /// Presses that were fitted.
     pub presses: usize,
-    /// Those of them at known places.
+    /// Fitted presses at known places.
     pub known: usize,
     /// What it is worth, on presses that were not used; none where there are too few to hold any out.
     pub held_out: Option<HeldOut>,

@@ -148,7 +148,7 @@ impl Container {
         }
     }
 
-    /// The same if all numbers are right.
+    /// The numbers of an array of this shape, if all of them are right.
     ///
     /// # Errors
     /// [`ContainerError`] also if one is not as `what` says.

@@ -70,12 +70,12 @@ impl Problem {
         Self { model, jacobian, nuisance: Arc::default(), completer: Arc::default(), learned: None }
     }
 
-    /// The same with another linear theory, on a mesh of its own.
+    /// This problem with another linear theory, on a mesh of its own.
     pub fn with_jacobian(self, jacobian: Jacobian) -> Self {
         Self { jacobian: Arc::new(jacobian), completer: Arc::default(), ..self }
     }
 
-    /// The same with what was learned on the sensor itself: its method takes that, in place of what it would make of the model.
+    /// This problem with what was learned on the sensor itself: its method takes that, in place of what it would make of the model.
     ///
     /// # Errors
     /// [`LearnedElsewhere`] if it needs other readings.
@@ -92,7 +92,7 @@ impl Problem {
         self.learned.as_ref()
     }
 
-    /// The same with drive voltage, multiplexer and converter of `detector`, and with what is not known of it.
+    /// This problem with drive voltage, multiplexer and converter of `detector`, and with what is not known of it.
     pub fn measured_as(&self, detector: &Detector) -> Self {
         let known = |detector: &Detector| (detector.tolerances, detector.calibration.clone());
         let nuisance = match known(detector) == known(self.detector()) {

@@ -152,7 +152,7 @@ pub(crate) fn follow_and_search(
     Ok(tracker.adopt(hypothesis, readings)?.solution)
 }
 
-/// The same for rows of readings.
+/// Rows of readings by both halves, one after the other: the thorough answer.
 pub(crate) fn follow_rows_and_search(
     tracker: &mut dyn Tracker,
     search: &mut dyn Search,

@@ -88,7 +88,7 @@ impl Surface {
         Self::parse(&bytes, named, unit)
     }
 
-    /// The same from a file's bytes.
+    /// Reads a surface from a file's bytes; `named` is the file, `unit` that of its lengths.
     ///
     /// # Errors
     /// [`SurfaceError`], which says where in the file and what is allowed.

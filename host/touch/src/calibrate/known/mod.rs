@@ -62,7 +62,7 @@ pub struct Evidence {
     pub is_corrected: bool,
     /// Logarithm of the marginal likelihood with noise alone.
     pub log_evidence_without: f64,
-    /// The same with a smooth error.
+    /// Logarithm of the marginal likelihood with a smooth error.
     pub log_evidence_with: f64,
 }
 
@@ -73,7 +73,7 @@ pub struct Progress {
     pub presses: usize,
     /// Mean distance of the rest from where they are, as found (m).
     pub before_m: f64,
-    /// The same, corrected by those known (m).
+    /// Mean distance of the rest from where they are, corrected by those known (m).
     pub after_m: f64,
 }
 

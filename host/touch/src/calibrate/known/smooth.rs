@@ -77,8 +77,8 @@ impl Smooth {
         Self { prior: Prior { length_m, deviation }, scatter: Scatter { noise, share } }
     }
 
-    /// The same with the deviations that so many numbers tell without bias: the likeliest are too small by what the parameters have fitted. Means stay,
-    /// since all variances grow alike.
+    /// This law with the deviations that so many numbers determine without bias: the likeliest are too small by what the parameters have fitted.
+    /// Means stay, since all variances grow alike.
     fn widened(self, numbers: usize, parameters: usize) -> Self {
         let factor = (numbers as f64 / numbers.saturating_sub(parameters).max(1) as f64).sqrt();
         let prior = Prior { deviation: factor * self.prior.deviation, ..self.prior };
@@ -99,7 +99,7 @@ impl Smooth {
         processes.map_or(f64::NEG_INFINITY, |all| all.iter().map(Process::log_evidence).sum())
     }
 
-    /// The same where there is nothing but noise.
+    /// Logarithm of the marginal likelihood where there is nothing but noise.
     fn log_evidence_of_noise(&self, errors: &Errors) -> f64 {
         let of_channel = |channel: &Channel| {
             let pairs =

@@ -30,7 +30,7 @@ struct Placed {
 }
 
 impl Corrector {
-    /// That of a detector, if it has one.
+    /// The corrector of a detector, if it has a correction.
     pub fn of(detector: &Detector) -> Option<Self> {
         let correction = detector.correction.as_ref()?;
         let places = correction.place.as_ref().and_then(Places::of);

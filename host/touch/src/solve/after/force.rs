@@ -18,7 +18,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// That of a problem whose detector has a law of force.
+    /// The scale of a problem whose detector has a law of force.
     pub fn of(problem: &Problem) -> Option<Self> {
         let (law, meter) = problem.detector().force.clone().zip(Meter::new(problem))?;
         Some(Self { law, meter, corrector: Corrector::of(problem.detector()) })

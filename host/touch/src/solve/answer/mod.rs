@@ -108,7 +108,7 @@ pub struct FoundContact {
     pub force_beyond_maximum: Option<bool>,
     /// Standard errors, of a method that knows them.
     pub uncertainty: Option<Uncertainty>,
-    /// The same number from frame to frame for the same contact, of a method that follows contacts.
+    /// Number that a contact keeps from frame to frame, of a method that follows contacts.
     pub id: Option<u32>,
 }
 

@@ -100,7 +100,8 @@ impl AdaptiveMean {
         self.add_beside(readings, &[]);
     }
 
-    /// The same; `slopes_v` are the readings' derivatives by the parameters of contacts that are known, in pairs that belong together (V).
+    /// Adds a frame's readings, unless they are the very same as those before; `slopes_v` are the readings' derivatives by the parameters of
+    /// contacts that are known, in pairs that belong together (V).
     pub(crate) fn add_beside(&mut self, readings: &Readings, slopes_v: &[Vec<f64>]) {
         if self.newest_v == readings.volts() && self.newest_says == readings.all_say() {
             return;
@@ -150,12 +151,12 @@ impl AdaptiveMean {
         Some(if self.says.is_empty() { readings } else { readings.saying(|g, e| self.says[g * n + e]) })
     }
 
-    /// The same with their number.
+    /// The mean of the newest frames with their number, once there is a frame.
     pub(crate) fn mean(&self) -> Option<Mean> {
         self.mean_readings().map(|readings| Mean { readings, frames: self.count() })
     }
 
-    /// The same, or else a frame.
+    /// The mean of the newest frames with their number, or else a single frame.
     pub(crate) fn mean_or(&self, readings: &Readings) -> Mean {
         self.mean().unwrap_or_else(|| Mean::of_frame(readings))
     }

@@ -92,7 +92,7 @@ impl Completer {
         logs.into_iter().map(|log| log.map(|log| (log - mean).exp())).collect()
     }
 
-    /// The same of all rows, by balanced readings `b`: `b[g][e] - b[e][g] = Vcc (D[g] - D[e])`.
+    /// What balancing multiplies each row with, of all rows, by balanced readings `b`: `b[g][e] - b[e][g] = Vcc (D[g] - D[e])`.
     fn scales(&self, known: &[Option<f64>], balanced_v: &DVector<f64>) -> Vec<f64> {
         let n = known.len();
         let told: Vec<(usize, f64)> = known.iter().enumerate().filter_map(|(g, scale)| Some((g, (*scale)?))).collect();
@@ -134,7 +134,7 @@ impl Completer {
     }
 }
 
-/// The same with what is known without reading it: a grounded electrode is at ground, but for the few millivolts at the switch.
+/// The readings with what is known without reading it: a grounded electrode is at ground, but for the few millivolts at the switch.
 fn grounded(readings: &Readings) -> Readings {
     let is_known = |g: usize, e: usize| g == e && readings.says(g, e) != Says::Voltage;
     let volts = |g: usize, e: usize| if is_known(g, e) { 0.0 } else { readings.at(g, e) };

@@ -97,7 +97,7 @@ impl ApproximationError {
         Self { directions, mean_v: Vec::new(), patterns_v, linearised: None, made_for }
     }
 
-    /// The same about a detector with such readings of the scene (V).
+    /// This error, about a detector with such readings of the scene (V).
     pub fn about(self, linearised: &Arc<Linearised>, volts: &[f64]) -> Self {
         let linear = &self.patterns_v * DVector::from_column_slice(&linearised.steps);
         let mean_v = volts.iter().zip(&self.made_for).zip(&linear).map(|((at, before), linear)| at - before - linear);

@@ -163,7 +163,7 @@ impl LinearImage {
         }
     }
 
-    /// Those of the decomposition, falling.
+    /// Singular values of the decomposition, falling.
     pub fn singular_values(&self) -> &[f64] {
         &self.singular_values
     }

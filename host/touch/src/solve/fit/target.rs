@@ -144,7 +144,7 @@ impl Target {
         Self { frames, noise_v, fixed_v, volts, weights, says, error, is_informed, is_provisional: false, shares }
     }
 
-    /// The same where a model predicts `volts` (V): bounds that it keeps are left out. Derivatives are whitened by this one.
+    /// The target where a model predicts `volts` (V): bounds that it keeps are left out. Derivatives are whitened by this one.
     pub fn at(&self, volts: &[f64]) -> Cow<'_, Self> {
         if self.says.is_empty() {
             return Cow::Borrowed(self);
@@ -192,13 +192,13 @@ impl Target {
         Self { is_provisional: errors.detector.is_some(), ..target }
     }
 
-    /// The same with what the readings may be off by together.
+    /// The target with what the readings may be off by together.
     pub(crate) fn with(&self, error: ApproximationError) -> Self {
         let shares = error.shares(self.deviation_v());
         Self { error: Arc::new(error), is_informed: true, is_provisional: false, shares, ..self.clone() }
     }
 
-    /// The same as if the detector were as described; `None` if it is taken as that already.
+    /// The target as if the detector were as described; `None` if it is taken as that already.
     pub(crate) fn as_exact(&self, errors: &Errors) -> Option<Self> {
         self.is_informed.then(|| Self::of_mean(&self.readings(), self.frames, errors, None))
     }
@@ -277,8 +277,8 @@ impl Target {
         dot(&residuals, &residuals)
     }
 
-    /// The same for there being no contact, which reads nothing on any detector: with what is added to it where contacts, whose readings an
-    /// unknown detector changes, are judged without their determinant.
+    /// Sum of squares of the residuals where there is no contact, which reads nothing on any detector: with what is added to it where contacts,
+    /// whose readings an unknown detector changes, are judged without their determinant.
     pub fn cost_of_nothing(&self) -> f64 {
         if !self.is_informed {
             return self.cost(&vec![0.0; self.volts.len()]);

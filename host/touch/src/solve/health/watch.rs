@@ -45,7 +45,7 @@ impl FaultyElectrodes {
         (0..electrodes).filter(|electrode| !is_faulty(*electrode) || is_first(*electrode)).collect()
     }
 
-    /// The same without some of them.
+    /// The faulty electrodes without some of them.
     pub fn but(&self, healthy: &[usize]) -> Self {
         let faults = self.faults.iter().copied().filter(|(wrong, _)| !healthy.contains(wrong)).collect();
         let is_left = |joint: &Joint| joint.electrodes.iter().all(|electrode| !healthy.contains(electrode));

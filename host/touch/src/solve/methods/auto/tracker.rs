@@ -129,7 +129,7 @@ impl AutoTracker {
         shapes.evidence()
     }
 
-    /// The same of an image.
+    /// Goes on from an image that was found, if it explains the frame better than the one that is followed; what that leaves.
     fn adopt_image(
         &mut self,
         found: Option<Descent>,

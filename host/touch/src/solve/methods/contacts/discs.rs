@@ -142,8 +142,8 @@ impl DiscFit {
         offset.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
-    /// The same of the crowded current alone, if its resistance were `S (1 - ln(r / r0))` in place of `S r0 / r`: of a firm contact little else
-    /// resists. It may be less, so that derivatives serve for steps all the same.
+    /// What the curvature of the crowded current alone makes of an offset, in standard deviations, if its resistance were `S (1 - ln(r / r0))` in
+    /// place of `S r0 / r`: of a firm contact little else resists. It may be less, so that derivatives serve for steps all the same.
     fn bend_of_crowding(&self, offset: &[f64]) -> f64 {
         let of = |(k, constriction): (usize, &f64)| {
             let (resistance, radius) = (PARAMETERS * k + 2, PARAMETERS * k + 3);

@@ -172,7 +172,7 @@ impl ContactFinder {
         self.evidence(&found.hypothesis.fit) - 0.5 * found.target.ln_determinant()
     }
 
-    /// The same target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
+    /// The target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
     /// if the detector is known exactly, or contacts make no sense.
     fn informed(&self, target: &Target, contacts: &[Contact], near: Option<&Arc<Linearised>>) -> Option<Target> {
         let detector = self.problem.detector();

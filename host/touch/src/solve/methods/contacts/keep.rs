@@ -49,7 +49,7 @@ impl ContactFinder {
         }
     }
 
-    /// The same contacts in the next frame, less those that were let go; `None` if that makes no sense.
+    /// Contacts brought to the next frame, less those that were let go; `None` if that makes no sense.
     pub(super) fn follow(&self, last: &ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
         let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
         let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };

@@ -335,7 +335,7 @@ impl ContactFinder {
         self.prior.ln_evidence(fit)
     }
 
-    /// The same for there being no contact.
+    /// Logarithm of the evidence for there being no contact.
     pub(super) fn evidence_of_nothing(&self, target: &Target) -> f64 {
         -0.5 * target.cost_of_nothing()
     }

@@ -129,7 +129,7 @@ pub(super) struct Ground {
 }
 
 impl Ground {
-    /// That of a flat mesh.
+    /// The ground of a flat mesh.
     pub fn new(mesh: &ImageMesh) -> Self {
         // From the triangles around each: of a grid, the root of twice their area.
         let mut sums = vec![(0.0, 0.0); mesh.nodes_m.len()];
