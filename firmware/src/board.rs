@@ -28,9 +28,9 @@ pub type Board32<M, S, L, C> = Board<M, S, L, C, 1024, { frame_bytes(32) }>;
 /// What a board says about itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity<'a> {
-    /// Version of the board's firmware; the first 24 bytes are told.
+    /// Version of the board's firmware; the first 24 bytes are sent.
     pub firmware_version: &'a str,
-    /// Name of the board, such as `esp32`; the first 24 bytes are told.
+    /// Name of the board, such as `esp32`; the first 24 bytes are sent.
     pub board: &'a str,
     /// Electrodes scanned.
     pub electrodes: u8,
@@ -86,7 +86,7 @@ pub struct Board<M, S, L, C, const READINGS: usize, const WIRE: usize> {
     pace: Pace,
     sequence: u16,
     /// Whether the host knows that the converter is stuck.
-    stuck_told: bool,
+    stuck_reported: bool,
     /// What went wrong before the reset, until a host has surely heard of it.
     boot_fault: Option<Fault>,
 }
@@ -126,7 +126,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             uplink,
             pace: Pace::default(),
             sequence: 0,
-            stuck_told: false,
+            stuck_reported: false,
             boot_fault: None,
         })
     }
@@ -208,7 +208,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
     fn start(&mut self) {
         if !self.hello.is_streaming {
             self.hello.is_streaming = true;
-            self.stuck_told = false;
+            self.stuck_reported = false;
             self.restart_pace();
         }
     }
@@ -272,10 +272,10 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
     }
 
     fn send(&mut self, scanned: Scanned) {
-        if scanned.stuck && !self.stuck_told {
+        if scanned.stuck && !self.stuck_reported {
             self.fault(Fault::AdcStuck);
         }
-        self.stuck_told = scanned.stuck;
+        self.stuck_reported = scanned.stuck;
         // A frame that is dropped for it shows as a gap in the numbers.
         self.uplink.frame(scanned.head(self.sequence), self.scan.scope(), self.scan.readings());
         self.sequence = self.sequence.wrapping_add(1);

@@ -77,9 +77,9 @@ pub struct Volts {
     /// Volts of one code.
     per_code: f64,
     electrodes: u8,
-    /// What can be told of each electrode; empty where nothing hides below a floor or above a ceiling.
+    /// What is known of each electrode's range; empty where nothing hides below a floor or above a ceiling.
     ranges: Vec<Range>,
-    /// Voltage of a grounded electrode's switch (V), above which readings are told.
+    /// Voltage of a grounded electrode's switch (V), above which readings are given.
     ground_v: f64,
 }
 

@@ -181,7 +181,7 @@ impl Session {
         Some(self.ask(command, now))
     }
 
-    /// What the board is to be told next.
+    /// What is to be sent to the board next.
     fn due(&mut self, now: Instant) -> Option<Command> {
         let silence = self.is_silent(now).then_some(Command::Hello);
         let Some(hello) = &self.hello else { return silence };
@@ -216,7 +216,7 @@ impl Session {
         self.heard.is_none_or(|heard| now.saturating_duration_since(heard) >= patience)
     }
 
-    /// Takes a Hello: an answer, an old one, or that of a board that has started anew and has to be told everything again.
+    /// Takes a Hello: an answer, an old one, or that of a board that has started anew and has to be sent everything again.
     pub fn hello(&mut self, hello: &Hello, now: Instant) {
         if hello.answers == 0 {
             return self.board_has_started(hello, now);
@@ -266,7 +266,7 @@ impl Session {
         }
     }
 
-    /// The board knows nothing any more of what it was told, but for a command that came after its start and before its Hello was heard here.
+    /// The board knows nothing any more of what it was sent, but for a command that came after its start and before its Hello was heard here.
     fn board_has_started(&mut self, hello: &Hello, now: Instant) {
         self.heard = Some(now);
         self.pending = None;

@@ -271,17 +271,17 @@ fn boards_scan_as_fast_as_their_budgets_say() {
 
 #[test]
 fn boards_tell_their_names_and_what_their_converters_can_see() {
-    let told = |board| {
+    let hello = |board| {
         let mut host = model(board, 1, Rising(0.0, 0.0));
         host.exchange_until("hello", |host| host.hello.is_some());
         let hello = host.hello.unwrap();
         let ranges: Vec<_> = hello.ranges.iter().map(|range| (range.electrodes, range.floor, range.ceiling)).collect();
         (hello.board.to_string(), hello.adc_full_scale_mv, ranges)
     };
-    assert_eq!(told(BoardModel::Ideal), ("simulated".to_owned(), 3300, vec![(16, 0, 4095)]));
+    assert_eq!(hello(BoardModel::Ideal), ("simulated".to_owned(), 3300, vec![(16, 0, 4095)]));
     let esp32 = vec![(6, 142, 3100), (10, 128, 3100)];
-    assert_eq!(told(BoardModel::Esp32), ("esp32 (simulated)".to_owned(), 4096, esp32));
-    assert_eq!(told(BoardModel::Esp32c3), ("esp32c3 (simulated)".to_owned(), 4096, vec![(16, 0, 2500)]));
+    assert_eq!(hello(BoardModel::Esp32), ("esp32 (simulated)".to_owned(), 4096, esp32));
+    assert_eq!(hello(BoardModel::Esp32c3), ("esp32c3 (simulated)".to_owned(), 4096, vec![(16, 0, 2500)]));
 }
 
 /// What the firmware reads, with noise and the chip's own errors averaged out, against what foams of little conductivity let through; and what the

@@ -55,7 +55,7 @@ pub struct Imprint {
     pub beyond: Option<Beyond>,
 }
 
-/// A limit of Hertz's theory. Beyond it contacts are narrower than told.
+/// A limit of Hertz's theory. Beyond it contacts are narrower than it says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Beyond {
     /// The contact is wider than half the tip.

@@ -102,7 +102,7 @@ pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
     if !args.simulate {
         return detector;
     }
-    args.model(&detector).told(detector, args.scene.as_built.is_given())
+    args.model(&detector).described(detector, args.scene.as_built.is_given())
 }
 
 /// The board that is chosen, and what the mouse presses with on a simulated one.

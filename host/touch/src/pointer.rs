@@ -2,7 +2,7 @@
 //!
 //! The pointer belongs to one contact, the firmest when it came, until that is gone; others do not move it. It knows no absolute place: as
 //! with a mouse, what counts is how far the contact has gone. A press is harder than what the contact rests or rolls with, by a factor, so
-//! that it is the same on any detector and wherever the contact is; while it lasts, small motion is not told, so that a click stays where
+//! that it is the same on any detector and wherever the contact is; while it lasts, small motion is not reported, so that a click stays where
 //! it was begun. Firmness is force where the detector has a law of force, else the apparent conductance, which firm contacts have sharply.
 
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::solve::FoundContact;
 const SETTLES_S: f64 = 0.1;
 /// Time after which a contact that is lost is gone (s). Solvers that follow keep its number for 120 frames, 0.1 s at 1200 frames/s.
 const GONE_S: f64 = 0.15;
-/// Way below which motion is not told (m): several times what the place of a resting ball strays by, 0.03 mm on `pad-257x182`.
+/// Way below which motion is not reported (m): several times what the place of a resting ball strays by, 0.03 mm on `pad-257x182`.
 const STEP_M: f64 = 0.2e-3;
 /// A contact is not faster than a hand (m/s), but for what a better answer to the same frame puts right (m): more is another contact or a
 /// mistake, and no motion.
@@ -88,7 +88,7 @@ struct Held {
     came_s: f64,
     seen_s: f64,
     place_m: [f64; 2],
-    /// Where the motion was told up to (m).
+    /// Up to where the motion was reported (m).
     told_m: [f64; 2],
     /// Where it has been near since when (m, s).
     stands_m: [f64; 2],

@@ -5,7 +5,7 @@
 
 use tactomo_physics::detector::Detector;
 
-/// Grounds that are told apart. More hardly tell more of one to three contacts, and each is then older
+/// Grounds that are distinguished. More hardly say more of one to three contacts, and each is then older
 /// (`tactomo-lab tradeoff --scan` compares).
 pub const FOCUS: usize = 3;
 /// Rows from one of the others to the next: what is new is seen within 25 ms on a wire of 921600 baud.
@@ -21,7 +21,7 @@ const WHOLE_S: [f64; 2] = [0.5, 4.0];
 /// What is attended to, chosen anew from time to time.
 #[derive(Clone, Debug)]
 pub struct Attention {
-    /// Grounds that are told apart.
+    /// Grounds that are distinguished.
     count: usize,
     last: Option<Last>,
     whole: Whole,
@@ -154,7 +154,7 @@ mod tests {
                 tried_s.push(now_s);
                 None
             };
-            // Nothing touches now and then, which is told by rows all the same.
+            // Nothing touches now and then, which shows in rows all the same.
             match (now_s % 0.3) < 0.05 {
                 true => _ = attention.consider(now_s, false, some),
                 false => _ = attention.consider(now_s, true, &mut none),

@@ -343,8 +343,8 @@ mod tests {
         let events = [PointerEvent::Press, PointerEvent::Move { dx_m: 0.5, dy_m: -0.25 }];
         let report = FrameReport { events: &events, arrived_unix_s: Some(1.79e9), ..FrameReport::of(&solution) };
         let rows = csv_rows(&report);
-        let told = r#"[{"kind":"press"},{"kind":"move","dx_m":0.5,"dy_m":-0.25}]"#;
-        assert_eq!(rows[1][csv_heads().len() - 3..], ["3 14", "2 contacts", told]);
+        let gestures = r#"[{"kind":"press"},{"kind":"move","dx_m":0.5,"dy_m":-0.25}]"#;
+        assert_eq!(rows[1][csv_heads().len() - 3..], ["3 14", "2 contacts", gestures]);
         let at = |name: &str| csv_heads().iter().position(|head| *head == name).unwrap();
         assert_eq!([&rows[1][at("arrived_unix_s")], &rows[1][at("misfit")]], ["1790000000", "true"]);
         let values = |event: &PointerEvent| EVENT_COLUMNS.each_ref().map(|column| column.value(event));

@@ -18,7 +18,7 @@ const SHORTEST_S: f64 = 0.5;
 const FEWEST: usize = 32;
 /// Samples further apart than this do not belong together (s).
 const GAP_S: f64 = 0.1;
-/// Highest frequency that is told (Hz), if frames come fast enough for it.
+/// Highest frequency that is given (Hz), if frames come fast enough for it.
 const HIGHEST_HZ: f64 = 100.0;
 /// A peak is above this frequency (Hz): what a hand does of itself is slower.
 const LOWEST_PEAK_HZ: f64 = 5.0;
@@ -77,8 +77,8 @@ impl Samples {
         let mut values = self.even(step_s);
         take_trend_off(&mut values);
         let step_hz = 1.0 / (count as f64 * step_s);
-        let told = 1 + ((0.5 / step_s).min(HIGHEST_HZ) / step_hz) as usize;
-        let amplitudes: Vec<f64> = amplitudes(&mut values).into_iter().take(told).collect();
+        let given = 1 + ((0.5 / step_s).min(HIGHEST_HZ) / step_hz) as usize;
+        let amplitudes: Vec<f64> = amplitudes(&mut values).into_iter().take(given).collect();
         let peak = peak(&amplitudes, step_hz);
         Some(Spectrum { step_hz, amplitudes, peak })
     }

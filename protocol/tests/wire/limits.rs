@@ -99,8 +99,8 @@ fn a_length_of_six_bytes_is_refused_by_hosts_and_boards() {
     let plan = Plan { grounds: [3].into_iter().collect(), reads: 1, rows_a_frame: 1, average_log2: 0 };
     assert_eq!(scan(&[0x81, 0x80, 0x80, 0x80, 0]), Ok(Request { tag: 1, command: Command::Scan(plan) }));
     let reset = |length: &[u8]| board_result(FAULT, &[&[1][..], length, b"ok"].concat());
-    let told = Fault::Reset("ok".try_into().unwrap());
-    assert_eq!(reset(&[0x82, 0x80, 0x80, 0x80, 0]), Ok(BoardMessage::Fault(told)));
+    let reported = Fault::Reset("ok".try_into().unwrap());
+    assert_eq!(reset(&[0x82, 0x80, 0x80, 0x80, 0]), Ok(BoardMessage::Fault(reported)));
     let mut hello_body = postcard::to_allocvec(&hello()).unwrap();
     let ranges = hello_body.iter().rposition(|byte| *byte == 0x8E).unwrap() - 2;
     assert_eq!(hello_body[ranges], 2, "the length of the list of ranges");

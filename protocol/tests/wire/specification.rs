@@ -21,10 +21,10 @@ fn examples() -> Vec<Example> {
     let blocks = PAGE.split("```wire\n").skip(1);
     blocks
         .map(|block| {
-            let (told, rest) = block.split_once('\n').unwrap();
+            let (described, rest) = block.split_once('\n').unwrap();
             let (bytes, _) = rest.split_once("```").unwrap();
             let bytes = bytes.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap());
-            (told.to_owned(), bytes.collect())
+            (described.to_owned(), bytes.collect())
         })
         .collect()
 }
@@ -75,7 +75,7 @@ fn requests() -> Vec<Request> {
     (7..).zip(commands).map(|(tag, command)| Request { tag, command }).collect()
 }
 
-fn told<M: Debug>(result: &Result<M, DecodeError>) -> String {
+fn described<M: Debug>(result: &Result<M, DecodeError>) -> String {
     match result {
         Ok(message) => format!("{message:?}"),
         Err(error) => format!("refused: {error}"),
@@ -94,8 +94,8 @@ fn expected() -> Vec<Example> {
     ];
     let hosts = requests().into_iter().map(|request| (request_wire(&request), Ok(request)));
     let hosts = hosts.chain([(scan, Err(DecodeError::Body)), (longest, Err(DecodeError::Corrupt))]);
-    let boards = boards.chain(refused).map(|(wire, result)| (format!("board: {}", told(&result)), wire));
-    boards.chain(hosts.map(|(wire, result)| (format!("host: {}", told(&result)), wire))).collect()
+    let boards = boards.chain(refused).map(|(wire, result)| (format!("board: {}", described(&result)), wire));
+    boards.chain(hosts.map(|(wire, result)| (format!("host: {}", described(&result)), wire))).collect()
 }
 
 /// A fault and a plan whose lengths have six bytes, and the longest plan with a length of two.
@@ -108,8 +108,8 @@ fn too_long() -> [Vec<u8>; 3] {
 
 fn page_text(examples: &[Example]) -> String {
     let line = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ");
-    let block = |(told, bytes): &Example| {
-        format!("```wire\n{told}\n{}\n```\n", bytes.chunks(32).map(line).collect::<Vec<_>>().join("\n"))
+    let block = |(described, bytes): &Example| {
+        format!("```wire\n{described}\n{}\n```\n", bytes.chunks(32).map(line).collect::<Vec<_>>().join("\n"))
     };
     examples.iter().map(block).collect::<Vec<_>>().join("\n")
 }
@@ -129,9 +129,11 @@ fn the_examples_are_what_is_taken() {
     for (expected, wire) in examples() {
         let taken = match expected.split_once(": ") {
             Some(("board", _)) => {
-                receive_board(&[&wire]).0.iter().map(|result| format!("board: {}", told(result))).collect()
+                receive_board(&[&wire]).0.iter().map(|result| format!("board: {}", described(result))).collect()
             }
-            _ => receive_command(&wire).0.iter().map(|result| format!("host: {}", told(result))).collect::<Vec<_>>(),
+            _ => {
+                receive_command(&wire).0.iter().map(|result| format!("host: {}", described(result))).collect::<Vec<_>>()
+            }
         };
         assert_eq!(taken, [expected]);
     }

@@ -47,7 +47,7 @@ impl PanicRecord<'_> {
     }
 }
 
-/// What is told of a panic.
+/// What is reported of a panic.
 fn text(place: Option<(&str, u32)>, message: impl fmt::Display) -> Cut {
     let mut text = Cut::default();
     if let Some((file, line)) = place {
@@ -104,14 +104,14 @@ mod tests {
 
     #[test]
     fn the_end_of_the_path_and_the_message_are_kept() {
-        let told = |file: &str, message: &str| text(Some((file, 77)), message).0;
-        assert_eq!(told("src/main.rs", "no"), "src/main.rs:77: no");
-        assert_eq!(told("main.rs", "no"), "main.rs:77: no");
+        let reported = |file: &str, message: &str| text(Some((file, 77)), message).0;
+        assert_eq!(reported("src/main.rs", "no"), "src/main.rs:77: no");
+        assert_eq!(reported("main.rs", "no"), "main.rs:77: no");
         let folder = "/home/somebody/.cargo/registry/src/index.crates.io-1949cf8c6b5b557f/esp-hal-1.2.2/src/analog";
-        assert_eq!(told(&format!("{folder}/adc/esp32.rs"), "no"), "adc/esp32.rs:77: no");
+        assert_eq!(reported(&format!("{folder}/adc/esp32.rs"), "no"), "adc/esp32.rs:77: no");
         let long = format!("{folder}/a-folder-with-a-name-of-its-own-that-is-long/esp32.rs");
         let message = "index out of bounds: the len is 16 but the index is 16";
-        assert_eq!(told(&long, message).as_str(), format!("esp32.rs:77: {message}"));
+        assert_eq!(reported(&long, message).as_str(), format!("esp32.rs:77: {message}"));
         assert_eq!(text(None, "no").0, "no");
     }
 

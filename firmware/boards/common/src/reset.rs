@@ -1,4 +1,4 @@
-//! What led to a boot, and what of it a host is told.
+//! What led to a boot, and what of it is reported to a host.
 
 use heapless::String;
 use tactomo_protocol::Fault;
@@ -67,16 +67,16 @@ mod tests {
     ];
 
     #[test]
-    fn every_reset_but_a_wanted_one_is_told_by_its_name() {
+    fn every_reset_but_a_wanted_one_is_reported_by_its_name() {
         for reset in ALL {
             let mut memory = [0xA5; RECORD_BYTES];
-            let told = match reset.boot_fault(&mut PanicRecord(&mut memory)) {
+            let reported = match reset.boot_fault(&mut PanicRecord(&mut memory)) {
                 Some(Fault::Reset(name)) => Some(name),
                 Some(other) => panic!("{other:?}"),
                 None => None,
             };
-            assert_eq!(told.as_deref(), reset.fault(), "{reset:?} fits a fault");
-            assert_eq!(told.is_none(), reset == Reset::AsWanted);
+            assert_eq!(reported.as_deref(), reset.fault(), "{reset:?} fits a fault");
+            assert_eq!(reported.is_none(), reset == Reset::AsWanted);
         }
         assert_eq!((Reset::BrownOut.fault(), Reset::Watchdog.fault()), (Some("brown-out"), Some("watchdog")));
     }

@@ -14,7 +14,7 @@ pub const ELECTRODES: u8 = 16;
 /// Bits of a conversion.
 const BITS: u8 = 12;
 /// Time that the converter's capacitor charges, in cycles of its clock: 28 at 21 MHz, which is 1.3 us. By the data sheet that is enough behind
-/// 27 kOhm; an electrode has its series resistor of 1 kOhm and some foam. A conversion takes 12 cycles more, 1.9 us in all. Told to the registers as a 2.
+/// 27 kOhm; an electrode has its series resistor of 1 kOhm and some foam. A conversion takes 12 cycles more, 1.9 us in all. Set in the registers as a 2.
 const SAMPLE_TIME: u32 = 2;
 /// The reference inside takes 10 us to start: twice that, in cycles of 168 MHz.
 const REFERENCE_CYCLES: u32 = 2 * 10 * 168;

@@ -1,7 +1,7 @@
 //! The readings with nothing on the detector, which are taken off all others.
 //!
 //! Without contact an ideal detector reads 0 V everywhere; a real one has offsets of its converter and perhaps leakage, and both drift. A
-//! baseline is taken at the start, follows what drifts while nothing touches, and never learns a touch: what looks like a contact is told
+//! baseline is taken at the start, follows what drifts while nothing touches, and never learns a touch: what looks like a contact is distinguished
 //! from offsets and leakage by its pattern ([`BaselinePatterns`](tactomo_physics::baseline::BaselinePatterns)), in each frame and in the mean of many.
 //! Under load it stays as it was. What it cannot decide, a person is asked ([`BaselineState::notice`]). Live, of recordings and of tables it
 //! is the same; where a person has said which frames are the baseline ([`BaselineTracker::given`]), it is neither judged nor followed.

@@ -1,4 +1,4 @@
-//! Rows of readings gathered until all were read: what rests can be told of them together.
+//! Rows of readings gathered until all were read: whether they are at rest shows in them together.
 
 use tactomo_physics::readings::{Readings, Rounds, Says};
 

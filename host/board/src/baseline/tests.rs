@@ -142,7 +142,7 @@ fn as_built(seed: u64) -> Detector {
 }
 
 #[test]
-fn leakage_of_a_detector_that_is_not_as_described_is_told_from_touch_and_mostly_taken_off_under_it() {
+fn leakage_of_a_detector_that_is_not_as_described_is_distinguished_from_touch_and_mostly_taken_off_under_it() {
     for seed in 0..6 {
         for sheets in [0.01, 0.05] {
             let built = as_built(seed);
@@ -240,8 +240,8 @@ fn what_is_too_slow_for_that_is_learned_up_to_a_limit_and_reported() {
         trial.touch(&touch_v, 1);
     }
     let state = trial.baseline.state();
-    let told = matches!(state, BaselineState::Drifted(_) | BaselineState::Lasting);
-    assert!(told && trial.learned() < 0.005, "{state:?} {}", trial.learned());
+    let reported = matches!(state, BaselineState::Drifted(_) | BaselineState::Lasting);
+    assert!(reported && trial.learned() < 0.005, "{state:?} {}", trial.learned());
 }
 
 #[test]
@@ -327,14 +327,14 @@ fn leakage_is_taken_off_under_load_where_a_person_says_what_is_the_baseline() {
     let mut noise = Noise::new(3);
     let adc = detector().adc;
     let mut read_v = |volts: &[f64]| measured(&Readings::from_fn(16, |g, e| volts[16 * g + e]), &adc, &mut noise);
-    let (mut told, mut live) =
+    let (mut given, mut live) =
         (BaselineTracker::given(Arc::clone(&JACOBIAN), 1, 40), BaselineTracker::new(Arc::clone(&JACOBIAN), 1));
     for frame in 0..40 {
         let readings = read_v(&rest_v);
-        told.add(readings.volts(), 1, 1e-3 * f64::from(frame), &[]);
+        given.add(readings.volts(), 1, 1e-3 * f64::from(frame), &[]);
         live.add(readings.volts(), 1, 1e-3 * f64::from(frame), &[]);
     }
-    let mut left_v = [&told, &live].map(|baseline| {
+    let mut left_v = [&given, &live].map(|baseline| {
         let mut left_v = vec![0.0; 256];
         baseline.subtract(&both_v, &mut left_v);
         left_v.iter_mut().zip(&touch_v).for_each(|(left, touch)| *left -= touch);
@@ -355,13 +355,13 @@ fn leakage_is_taken_off_under_load_where_a_person_says_what_is_the_baseline() {
 fn what_was_never_cut_off_has_no_hidden_offset() {
     // Readings that something was taken off already: noise about zero, on both sides.
     let mut noise = Noise::new(5);
-    let mut told = BaselineTracker::given(Arc::clone(&JACOBIAN), 1, 64);
+    let mut given = BaselineTracker::given(Arc::clone(&JACOBIAN), 1, 64);
     for _ in 0..64 {
         let readings_v: Vec<f64> = (0..256).map(|_| 1.5e-3 * noise.normal()).collect();
-        told.add(&readings_v, 1, 0.0, &[]);
+        given.add(&readings_v, 1, 0.0, &[]);
     }
     let mut touch_v = vec![0.0; 256];
-    told.subtract(&[0.5; 256], &mut touch_v);
+    given.subtract(&[0.5; 256], &mut touch_v);
     assert!(touch_v.iter().all(|volts| (volts - 0.5).abs() < 1e-3), "{:?}", &touch_v[..4]);
 }
 

@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_noise_and_other_programs_are_told_apart() {
+    fn silence_noise_and_other_programs_are_distinguished() {
         let noise: Vec<u8> = (0..500u32).map(|i| (i * 167 % 251) as u8 | 0x80).collect();
         for (bytes, meaning) in [(&b""[..], "cable"), (&noise, "--baud"), (b"hello from blinky\n", "another program")] {
             assert!(unframed(bytes).meaning().contains(meaning), "{}", unframed(bytes));

@@ -1,4 +1,4 @@
-//! What a person is told of pads that a board is too quick for.
+//! What a person is advised of pads that a board is too quick for.
 
 use std::fmt;
 
@@ -37,14 +37,14 @@ mod tests {
 
     #[test]
     fn advice_names_the_options_and_the_buffer_where_it_is_better() {
-        let told = |board, pad_ohm: f64| settling(board, &Settings::default(), pad_ohm).unwrap().to_string();
-        assert_eq!(told("esp32", 550.0), "pads of 0.6 kohm at the board esp32: its settings suit them");
-        let thin = told("esp32c3 (simulated)", 5_000.0);
+        let advice = |board, pad_ohm: f64| settling(board, &Settings::default(), pad_ohm).unwrap().to_string();
+        assert_eq!(advice("esp32", 550.0), "pads of 0.6 kohm at the board esp32: its settings suit them");
+        let thin = advice("esp32c3 (simulated)", 5_000.0);
         assert!(thin.contains("mV for each volt") && thin.contains("`--select-us 5 --discard 1` does"), "{thin}");
         assert!(!thin.contains("buffer"), "{thin}");
-        let c = told("esp32c6", 75_000.0);
+        let c = advice("esp32c6", 75_000.0);
         assert!(c.contains("a buffer behind each pad") && c.contains("--discard"), "{c}");
-        let d = told("esp32", 15_630.0);
+        let d = advice("esp32", 15_630.0);
         assert!(d.contains("--settle-us 20 --discard 1"), "{d}");
     }
 }

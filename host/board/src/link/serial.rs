@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn devices_and_files_that_are_not_serial_ports_are_told() {
+    fn devices_and_files_that_are_not_serial_ports_are_reported() {
         assert!(matches!(refusal("/dev/null"), PortError::NotSerial { .. }));
         assert!(matches!(refusal(file!()), PortError::NotSerial { .. } | PortError::Missing { .. }));
     }
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn without_permission_the_group_and_the_command_are_told() {
+    fn without_permission_the_group_and_the_command_are_named() {
         let permission = serialport::Error::new(ErrorKind::Io(io::ErrorKind::PermissionDenied), "Permission denied");
         assert!(matches!(explain("/dev/null", DEFAULT_BAUD, permission), PortError::Permission { .. }));
         assert_eq!(group_name("root:x:0:\ndialout:x:20:someone\nbroken\n", 20).as_deref(), Some("dialout"));

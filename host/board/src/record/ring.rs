@@ -16,7 +16,7 @@ const MOST_HELD: usize = 256 << 20;
 /// Most files of one name.
 const MOST_FILES: u32 = 100_000;
 
-/// The last seconds of a board. When it is told to save, a new file gets what it holds and what comes within a time after that.
+/// The last seconds of a board. When it is asked to save, a new file gets what it holds and what comes within a time after that.
 #[derive(Debug)]
 pub struct Ring {
     path: PathBuf,
@@ -176,7 +176,7 @@ mod tests {
         folder
     }
 
-    /// Packets of three bytes, one every 100 ms, each with its number; at these numbers it is told to save.
+    /// Packets of three bytes, one every 100 ms, each with its number; at these numbers it is asked to save.
     fn run(ring: &mut Ring, numbers: std::ops::Range<u8>, save_at: &[u8]) -> Vec<PathBuf> {
         let begin = Instant::now();
         let mut begun = Vec::new();

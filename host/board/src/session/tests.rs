@@ -30,7 +30,7 @@ fn command(session: &mut Session, now: Instant) -> Option<Command> {
     said(session, now).map(|(_, command)| command)
 }
 
-/// A session with a board that has just started, was told its settings, and streams.
+/// A session with a board that has just started, was sent its settings, and streams.
 fn streaming(requested: RequestedSettings, now: Instant) -> Session {
     let mut session = Session::new(requested);
     session.hello(&hello(0, Settings::default(), false), now);

@@ -219,8 +219,8 @@ impl BoardModel {
         }
     }
 
-    /// What is told of a detector that this board simulates: with its converter, and exact unless it is one as built.
-    pub fn told(self, detector: Detector, is_as_built: bool) -> Detector {
+    /// The description of a detector that this board simulates: with its converter, and exact unless it is one as built.
+    pub fn described(self, detector: Detector, is_as_built: bool) -> Detector {
         let detector = Detector { adc: self.adc(detector.adc), ..detector };
         if is_as_built { detector } else { detector.taken_as_exact() }
     }
@@ -237,7 +237,7 @@ impl BoardModel {
         }
     }
 
-    /// What the firmware is told of its converters, where the board has some of its own.
+    /// What the firmware knows of its converters, where the board has some of its own.
     pub(super) fn firmware_adc(self) -> Option<FirmwareAdc> {
         let analog = self.figures().analog.as_ref()?;
         let ranges: Vec<Range> = analog.converters.iter().map(ConverterFigures::range).collect();

@@ -26,7 +26,7 @@ pub struct CalibratedParameter {
     pub parameter: Parameter,
     /// Its standard error, in its unit.
     pub standard_error: f64,
-    /// Whether its standard error is still about that before: what is told of it is the description.
+    /// Whether its standard error is still about that before: what is known of it is the description.
     pub is_prior: bool,
 }
 

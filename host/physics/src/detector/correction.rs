@@ -46,7 +46,7 @@ pub struct PlaceErrors {
     pub found_m: Vec<[f64; 2]>,
     /// How far from where they were (m): found less known.
     pub errors_m: Vec<[f64; 2]>,
-    /// Standard errors of x and y that the solver told (m).
+    /// Standard errors of x and y that the solver gave (m).
     pub standard_errors_m: Vec<[f64; 2]>,
 }
 
@@ -64,7 +64,7 @@ pub struct ConductanceErrors {
     pub found_m: Vec<[f64; 2]>,
     /// Logarithm of the conductance found over that of the law, with the constriction both.
     pub log_errors: Vec<f64>,
-    /// Standard errors of it that the solver told.
+    /// Standard errors of it that the solver gave.
     pub log_standard_errors: Vec<f64>,
 }
 

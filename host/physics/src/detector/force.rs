@@ -31,9 +31,9 @@ use std::ops::RangeInclusive;
 use super::check::{Problem, within};
 use super::svg::short;
 
-/// Share of the saturation at which a force is the largest that can be told: eq. (8).
+/// Share of the saturation at which a force is the largest that can be measured: eq. (8).
 const SATURATED_SHARE: f64 = 0.9;
-/// Forces beyond the maximum are told up to so many times the maximum, and held there, and no maximum is told that is so many times the largest
+/// Forces beyond the maximum are given up to so many times the maximum, and held there, and no maximum is given that is so many times the largest
 /// press: a law says little of what it never saw.
 pub const FARTHEST: f64 = 2.0;
 
@@ -62,11 +62,11 @@ pub struct ForceLaw {
     /// Standard deviation of the logarithm of a contact's conductance about the law, from press to press.
     pub scatter: f64,
     /// Half the width between the curves of loading and unloading, as a logarithm of the conductance (a share, while it is small); 0
-    /// where they were not told apart: then it is in the scatter.
+    /// where they were not distinguished: then it is in the scatter.
     pub hysteresis: f64,
     /// Smallest and largest force that was calibrated (N).
     pub range_n: [f64; 2],
-    /// Largest force that can be told (N), where the law saturates and the presses determine it.
+    /// Largest force that can be measured (N), where the law saturates and the presses determine it.
     pub maximum_n: Option<f64>,
     /// Presses that it was fitted to.
     pub presses: usize,
@@ -79,7 +79,7 @@ pub struct Newtons {
     pub force_n: f64,
     /// Standard error: parameters, scatter, hysteresis and conductance together (N).
     pub deviation_n: f64,
-    /// The force is beyond the largest that can be told.
+    /// The force is beyond the largest that can be measured.
     pub beyond_maximum: bool,
 }
 
@@ -105,7 +105,7 @@ impl ForceLaw {
     ///
     /// The error of the conductance that a force should have is that of the contact itself, scatter, hysteresis, and the parameters' through
     /// their slopes (the delta method). What that is in newtons is the difference to the force under a contact that conducts so much
-    /// better: near saturation, where the law is steep, forces may be much larger than told, but not much smaller.
+    /// better: near saturation, where the law is steep, forces may be much larger than given, but not much smaller.
     pub fn force_n(&self, conductance_s: f64, deviation_s: f64) -> Newtons {
         if conductance_s <= 0.0 {
             // No contact conducts less than nothing; as much as its error may be there.
@@ -129,7 +129,7 @@ impl ForceLaw {
         own_s / (1.0 + own_s * self.series_ohm.unwrap_or(0.0))
     }
 
-    /// The force beyond which contacts are flagged (N): the largest that can be told, or else the largest that was calibrated.
+    /// The force beyond which contacts are flagged (N): the largest that can be measured, or else the largest that was calibrated.
     pub fn limit_n(&self) -> f64 {
         self.maximum_n.unwrap_or(self.range_n[1])
     }
@@ -218,7 +218,7 @@ impl ForceLaw {
         Some((product / (self.conductance_at_1_n_s * series_ohm)).powf(self.exponent.recip()))
     }
 
-    /// The force by the law, held at the farthest that is told (N).
+    /// The force by the law, held at the farthest that is given (N).
     fn held_force_n(&self, conductance_s: f64) -> f64 {
         let held_s = conductance_s.min(self.conductance_s(FARTHEST * self.limit_n()));
         let own_s = held_s / (1.0 - held_s * self.series_ohm.unwrap_or(0.0));

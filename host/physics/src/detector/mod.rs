@@ -57,7 +57,7 @@ pub struct Detector {
     /// Voltage of the driving layer above that of a grounded electrode's switch (V).
     pub drive_v: f64,
     /// Voltage of a grounded electrode's switch above the converter's zero (V): zero unless the multiplexer's drain is lifted, so that readings
-    /// stay clear of a converter's floor. All readings are told above it.
+    /// stay clear of a converter's floor. All readings are given above it.
     #[serde(default)]
     pub ground_v: f64,
     /// Resistance of the multiplexer's closed switch (ohm).
@@ -71,7 +71,7 @@ pub struct Detector {
     /// How far it may be from this description.
     #[serde(default)]
     pub tolerances: Tolerances,
-    /// Where its quantities come from, if they were not told but calibrated.
+    /// Where its quantities come from, if they were not described but calibrated.
     #[serde(skip)]
     pub calibration: Option<Calibration>,
     /// Newtons from conductances, once that is calibrated.

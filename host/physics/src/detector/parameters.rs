@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::{Detector, Layer};
 use crate::space::Place;
 
-/// A quantity of a detector that differs between paper and bench. Its steps are told in the unit given: logarithms are of the factor by which
+/// A quantity of a detector that differs between paper and bench. Its steps are in the unit given: logarithms are of the factor by which
 /// it changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Parameter {
@@ -363,7 +363,7 @@ mod tests {
         assert_eq!(kept.directions, [[0.1, 0.3], [0.0, 0.4]]);
         let unknown = detector.keeping(&[9, 7, 1]).unknowns().directions;
         assert_eq!(unknown[0], [(Parameter::Thickness, 0.1), (Parameter::ElectrodeX(1), 0.3)]);
-        assert_eq!(unknown[1], [(Parameter::ElectrodeX(1), 0.4)], "what does not change is not told");
+        assert_eq!(unknown[1], [(Parameter::ElectrodeX(1), 0.4)], "what does not change is not listed");
     }
 
     fn any_parameter() -> impl Strategy<Value = Parameter> {

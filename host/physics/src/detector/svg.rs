@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn dots_of_glue_are_drawn_and_told() {
+    fn dots_of_glue_are_drawn_and_named() {
         let svg = Detector::preset("BB-7x7").unwrap().to_svg();
         assert_eq!(svg.matches(r#"<circle class="dot""#).count(), 49);
         // 7.22 mm at 7 px a millimetre.

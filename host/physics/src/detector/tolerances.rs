@@ -206,7 +206,7 @@ mod tests {
 
     /// Mean square of the unevenness over the plane and over all detectors, and its correlation a quarter of the width apart: `exp(-1/2)`.
     #[test]
-    fn unevenness_is_as_large_and_as_long_as_told() {
+    fn unevenness_is_as_large_and_as_long_as_given() {
         for size_m in [[0.06, 0.06], [0.14, 0.07]] {
             let detector = Detector { outline: Outline::rectangle(size_m[0], size_m[1]), ..Detector::default() };
             let variance = |mode: [usize; 2]| detector.tolerances.deviation(&detector, Parameter::Uneven(mode)).powi(2);

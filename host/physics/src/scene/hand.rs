@@ -71,7 +71,7 @@ impl Hand {
         Self { hertz: fingertip.hertz, fingertip: Some(fingertip), ..Self::relative(detector) }
     }
 
-    /// Mechanics of the detector: of sample A unless told otherwise.
+    /// Mechanics of the detector: of sample A unless given.
     pub(super) fn hertz(&self) -> Hertz {
         self.hertz
     }
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn a_press_beyond_hertz_is_told() {
+    fn a_press_beyond_hertz_is_reported() {
         assert_eq!(newtons(0.5).beyond(1.0, 1.0), None);
         assert_eq!(newtons(5.0).beyond(1.0, 1.0), Some(Beyond::Tip));
     }

@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_read_back_and_others_told() {
+    fn names_are_read_back_and_others_reported() {
         for name in SceneName::ALL {
             assert_eq!(name.to_string().parse(), Ok(name));
         }

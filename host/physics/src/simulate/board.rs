@@ -258,13 +258,13 @@ mod tests {
     #[test]
     fn a_detector_that_has_drifted_is_one_of_that_conductivity() {
         let drifted = simulation(SceneName::Several, &["drift:0.2:100"]).readings_v(100.0);
-        let told = simulation(SceneName::Several, &["conductivity:1.2"]).readings_v(100.0);
+        let given = simulation(SceneName::Several, &["conductivity:1.2"]).readings_v(100.0);
         let before = simulation(SceneName::Several, &[]).readings_v(100.0);
         let apart = |a: &Readings, b: &Readings| {
             a.volts().iter().zip(b.volts()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
         // All that differs is the pads' contact impedance, of which 0.8 ohm drift too.
-        assert!(apart(&drifted, &told) < 4e-4, "{}", apart(&drifted, &told));
+        assert!(apart(&drifted, &given) < 4e-4, "{}", apart(&drifted, &given));
         assert!(apart(&drifted, &before) > 0.02, "{}", apart(&drifted, &before));
     }
 }

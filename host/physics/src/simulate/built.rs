@@ -196,35 +196,35 @@ mod tests {
 
     #[test]
     fn detectors_are_drawn_with_the_deviations_of_their_tolerances() {
-        let told = Detector::default();
+        let described = Detector::default();
         let is = |of: &dyn Fn(&Detector) -> f64, deviation: f64| {
-            let [found, mean] = over_seeds(&told, of);
+            let [found, mean] = over_seeds(&described, of);
             // Four standard errors of the deviation and of the mean, of 400 normal numbers.
             assert!((found / deviation - 1.0).abs() < 4.0 / 800f64.sqrt(), "{found} {deviation}");
             assert!(mean.abs() < 4.0 * deviation / 20.0, "{mean} {deviation}");
         };
-        is(&|built| (built.thickness_m() / told.thickness_m()).ln(), 0.1);
+        is(&|built| (built.thickness_m() / described.thickness_m()).ln(), 0.1);
         is(&|built| (built.layers[0].top_s_per_m / built.layers[0].bottom_s_per_m).ln(), 2f64.ln());
         let per_m = |detector: &Detector| detector.sheet_conductance_s() / detector.thickness_m();
-        is(&|built| (per_m(built) / per_m(&told)).ln(), 0.2);
-        is(&|built| built.electrodes[5].x_m - told.electrodes[5].x_m, 3e-4);
-        is(&|built| built.electrodes[9].y_m - told.electrodes[9].y_m, 3e-4);
-        is(&|built| (built.contact_impedance_ohm_m2 / told.contact_impedance_ohm_m2).ln(), 3f64.ln());
+        is(&|built| (per_m(built) / per_m(&described)).ln(), 0.2);
+        is(&|built| built.electrodes[5].x_m - described.electrodes[5].x_m, 3e-4);
+        is(&|built| built.electrodes[9].y_m - described.electrodes[9].y_m, 3e-4);
+        is(&|built| (built.contact_impedance_ohm_m2 / described.contact_impedance_ohm_m2).ln(), 3f64.ln());
         is(&|built| (built.pad_impedance_ohm_m2(&built.electrodes[2]) / built.contact_impedance_ohm_m2).ln(), 0.3);
         is(&|built| built.electrodes[2].gain.ln(), 0.003);
-        is(&|built| built.electrodes[2].offset_v, 2.0 * told.adc.lsb_v());
-        is(&|built| (built.on_resistance_ohm / told.on_resistance_ohm).ln(), 0.25);
+        is(&|built| built.electrodes[2].offset_v, 2.0 * described.adc.lsb_v());
+        is(&|built| (built.on_resistance_ohm / described.on_resistance_ohm).ln(), 0.25);
         let mode = Parameter::Uneven([1, 1]);
-        is(&|built| built.unevenness.log_amplitudes[1][1], told.tolerances.deviation(&told, mode));
+        is(&|built| built.unevenness.log_amplitudes[1][1], described.tolerances.deviation(&described, mode));
     }
 
     #[test]
     fn a_seed_is_one_detector_and_what_is_drawn_is_exact() {
-        let told = Detector::default();
-        assert_eq!(drawn(&told, 7), drawn(&told, 7));
-        assert_ne!(drawn(&told, 7), drawn(&told, 8));
-        assert!(drawn(&told, 7).tolerances.is_exact());
-        let exact = told.taken_as_exact();
+        let described = Detector::default();
+        assert_eq!(drawn(&described, 7), drawn(&described, 7));
+        assert_ne!(drawn(&described, 7), drawn(&described, 8));
+        assert!(drawn(&described, 7).tolerances.is_exact());
+        let exact = described.taken_as_exact();
         assert_eq!(drawn(&exact, 7), exact);
     }
 
@@ -233,22 +233,27 @@ mod tests {
         let examples = |name| format!("{}/../examples/detectors/{name}", env!("CARGO_MANIFEST_DIR"));
         let files = ["fingertip.toml", "l-shape.toml"].map(|name| Detector::read(examples(name).as_ref()).unwrap());
         let presets = Detector::preset_names().filter_map(Detector::preset);
-        for mut told in files.into_iter().chain(presets) {
-            told.tolerances.electrodes_m = 0.01;
+        for mut described in files.into_iter().chain(presets) {
+            described.tolerances.electrodes_m = 0.01;
             for seed in 0..10 {
-                let built = drawn(&told, seed);
-                assert_eq!(built.check(), Ok(()), "{} {seed}", told.name);
-                assert_ne!(built.electrodes[0].place_m(), told.electrodes[0].place_m(), "{} {seed}", told.name);
+                let built = drawn(&described, seed);
+                assert_eq!(built.check(), Ok(()), "{} {seed}", described.name);
+                assert_ne!(
+                    built.electrodes[0].place_m(),
+                    described.electrodes[0].place_m(),
+                    "{} {seed}",
+                    described.name
+                );
             }
         }
     }
 
     #[test]
     fn a_detector_as_built_reads_otherwise_than_the_one_on_paper() {
-        let told = Detector::default();
+        let described = Detector::default();
         let press = Contact::flat(0.004, -0.011, 0.003, 1e-3);
         let slab = |detector: &Detector| Slab::new(detector).unwrap().impedance_ohm(&[press]).unwrap();
-        let (paper, bench) = (slab(&told), slab(&drawn(&told, 1)));
+        let (paper, bench) = (slab(&described), slab(&drawn(&described, 1)));
         assert!((&paper - &bench).amax() > 0.02 * paper.amax());
         assert!((&bench - bench.transpose()).amax() < 1e-9 * bench.amax());
     }
@@ -256,9 +261,9 @@ mod tests {
     #[test]
     fn unevenness_over_seeds_is_that_asked_for_and_smooth_over_a_quarter_of_the_side() {
         const SEEDS: u64 = 2000;
-        let told = Detector::preset(Detector::DEFAULT).unwrap();
+        let described = Detector::preset(Detector::DEFAULT).unwrap();
         let fault = [Fault::Uneven { deviation: 0.2 }];
-        let built: Vec<Detector> = (0..SEEDS).map(|seed| as_built(&told, &fault, seed)).collect();
+        let built: Vec<Detector> = (0..SEEDS).map(|seed| as_built(&described, &fault, seed)).collect();
         let covariance = |a: [f64; 2], b: [f64; 2]| {
             let product = |built: &Detector| built.log_unevenness(a) * built.log_unevenness(b);
             built.iter().map(product).sum::<f64>() / SEEDS as f64
@@ -279,12 +284,12 @@ mod tests {
 
     #[test]
     fn unevenness_of_nothing_is_none_and_of_a_seed_one() {
-        let told = Detector::default();
-        let of = |deviation, seed| as_built(&told, &[Fault::Uneven { deviation }], seed);
-        assert_eq!(of(0.0, 1), told);
+        let described = Detector::default();
+        let of = |deviation, seed| as_built(&described, &[Fault::Uneven { deviation }], seed);
+        assert_eq!(of(0.0, 1), described);
         assert_eq!(of(0.2, 1), of(0.2, 1));
         assert_ne!(of(0.2, 1), of(0.2, 2));
-        let even = Detector { unevenness: told.unevenness.clone(), ..of(0.2, 1) };
-        assert_eq!(even, told, "nothing else differs");
+        let even = Detector { unevenness: described.unevenness.clone(), ..of(0.2, 1) };
+        assert_eq!(even, described, "nothing else differs");
     }
 }

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn shorted_wires_are_one_and_a_short_told_twice_is_one() {
+    fn shorted_wires_are_one_and_a_short_given_twice_is_one() {
         let once = wired(&["short:1,3"]);
         for e in 0..4 {
             assert!((once.impedance_ohm[(1, e)] - once.impedance_ohm[(3, e)]).abs() < 1e-9);

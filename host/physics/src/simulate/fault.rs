@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use crate::forward::ConnectingPoints;
 
-/// Something wrong. Electrodes count from 0. Breaks and shorts are told by electrode; what stands behind them, the exchange of
+/// Something wrong. Electrodes count from 0. Breaks and shorts are given by electrode; what stands behind them, the exchange of
 /// two wires first, then gain and sign, by channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
@@ -43,7 +43,7 @@ pub enum Fault {
         /// Standard deviation of their logarithm.
         deviation: f64,
     },
-    /// The conductivity is not the one told, by a factor. `conductivity:2`
+    /// The conductivity is not the one described, by a factor. `conductivity:2`
     Conductivity {
         /// The factor.
         factor: f64,
@@ -103,7 +103,7 @@ const FORMS: &str = "open:3, short:2,7, short:2,7:50, swap:1,5, gain:4:0.8, inve
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FaultError {
     /// Not one of the forms.
-    #[error("`{text}` is no fault ({what}); faults are told as {FORMS}")]
+    #[error("`{text}` is no fault ({what}); faults are written as {FORMS}")]
     Text {
         /// What was given.
         text: String,

@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn loading_and_unloading_are_as_far_apart_as_told_at_any_speed() {
+    fn loading_and_unloading_are_as_far_apart_as_described_at_any_speed() {
         for step_s in [0.01, 10.0] {
             let mut foam = Foam::new(&faults(&["hysteresis:0.1"]));
             let mut at = |index: i32, force: f64| grown(&mut foam, disc(0.0, C_S * force), step_s * f64::from(index));

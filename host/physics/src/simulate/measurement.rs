@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_floating_wire_drifts_as_told() {
+    fn a_floating_wire_drifts_as_described() {
         let faults = ["open:0".parse().unwrap()];
         let mut measurement = Measurement::new(&detector(), &faults, 7).unwrap();
         let frames = 100_000;

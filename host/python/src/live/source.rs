@@ -78,7 +78,7 @@ impl Simulated {
     fn told(&self, given: Option<Described>) -> Described {
         let made_for = || self.scene.detector().and_then(Described::preset);
         let detector = given.or_else(made_for).unwrap_or_default();
-        self.model(&detector).told(detector, self.as_built.is_some())
+        self.model(&detector).described(detector, self.as_built.is_some())
     }
 
     fn start(&self, told: &Described) -> PyResult<Box<dyn Source>> {

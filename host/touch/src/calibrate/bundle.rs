@@ -248,12 +248,13 @@ impl Bundle {
         all.iter().fold(DMatrix::zeros(count, count), |sum, of| sum + of) / all.len().max(1) as f64
     }
 
-    /// Adjusts everything, with derivatives that are made anew in the first iterations; tells after each how far it is.
+    /// Adjusts everything, with derivatives that are made anew in the first iterations; `report` hears after each how far it is, and stops it by
+    /// `false`.
     pub fn adjust(
         &mut self,
         slopes: &mut Slopes,
         iterations: Iterations,
-        told: &mut dyn FnMut(Step) -> bool,
+        report: &mut dyn FnMut(Step) -> bool,
     ) -> Result<Normal, CalibrateError> {
         let mut normal = self.normal(slopes);
         for iteration in 1..=iterations.most {
@@ -265,7 +266,7 @@ impl Bundle {
             normal = self.normal(slopes);
             let after = self.objective(&normal, &self.steps);
             self.done += 1;
-            if !told(Step { iteration: self.done, chi_square: self.chi_square(&normal) }) {
+            if !report(Step { iteration: self.done, chi_square: self.chi_square(&normal) }) {
                 return Err(CalibrateError::Stopped);
             }
             if !bettered || before - after < WORTH {

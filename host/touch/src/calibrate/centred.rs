@@ -30,7 +30,7 @@ pub(super) struct Centred {
     pub noise: f64,
 }
 
-/// Impedances between those electrodes that are told, up to one factor and what depends on the row or the column only.
+/// Impedances between those electrodes that are read, up to one factor and what depends on the row or the column only.
 #[derive(Clone, Debug)]
 pub(super) struct Partly {
     electrodes: usize,
@@ -46,7 +46,7 @@ impl Shown {
     pub fn of(readings: &Readings, drive_v: f64, noise_v: f64) -> Option<Self> {
         let n = readings.electrodes();
         let share = |g: usize, e: usize| 1.0 - readings.at(g, e) / drive_v;
-        let is_told = |g: usize, e: usize| g != e && readings.says(g, e) == Says::Voltage;
+        let is_read = |g: usize, e: usize| g != e && readings.says(g, e) == Says::Voltage;
         let off_diagonal = || (0..n).flat_map(|g| (0..n).map(move |e| (g, e))).filter(|(g, e)| g != e);
         let is_out = |g: usize, e: usize| match readings.says(g, e) {
             Says::Voltage => !(share(g, e) > SMALLEST && share(g, e) < 2.0),
@@ -56,7 +56,7 @@ impl Shown {
         if !tells_enough(readings) || off_diagonal().any(|(g, e)| is_out(g, e)) {
             return None;
         }
-        let pair = |g: usize, e: usize| match is_told(g, e) && is_told(e, g) {
+        let pair = |g: usize, e: usize| match is_read(g, e) && is_read(e, g) {
             true => PairOfLoads { log: (share(g, e) / share(e, g)).ln(), weight: 1.0 },
             false => PairOfLoads::default(),
         };
@@ -65,8 +65,8 @@ impl Shown {
         // The load of an electrode that has no pair is not known.
         let is_loaded: Vec<bool> = both.chunks(n).map(|row| row.iter().any(|pair| pair.weight > 0.0)).collect();
         let impedance = |i: usize, j: usize| {
-            let told = [(i, j), (j, i)].into_iter().filter(|(g, e)| is_told(*g, *e) && is_loaded[*g]);
-            let (sum, count) = told.fold((0.0, 0), |(sum, count), (g, e)| (sum + share(g, e) * loads[g], count + 1));
+            let read = [(i, j), (j, i)].into_iter().filter(|(g, e)| is_read(*g, *e) && is_loaded[*g]);
+            let (sum, count) = read.fold((0.0, 0), |(sum, count), (g, e)| (sum + share(g, e) * loads[g], count + 1));
             (count > 0).then(|| sum / f64::from(count))
         };
         let all = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
@@ -102,9 +102,9 @@ impl Shown {
 /// Whether readings tell so many pairs of electrodes that one contact does not explain whatever they are: as many again as it has unknowns.
 pub(super) fn tells_enough(readings: &Readings) -> bool {
     let n = readings.electrodes();
-    let is_told = |g: usize, e: usize| [readings.says(g, e), readings.says(e, g)].contains(&Says::Voltage);
-    let told = (0..n).map(|i| (0..i).filter(|j| is_told(i, *j)).count()).sum::<usize>();
-    told >= 2 * (n + 1) || told == n * n.saturating_sub(1) / 2
+    let is_read = |g: usize, e: usize| [readings.says(g, e), readings.says(e, g)].contains(&Says::Voltage);
+    let pairs = (0..n).map(|i| (0..i).filter(|j| is_read(i, *j)).count()).sum::<usize>();
+    pairs >= 2 * (n + 1) || pairs == n * n.saturating_sub(1) / 2
 }
 
 impl Centred {

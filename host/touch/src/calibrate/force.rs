@@ -63,7 +63,7 @@ pub enum Law {
     Saturating,
 }
 
-/// The largest force that can be told.
+/// The largest force that can be measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MaximumForce {
     /// Nine tenths of the saturation are reached at this force.
@@ -113,7 +113,7 @@ pub struct ForceFit {
     pub law: ForceLaw,
     /// Its parameters.
     pub parameters: Vec<FittedParameter>,
-    /// The largest force that can be told.
+    /// The largest force that can be measured.
     pub maximum: MaximumForce,
     /// Presses that do not agree with the others, by their index: they count for little.
     pub left_out: Vec<usize>,

@@ -128,7 +128,7 @@ pub enum CalibrateError {
     /// There is no model of the detector.
     #[error(transparent)]
     Forward(#[from] ForwardError),
-    /// It was told to stop.
+    /// It was asked to stop.
     #[error("stopped before the end")]
     Stopped,
 }

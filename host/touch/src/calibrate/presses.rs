@@ -192,9 +192,9 @@ fn mean_of(group: &[&Frame]) -> Readings {
 /// Root of the mean square of what the readings of two frames differ by (V), of those that are voltages in either.
 fn root_off_v(a: &Readings, b: &Readings) -> f64 {
     let n = a.electrodes();
-    let is_told = |index: &usize| [a, b].iter().any(|one| one.says(index / n, index % n) == Says::Voltage);
+    let is_voltage = |index: &usize| [a, b].iter().any(|one| one.says(index / n, index % n) == Says::Voltage);
     let (sum_v2, count) = (0..n * n)
-        .filter(is_told)
+        .filter(is_voltage)
         .fold((0.0, 0), |(sum_v2, count), index| (sum_v2 + (a.volts()[index] - b.volts()[index]).powi(2), count + 1));
     (sum_v2 / f64::from(count.max(1))).sqrt()
 }

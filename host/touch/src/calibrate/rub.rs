@@ -23,7 +23,7 @@ use tactomo_physics::threads::map;
 pub struct RubSettings {
     /// Most presses that are fitted, spread over the detector.
     pub presses: usize,
-    /// Standard deviation of places that are told (m).
+    /// Standard deviation of known places (m).
     pub known_deviation_m: f64,
 }
 
@@ -80,7 +80,7 @@ fn median_m(place_errors_m: &[([f64; 2], f64)]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or_default()
 }
 
-/// Places along a side that standard errors are told for, and how far they reach in shares of it.
+/// Places along a side that standard errors are given for, and how far they reach in shares of it.
 const PLACES: usize = 7;
 const REACH: f64 = 0.8;
 
@@ -102,7 +102,7 @@ const FIRST: usize = 24;
 /// Sum of squares, in those of most presses, above which a press is sought anew.
 const LOST: f64 = 2.0;
 
-/// Fits the detector `nominal` to the frames of a rub; `told` hears of each step, and stops it by `false`.
+/// Fits the detector `nominal` to the frames of a rub; `report` hears of each step, and stops it by `false`.
 ///
 /// # Errors
 /// [`CalibrateError`] if the frames are not those of a single contact on such a detector.
@@ -110,7 +110,7 @@ pub fn rub(
     nominal: &Detector,
     frames: &[Frame],
     settings: &RubSettings,
-    told: &mut dyn FnMut(Step) -> bool,
+    report: &mut dyn FnMut(Step) -> bool,
 ) -> Result<Rub, CalibrateError> {
     // Readings are those of the channels: gains and offsets are fitted from none.
     let (told_channels, nominal) = (nominal, &without_channels(nominal));
@@ -127,7 +127,7 @@ pub fn rub(
     let mut bundle = Bundle::new(Arc::clone(&problem.model), parameters, first, full_v);
     let mut slopes = Slopes::new(&bundle.model, &bundle.parameters)?;
     let before_m = median_m(&place_errors_m(&bundle, &slopes, &Posterior::before(bundle.parameters.len())));
-    let (first, last) = adjusted(&mut bundle, &mut slopes, &presses, &rest, told)?;
+    let (first, last) = adjusted(&mut bundle, &mut slopes, &presses, &rest, report)?;
     let single = chosen.singles.iter().map(|mean| mean.frames).sum();
     if bundle.chi_square(&last) > UNFIT {
         let residual = bundle.chi_square(&last).sqrt();
@@ -227,12 +227,12 @@ fn wired(chosen: &Chosen, nominal: &Detector, problem: &Problem) -> Result<Vec<O
     let fields_ohm = problem.model.electrode_fields_ohm();
     let described = between_others(&fields_ohm.select_rows(&chosen.kept).select_columns(&chosen.kept));
     let described = &described / described.norm();
-    let as_told =
+    let as_described =
         Order { electrodes: (0..chosen.kept.len()).collect(), distance: (&described - &chosen.centred).norm() };
-    // Which electrode is missing and how the others are exchanged cannot both be told.
+    // Which electrode is missing and how the others are exchanged cannot both be found.
     let found = match chosen.kept.len() == nominal.electrodes.len() {
         true => orders(&chosen.centred, &described),
-        false => vec![as_told],
+        false => vec![as_described],
     };
     match found.first() {
         Some(best) if best.distance < FAR => Ok(found),
@@ -340,17 +340,17 @@ fn adjusted(
     slopes: &mut Slopes,
     presses: &Presses<'_>,
     rest: &[usize],
-    told: &mut dyn FnMut(Step) -> bool,
+    report: &mut dyn FnMut(Step) -> bool,
 ) -> Result<(f64, Normal), CalibrateError> {
     let first = bundle.chi_square(&bundle.normal(slopes));
     for rough in ROUGH {
         bundle.rough = rough;
-        bundle.adjust(slopes, Iterations { most: 1, renewed: 1 }, told)?;
+        bundle.adjust(slopes, Iterations { most: 1, renewed: 1 }, report)?;
     }
     bundle.rough = 1.0;
     let others = presses.started(&Problem::new(Arc::clone(&bundle.model)), rest)?;
     bundle.presses.extend(others);
-    let mut normal = bundle.adjust(slopes, Iterations::default(), told)?;
+    let mut normal = bundle.adjust(slopes, Iterations::default(), report)?;
     for _ in 0..2 {
         let lost = bundle.lost(&normal, LOST);
         if lost.is_empty() {
@@ -362,7 +362,7 @@ fn adjusted(
         if !bundle.offer(&lost, &found) {
             break;
         }
-        normal = bundle.adjust(slopes, Iterations::default(), told)?;
+        normal = bundle.adjust(slopes, Iterations::default(), report)?;
     }
     Ok((first, normal))
 }

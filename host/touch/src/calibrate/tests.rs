@@ -75,7 +75,7 @@ fn what_is_below_a_floor_spoils_no_calibration() {
 }
 
 #[test]
-fn two_electrodes_that_are_below_the_floor_in_every_frame_are_told() {
+fn two_electrodes_that_are_below_the_floor_in_every_frame_are_reported() {
     let mut trial = RubTrial::new(5);
     let hidden = |readings: Readings| readings.saying(|g, e| if g + e == 1 { Says::AtMost } else { Says::Voltage });
     let frame = |(_, [whole, _]): (Contact, [Frame; 2])| Frame { readings: hidden(whole.readings), known_m: None };
@@ -163,7 +163,7 @@ fn presses_that_were_not_used_say_whether_it_helped() {
     let [before, after] = held_out.residuals;
     assert!(found.helped() && held_out.presses == 8 && after < 0.5 * before, "{held_out:?}");
     assert_eq!(found.place_error_m(), held_out.place_errors_m[1]);
-    // Of a few light presses in one place nothing can be told.
+    // Of a few light presses in one place nothing can be concluded.
     let few: Vec<_> = (0..8)
         .map(|_| {
             let [contact] = trial.contacts(1)[..] else { panic!() };

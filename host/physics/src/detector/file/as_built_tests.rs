@@ -52,8 +52,8 @@ fn unevenness_gains_tolerances_and_calibration_are_read() {
     let modes: Vec<_> = detector.unevenness.modes().collect();
     assert_eq!(modes, [([0, 1], 0.03), ([1, 0], -0.05)]);
     assert_eq!(detector.electrodes.iter().map(|pad| pad.gain).collect::<Vec<_>>(), [1.0, 0.997, 1.004, 1.0]);
-    let told = Tolerances { thickness_share: 0.02, electrodes_m: 1e-4, ..Tolerances::default() };
-    assert_eq!(detector.tolerances, told, "what is not told is the default");
+    let given = Tolerances { thickness_share: 0.02, electrodes_m: 1e-4, ..Tolerances::default() };
+    assert_eq!(detector.tolerances, given, "what is not given is the default");
     let calibration = detector.calibration.unwrap();
     assert_eq!((calibration.board.as_deref(), calibration.date.as_str()), (Some("esp32 \"A\""), "2025-03-01"));
     assert_eq!((calibration.frames, calibration.presses), (1200, 40));
@@ -86,8 +86,8 @@ fn the_documented_tables_are_read() {
     let defaults = Tolerances::default();
     for (name, value) in defaults.named() {
         let row = documentation.lines().find(|line| line.starts_with(&format!("| `{name}` |"))).unwrap();
-        let told: f64 = row.split('|').nth(3).unwrap().trim().parse().unwrap();
-        assert_eq!(told, value, "{row}");
+        let documented: f64 = row.split('|').nth(3).unwrap().trim().parse().unwrap();
+        assert_eq!(documented, value, "{row}");
     }
 }
 

@@ -196,7 +196,7 @@ fn detectors() -> impl Strategy<Value = Detector> {
 }
 
 #[test]
-fn a_lifted_ground_is_told_as_a_meter_shows_it() {
+fn a_lifted_ground_is_given_as_a_meter_shows_it() {
     let lifted = |drive_v: f64| {
         let text = Detector { drive_v, ground_v: 0.25, ..Detector::default() }.to_toml();
         (text.clone(), Detector::from_toml(&text, ""))

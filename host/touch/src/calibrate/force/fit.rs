@@ -3,7 +3,7 @@
 //! Fitted is `ln S`, since hysteresis, scatter and the solver's error are shares of the conductance. With `x = ln a + gamma ln F`
 //!
 //! ```text
-//! ln S = x - ln(1 + R e^x) + h d + noise,   d = -1 loading, +1 unloading, 0 not told,
+//! ln S = x - ln(1 + R e^x) + h d + noise,   d = -1 loading, +1 unloading, 0 unknown,
 //! ```
 //!
 //! whose noise has the variance `s^2 + v`: `s` is the scatter from press to press, which is fitted, `v` the solver's own. One press in twenty is

@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn taps_are_no_presses_and_two_contacts_are_told() {
+    fn taps_are_no_presses_and_two_contacts_are_counted() {
         let mut all = moments(3.0, |time_s| if (0.5..0.6).contains(&time_s) || time_s > 1.0 { 1e-3 } else { 0.0 });
         all.iter_mut().filter(|moment| moment.time_s > 1.2).for_each(|moment| moment.contacts = 2);
         let [plateau] = plateaus(&all)[..] else { panic!("{:?}", plateaus(&all)) };

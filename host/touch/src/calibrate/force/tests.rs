@@ -9,8 +9,8 @@ struct ForceLawTrial {
     hysteresis: f64,
     /// Deviation of `ln S` from press to press.
     scatter: f64,
-    /// Whether the fit is told which way the force went.
-    is_told: bool,
+    /// Whether the fit knows which way the force went.
+    is_known: bool,
     noise: Noise,
 }
 
@@ -21,7 +21,7 @@ const TEN_N: [f64; 10] = [0.3, 0.5, 0.7, 1.0, 1.4, 2.0, 2.6, 3.3, 4.2, 5.0];
 
 impl ForceLawTrial {
     fn new(truth: (f64, f64, f64), hysteresis: f64, scatter: f64, seed: u64) -> Self {
-        Self { truth, hysteresis, scatter, is_told: false, noise: Noise::new(seed) }
+        Self { truth, hysteresis, scatter, is_known: false, noise: Noise::new(seed) }
     }
 
     fn curve_s(&self, force_n: f64) -> f64 {
@@ -37,7 +37,7 @@ impl ForceLawTrial {
             force_n,
             conductance_s: self.curve_s(force_n) * (side + self.scatter * self.noise.normal()).exp(),
             deviation_s: 0.0,
-            direction: self.is_told.then_some(direction),
+            direction: self.is_known.then_some(direction),
         }
     }
 
@@ -108,15 +108,15 @@ fn bands_hold_nine_of_ten_presses() {
 }
 
 #[test]
-fn ten_presses_with_a_hysteresis_of_a_tenth_are_told_within_it() {
-    for is_told in [false, true] {
-        let judged = judged(|seed| ForceLawTrial { is_told, ..ForceLawTrial::new(BALL, 0.1, 0.02, seed) }, [0.3, 5.0]);
+fn ten_presses_with_a_hysteresis_of_a_tenth_are_measured_within_it() {
+    for is_known in [false, true] {
+        let judged = judged(|seed| ForceLawTrial { is_known, ..ForceLawTrial::new(BALL, 0.1, 0.02, seed) }, [0.3, 5.0]);
         // Half the width of 0.1 in the conductance is 0.15 in the force. What is off is at most that, of the middle: whoever does not
         // know which way a force went cannot tell it better.
-        assert!(judged.middle_95() < 0.15, "{is_told}: {}", judged.middle_95());
-        assert!(judged.within[1] > 0.9, "{is_told}: {:?}", judged.within);
-        // Once the direction is told, hysteresis is no scatter any more.
-        assert!(!is_told || judged.middle_95() < 0.04, "{}", judged.middle_95());
+        assert!(judged.middle_95() < 0.15, "{is_known}: {}", judged.middle_95());
+        assert!(judged.within[1] > 0.9, "{is_known}: {:?}", judged.within);
+        // Once the direction is known, hysteresis is no scatter any more.
+        assert!(!is_known || judged.middle_95() < 0.04, "{}", judged.middle_95());
         assert!(judged.refused < 8, "{} refused", judged.refused);
     }
 }
@@ -178,12 +178,12 @@ fn a_maximum_that_the_presses_do_not_tell_is_no_number() {
 }
 
 #[test]
-fn hysteresis_is_found_where_it_is_told() {
-    let mut trial = ForceLawTrial { is_told: true, ..ForceLawTrial::new(BALL, 0.1, 0.02, 3) };
+fn hysteresis_is_found_where_it_is_known() {
+    let mut trial = ForceLawTrial { is_known: true, ..ForceLawTrial::new(BALL, 0.1, 0.02, 3) };
     let fit = fit_force(&[trial.presses(&TEN_N), trial.presses(&TEN_N)].concat(), None).unwrap();
     assert!((fit.law.hysteresis - 0.1).abs() < 0.02 && fit.law.scatter < 0.05, "{:?}", fit.law);
     assert_eq!(fit.candidates.len(), 4);
-    let mut none = ForceLawTrial { is_told: true, ..ForceLawTrial::new(BALL, 0.0, 0.02, 3) };
+    let mut none = ForceLawTrial { is_known: true, ..ForceLawTrial::new(BALL, 0.0, 0.02, 3) };
     assert!(fit_force(&none.presses(&TEN_N), None).unwrap().law.hysteresis < 0.015);
 }
 
@@ -236,7 +236,7 @@ fn forces_in_another_order_are_refused() {
         assert!(fit_force(&in_order(&order), None).is_ok(), "{seed}");
         order.reverse();
         assert!(matches!(refused(&in_order(&order)), ForceError::Mistyped(Mistyped::Order { reversed: true, .. })));
-        // Orders that are nearly right cannot be told from scatter.
+        // Orders that are nearly right cannot be distinguished from scatter.
         let mut wrong = order.clone();
         while (0..10).map(|k| wrong[k].abs_diff(k)).sum::<usize>() < 20 {
             random.shuffle(&mut wrong);
@@ -262,18 +262,22 @@ fn two_exchanged_forces_are_named() {
 #[test]
 fn what_tells_no_law_is_refused_with_a_reason() {
     let presses = ForceLawTrial::new(BALL, 0.0, 0.03, 1).presses(&TEN_N);
-    let told = |presses: &[ForcePress]| refused(presses).to_string();
-    assert!(told(&presses[..4]).starts_with("4 presses, but 5 at least"));
-    assert!(told(&[&presses[6..9], &presses[6..8]].concat()).starts_with("the forces go from 2.6 N to 4.2 N only"));
+    let refusal = |presses: &[ForcePress]| refused(presses).to_string();
+    assert!(refusal(&presses[..4]).starts_with("4 presses, but 5 at least"));
+    assert!(refusal(&[&presses[6..9], &presses[6..8]].concat()).starts_with("the forces go from 2.6 N to 4.2 N only"));
     let mut wrong = presses.clone();
     wrong[3].force_n = 0.0;
-    assert!(told(&wrong).starts_with("press 4: its force is 0 N"));
+    assert!(refusal(&wrong).starts_with("press 4: its force is 0 N"));
     wrong[3] = ForcePress { conductance_s: f64::NAN, ..presses[3] };
-    assert!(told(&wrong).starts_with("press 4: its conductance is NaN S"));
+    assert!(refusal(&wrong).starts_with("press 4: its conductance is NaN S"));
     let wild = |seed| ForceLawTrial::new((2e-3, 0.05, 0.0), 0.0, 0.3, seed).presses(&TEN_N);
     let lawful = (0..200).filter(|seed| fit_force(&wild(*seed), None).is_ok()).count();
     assert!(lawful < 10, "{lawful} of 200 laws in conductances that do not rise");
     let mut slipped = presses.clone();
     [(1, 5.0), (4, 0.2), (8, 5.0)].iter().for_each(|(press, times)| slipped[*press].conductance_s *= times);
-    assert!(matches!(refused(&slipped), ForceError::Disagree { .. } | ForceError::Mistyped(_)), "{}", told(&slipped));
+    assert!(
+        matches!(refused(&slipped), ForceError::Disagree { .. } | ForceError::Mistyped(_)),
+        "{}",
+        refusal(&slipped)
+    );
 }

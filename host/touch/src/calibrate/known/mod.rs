@@ -49,7 +49,7 @@ pub struct Corrected {
     pub before_m: Vec<f64>,
     /// How far it is off if the others correct it (m).
     pub left_out_m: Vec<f64>,
-    /// Standard error that is told of it then (m), in the root of the mean square of x and y.
+    /// Standard error that is given of it then (m), in the root of the mean square of x and y.
     pub left_out_deviations_m: Vec<f64>,
     /// How much the rest was off as presses came.
     pub progress: Vec<Progress>,
@@ -118,21 +118,21 @@ pub enum KnownError {
     },
 }
 
-/// Finds what known presses correct on a detector; `told` hears how the error falls as they come.
+/// Finds what known presses correct on a detector; `report` hears how the error falls as they come.
 ///
 /// # Errors
 /// [`KnownError`] if they are no presses of that detector.
 pub fn correction(
     detector: &Detector,
     presses: &[KnownPress],
-    told: &mut dyn FnMut(&Progress),
+    report: &mut dyn FnMut(&Progress),
 ) -> Result<Corrected, KnownError> {
     check(detector, presses)?;
     let [width_m, height_m] = detector.outline.size_m();
     let side_m = width_m.max(height_m);
     let progress = (0..).map(|power| 1 << power).take_while(|count| *count < presses.len()).map(|count| {
         let progress = progressed(presses, count, side_m);
-        told(&progress);
+        report(&progress);
         progress
     });
     let progress = progress.collect();

@@ -5,7 +5,7 @@ use std::fmt;
 /// An exchange of two shows where both are so many medians of the others off, and each is nearer than this share of that at the other's place.
 const EXCHANGED_MEDIANS: f64 = 4.0;
 const EXCHANGED_SHARE: f64 = 0.25;
-/// Another order or position is told if places would be off by less than this share of the limit.
+/// Another order or position is reported if places would be off by less than this share of the limit.
 const FITS: f64 = 0.6;
 
 /// What would make the places fit.
@@ -66,17 +66,17 @@ fn off_m(pairs: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> f64 {
 /// # Errors
 /// How far off they are (m), and what would make them fit.
 pub(super) fn check(found_m: &[[f64; 2]], known_m: &[[f64; 2]], limit_m: f64) -> Result<(), (f64, WouldFit)> {
-    let as_told_m = off_m(found_m.iter().copied().zip(known_m.iter().copied()));
+    let as_given_m = off_m(found_m.iter().copied().zip(known_m.iter().copied()));
     if let Some((a, b)) = exchanged(found_m, known_m) {
-        return Err((as_told_m, WouldFit::Exchanged(a, b)));
+        return Err((as_given_m, WouldFit::Exchanged(a, b)));
     }
-    if as_told_m <= limit_m {
+    if as_given_m <= limit_m {
         return Ok(());
     }
     let tried = others(found_m, known_m).into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     match tried.filter(|(off_m, _)| *off_m < FITS * limit_m) {
-        Some((_, would)) => Err((as_told_m, would)),
-        None => Err((as_told_m, WouldFit::Nothing)),
+        Some((_, would)) => Err((as_given_m, would)),
+        None => Err((as_given_m, WouldFit::Nothing)),
     }
 }
 
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn right_lists_pass_and_wrong_ones_are_told_with_what_would_fit() {
+    fn right_lists_pass_and_wrong_ones_are_reported_with_what_would_fit() {
         assert_eq!(would(|_| ()), None);
         assert_eq!(would(|all| all.reverse()), Some(WouldFit::Reversed));
         assert_eq!(would(|all| all.swap(1, 4)), Some(WouldFit::Exchanged(1, 4)));

@@ -12,7 +12,7 @@ use crate::gaussian::{Prior, Process, Scatter};
 pub(super) struct Channel {
     /// Errors.
     pub errors: Vec<f64>,
-    /// Standard errors that the solver told.
+    /// Standard errors that the solver gave.
     pub claimed: Vec<f64>,
 }
 

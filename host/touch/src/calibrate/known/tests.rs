@@ -45,7 +45,7 @@ fn tried(corrected: Corrected, others: &[KnownPress]) -> ([f64; 2], [f64; 2]) {
     let corrector = Corrector::of(&detector).unwrap();
     let (mut off_m, mut within) = ([0.0; 2], [0.0; 2]);
     for press in others {
-        let (mean_m, deviations_m) = corrector.told(&found_contact(press));
+        let (mean_m, deviations_m) = corrector.error_and_deviations(&found_contact(press));
         let left_m = [0, 1].map(|axis| press.error_m()[axis] - mean_m[axis]);
         off_m = [off_m[0] + press.off_m(), off_m[1] + left_m[0].hypot(left_m[1])];
         for axis in 0..2 {
@@ -94,12 +94,15 @@ fn noise_asks_for_no_correction() {
 fn the_error_falls_as_presses_come_and_presses_left_out_tell_it() {
     let mut random = Rng::with_seed(5);
     let all = presses(30, &mut random, 1e-4, warp);
-    let mut told = Vec::new();
-    let found = correction(&Detector::default(), &all, &mut |progress| told.push(*progress)).unwrap();
-    assert_eq!(told, found.progress);
-    assert_eq!(told.iter().map(|progress| progress.presses).collect::<Vec<_>>(), [1, 2, 4, 8, 16]);
-    assert!(told[..2].iter().all(|progress| progress.after_m == progress.before_m), "two presses correct nothing");
-    assert!(told[4].after_m < 0.5 * told[4].before_m && told[4].after_m < told[3].after_m, "{told:?}");
+    let mut reported = Vec::new();
+    let found = correction(&Detector::default(), &all, &mut |progress| reported.push(*progress)).unwrap();
+    assert_eq!(reported, found.progress);
+    assert_eq!(reported.iter().map(|progress| progress.presses).collect::<Vec<_>>(), [1, 2, 4, 8, 16]);
+    assert!(reported[..2].iter().all(|progress| progress.after_m == progress.before_m), "two presses correct nothing");
+    assert!(
+        reported[4].after_m < 0.5 * reported[4].before_m && reported[4].after_m < reported[3].after_m,
+        "{reported:?}"
+    );
     let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
     let left_out_m = mean(&found.left_out_m);
     let evidence = found.place;

@@ -21,7 +21,7 @@ const SQUARE_60: &[u8] = include_bytes!("square-60.safetensors");
 const PLACES_SHARE: f64 = 0.05;
 /// How far its thickness may be, as a factor: four tolerances.
 const THICKNESS_FACTOR: f64 = 1.4;
-/// Sizes of readings that were seen go so far beyond those that limits are told for, as a logarithm.
+/// Sizes of readings that were seen go so far beyond those that limits are given for, as a logarithm.
 const SIZES_BEYOND: f32 = 0.7;
 
 /// A trained network.

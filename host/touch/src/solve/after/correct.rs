@@ -152,11 +152,11 @@ fn conductance(errors: &ConductanceErrors) -> Option<Process> {
 
 #[cfg(test)]
 impl Corrector {
-    /// Mean error of a place that is found, and the standard errors that are told there, for tests of what makes corrections.
-    pub(crate) fn told(&self, found: &FoundContact) -> ([f64; 2], [f64; 2]) {
-        let told = self.contact(found);
-        let deviations_m = told.uncertainty.map_or([0.0; 2], |told| [told.x_m, told.y_m]);
-        ([found.x_m - told.x_m, found.y_m - told.y_m], deviations_m)
+    /// Mean error of a place that is found, and the standard errors that are given there, for tests of what makes corrections.
+    pub(crate) fn error_and_deviations(&self, found: &FoundContact) -> ([f64; 2], [f64; 2]) {
+        let corrected = self.contact(found);
+        let deviations_m = corrected.uncertainty.map_or([0.0; 2], |deviation| [deviation.x_m, deviation.y_m]);
+        ([found.x_m - corrected.x_m, found.y_m - corrected.y_m], deviations_m)
     }
 }
 
@@ -245,7 +245,7 @@ mod tests {
             FaultTolerant::new(Method::Contacts, problem).unwrap().solve(&readings).unwrap().contacts[0]
         };
         assert_corrected(&tolerant(&corrected), &tolerant(&plain), "tolerant");
-        // Told to be 22 mm from where it is found: only who takes that back knows it again.
+        // Corrected to be 22 mm from where it is found: only who takes that back knows it again.
         let mut far = correction();
         far.place.as_mut().unwrap().errors_m.fill([0.02, -0.01]);
         far.place.as_mut().unwrap().deviation_m = 0.02;
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn far_from_the_presses_nothing_is_corrected_and_the_doubt_is_told() {
+    fn far_from_the_presses_nothing_is_corrected_and_the_doubt_is_reported() {
         let mut correction = correction();
         let places = correction.place.as_mut().unwrap();
         places.length_m = 1e-3;
@@ -264,9 +264,9 @@ mod tests {
         let corrector = Corrector::of(&detector).unwrap();
         let claimed = Uncertainty { x_m: 3e-4, y_m: 4e-4, correlation: 0.5, conductance_s: 1e-5 };
         let found = FoundContact { uncertainty: Some(claimed), ..FoundContact::flat(0.01, 0.01, 1e-3) };
-        let told = corrector.contact(&found);
-        assert!((told.x_m - 0.01).abs() < 1e-9 && (told.y_m - 0.01).abs() < 1e-9, "{told:?}");
-        let uncertainty = told.uncertainty.unwrap();
+        let corrected = corrector.contact(&found);
+        assert!((corrected.x_m - 0.01).abs() < 1e-9 && (corrected.y_m - 0.01).abs() < 1e-9, "{corrected:?}");
+        let uncertainty = corrected.uncertainty.unwrap();
         let variance_m2 = 4e-6 + 1e-8 + 0.25 * 9e-8;
         assert!((uncertainty.x_m.powi(2) / variance_m2 - 1.0).abs() < 1e-9, "{uncertainty:?}");
         let covariance_m2 = uncertainty.correlation * uncertainty.x_m * uncertainty.y_m;
@@ -290,6 +290,6 @@ mod tests {
         };
         let FoundShape::Line(moved) = corrector.shape(FoundShape::Line(line)) else { panic!("no line") };
         assert!((moved.from_m[0] + 0.012).abs() < 5e-5 && (moved.to_m[1] - 1e-3).abs() < 5e-5, "{moved:?}");
-        assert!(moved.uncertainty.is_some_and(|told| told.to_m[0] > 1.1e-4 && told.width_m == 1e-3));
+        assert!(moved.uncertainty.is_some_and(|corrected| corrected.to_m[0] > 1.1e-4 && corrected.width_m == 1e-3));
     }
 }

@@ -25,9 +25,9 @@ impl Scale {
     }
 
     /// Adds forces to contacts, unless the solver was taught forces itself.
-    pub fn told(&self, readings: &Readings, mut solution: Solution) -> Solution {
-        let is_told = solution.contacts.iter().any(|contact| contact.force_n.is_some());
-        let measured = if is_told { None } else { self.meter.measure(readings, &solution.contacts) };
+    pub fn with_forces(&self, readings: &Readings, mut solution: Solution) -> Solution {
+        let is_known = solution.contacts.iter().any(|contact| contact.force_n.is_some());
+        let measured = if is_known { None } else { self.meter.measure(readings, &solution.contacts) };
         for (contact, measured) in solution.contacts.iter_mut().zip(measured.into_iter().flatten()) {
             let Measured { conductance_s, deviation_s } = measured;
             let found = [conductance_s, deviation_s];
@@ -67,7 +67,7 @@ mod tests {
     fn contacts_of_every_solver_carry_newtons() {
         let (calibrated, plain) = (problem(Some(law())), problem(None));
         let readings = readings(CONTACT);
-        let mut told = Vec::new();
+        let mut forces = Vec::new();
         for method in Method::ALL {
             let solve = |problem| method.build(problem).unwrap().solve(&readings).unwrap().contacts;
             let (with, without) = (solve(&calibrated), solve(&plain));
@@ -80,11 +80,11 @@ mod tests {
                     FoundContact { force_n: None, force_deviation_n: None, force_beyond_maximum: None, ..*with };
                 assert_eq!(plain, *without, "{}: newtons change nothing else", method.name());
             }
-            told.push((method, with[0].force_n.unwrap()));
+            forces.push((method, with[0].force_n.unwrap()));
         }
         // As far as the place is right, the force does not depend on the solver.
-        let best = told[1].1;
-        for (method, force_n) in told {
+        let best = forces[1].1;
+        for (method, force_n) in forces {
             let factor = if method.family() == Family::Contacts || method == Method::Auto { 1.01 } else { 1.3 };
             assert!((force_n / best).ln().abs() < f64::ln(factor), "{}: {force_n} N, {best} N", method.name());
         }
@@ -119,10 +119,11 @@ mod tests {
     fn a_force_that_was_taught_stays_and_nothing_is_made_of_no_number() {
         let problem = problem(Some(law()));
         let scale = Scale { law: law(), meter: Meter::new(&problem).unwrap(), corrector: None };
-        let told =
-            |contact| scale.told(&readings(CONTACT), Solution { contacts: vec![contact], ..Solution::default() });
+        let scaled = |contact| {
+            scale.with_forces(&readings(CONTACT), Solution { contacts: vec![contact], ..Solution::default() })
+        };
         let taught = FoundContact { force_n: Some(7.0), ..FoundContact::flat(0.0, 0.0, 1e-4) };
-        assert_eq!(told(taught).contacts, [taught]);
-        assert_eq!(told(FoundContact::flat(f64::NAN, 0.0, 1e-4)).contacts[0].force_n, None);
+        assert_eq!(scaled(taught).contacts, [taught]);
+        assert_eq!(scaled(FoundContact::flat(f64::NAN, 0.0, 1e-4)).contacts[0].force_n, None);
     }
 }

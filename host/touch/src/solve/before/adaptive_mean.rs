@@ -199,7 +199,7 @@ impl AdaptiveMean {
         for newest in windows(all) {
             let difference = self.difference(newest, moves);
             let alarm = -2.0 * (policy::FALSE_ALARMS * newest as f64).ln();
-            // A reading that is no voltage of a board makes sums that nothing can be told from.
+            // A reading that is no voltage of a board makes sums that nothing can be concluded from.
             if difference.overall.is_nan()
                 || difference.overall > policy::OTHER_SCENE_DEVIATIONS
                 || difference.of_contacts > alarm

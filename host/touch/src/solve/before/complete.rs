@@ -80,28 +80,29 @@ impl Completer {
         for _ in 0..SWEEPS {
             for g in 0..n {
                 let others = (0..n).filter(|e| is_pair(g, *e));
-                let told = others.map(|e| log(e, g) - log(g, e) + logs[e].unwrap_or_default());
-                let (sum, count) = told.fold((0.0, 0.0), |(sum, count), told| (sum + told, count + 1.0));
+                let estimates = others.map(|e| log(e, g) - log(g, e) + logs[e].unwrap_or_default());
+                let (sum, count) = estimates.fold((0.0, 0.0), |(sum, count), log| (sum + log, count + 1.0));
                 if count > 0.0 {
                     logs[g] = Some(sum / count);
                 }
             }
         }
-        let told = logs.iter().flatten();
-        let mean = told.clone().sum::<f64>() / told.count().max(1) as f64;
+        let found = logs.iter().flatten();
+        let mean = found.clone().sum::<f64>() / found.count().max(1) as f64;
         logs.into_iter().map(|log| log.map(|log| (log - mean).exp())).collect()
     }
 
     /// What balancing multiplies each row with, of all rows, by balanced readings `b`: `b[g][e] - b[e][g] = Vcc (D[g] - D[e])`.
     fn scales(&self, known: &[Option<f64>], balanced_v: &DVector<f64>) -> Vec<f64> {
         let n = known.len();
-        let told: Vec<(usize, f64)> = known.iter().enumerate().filter_map(|(g, scale)| Some((g, (*scale)?))).collect();
+        let scaled: Vec<(usize, f64)> =
+            known.iter().enumerate().filter_map(|(g, scale)| Some((g, (*scale)?))).collect();
         let of = |g: usize| {
-            if told.is_empty() {
+            if scaled.is_empty() {
                 return 1.0;
             }
             let by = |(e, scale): &(usize, f64)| scale + (balanced_v[g * n + e] - balanced_v[e * n + g]) / self.drive_v;
-            (told.iter().map(by).sum::<f64>() / told.len() as f64).max(LEAST_GAP)
+            (scaled.iter().map(by).sum::<f64>() / scaled.len() as f64).max(LEAST_GAP)
         };
         (0..n).map(|g| known[g].unwrap_or_else(|| of(g))).collect()
     }

@@ -1,7 +1,7 @@
 //! The latest of each reading, of scans that read some rows at a time.
 //!
 //! Rows that were read some milliseconds ago are those of contacts that have moved since. What they say of others than the contacts that are
-//! followed is still true: so each reading is kept as what it is beside the model's at that time, and told as the model's now with that. It is
+//! followed is still true: so each reading is kept as what it is beside the model's at that time, and given as the model's now with that. It is
 //! the motion of contacts that this follows; where a model takes the place of another, or does not fit, nothing has moved.
 
 use tactomo_physics::readings::{Readings, Says};
@@ -62,8 +62,8 @@ impl Latest {
         self.cells.iter_mut().for_each(|cell| cell.age_s = f64::INFINITY);
     }
 
-    /// The readings that are younger than `oldest_s` (s), told for a model that expects `expected_v` (V) now. Those that are bounds are told
-    /// as they were read.
+    /// The readings that are younger than `oldest_s` (s), as they would be for a model that expects `expected_v` (V) now. Those that are bounds are
+    /// given as they were read.
     pub fn readings(&self, oldest_s: f64, expected_v: Option<&[f64]>) -> Readings {
         let n = self.electrodes;
         let volts = |i: usize| self.cells[i].now_v(expected_v.map(|all| all[i]));
@@ -72,7 +72,7 @@ impl Latest {
         all.hiding(|g, e| is_old(g * n + e))
     }
 
-    /// Goes on with a model that expects `after_v` (V) now in place of one that expects `before_v` (V): the readings stay as they are told.
+    /// Goes on with a model that expects `after_v` (V) now in place of one that expects `before_v` (V): the readings stay as they are given.
     pub fn change_model(&mut self, before_v: Option<&[f64]>, after_v: Option<&[f64]>) {
         for (i, cell) in self.cells.iter_mut().enumerate() {
             cell.volts = cell.now_v(before_v.map(|all| all[i]));
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_told_as_long_as_they_are_young() {
+    fn rows_are_given_as_long_as_they_are_young() {
         let mut latest = Latest::new(4);
         (0..4).for_each(|g| latest.add(&row(g, 0.1 * g as f64), 1e-3, None));
         assert!(latest.is_whole(3.5e-3) && !latest.is_whole(2.5e-3));

@@ -326,12 +326,12 @@ mod tests {
     }
 
     #[test]
-    fn a_choice_is_told_and_a_given_lambda_is_not() {
+    fn a_choice_is_reported_and_a_given_lambda_is_not() {
         let spectrum = spectrum(0.0064);
-        let told = |rule: Rule| rule.choice(&spectrum, 0.3, spectrum.left_v2(0.3));
-        assert_eq!(told(Rule::Given(0.3)), None);
+        let chosen = |rule: Rule| rule.choice(&spectrum, 0.3, spectrum.left_v2(0.3));
+        assert_eq!(chosen(Rule::Given(0.3)), None);
         assert_eq!(
-            told(Rule::Gcv).map(|choice| choice.what),
+            chosen(Rule::Gcv).map(|choice| choice.what),
             Some("lambda 3.00e-2 of the largest singular value".into())
         );
     }

@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_that_are_not_told_apart_share_a_step_and_have_no_covariance() {
+    fn parameters_that_are_not_distinguished_share_a_step_and_have_no_covariance() {
         let slopes = DMatrix::from_row_slice(3, 2, &[1.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
         let equations = NormalEquations::of(&slopes, &DVector::from_column_slice(&[1.0, 2.0, 2.0]));
         assert!(equations.step(0.0).is_none() && covariance(&equations.matrix).is_none());

@@ -69,7 +69,7 @@ fn shorted(readings: &Readings, sound: &[usize], detector: &Detector) -> Vec<usi
     let noise_v = detector.adc.deviation_v();
     let same_v = SAME * std::f64::consts::SQRT_2 * noise_v;
     // Two that are below the converter's floor read the same whatever they are.
-    let is_told = |e: usize, f: usize| {
+    let is_read = |e: usize, f: usize| {
         let both = |g: &&usize| [e, f].iter().all(|e| readings.says(**g, *e) == Says::Voltage);
         2 * sound.iter().filter(both).count() > sound.len()
     };
@@ -81,7 +81,7 @@ fn shorted(readings: &Readings, sound: &[usize], detector: &Detector) -> Vec<usi
             // Both rise while others are grounded: where nothing touches all read the same, but for a wire that floats.
             let risen_v = sound.iter().map(|g| readings.touch_v(*g, *e)).fold(0.0, f64::max);
             let row_v = sound.iter().map(|other| readings.touch_v(*e, *other)).fold(0.0, f64::max);
-            let is_touched = row_v.min(risen_v) > TOUCHED * noise_v && is_told(*e, *f);
+            let is_touched = row_v.min(risen_v) > TOUCHED * noise_v && is_read(*e, *f);
             if is_touched && grounded_v < same_v && read_the_same(readings, [*e, *f], sound, detector) {
                 found.extend([*e, *f]);
             }
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn two_wires_that_touch_are_told() {
+    fn two_wires_that_touch_are_found() {
         let rises = |g: usize, e: usize| if g == e { 0.0 } else { 0.3 + 0.02 * e as f64 };
         let joined = |e: usize| if e == 6 { 5 } else { e };
         let shorted = Readings::from_fn(16, |g, e| rises(joined(g), joined(e)));
@@ -304,13 +304,14 @@ mod tests {
     }
 
     #[test]
-    fn wires_of_two_converters_that_touch_are_told_whatever_the_chip() {
+    fn wires_of_two_converters_that_touch_are_found_whatever_the_chip() {
         for (seed, [a, b]) in (1..).zip([[5, 6], [0, 15], [2, 9], [4, 7], [1, 12], [3, 6]]) {
             let found = presses(Detector::default().taken_as_exact(), Some(&format!("short:{a},{b}")), 60, seed);
-            let told = found.iter().filter(|found| **found == [a, b].map(|e| (e, ElectrodeFault::Shorted))).count();
+            let found_pair =
+                found.iter().filter(|found| **found == [a, b].map(|e| (e, ElectrodeFault::Shorted))).count();
             // The others are too light to say anything.
-            assert!(told >= 50, "{a},{b}: {told} of {}", found.len());
-            let others = found.iter().filter(|found| !found.is_empty()).count() - told;
+            assert!(found_pair >= 50, "{a},{b}: {found_pair} of {}", found.len());
+            let others = found.iter().filter(|found| !found.is_empty()).count() - found_pair;
             assert_eq!(others, 0, "{a},{b}: {found:?}");
         }
     }

@@ -16,7 +16,7 @@ use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::Noise;
 
-/// Presses that are simulated where none are told.
+/// Presses that are simulated where none are given.
 const SIMULATED: usize = 300;
 /// Conductance of the lightest and of the firmest simulated press, in sheet conductances.
 const FIRMNESS: [f64; 2] = [0.015, 10.0];
@@ -43,11 +43,11 @@ impl KernelSolver {
     /// [`ForwardError`] if the model takes no presses on this detector.
     pub fn new(problem: &Problem) -> Result<Self, ForwardError> {
         let detector = problem.detector();
-        let told =
+        let refused =
             |error: TeachError| ForwardError::Detector { detector: detector.name.clone(), what: with_causes(&error) };
         let kernel = match problem.learned() {
             Some(Learned::Kernel(kernel)) => Arc::clone(kernel),
-            _ => Arc::new(Kernel::train(&Presses::simulated(problem, SIMULATED)).map_err(told)?),
+            _ => Arc::new(Kernel::train(&Presses::simulated(problem, SIMULATED)).map_err(refused)?),
         };
         Ok(Self {
             electrodes: detector.electrodes.len(),

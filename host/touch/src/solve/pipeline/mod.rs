@@ -72,7 +72,7 @@ impl Stages {
     fn after(&self, seen: &Readings, mut solution: Solution) -> Solution {
         // Newtons are measured where the model explains the readings, so before places are corrected.
         if let Some(scale) = &self.scale {
-            solution = scale.told(seen, solution);
+            solution = scale.with_forces(seen, solution);
         }
         if let Some(corrector) = &self.corrector {
             solution = corrector.solution(solution);
@@ -175,7 +175,7 @@ impl Tracker for Staged<dyn Tracker> {
     }
 
     fn inherit(&mut self, before: &[FoundContact]) {
-        // They were told where they are; the half goes on from where contacts are found.
+        // They were corrected to where they are; the half goes on from where contacts are found.
         match &self.stages.corrector {
             Some(corrector) => self.half.inherit(&corrector.found(before)),
             None => self.half.inherit(before),

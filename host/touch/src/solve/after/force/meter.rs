@@ -81,7 +81,7 @@ impl Meter {
         })
     }
 
-    /// Conductances at the contacts' places; none where they cannot be told, as of two contacts at one place.
+    /// Conductances at the contacts' places; none where they cannot be distinguished, as of two contacts at one place.
     pub fn measure(&self, readings: &Readings, contacts: &[FoundContact]) -> Option<Vec<Measured>> {
         let is_sound = |contact: &FoundContact| {
             [contact.x_m, contact.y_m, contact.z_m, contact.conductance_s].iter().all(|value| value.is_finite())
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_are_wrong_matter_little_and_are_told_by_the_error() {
+    fn places_that_are_wrong_matter_little_and_are_in_the_error() {
         let mut trial = MeterTrial::new(Detector::default());
         for (at_mm, force_n) in [([0.0, 0.0], 0.03), ([7.5, 7.5], 1.0), ([3.0, -11.0], 0.3), ([17.5, 22.5], 1.0)] {
             let ball = trial.ball(at_mm, force_n);
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn contacts_beside_each_other_are_told_apart() {
+    fn contacts_beside_each_other_are_distinguished() {
         let mut trial = MeterTrial::new(Detector::default());
         for apart_mm in [6.0, 10.0, 20.0] {
             let pair = [trial.ball([-apart_mm / 2.0, 3.0], 0.2), trial.ball([apart_mm / 2.0, 3.0], 1.0)];

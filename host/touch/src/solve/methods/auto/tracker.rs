@@ -75,7 +75,7 @@ impl AutoTracker {
         self.contacts.as_ref().map(of).transpose()
     }
 
-    /// The latest readings while contacts go by rows, told for them as they are now.
+    /// The latest readings while contacts go by rows, as they would be for them now.
     fn latest(&self) -> Option<Mean> {
         self.contacts.as_ref().and_then(ContactTracker::latest)
     }

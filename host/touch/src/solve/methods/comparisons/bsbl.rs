@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn two_firm_contacts_are_told_apart() {
+    fn two_firm_contacts_are_distinguished() {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
         let slab = Slab::with_resolution(&detector, Resolution::FINE).unwrap();
         let truth = [Contact::flat(0.012, 0.005, 0.002, 5e-4), Contact::flat(-0.013, -0.007, 0.002, 5e-4)];

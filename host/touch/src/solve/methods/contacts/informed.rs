@@ -41,7 +41,7 @@ impl ContactFinder {
         if self.problem.nuisance().is_none() {
             return self.search_exact(from, target, better);
         }
-        // What was found before anything was known of the readings' errors is told with them first: to bring it to them takes a while.
+        // What was found before anything was known of the readings' errors is given with them first: to bring it to them takes a while.
         let provisional = from.filter(|from| from.error.is_none());
         if let Some(judged) = provisional.and_then(|from| self.informed_as_is(from, target))
             && better(&judged).is_break()

@@ -99,7 +99,7 @@ impl ContactFinder {
         let counted = target.at(&fit.volts).count() as f64;
         let noise = counted + policy::MISFIT_DEVIATIONS * (2.0 * counted).sqrt();
         state.unfit = if fit.cost > noise { state.unfit + 1 } else { 0 };
-        // What is gone is told by the rows alone: what they say for it is what a contact of that kind would have taken off.
+        // What is gone shows in the rows alone: what they say for it is what a contact of that kind would have taken off.
         state.gone = (state.gone + 0.5 * (fit.cost - target.cost_of_nothing())).max(0.0);
         if state.gone > policy::GONE_NATS || self.is_vanishing(&fit) {
             return Step::Gone;
@@ -108,8 +108,8 @@ impl ContactFinder {
         state.systematic_error.add(&fit, target, &self.errors, self.spacing_m);
         let known = state.filters.information();
         let stays = state.systematic_error.covariance(&fit);
-        let told = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
-        (fit.normal, fit.settled) = (told().unwrap_or_else(|| known.clone()), true);
+        let covariance = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
+        (fit.normal, fit.settled) = (covariance().unwrap_or_else(|| known.clone()), true);
         Step::Followed(ContactHypothesis { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
     }
 
@@ -122,7 +122,7 @@ impl ContactFinder {
         Some(ContactHypothesis::of(fit, target))
     }
 
-    /// Whether what is followed has become so light that it cannot be told from nothing.
+    /// Whether what is followed has become so light that it cannot be distinguished from nothing.
     fn is_vanishing(&self, fit: &DiscFit) -> bool {
         let least_s = policy::VANISHING_SHEETS * self.sheet_s;
         fit.contacts.iter().all(|contact| contact.conductance_s < least_s)

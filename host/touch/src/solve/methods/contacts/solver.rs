@@ -48,14 +48,14 @@ pub(crate) struct ContactTracker {
     latest: Option<Latest>,
     /// Whether what is followed was found in some of the rows only.
     is_glimpsed: bool,
-    /// Time since a search changed the number of contacts (s), until one does not: rows from before were told for other contacts' motion.
+    /// Time since a search changed the number of contacts (s), until one does not: rows from before were given for other contacts' motion.
     recounted_s: Option<f64>,
     doubt: Doubt,
     /// Time for which no row has said more than that its readings are below the converter's range (s).
     silent_s: f64,
     /// Whether it was found when what the readings may be off by together was not known yet.
     is_provisional: bool,
-    /// What a calibration would bring, as all readings told of what is followed.
+    /// What a calibration would bring, as all readings showed of what is followed.
     calibrated: Option<Calibrated>,
     association: Association,
     /// As it was before this frame: a frame that has several answers is one frame.

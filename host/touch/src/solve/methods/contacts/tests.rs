@@ -144,19 +144,19 @@ fn a_pad_that_is_not_as_the_model_has_it_does_not_matter() {
 
 #[test]
 fn as_long_as_nothing_is_known_of_its_errors_a_detector_as_built_invents_little_and_claims_little() {
-    let told = Detector::preset(Detector::DEFAULT).unwrap();
-    let problem = Problem::of(&told).unwrap();
+    let described = Detector::preset(Detector::DEFAULT).unwrap();
+    let problem = Problem::of(&described).unwrap();
     let solver = Contacts::new(&problem, ContactSettings::of(&problem)).unwrap();
     let (finder, mut random) = (solver.finder(), fastrand::Rng::with_seed(8));
     let (mut invented, mut far) = ([0, 0], 0);
     for seed in 0..10 {
-        let built = drawn(&told, seed);
+        let built = drawn(&described, seed);
         let model = Slab::with_resolution(&built, Resolution::FINE).unwrap();
         for _ in 0..4 {
             let [x_m, y_m] = [0, 1].map(|_| 0.05 * (random.f64() - 0.5));
             let truth = contact(x_m, y_m, 10f64.powf(2.0 * random.f64() - 1.0));
             let readings = readings_v(&model.impedance_ohm(&[truth]).unwrap(), &built);
-            let readings = measured(&readings, &told.adc, &mut Noise::new(seed));
+            let readings = measured(&readings, &described.adc, &mut Noise::new(seed));
             let exact = Target::of_mean(&readings, 1, &finder.errors, None);
             let exact = finder.search_exact(None, &exact, &mut |_| ControlFlow::Continue(())).unwrap();
             invented[0] += usize::from(exact.fit.contacts.len() > 1);

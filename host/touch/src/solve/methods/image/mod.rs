@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_of_no_scene_and_of_the_drive_itself_are_told() {
+    fn readings_of_no_scene_and_of_the_drive_itself_are_flagged() {
         let mut solver = Nonlinear::new(&problem(), NonlinearSettings::default()).unwrap();
         let contact = Contact::flat(0.004, -0.011, 0.003, 1e-3);
         let mut swapped = readings(&[contact.into()]);

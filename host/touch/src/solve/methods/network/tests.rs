@@ -45,7 +45,7 @@ fn single_contacts_are_found_on_detectors_that_nobody_calibrated() {
 }
 
 #[test]
-fn two_contacts_far_apart_are_told_apart() {
+fn two_contacts_far_apart_are_distinguished() {
     let mut solver = solver();
     let pair = [(-0.015, -0.012, 0.5), (0.014, 0.013, 0.5)];
     let solution = solver.solve(&read(2010, &pair, &[])).unwrap();

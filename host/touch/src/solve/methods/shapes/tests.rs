@@ -145,7 +145,7 @@ fn a_ring_is_found_within_its_standard_errors() {
 }
 
 #[test]
-fn what_is_beyond_an_edge_is_not_told() {
+fn what_is_beyond_an_edge_is_not_known() {
     let mut trial = ShapeTrial::new();
     let touch = Touch { centre_m: [0.018, -0.004], ..line(1.0) };
     let shifted = ALONG.map(|[x_m, y_m]| [(x_m + 0.012_f64).min(0.029), y_m]);

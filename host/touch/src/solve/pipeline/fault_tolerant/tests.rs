@@ -38,7 +38,7 @@ fn a_sound_board_keeps_its_electrodes() {
 }
 
 #[test]
-fn what_is_wrong_is_told_and_left_out() {
+fn what_is_wrong_is_reported_and_left_out() {
     type Case<'a> = (&'a [&'a str], &'a [(usize, ElectrodeFault)]);
     let cases: [Case<'_>; 5] = [
         (&["open:3"], &[(3, ElectrodeFault::Open)]),
@@ -123,7 +123,7 @@ fn looked(problem: &Problem, readings: &Readings) -> Option<[usize; 2]> {
 }
 
 #[test]
-fn healthy_detectors_as_built_are_never_told_exchanged() {
+fn healthy_detectors_as_built_are_never_found_exchanged() {
     let described = Detector::default();
     let problem = Problem::of(&described).unwrap();
     for seed in 0..24 {
@@ -134,7 +134,7 @@ fn healthy_detectors_as_built_are_never_told_exchanged() {
 }
 
 #[test]
-fn exchanged_wires_of_detectors_as_built_are_told_by_most_presses() {
+fn exchanged_wires_of_detectors_as_built_are_found_by_most_presses() {
     let described = Detector::default();
     let problem = Problem::of(&described).unwrap();
     // Neighbours, electrodes far apart, and across the converters of an ESP32.
@@ -144,18 +144,18 @@ fn exchanged_wires_of_detectors_as_built_are_told_by_most_presses() {
         let swap = Fault::Swap { channels: [a, b] };
         let singles = presses(&drawn(&described, seed), 19, seed, &[swap]);
         let found = singles.iter().filter(|(fingers, _)| *fingers == 1).map(|(_, press)| looked(&problem, press));
-        let told: Vec<_> = found.collect();
-        let others = told.iter().flatten().filter(|pair| **pair != [a, b]).count();
-        assert_eq!(others, 0, "{a},{b}, seed {seed}: {told:?}");
-        right += told.iter().flatten().count();
-        count += told.len();
+        let pairs: Vec<_> = found.collect();
+        let others = pairs.iter().flatten().filter(|pair| **pair != [a, b]).count();
+        assert_eq!(others, 0, "{a},{b}, seed {seed}: {pairs:?}");
+        right += pairs.iter().flatten().count();
+        count += pairs.len();
     }
     // Of some pairs on some detectors a single look tells nothing: live has others.
     assert!(2 * right >= count, "{right} of {count}");
 }
 
 #[test]
-fn a_certainty_is_told_of_no_answer_that_is_doubtful() {
+fn a_certainty_is_given_of_no_answer_that_is_doubtful() {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
     detector.adc.noise_lsb = 1.5;
     let fine = Slab::with_resolution(&detector, Resolution::FINE).unwrap();

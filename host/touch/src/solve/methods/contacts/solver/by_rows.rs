@@ -68,7 +68,7 @@ impl ContactTracker {
         }
     }
 
-    /// The latest readings, told for the contacts as they are now; none while whole frames come.
+    /// The latest readings, as they would be for the contacts now; none while whole frames come.
     pub fn latest(&self) -> Option<Mean> {
         let readings = self.latest.as_ref()?.readings(OLDEST_S, self.expected_v());
         Some(Mean { readings, frames: 1 })
