@@ -96,7 +96,7 @@ impl DriftTrial {
 
     /// Error of what is taken off (codes, root of the mean square) of readings that are large.
     fn error_lsb(&self) -> f64 {
-        let offset_v = self.baseline.rest.offset_v();
+        let offset_v = self.baseline.baseline.offset_v();
         let true_v = self.true_v(&[0.0; 256]);
         let squares: f64 = offset_v.iter().zip(&true_v).map(|(a, b)| (a - b).powi(2)).sum();
         (squares / 256.0).sqrt() / detector().adc.lsb_v()
@@ -106,7 +106,7 @@ impl DriftTrial {
     fn learned(&self) -> f64 {
         let of_one_v: Vec<f64> = contact_v(0.003).iter().map(|volts| volts / 0.003).collect();
         let square: f64 = of_one_v.iter().map(|volts| volts * volts).sum();
-        let off = self.baseline.rest.mean_v().iter().zip(self.true_v(&[0.0; 256]));
+        let off = self.baseline.baseline.mean_v().iter().zip(self.true_v(&[0.0; 256]));
         off.zip(&of_one_v).map(|((mean, truth), one)| (mean - truth.max(0.0)) * one).sum::<f64>() / square
     }
 }
@@ -178,7 +178,7 @@ fn a_press_at_the_start_is_never_the_baseline() {
         let (mut trial, touch_v) = (DriftTrial::new(1e-3, 0.0), contact_v(sheets));
         trial.touch(&touch_v, 5 * FRAMES);
         assert!(matches!(trial.baseline.state(), BaselineState::Pressed(_)), "{sheets}: {:?}", trial.baseline.state());
-        assert_eq!(trial.baseline.rest.mean_v(), [0.0; 256]);
+        assert_eq!(trial.baseline.baseline.mean_v(), [0.0; 256]);
         if sheets > 0.1 {
             trial.baseline.renew();
             trial.touch(&touch_v, 2 * FRAMES);
@@ -251,12 +251,12 @@ fn a_cup_for_an_hour_is_not_learned_and_afterwards_what_has_drifted_is() {
     let rim =
         Touch::flat([0.004, 0.002], Shape::Ring { radius_m: 0.02, width_m: 0.002 }, detector().sheet_conductance_s());
     let cup_v = image_v(&FINE.image_mesh().conductances_s(&[rim]).unwrap());
-    let before_v = trial.baseline.rest.mean_v().to_vec();
+    let before_v = trial.baseline.baseline.mean_v().to_vec();
     for _ in 0..60 {
         trial.offsets.iter_mut().for_each(|offset| *offset += 2.0 / 60.0);
         trial.touch(&cup_v, 600);
     }
-    assert_eq!(trial.baseline.rest.mean_v(), before_v, "nothing is taken under load");
+    assert_eq!(trial.baseline.baseline.mean_v(), before_v, "nothing is taken under load");
     assert_eq!(trial.baseline.state(), BaselineState::Lasting);
     assert!(trial.error_lsb() > 1.5);
     trial.rest(40);
@@ -276,12 +276,12 @@ fn a_very_light_touch_at_the_start_is_forgotten_when_it_is_lifted() {
 fn a_person_may_take_a_light_touch_for_the_baseline_but_no_press() {
     let mut trial = DriftTrial::new(1e-3, 0.0);
     trial.rest(FRAMES);
-    let before_v = trial.baseline.rest.mean_v().to_vec();
+    let before_v = trial.baseline.baseline.mean_v().to_vec();
     trial.baseline.renew();
     assert!(trial.baseline.state().is_taking());
     trial.touch(&contact_v(0.3), FRAMES);
     let refused = matches!(trial.baseline.state(), BaselineState::Refused(volts) if volts > 0.1);
-    assert!(refused && trial.baseline.rest.mean_v() == before_v);
+    assert!(refused && trial.baseline.baseline.mean_v() == before_v);
     trial.rest(2 * FRAMES);
     assert_eq!(trial.baseline.state(), BaselineState::Held, "once nothing presses");
     trial.baseline.renew();

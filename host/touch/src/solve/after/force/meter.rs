@@ -3,7 +3,7 @@
 //! Of a firm contact readings hardly tell conductance and radius apart (`contacts` says so in its standard
 //! errors), but the resistance of both to a tenth of a per cent: that of the contact itself and of the current that crowds under it, in Holm's words
 //! film and constriction resistance (*Electric Contacts*, 1967). A force changes both, so it is that sum that tells it. The contacts are spots of a
-//! [`Network`] at the places that a solver found, whichever it is, and their resistances are fitted to the readings by Gauss and Newton's
+//! [`SpotModel`] at the places that a solver found, whichever it is, and their resistances are fitted to the readings by Gauss and Newton's
 //! steps. With `U[k]` the current that an ampere into each electrode makes at contact `k`, `dZ[e][g] = U[k][e] U[k][g] dA[k]`.
 //!
 //! From a fitted resistance `A = N(x, x) + 1/C` of a spot of the usual radius `r` all is taken away that depends on the place: walls, layers, pads.
@@ -19,7 +19,7 @@ use crate::solve::fit::evidence::misfit_limit;
 use crate::solve::fit::least_squares::{LeastSquares, NormalEquations, Schedule, covariance, minimise};
 use crate::solve::fit::linear::full_v;
 use crate::solve::fit::policy;
-use crate::solve::fit::spots::{LoadedSpot, Network, Solved};
+use crate::solve::fit::spots::{LoadedSpot, Solved, SpotModel};
 use crate::solve::problem::Problem;
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::readings::{Readings, Says};
@@ -48,7 +48,7 @@ pub(super) struct Measured {
 
 /// Measures contacts at known places.
 pub(super) struct Meter {
-    network: Network,
+    spot_model: SpotModel,
     fields: Box<dyn SpotFields>,
     /// The constriction that is the same everywhere (ohm).
     constriction_ohm: f64,
@@ -72,7 +72,7 @@ impl Meter {
         let sheet_s = detector.sheet_conductance_s();
         let top_s_per_m = detector.layers.last()?.top_s_per_m;
         Some(Self {
-            network: Network::new(detector, problem.model.electrode_fields_ohm()),
+            spot_model: SpotModel::new(detector, problem.model.electrode_fields_ohm()),
             fields: problem.model.spots(radius_m)?,
             constriction_ohm: 1.0 / (4.0 * top_s_per_m * radius_m) + 1.0 / (2.0 * PI * sheet_s),
             sheet_s,
@@ -119,11 +119,11 @@ impl Meter {
         for (spot, log) in spots.iter_mut().zip(&logs) {
             spot.ohm = spot.spot.own_ohm - self.constriction_ohm + log.exp();
         }
-        let solved = self.network.solve(spots, &*self.fields)?;
-        let n = self.network.electrodes();
+        let solved = self.spot_model.solve(spots, &*self.fields)?;
+        let n = self.spot_model.electrodes();
         let residual = |(index, volts): (usize, &f64)| {
             let (g, e) = (index / n, index % n);
-            let model_v = self.network.drive_v * (1.0 - solved.impedance_ohm[e * n + g] / solved.loads_ohm[g]);
+            let model_v = self.spot_model.drive_v * (1.0 - solved.impedance_ohm[e * n + g] / solved.loads_ohm[g]);
             if self.counts(readings, g, e) { (volts - model_v) / self.noise_v } else { 0.0 }
         };
         let residuals: Vec<f64> = readings.volts().iter().enumerate().map(residual).collect();
@@ -132,7 +132,7 @@ impl Meter {
 
     /// Derivatives of the readings by the logarithms, in deviations of the noise, a row for each.
     fn slopes(&self, fit: &Fit, readings: &Readings) -> Vec<Vec<f64>> {
-        let n = self.network.electrodes();
+        let n = self.spot_model.electrodes();
         let of = |k: usize| {
             let currents = &fit.solved.currents[k * n..(k + 1) * n];
             let ohm = fit.logs[k].exp();
@@ -144,7 +144,7 @@ impl Meter {
                 let load_ohm = fit.solved.loads_ohm[g];
                 let share = fit.solved.impedance_ohm[e * n + g] / load_ohm;
                 let change = currents[g] * (currents[e] - share * currents[g]);
-                -self.network.drive_v * ohm * change / (load_ohm * self.noise_v)
+                -self.spot_model.drive_v * ohm * change / (load_ohm * self.noise_v)
             };
             (0..n * n).map(slope).collect()
         };

@@ -93,7 +93,7 @@ impl Shared {
         let areas_m2 = mesh.node_areas_m2.clone();
         let mean_m2 = areas_m2.iter().sum::<f64>() / areas_m2.len() as f64;
         let unit_s = areas_m2.iter().map(|area_m2| detector.sheet_conductance_s() * area_m2 / mean_m2).collect();
-        let full_v = full_v(detector);
+        let full_v = full_v(&detector);
         let noise_v = detector.adc.deviation_v();
         let to_image = Interpolation::new(mesh, &problem.jacobian.image_mesh);
         let locator = Locator::new(&problem.jacobian.image_mesh, &detector);

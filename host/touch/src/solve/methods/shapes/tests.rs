@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::fit::KNOWN;
+use super::fit::PRIOR_ROWS;
 use super::*;
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::methods::contacts::{ContactFinder, ContactSettings};
