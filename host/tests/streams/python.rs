@@ -74,8 +74,7 @@ fn done(args: &[&str]) -> String {
 
 /// Numbers of the field of a grid that is `offset` bytes after the first.
 fn grid(message: &Value, offset: usize) -> Vec<f64> {
-    use base64::Engine;
-    let data = base64::engine::general_purpose::STANDARD.decode(message["data"].as_str().unwrap()).unwrap();
+    let data = data_encoding::BASE64.decode(message["data"].as_str().unwrap().as_bytes()).unwrap();
     let cells = data.chunks(message["cell_stride"].as_u64().unwrap() as usize);
     cells.map(|cell| f64::from_le_bytes(cell[offset..offset + 8].try_into().unwrap())).collect()
 }
