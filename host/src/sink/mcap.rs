@@ -1,16 +1,15 @@
 //! MCAP files (<https://mcap.dev>), for Foxglove's app and everything that reads them: the [channels](super::channels) in compressed chunks with
 //! an index.
 
+mod writer;
+
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use mcap::records::{MessageHeader, Metadata};
-use mcap::write::NoSeek;
-use mcap::{Compression, McapError, WriteOptions, Writer};
-
+use self::writer::{Schema, Writer};
 use super::channels::{Channel, Messages};
 use super::feed::{Delivery, Keeps};
 use super::running::{Sink, Sinks};
@@ -19,11 +18,11 @@ use super::target::{DISK_PATIENCE, StreamError};
 /// Longest that answers wait in memory: what a kill costs at most.
 const CHUNK_LASTS: Duration = Duration::from_millis(500);
 /// Size of a chunk before it is compressed, in bytes: half a second at 1200 answers a second without images is 4 MB.
-const CHUNK_BYTES: u64 = 4 << 20;
+const CHUNK_BYTES: usize = 4 << 20;
 
 /// An MCAP file that is being written.
 pub struct McapFile<W: Write> {
-    writer: Writer<NoSeek<W>>,
+    writer: Writer<W>,
     messages: Messages,
     /// Number of each channel in the file.
     channels: [u16; Channel::ALL.len()],
@@ -38,20 +37,13 @@ impl<W: Write> McapFile<W> {
     /// # Errors
     /// If it cannot be written.
     pub fn new(out: W, messages: Messages, about: BTreeMap<String, String>) -> io::Result<Self> {
-        // A chunk is written once it is whole: a file that ends early ends after a chunk.
-        let options = WriteOptions::new()
-            .compression(Some(Compression::Lz4))
-            .chunk_size(Some(CHUNK_BYTES))
-            .library(concat!("tactomo ", env!("CARGO_PKG_VERSION")))
-            .disable_seeking(true);
-        let mut writer = options.create(NoSeek::new(out)).map_err(as_io)?;
-        writer.write_metadata(&Metadata { name: "tactomo".to_owned(), metadata: about }).map_err(as_io)?;
-        let mut channels = [0; Channel::ALL.len()];
-        for (number, channel) in channels.iter_mut().zip(Channel::ALL) {
-            let schema = channel.schema();
-            let schema = writer.add_schema(channel.schema_name(), "jsonschema", schema.as_bytes()).map_err(as_io)?;
-            *number = writer.add_channel(schema, channel.topic(), "json", &BTreeMap::new()).map_err(as_io)?;
-        }
+        let mut writer = Writer::new(out, concat!("tactomo ", env!("CARGO_PKG_VERSION")), CHUNK_BYTES)?;
+        writer.metadata("tactomo", &about)?;
+        let channels = Channel::ALL.map(|channel| {
+            let data = &channel.schema();
+            let schema = Schema { name: channel.schema_name(), encoding: "jsonschema", data };
+            writer.channel(channel.topic(), "json", &schema)
+        });
         Ok(Self { writer, messages, channels, sequence: 0, out: Vec::new(), flushed: Instant::now() })
     }
 
@@ -63,12 +55,9 @@ impl<W: Write> McapFile<W> {
         let time_ns = delivery.event.arrived_unix_ns;
         for (channel, number) in Channel::ALL.into_iter().zip(self.channels) {
             self.out.clear();
-            if !self.messages.write(channel, delivery, &mut self.out)? {
-                continue;
+            if self.messages.write(channel, delivery, &mut self.out)? {
+                self.writer.message(number, self.sequence, time_ns, &self.out)?;
             }
-            let header =
-                MessageHeader { channel_id: number, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
-            self.writer.write_to_known_channel(&header, &self.out).map_err(as_io)?;
         }
         self.sequence = self.sequence.wrapping_add(1);
         Ok(())
@@ -79,11 +68,7 @@ impl<W: Write> McapFile<W> {
     /// # Errors
     /// If that fails.
     pub fn finish(mut self) -> io::Result<()> {
-        self.end()
-    }
-
-    fn end(&mut self) -> io::Result<()> {
-        self.writer.finish().map(drop).map_err(as_io)
+        self.writer.finish()
     }
 
     /// Ends the chunk, if it has lasted long enough.
@@ -92,7 +77,7 @@ impl<W: Write> McapFile<W> {
             return Ok(());
         }
         self.flushed = Instant::now();
-        self.writer.flush().map_err(as_io)
+        self.writer.end_chunk()
     }
 }
 
@@ -107,7 +92,7 @@ impl<W: Write + Send + 'static> Sink for McapFile<W> {
     }
 
     fn finish(&mut self) -> io::Result<()> {
-        self.end()
+        self.writer.finish()
     }
 }
 
@@ -127,12 +112,5 @@ impl Sinks {
         let file = McapFile::new(BufWriter::new(file), messages, about).map_err(failed)?;
         let name = format!("{}", path.display());
         self.run(name.clone(), (Keeps::All, None), DISK_PATIENCE, file).map_err(StreamError::thread(&name))
-    }
-}
-
-fn as_io(error: McapError) -> io::Error {
-    match error {
-        McapError::Io(error) => error,
-        other => io::Error::other(other),
     }
 }

@@ -128,6 +128,29 @@ fn a_page_of_an_origin_that_is_named_opens_the_socket() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn a_socket_opens_where_all_is_asked_that_it_needs() -> Result<()> {
+    let rig = Rig::start(None)?;
+    let host = format!("127.0.0.1:{}", rig.server.port());
+    let origin = format!("http://{host}");
+    let asked = [
+        ("Origin", origin.as_str()),
+        ("Connection", "keep-alive, Upgrade"),
+        ("Upgrade", "websocket"),
+        ("Sec-WebSocket-Version", "13"),
+        ("Sec-WebSocket-Key", "dGhlIHNhbXBsZSBub25jZQ=="),
+    ];
+    let answer = ask(rig.server.port(), "/socket", &host, &asked)?;
+    // The example of RFC 6455, section 1.3.
+    let accepted = "sec-websocket-accept: s3pPLMBiTxaQ9kYGzzhZRbK+xOo=\r\n";
+    assert!(answer.status == 101 && answer.headers.contains(accepted), "{}", answer.headers);
+    for (name, _) in &asked[1..] {
+        let rest: Vec<_> = asked.into_iter().filter(|(other, _)| other != name).collect();
+        assert_eq!(ask(rig.server.port(), "/socket", &host, &rest)?.status, 400, "without {name}");
+    }
+    Ok(())
+}
+
 /// A server with little patience.
 fn hasty() -> Result<Rig> {
     let limits = Limits {

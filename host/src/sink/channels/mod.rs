@@ -169,8 +169,7 @@ impl Pose {
 mod tests {
     use std::sync::Arc;
 
-    use base64::Engine;
-    use base64::engine::general_purpose::STANDARD;
+    use data_encoding::BASE64;
     use serde_json::Value;
     use tactomo_physics::readings::{Readings, Says};
     use tactomo_touch::solve::{FoundContact, FoundRing, FoundShape, Solution};
@@ -244,7 +243,7 @@ mod tests {
         let grid = message(Channel::Readings, event).unwrap();
         let (columns, stride) = (grid["column_count"].as_u64().unwrap(), grid["cell_stride"].as_u64().unwrap());
         assert_eq!((columns, stride, grid["row_stride"].as_u64()), (4, 24, Some(96)));
-        let data = STANDARD.decode(grid["data"].as_str().unwrap()).unwrap();
+        let data = BASE64.decode(grid["data"].as_str().unwrap().as_bytes()).unwrap();
         let found: Vec<f64> = data.chunks(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap())).collect();
         for (i, pair) in found.chunks(3).enumerate() {
             let (g, e) = (i / 4, i % 4);
@@ -262,7 +261,7 @@ mod tests {
     fn an_image_has_its_nodes_places_and_what_has_none_sends_nothing() {
         let solution = Solution { image_s_per_m2: Some(vec![0.5, 1.5]), ..Solution::default() };
         let cloud = message(Channel::Image, TouchEvent::of(0, solution)).unwrap();
-        let data = STANDARD.decode(cloud["data"].as_str().unwrap()).unwrap();
+        let data = BASE64.decode(cloud["data"].as_str().unwrap().as_bytes()).unwrap();
         let found: Vec<f32> = data.chunks(4).map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap())).collect();
         assert_eq!(found, [0.01, 0.02, 0.0, 0.5, -0.01, 0.0, 0.0, 1.5]);
         assert!(message(Channel::Image, TouchEvent::of(0, Solution::default())).is_none());

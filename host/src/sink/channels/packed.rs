@@ -1,7 +1,6 @@
 //! Numbers as bytes: images as point clouds, readings as grids.
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
+use data_encoding::BASE64;
 use serde::Serialize;
 use tactomo_physics::forward::ImageMesh;
 use tactomo_physics::readings::Readings;
@@ -64,7 +63,7 @@ pub(super) fn image(image_s_per_m2: &[f32], mesh: &ImageMesh, timestamp: Stamp) 
         pose: Pose::at([0.0; 3]),
         point_stride: 4 * size_of::<f32>(),
         fields: [field("x", 0), field("y", 4), field("z", 8), field("conductance_s_per_m2", 12)],
-        data: STANDARD.encode(data),
+        data: BASE64.encode(&data),
     }
 }
 
@@ -93,6 +92,6 @@ pub(super) fn readings(
         row_stride: n * cell_stride,
         cell_stride,
         fields: [field("readings_v", 0), field("used_v", 8), field("touch_v", 16)],
-        data: STANDARD.encode(data),
+        data: BASE64.encode(&data),
     }
 }

@@ -1,12 +1,15 @@
 //! One app's connection.
 
-use axum::extract::ws::{Message, WebSocket};
+use std::io;
+
+use futures_util::StreamExt;
+use tokio_tungstenite::tungstenite::Message;
 
 use super::Shared;
 use super::protocol::{self, Asked, Subscription};
 use crate::sink::channels::Channel;
 use crate::sink::feed::{Delivery, Keeps, Next, Tail};
-use crate::sink::web::{Beat, Pulse};
+use crate::sink::web::{Beat, Pulse, WebSocket};
 
 /// Talks to an app until it leaves or nothing more comes.
 pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
@@ -27,22 +30,22 @@ struct App<'a> {
 }
 
 impl App<'_> {
-    async fn talk(&mut self, socket: &mut WebSocket) -> Result<(), axum::Error> {
+    async fn talk(&mut self, socket: &mut WebSocket) -> io::Result<()> {
         self.pulse.send(socket, Message::text(protocol::server_info(&self.shared.session))).await?;
         self.pulse.send(socket, Message::text(protocol::advertise())).await?;
         let mut alive = self.shared.taps.clone();
         loop {
             tokio::select! {
-                heard = socket.recv() => {
+                heard = socket.next() => {
                     self.pulse.heard();
                     match heard {
                         Some(Ok(Message::Text(text))) => for warning in self.hear(&text) {
                             self.pulse.send(socket, Message::text(protocol::warning(&warning))).await?;
                         },
                         Some(Ok(Message::Close(_))) | None => return Ok(()),
-                        Some(Err(error)) => return Err(error),
+                        Some(Err(error)) => return Err(io::Error::other(error)),
                         // Nothing that an app sends in bytes is for a server that offers nothing of the kind.
-                        Some(Ok(Message::Binary(_) | Message::Ping(_) | Message::Pong(_))) => {}
+                        Some(Ok(Message::Binary(_) | Message::Ping(_) | Message::Pong(_) | Message::Frame(_))) => {}
                     }
                 }
                 beat = self.pulse.next() => match beat {
@@ -89,11 +92,11 @@ impl App<'_> {
         Ok(())
     }
 
-    async fn send(&mut self, socket: &mut WebSocket, delivery: &Delivery) -> Result<(), axum::Error> {
+    async fn send(&mut self, socket: &mut WebSocket, delivery: &Delivery) -> io::Result<()> {
         let Self { shared, subscriptions, tail: Some(tail), out, pulse } = self else { return Ok(()) };
         for (id, channel) in subscriptions {
             protocol::begin_data(*id, delivery.event.arrived_unix_ns, out);
-            if shared.messages.write(*channel, delivery, out).map_err(axum::Error::new)? {
+            if shared.messages.write(*channel, delivery, out)? {
                 // Waits here while the app does not read; nobody else waits for it.
                 tail.wait_for(pulse.send(socket, Message::binary(out.clone()))).await?;
             }

@@ -12,11 +12,8 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use axum::Router;
-use axum::extract::ws::rejection::WebSocketUpgradeRejection;
-use axum::extract::{State, WebSocketUpgrade};
-use axum::http::{HeaderMap, StatusCode};
-use axum::response::{IntoResponse, Response};
+use hyper::header::{HeaderValue, SEC_WEBSOCKET_PROTOCOL};
+use hyper::{HeaderMap, StatusCode};
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
@@ -27,7 +24,7 @@ use super::door::Door;
 use super::feed::Taps;
 use super::running::{PATIENCE, Sinks};
 use super::target::StreamError;
-use super::web;
+use super::web::{self, PLAIN, Request, Response, response};
 use tactomo_physics::causes::with_causes;
 
 /// The port that Foxglove's app proposes.
@@ -84,10 +81,9 @@ impl Sinks {
 async fn serve(listener: std::net::TcpListener, shared: Arc<Shared>) -> io::Result<()> {
     let listener = TcpListener::from_std(listener)?;
     let mut alive = shared.taps.clone();
-    let router = Router::new().fallback(connect).with_state(Arc::clone(&shared));
-    let limits = shared.door.limits;
+    let all = Arc::clone(&shared);
     tokio::select! {
-        () = web::serve(listener, router, limits) => {}
+        () = web::serve(listener, move |request: &mut Request| connect(&all, request), shared.door.limits) => {}
         () = alive.ended() => {}
     }
     // What is left is for those who read; a stalled one is not waited for.
@@ -95,28 +91,33 @@ async fn serve(listener: std::net::TcpListener, shared: Arc<Shared>) -> io::Resu
     Ok(())
 }
 
-async fn connect(
-    State(shared): State<Arc<Shared>>,
-    headers: HeaderMap,
-    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
-) -> Response {
-    if !shared.door.lets_in(&headers, OWN, true) {
+fn connect(shared: &Arc<Shared>, request: &mut Request) -> Response {
+    if !shared.door.lets_in(request.headers(), OWN, true) {
         let refused = "Only Foxglove's own pages may read this, and those that --allow-origin names.\n";
-        return (StatusCode::FORBIDDEN, refused).into_response();
+        return response(StatusCode::FORBIDDEN, PLAIN, refused);
     }
-    let Ok(upgrade) = upgrade else {
-        return (StatusCode::UPGRADE_REQUIRED, "Open this address in Foxglove, as a WebSocket.\n").into_response();
+    let Ok(mut switching) = web::switching(request) else {
+        return response(StatusCode::UPGRADE_REQUIRED, PLAIN, "Open this address in Foxglove, as a WebSocket.\n");
     };
-    let upgrade = upgrade.protocols(SUBPROTOCOLS).max_message_size(LONGEST_ASKED).max_frame_size(LONGEST_ASKED);
-    if upgrade.selected_protocol().is_none() {
+    let Some(subprotocol) = subprotocol(request.headers()) else {
         let offered = "This server speaks the subprotocol foxglove.websocket.v1, which was not offered.\n";
-        return (StatusCode::BAD_REQUEST, offered).into_response();
-    }
-    let Ok(place) = Arc::clone(&shared.room).try_acquire_owned() else {
-        return (StatusCode::SERVICE_UNAVAILABLE, "Too many apps are connected.\n").into_response();
+        return response(StatusCode::BAD_REQUEST, PLAIN, offered);
     };
-    upgrade.on_upgrade(async move |socket| {
+    let Ok(place) = Arc::clone(&shared.room).try_acquire_owned() else {
+        return response(StatusCode::SERVICE_UNAVAILABLE, PLAIN, "Too many apps are connected.\n");
+    };
+    switching.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(subprotocol));
+    let shared = Arc::clone(shared);
+    web::when_switched(request, LONGEST_ASKED, async move |socket| {
         client::serve(socket, &shared).await;
         drop(place);
-    })
+    });
+    switching
+}
+
+/// The first name of the protocol that is among those an app offers.
+fn subprotocol(headers: &HeaderMap) -> Option<&'static str> {
+    let lists = headers.get_all(SEC_WEBSOCKET_PROTOCOL).iter().filter_map(|list| list.to_str().ok());
+    let offered: Vec<_> = lists.flat_map(|list| list.split(',')).map(str::trim).collect();
+    SUBPROTOCOLS.into_iter().find(|name| offered.contains(name))
 }

@@ -1,8 +1,8 @@
 //! The files of the page, held in the program.
 
-use axum::http::StatusCode;
-use axum::http::header::CONTENT_TYPE;
-use axum::response::IntoResponse;
+use hyper::StatusCode;
+
+use crate::sink::web::{PLAIN, Response, response};
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
@@ -58,9 +58,11 @@ const ASSETS: &[Asset] = &[
 ];
 
 /// Answer to a request for `path`.
-pub(super) fn answer(path: &str) -> Result<impl IntoResponse + use<>, StatusCode> {
-    let asset = ASSETS.iter().find(|asset| asset.0 == path).ok_or(StatusCode::NOT_FOUND)?;
-    Ok(([(CONTENT_TYPE, asset.1)], asset.2))
+pub(super) fn answer(path: &str) -> Response {
+    match ASSETS.iter().find(|asset| asset.0 == path) {
+        Some((_, kind, contents)) => response(StatusCode::OK, kind, contents),
+        None => response(StatusCode::NOT_FOUND, PLAIN, ""),
+    }
 }
 
 #[cfg(test)]
@@ -72,7 +74,7 @@ mod tests {
         for (path, _, text) in ASSETS.iter().filter(|asset| asset.1 == SCRIPT) {
             for line in text.lines().filter(|line| line.starts_with("import ")) {
                 let name = line.split('"').nth(1).and_then(|name| name.strip_prefix('.'));
-                assert!(name.is_some_and(|name| answer(name).is_ok()), "{path}: {line}");
+                assert!(name.is_some_and(|name| answer(name).status() == StatusCode::OK), "{path}: {line}");
             }
         }
     }

@@ -19,18 +19,14 @@ use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::SyncSender;
 use std::thread::JoinHandle;
 
-use axum::Router;
-use axum::extract::{FromRequestParts, Request as HttpRequest, State, WebSocketUpgrade};
-use axum::http::header::LOCATION;
-use axum::http::request::Parts;
-use axum::http::{HeaderValue, StatusCode};
-use axum::response::{IntoResponse, Response};
+use hyper::StatusCode;
+use hyper::header::{HeaderValue, LOCATION};
 use tokio::sync::{Semaphore, oneshot, watch};
 
 use self::access::Access;
 use super::address::Address;
 use super::door::Door;
-use super::web;
+use super::web::{self, PLAIN, Response, response};
 use crate::run::{Request, Snapshot};
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
@@ -273,71 +269,69 @@ fn bind(listen: &Listen) -> Result<TcpListener, ServerError> {
 fn run(listener: TcpListener, shared: Arc<Shared>, stopped: oneshot::Receiver<()>) -> io::Result<JoinHandle<()>> {
     listener.set_nonblocking(true)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let serve = async move {
+    let limits = shared.door.limits;
+    let serving = async move {
         let listener = tokio::net::TcpListener::from_std(listener)?;
         tokio::select! {
-            () = web::serve(listener, router(Arc::clone(&shared)), shared.door.limits) => {}
+            () = web::serve(listener, move |request: &mut web::Request| serve(&shared, request), limits) => {}
             _ = stopped => {}
         }
         io::Result::Ok(())
     };
     std::thread::Builder::new().name("page server".to_owned()).spawn(move || {
-        if let Err(error) = runtime.block_on(serve) {
+        if let Err(error) = runtime.block_on(serving) {
             tracing::error!("the page is no longer served: {}", with_causes(&error));
         }
     })
 }
 
-fn router(shared: Arc<Shared>) -> Router {
-    Router::new().fallback(serve).with_state(shared)
-}
-
 /// Answers any request: who may not ask gets nothing else.
-async fn serve(State(shared): State<Arc<Shared>>, request: HttpRequest) -> Response {
-    let (mut parts, _) = request.into_parts();
-    let host = shared.access.host(&parts.headers).map(ToOwned::to_owned);
+fn serve(shared: &Arc<Shared>, request: &mut web::Request) -> Response {
+    let host = shared.access.host(request.headers()).map(ToOwned::to_owned);
     let mut response = match &host {
-        Some(host) => answer(shared, &mut parts, host).await,
+        Some(host) => answer(shared, request, host),
         None => refuse("This server answers to its own address only: open the address that tactomo live printed.\n"),
     };
     access::protect(response.headers_mut(), host.as_deref());
     response
 }
 
-fn refuse(why: &'static str) -> Response {
-    (StatusCode::FORBIDDEN, why).into_response()
+fn refuse(why: &str) -> Response {
+    response(StatusCode::FORBIDDEN, PLAIN, why)
 }
 
-async fn answer(shared: Arc<Shared>, parts: &mut Parts, host: &str) -> Response {
-    let whole = parts.uri.path().to_owned();
-    match shared.access.path(&whole) {
+fn answer(shared: &Arc<Shared>, request: &mut web::Request, host: &str) -> Response {
+    let whole = request.uri().path();
+    match shared.access.path(whole) {
         None => refuse("The token is missing or wrong: open the whole address that tactomo live printed.\n"),
         Some("") => redirect(&format!("{whole}/")),
-        Some("/socket") => match WebSocketUpgrade::from_request_parts(parts, &()).await {
-            Ok(upgrade) => open_socket(shared, parts, host, upgrade),
-            Err(rejection) => rejection.into_response(),
-        },
-        Some(path) => assets::answer(path).into_response(),
+        Some("/socket") => open_socket(shared, request, host),
+        Some(path) => assets::answer(path),
     }
 }
 
 /// The same page with a slash at its end: the names of its files are relative to that.
 fn redirect(to: &str) -> Response {
-    match HeaderValue::try_from(to) {
-        Ok(to) => (StatusCode::PERMANENT_REDIRECT, [(LOCATION, to)]).into_response(),
-        Err(_) => StatusCode::NOT_FOUND.into_response(),
-    }
+    let Ok(to) = HeaderValue::try_from(to) else { return response(StatusCode::NOT_FOUND, PLAIN, "") };
+    let mut redirect = response(StatusCode::PERMANENT_REDIRECT, PLAIN, "");
+    redirect.headers_mut().insert(LOCATION, to);
+    redirect
 }
 
-fn open_socket(shared: Arc<Shared>, parts: &Parts, host: &str, upgrade: WebSocketUpgrade) -> Response {
-    if !shared.door.lets_in(&parts.headers, &format!("http://{host}"), false) {
+fn open_socket(shared: &Arc<Shared>, request: &mut web::Request, host: &str) -> Response {
+    let Ok(switching) = web::switching(request) else {
+        return response(StatusCode::BAD_REQUEST, PLAIN, "This is the page's socket: open the page.\n");
+    };
+    if !shared.door.lets_in(request.headers(), &format!("http://{host}"), false) {
         return refuse("Only the live page itself may open its socket, and pages that --allow-origin names.\n");
     }
     let Ok(page) = shared.pages.clone().try_acquire_owned() else {
-        return (StatusCode::SERVICE_UNAVAILABLE, "Too many pages are open.\n").into_response();
+        return response(StatusCode::SERVICE_UNAVAILABLE, PLAIN, "Too many pages are open.\n");
     };
-    upgrade.max_message_size(MAX_PAGE_MESSAGE).max_frame_size(MAX_PAGE_MESSAGE).on_upgrade(async move |socket| {
+    let shared = Arc::clone(shared);
+    web::when_switched(request, MAX_PAGE_MESSAGE, async move |socket| {
         socket::serve(socket, &shared).await;
         drop(page);
-    })
+    });
+    switching
 }

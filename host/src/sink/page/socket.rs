@@ -5,15 +5,18 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use futures_util::StreamExt;
 use tactomo_board::link::Control;
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
+use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::protocol::CloseFrame;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
 use super::messages::PageMessage;
 use super::{Shared, update, wire};
 use crate::run::{Request, Snapshot};
-use crate::sink::web::{Beat, Pulse};
+use crate::sink::web::{Beat, Pulse, WebSocket};
 
 /// Least time between two updates: a little less than a screen's refresh, so that a page that asks at each refresh is served
 /// at each.
@@ -31,7 +34,7 @@ pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
         page.ask(Request::Control(Control::Press(Vec::new())));
     }
     if let Some(reason) = reason {
-        let frame = CloseFrame { code: close_code::POLICY, reason: reason.into() };
+        let frame = CloseFrame { code: CloseCode::Policy, reason: reason.into() };
         // The page may be gone already.
         let _ = page.pulse.send(&mut socket, Message::Close(Some(frame))).await;
     }
@@ -79,7 +82,7 @@ impl<'a> Page<'a> {
         self.pulse.send(socket, Message::text(self.shared.setup_message.clone())).await.ok()?;
         loop {
             tokio::select! {
-                heard = socket.recv() => {
+                heard = socket.next() => {
                     self.pulse.heard();
                     match heard?.ok()? {
                         Message::Text(text) => if let Err(reason) = self.hear(&text) {
@@ -87,7 +90,7 @@ impl<'a> Page<'a> {
                         },
                         Message::Binary(_) => return Some("pages send text only"),
                         Message::Close(_) => return None,
-                        Message::Ping(_) | Message::Pong(_) => {}
+                        Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
                     }
                 }
                 beat = self.pulse.next() => match beat {
