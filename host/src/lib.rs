@@ -24,7 +24,7 @@
 //! ```
 
 pub use tactomo_board as board;
-pub use tactomo_physics::{causes, detector, forward, hertz, readings, rest, scene, simulate};
+pub use tactomo_physics::{causes, detector, forward, hertz, nalgebra, readings, rest, scene, simulate};
 pub use tactomo_table as table;
 pub use tactomo_touch::{calibrate, learned, metrics, pointer, schema, solve, vibration};
 

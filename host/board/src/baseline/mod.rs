@@ -30,6 +30,14 @@ pub const FRAMES: u32 = 32;
 const LEAKAGE: f64 = 5e-4;
 
 /// Readings of a detector that nothing touches.
+///
+/// ```
+/// use tactomo_board::baseline::{Baseline, BaselineState};
+///
+/// // The mean of the first four frames of whatever that is.
+/// let baseline = Baseline::over(4, 256);
+/// assert_eq!(baseline.state(), BaselineState::Starting);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Baseline {
     rest: Rest,

@@ -22,6 +22,16 @@ const ROUGHLY_HEALED: f64 = 0.5;
 
 /// A solver that leaves out electrodes that are open, shorted, exchanged or otherwise wrong, once it has seen that, and takes them back
 /// when they are healthy.
+///
+/// ```
+/// use tactomo_physics::{detector::Detector, readings::Readings};
+/// use tactomo_touch::solve::{Guard, Method, Problem, Solver};
+///
+/// let mut guard = Guard::new(Method::Tikhonov, &Problem::of(&Detector::default())?)?;
+/// guard.solve(&Readings::from_fn(16, |_, _| 0.0))?;
+/// assert!(guard.excluded().is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Guard {
     method: Method,
     problem: Problem,
