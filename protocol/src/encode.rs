@@ -15,6 +15,7 @@ const MAX_BODY: usize = 160;
 
 /// A message that cannot be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum EncodeError {
     /// The output is too short for the message.
     #[error("the output buffer is too short for the message")]

@@ -1,4 +1,4 @@
-//! The Python package: its wheel is built, installed into a virtual environment, and tested by pytest.
+//! The Python package: its wheel is built, installed into a virtual environment, compared with its types, and tested by pytest.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 /// Set where a missing tool must not pass for a success.
 const SKIP_NOTHING: &str = "TACTOMO_SKIP_NOTHING";
 /// What builds and tests the package, beside what it needs itself.
-const TOOLS: [&str; 3] = ["maturin>=1.9,<2", "numpy>=1.23", "pytest>=7"];
+const TOOLS: [&str; 4] = ["maturin>=1.9,<2", "mypy>=1.15", "numpy>=1.23", "pytest>=7"];
 /// Whether this Python can make virtual environments, and is one that the wheel is for.
 const CHECK: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))";
 
@@ -62,8 +62,10 @@ fn the_wheel_installs_and_passes_its_own_tests() -> Result<()> {
     let wheel = wheel(&python, &package)?;
     let pip = ["-m", "pip", "install", "--quiet", "--no-deps", "--force-reinstall"];
     run(Command::new(&python).args(pip).arg(&wheel))?;
-    // Not in the package's folder, where its sources would be imported in place of what is installed.
+    // Neither in the package's folder, where its sources would be imported in place of what is installed.
+    let away = env!("CARGO_TARGET_TMPDIR");
+    run(Command::new(&python).args(["-m", "mypy.stubtest", "tactomo"]).current_dir(away))?;
     let pytest = ["-m", "pytest", "-q", "-p", "no:cacheprovider"];
     let tests = ["tests", "adapters"].map(|folder| package.join(folder));
-    run(Command::new(&python).args(pytest).args(tests).current_dir(env!("CARGO_TARGET_TMPDIR")))
+    run(Command::new(&python).args(pytest).args(tests).current_dir(away))
 }

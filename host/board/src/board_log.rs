@@ -8,6 +8,7 @@ mod printer;
 
 /// Why a firmware file does not serve to read its log.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ElfError {
     /// It cannot be read.
     #[error("cannot read the firmware file {path}")]

@@ -70,6 +70,7 @@ pub enum Control {
 
 /// Why what a person asks of a link cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ControlError {
     /// Of a real board.
     #[error("this is a real board: only simulated detectors and recordings can be controlled from here")]

@@ -54,6 +54,7 @@ const VERSION: u8 = 2;
 
 /// Why a recording cannot be read or kept.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordError {
     /// The file cannot be opened or created.
     #[error("cannot open the recording {path}")]

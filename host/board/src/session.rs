@@ -53,6 +53,18 @@ struct Pending {
 /// The talk with one board, from the opening of its link on. One command at a time is on its way.
 ///
 /// A board names the command that it answers, so an answer to an earlier one is known as such.
+///
+/// ```
+/// use std::time::Instant;
+///
+/// use tactomo_board::session::{RequestedSettings, Session};
+/// use tactomo_protocol::Command;
+///
+/// let mut session = Session::new(RequestedSettings::default());
+/// // Of a board of which nothing is known yet, it is asked first who it is.
+/// let request = session.command(Instant::now());
+/// assert!(request.is_some_and(|request| request.command == Command::Hello));
+/// ```
 #[derive(Debug)]
 pub struct Session {
     /// Tag of the last command.

@@ -62,6 +62,7 @@ impl Default for Options {
 
 /// A simulated board that cannot be started.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimulatedBoardError {
     /// The firmware does not take the detector.
     #[error("the board cannot scan detector `{detector}`")]
@@ -101,6 +102,21 @@ pub enum SimulatedBoardError {
 }
 
 /// The host's end of a simulated board's line; the board stops when this is dropped.
+///
+/// ```
+/// use tactomo_board::link::Link;
+/// use tactomo_board::simulated::{BoardModel, Options, SimulatedBoard};
+/// use tactomo_physics::detector::Detector;
+/// use tactomo_physics::scene::{Hand, Scene, SceneName};
+/// use tactomo_physics::simulate::Simulation;
+///
+/// let detector = Detector::default();
+/// let scene = Scene::new(SceneName::Rest, &detector, Hand::relative(&detector), 1);
+/// let simulation = Simulation::new(&detector, scene, &[], 1)?;
+/// let board = SimulatedBoard::simulate(&detector, simulation, Options { seed: 1, model: BoardModel::Ideal })?;
+/// assert!(board.name().contains("simulated"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct SimulatedBoard {
     line: Arc<Line>,
     model: BoardModel,

@@ -32,6 +32,7 @@ pub trait Source: Send {
 
 /// Why a source does not open.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SourceError {
     /// The port that was named.
     #[error(transparent)]

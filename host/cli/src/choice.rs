@@ -129,7 +129,7 @@ impl DetectorArgs {
 
     fn in_material(&self, detector: Detector) -> anyhow::Result<Detector> {
         match &self.material {
-            Some(stack) => detector.in_material(stack).map_err(anyhow::Error::msg),
+            Some(stack) => Ok(detector.in_material(stack)?),
             None => Ok(detector),
         }
     }

@@ -37,6 +37,17 @@ pub struct Skin {
 }
 
 /// Contact mechanics of a detector.
+///
+/// ```
+/// use tactomo_physics::detector::Detector;
+/// use tactomo_physics::hertz::{Hertz, Skin};
+///
+/// let hertz = Hertz::new(&Detector::default(), Skin::of(0.35e6))?;
+/// let [light, firm] = [0.5, 2.0].map(|force_n| hertz.ball(0.01, force_n).half_width_m);
+/// // Radii go with the cube root of the force.
+/// assert!((firm / light - 4f64.cbrt()).abs() < 1e-9);
+/// # Ok::<(), tactomo_physics::hertz::SkinError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hertz {
     plane_modulus_pa: f64,

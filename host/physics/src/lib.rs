@@ -4,6 +4,9 @@
 //! what of that arrives through wires and a converter. Nothing here knows of solvers, boards or files of other programs. Units are
 //! SI, and in the names.
 
+/// Matrices in this package's signatures are of this version of it.
+pub use nalgebra;
+
 pub mod baseline;
 pub mod causes;
 pub mod detector;

@@ -199,6 +199,15 @@ impl Calibration {
     }
 }
 
+#[pymethods]
+impl Detector {
+    /// What a calibration found; `None` if the detector is as it was described.
+    #[getter]
+    fn calibration(&self) -> Option<Calibration> {
+        Calibration::of(&self.0)
+    }
+}
+
 /// Tells of a step; whether to go on. Ctrl-C stops it.
 fn told(progress: Option<&Py<PyAny>>, step: Step) -> PyResult<bool> {
     Python::attach(|py| {

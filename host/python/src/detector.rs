@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyType;
 use tactomo::detector::{Chosen, Detector as Described, Stack};
 use tactomo::simulate;
 
 use crate::array;
-use crate::calibration::Calibration;
-use crate::error::{raised, refused};
+use crate::error::raised;
+use crate::pickle::{Restored, restored};
 
 /// A detection layer with its electrodes and the circuit that measures it.
 ///
@@ -60,8 +61,8 @@ impl Detector {
 
     /// This detector in another foam of the paper, `"A"` to `"D"`, or in a stack of them such as `"BC"`, B above C.
     fn in_material(&self, material: &str) -> PyResult<Self> {
-        let stack: Stack = material.parse().map_err(|error: String| refused(error))?;
-        Ok(Self(self.0.clone().in_material(&stack).map_err(refused)?))
+        let stack: Stack = material.parse().map_err(raised)?;
+        Ok(Self(self.0.clone().in_material(&stack).map_err(raised)?))
     }
 
     /// This detector with its description taken as exact: there is nothing to correct then.
@@ -123,16 +124,25 @@ impl Detector {
         self.0.adc.deviation_v()
     }
 
-    /// What a calibration found; `None` if the detector is as it was described.
-    #[getter]
-    fn calibration(&self) -> Option<Calibration> {
-        Calibration::of(&self.0)
-    }
-
     /// Whether contacts on it carry newtons.
     #[getter]
     fn has_newtons(&self) -> bool {
         self.0.force.is_some()
+    }
+
+    /// Pickled as its TOML, with the surface of a curved one as OBJ.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Restored<'py, (String, Option<String>)>> {
+        let detector = &slf.get().0;
+        restored(slf, (detector.to_toml(), detector.surface.as_ref().map(|surface| surface.to_obj())))
+    }
+
+    #[classmethod]
+    fn _restored(_class: &Bound<'_, PyType>, toml: &str, obj: Option<&str>) -> PyResult<Self> {
+        let detector = match obj {
+            None => Described::from_toml(toml, Described::DEFAULT),
+            Some(obj) => Described::from_toml_and_obj(toml, obj, Described::DEFAULT),
+        };
+        Ok(Self(detector.map_err(raised)?))
     }
 
     fn __repr__(&self) -> String {

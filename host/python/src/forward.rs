@@ -2,11 +2,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::DMatrix;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use tactomo::detector::Detector as Described;
 use tactomo::forward::{Auto, ForwardError, ForwardModel, readings_v, touched_impedance_ohm};
+use tactomo::nalgebra::DMatrix;
 use tactomo::readings::Readings;
 use tactomo::scene::{Contact as Disc, Touch};
 use tactomo::simulate::{self, Fault, Measurement};
@@ -37,6 +37,11 @@ impl Contact {
     #[pyo3(signature = (x_m, y_m, radius_m, conductance_s, z_m = 0.0))]
     fn new(x_m: f64, y_m: f64, radius_m: f64, conductance_s: f64, z_m: f64) -> Self {
         Self { x_m, y_m, z_m, radius_m, conductance_s }
+    }
+
+    /// What it is made of again, for pickle and copies.
+    fn __getnewargs__(&self) -> (f64, f64, f64, f64, f64) {
+        (self.x_m, self.y_m, self.radius_m, self.conductance_s, self.z_m)
     }
 
     fn __repr__(&self) -> String {

@@ -12,6 +12,7 @@ mod given;
 mod json;
 mod live;
 mod mesh;
+mod pickle;
 mod recording;
 mod solution;
 mod solver;
@@ -54,6 +55,7 @@ mod _tactomo {
         module.add("SOLVERS", solvers)?;
         module.add("SCENES", PyTuple::new(py, SceneName::ALL.map(|name| name.to_string()))?)?;
         module.add("CONTACT_FIELDS", PyTuple::new(py, CONTACT_COLUMNS.iter().map(|column| column.name))?)?;
+        FoundContact::add_fields(&module.getattr("FoundContact")?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

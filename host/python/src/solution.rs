@@ -5,11 +5,26 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyList;
-use tactomo::schema::{CONTACT_COLUMNS, FrameReport, SHAPE_COLUMNS};
-use tactomo::solve::{Calibrated, FoundContact as FoundDisc, FoundShape, Solution as Answer};
+use pyo3::types::{PyCFunction, PyDict, PyList, PyTuple, PyType};
+use tactomo::schema::{CONTACT_COLUMNS, ContactColumn, FrameReport, Kind, SHAPE_COLUMNS};
+use tactomo::solve::{Calibrated, Choice, FoundContact as FoundDisc, FoundShape, Solution as Answer};
 
-use crate::error::raised;
+use crate::error::{raised, refused};
+use crate::pickle::{Restored, restored};
+
+/// Numbers of a contact, in the order of the schema.
+type ContactValues = [Option<f64>; CONTACT_COLUMNS.len()];
+/// Numbers of a shape, likewise.
+type ShapeValues = [Option<f64>; SHAPE_COLUMNS.len()];
+/// What pickle keeps of a solution: contacts, shape and image; residual, certainty and `calibrated_m`; the choice; flags as JSON.
+type SolutionState = (
+    Vec<ContactValues>,
+    Option<ShapeValues>,
+    Option<Py<PyArray1<f32>>>,
+    (Option<f64>, Option<f64>, Option<(f64, f64)>),
+    Option<(String, String)>,
+    String,
+);
 
 /// What a solver found in a frame.
 #[pyclass(frozen, module = "tactomo")]
@@ -95,6 +110,37 @@ impl Solution {
         serde_json::to_string(&FrameReport::of(&self.answer)).map_err(raised)
     }
 
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Restored<'py, SolutionState>> {
+        let Self { answer, image } = slf.get();
+        let state = (
+            answer.contacts.iter().map(contact_values).collect(),
+            answer.shape.as_ref().map(shape_values),
+            image.as_ref().map(|image| image.clone_ref(slf.py())),
+            (answer.residual, answer.certainty, slf.get().calibrated_m()),
+            slf.get().choice(),
+            serde_json::to_string(&answer.flags).map_err(raised)?,
+        );
+        restored(slf, state)
+    }
+
+    #[classmethod]
+    #[pyo3(signature = (*state))]
+    fn _restored(_class: &Bound<'_, PyType>, state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let (contacts, shape, image, (residual, certainty, calibrated_m), choice, flags): SolutionState =
+            state.extract()?;
+        let answer = Answer {
+            image_s_per_m2: None,
+            contacts: contacts.into_iter().map(FoundDisc::of_values).collect(),
+            shape: shape.and_then(FoundShape::of_values),
+            residual,
+            flags: serde_json::from_str(&flags).map_err(raised)?,
+            calibrated: calibrated_m.map(|(now_m, calibrated_m)| Calibrated { now_m, calibrated_m }),
+            certainty,
+            choice: choice.map(|(what, why)| Choice { what, why }),
+        };
+        Ok(Self { answer, image })
+    }
+
     fn __repr__(&self) -> String {
         match &self.answer.choice {
             Some(choice) => format!("Solution({})", choice.what),
@@ -125,20 +171,48 @@ pub fn contact_array<'py>(py: Python<'py>, found: &[FoundDisc]) -> PyResult<Boun
 #[pyclass(frozen, module = "tactomo")]
 pub struct FoundContact(FoundDisc);
 
+impl FoundContact {
+    /// Gives the class a property for each field of the schema.
+    pub fn add_fields(class: &Bound<'_, PyAny>) -> PyResult<()> {
+        let py = class.py();
+        let property = py.import("builtins")?.getattr("property")?;
+        CONTACT_COLUMNS.iter().try_for_each(|column| {
+            let get = move |arguments: &Bound<'_, PyTuple>, _: Option<&Bound<'_, PyDict>>| -> PyResult<Py<PyAny>> {
+                let contact = arguments.get_item(0)?.cast_into::<Self>()?;
+                Ok(field(column, contact.get(), contact.py())?.unbind())
+            };
+            let get = PyCFunction::new_closure(py, None, None, get)?;
+            class.setattr(column.name, property.call1((get, py.None(), py.None(), column.what))?)
+        })
+    }
+}
+
+fn field<'py>(column: &ContactColumn, contact: &FoundContact, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    let value = column.value(&contact.0);
+    match column.kind {
+        Kind::Integer => value.map(|value| value as i64).into_bound_py_any(py),
+        Kind::Flag => value.map(|value| value != 0.0).into_bound_py_any(py),
+        Kind::Number => value.into_bound_py_any(py),
+    }
+}
+
+fn contact_values(contact: &FoundDisc) -> ContactValues {
+    CONTACT_COLUMNS.each_ref().map(|column| column.value(contact))
+}
+
+fn shape_values(shape: &FoundShape) -> ShapeValues {
+    SHAPE_COLUMNS.each_ref().map(|column| column.value(shape))
+}
+
 #[pymethods]
 impl FoundContact {
-    fn __getattr__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let column = CONTACT_COLUMNS.iter().find(|column| column.name == name);
-        let column = column.ok_or_else(|| no_attribute("FoundContact", name))?;
-        match name {
-            "id" => self.0.id.into_bound_py_any(py),
-            "force_beyond_maximum" => self.0.force_beyond_maximum.into_bound_py_any(py),
-            _ => column.value(&self.0).into_bound_py_any(py),
-        }
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Restored<'py, (ContactValues,)>> {
+        restored(slf, (contact_values(&slf.get().0),))
     }
 
-    fn __dir__(&self) -> Vec<&'static str> {
-        CONTACT_COLUMNS.iter().map(|column| column.name).collect()
+    #[classmethod]
+    fn _restored(_class: &Bound<'_, PyType>, values: ContactValues) -> Self {
+        Self(FoundDisc::of_values(values))
     }
 
     fn __repr__(&self) -> PyResult<String> {
@@ -161,7 +235,17 @@ impl Shape {
 
     fn __getattr__(&self, name: &str) -> PyResult<Option<f64>> {
         let column = SHAPE_COLUMNS.iter().find(|column| column.name.trim_start_matches("shape_") == name);
-        Ok(column.ok_or_else(|| no_attribute("Shape", name))?.value(&self.0))
+        let no_attribute = || PyAttributeError::new_err(format!("'Shape' object has no attribute '{name}'"));
+        Ok(column.ok_or_else(no_attribute)?.value(&self.0))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Restored<'py, (ShapeValues,)>> {
+        restored(slf, (shape_values(&slf.get().0),))
+    }
+
+    #[classmethod]
+    fn _restored(_class: &Bound<'_, PyType>, values: ShapeValues) -> PyResult<Self> {
+        FoundShape::of_values(values).map(Self).ok_or_else(|| refused("these are no numbers of a shape"))
     }
 
     fn __dir__(&self) -> Vec<&'static str> {
@@ -172,10 +256,6 @@ impl Shape {
     fn __repr__(&self) -> PyResult<String> {
         Ok(format!("Shape({})", serde_json::to_string(&self.0).map_err(raised)?))
     }
-}
-
-fn no_attribute(class: &str, name: &str) -> PyErr {
-    PyAttributeError::new_err(format!("'{class}' object has no attribute '{name}'"))
 }
 
 /// What to know before a solution is believed.

@@ -36,7 +36,7 @@ impl Solver {
         detector: Option<&Detector>,
         lambda_: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let method: Method = name.parse().map_err(|error: String| refused(error))?;
+        let method: Method = name.parse().map_err(raised)?;
         let lambda = lambda_.map(|lambda| lambda.str()?.extract::<String>()).transpose()?;
         let lambda: Option<Lambda> =
             lambda.map(|lambda| lambda.parse().map_err(|error| refused(format!("lambda_: {error}")))).transpose()?;

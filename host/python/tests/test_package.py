@@ -19,13 +19,18 @@ def test_types_are_told_of_all_there_is_and_of_nothing_else():
     for name, node in classes.items():
         cls = getattr(tactomo, name)
         told = {part.name for part in node.body if isinstance(part, ast.FunctionDef)}
-        # The fields of a contact are those of the schema, which are looked up.
-        there = set(tactomo.CONTACT_FIELDS) if name == "FoundContact" else set(vars(cls))
-        assert public(told) == public(there), name
+        assert public(told) == public(vars(cls)), name
     functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
     values = {node.target.id for node in tree.body if isinstance(node, ast.AnnAssign)}
     assert public(classes) | functions | public(values) == public(vars(_tactomo)) == public(tactomo.__all__)
     assert STUB.with_name("py.typed").exists()
+
+
+def test_names_of_solvers_and_scenes_are_told_as_they_are():
+    tree = ast.parse(STUB.read_text())
+    told = {node.target.id: node.value for node in tree.body if isinstance(node, ast.AnnAssign) and node.value}
+    for alias, names in {"_SolverName": tactomo.SOLVERS, "_SceneName": tactomo.SCENES}.items():
+        assert [name.value for name in told[alias].slice.elts] == list(names), alias
 
 
 def test_everything_public_is_documented():

@@ -77,6 +77,7 @@ def test_a_solution_says_the_same_as_objects_array_and_json(detector, readings):
     flags = solution.flags
     assert not flags.misfit and flags.excluded == [] and solution.is_contacts and solution.image is None
     assert 0.3 < solution.residual < 2
+    assert set(dir(contact)) >= {*tactomo.CONTACT_FIELDS, "__class__"}
     with pytest.raises(AttributeError, match="no attribute 'colour'"):
         contact.colour
 

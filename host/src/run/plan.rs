@@ -195,6 +195,7 @@ pub struct Summary {
 
 /// Why the run cannot go on.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LiveError {
     /// The source does not open.
     #[error(transparent)]

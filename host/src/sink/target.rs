@@ -61,6 +61,7 @@ pub struct Form {
 
 /// Why there is no stream.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StreamError {
     /// The file cannot be made, or is there already.
     #[error("cannot write the stream {path} (it has to be a new file, or `-` for stdout)")]

@@ -25,6 +25,14 @@ pub struct Array {
 }
 
 /// What a file holds.
+///
+/// ```
+/// use tactomo_table::Table;
+///
+/// let table = Table::parse(b"x_m,y_m\n0.01,0.02\n0.03,0.04\n")?;
+/// assert!(matches!(table, Table::Columns { names, .. } if names == ["x_m", "y_m"]));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Table {
     /// Columns of text, with names if its first line has them.

@@ -39,6 +39,7 @@ const DRAG_M: f64 = 3e-3;
 /// What a pointer does. In JSON an object with its `kind`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum PointerEvent {
     /// It moves on, since the last such event.
     Move {
@@ -75,6 +76,17 @@ pub struct PointerState {
 }
 
 /// Turns contacts into what a pointer does.
+///
+/// ```
+/// use tactomo_touch::{pointer::Pointer, solve::FoundContact};
+///
+/// let mut pointer = Pointer::default();
+/// for frame in 0..50 {
+///     let finger = FoundContact { id: Some(1), ..FoundContact::flat(2e-4 * f64::from(frame), 0.0, 2e-4) };
+///     pointer.take(0.01 * f64::from(frame), &[finger]);
+/// }
+/// assert!(pointer.state().way_m[0] > 0.005);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Pointer {
     state: PointerState,

@@ -33,6 +33,16 @@ impl Serialize for SchemaVersion {
 }
 
 /// A solved frame as it leaves the program: a line of JSON.
+///
+/// ```
+/// use tactomo_touch::schema::FrameReport;
+/// use tactomo_touch::solve::{FoundContact, Solution};
+///
+/// let solution = Solution { contacts: vec![FoundContact::flat(0.01, -0.005, 2e-4)], ..Solution::default() };
+/// let line = serde_json::to_string(&FrameReport { time_s: Some(0.5), ..FrameReport::of(&solution) })?;
+/// assert!(line.contains(r#""contacts":[{"x_m":0.01,"y_m":-0.005,"conductance_s":0.0002}]"#));
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameReport<'a> {
     /// Version of these fields.
@@ -221,7 +231,7 @@ pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::{ElectrodeFault, FoundLine, FoundRing, LineUncertainty, Uncertainty};
+    use crate::solve::{ElectrodeFault, FoundLine, FoundRing, LineUncertainty, RingUncertainty, Uncertainty};
 
     fn contact() -> FoundContact {
         FoundContact {
@@ -303,6 +313,24 @@ mod tests {
         assert_eq!(json["shape"].as_object().map(serde_json::Map::len), Some(13));
         let values = shape_values(&FoundShape::Line(line));
         assert!(values[0] == 1.0 && values[4].is_nan() && values[17] == 0.4, "{values:?}");
+    }
+
+    #[test]
+    fn what_its_numbers_say_is_the_whole_of_a_contact_and_of_a_shape() {
+        for contact in [contact(), FoundContact::flat(-1.0, -2.0, 5.0)] {
+            let values = CONTACT_COLUMNS.each_ref().map(|column| column.value(&contact));
+            assert_eq!(FoundContact::of_values(values), contact);
+        }
+        let line = LineUncertainty { from_m: [0.1, 0.2], to_m: [0.3, 0.4], width_m: 0.5, conductance_s: 0.6 };
+        let line = FoundLine { from_m: [1.0, 2.0], to_m: [3.0, 4.0], uncertainty: Some(line), ..FoundLine::default() };
+        let ring = RingUncertainty { centre_m: [0.1, 0.2], radius_m: 0.3, width_m: 0.4, conductance_s: 0.5 };
+        let ring = FoundRing { centre_m: [1.0, 2.0], radius_m: 3.0, uncertainty: Some(ring), ..FoundRing::default() };
+        let unsure = FoundShape::Ring(FoundRing { uncertainty: None, width_m: 4.0, conductance_s: 5.0, ..ring });
+        for shape in [FoundShape::Line(line), FoundShape::Ring(ring), unsure] {
+            let values = SHAPE_COLUMNS.each_ref().map(|column| column.value(&shape));
+            assert_eq!(FoundShape::of_values(values), Some(shape));
+        }
+        assert_eq!(FoundShape::of_values([None; SHAPE_COLUMNS.len()]), None);
     }
 
     #[test]

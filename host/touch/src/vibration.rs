@@ -30,6 +30,18 @@ const STANDS_OUT: f64 = 5.0;
 const BESIDE: std::ops::RangeInclusive<usize> = 3..=10;
 
 /// The values of the last seconds.
+///
+/// ```
+/// use tactomo_touch::vibration::Samples;
+///
+/// let mut samples = Samples::default();
+/// for frame in 0..400 {
+///     let time_s = f64::from(frame) / 200.0;
+///     samples.add(time_s, 0.1 + 0.01 * (std::f64::consts::TAU * 30.0 * time_s).sin());
+/// }
+/// let peak = samples.spectrum().and_then(|spectrum| spectrum.peak);
+/// assert!(peak.is_some_and(|peak| (peak.frequency_hz - 30.0).abs() < 1.0));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Samples(VecDeque<[f64; 2]>);
 

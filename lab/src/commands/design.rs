@@ -163,10 +163,7 @@ impl Args {
         };
         wishes.check()?;
         let compared = match &self.compare {
-            Some(chosen) => Some((
-                chosen.get()?.in_material(&self.material).map_err(anyhow::Error::msg)?,
-                Skin::from(&self.material),
-            )),
+            Some(chosen) => Some((chosen.get()?.in_material(&self.material)?, Skin::from(&self.material))),
             None => None,
         };
         Ok(Plan { wishes, foams: self.foams()?, most: self.most as usize, compared, seed: self.seed })

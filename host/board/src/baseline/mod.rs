@@ -30,6 +30,14 @@ pub const FRAMES: u32 = 32;
 const LEAKAGE: f64 = 5e-4;
 
 /// Knows what a detector reads while nothing touches it: takes it at the start, and follows its drift.
+///
+/// ```
+/// use tactomo_board::baseline::{BaselineState, BaselineTracker};
+///
+/// // The mean of the first four frames of whatever that is.
+/// let baseline = BaselineTracker::over(4, 256);
+/// assert_eq!(baseline.state(), BaselineState::Starting);
+/// ```
 #[derive(Clone, Debug)]
 pub struct BaselineTracker {
     baseline: Baseline,

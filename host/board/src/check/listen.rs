@@ -21,6 +21,7 @@ const READ_BYTES: usize = 4096;
 
 /// Why there are no frames.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ListenError {
     /// The link does not open.
     #[error(transparent)]

@@ -99,6 +99,7 @@ impl FileFrame {
 
 /// Why a file gives no frames.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FramesError {
     /// As a recording.
     #[error(transparent)]

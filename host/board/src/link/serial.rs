@@ -26,6 +26,7 @@ pub struct SerialLink {
 
 /// Why a serial port does not open.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PortError {
     /// No such device.
     #[error("there is no serial port {port}: {there}")]

@@ -16,6 +16,7 @@ const PAUSE_US: u64 = 1000;
 
 /// Why nothing was cut or joined.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EditError {
     /// One of the recordings.
     #[error(transparent)]

@@ -10,6 +10,7 @@ use super::{Header, RecordError};
 /// Something set down in a recording, at a time of its own: JSON with its `kind`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Note {
     /// A moment that a person has marked.
     Mark {

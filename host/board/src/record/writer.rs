@@ -8,6 +8,21 @@ use super::format::{Kind, MAX_CHUNK, MAX_HEADER, put_chunk};
 use super::{Header, MAGIC, Note, VERSION};
 
 /// Writes a recording.
+///
+/// ```
+/// use tactomo_board::record::{Header, RecordReader, RecordWriter};
+/// use tactomo_physics::detector::Detector;
+///
+/// let mut file = Vec::new();
+/// let header = Header::now(&Detector::default(), "a board".to_owned());
+/// RecordWriter::new(&mut file, &header)?.write(1500, b"bytes of the board")?;
+///
+/// let mut recording = RecordReader::new(&file[..], "memory".as_ref())?;
+/// let mut bytes = Vec::new();
+/// assert_eq!(recording.next_into(&mut bytes)?, Some(1500));
+/// assert_eq!(bytes, b"bytes of the board");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct RecordWriter<W: Write> {
     pub(super) out: W,

@@ -11,6 +11,7 @@ use crate::link::Link;
 
 /// Why a board cannot be talked to.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GreetError {
     /// No Hello in time.
     #[error("no board said Hello within {seconds} s ({junk_bytes} bytes came that were no message)")]

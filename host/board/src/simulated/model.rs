@@ -12,6 +12,7 @@ use crate::inputs::{self, InputFigures};
 
 /// Which board is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BoardModel {
     /// The detector's own converter behind a fast multiplexer, a line without end, and a scene that stands still for a scan.
     #[default]

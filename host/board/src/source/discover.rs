@@ -25,6 +25,7 @@ pub struct Probe {
 
 /// Why a port has no board to work with.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProbeError {
     /// It does not open.
     #[error(transparent)]

@@ -6,6 +6,15 @@ use std::str::FromStr;
 use super::{Detector, FileError};
 
 /// A preset, or a file that is still to be read.
+///
+/// ```
+/// use tactomo_physics::detector::Chosen;
+///
+/// let detector = "display-140x70".parse::<Chosen>()?.get()?;
+/// assert_eq!(detector.electrodes.len(), 32);
+/// assert!("round".parse::<Chosen>().is_err_and(|error| error.to_string().contains("choose one of square-60")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub enum Chosen {
     /// A preset.

@@ -28,6 +28,7 @@ pub(super) const CENTRED_M: f64 = 1e-9;
 
 /// Why a file is no detector.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FileError {
     /// It cannot be read.
     #[error("cannot read the detector {path}: {error}")]
@@ -49,6 +50,7 @@ pub enum FileError {
 
 /// Why a text is no detector.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TomlError {
     /// It is not TOML, or has a field that is missing, unknown or of another type.
     #[error("{}", .0.to_string().trim_end())]

@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use super::bond::DOT_DIAMETER_M;
+use super::check::Problem;
 use super::{Bond, Detector, Layer};
 
 /// Letters that a stack may have.
@@ -30,6 +31,14 @@ pub const FOAMS: [Foam; 4] = [
 ];
 
 /// A foam or a stack of foams; the first letter is the upper layer, as in the paper.
+///
+/// ```
+/// use tactomo_physics::detector::Detector;
+///
+/// let detector = Detector::default().in_material(&"BC".parse()?)?;
+/// assert_eq!(detector.layers.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stack {
     name: String,
@@ -53,32 +62,70 @@ impl Stack {
     }
 }
 
-impl FromStr for Stack {
-    type Err = String;
+/// Why a text is no [`Stack`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StackError {
+    /// These are no letters of foams, or too many.
+    #[error(
+        "`{0}`: a foam A, B, C or D is needed, or up to {MAX_LETTERS} of them as in BA, the upper one first, or two that are joined by dots \
+         of glue as in BB-5x5"
+    )]
+    Foams(String),
+    /// What follows the letters is no grid of dots between two foams.
+    #[error("`-{0}` has to follow two foams and be columns and rows of dots, as in BB-5x5")]
+    Dots(String),
+}
 
-    fn from_str(name: &str) -> Result<Self, String> {
+/// Why a detector cannot be of a [`Stack`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MaterialError {
+    /// Another number of foams than of layers.
+    #[error("material {stack} has {foams} foams, but {detector} has {layers} layers: as many foams are needed")]
+    Layers {
+        /// Name of the stack.
+        stack: String,
+        /// How many it has.
+        foams: usize,
+        /// Name of the detector.
+        detector: String,
+        /// How many it has.
+        layers: usize,
+    },
+    /// Its dots do not fit on the detector.
+    #[error("material {stack} on {detector}: {problem}")]
+    Bond {
+        /// Name of the stack.
+        stack: String,
+        /// Name of the detector.
+        detector: String,
+        /// What does not fit.
+        problem: Problem,
+    },
+}
+
+impl FromStr for Stack {
+    type Err = StackError;
+
+    fn from_str(name: &str) -> Result<Self, StackError> {
         let (letters, dots) = match name.split_once('-') {
             Some((letters, dots)) => (letters, Some(dots)),
             None => (name, None),
         };
         let foams: Option<Vec<Foam>> = letters.chars().rev().map(Foam::of).collect();
-        let foams = foams.filter(|foams| (1..=MAX_LETTERS).contains(&foams.len())).ok_or_else(|| {
-            format!(
-                "a foam A, B, C or D is needed, or up to {MAX_LETTERS} of them as in BA, the upper one first, or two that are joined by \
-                 dots of glue as in BB-5x5"
-            )
-        })?;
+        let foams = foams.filter(|foams| (1..=MAX_LETTERS).contains(&foams.len()));
+        let foams = foams.ok_or_else(|| StackError::Foams(name.to_owned()))?;
         let bond = dots.map(|dots| bond(dots, foams.len())).transpose()?;
         Ok(Self { name: name.to_owned(), foams, bond })
     }
 }
 
 /// The paper's dots in columns and rows as in `5x5`.
-fn bond(dots: &str, foams: usize) -> Result<Bond, String> {
+fn bond(dots: &str, foams: usize) -> Result<Bond, StackError> {
     let grid = dots.split_once('x').and_then(|(columns, rows)| Some([columns.parse().ok()?, rows.parse().ok()?]));
     let grid = grid.filter(|_| foams == 2);
-    let wrong = || format!("`-{dots}` has to follow two foams and be columns and rows of dots, as in BB-5x5");
-    grid.map(|grid| Bond::of_dots(grid, DOT_DIAMETER_M)).ok_or_else(wrong)
+    grid.map(|grid| Bond::of_dots(grid, DOT_DIAMETER_M)).ok_or_else(|| StackError::Dots(dots.to_owned()))
 }
 
 impl Detector {
@@ -87,14 +134,11 @@ impl Detector {
     /// dots of its own.
     ///
     /// # Errors
-    /// What does not fit, if there are several layers but another number of foams, or dots that have no room.
-    pub fn in_material(mut self, stack: &Stack) -> Result<Self, String> {
+    /// [`MaterialError`] if there are several layers but another number of foams, or dots that have no room.
+    pub fn in_material(mut self, stack: &Stack) -> Result<Self, MaterialError> {
         let (layers, foams) = (self.layers.len(), stack.foams.len());
         if layers != 1 && layers != foams {
-            return Err(format!(
-                "material {} has {foams} foams, but {} has {layers} layers: as many foams are needed",
-                stack.name, self.name
-            ));
+            return Err(MaterialError::Layers { stack: stack.name.clone(), foams, detector: self.name, layers });
         }
         let thickness_m = |index: usize| self.layers[index.min(layers - 1)].thickness_m;
         let own_bond = |index: usize| self.layers.get(index).and_then(|layer| layer.bond);
@@ -103,7 +147,9 @@ impl Detector {
             ..Layer::uniform(thickness_m(index), foam.conductivity_s_per_m)
         };
         self.layers = stack.foams.iter().enumerate().map(layer).collect();
-        self.check_bond().map_err(|problem| format!("material {} on {}: {problem}", stack.name, self.name))?;
+        let (name, detector) = (&stack.name, &self.name);
+        let named = |problem| MaterialError::Bond { stack: name.clone(), detector: detector.clone(), problem };
+        self.check_bond().map_err(named)?;
         self.name = format!("{} in {}", self.name, stack.name);
         (self.force, self.correction) = (None, None);
         Ok(self)
@@ -132,16 +178,17 @@ mod tests {
         detector.layers[1].thickness_m = 0.001;
         let detector = detector.in_material(&"DC".parse().unwrap()).unwrap();
         assert_eq!(detector.layers, [Layer::uniform(0.005, 0.001667), Layer::uniform(0.001, 0.008)]);
-        assert!(detector.in_material(&"ABC".parse().unwrap()).is_err_and(|what| what.contains("has 2 layers")));
+        let error = detector.in_material(&"ABC".parse().unwrap());
+        assert!(matches!(error, Err(MaterialError::Layers { foams: 3, layers: 2, .. })), "{error:?}");
     }
 
     #[test]
     fn other_letters_are_refused() {
         for wrong in ["", "E", "a", "AE", "ABCDABCDA", "-5x5"] {
-            assert!(wrong.parse::<Stack>().is_err_and(|what| what.contains("A, B, C or D")), "{wrong}");
+            assert!(wrong.parse::<Stack>().is_err_and(|error| error.to_string().contains("A, B, C or D")), "{wrong}");
         }
         for wrong in ["BB-", "BB-5", "BB-5x", "BB-5x-5", "B-5x5", "BBB-5x5"] {
-            assert!(wrong.parse::<Stack>().is_err_and(|what| what.contains("as in BB-5x5")), "{wrong}");
+            assert!(wrong.parse::<Stack>().is_err_and(|error| error.to_string().contains("as in BB-5x5")), "{wrong}");
         }
     }
 
@@ -153,6 +200,6 @@ mod tests {
         let other = detector.in_material(&"BC".parse().unwrap()).unwrap();
         assert_eq!(other.bond(), Some((1, Bond::of_dots([7, 6], 0.00722))), "another foam, the same glue");
         let small = Detector::preset("fingertip-10").unwrap().in_material(&"BB-5x5".parse().unwrap());
-        assert!(small.is_err_and(|what| what.contains("makes the dots overlap")));
+        assert!(small.is_err_and(|error| error.to_string().contains("makes the dots overlap")));
     }
 }

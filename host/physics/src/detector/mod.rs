@@ -23,8 +23,8 @@ pub use self::chosen::{Chosen, UnknownDetector};
 pub use self::correction::{ConductanceErrors, Correction, PlaceErrors};
 pub use self::file::{FileError, TomlError};
 pub use self::force::{FARTHEST, ForceLaw, Newtons};
-pub use self::material::{FOAMS, Foam, Stack};
-pub use self::parameters::Parameter;
+pub use self::material::{FOAMS, Foam, MaterialError, Stack, StackError};
+pub use self::parameters::{Parameter, UnknownParameter};
 pub use self::preset::electrode_grid;
 pub use self::surface::edges_of;
 pub use self::surface::{Foot, FormatError, Surface, SurfaceError};
@@ -37,6 +37,17 @@ use crate::geometry;
 /// A detection layer with its electrodes and the circuit that measures it.
 ///
 /// Coordinates: x and y from the middle of the outline's bounding box, z up from the electrode side; metres.
+///
+/// ```
+/// use tactomo_physics::detector::Detector;
+///
+/// let detector = Detector::preset("square-60").unwrap_or_default();
+/// assert_eq!(detector.electrodes.len(), 16);
+/// // The same from a file's text, with another name.
+/// let text = detector.to_toml().replace("square-60", "mine");
+/// assert_eq!(Detector::from_toml(&text, "unnamed")?.name, "mine");
+/// # Ok::<(), tactomo_physics::detector::TomlError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Detector {
     /// Preset or file name, for people.

@@ -200,11 +200,16 @@ impl fmt::Display for Parameter {
     }
 }
 
-impl FromStr for Parameter {
-    type Err = String;
+/// A name that no [`Parameter`] has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no parameter of a detector: {FORMS}")]
+pub struct UnknownParameter(pub String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no parameter of a detector: {FORMS}");
+impl FromStr for Parameter {
+    type Err = UnknownParameter;
+
+    fn from_str(text: &str) -> Result<Self, UnknownParameter> {
+        let wrong = || UnknownParameter(text.to_owned());
         let number = |text: &str| text.parse::<usize>().map_err(|_| wrong());
         match text.split_once(':') {
             None => match text {
@@ -400,7 +405,7 @@ mod tests {
     #[test]
     fn other_texts_say_what_there_is() {
         for text in ["", "gain", "gain:", "gain:-1", "uneven:1", "uneven:1,x", "pads:3", "X:1", "thickness:0"] {
-            let error = text.parse::<Parameter>().unwrap_err();
+            let error = text.parse::<Parameter>().unwrap_err().to_string();
             assert!(error.contains("top-over-bottom") && error.contains(&format!("`{text}`")), "{error}");
         }
     }

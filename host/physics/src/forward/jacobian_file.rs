@@ -21,6 +21,7 @@ const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a Jacobian cannot be saved or loaded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum JacobianFileError {
     /// The file cannot be read or written.
     #[error("cannot read or write {}", path.display())]

@@ -195,6 +195,7 @@ impl ImageMesh {
 
 /// Why a model cannot answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ForwardError {
     /// A contact outside, or with a radius or conductance that is not a positive number.
     #[error("contact {index} ({what}): contacts need a place on the detector, a radius and a conductance above zero")]

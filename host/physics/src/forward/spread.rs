@@ -8,6 +8,19 @@ use crate::scene::{Contact, Touch};
 
 /// Impedance matrix under touches of any shape (ohm): as discs where all are, else as an image of conductance.
 ///
+/// ```
+/// use tactomo_physics::detector::Detector;
+/// use tactomo_physics::forward::{Auto, readings_v, touched_impedance_ohm};
+/// use tactomo_physics::scene::Contact;
+///
+/// let detector = Detector::default();
+/// let model = Auto::new(&detector, None)?.model;
+/// let press = Contact::flat(0.009, -0.006, 0.003, 2e-4);
+/// let readings = readings_v(&touched_impedance_ohm(&*model, &[press.into()])?, &detector);
+/// assert!(readings.largest_v() > 0.01 && readings.largest_v() < detector.drive_v);
+/// # Ok::<(), tactomo_physics::forward::ForwardError>(())
+/// ```
+///
 /// # Errors
 /// As for [`ForwardModel::impedance_ohm`] and [`ForwardModel::image_fields`].
 pub fn touched_impedance_ohm(model: &dyn ForwardModel, touches: &[Touch]) -> Result<DMatrix<f64>, ForwardError> {

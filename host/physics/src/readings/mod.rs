@@ -46,6 +46,14 @@ impl Range {
 }
 
 /// `n x n` readings of one frame (V): reading `(g, e)` is electrode `e` while `g` is grounded.
+///
+/// ```
+/// use tactomo_physics::readings::Readings;
+///
+/// let readings = Readings::from_fn(16, |g, e| if g == e { 0.0 } else { 0.25 });
+/// assert_eq!((readings.at(3, 7), readings.largest_v(), readings.volts().len()), (0.25, 0.25, 256));
+/// assert!(Readings::new(16, vec![0.0; 255]).is_none());
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Readings {
     electrodes: usize,

@@ -13,6 +13,14 @@ pub use self::script::Scene;
 pub use self::touch::{Shape, Touch};
 
 /// A disc of contact between driving layer and detector.
+///
+/// ```
+/// use tactomo_physics::scene::{Contact, Touch};
+///
+/// // A light press of 3 mm radius, 9 mm right of the middle and 6 mm below it.
+/// let press = Contact::flat(0.009, -0.006, 0.003, 2e-4);
+/// assert_eq!(Touch::from(press).disc(), Some(press));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Contact {
     /// Centre, x (m).

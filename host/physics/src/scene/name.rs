@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 /// Names of the scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SceneName {
     /// Nothing touches.
     Rest,

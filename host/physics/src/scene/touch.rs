@@ -9,6 +9,15 @@ use crate::geometry::{self, Point};
 const CORNERS: usize = 64;
 
 /// Where driving layer and detector touch, and how well.
+///
+/// ```
+/// use tactomo_physics::scene::{Shape, Touch};
+///
+/// let ring = Touch::flat([0.0, 0.0], Shape::Ring { radius_m: 0.01, width_m: 0.002 }, 1e-3);
+/// // 1 mS over a ring's area of 2 pi 10 mm 2 mm, which is drawn with corners.
+/// assert!((ring.density_s_per_m2()? / 7.96 - 1.0).abs() < 0.01);
+/// # Ok::<(), &'static str>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Touch {

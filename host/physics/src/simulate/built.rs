@@ -37,6 +37,7 @@ pub fn drawn(detector: &Detector, seed: u64) -> Detector {
 
 /// Why no detector as built can be drawn.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CannotDraw {
     /// What is left unknown of a calibrated detector is less than its tolerances.
     #[error(

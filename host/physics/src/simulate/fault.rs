@@ -101,6 +101,7 @@ const FORMS: &str = "open:3, short:2,7, short:2,7:50, swap:1,5, gain:4:0.8, inve
 
 /// Why a fault cannot be.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FaultError {
     /// Not one of the forms.
     #[error("`{text}` is no fault ({what}); faults are written as {FORMS}")]

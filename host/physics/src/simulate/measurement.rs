@@ -22,6 +22,19 @@ const PICKED_UP: f64 = 0.02;
 /// Where nothing conducts, everything is at the ground's potential. A channel whose wire is broken, when it is
 /// grounded, takes no current: everything else is at the drive's potential, and it reads 0 V itself. When it is not, its input
 /// floats: it drifts about, and picks up what is around, the same for the same seed.
+///
+/// ```
+/// use tactomo_physics::detector::Detector;
+/// use tactomo_physics::simulate::Measurement;
+///
+/// let detector = Detector::default();
+/// let mut board = Measurement::new(&detector, &["open:3".parse()?], 1)?;
+/// // Nothing touches, so all is quiet but for the electrode whose wire is broken, which floats.
+/// let readings = board.pad_voltages(None);
+/// assert_eq!(readings.at(0, 5), 0.0);
+/// assert!(readings.at(0, 3) > 0.0);
+/// # Ok::<(), tactomo_physics::simulate::FaultError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Measurement {
     detector: Detector,

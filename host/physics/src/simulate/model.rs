@@ -13,6 +13,7 @@ const FINER: usize = 3;
 
 /// Why a detector cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimulationError {
     /// There is no model of it.
     #[error(transparent)]

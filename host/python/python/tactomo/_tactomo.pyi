@@ -1,14 +1,48 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias, final
+from typing import Any, ClassVar, Literal, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self
 
+_SolverName: TypeAlias = Literal[
+    "auto",
+    "contacts",
+    "nonlinear",
+    "bsbl",
+    "tikhonov",
+    "tv",
+    "nonnegative",
+    "laplace",
+    "noser",
+    "tsvd",
+    "kernel",
+    "network",
+    "tikhonov-paper",
+]
+_SceneName: TypeAlias = Literal[
+    "rest",
+    "wandering",
+    "single",
+    "several",
+    "wide",
+    "ring",
+    "line",
+    "five-fingers",
+    "rolling-ball",
+    "moving",
+    "changing-force",
+    "gripper",
+    "display",
+    "pointer",
+    "texture",
+    "hand",
+]
+
 __version__: str
-SOLVERS: dict[str, str]
-SCENES: tuple[str, ...]
+SOLVERS: dict[_SolverName, str]
+SCENES: tuple[_SceneName, ...]
 CONTACT_FIELDS: tuple[str, ...]
 
 _Path: TypeAlias = str | PathLike[str]
@@ -19,6 +53,7 @@ class TactomoError(ValueError): ...
 
 @final
 class Detector:
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     def __new__(cls, name: _Path = "square-60") -> Self: ...
     @staticmethod
     def from_toml(text: str, name: str = "detector") -> Detector: ...
@@ -89,6 +124,7 @@ class Calibration:
 
 @final
 class Contact:
+    __hash__: ClassVar[None]  # type: ignore[assignment]
     def __new__(
         cls, x_m: float, y_m: float, radius_m: float, conductance_s: float, z_m: float = 0.0
     ) -> Self: ...
@@ -117,7 +153,7 @@ class Simulator:
 class Solver:
     def __new__(
         cls,
-        name: str = "auto",
+        name: _SolverName = "auto",
         detector: Detector | None = None,
         *,
         lambda_: float | Literal["discrepancy", "l-curve", "gcv"] | None = None,
@@ -125,7 +161,7 @@ class Solver:
     def solve(self, readings: _Readings) -> Solution: ...
     def reset(self) -> None: ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> _SolverName: ...
     @property
     def detector(self) -> Detector: ...
     @property
@@ -226,7 +262,7 @@ class Flags:
     @property
     def excluded(self) -> list[int]: ...
     @property
-    def faults(self) -> list[str]: ...
+    def faults(self) -> list[Literal["open", "shorted", "exchanged", "contradicting"]]: ...
 
 @final
 class Recording:
@@ -301,11 +337,11 @@ class Live:
         port: str | None = None,
         *,
         detector: Detector | None = None,
-        solver: str = "auto",
+        solver: _SolverName = "auto",
         seconds: float | None = None,
         queue: int = 4096,
         simulate: bool = False,
-        scene: str | None = None,
+        scene: _SceneName | None = None,
         board: Literal["ideal", "esp32", "esp32c3"] | None = None,
         faults: Sequence[str] | None = None,
         seed: int | None = None,
@@ -329,7 +365,7 @@ class Live:
     def next(self, timeout: float = 1.0) -> TouchEvent | None: ...
     def newest(self, timeout: float = 1.0) -> TouchEvent | None: ...
     def rezero(self) -> None: ...
-    def change_solver(self, name: str) -> None: ...
+    def change_solver(self, name: _SolverName) -> None: ...
     def press(self, contacts: _Contacts = ()) -> None: ...
     @property
     def lost(self) -> int: ...

@@ -150,7 +150,7 @@ impl Live {
             return Err(refused("queue: room for one event at least is needed"));
         }
         Ok(Self {
-            method: solver.parse().map_err(|error: String| refused(error))?,
+            method: solver.parse().map_err(raised)?,
             scan,
             settings: RequestedSettings {
                 settle_us,
@@ -233,7 +233,7 @@ impl Live {
 
     /// Reads the touch by another solver from now on.
     fn change_solver(&self, name: &str) -> PyResult<()> {
-        self.ask(Request::Solver(name.parse().map_err(|error: String| refused(error))?))
+        self.ask(Request::Solver(name.parse().map_err(raised)?))
     }
 
     /// Presses on the simulated detector with these contacts and no others, beside its scene; with none, lets go.

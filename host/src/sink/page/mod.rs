@@ -115,6 +115,7 @@ pub struct Server {
 
 /// Why the page cannot be served.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ServerError {
     /// Another program listens there.
     #[error("port {port} on {address} is busy (is another tactomo live running?): choose another with --http-port")]

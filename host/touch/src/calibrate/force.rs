@@ -123,6 +123,7 @@ pub struct ForceFit {
 
 /// Why presses give no law.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ForceError {
     /// Too few.
     #[error("{found} presses, but {FEWEST} at least are needed; ten with forces from light to firm are good")]

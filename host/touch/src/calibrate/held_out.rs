@@ -52,6 +52,7 @@ impl HeldOut {
 
 /// What a rub is missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Missing {
     /// More presses.
     Presses(usize),

@@ -45,6 +45,7 @@ pub struct Step {
 
 /// Why there is no calibration.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CalibrateError {
     /// Nothing was touched.
     #[error(

@@ -14,6 +14,7 @@ pub struct Container {
 
 /// Why bytes, or what is in them, are not what was learned.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ContainerError {
     /// They are no such file, or a damaged one.
     #[error("this is no safetensors file, or it is damaged ({0}): make one with `tactomo-lab learn`")]

@@ -36,6 +36,7 @@ pub enum Learned {
 
 /// Why a file is not one of these.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LearnedError {
     /// It cannot be opened or read.
     #[error("cannot read {path}")]

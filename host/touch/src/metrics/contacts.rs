@@ -5,6 +5,16 @@ use tactomo_physics::scene::Contact;
 use tactomo_physics::space;
 
 /// Which found contact stands for which true one.
+///
+/// ```
+/// use tactomo_physics::scene::Contact;
+/// use tactomo_touch::{metrics::Matching, solve::FoundContact};
+///
+/// let truth = [Contact::flat(0.010, 0.0, 0.003, 2e-4), Contact::flat(-0.010, 0.0, 0.003, 2e-4)];
+/// let matching = Matching::within(0.005, &truth, &[FoundContact::flat(0.011, 0.0, 2e-4)]);
+/// assert_eq!((matching.pairs.len(), &matching.missed[..]), (1, &[1][..]));
+/// assert!(matching.position_error_m().is_some_and(|error_m| (error_m - 0.001).abs() < 1e-12));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Matching {
     /// Pairs, the nearest first.

@@ -2,7 +2,7 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use crate::solve::{FoundContact, FoundLine, FoundRing, FoundShape, Uncertainty};
+use crate::solve::{FoundContact, FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty, Uncertainty};
 
 /// What kind of number a column has. In files of columns each kind is that of the file: 64-bit integers, booleans, double precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,38 +32,93 @@ pub struct ContactColumn {
     pub name: &'static str,
     /// What kind of number it is.
     pub kind: Kind,
+    /// What it says, in a line.
+    pub what: &'static str,
     of: fn(&FoundContact) -> Option<f64>,
 }
 
 /// The numbers of a contact, in the order of every format.
 pub const CONTACT_COLUMNS: [ContactColumn; 15] = [
-    ContactColumn { name: "id", kind: Kind::Integer, of: |contact| contact.id.map(f64::from) },
-    ContactColumn { name: "x_m", kind: Kind::Number, of: |contact| Some(contact.x_m) },
-    ContactColumn { name: "y_m", kind: Kind::Number, of: |contact| Some(contact.y_m) },
-    ContactColumn { name: "z_m", kind: Kind::Number, of: |contact| Some(contact.z_m) },
-    ContactColumn { name: "conductance_s", kind: Kind::Number, of: FoundContact::known_conductance_s },
-    ContactColumn { name: "apparent_conductance_s", kind: Kind::Number, of: |contact| contact.apparent_conductance_s },
-    ContactColumn { name: "radius_m", kind: Kind::Number, of: |contact| contact.radius_m },
-    ContactColumn { name: "force_n", kind: Kind::Number, of: |contact| contact.force_n },
-    ContactColumn { name: "force_deviation_n", kind: Kind::Number, of: |contact| contact.force_deviation_n },
+    ContactColumn {
+        name: "id",
+        kind: Kind::Integer,
+        what: "Its number, which stays the same from frame to frame.",
+        of: |contact| contact.id.map(f64::from),
+    },
+    ContactColumn { name: "x_m", kind: Kind::Number, what: "Centre, x (m).", of: |contact| Some(contact.x_m) },
+    ContactColumn { name: "y_m", kind: Kind::Number, what: "Centre, y (m).", of: |contact| Some(contact.y_m) },
+    ContactColumn {
+        name: "z_m",
+        kind: Kind::Number,
+        what: "Centre, z (m): on a curved detector; zero on a flat one.",
+        of: |contact| Some(contact.z_m),
+    },
+    ContactColumn {
+        name: "conductance_s",
+        kind: Kind::Number,
+        what: "Conductance (S); not known where something else was taught.",
+        of: FoundContact::known_conductance_s,
+    },
+    ContactColumn {
+        name: "apparent_conductance_s",
+        kind: Kind::Number,
+        what: "Conductance (S) in series with the spreading resistance under it: better determined for firm contacts.",
+        of: |contact| contact.apparent_conductance_s,
+    },
+    ContactColumn {
+        name: "radius_m",
+        kind: Kind::Number,
+        what: "Radius (m), where the readings determine it.",
+        of: |contact| contact.radius_m,
+    },
+    ContactColumn {
+        name: "force_n",
+        kind: Kind::Number,
+        what: "Force (N), on a detector with a law of force, or of a solver that was taught forces.",
+        of: |contact| contact.force_n,
+    },
+    ContactColumn {
+        name: "force_deviation_n",
+        kind: Kind::Number,
+        what: "Standard error of the force (N).",
+        of: |contact| contact.force_deviation_n,
+    },
     ContactColumn {
         name: "force_beyond_maximum",
         kind: Kind::Flag,
+        what: "Whether the force is beyond the largest that can be determined.",
         of: |contact| contact.force_beyond_maximum.map(f64::from),
     },
-    ContactColumn { name: "sigma_x_m", kind: Kind::Number, of: |contact| error(contact, |errors| errors.x_m) },
-    ContactColumn { name: "sigma_y_m", kind: Kind::Number, of: |contact| error(contact, |errors| errors.y_m) },
+    ContactColumn {
+        name: "sigma_x_m",
+        kind: Kind::Number,
+        what: "Standard error of x (m).",
+        of: |contact| error(contact, |errors| errors.x_m),
+    },
+    ContactColumn {
+        name: "sigma_y_m",
+        kind: Kind::Number,
+        what: "Standard error of y (m).",
+        of: |contact| error(contact, |errors| errors.y_m),
+    },
     ContactColumn {
         name: "correlation",
         kind: Kind::Number,
+        what: "Correlation of the errors of x and y, -1 to 1.",
         of: |contact| error(contact, |errors| errors.correlation),
     },
     ContactColumn {
         name: "sigma_conductance_s",
         kind: Kind::Number,
+        what: "Standard error of the conductance (S).",
         of: |contact| error(contact, |errors| errors.conductance_s),
     },
-    ContactColumn { name: "depth_m", kind: Kind::Number, of: |contact| contact.depth_m },
+    ContactColumn {
+        name: "depth_m",
+        kind: Kind::Number,
+        what: "Depth (m) that it is pressed in, of a solver that was taught depths.",
+        of: |contact| contact.depth_m,
+    },
 ];
 
 fn error(contact: &FoundContact, of: fn(&Uncertainty) -> f64) -> Option<f64> {
@@ -81,6 +136,32 @@ impl ContactColumn {
 /// known. For binary layouts.
 pub fn contact_values(contact: &FoundContact) -> [f32; CONTACT_COLUMNS.len() - 1] {
     std::array::from_fn(|index| CONTACT_COLUMNS[index + 1].value(contact).map_or(f32::NAN, |value| value as f32))
+}
+
+impl FoundContact {
+    /// The contact with these numbers, in the order of [`CONTACT_COLUMNS`]: the inverse of [`ContactColumn::value`].
+    pub fn of_values(values: [Option<f64>; CONTACT_COLUMNS.len()]) -> Self {
+        let [id, x_m, y_m, z_m, conductance_s, apparent_conductance_s, radius_m, others @ ..] = values;
+        let [force_n, force_deviation_n, beyond, sigma_x_m, sigma_y_m, correlation, sigma_s, depth_m] = others;
+        let uncertainty = || {
+            let (correlation, conductance_s) = (correlation?, sigma_s?);
+            Some(Uncertainty { x_m: sigma_x_m?, y_m: sigma_y_m?, correlation, conductance_s })
+        };
+        Self {
+            id: id.map(|id| id as u32),
+            x_m: x_m.unwrap_or_default(),
+            y_m: y_m.unwrap_or_default(),
+            z_m: z_m.unwrap_or_default(),
+            conductance_s: conductance_s.unwrap_or_default(),
+            apparent_conductance_s,
+            radius_m,
+            force_n,
+            depth_m,
+            force_deviation_n,
+            force_beyond_maximum: beyond.map(|flag| flag != 0.0),
+            uncertainty: uncertainty(),
+        }
+    }
 }
 
 /// `{id?, x_m, y_m, z_m?, conductance_s?, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ..., depth_m?}`; z is left out on a flat detector.
@@ -158,6 +239,31 @@ impl ShapeColumn {
     /// Its value, if it is known.
     pub fn value(&self, shape: &FoundShape) -> Option<f64> {
         (self.of)(shape)
+    }
+}
+
+impl FoundShape {
+    /// The shape with these numbers, in the order of [`SHAPE_COLUMNS`]: the inverse of [`ShapeColumn::value`]. `None` if they are neither a
+    /// line's nor a ring's.
+    pub fn of_values(values: [Option<f64>; SHAPE_COLUMNS.len()]) -> Option<Self> {
+        let [from_x, from_y, to_x, to_y, x, y, radius, width, conductance, sigmas @ ..] = values;
+        let [sigma_from_x, sigma_from_y, sigma_to_x, sigma_to_y, others @ ..] = sigmas;
+        let [sigma_x, sigma_y, sigma_radius, sigma_width, sigma_conductance] = others;
+        let (width_m, conductance_s) = (width?, conductance?);
+        let pair = |x: Option<f64>, y: Option<f64>| Some([x?, y?]);
+        if let (Some(from_m), Some(to_m)) = (pair(from_x, from_y), pair(to_x, to_y)) {
+            let uncertainty = || {
+                let (from_m, to_m) = (pair(sigma_from_x, sigma_from_y)?, pair(sigma_to_x, sigma_to_y)?);
+                Some(LineUncertainty { from_m, to_m, width_m: sigma_width?, conductance_s: sigma_conductance? })
+            };
+            return Some(Self::Line(FoundLine { from_m, to_m, width_m, conductance_s, uncertainty: uncertainty() }));
+        }
+        let uncertainty = || {
+            let (centre_m, radius_m) = (pair(sigma_x, sigma_y)?, sigma_radius?);
+            Some(RingUncertainty { centre_m, radius_m, width_m: sigma_width?, conductance_s: sigma_conductance? })
+        };
+        let (centre_m, radius_m) = (pair(x, y)?, radius?);
+        Some(Self::Ring(FoundRing { centre_m, radius_m, width_m, conductance_s, uncertainty: uncertainty() }))
     }
 }
 

@@ -16,6 +16,17 @@ use crate::learned::Learned;
 use crate::solve::before::complete::Completer;
 
 /// A detector as it is measured, and the model of it that is inverted. Cheap to clone.
+///
+/// ```
+/// use tactomo_physics::detector::Detector;
+/// use tactomo_touch::solve::{Method, Problem};
+///
+/// let problem = Problem::of(&Detector::default())?;
+/// // All solvers of a detector share it.
+/// let solvers = [Method::Tikhonov.build(&problem)?, Method::Contacts.build(&problem)?];
+/// assert_eq!(solvers.map(|solver| solver.name()), ["tikhonov", "contacts"]);
+/// # Ok::<(), tactomo_physics::forward::ForwardError>(())
+/// ```
 #[derive(Clone)]
 pub struct Problem {
     /// The model. Its fields do not depend on drive voltage and converter, so it serves any board.

@@ -10,6 +10,21 @@ use crate::solve::answer::{FoundContact, Solution, SolveError};
 use tactomo_physics::readings::Readings;
 
 /// A method that reads touch from the readings of a frame.
+///
+/// ```
+/// use tactomo_physics::{detector::Detector, forward::readings_v, scene::Contact, simulate::finer_model};
+/// use tactomo_touch::solve::{Method, Problem};
+///
+/// let detector = Detector::default().taken_as_exact();
+/// let press = Contact::flat(0.009, -0.006, 0.003, 2e-4);
+/// let readings = readings_v(&finer_model(&detector, &[], 0)?.impedance_ohm(&[press])?, &detector);
+///
+/// let mut solver = Method::Contacts.build(&Problem::of(&detector)?)?;
+/// let solution = solver.solve(&readings)?;
+/// assert_eq!(solution.contacts.len(), 1);
+/// assert!((solution.contacts[0].x_m - press.x_m).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Solver: Send + 'static {
     /// Name on the command line.
     fn name(&self) -> &'static str;

@@ -9,6 +9,7 @@ mod page;
 mod section;
 mod table;
 
+use std::fmt::Display;
 use std::time::Instant;
 
 use tactomo_physics::detector::{Bond, Detector, Stack};
@@ -90,9 +91,9 @@ pub struct Report {
 /// [`DesignError`] if there is no model of a bond.
 pub fn run(progress: Progress) -> Result<Report, DesignError> {
     let start = Instant::now();
-    let wrong = |what: String| ForwardError::Detector { detector: MATERIAL.to_owned(), what };
-    let stack: Stack = MATERIAL.parse().map_err(wrong)?;
-    let touching = Detector::default().in_material(&stack).map_err(wrong)?.taken_as_exact();
+    let wrong = |what: &dyn Display| ForwardError::Detector { detector: MATERIAL.to_owned(), what: what.to_string() };
+    let stack: Stack = MATERIAL.parse().map_err(|error| wrong(&error))?;
+    let touching = Detector::default().in_material(&stack).map_err(|error| wrong(&error))?.taken_as_exact();
     let solver = PaperSolver::new(&touching)?;
     let bonds = GRIDS.iter().flat_map(|dots| {
         let pitch_m = touching.outline.size_m()[0] / *dots as f64;

@@ -12,6 +12,7 @@ mod page;
 mod planes;
 mod table;
 
+use std::fmt::Display;
 use std::time::Instant;
 
 use tactomo_physics::detector::{Detector, Stack};
@@ -105,9 +106,9 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
 
 /// The detector that a sample was, and the paper's indenter on it.
 fn pressed(name: &str) -> Result<(Detector, Press), DesignError> {
-    let wrong = |what: String| ForwardError::Detector { detector: name.to_owned(), what };
-    let stack: Stack = name.parse().map_err(wrong)?;
-    let detector = Detector::default().in_material(&stack).map_err(wrong)?.taken_as_exact();
+    let wrong = |what: &dyn Display| ForwardError::Detector { detector: name.to_owned(), what: what.to_string() };
+    let stack: Stack = name.parse().map_err(|error| wrong(&error))?;
+    let detector = Detector::default().in_material(&stack).map_err(|error| wrong(&error))?.taken_as_exact();
     let press = Press::indenter(&detector, Skin::from(&stack))?;
     Ok((detector, press))
 }

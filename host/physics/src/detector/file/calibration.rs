@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde::Deserialize;
 
 use super::super::check::Problem;
-use super::super::{CalibratedParameter, Calibration};
+use super::super::{CalibratedParameter, Calibration, UnknownParameter};
 use super::quoted;
 
 /// Most parameters and directions of a file.
@@ -48,8 +48,9 @@ impl CalibrationTable {
             let what = format!("names {}, which is none of calibration.parameters", quoted(other));
             return Err(Problem::new("calibration.left_at_prior", what));
         }
+        let unknown = |error: UnknownParameter| Problem::new("calibration.parameters", error.to_string());
         let parameter = |(name, standard_error): (&String, &f64)| {
-            let parameter = name.parse().map_err(|what: String| Problem::new("calibration.parameters", what))?;
+            let parameter = name.parse().map_err(unknown)?;
             let is_prior = self.left_at_prior.contains(name);
             Ok(CalibratedParameter { parameter, standard_error: *standard_error, is_prior })
         };

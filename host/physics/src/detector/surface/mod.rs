@@ -46,6 +46,7 @@ pub struct Surface {
 
 /// Why a file is no surface.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SurfaceError {
     /// It cannot be read.
     #[error(transparent)]

@@ -13,6 +13,7 @@ pub(super) struct Raw {
 
 /// What a file is wrong about, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FormatError {
     /// A line of a text file, from 1.
     #[error("line {line}: {what}")]

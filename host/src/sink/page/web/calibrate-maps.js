@@ -14,6 +14,8 @@ export const shareOf = (errorM) => Math.min(1, Math.max(0, Math.log(errorM / BES
 
 /** A map of the detector on the canvas of this id, as wide as that is. */
 class DetectorMap {
+  left; bottom; right; top; outline;
+
   constructor(id, { bounds_m: [[left, bottom], [right, top]], outline_m: outline }) {
     this.canvas = document.getElementById(id);
     Object.assign(this, { left, bottom, right, top, outline });
@@ -54,7 +56,13 @@ export class RubbedMap extends DetectorMap {
   }
 }
 
-// The value at a place of a regular grid of places, linear in between and as at its edge beyond it.
+/**
+ * The value at a place of a regular grid of places, linear in between and as at its edge beyond it.
+ * @param {Map<string, number>} places
+ * @param {number[]} xs
+ * @param {number[]} ys
+ * @param {number[]} at
+ */
 function between(places, xs, ys, [xM, yM]) {
   const along = (all, value) => {
     const place = Math.min(all.length - 1, Math.max(0, ((value - all[0]) / (all.at(-1) - all[0] || 1)) * (all.length - 1)));

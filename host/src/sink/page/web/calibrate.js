@@ -78,6 +78,8 @@ function row(what, before, after) {
 
 /** The panel; asks through `send`. */
 export class CalibratePanel {
+  state;
+
   constructor(setup, send) {
     this.send = (what) => send({ calibrate: what });
     this.card = element("calibrate-card");

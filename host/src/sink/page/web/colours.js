@@ -30,6 +30,7 @@ function along(points, t) {
     v + 0.5 * f * (c[k] - a[k] + f * (2 * a[k] - 5 * v + 4 * c[k] - d[k] + f * (3 * (v - c[k]) + d[k] - a[k]))));
 }
 
+/** @param {number[]} colour */
 function linearRgb([lightness, a, b]) {
   const l = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3;
   const m = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3;

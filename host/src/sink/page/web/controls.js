@@ -13,7 +13,7 @@ export function listenForActions(actions) {
     if (button) button.onclick = act;
   }
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input, select")) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || /** @type {Element} */ (event.target).matches("input, select")) return;
     KEYS[event.key.toLowerCase()]?.();
   });
 }

@@ -4,7 +4,10 @@ import { count, fixed } from "./units.js";
 
 const microseconds = (us) => (us < 1000 ? [fixed(us, us < 100 ? 1 : 0), "µs"] : [fixed(us / 1000, us < 1e5 ? 1 : 0), "ms"]);
 
-// In rows of two.
+/**
+ * In rows of two.
+ * @type {[string, string, Function, Function?][]}
+ */
 const FIGURES = [
   ["frames/s", "Frames that came over the last second", ({ frames_per_s: rate }) => [count(rate), ""]],
   ["age p50", "Median age of answers when they are ready, since the last byte of their frame came", ({ age_us: age }) => microseconds(age.p50)],

@@ -6,6 +6,8 @@ const NARROW_BELOW = 520;
 
 /** Fits bounds (m) into a box of pixels; `x`, `y` turn places (m) into pixels, `placeOf` pixels into places. */
 export class Layout {
+  leftM; bottomM; rightM; topM; boxWidth; boxHeight;
+
   constructor([[leftM, bottomM], [rightM, topM]], boxWidth, boxHeight) {
     this.narrow = boxWidth < NARROW_BELOW;
     const margin = this.narrow ? NARROW : WIDE;

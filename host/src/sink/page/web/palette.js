@@ -6,7 +6,10 @@ const NAMES = ["ink", "muted", "card", "edge", "accent", "good", "bad"];
 /** The class that colours a contact: the same for the same number. */
 export const hueOf = (id) => (id ? `hue-${(id - 1) % HUES}` : "hue-none");
 
-/** The colours of the theme in use: `ink`, `muted` and so on, and `hue(id)` of a contact. */
+/**
+ * The colours of the theme in use: `ink`, `muted` and so on, and `hue(id)` of a contact.
+ * @returns {Record<string, any>}
+ */
 export function palette() {
   const style = getComputedStyle(document.documentElement);
   const read = (name) => style.getPropertyValue(`--${name}`).trim();

@@ -65,6 +65,7 @@ export class PointerPanel {
 
   #draw({ pressed }, now) {
     const { context, width, height, colours } = this;
+    /** @param {number[]} place */
     const onScreen = ([x, y]) => [x * width, y * height];
     context.fillStyle = faded(colours.muted, 0.1);
     context.clearRect(0, 0, width, height);
@@ -87,6 +88,7 @@ export class PointerPanel {
     this.#drawArrow(onScreen(this.at), pressed);
   }
 
+  /** @param {number[]} place */
   #drawArrow([x, y], pressed) {
     const { context, colours } = this;
     context.beginPath();

@@ -45,7 +45,10 @@ function contact(taker) {
   };
 }
 
-// What the pointer has done, if a contact is one.
+/**
+ * What the pointer has done, if a contact is one.
+ * @param {Float32Array} numbers
+ */
 function pointer([xM, yM, pressed, clicks]) {
   return Number.isNaN(clicks) ? null : { wayM: [xM, yM], pressed: pressed === 1, clicks };
 }

@@ -14,6 +14,8 @@ const STEPS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRi
 
 /** Draws the readings; calls `onChoose(g, e)` when one is pointed at, and `onChoose()` when none is. */
 export class ReadingsMap {
+  moved; drawn;
+
   constructor(setup, theme, onChoose) {
     this.count = setup.electrodes.length;
     this.theme = theme;

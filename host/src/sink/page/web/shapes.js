@@ -10,7 +10,11 @@ const SWELL = 0.1;
 // Share of the picture that the size takes: a plate lies, a curved detector may stand.
 const FILL = { plate: 0.64, curved: 0.5 };
 
-// Whether a point is within an outline with holes: even-odd rule.
+/**
+ * Whether a point is within an outline with holes: even-odd rule.
+ * @param {number[][][]} loops
+ * @param {number[]} place
+ */
 function isInside(loops, [x, y]) {
   let inside = false;
   for (const loop of loops) {
@@ -47,6 +51,8 @@ export function normalsOf(points, triangles, normals) {
 
 /** A flat detector. */
 class Plate {
+  pixels;
+
   constructor({ bounds_m: [[left, bottom], [right, top]], outline_m: loops }) {
     this.sizeM = Math.max(right - left, top - bottom);
     this.fill = FILL.plate;

@@ -18,6 +18,8 @@ const SHADES = { light: { darkest: 0.6, lift: 0 }, dark: { darkest: 0.4, lift: 3
 
 /** Draws `view.field` in space. */
 export class SpaceView {
+  width; height;
+
   constructor(view) {
     this.view = view;
     this.canvas = document.getElementById("space");
@@ -26,6 +28,7 @@ export class SpaceView {
     this.camera = new Camera(view.setup.places_m.length > 0);
     const count = this.shape.shares.length;
     this.normals = new Float32Array(3 * count);
+    /** @type {any} */
     this.screen = { share: this.shape.shares };
     for (const name of ["x", "y", "z", "light"]) this.screen[name] = new Float32Array(count);
   }

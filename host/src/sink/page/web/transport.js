@@ -10,6 +10,8 @@ const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seco
 
 /** The bar under the picture; asks through `send`. */
 export class Transport {
+  bar; playButton; position; seek; length; speed; loop; ended;
+
   constructor(send) {
     this.send = send;
     const find = (id) => document.getElementById(id);

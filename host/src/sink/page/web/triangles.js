@@ -5,6 +5,8 @@ const LIGHTS = 32;
 
 /** An image with depth. */
 export class DepthImage {
+  width; height;
+
   constructor(width, height) {
     [this.width, this.height] = [width, height];
     this.image = new ImageData(width, height);

@@ -1,5 +1,6 @@
 // Numbers as people read them.
 
+/** @type {[number, string][]} */
 const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
 const MINUS = "\u2212";
 

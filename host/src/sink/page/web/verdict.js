@@ -50,6 +50,8 @@ function ageText(ageS) {
 
 /** What the solver says of its answer. */
 export class Verdict {
+  flags; wires;
+
   constructor() {
     this.what = document.getElementById("choice");
     this.residual = document.getElementById("residual");

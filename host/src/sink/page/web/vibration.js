@@ -103,6 +103,8 @@ export class VibrationPanel {
 
 // A small chart: from and to of both axes.
 class Axes {
+  context; width; colours; left; right; low; high;
+
   constructor(context, width, colours, [left, right], [low, high]) {
     Object.assign(this, { context, width, colours, left, right, low, high });
     context.clearRect(0, 0, width, HEIGHT);

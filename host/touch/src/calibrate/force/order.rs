@@ -15,6 +15,7 @@ const FITS: f64 = 3.0;
 
 /// Forces that do not belong to the conductances that they are given for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Mistyped {
     /// Conductances do not rise with the forces.
     #[error(

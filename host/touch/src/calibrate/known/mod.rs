@@ -79,6 +79,7 @@ pub struct Progress {
 
 /// Why there is no correction.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum KnownError {
     /// Too few.
     #[error(

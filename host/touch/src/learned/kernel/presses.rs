@@ -54,6 +54,7 @@ impl Strength {
 
 /// Why presses teach nothing.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PressesError {
     /// The file cannot be read.
     #[error(transparent)]

@@ -28,6 +28,7 @@ const SIDES: std::ops::RangeInclusive<usize> = 4..=128;
 
 /// Why there is no network, or it is not one for a detector.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NetworkError {
     /// The file is no `safetensors`.
     #[error("no network: {0}; `tools/train_network.py` writes networks")]

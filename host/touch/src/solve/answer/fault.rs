@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// What frames say of electrodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ElectrodeFault {
     /// Grounding it grounds nothing: its wire is broken.

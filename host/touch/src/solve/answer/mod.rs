@@ -8,6 +8,13 @@ pub use self::shape::{FoundLine, FoundRing, FoundShape, LineUncertainty, RingUnc
 use tactomo_physics::readings::Readings;
 
 /// What a solver found.
+///
+/// ```
+/// use tactomo_touch::solve::{FoundContact, Solution};
+///
+/// let solution = Solution { contacts: vec![FoundContact::flat(0.01, -0.005, 2e-4)], ..Solution::default() };
+/// assert!(solution.is_contacts() && !solution.flags.is_doubtful());
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Solution {
     /// Contact conductance per area at each node of the model's image mesh (S/m2), if the method makes an image. A density,
@@ -40,7 +47,7 @@ impl Solution {
 }
 
 /// What to know before a solution is believed.
-#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Flags {
     /// Readings are at an end of the converter's range, or contacts conduct so well that more would change nothing.
     pub saturated: bool,
@@ -139,6 +146,7 @@ impl FoundContact {
 
 /// Why a solver cannot answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SolveError {
     /// Readings of another number of electrodes.
     #[error("readings of {found} electrodes, but the detector has {expected}")]

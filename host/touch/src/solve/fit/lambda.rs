@@ -17,7 +17,16 @@ const TRIED_IN_A_DECADE: usize = 10;
 const HALVINGS: usize = 24;
 
 /// How strongly an image is held down.
+///
+/// ```
+/// use tactomo_touch::solve::Lambda;
+///
+/// assert_eq!("0.03".parse(), Ok(Lambda::default()));
+/// assert_eq!("gcv".parse(), Ok(Lambda::Gcv));
+/// assert!("-1".parse::<Lambda>().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Lambda {
     /// A share of the largest singular value: the same meaning for every detector, mesh and drive voltage.
     Relative(f64),
@@ -49,20 +58,22 @@ impl Default for Lambda {
     }
 }
 
+/// A text that is no [`Lambda`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no lambda: a share of the largest singular value above zero, discrepancy, l-curve or gcv is needed")]
+pub struct UnknownLambda(pub String);
+
 impl std::str::FromStr for Lambda {
-    type Err = String;
+    type Err = UnknownLambda;
 
     /// A share of the largest singular value, or `discrepancy`, `l-curve`, `gcv`.
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, UnknownLambda> {
         match (text, text.parse::<f64>()) {
             ("discrepancy", _) => Ok(Self::Discrepancy(1.0)),
             ("l-curve", _) => Ok(Self::LCurve),
             ("gcv", _) => Ok(Self::Gcv),
             (_, Ok(share)) if share > 0.0 && share.is_finite() => Ok(Self::Relative(share)),
-            _ => {
-                Err("a share of the largest singular value above zero, discrepancy, l-curve or gcv is needed"
-                    .to_owned())
-            }
+            _ => Err(UnknownLambda(text.to_owned())),
         }
     }
 }

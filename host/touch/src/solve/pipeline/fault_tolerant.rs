@@ -17,6 +17,16 @@ const TRIED: usize = 6;
 
 /// A solver that leaves out electrodes that are open, shorted, exchanged or otherwise wrong, once it has seen that, and takes them back
 /// when they are healthy.
+///
+/// ```
+/// use tactomo_physics::{detector::Detector, readings::Readings};
+/// use tactomo_touch::solve::{FaultTolerant, Method, Problem, Solver};
+///
+/// let mut solver = FaultTolerant::new(Method::Tikhonov, &Problem::of(&Detector::default())?)?;
+/// solver.solve(&Readings::from_fn(16, |_, _| 0.0))?;
+/// assert!(solver.excluded().is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct FaultTolerant {
     method: Method,
     problem: Problem,

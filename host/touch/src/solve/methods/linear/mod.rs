@@ -21,6 +21,7 @@ const SMOOTH_SHARE: f64 = 0.015;
 
 /// What is done before and after the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Variant {
     /// The force is taken out of the readings first, so that a firm contact is where a light one is; contacts are the image's
     /// peaks. The image of one contact then has the conductance of contact and detector in series.
