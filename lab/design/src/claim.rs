@@ -1,6 +1,6 @@
 //! What the paper claims, and whether it holds: as the paper computes it, or of the sensor.
 
-use tactomo_study::page::escaped;
+use tactomo_study::view::{Cell, Style, TEXT, Table};
 
 use super::rank::spearman;
 
@@ -139,45 +139,25 @@ impl Trend {
     }
 }
 
-/// Claims as lines of text.
-pub fn table(claims: &[Claim]) -> String {
-    let line = |claim: &Claim| {
-        format!(
-            "{}: {}\n    {}: {}\n    the sensor: {}\n",
-            claim.claim,
-            claim.verdict_text(),
-            claim.basis.text(),
-            claim.paper,
-            claim.sensor
-        )
-    };
-    claims.iter().map(line).collect()
-}
+/// Title of the table of claims.
+pub const CLAIMS: &str = "What of the paper holds";
 
-/// Claims as a table of a page: what is said, whether it holds, and the numbers.
-pub fn html(claims: &[Claim]) -> String {
-    let row = |claim: &Claim| {
-        let level = match claim.verdict {
-            Verdict::Holds => "h0",
-            Verdict::SensorOnly | Verdict::SensorHolds => "h1",
-            Verdict::PaperOnly => "h2",
-            Verdict::DoesNotHold | Verdict::SensorDoesNot => "h3",
-            Verdict::Unknown => "empty",
-        };
-        format!(
-            "<tr><td>{}</td><td class=\"verdict {level}\">{}</td><td><small>{}</small>{}</td><td>{}</td></tr>\n",
-            escaped(claim.claim),
-            claim.verdict_text(),
-            claim.basis.text(),
-            escaped(&claim.paper),
-            escaped(&claim.sensor)
-        )
+/// Claims as a table: what is said, whether it holds, and the numbers.
+pub(crate) fn table(claims: &[Claim]) -> Table {
+    let level = |claim: &Claim| match claim.verdict {
+        Verdict::Holds => Some(0),
+        Verdict::SensorOnly | Verdict::SensorHolds => Some(1),
+        Verdict::PaperOnly => Some(2),
+        Verdict::DoesNotHold | Verdict::SensorDoesNot => Some(3),
+        Verdict::Unknown => None,
     };
-    let rows: String = claims.iter().map(row).collect();
-    format!(
-        "<div class=\"wide\"><table class=\"claims\"><thead><tr><th>the paper says</th><th></th><th>as it computes it</th>\
-         <th>the sensor itself</th></tr></thead><tbody>\n{rows}</tbody></table></div>"
-    )
+    Table::of(CLAIMS, claims)
+        .column("the paper says", TEXT, |claim| claim.claim)
+        .cells("", TEXT, |claim| Cell { value: claim.verdict_text().into(), level: level(claim), ..Cell::default() })
+        .column("as it computes it", TEXT, |claim| format!("{}: {}", claim.basis.text(), claim.paper))
+        .column("the sensor itself", TEXT, |claim| claim.sensor.as_str())
+        .style(Style::Prose)
+        .into()
 }
 
 #[cfg(test)]
@@ -200,6 +180,6 @@ mod tests {
         );
         assert_eq!(text(Basis::Solver, [Some(true), None]), "cannot be judged");
         let all = [claim(Basis::Definition, [Some(true); 2])];
-        assert!(table(&all).contains("by its definition: p < 1") && html(&all).contains("p &lt; 1"));
+        assert_eq!(table(&all).rows[0][2].value, "by its definition: p < 1".into());
     }
 }

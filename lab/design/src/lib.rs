@@ -21,7 +21,6 @@ mod reached;
 mod report;
 pub mod samples;
 pub mod search;
-mod text;
 pub mod thickness;
 
 pub use self::claim::{Basis, Claim, Verdict};
@@ -35,4 +34,4 @@ pub use self::press::Press;
 pub use self::progress::{Progress, Step};
 pub use self::rank::{chance, holm, spearman};
 pub use self::reached::Reached;
-pub use self::report::{Course, Heading, Report, page};
+pub use self::report::{Course, overview};

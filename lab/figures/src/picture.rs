@@ -64,7 +64,7 @@ const PAGE: &[&str] = &[
     "host/src/sink/page/messages.rs",
 ];
 /// What charts are drawn by.
-const CHARTS: &[&str] = &["lab/study/src/page", "lab/study/src/tradeoff/page.rs"];
+const CHARTS: &[&str] = &["lab/study/src/view", "lab/study/src/tradeoff/view.rs"];
 
 const fn live(
     file: &'static str,
@@ -95,13 +95,13 @@ pub const PICTURES: &[Picture] = &[
         file: "docs/scan.png",
         how: How::Chart { job: "scan", option: "--picture" },
         size: [1300, 926],
-        sources: &["lab/study/src/page", "lab/study/src/scanning/page.rs"],
+        sources: &["lab/study/src/view", "lab/study/src/scanning/view.rs"],
     },
     Picture {
         file: "docs/design-materials.png",
         how: How::Chart { job: "materials", option: "--out" },
         size: [1300, 930],
-        sources: &["lab/study/src/page", "lab/design/src/materials/page.rs", "lab/design/src/claim.rs"],
+        sources: &["lab/study/src/view", "lab/design/src/materials/view.rs", "lab/design/src/claim.rs"],
     },
     Picture {
         file: "docs/cost.svg",

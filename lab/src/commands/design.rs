@@ -8,6 +8,7 @@ use tactomo_board::inputs::{self, Settling};
 use tactomo_design::search::{self, Material, Plan, Wishes};
 use tactomo_physics::detector::{Chosen, Detector, Stack};
 use tactomo_physics::hertz::Skin;
+use tactomo_study::view::{self, View};
 
 use super::study::watched;
 use tactomo_cli::output::{self, NewFile, message};
@@ -106,10 +107,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let file = NewFile::optional(args.out.as_ref(), args.overwrite)?;
     let page = NewFile::optional(args.page.as_ref(), args.overwrite)?;
     let answer = watched(|progress| search::answer(&plan, progress))?;
-    page.map(|page| page.write(search::page(&answer, &output::command_line()))).transpose()?;
+    let view = search::view(&answer);
+    page.map(|page| page.write(view::page(std::slice::from_ref(&view), &output::command_line()))).transpose()?;
     let settling = answer.choices.iter().map(|choice| settlings(&choice.detector)).collect();
     let output = Output { answer: &answer, settling };
-    output::print(&if args.json { serde_json::to_string(&output)? } else { output.text() })?;
+    output::print(&if args.json { serde_json::to_string(&output)? } else { output.text(view) })?;
     if let (Some(file), Some(path)) = (file, &args.out) {
         let index = usize::from(args.choose) - 1;
         let toml = answer.toml(index).with_context(|| {
@@ -137,13 +139,12 @@ fn settlings(detector: &Detector) -> Vec<Settling> {
 
 impl Output<'_> {
     /// The answer as a table, and what the boards need that do not suit.
-    fn text(&self) -> String {
-        let mut lines = vec![search::table(self.answer)];
+    fn text(&self, mut shown: View) -> String {
         for (choice, settlings) in (1..).zip(&self.settling) {
             let unsuited = settlings.iter().filter(|settling| !settling.suits);
-            lines.extend(unsuited.map(|settling| format!("choice {choice}: {settling}")));
+            shown = unsuited.fold(shown, |shown, settling| shown.text(format!("choice {choice}: {settling}")));
         }
-        lines.join("\n")
+        view::text(&[shown])
     }
 }
 

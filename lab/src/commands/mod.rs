@@ -3,6 +3,7 @@
 mod design;
 mod learn;
 mod score;
+mod shown;
 mod stability;
 mod study;
 mod tradeoff;

@@ -6,8 +6,8 @@ mod report;
 use std::path::PathBuf;
 
 use anyhow::{Context, anyhow, bail, ensure};
-use tactomo_study::page;
 use tactomo_study::stopwatch::timed;
+use tactomo_study::view::{self, View};
 use tactomo_touch::learned::Learned;
 use tactomo_touch::solve::{Kernel, Press, Presses};
 
@@ -62,30 +62,15 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let scored = scored(&kernel, &presses).with_context(|| args.presses.display().to_string())?;
     let map = Map::of(&scored.errors());
     let report = Report::of(&scored, &map);
+    let title = format!("{} on {}", args.model.display(), args.presses.display());
+    let shown = [View::new(title, "").with(report.table()).figures("", [map.drawn()])];
     if let Some(out) = out {
-        let title = format!("{} on {}", args.model.display(), args.presses.display());
-        let content = match extension {
-            Some("svg") => map.svg(),
-            _ => page::html(&title, &html(&title, &report, &map)),
-        };
-        out.write(content)?;
+        out.write(match extension {
+            Some("svg") => view::standalone(&map.drawn()),
+            _ => view::page(&shown, &command_line()),
+        })?;
     }
-    match args.json {
-        true => output::print(&serde_json::to_string(&report)?)?,
-        false => output::print(&report.text())?,
-    }
-    Ok(())
-}
-
-/// Parts of the page.
-fn html(title: &str, report: &Report, map: &Map) -> Vec<String> {
-    let rows: Vec<Vec<String>> = report.rows().into_iter().map(|(name, value)| vec![name.to_owned(), value]).collect();
-    vec![
-        format!("<h1>{}</h1>", page::escaped(title)),
-        page::table(&["presses that were not taught", ""], &rows),
-        map.svg(),
-        format!("<p class=\"note\"><code>{}</code></p>", page::escaped(&command_line())),
-    ]
+    Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { view::text(&shown) })?)
 }
 
 /// What the kernel reads of all presses.

@@ -4,7 +4,7 @@ use tactomo_study::stability::{self, Plan};
 
 use super::study::StudyArgs;
 use tactomo_cli::choice::DetectorArgs;
-use tactomo_cli::output::{self, NewFile, message};
+use tactomo_cli::output::{self, message};
 
 /// Finds where each solver breaks, how, and whether it reports it.
 ///
@@ -27,7 +27,7 @@ pub struct Args {
 /// Runs the study.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let Args { detector, study } = args;
-    let page = NewFile::optional(study.out.as_ref(), study.overwrite)?;
+    let files = study.shown.files()?;
     let [places, frames] = study.places_and_frames(if study.quick { [1, 2] } else { [3, 2] });
     let plan = Plan {
         detector: detector.get()?,
@@ -40,6 +40,5 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         calibrate: study.calibrate(),
     };
     let report = stability::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
-    page.map(|page| page.write(stability::page(&report))).transpose()?;
-    Ok(output::print(&if study.json { serde_json::to_string(&report)? } else { stability::table(&report) })?)
+    study.shown.put_out(files, &report, &[stability::view(&report)])
 }

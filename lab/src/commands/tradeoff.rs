@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use tactomo_physics::detector::Chosen;
 use tactomo_study::scanning::{self, Settings};
 use tactomo_study::tradeoff::{self, Plan};
+use tactomo_study::view::picture as picture_of;
 
 use super::study::StudyArgs;
 use crate::heap::HEAP;
@@ -54,8 +55,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return scan(args);
     }
     let Args { detector, study, picture, .. } = args;
-    let page = NewFile::optional(study.out.as_ref(), study.overwrite)?;
-    let picture = NewFile::optional(picture.as_ref(), study.overwrite)?;
+    let files = study.shown.files()?;
+    let picture = NewFile::optional(picture.as_ref(), study.shown.overwrite)?;
     let [places, frames] = study.places_and_frames(if study.quick { [2, 3] } else { [6, 5] });
     let plan = Plan {
         detectors: choice::detectors(detector, if study.quick { &DETECTORS[..1] } else { &DETECTORS })?,
@@ -70,23 +71,23 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         calibrate: study.calibrate(),
     };
     let report = tradeoff::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
-    page.map(|page| page.write(tradeoff::page(&report))).transpose()?;
-    picture.map(|picture| picture.write(tradeoff::picture(&report))).transpose()?;
-    Ok(output::print(&if study.json { serde_json::to_string(&report)? } else { tradeoff::table(&report) })?)
+    let view = tradeoff::view(&report);
+    picture.map(|picture| picture.write(picture_of(&view))).transpose()?;
+    study.shown.put_out(files, &report, &[view])
 }
 
 /// Runs the study of rows.
 fn scan(args: &Args) -> anyhow::Result<()> {
     let Args { detector, study, picture, .. } = args;
     anyhow::ensure!(detector.len() <= 1, "--scan is of one detector: give --detector once");
-    let page = NewFile::optional(study.out.as_ref(), study.overwrite)?;
-    let picture = NewFile::optional(picture.as_ref(), study.overwrite)?;
+    let files = study.shown.files()?;
+    let picture = NewFile::optional(picture.as_ref(), study.shown.overwrite)?;
     let own = if study.quick { SCENES[0] } else { SCENES[1] };
     let [scenes, _] = study.places_and_frames([own, 0]);
     let detector = choice::detectors(detector, &DETECTORS[..1])?.into_iter().next().unwrap_or_default();
     let settings = Settings { detector, contacts: CONTACTS.to_vec(), scenes, seed: study.seed };
     let report = scanning::run(&settings, &output::command_line(), &mut |step| message!("{step}"))?;
-    page.map(|page| page.write(scanning::page(&report))).transpose()?;
-    picture.map(|picture| picture.write(scanning::picture(&report))).transpose()?;
-    Ok(output::print(&if study.json { serde_json::to_string(&report)? } else { scanning::table(&report) })?)
+    let view = scanning::view(&report);
+    picture.map(|picture| picture.write(picture_of(&view))).transpose()?;
+    study.shown.put_out(files, &report, &[view])
 }

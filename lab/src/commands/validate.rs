@@ -9,10 +9,12 @@ use tactomo_physics::forward::ForwardModel;
 use tactomo_physics::forward::shell::Shell;
 use tactomo_study::case::Case;
 use tactomo_study::validate::{CaseReport, SolverReport, Trials, forward_errors, try_solver};
+use tactomo_study::view::{Format, MM, PERCENT, PLAIN, TEXT, Table, US, View};
 use tactomo_touch::solve::{Lambda, Method, Parameter, Problem};
 
+use super::shown::Shown;
 use tactomo_cli::choice::{self, Model};
-use tactomo_cli::output::{self, message};
+use tactomo_cli::output::message;
 
 /// Compares models and solvers with reference cases.
 ///
@@ -51,9 +53,8 @@ pub struct Args {
     /// Lambda of the solvers that have one, as a share of the largest singular value
     #[arg(long, value_name = "SHARE", value_parser = positive)]
     lambda: Option<f64>,
-    /// Prints `{cases: [...]}` as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    shown: Shown,
 }
 
 #[derive(Serialize)]
@@ -63,13 +64,13 @@ struct Report {
 
 /// Runs all cases and prints a table or JSON.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    let files = args.shown.files()?;
     let mut report = Report { cases: Vec::with_capacity(args.cases.len()) };
     for path in &args.cases {
         let case = Case::read(path)?;
         report.cases.push(report_case(args, &case).with_context(|| path.display().to_string())?);
     }
-    let text = if args.json { serde_json::to_string(&report)? } else { table(&report.cases) };
-    Ok(output::print(&text)?)
+    args.shown.put_out(files, &report, &[view(&report.cases)])
 }
 
 fn report_case(args: &Args, case: &Case) -> anyhow::Result<CaseReport> {
@@ -116,31 +117,35 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Errors in per cent of the largest reading or impedance.
-fn table(cases: &[CaseReport]) -> String {
-    let mut lines = vec![format!(
-        "{:<28} {:<6} {:>9} {:>9} {:>9}   {:<18} {:>10} {:>9} {:>12} {:>9}",
-        "case", "model", "reading %", "Z %", "ref. %", "solver", "found/true", "error mm", "conduct. S", "us/frame"
-    )];
-    for case in cases {
-        let forward = format!(
-            "{:<28} {:<6} {:>9.2} {:>9.2} {:>9.2}",
-            case.case,
-            case.model,
-            100.0 * case.forward_error,
-            100.0 * case.impedance_error,
-            100.0 * case.reference_error
-        );
-        for (i, solver) in case.solvers.iter().enumerate() {
-            lines.push(format!("{:<65}   {}", if i == 0 { forward.as_str() } else { "" }, solver_columns(solver)));
-        }
-    }
-    lines.join("\n")
-}
-
-fn solver_columns(report: &SolverReport) -> String {
-    let error = report.position_error_m.map_or_else(|| "-".to_owned(), |error_m| format!("{:.2}", error_m * 1e3));
-    let conductance_s: f64 = report.contacts.iter().map(|contact| contact.conductance_s).sum();
-    let found = format!("{:.1}/{}", report.count_found, report.count_true);
-    format!("{:<18} {found:>10} {error:>9} {conductance_s:>12.2e} {:>9.1}", report.solver, report.frame_us)
+/// A row for each case and solver.
+fn view(cases: &[CaseReport]) -> View {
+    let rows = cases.iter().flat_map(|case| case.solvers.iter().map(move |solver| (case, solver)));
+    let percent = PERCENT.digits(2);
+    let case = |(case, _): &(&CaseReport, &SolverReport)| {
+        let [readings, impedance, own] =
+            [case.forward_error, case.impedance_error, case.reference_error].map(|share| percent.text(Some(share)));
+        format!(
+            "{} ({} model): readings differ by {readings} %, Z by {impedance} %; the reference's own {own} %",
+            case.case, case.model
+        )
+    };
+    let conductance_s = |(_, solver): &(&CaseReport, &SolverReport)| {
+        solver.contacts.iter().map(|contact| contact.conductance_s).sum::<f64>()
+    };
+    let table = Table::of("", rows)
+        .group("compared", case)
+        .detail("case", TEXT, |(case, _)| case.case.as_str())
+        .detail("model", TEXT, |(case, _)| case.model.as_str())
+        .detail("readings", percent, |(case, _)| case.forward_error)
+        .detail("Z", percent, |(case, _)| case.impedance_error)
+        .detail("reference", percent, |(case, _)| case.reference_error)
+        .column("solver", TEXT, |(_, solver)| solver.solver.as_str())
+        .column("found", PLAIN.digits(1), |(_, solver)| solver.count_found)
+        .column("true", PLAIN.digits(0), |(_, solver)| solver.count_true)
+        .column("error", MM.digits(2), |(_, solver)| solver.position_error_m)
+        .column("conductance", Format::new("S", "s"), conductance_s)
+        .column("time", US, |(_, solver)| solver.frame_us)
+        .note("Differences are over the largest reading or impedance.")
+        .data();
+    View::new("Models and solvers against reference cases", "").with(table)
 }

@@ -10,7 +10,6 @@ pub mod contacts;
 mod experiment;
 mod json_file;
 mod machine;
-pub mod page;
 mod presses;
 pub mod scanning;
 mod scenes;
@@ -20,6 +19,7 @@ pub mod stopwatch;
 pub mod tradeoff;
 pub mod validate;
 mod variant;
+pub mod view;
 
 pub use self::bound::{Bound, RADIUS_DEVIATION, cramer_rao};
 pub use self::calibrate::{Calibrate, Calibrated};

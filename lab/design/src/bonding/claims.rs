@@ -1,8 +1,9 @@
 //! What the paper concludes on bonding, on ours.
 
+use tactomo_study::view::MM;
+
 use super::super::claim::{Basis, Trend, Verdict};
 use super::super::rank::spearman;
-use super::super::text::number;
 use super::{Claim, GRIDS, Glue, Row};
 
 /// Where the paper sees a local peak of the error (m), and within what a peak is that one.
@@ -84,8 +85,7 @@ fn peak(rows: &[Row]) -> Claim {
     let [peaks, lows] = [1.0, -1.0].map(|sign| ERRORS.map(|error| turns(rows, error, sign)));
     let is_there = |peaks: &[(usize, f64)]| Some(peaks.iter().any(|(_, at_m)| (at_m - PEAK_M).abs() <= NEAR_PEAK_M));
     let each = |turns: &[(usize, f64)]| {
-        let each =
-            turns.iter().map(|(dots, at_m)| format!("{} mm with {dots} x {dots}", number(Some(at_m * 1e3), 1.0)));
+        let each = turns.iter().map(|(dots, at_m)| format!("{} mm with {dots} x {dots}", MM.text(Some(*at_m))));
         each.collect::<Vec<_>>().join(", ")
     };
     let text = |peaks: &[(usize, f64)], lows: &[(usize, f64)]| match (peaks, lows) {

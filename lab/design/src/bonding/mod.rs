@@ -5,9 +5,7 @@
 
 mod bar;
 mod claims;
-mod page;
-mod section;
-mod table;
+mod view;
 
 use std::fmt::Display;
 use std::time::Instant;
@@ -16,9 +14,10 @@ use tactomo_physics::detector::{Bond, Detector, Stack};
 use tactomo_physics::forward::{ForwardError, Slab};
 
 pub use self::bar::Bar;
+pub use self::view::view;
 use super::metrics::Sweep;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, MIDDLE};
-use super::{Claim, Course, DesignError, Heading, Imaging, Limit, PaperSolver, Press, Progress};
+use super::{Claim, Course, DesignError, Imaging, Limit, PaperSolver, Press, Progress};
 
 /// What is stacked.
 const MATERIAL: &str = "BB";
@@ -176,33 +175,6 @@ impl Glue {
             Self::Conducting => "glue of the paper",
             Self::AcrossOnly => "glue that conducts only across",
         }
-    }
-}
-
-impl super::Report for Report {
-    fn heading(&self) -> Heading {
-        Heading {
-            name: "bonding",
-            title: "How layers are joined",
-            lead_in: "Two layers of sample B joined by 5 x 5 or 7 x 7 dots of conductive glue: errors of places over the dots' diameter, up to dots that touch, and the current through \
-         the dots.",
-        }
-    }
-
-    fn course(&self) -> &Course {
-        &self.course
-    }
-
-    fn table(&self) -> String {
-        table::table(self)
-    }
-
-    fn csv(&self) -> String {
-        table::csv(self)
-    }
-
-    fn parts(&self) -> Vec<String> {
-        page::parts(self)
     }
 }
 

@@ -3,8 +3,7 @@
 //! On its sample A, 60 x 60 x 5 mm, with its contact of 4 mm and 1 S/m. A frame has a conversion for each ground and electrode, so that more
 //! electrodes take longer: places are compared for one frame, and for the time of a frame of 16.
 
-mod page;
-mod table;
+mod view;
 
 use std::time::Instant;
 
@@ -14,7 +13,9 @@ use tactomo_physics::forward::Slab;
 use super::limit::{Spread, places_everywhere};
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, nine_places};
 use super::reached::by_auto;
-use super::{Course, DesignError, Heading, Layout, Limit, Press, Progress, Reached};
+use super::{Course, DesignError, Layout, Limit, Press, Progress, Reached};
+
+pub use self::view::view;
 
 /// Places over the whole surface.
 const PLACES: usize = 100;
@@ -169,33 +170,6 @@ fn row(group: Group, layout: Layout, diameter_m: f64, seed: u64) -> Result<Row, 
 
 fn base_width_m(detector: &Detector) -> f64 {
     detector.outline.size_m()[0]
-}
-
-impl super::Report for Report {
-    fn heading(&self) -> Heading {
-        Heading {
-            name: "electrodes",
-            title: "Which electrodes",
-            lead_in: "How many electrodes, in which pattern, how wide and how far apart: what the sensor itself can tell with them, on sample A of 60 x 60 x 5 mm. The paper does \
-         not study this.",
-        }
-    }
-
-    fn course(&self) -> &Course {
-        &self.course
-    }
-
-    fn table(&self) -> String {
-        table::table(self)
-    }
-
-    fn csv(&self) -> String {
-        table::csv(self)
-    }
-
-    fn parts(&self) -> Vec<String> {
-        page::parts(self)
-    }
 }
 
 #[cfg(test)]

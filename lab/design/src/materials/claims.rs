@@ -287,7 +287,7 @@ impl<'a> Map<'a> {
 const NOT_COMPUTED: &str = "too few conditions";
 
 /// Smallest and largest.
-pub(super) fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(crate) fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 

@@ -6,8 +6,7 @@
 
 mod claims;
 mod half;
-mod page;
-mod table;
+mod view;
 
 use std::time::Instant;
 
@@ -16,13 +15,15 @@ use tactomo_physics::forward::Slab;
 use tactomo_physics::hertz::Skin;
 use tactomo_physics::simulate::Noise;
 
+pub(crate) use self::claims::extent;
 pub use self::half::AtHalf;
+pub use self::view::view;
 use super::imaging::accuracy_of_the_middle;
 use super::limit::range;
 use super::metrics::Sweep;
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, FORCES_N, in_decades, nine_places};
 use super::reached::by_auto;
-use super::{Claim, Course, DesignError, Heading, Limit, Metrics, PaperSolver, Press, Progress, Reached};
+use super::{Claim, Course, DesignError, Limit, Metrics, PaperSolver, Press, Progress, Reached};
 
 /// Conductivities of top and bottom (S/m), section III.A.
 const RANGE_S_PER_M: [f64; 2] = [1e-3, 100.0];
@@ -181,33 +182,6 @@ impl Condition {
     }
 }
 
-impl super::Report for Report {
-    fn heading(&self) -> Heading {
-        Heading {
-            name: "materials",
-            title: "Which material",
-            lead_in: "What the conductivities of bottom and top do to a tomographic tactile sensor: the four metrics of the paper, two by their definition and two \
-         with its solver, and beside them what the sensor itself can tell, whatever the solver.",
-        }
-    }
-
-    fn course(&self) -> &Course {
-        &self.course
-    }
-
-    fn table(&self) -> String {
-        table::table(self)
-    }
-
-    fn csv(&self) -> String {
-        table::csv(self)
-    }
-
-    fn parts(&self) -> Vec<String> {
-        page::parts(self)
-    }
-}
-
 /// A number with three digits.
 fn short(value: f64) -> String {
     tactomo_physics::detector::short(value)
@@ -245,9 +219,8 @@ mod tests {
         let progress = Progress::new(&stop, &say);
         let report = run(&plan(5, false), progress).unwrap();
         assert!(report.course.is_stopped && (2..25).contains(&report.conditions.len()), "{}", report.conditions.len());
-        let page = crate::page(&[&report], "tactomo-lab study materials");
-        assert!(
-            page.contains("Stopped before the end") && crate::Report::table(&report).contains("stopped before the end")
-        );
+        let view = [view(&report)];
+        let [page, text] = [tactomo_study::view::page(&view, ""), tactomo_study::view::text(&view)];
+        assert!(page.contains("Stopped before the end") && text.contains("Stopped before the end"));
     }
 }

@@ -10,14 +10,14 @@ const FALSE_ONE: f64 = 0.05;
 type Figure = fn(&Sample) -> Option<f64>;
 
 /// A metric: what it is called, what was measured, and what of it is simulated with the paper's solver and of the sensor itself.
-pub(super) struct Metric {
-    pub claim: &'static str,
-    pub measured: Figure,
-    pub solver: Figure,
-    pub sensor: (&'static str, Figure),
+struct Metric {
+    claim: &'static str,
+    measured: Figure,
+    solver: Figure,
+    sensor: (&'static str, Figure),
 }
 
-pub(super) const METRICS: [Metric; 4] = [
+const METRICS: [Metric; 4] = [
     Metric {
         claim: "the simulation predicts the order of measured sensitivities",
         measured: |sample| Some(sample.measured.sensitivity_mv_per_n),

@@ -4,13 +4,10 @@
 //! 60 x 60 mm, each layer 5 mm; nine places; a ball of 5 mm pressed from 0 to 5 N and let go, on foam with hysteresis. The output is the value of the
 //! paper's image at its centroid, over a sheet of 1 S.
 
-mod card;
 mod choices;
 mod claims;
 mod measured;
-mod page;
-mod planes;
-mod table;
+mod view;
 
 use std::fmt::Display;
 use std::time::Instant;
@@ -25,11 +22,12 @@ use tactomo_physics::simulate::{Fault, Foam, Noise, measured as through_converte
 
 pub use self::choices::{Choice, Choices};
 pub use self::measured::Measured;
+pub use self::view::view;
 use super::curve::{Fit, fit};
 use super::imaging::{Images, Imaging, accuracy_of_the_middle};
 use super::press::{FORCES_N, MIDDLE, nine_places};
 use super::reached::by_auto;
-use super::{Claim, Course, DesignError, Heading, Limit, PaperSolver, Press, Progress, Reached};
+use super::{Claim, Course, DesignError, Limit, PaperSolver, Press, Progress, Reached};
 
 /// Forces on the way up, and as many on the way down: every 0.125 N.
 const STEPS: usize = 40;
@@ -179,33 +177,6 @@ fn normalised(profile: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     profile.into_iter().map(|[x_m, value]| [x_m, value / largest]).collect()
 }
 
-impl super::Report for Report {
-    fn heading(&self) -> Heading {
-        Heading {
-            name: "samples",
-            title: "The paper's samples",
-            lead_in: "Foams A to D and stacks of them under an indenter of 5 mm, simulated as the paper measured them, with its measured figures beside: does the \
-         simulation predict the experiment?",
-        }
-    }
-
-    fn course(&self) -> &Course {
-        &self.course
-    }
-
-    fn table(&self) -> String {
-        table::table(self)
-    }
-
-    fn csv(&self) -> String {
-        table::csv(self)
-    }
-
-    fn parts(&self) -> Vec<String> {
-        page::parts(self)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -231,8 +202,8 @@ mod tests {
         let report = run(&Plan { seed: 1 }, Progress::new(&stop, &|_| {})).unwrap();
         let below = report.samples.iter().filter(|one| one.measured.position_accuracy < report.accuracy_of_the_middle);
         assert_eq!(below.count(), 5);
-        let text = crate::Report::table(&report);
-        let page = crate::page(&[&report], "tactomo-lab study samples");
+        let view = [view(&report)];
+        let [text, page] = [tactomo_study::view::text(&view), tactomo_study::view::page(&view, "")];
         for part in ["34975, failed fit", "105.5, failed fit", "of 11 measured PA 5 are below", "of 8 tests (Holm)"] {
             assert!(text.contains(part) && page.contains(part), "{part}: {text}");
         }

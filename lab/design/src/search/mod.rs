@@ -3,17 +3,15 @@
 mod answer;
 mod find;
 mod foams;
-mod page;
 mod rating;
 mod space;
-mod table;
+mod view;
 mod wishes;
 
 pub use self::answer::{Answer, Choice, Compared, Plan, Unmet, answer};
 pub use self::find::{Found, find};
 pub use self::foams::{FoamsError, Material, WrongFoam};
-pub use self::page::page;
 pub use self::rating::{Rating, frames_per_s};
 pub use self::space::{Candidate, Space};
-pub use self::table::table;
+pub use self::view::view;
 pub use self::wishes::{Wish, Wishes, WrongWish};

@@ -221,12 +221,17 @@ impl Space {
             .rev()
             .map(|[foam, thickness]| {
                 let foam = &self.foams[*foam];
-                format!("{} {} mm", foam.name, crate::text::plain(foam.thicknesses_m[*thickness] * 1e3))
+                format!("{} {} mm", foam.name, plain(foam.thicknesses_m[*thickness] * 1e3))
             })
             .collect();
-        let diameter_mm = crate::text::plain(diameter_m * 1e3);
+        let diameter_mm = plain(diameter_m * 1e3);
         format!("{}; electrodes of {diameter_mm} mm: {}", layers.join(" on "), layout.name())
     }
+}
+
+/// A length or the like that was chosen, without digits that say nothing.
+pub(super) fn plain(value: f64) -> String {
+    tactomo_physics::detector::short((value * 1e3).round() / 1e3)
 }
 
 #[cfg(test)]

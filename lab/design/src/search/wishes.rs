@@ -69,7 +69,7 @@ impl Wish {
 
     /// A value of it with its unit.
     pub fn text(self, value: f64) -> String {
-        let three = |value: f64| crate::text::number(Some(value), 1.0);
+        let three = |value: f64| tactomo_study::view::PLAIN.text(Some(value));
         match self {
             // Below this it is the mesh between the layers that decides, which nothing here knows.
             Self::Smallest if value < 1e-3 => "under 0.001 N".to_owned(),

@@ -1,8 +1,7 @@
 //! The paper's study of thickness, its figure 4: how far a thick detector is from the thin shell that its solver takes it for; and where
 //! each solver starts to fail because of that.
 
-mod page;
-mod table;
+mod view;
 
 use std::time::Instant;
 
@@ -17,7 +16,9 @@ use tactomo_touch::solve::Method;
 use super::claim::{Basis, Trend, Verdict};
 use super::press::{COMPARED_S_PER_M, nine_places};
 use super::rank::mean;
-use super::{Claim, Course, DesignError, Heading, Press, Progress};
+use super::{Claim, Course, DesignError, Press, Progress};
+
+pub use self::view::view;
 
 /// Thicknesses (m), and conductivity (S/m), section III.B.
 const THICKNESSES_M: [f64; 5] = [1e-3, 2e-3, 4e-3, 8e-3, 16e-3];
@@ -249,32 +250,6 @@ impl Report {
     }
 }
 
-impl super::Report for Report {
-    fn heading(&self) -> Heading {
-        Heading {
-            name: "thickness",
-            title: "How thick",
-            lead_in: "How far a detector of 1, 2, 4, 8 or 16 mm is from the thin shell that the paper's solver takes it for, and which solvers fail because of it.",
-        }
-    }
-
-    fn course(&self) -> &Course {
-        &self.course
-    }
-
-    fn table(&self) -> String {
-        table::table(self)
-    }
-
-    fn csv(&self) -> String {
-        table::csv(self)
-    }
-
-    fn parts(&self) -> Vec<String> {
-        page::parts(self)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -300,9 +275,10 @@ mod tests {
             |row: &Row| row.normalised[0].iter().zip(&row.normalised[1]).map(|(a, b)| (a - b).abs()).sum::<f64>();
         assert!(apart(&rows[4]) > 5.0 * apart(&rows[0]));
         assert_eq!(report.fails_at_m("contacts", |row| row.on_slab_m), None);
-        let text = crate::page(&[&report], "tactomo-lab study thickness");
+        let view = [view(&report)];
+        let text = tactomo_study::view::text(&view);
         assert!(text.contains("contacts") && text.contains("16 mm"), "{text}");
-        assert_eq!(crate::Report::csv(&report).lines().count(), 6);
+        assert_eq!(tactomo_study::view::csv(&view).lines().count(), 6);
     }
 
     #[test]

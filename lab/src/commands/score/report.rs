@@ -1,6 +1,7 @@
 //! Errors of presses, and what they come to.
 
 use serde::Serialize;
+use tactomo_study::view::{TEXT, Table};
 use tactomo_touch::solve::{Press, Presses, Strength};
 
 use super::map::{Cell, Map, Missed};
@@ -87,7 +88,7 @@ impl Report {
     }
 
     /// Names and figures, for people.
-    pub fn rows(&self) -> Vec<(&'static str, String)> {
+    pub fn table(&self) -> Table {
         let mm = |metres: f64| format!("{:.2} mm", metres * 1e3);
         let mut rows = vec![
             ("presses", self.presses.to_string()),
@@ -103,11 +104,7 @@ impl Report {
             rows.push(("its median error", format!("{:.1} %", share * 100.0)));
         }
         rows.push(("time for a press", format!("{:.0} us", self.press_us)));
-        rows
-    }
-
-    /// The same as text.
-    pub fn text(&self) -> String {
-        self.rows().iter().map(|(name, value)| format!("{name:<32} {value}")).collect::<Vec<_>>().join("\n")
+        let table = Table::of("", rows).column("presses that were not taught", TEXT, |(name, _)| *name);
+        table.column("", TEXT, |(_, value)| value.clone()).into()
     }
 }

@@ -1,10 +1,9 @@
 //! Arguments that studies share.
 
-use std::path::PathBuf;
-
 use tactomo_study::Calibrate;
 use tactomo_touch::solve::Method;
 
+use super::super::shown::Shown;
 use tactomo_cli::choice;
 
 /// What a study tries, and where its page goes.
@@ -32,18 +31,11 @@ pub struct StudyArgs {
     /// Detectors as built are tried once more after a rub of so many presses at unknown places; 0 for none. Some seconds for each detector
     #[arg(long, value_name = "PRESSES", default_value_t = RUBBED, value_parser = clap::value_parser!(u16).range(0..=10_000))]
     calibrate: u16,
-    /// Writes a page with charts, which needs nothing else
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-    /// Replaces files that exist
-    #[arg(long, visible_alias = "force")]
-    pub overwrite: bool,
-    /// Prints all figures as JSON
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub shown: Shown,
 }
 
-/// Rubbed presses unless said otherwise: more of them did not better places (`study built --chart-frames`, the table in docs/calibrate.md), and
+/// Rubbed presses unless said otherwise: more of them did not better places (`study built --rub`, the table in docs/calibrate.md), and
 /// take longer.
 const RUBBED: u16 = 24;
 

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use tactomo_study::built::{self, Plan};
 use tactomo_touch::solve::Method;
 
+use super::super::shown::Shown;
 use tactomo_cli::choice::{self, DetectorArgs};
-use tactomo_cli::output::{self, NewFile, message};
+use tactomo_cli::output::{self, message};
 
 /// Tries solvers on detectors as built, of which they know the description only.
 ///
@@ -18,7 +19,6 @@ use tactomo_cli::output::{self, NewFile, message};
 ///   tactomo-lab study built --detectors 20 --presses 12
 ///   tactomo-lab study built --tolerances 0.1 --solver auto --json
 ///   tactomo-lab study built --rub 300 --known 3
-///   tactomo-lab study built --chart-frames --detectors 4 --solver contacts --out frames.html
 ///   tactomo-lab study built --rub 24 --solver contacts tests/reference/built/*.json.gz
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -46,24 +46,14 @@ pub struct Args {
     /// So many of them are at known places
     #[arg(long, value_name = "PRESSES", default_value_t = 0, requires = "rub", value_parser = clap::value_parser!(u32).range(0..=10_000))]
     known: u32,
-    /// Calibrates with 5, 20, 100 and 1000 presses in turn, at three noises of the converter, and compares
-    #[arg(long, conflicts_with_all = ["files", "rub", "known"])]
-    chart_frames: bool,
-    /// Writes a page with the charts of --chart-frames, which needs nothing else
-    #[arg(long, value_name = "FILE", requires = "chart_frames")]
-    out: Option<PathBuf>,
-    /// Replaces the file if it exists
-    #[arg(long, visible_alias = "force", requires = "out")]
-    overwrite: bool,
     /// First of the seeds of detectors, presses and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Detectors tried at a time; times are right with one only
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     threads: u8,
-    /// Prints all figures, and every press, as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    shown: Shown,
 }
 
 /// Runs the study.
@@ -85,18 +75,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         threads: usize::from(args.threads),
         seed: args.seed,
     };
-    if args.chart_frames {
-        return over_frames(args, &plan);
-    }
+    let files = args.shown.files()?;
     let report = built::run(&plan, &output::command_line(), &|step| message!("{step}"))?;
-    Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { built::table(&report) })?)
-}
-
-fn over_frames(args: &Args, plan: &Plan) -> anyhow::Result<()> {
-    let page = NewFile::optional(args.out.as_ref(), args.overwrite)?;
-    let report = built::over_frames(plan, &output::command_line(), &|step| message!("{step}"))?;
-    page.map(|page| page.write(built::page(&report))).transpose()?;
-    Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { built::frames_table(&report) })?)
+    args.shown.put_out(files, &report, &[built::view(&report)])
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -4,6 +4,7 @@ use tactomo_physics::detector::Chosen;
 use tactomo_study::contacts::{self, Plan};
 use tactomo_touch::solve::Method;
 
+use super::super::shown::Shown;
 use tactomo_cli::choice;
 use tactomo_cli::output::{self, message};
 
@@ -45,9 +46,8 @@ pub struct Args {
     /// Prints this many of the worst scenes, with what was found of each contact
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     worst: u16,
-    /// Prints all figures as JSON
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    shown: Shown,
 }
 
 /// Runs the study.
@@ -66,6 +66,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.seed,
         as_built: args.as_built,
     };
+    let files = args.shown.files()?;
     let report = contacts::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
-    Ok(output::print(&if args.json { serde_json::to_string(&report)? } else { contacts::table(&report) })?)
+    args.shown.put_out(files, &report, &[contacts::view(&report)])
 }

@@ -1,71 +1,180 @@
 //! `tactomo-lab study materials` and the other studies of detectors.
 
-use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use tactomo_design::{DesignError, Progress, Report, Step};
+use tactomo_design::{DesignError, Progress, Step, bonding, electrodes, materials, overview, samples, thickness};
+use tactomo_study::view::View;
+use tactomo_touch::solve::Method;
 
-use tactomo_cli::interrupt;
-use tactomo_cli::output::{self, NewFile, message};
+use super::super::shown::Shown;
+use tactomo_cli::output::message;
+use tactomo_cli::{choice, interrupt};
 
 /// Steps are told so often at most.
 const TOLD_EVERY: Duration = Duration::from_secs(1);
+/// Conductivities on a side of the paper's map.
+const SIDE: usize = 11;
 
-/// Where what is found goes.
-#[derive(Debug, clap::Args)]
-pub struct Output {
-    /// Writes a page with maps and charts, which needs nothing else
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Replaces files that exist
-    #[arg(long, visible_alias = "force")]
-    overwrite: bool,
-    /// Prints all figures as JSON
-    #[arg(long)]
-    json: bool,
+/// Studies of detectors.
+#[derive(Debug, clap::Subcommand)]
+pub enum Study {
+    /// Maps what the conductivities of a detector's bottom and top do: the paper's figures 2 and 3.
+    ///
+    /// A slab of 60 x 60 x 10 mm with 16 electrodes, conductivities from 0.001 to 100 S/m at the
+    /// bottom and at the top, and the paper's foams and stacks among them: sensitivity, maximum
+    /// force, spatial resolution and position accuracy with the paper's solver, and beside them the
+    /// limits of the sensor itself. Says of each of the paper's conclusions whether it holds.
+    ///
+    /// Examples:
+    ///   tactomo-lab study materials --out materials.html
+    ///   tactomo-lab study materials --side 101 --csv materials.csv
+    #[command(verbatim_doc_comment)]
+    Materials {
+        /// Conductivities on each side of the map: 11 are the paper's
+        #[arg(long, default_value_t = SIDE as u16, value_parser = clap::value_parser!(u16).range(2..=301))]
+        side: u16,
+        /// Has `auto` find presses on all of the map, not on the foams alone; takes some ten seconds more
+        #[arg(long)]
+        auto: bool,
+        #[command(flatten)]
+        args: Seeded,
+    },
+    /// Compares detectors of 1 to 16 mm with the thin shell that the paper's solver takes them for: its figure 4.
+    ///
+    /// Correlation of the readings, largest reading, mean absolute error; and of each solver the
+    /// error where it takes the detector for a shell, and where it inverts the slab.
+    ///
+    /// Examples:
+    ///   tactomo-lab study thickness --out thickness.html
+    ///   tactomo-lab study thickness --solver contacts --solver tikhonov --json
+    #[command(verbatim_doc_comment)]
+    Thickness {
+        /// Solver to try; give it again for more [default: all but auto, which makes of single contacts what `contacts` does]
+        #[arg(long, value_name = "NAME", value_parser = choice::method(), hide_possible_values = true)]
+        solver: Vec<Method>,
+        #[command(flatten)]
+        args: Seeded,
+    },
+    /// Simulates the paper's foams A to D and their stacks as it measured them, with its figures beside: tables I and II.
+    ///
+    /// Nine places, an indenter of 5 mm, 0 to 5 N up and down; curves of output over force with eq.
+    /// (6) fitted, line profiles, places seen at 2.25 N; and whether the simulation puts the
+    /// samples in the order that was measured.
+    ///
+    /// Examples:
+    ///   tactomo-lab study samples --out samples.html
+    ///   tactomo-lab study samples --json
+    #[command(verbatim_doc_comment)]
+    Samples(Seeded),
+    /// Joins two layers of sample B by 5 x 5 and 7 x 7 dots of conductive glue, from 1 mm to dots that touch: figure 7.
+    ///
+    /// Errors of places with the paper's solver and the limit of the sensor itself over the dots'
+    /// diameter, and the current through each dot.
+    ///
+    /// Examples:
+    ///   tactomo-lab study bonding --out bonding.html
+    ///   tactomo-lab study bonding --json
+    #[command(verbatim_doc_comment)]
+    Bonding(Shown),
+    /// Compares electrodes: 4 to 32 of them, grids, a ring around the edge, diameters and pitches.
+    ///
+    /// What the sensor itself can tell with them of places, two points and strengths, with one frame and in the
+    /// same time, and what `auto` reaches, on the paper's sample A of 60 x 60 x 5 mm.
+    ///
+    /// Examples:
+    ///   tactomo-lab study electrodes --out electrodes.html
+    ///   tactomo-lab study electrodes --csv electrodes.csv
+    #[command(verbatim_doc_comment)]
+    Electrodes(Seeded),
+    /// All studies of detectors, on one page: what of the paper holds, and what of it belongs to its solver.
+    ///
+    /// Examples:
+    ///   tactomo-lab study all --out detectors.html
+    ///   tactomo-lab study all --json
+    #[command(verbatim_doc_comment)]
+    All(Seeded),
 }
 
-/// Where the figures of one study go.
-#[derive(Debug, clap::Args)]
-pub struct OneOutput {
-    #[command(flatten)]
-    output: Output,
-    /// Writes all figures as comma-separated values, a row for each thing that was computed
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
-}
-
-/// What noise there is.
+/// What noise there is, and where what is found goes.
 #[derive(Debug, clap::Args)]
 pub struct Seeded {
     /// Seed of the noise: the same seed gives the same figures
     #[arg(long, default_value_t = 1)]
-    pub seed: u64,
+    seed: u64,
+    #[command(flatten)]
+    shown: Shown,
 }
 
-/// Runs one study on all cores, tells how far it is, and puts out what it found; Ctrl-C keeps what is done.
-pub fn one<R: Report + Serialize>(
-    args: &OneOutput,
-    run: impl FnOnce(Progress) -> Result<R, DesignError>,
-) -> anyhow::Result<()> {
-    let csv = NewFile::optional(args.csv.as_ref(), args.output.overwrite)?;
-    let page = NewFile::optional(args.output.out.as_ref(), args.output.overwrite)?;
-    let report = watched(run)?;
-    csv.map(|csv| csv.write(report.csv())).transpose()?;
-    put_out(&args.output, page, &[&report], &report)
+/// What all of them found, by their names.
+#[derive(Serialize)]
+struct All {
+    materials: materials::Report,
+    thickness: thickness::Report,
+    samples: samples::Report,
+    bonding: bonding::Report,
+    electrodes: electrodes::Report,
 }
 
-/// The same of several studies, on one page.
-pub fn several<R: Serialize>(
-    args: &Output,
+impl All {
+    fn run(seed: u64, progress: Progress) -> Result<Self, DesignError> {
+        Ok(Self {
+            materials: materials::run(&materials::Plan { side: SIDE, reached: false, seed }, progress)?,
+            thickness: thickness::run(&thickness::Plan { methods: thickness::methods(), seed }, progress)?,
+            samples: samples::run(&samples::Plan { seed }, progress)?,
+            bonding: bonding::run(progress)?,
+            electrodes: electrodes::run(&electrodes::Plan { seed }, progress)?,
+        })
+    }
+
+    fn views(&self) -> Vec<View> {
+        let mut views = vec![
+            materials::view(&self.materials),
+            thickness::view(&self.thickness),
+            samples::view(&self.samples),
+            bonding::view(&self.bonding),
+            electrodes::view(&self.electrodes),
+        ];
+        overview(&mut views);
+        views
+    }
+}
+
+/// Runs the study that was asked for.
+pub fn run(study: &Study) -> anyhow::Result<()> {
+    match study {
+        Study::Materials { side, auto, args: Seeded { seed, shown } } => {
+            let plan = materials::Plan { side: usize::from(*side), reached: *auto, seed: *seed };
+            found(shown, |progress| materials::run(&plan, progress), |report| vec![materials::view(report)])
+        }
+        Study::Thickness { solver, args: Seeded { seed, shown } } => {
+            let methods = if solver.is_empty() { thickness::methods() } else { solver.clone() };
+            let plan = thickness::Plan { methods, seed: *seed };
+            found(shown, |progress| thickness::run(&plan, progress), |report| vec![thickness::view(report)])
+        }
+        Study::Samples(Seeded { seed, shown }) => {
+            let plan = samples::Plan { seed: *seed };
+            found(shown, |progress| samples::run(&plan, progress), |report| vec![samples::view(report)])
+        }
+        Study::Bonding(shown) => found(shown, bonding::run, |report| vec![bonding::view(report)]),
+        Study::Electrodes(Seeded { seed, shown }) => {
+            let plan = electrodes::Plan { seed: *seed };
+            found(shown, |progress| electrodes::run(&plan, progress), |report| vec![electrodes::view(report)])
+        }
+        Study::All(Seeded { seed, shown }) => found(shown, |progress| All::run(*seed, progress), All::views),
+    }
+}
+
+/// Runs a study on all cores, tells how far it is, and puts out what it found; Ctrl-C keeps what is done.
+fn found<R: Serialize>(
+    shown: &Shown,
     run: impl FnOnce(Progress) -> Result<R, DesignError>,
-    reports: impl FnOnce(&R) -> Vec<&dyn Report>,
+    views: impl FnOnce(&R) -> Vec<View>,
 ) -> anyhow::Result<()> {
-    let page = NewFile::optional(args.out.as_ref(), args.overwrite)?;
-    let all = watched(run)?;
-    put_out(args, page, &reports(&all), &all)
+    let files = shown.files()?;
+    let found = watched(run)?;
+    shown.put_out(files, &found, &views(&found))
 }
 
 /// Runs something that tells how far it is, until Ctrl-C.
@@ -86,13 +195,4 @@ pub fn watched<R>(run: impl FnOnce(Progress) -> Result<R, DesignError>) -> anyho
         }
     };
     Ok(run(Progress::new(&stop, &say))?)
-}
-
-fn put_out(args: &Output, page: Option<NewFile>, reports: &[&dyn Report], json: &impl Serialize) -> anyhow::Result<()> {
-    page.map(|page| page.write(tactomo_design::page(reports, &output::command_line()))).transpose()?;
-    if let Some(path) = &args.out {
-        message!("page written to {}", path.display());
-    }
-    let text = || reports.iter().map(|report| report.table()).collect::<Vec<_>>().join("\n");
-    Ok(output::print(&if args.json { serde_json::to_string(json)? } else { text() })?)
 }

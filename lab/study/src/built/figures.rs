@@ -1,6 +1,7 @@
 //! What trials show together.
 
 use super::Trial;
+use crate::score::quantiles;
 use tactomo_touch::solve::Method;
 
 /// Figures of a solver.
@@ -72,17 +73,17 @@ impl Figures {
         let of_conductance = |[off, claimed]: &[f64; 2]| off / claimed;
         let conductances: Vec<_> =
             trials.iter().flat_map(|trial| trial.ln_conductances.iter().map(of_conductance)).collect();
-        let times_s: Vec<_> = trials.iter().map(|trial| trial.time_s).collect();
+        let claimed_m = trials.iter().flat_map(|trial| trial.claimed_m.iter().copied());
         Self {
             scenes: trials.len(),
             error_m: (!errors_m.is_empty()).then(|| errors_m.iter().sum::<f64>() / errors_m.len() as f64),
-            p95_m: quantile(&errors_m, 0.95),
+            p95_m: quantiles(errors_m.iter().copied(), [0.95]).map(|[p95_m]| p95_m),
             count_right: share(&|trial| trial.is_count_right),
             misfit: share(&|trial| trial.misfit),
             within: within(&sigmas),
             within_conductance: within(&conductances),
-            claimed_m: quantile(&trials.iter().flat_map(|trial| trial.claimed_m.clone()).collect::<Vec<_>>(), 0.5),
-            time_s: [0.5, 0.95].map(|share| quantile(&times_s, share).unwrap_or_default()),
+            claimed_m: quantiles(claimed_m, [0.5]).map(|[median_m]| median_m),
+            time_s: quantiles(trials.iter().map(|trial| trial.time_s), [0.5, 0.95]).unwrap_or_default(),
         }
     }
 }
@@ -91,10 +92,4 @@ impl Figures {
 fn within(sigmas: &[f64]) -> Option<[f64; 2]> {
     let within = |sigma: f64| sigmas.iter().filter(|off| off.abs() < sigma).count() as f64 / sigmas.len() as f64;
     (!sigmas.is_empty()).then(|| [within(1.0), within(2.0)])
-}
-
-fn quantile(values: &[f64], share: f64) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    sorted.get((share * sorted.len().saturating_sub(1) as f64).round() as usize).copied()
 }

@@ -4,14 +4,9 @@
 
 mod figures;
 mod file;
-mod frames;
-mod page;
-mod table;
+mod view;
 
-use std::panic::resume_unwind;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use super::calibrate::{Calibrated, Scene, read, rubbed};
 use super::experiment::{Experiment, StudyError};
@@ -20,13 +15,12 @@ use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, measured};
+use tactomo_physics::threads::map_on;
 use tactomo_touch::solve::{Method, Problem, Solution};
 
 pub use self::figures::{Figures, Row};
 pub use self::file::{BuiltFile, BuiltFileError};
-pub use self::frames::{Curve, OverFrames, Point, over_frames};
-pub use self::page::page;
-pub use self::table::{frames_table, table};
+pub use self::view::view;
 
 /// What is tried.
 #[derive(Clone, Debug)]
@@ -129,30 +123,19 @@ pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Resu
         [] => Some(Experiment::new(&plan.detector)?),
         _ => None,
     };
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut all = Vec::new();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= count {
-                return Ok(all);
-            }
-            let built = match &nominal {
-                Some(nominal) => from_tolerances(plan, nominal, index)?,
-                None => from_file(plan, index)?,
-            };
-            built.refused.iter().for_each(|why| progress(why));
-            progress(&format!("{}: {} scenes", built.name, built.scenes.len()));
-            let trials = try_all(plan, index, &built)?;
-            all.push(Tried { index, name: built.name, refused: built.refused, trials });
-        }
+    let one = |index: &usize| {
+        let built = match &nominal {
+            Some(nominal) => from_tolerances(plan, nominal, *index)?,
+            None => from_file(plan, *index)?,
+        };
+        built.refused.iter().for_each(|why| progress(why));
+        progress(&format!("{}: {} scenes", built.name, built.scenes.len()));
+        let trials = try_all(plan, *index, &built)?;
+        Ok(Tried { name: built.name, refused: built.refused, trials })
     };
-    let parts: Vec<Result<Vec<Tried>, BuiltError>> = thread::scope(|scope| {
-        let threads: Vec<_> = (0..plan.threads.max(1)).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
-    });
-    let mut parts: Vec<_> = parts.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-    parts.sort_by_key(|tried| tried.index);
+    let indices: Vec<usize> = (0..count).collect();
+    let parts: Vec<Tried> =
+        map_on(plan.threads.max(1), &indices, one).into_iter().collect::<Result<_, BuiltError>>()?;
     let detectors: Vec<_> = parts.iter().map(|tried| tried.name.clone()).collect();
     let refused = parts.iter().filter_map(|tried| tried.refused.clone()).collect();
     let trials: Vec<_> = parts.into_iter().flat_map(|tried| tried.trials).collect();
@@ -162,7 +145,6 @@ pub fn run(plan: &Plan, command: &str, progress: &(dyn Fn(&str) + Sync)) -> Resu
 
 /// A detector that was tried.
 struct Tried {
-    index: usize,
     name: String,
     refused: Option<String>,
     trials: Vec<Trial>,
@@ -279,7 +261,7 @@ mod tests {
         let run = |tolerances| {
             let report = run(&plan(Detector { tolerances, ..Detector::default() }), "", &|_| ()).unwrap();
             assert_eq!((report.detectors.len(), report.trials.len()), (2, 10));
-            assert!(table(&report).contains("contacts"));
+            assert!(crate::view::text(&[view(&report)]).contains("contacts"));
             report.rows.into_iter().find(|row| row.contacts == 1).unwrap().figures
         };
         let exact = run(Tolerances::EXACT);

@@ -3,7 +3,7 @@
 mod judge;
 mod rows;
 mod scenes;
-mod table;
+mod view;
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,7 +20,7 @@ use tactomo_touch::solve::{Method, SolveError, Solver};
 
 pub use self::judge::{Judged, Match, Place, TrueContact};
 pub use self::rows::{ContactFigures, Quantiles, Row, SceneFigures};
-pub use self::table::table;
+pub use self::view::view;
 
 /// Frames a scene has at least: the first is a cold start, and the time to follow is that of the third and those after it, as a solver that
 /// averages still frames searches their mean again when it has twice as many of them.

@@ -7,10 +7,9 @@
 
 mod budget;
 mod grounds;
-mod page;
 mod path;
-mod table;
 mod trial;
+mod view;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::Contact;
@@ -25,8 +24,7 @@ use self::path::Path;
 use self::trial::{Answer, Bench, Plan};
 
 pub use self::grounds::Choice;
-pub use self::page::{page, picture};
-pub use self::table::table;
+pub use self::view::view;
 
 /// Speeds of contacts (m/s): none, a finger that feels its way, and one that wipes.
 const SPEEDS_M_PER_S: [f64; 3] = [0.0, 0.05, 0.5];
@@ -257,6 +255,7 @@ fn bound_m(information: &RowInformation, answers: &[Answer], electrodes: usize) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::{page, picture, text};
 
     fn report(seed: u64) -> Report {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
@@ -279,12 +278,13 @@ mod tests {
         let still = at(&report, 0.0, Choice::Adaptive, 2);
         assert_eq!(still.arrived_m, still.middle_m);
         assert!(still.arrived_m < 2e-4 && still.bound_all_m.unwrap() < 0.5 * still.bound_rows_m, "{still:?}");
-        let (page, table) = (page(&report), table(&report));
+        let view = view(&report);
+        let (page, table) = (page(&[view.clone()], &report.command), text(&[view.clone()]));
         for part in ["adaptive", "in turn", "corners", "whole"] {
             assert!(page.contains(part) && table.contains(part), "{part}");
         }
         assert!(page.contains("tactomo &lt;tradeoff&gt; --scan") && !page.contains("NaN"));
-        assert_eq!(picture(&report).matches("<svg").count(), 3);
+        assert_eq!(picture(&view).matches("<svg").count(), 3);
         let json = serde_json::to_value(&report).unwrap();
         assert_eq!((&json["points"][1]["choice"], &json["points"][1]["rows"]), (&"adaptive".into(), &1.into()));
         assert!(json["points"][0]["bound_all_m"].is_f64());

@@ -25,8 +25,6 @@ pub struct Report {
     pub frames: usize,
     /// The sweeps.
     pub sweeps: Vec<SweepReport>,
-    /// How often each solver is how far off, over the points of all sweeps.
-    pub errors: Vec<ErrorCurve>,
     /// What noise allows, beside what solvers reach.
     pub bounds: BoundReport,
 }
@@ -85,15 +83,4 @@ pub struct ErrorRange {
     pub median_m: Option<f64>,
     /// The largest.
     pub largest_m: Option<f64>,
-}
-
-/// How often a solver's error is beyond a limit, over the points of all sweeps.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct ErrorCurve {
-    /// The solver.
-    pub solver: String,
-    /// How many points there are.
-    pub count: usize,
-    /// Error (m), and the share of the points at which that of the solver is larger, or at which it refuses.
-    pub points: Vec<[f64; 2]>,
 }

@@ -6,122 +6,53 @@ use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
 use tactomo_physics::detector::{Detector, Tolerances};
 
-/// A tolerance, from nothing to hopeless. Of the tolerances at hand all others are nothing.
-struct Kind {
-    title: &'static str,
-    note: &'static str,
-    values: &'static [f64],
-    label: fn(f64) -> String,
-    of: fn(f64) -> Tolerances,
-}
-
+/// Times a hobbyist's bench: from nothing to hopeless.
+const TIMES: [f64; 6] = [0.0, 0.1, 0.3, 1.0, 3.0, 10.0];
+/// The same of all at once, which are hopeless sooner.
+const ALL_TIMES: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 2.0];
 const EXACT: Tolerances = Tolerances::EXACT;
 
+/// A tolerance: what it is called, and a detector's tolerances with all others taken away.
+type Kind = (&'static str, fn(Tolerances) -> Tolerances);
+
 const KINDS: [Kind; 11] = [
-    Kind {
-        title: "All tolerances",
-        note: "Every tolerance at so many times that of a hobbyist's bench.",
-        values: &[0.0, 0.03, 0.1, 0.3, 1.0, 2.0],
-        label: times,
-        of: |factor| Tolerances::default().times(factor),
-    },
-    Kind {
-        title: "Tolerance of thickness",
-        note: "Standard deviation of its logarithm, at the same conductivity.",
-        values: &[0.0, 0.02, 0.05, 0.1, 0.2, 0.4],
-        label: percent,
-        of: |thickness_share| Tolerances { thickness_share, ..EXACT },
-    },
-    Kind {
-        title: "Tolerance of conductivity",
-        note: "Standard deviation of its logarithm.",
-        values: &[0.0, 0.05, 0.1, 0.2, 0.5, 1.0],
-        label: percent,
-        of: |conductivity_share| Tolerances { conductivity_share, ..EXACT },
-    },
-    Kind {
-        title: "Tolerance of top over bottom",
-        note: "Of the conductivities of both: a factor, by its standard deviation.",
-        values: &[1.0, 1.1, 1.3, 2.0, 4.0, 10.0],
-        label: times,
-        of: |top_over_bottom_factor| Tolerances { top_over_bottom_factor, ..EXACT },
-    },
-    Kind {
-        title: "Unevenness",
-        note: "Standard deviation of the logarithm of the conductivity from place to place, over a quarter of the shorter side.",
-        values: &[0.0, 0.01, 0.03, 0.06, 0.12, 0.25],
-        label: percent,
-        of: |uneven_share| Tolerances { uneven_share, ..EXACT },
-    },
-    Kind {
-        title: "Tolerance of electrodes' places",
-        note: "Standard deviation of their x and y.",
-        values: &[0.0, 5e-5, 1e-4, 3e-4, 1e-3, 3e-3],
-        label: |metres| format!("{} mm", metres * 1e3),
-        of: |electrodes_m| Tolerances { electrodes_m, ..EXACT },
-    },
-    Kind {
-        title: "Tolerance of pads' contact impedance",
-        note: "Of all pads alike: a factor, by its standard deviation.",
-        values: &[1.0, 1.5, 3.0, 10.0, 30.0, 100.0],
-        label: times,
-        of: |contact_impedance_factor| Tolerances { contact_impedance_factor, ..EXACT },
-    },
-    Kind {
-        title: "Spread of pads' contact impedance",
-        note: "Standard deviation of its logarithm from pad to pad.",
-        values: &[0.0, 0.1, 0.2, 0.3, 0.6, 1.0],
-        label: percent,
-        of: |contact_impedance_spread| Tolerances { contact_impedance_spread, ..EXACT },
-    },
-    Kind {
-        title: "Tolerance of channel gains",
-        note: "Standard deviation of their logarithm.",
-        values: &[0.0, 0.001, 0.003, 0.01, 0.03, 0.1],
-        label: |share| format!("{} %", (1e3 * share).round() / 10.0),
-        of: |gain_share| Tolerances { gain_share, ..EXACT },
-    },
-    Kind {
-        title: "Offsets of channels",
-        note: "Standard deviation, in codes. The baseline takes them away, but for those below zero, which no converter reads.",
-        values: &[0.0, 1.0, 2.0, 5.0, 20.0, 100.0],
-        label: |codes| format!("{codes} LSB"),
-        of: |offset_lsb| Tolerances { offset_lsb, ..EXACT },
-    },
-    Kind {
-        title: "Tolerance of the on-resistance",
-        note: "Standard deviation of its logarithm.",
-        values: &[0.0, 0.1, 0.25, 0.5, 0.7, 1.0],
-        label: percent,
-        of: |on_resistance_share| Tolerances { on_resistance_share, ..EXACT },
-    },
+    (ALL, |all| all),
+    ("Tolerance of thickness", |all| Tolerances { thickness_share: all.thickness_share, ..EXACT }),
+    ("Tolerance of conductivity", |all| Tolerances { conductivity_share: all.conductivity_share, ..EXACT }),
+    ("Tolerance of top over bottom", |all| Tolerances { top_over_bottom_factor: all.top_over_bottom_factor, ..EXACT }),
+    ("Unevenness", |all| Tolerances { uneven_share: all.uneven_share, ..EXACT }),
+    ("Tolerance of electrodes' places", |all| Tolerances { electrodes_m: all.electrodes_m, ..EXACT }),
+    ("Tolerance of pads' contact impedance", |all| Tolerances {
+        contact_impedance_factor: all.contact_impedance_factor,
+        ..EXACT
+    }),
+    ("Spread of pads' contact impedance", |all| Tolerances {
+        contact_impedance_spread: all.contact_impedance_spread,
+        ..EXACT
+    }),
+    ("Tolerance of channel gains", |all| Tolerances { gain_share: all.gain_share, ..EXACT }),
+    ("Offsets of channels", |all| Tolerances { offset_lsb: all.offset_lsb, ..EXACT }),
+    ("Tolerance of the on-resistance", |all| Tolerances { on_resistance_share: all.on_resistance_share, ..EXACT }),
 ];
-
-fn percent(share: f64) -> String {
-    format!("{:.0} %", 100.0 * share)
-}
-
-fn times(factor: f64) -> String {
-    format!("x {factor}")
-}
+const ALL: &str = "All tolerances";
 
 /// All of them: with what solvers know from the description, and after a calibration if there is one.
 pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
     let mut calibrated = CalibratedBench { bench, done: Vec::new() };
-    KINDS.iter().map(|kind| sweep(&mut calibrated, kind)).collect()
+    KINDS.into_iter().map(|kind| sweep(&mut calibrated, kind)).collect()
 }
 
-fn sweep(calibrated: &mut CalibratedBench, kind: &Kind) -> Result<Sweep, StudyError> {
+fn sweep(calibrated: &mut CalibratedBench, (title, only): Kind) -> Result<Sweep, StudyError> {
     let bench = calibrated.bench;
-    let mut note = format!("{} A firm contact, each place on another detector as built.", kind.note);
+    let mut note = "At so many times that of a hobbyist's bench, docs/detector.md. A firm contact, each place on another detector as built.".to_owned();
     let (mut points, mut refused) = (Vec::new(), 0);
-    for (index, value) in bench.some(kind.values).copied().enumerate() {
-        let (label, severity) = ((kind.label)(value), index as f64);
-        let tolerances = (kind.of)(value);
+    for (index, times) in bench.some(if title == ALL { &ALL_TIMES } else { &TIMES }).enumerate() {
+        let (label, severity) = (format!("x {times}"), index as f64);
+        let tolerances = only(Tolerances::default().times(*times));
         let built = as_built(bench, tolerances)?;
         let mut point = point(bench, label.clone(), severity, &built)?;
         if let Some(calibrate) = bench.plan.calibrate {
-            bench.tell(&format!("{}, {label}: calibrating {} detectors", kind.title, built.len()));
+            bench.tell(&format!("{title}, {label}: calibrating {} detectors", built.len()));
             let (known, more) = calibrated.known(calibrate, tolerances, &built)?;
             refused += more;
             point.calibrated = Some(Box::new(self::point(bench, label, severity, &known)?));
@@ -134,7 +65,7 @@ fn sweep(calibrated: &mut CalibratedBench, kind: &Kind) -> Result<Sweep, StudyEr
     if refused > 0 {
         note += &format!(" {refused} calibrations were refused; solvers know the description there.");
     }
-    Ok(Sweep { title: kind.title, note, points })
+    Ok(Sweep { title, note, points })
 }
 
 /// The detector as it was built at each place, within tolerances of which solvers know nothing.

@@ -3,9 +3,8 @@
 //! Times are processor times of one thread with nothing else of this program running. Memory is what is allocated beyond what was before, as a
 //! [`Heap`] counts it.
 
-mod page;
-mod table;
 mod trial;
+mod view;
 
 use std::time::Duration;
 
@@ -21,8 +20,7 @@ use tactomo_touch::solve::{Family, Method};
 
 use self::trial::{Trial, try_variation};
 
-pub use self::page::{page, picture};
-pub use self::table::table;
+pub use self::view::view;
 
 /// What is tried.
 #[derive(Clone, Debug)]
@@ -297,6 +295,7 @@ fn milliseconds(time: Duration) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::text;
 
     fn report() -> Report {
         let plan = Plan {
@@ -365,18 +364,17 @@ mod tests {
     }
 
     #[test]
-    fn page_and_table_show_every_solver_and_how_to_run_it_again() {
+    fn page_and_text_show_every_solver_and_how_to_run_it_again() {
         let report = report();
-        let (page, table) = (page(&report), table(&report));
-        for part in ["2 detectors as built", "calibrated without an error"] {
-            assert!(page.contains(part) && table.contains(part), "{part}");
-        }
-        assert_eq!(table.matches("  calibrated ").count(), 2, "{table}");
-        assert!(page.contains("by their description: tikhonov:") && page.contains("calibrated: tikhonov:"));
+        let view = view(&report);
+        let (page, text) = (crate::view::page(std::slice::from_ref(&view), &report.command), text(&[view.clone()]));
+        assert!(page.contains("2 detectors as built") && page.contains("calibrated without an error"));
+        assert_eq!(text.matches("- 2 detectors as built, ").count(), 2, "{text}");
+        assert!(page.contains(": by their description: error") && page.contains(": calibrated: error"), "{page}");
         for solver in ["tikhonov", "tikhonov-paper", "tikhonov lambda 0.1"] {
-            assert!(page.contains(solver) && table.contains(solver), "{solver}");
+            assert!(page.contains(solver) && text.contains(solver), "{solver}");
         }
         assert!(page.contains("tactomo &lt;tradeoff&gt;") && page.contains(&report.machine.version));
-        assert!(!page.contains("NaN") && picture(&report).contains("<svg"));
+        assert!(!page.contains("NaN") && crate::view::picture(&view).contains("<svg"));
     }
 }

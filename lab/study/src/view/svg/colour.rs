@@ -9,7 +9,7 @@ const HUE: [f64; 2] = [285.0, 100.0];
 const CHROMA: [f64; 2] = [0.125, 0.075];
 
 /// The colour of a share from 0 to 1, as `#rrggbb`.
-pub fn of_share(share: f64) -> String {
+pub(super) fn of_share(share: f64) -> String {
     let share = share.clamp(0.0, 1.0);
     let between = |[from, to]: [f64; 2]| from + (to - from) * share;
     let ends = (2.0 * share - 1.0).powi(2);

@@ -2,9 +2,11 @@
 
 use std::fmt::Write;
 
-use super::axis::Axis;
-use super::escaped;
+use super::super::figure::{Chart, Mark, Series};
+use super::super::html::escaped;
 use super::label::Labels;
+use super::scale::Scale;
+use super::{opened, tick};
 
 /// Room around the plot: left, top, right, bottom (px).
 const ROOM: [f64; 4] = [58.0, 44.0, 14.0, 42.0];
@@ -13,71 +15,29 @@ const ROOMY: f64 = 350.0;
 /// Marks nearer than this have one label (px).
 const ONE_SPOT: f64 = 14.0;
 
-/// Marks between two axes; with a front, further left and further down is better.
-#[derive(Clone, Debug)]
-pub struct Chart {
-    /// What it shows, in a few words.
-    pub title: String,
-    /// A line below the title.
-    pub subtitle: String,
-    /// To the right.
-    pub x: Axis,
-    /// Upwards.
-    pub y: Axis,
-    /// What is in it.
-    pub series: Vec<Series>,
-    /// Whether marks that no other beats in both directions are joined, and what is beaten steps back.
-    pub has_front: bool,
-    /// A value to the right that matters, and why.
-    pub guide: Option<(f64, &'static str)>,
-    /// A value upwards that matters, and why.
-    pub level: Option<(f64, &'static str)>,
-    /// Width and height (px).
-    pub size: [f64; 2],
+/// A chart with its axes found.
+pub(super) struct Drawing<'a> {
+    chart: &'a Chart,
+    x: Scale,
+    y: Scale,
 }
 
-/// Marks that belong together.
-#[derive(Clone, Debug)]
-pub struct Series {
-    /// Its label.
-    pub name: String,
-    /// Class that gives it its colour: one of the style sheet's.
-    pub class: &'static str,
-    /// Its marks, in order.
-    pub marks: Vec<Mark>,
-    /// The mark that has the label; others are small.
-    pub main: usize,
-    /// Whether its marks are joined.
-    pub is_joined: bool,
-}
+impl<'a> Drawing<'a> {
+    /// Of a chart.
+    pub fn of(chart: &'a Chart) -> Self {
+        let [x, y] = [0, 1].map(|axis: usize| Scale::of(&chart.axes[axis], chart.values(axis)));
+        Self { chart, x, y }
+    }
 
-/// A mark.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mark {
-    /// To the right.
-    pub x: f64,
-    /// Upwards.
-    pub y: f64,
-    /// Shown when the mouse is over it.
-    pub tooltip: String,
-}
-
-impl Chart {
-    /// The chart as SVG, for a page of this module.
+    /// The chart as SVG, for a page with the style sheet.
     pub fn svg(&self) -> String {
-        let [width, height] = self.size;
-        let mut svg = format!(
-            "<svg class=\"chart\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">\n\
-             <text class=\"title\" x=\"0\" y=\"15\">{}</text><text class=\"subtitle\" x=\"0\" y=\"32\">{}</text>\n",
-            escaped(&self.title),
-            escaped(&self.title),
-            escaped(&self.subtitle)
-        );
+        let Chart { title, subtitle, size, series, .. } = self.chart;
+        let mut svg = opened("chart", *size, title, subtitle);
         self.axes(&mut svg);
-        let front = if self.has_front { self.front() } else { Vec::new() };
+        let front = if self.chart.has_front { self.front() } else { Vec::new() };
         self.front_line(&front, &mut svg);
         // What leads is drawn last, over the others, but is labelled first; what has no name is behind all.
-        let mut order: Vec<_> = self.series.iter().filter(|series| !series.marks.is_empty()).collect();
+        let mut order: Vec<_> = series.iter().filter(|series| !series.marks.is_empty()).collect();
         order.sort_by_key(|series| (!series.name.is_empty(), self.leads(series, &front)));
         order.iter().for_each(|series| self.draw(series, &front, &mut svg));
         self.labels(order.iter().rev().copied(), &front, &mut svg);
@@ -85,7 +45,8 @@ impl Chart {
     }
 
     fn plot(&self) -> [f64; 4] {
-        [ROOM[0], ROOM[1], self.size[0] - ROOM[2], self.size[1] - ROOM[3]]
+        let [width, height] = self.chart.size;
+        [ROOM[0], ROOM[1], width - ROOM[2], height - ROOM[3]]
     }
 
     fn at(&self, x: f64, y: f64) -> [f64; 2] {
@@ -97,65 +58,38 @@ impl Chart {
         let [left, top, right, bottom] = self.plot();
         for (value, text) in self.y.ticks() {
             let [_, y] = self.at(self.x.range[0], value);
-            _ = writeln!(
-                svg,
-                "<path class=\"grid\" d=\"M{left} {y:.1}H{right}\"/><text class=\"tick\" x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-                left - 6.0,
-                y + 4.0,
-                escaped(&text)
-            );
+            _ = write!(svg, "<path class=\"grid\" d=\"M{left} {y:.1}H{right}\"/>");
+            *svg += &tick([left - 6.0, y + 4.0], "end", &text);
         }
         let mut free_from = f64::NEG_INFINITY;
         for (value, text) in self.x.ticks() {
             let [x, _] = self.at(value, self.y.range[0]);
             _ = write!(svg, "<path class=\"grid\" d=\"M{x:.1} {top}V{bottom}\"/>");
             if x > free_from {
-                let y = bottom + 16.0;
-                _ = writeln!(
-                    svg,
-                    "<text class=\"tick\" x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{}</text>",
-                    escaped(&text)
-                );
+                *svg += &tick([x, bottom + 16.0], "middle", &text);
                 free_from = x + 46.0;
             }
         }
-        _ = writeln!(
-            svg,
-            "<text class=\"tick\" x=\"{right}\" y=\"{}\" text-anchor=\"end\">{}</text>",
-            bottom + 33.0,
-            escaped(&self.x.title)
-        );
-        if let Some((value, why)) = self.guide.filter(|(value, _)| (self.x.range[0]..=self.x.range[1]).contains(value))
-        {
-            let [x, _] = self.at(value, self.y.range[0]);
-            _ = writeln!(
-                svg,
-                "<path class=\"guide\" d=\"M{x:.1} {top}V{bottom}\"/><text class=\"tick\" x=\"{:.1}\" y=\"{}\">{}</text>",
-                x + 5.0,
-                top + 10.0,
-                escaped(why)
-            );
+        *svg += &tick([right, bottom + 33.0], "end", &self.chart.axes[0].title);
+        if let Some((value, why)) = self.chart.guide.as_ref().filter(|(value, _)| self.x.has(*value)) {
+            let [x, _] = self.at(*value, self.y.range[0]);
+            _ = write!(svg, "<path class=\"guide\" d=\"M{x:.1} {top}V{bottom}\"/>");
+            *svg += &tick([x + 5.0, top + 10.0], "start", why);
         }
-        let has = |(value, _): &(f64, &str)| (self.y.range[0]..=self.y.range[1]).contains(value);
-        if let Some((value, why)) = self.level.filter(has) {
-            let [_, y] = self.at(self.x.range[0], value);
-            _ = writeln!(
-                svg,
-                "<path class=\"guide\" d=\"M{left} {y:.1}H{right}\"/><text class=\"tick\" x=\"{right}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-                y - 4.0,
-                escaped(why)
-            );
+        if let Some((value, why)) = self.chart.level.as_ref().filter(|(value, _)| self.y.has(*value)) {
+            let [_, y] = self.at(self.x.range[0], *value);
+            _ = write!(svg, "<path class=\"guide\" d=\"M{left} {y:.1}H{right}\"/>");
+            *svg += &tick([right, y - 4.0], "end", why);
         }
-        if self.has_front {
-            _ = writeln!(svg, "<text class=\"better\" x=\"{}\" y=\"{}\">↙ better</text>", left, bottom + 33.0);
+        if self.chart.has_front {
+            _ = writeln!(svg, "<text class=\"better\" x=\"{left}\" y=\"{}\">↙ better</text>", bottom + 33.0);
         }
     }
 
     /// Marks that no other beats, from the left: each is lower than all before it.
     fn front(&self) -> Vec<[f64; 2]> {
-        let marks = self.series.iter().flat_map(|series| &series.marks);
-        let mut all: Vec<_> =
-            marks.map(|mark| [mark.x, mark.y]).filter(|at| at.iter().all(|x| x.is_finite())).collect();
+        let marks = self.chart.series.iter().flat_map(|series| &series.marks);
+        let mut all: Vec<_> = marks.map(|mark| [mark.x, mark.y]).collect();
         all.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
         let mut lowest = f64::INFINITY;
         all.retain(|[_, y]| {
@@ -167,7 +101,7 @@ impl Chart {
     }
 
     fn leads(&self, series: &Series, front: &[[f64; 2]]) -> bool {
-        !self.has_front || series.marks.iter().any(|mark| front.contains(&[mark.x, mark.y]))
+        !self.chart.has_front || series.marks.iter().any(|mark| front.contains(&[mark.x, mark.y]))
     }
 
     fn front_line(&self, front: &[[f64; 2]], svg: &mut String) {
@@ -193,25 +127,33 @@ impl Chart {
             _ = writeln!(svg, "<polyline points=\"{}\"/>", points.join(" "));
         }
         // The main mark is drawn last, over the others.
-        let mut marks: Vec<_> = series.marks.iter().enumerate().collect();
-        marks.sort_by_key(|(index, _)| *index == series.main);
+        let mut marks: Vec<_> = series.marks.iter().enumerate().filter(|_| series.is_dotted).collect();
+        marks.sort_by_key(|(index, _)| Some(*index) == series.main);
         for (index, mark) in marks {
             let [x, y] = self.at(mark.x, mark.y);
-            let radius = if index == series.main { 5.0 } else { 2.5 };
+            let radius = if Some(index) == series.main { 5.0 } else { 2.5 };
             _ = writeln!(
                 svg,
                 "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}</title></circle>",
-                escaped(&mark.tooltip)
+                escaped(&self.tooltip(series, mark))
             );
         }
         *svg += "</g>\n";
     }
 
+    /// What a mark is, and what else there is to say.
+    fn tooltip(&self, series: &Series, mark: &Mark) -> String {
+        let [x, y] =
+            [(0, mark.x), (1, mark.y)].map(|(axis, value): (usize, f64)| self.chart.axes[axis].unit.text(value));
+        let parts = [&series.name, &format!("{x}, {y}"), &mark.note];
+        parts.into_iter().filter(|part| !part.is_empty()).map(String::as_str).collect::<Vec<_>>().join(": ")
+    }
+
     /// One label for marks of a class that lie on one spot.
-    fn labels<'a>(&self, series: impl Iterator<Item = &'a Series>, front: &[[f64; 2]], svg: &mut String) {
+    fn labels<'s>(&self, series: impl Iterator<Item = &'s Series>, front: &[[f64; 2]], svg: &mut String) {
         let mut spots: Vec<Spot> = Vec::new();
         for series in series {
-            let Some(mark) = series.marks.get(series.main) else { continue };
+            let Some(mark) = series.main.and_then(|main| series.marks.get(main)) else { continue };
             let (at, leads) = (self.at(mark.x, mark.y), self.leads(series, front));
             let near = |spot: &&mut Spot| spot.class == series.class && distance(spot.at, at) < ONE_SPOT;
             match spots.iter_mut().find(near) {
@@ -219,19 +161,19 @@ impl Chart {
                 None => spots.push(Spot { at, class: series.class, names: vec![series.name.clone()], leads }),
             }
         }
-        let small = self.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
+        let small = self.chart.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
         let mut labels = Labels::new(self.plot(), spots.iter().map(|spot| spot.at), small);
         let [_, top, right, _] = self.plot();
-        if let Some((value, why)) = self.guide {
-            let left = self.at(value, self.y.range[0])[0] + 5.0;
+        if let Some((value, why)) = &self.chart.guide {
+            let left = self.at(*value, self.y.range[0])[0] + 5.0;
             // Clear of the line itself too.
             labels.keep_clear([left - 8.0, left + Labels::width(why)], top + 10.0);
         }
-        if let Some((value, why)) = self.level {
-            labels.keep_clear([right - Labels::width(why), right], self.at(self.x.range[0], value)[1] - 4.0);
+        if let Some((value, why)) = &self.chart.level {
+            labels.keep_clear([right - Labels::width(why), right], self.at(self.x.range[0], *value)[1] - 4.0);
         }
         for spot in &spots {
-            let text = spot.text(if self.size[0] > ROOMY { usize::MAX } else { 1 });
+            let text = spot.text(if self.chart.size[0] > ROOMY { usize::MAX } else { 1 });
             let place = labels.place(spot.at, &text);
             if place.is_far {
                 let (to, y) = (place.left + 4.0, place.baseline - 4.0);
@@ -278,69 +220,56 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::axis::Unit;
+    use super::super::super::figure::{Axis, Unit};
     use super::*;
 
     fn chart(points: &[[f64; 2]]) -> Chart {
-        let axis = || Axis { title: "x".to_owned(), unit: Unit::Plain, range: [1.0, 100.0], is_linear: false };
-        let series = points.iter().map(|&[x, y]| Series {
-            name: format!("s{x}"),
-            class: "linear",
-            marks: vec![Mark { x, y, tooltip: "<&".to_owned() }],
-            main: 0,
-            is_joined: false,
-        });
-        Chart {
-            title: "t".to_owned(),
-            subtitle: String::new(),
-            x: axis(),
-            y: axis(),
-            series: series.collect(),
-            has_front: true,
-            guide: None,
-            level: None,
-            size: [400.0, 300.0],
-        }
+        let axis = || Axis::log("x", Unit::Plain).within([1.0, 100.0]);
+        let series = points.iter().map(|&[x, y]| Series::dots(format!("<&{x}"), "linear", [[x, y]]));
+        Chart { has_front: true, ..Chart::new("t", "", [axis(), axis()], series).sized([400.0, 300.0]) }
     }
 
     #[test]
     fn the_front_is_what_nothing_beats() {
         let chart =
             chart(&[[10.0, 10.0], [2.0, 50.0], [20.0, 20.0], [50.0, 2.0], [2.0, 60.0], [60.0, 2.0], [5.0, f64::NAN]]);
-        assert_eq!(chart.front(), [[2.0, 50.0], [10.0, 10.0], [50.0, 2.0]]);
+        assert_eq!(Drawing::of(&chart).front(), [[2.0, 50.0], [10.0, 10.0], [50.0, 2.0]]);
     }
 
     #[test]
     fn values_lie_where_their_logarithms_do() {
-        let [x, y] = chart(&[]).at(10.0, 10.0);
+        let chart = chart(&[]);
+        let [x, y] = Drawing::of(&chart).at(10.0, 10.0);
         assert!((x - (58.0 + 386.0) / 2.0).abs() < 1e-9 && (y - (44.0 + 258.0) / 2.0).abs() < 1e-9);
-        assert_eq!(chart(&[]).at(1e9, 0.0), [386.0, 258.0], "what is beyond an axis lies on its end");
+        assert_eq!(Drawing::of(&chart).at(1e9, 0.0), [386.0, 258.0], "what is beyond an axis lies on its end");
     }
 
     #[test]
     fn a_level_is_a_line_across_where_its_value_is() {
-        let with = |value| Chart { level: Some((value, "the <middle>")), ..chart(&[[10.0, 10.0]]) }.svg();
-        assert!(with(10.0).contains("M58 151.0H386") && with(10.0).contains("the &lt;middle&gt;"));
-        assert!(!with(1000.0).contains("the &lt;middle"), "a value beyond the axis has no line");
+        let with = |value| Chart { level: Some((value, "the <middle>".to_owned())), ..chart(&[[10.0, 10.0]]) };
+        let svg = |value| Drawing::of(&with(value)).svg();
+        assert!(svg(10.0).contains("M58 151.0H386") && svg(10.0).contains("the &lt;middle&gt;"));
+        assert!(!svg(1000.0).contains("the &lt;middle"), "a value beyond the axis has no line");
     }
 
     #[test]
     fn labels_keep_clear_of_what_the_lines_say() {
         let label = |chart: &Chart| {
-            let svg = chart.svg();
+            let svg = Drawing::of(chart).svg();
             let found = svg.lines().find(|line| line.contains("class=\"label")).map(str::to_owned);
             found.unwrap_or_default()
         };
         let mut one = chart(&[[10.0, 90.0]]);
         let free = label(&one);
-        one.guide = Some((9.0, "a line that matters"));
+        one.guide = Some((9.0, "a line that matters".to_owned()));
         assert_ne!(label(&one), free, "{free}");
     }
 
     #[test]
     fn what_is_beaten_steps_back_and_texts_are_harmless() {
-        let svg = chart(&[[10.0, 10.0], [20.0, 20.0]]).svg();
+        let chart = chart(&[[10.0, 10.0], [20.0, 20.0]]);
+        let svg = Drawing::of(&chart).svg();
         assert_eq!(svg.matches("<g class=\"linear behind\">").count(), 1);
-        assert!(svg.contains("&lt;&amp;") && svg.starts_with("<svg") && svg.ends_with("</svg>"));
+        assert!(svg.contains("&lt;&amp;10: 10, 10") && svg.starts_with("<svg") && svg.ends_with("</svg>"));
     }
 }

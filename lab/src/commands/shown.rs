@@ -1,0 +1,51 @@
+//! Where what a study finds goes: the same options for all.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use tactomo_cli::output::{self, NewFile, message};
+use tactomo_study::view::{self, View};
+
+/// Where what is found goes.
+#[derive(Debug, clap::Args)]
+pub struct Shown {
+    /// Writes a page with maps and charts, which needs nothing else; or, if the name ends in .json, what it shows as data
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Writes all figures as comma-separated values, a row for each thing that was computed
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Replaces files that exist
+    #[arg(long, visible_alias = "force")]
+    pub overwrite: bool,
+    /// Prints all figures as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Files that are to be written: none of them is replaced against one's will.
+pub struct Files {
+    out: Option<NewFile>,
+    csv: Option<NewFile>,
+}
+
+impl Shown {
+    /// The files, before anything is computed.
+    pub fn files(&self) -> anyhow::Result<Files> {
+        let file = |path: &Option<PathBuf>| NewFile::optional(path.as_ref(), self.overwrite);
+        Ok(Files { out: file(&self.out)?, csv: file(&self.csv)? })
+    }
+
+    /// Puts out what was found, and how it is shown.
+    pub fn put_out(&self, files: Files, found: &impl Serialize, views: &[View]) -> anyhow::Result<()> {
+        if let (Some(out), Some(path)) = (files.out, &self.out) {
+            out.write(match path.extension() {
+                Some(extension) if extension == "json" => serde_json::to_string(views)?,
+                _ => view::page(views, &output::command_line()),
+            })?;
+            message!("page written to {}", path.display());
+        }
+        files.csv.map(|csv| csv.write(view::csv(views))).transpose()?;
+        Ok(output::print(&if self.json { serde_json::to_string(found)? } else { view::text(views) })?)
+    }
+}

@@ -1,0 +1,111 @@
+//! What the report shows.
+
+use super::judge::TrueContact;
+use super::rows::{ContactFigures, Quantiles, Row, SceneFigures};
+use super::{Report, Trial};
+use crate::view::{Cell, Format, MM, PERCENT, PLAIN, Style, TEXT, Table, US, Value, View};
+use tactomo_touch::solve::FoundContact;
+
+const MILLISECONDS: Format = Format { factor: 1e-3, ..Format::new("ms", "us").digits(1) };
+
+/// A row for each class, then the worst scenes.
+pub fn view(report: &Report) -> View {
+    let of_scenes = |value: fn(&SceneFigures) -> f64| {
+        move |row: &&Row| match &row.scenes {
+            Some(scenes) => Value::Number(value(scenes)),
+            None => Value::Text(String::new()),
+        }
+    };
+    let of = |value: fn(&ContactFigures) -> Option<f64>| move |row: &&Row| value(&row.contacts);
+    let high = |pair: Option<Quantiles>| pair.map(|pair| pair.high);
+    let median = |pair: Option<Quantiles>| pair.map(|pair| pair.median);
+    let (whole, two) = (PLAIN.digits(0), PLAIN.digits(2));
+    let title = format!(
+        "{} on {}; {} scenes, seed {}{}, judged at frame {}",
+        report.solver,
+        report.detectors.join(", "),
+        report.scenes,
+        report.seed,
+        report.as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}")),
+        report.frames
+    );
+    let table = Table::of("", &report.rows)
+        .column("", TEXT, |row| row.class)
+        .column("scenes", whole, of_scenes(|scenes| scenes.scenes as f64))
+        .column("count", PERCENT, of_scenes(|scenes| scenes.count_right))
+        .column("right", PERCENT, of_scenes(|scenes| scenes.all_found))
+        .column("misfit", PERCENT, of_scenes(|scenes| scenes.misfit))
+        .column("cold", MILLISECONDS, of_scenes(|scenes| scenes.cold_us.median))
+        .column("p95", MILLISECONDS, of_scenes(|scenes| scenes.cold_us.high))
+        .column("next", US.digits(0), of_scenes(|scenes| scenes.next_us.median))
+        .column("p95", US.digits(0), of_scenes(|scenes| scenes.next_us.high))
+        .column("visible", whole, |row| row.contacts.visible)
+        .column("found", PERCENT, of(|contacts| contacts.found))
+        .column("error", MM.digits(3), move |row| median(row.contacts.error_m))
+        .column("p90", MM.digits(3), move |row| high(row.contacts.error_m))
+        .column("over bound", two, move |row| median(row.contacts.over_bound))
+        .column("p90", two, move |row| high(row.contacts.over_bound))
+        .column("xy, 1 s", PERCENT, of(|contacts| contacts.place_within.map(|[one, _]| one)))
+        .column("2 s", PERCENT, of(|contacts| contacts.place_within.map(|[_, two]| two)))
+        .column("ln C, 1 s", PERCENT, of(|contacts| contacts.conductance_within.map(|[one, _]| one)))
+        .column("2 s", PERCENT, of(|contacts| contacts.conductance_within.map(|[_, two]| two)))
+        .note(
+            "count: as many found as are there; right: all visible found and none invented; cold, next: time of the first frame and of later ones; visible: \
+             the bound on ln C is below 0.2; xy, ln C: within 1 and 2 claimed standard errors",
+        )
+        .data();
+    let view = View::new(title, "").with(table);
+    let view = match report.threads {
+        ..=1 => view,
+        threads => view
+            .text(format!("Times are too long: {threads} scenes were tried at a time, which share caches and cores.")),
+    };
+    report.worst.iter().fold(view, |view, trial| view.with(worst(trial)))
+}
+
+/// A scene with what was found of each contact, lengths in mm; contacts as `--contact` takes them.
+fn worst(trial: &Trial) -> Table {
+    let judged = &trial.judged;
+    let title = format!(
+        "scene {} on {}: {} there, {} visible, {} found, {} invented; residual {}{}",
+        trial.scene,
+        trial.detector,
+        judged.truth.len(),
+        judged.visible().count(),
+        judged.found.len(),
+        judged.invented.len(),
+        PLAIN.digits(2).text(judged.residual),
+        if judged.misfit { ", misfit" } else { "" }
+    );
+    let there = judged.truth.iter().map(|truth| (Some(truth), truth.found.map(|found| &judged.found[found.index])));
+    let invented = judged.invented.iter().map(|index| (None, Some(&judged.found[*index])));
+    type Pair<'a> = (Option<&'a TrueContact>, Option<&'a FoundContact>);
+    let of = |value: fn(&TrueContact) -> Option<f64>| {
+        move |(truth, _): &Pair| Cell { value: truth.and_then(value).into(), ..Cell::default() }
+    };
+    Table::of(title, there.chain(invented))
+        .column("there", TEXT, |(truth, _)| truth.map_or("nothing".to_owned(), of_truth))
+        .cells("bound", MM.digits(3), of(|truth| truth.bound.map(|bound| bound.position_m)))
+        .cells("ln C", PLAIN.digits(3), of(|truth| truth.bound.map(|bound| bound.conductance)))
+        .column("found", TEXT, |(_, found)| found.map_or("missed".to_owned(), of_found))
+        .cells("off", MM.digits(2), of(|truth| truth.found.map(|found| found.error_m)))
+        .cells("in bounds", PLAIN.digits(1), of(|truth| truth.found.and_then(|found| found.over_bound)))
+        .note(judged.choice.as_deref().unwrap_or_default())
+        .style(Style::Plain)
+        .into()
+}
+
+fn of_truth(truth: &TrueContact) -> String {
+    let contact = &truth.contact;
+    let [x, y, radius] = [contact.x_m, contact.y_m, contact.radius_m].map(|metres| 1e3 * metres);
+    format!("{x:.2},{y:.2},{radius:.2},{:.3e}", contact.conductance_s)
+}
+
+fn of_found(found: &FoundContact) -> String {
+    let radius = MM.digits(2).text(found.radius_m);
+    let text = format!("{:.2},{:.2},{radius},{:.3e}", 1e3 * found.x_m, 1e3 * found.y_m, found.conductance_s);
+    found.uncertainty.map_or(text.clone(), |errors| {
+        let relative = errors.conductance_s / found.conductance_s;
+        format!("{text} +- {:.3},{:.3}, ln C {relative:.3}", 1e3 * errors.x_m, 1e3 * errors.y_m)
+    })
+}
