@@ -3,6 +3,7 @@
 //! Frames are those of the firmware on the simulated pins; the watch and the solvers are those of live and `reconstruct`.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use nalgebra::DMatrix;
@@ -62,11 +63,13 @@ struct Bench {
     problem: Problem,
 }
 
-impl Bench {
-    fn new(detector: &Detector) -> Self {
-        Self { fine: finer_model(detector, &[], 1).unwrap(), problem: Problem::of(detector).unwrap() }
-    }
+/// The default detector, for all tests.
+static BENCH: LazyLock<Bench> = LazyLock::new(|| {
+    let detector = Detector::default();
+    Bench { fine: finer_model(&detector, &[], 1).unwrap(), problem: Problem::of(&detector).unwrap() }
+});
 
+impl Bench {
     /// Impedances under what touches at the start of a scene.
     fn touched_ohm(&self, scene: SceneName, seed: u64) -> DMatrix<f64> {
         let detector = self.fine.detector();
@@ -166,10 +169,10 @@ fn apart(one: &FoundContact, other: &FoundContact) -> f64 {
 
 /// `open:E` and `short:E,F` for each electrode `E` end with the answer of the healthy board.
 fn left_out_everywhere(model: BoardModel) {
-    let bench = Bench::new(&Detector::default());
-    let impedance_ohm = bench.touched_ohm(SceneName::Single, 1);
-    let healthy = bench.frames(model, &impedance_ohm, None);
-    let (expected, none) = answered(&healthy.0, &healthy.1);
+    let impedance_ohm = BENCH.touched_ohm(SceneName::Single, 1);
+    // Of all faults: what a board says of itself does not depend on them.
+    let (problem, healthy) = BENCH.frames(model, &impedance_ohm, None);
+    let (expected, none) = answered(&problem, &healthy);
     assert_eq!((expected.len(), none), (1, vec![]), "{model:?}");
     let cases = (0..16).flat_map(|e| {
         let other = (e + 1) % 16;
@@ -177,7 +180,7 @@ fn left_out_everywhere(model: BoardModel) {
     });
     let mut wrong = Vec::new();
     for (fault, kind) in cases {
-        let (problem, frames) = bench.frames(model, &impedance_ohm, Some(&fault));
+        let (_, frames) = BENCH.frames(model, &impedance_ohm, Some(&fault));
         let (found, faults) = answered(&problem, &frames);
         let is_as_healthy = found.len() == 1 && apart(&found[0], &expected[0]) < 3.0;
         if !is_as_healthy || faults != faults_of(&fault, kind) {
@@ -207,14 +210,13 @@ const EXCHANGED: [[usize; 2]; 5] = [[5, 6], [0, 1], [1, 9], [3, 12], [10, 14]];
 
 #[test]
 fn exchanged_wires_are_told_by_most_presses_on_every_board() {
-    let bench = Bench::new(&Detector::default());
     let faulty = FaultyElectrodes::default();
     for (index, [a, b]) in EXCHANGED.into_iter().enumerate() {
         let model = BoardModel::ALL[index % BoardModel::ALL.len()];
         let told: Vec<_> = (1..=3)
             .map(|seed| {
-                let impedance_ohm = bench.touched_ohm(SceneName::Single, seed);
-                let (problem, frames) = bench.frames(model, &impedance_ohm, Some(&format!("swap:{a},{b}")));
+                let impedance_ohm = BENCH.touched_ohm(SceneName::Single, seed);
+                let (problem, frames) = BENCH.frames(model, &impedance_ohm, Some(&format!("swap:{a},{b}")));
                 Look::Exchanged.run(&problem, &faulty, &frames[FRAMES - 1])
             })
             .collect();
@@ -226,14 +228,13 @@ fn exchanged_wires_are_told_by_most_presses_on_every_board() {
 /// Counted in the board's time and in answers, one a frame as `live` has them: it is when the guard looks that is tested, not this machine.
 #[test]
 fn exchanged_wires_are_named_within_two_seconds_of_presses() {
-    let bench = Bench::new(&Detector::default());
-    let impedances_ohm: Vec<_> = (1..=4).map(|seed| bench.touched_ohm(SceneName::Single, seed)).collect();
+    let impedances_ohm: Vec<_> = (1..=4).map(|seed| BENCH.touched_ohm(SceneName::Single, seed)).collect();
     for (index, [a, b]) in EXCHANGED.into_iter().chain([[4, 11], [7, 8]]).enumerate() {
         let model = BoardModel::ALL[index % BoardModel::ALL.len()];
-        let wires = bench.wires(Some(&format!("swap:{a},{b}")));
+        let wires = BENCH.wires(Some(&format!("swap:{a},{b}")));
         let pressing = Pressing { impedances_ohm: impedances_ohm.clone(), wires };
         let is_enough = |frames: &[(f64, Readings)]| frames.last().is_some_and(|(time_s, _)| *time_s > NAMED_WITHIN_S);
-        let (problem, frames) = bench.recorded(model, Box::new(pressing), is_enough);
+        let (problem, frames) = BENCH.recorded(model, Box::new(pressing), is_enough);
         let mut guard = FaultTolerant::new(Method::Auto, &problem).unwrap();
         let named = frames.iter().enumerate().find_map(|(answer, (time_s, readings))| {
             guard.solve(readings).unwrap();
@@ -246,10 +247,9 @@ fn exchanged_wires_are_named_within_two_seconds_of_presses() {
 
 #[test]
 fn a_wide_press_is_a_contact_and_a_ring_a_ring() {
-    let bench = Bench::new(&Detector::default());
     for seed in 1..=3 {
         for (scene, is_ring) in [(SceneName::Wide, false), (SceneName::Ring, true)] {
-            let (problem, frames) = bench.frames(BoardModel::Esp32, &bench.touched_ohm(scene, seed), None);
+            let (problem, frames) = BENCH.frames(BoardModel::Esp32, &BENCH.touched_ohm(scene, seed), None);
             let mut solver = Method::Auto.build(&problem).unwrap();
             let shapes = frames.iter().map(|frame| solver.solve(frame).unwrap().shape);
             let shapes: Vec<_> = shapes.collect();

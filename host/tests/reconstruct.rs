@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-use std::path::{Path, PathBuf};
-
 use serde_json::Value;
 use tactomo::board::identity::identity;
 use tactomo::board::record::{Header, RecordWriter};
@@ -11,49 +9,25 @@ use tactomo::detector::{Calibration, Detector, Tolerances};
 use tactomo::schema::{CONTACT_COLUMNS, Kind, csv_heads};
 use tactomo::table::{NpzWriter, Table};
 use tactomo_protocol::{BoardMessage, FrameHead, Hello, MAX_WIRE, encode_board, encode_frame};
-use tactomo_tests::{TACTOMO, csv};
+use tactomo_tests::{Folder, TACTOMO, csv};
 
 const PLACE_MM: [f64; 2] = [9.0, -6.0];
 
-/// A file that goes when the test ends.
-struct Temporary(PathBuf);
-
-impl Temporary {
-    fn new(name: &str) -> Self {
-        Self(std::env::temp_dir().join(format!("tactomo-{}-{name}", std::process::id())))
-    }
-
-    fn with(name: &str, bytes: impl AsRef<[u8]>) -> Self {
-        let file = Self::new(name);
-        std::fs::write(&file.0, bytes).unwrap();
-        file
-    }
-
-    fn name(&self) -> &str {
-        self.0.to_str().unwrap()
-    }
-}
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        let _gone = std::fs::remove_file(&self.0);
-    }
-}
-
-/// Readings of a light contact (V), row by row.
-fn readings() -> Vec<f64> {
-    let contact = format!("{},{},2,2e-4", PLACE_MM[0], PLACE_MM[1]);
-    let output = TACTOMO.run(&["forward", "--contact", &contact, "--json"]);
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+/// Readings that `forward` has (V), row by row.
+fn forward(args: &[&str]) -> Vec<f64> {
+    let report = TACTOMO.json(&[&["forward", "--json"], args].concat());
     let rows = report["readings_v"].as_array().unwrap();
     rows.iter().flat_map(|row| row.as_array().unwrap()).map(|volts| volts.as_f64().unwrap()).collect()
 }
 
+/// Readings of a light contact (V), row by row.
+fn readings() -> Vec<f64> {
+    forward(&["--contact", &format!("{},{},2,2e-4", PLACE_MM[0], PLACE_MM[1])])
+}
+
 /// The objects that the command prints.
 fn lines(args: &[&str]) -> Vec<Value> {
-    let output = TACTOMO.run(&[&["reconstruct"], args, &["--json"]].concat());
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    TACTOMO.lines(&[&["reconstruct"], args, &["--json"]].concat())
 }
 
 fn assert_found(line: &Value) {
@@ -64,16 +38,17 @@ fn assert_found(line: &Value) {
 
 #[test]
 fn tables_of_every_kind_give_the_same_contacts() {
+    let folder = Folder::new("tables-of-every-kind-give-the-same-contacts");
     let (readings, nothing) = (readings(), vec![0.0; 256]);
     let frames = [nothing, readings];
-    let text = Temporary::with("frames.csv", csv(&frames));
-    let archive = Temporary::new("frames.npz");
-    let mut writer = NpzWriter::new(std::fs::File::create(&archive.0).unwrap());
+    let text = folder.with("frames.csv", csv(&frames));
+    let archive = folder.path("frames.npz");
+    let mut writer = NpzWriter::new(std::fs::File::create(&archive).unwrap());
     writer.add("other", &[1], &[1.0]).unwrap();
     writer.add("readings_v", &[2, 16, 16], &frames.concat()).unwrap();
     writer.finish().unwrap();
     let [from_text, from_archive] =
-        [&text, &archive].map(|file| lines(&[file.name(), "--solver", "tikhonov", "--lambda", "gcv"]));
+        [&text, &archive].map(|file| lines(&[&file, "--solver", "tikhonov", "--lambda", "gcv"]));
     assert_eq!(from_text.len(), 2);
     assert_eq!(from_text[0]["contacts"], Value::Array(Vec::new()));
     assert_found(&from_text[1]);
@@ -86,31 +61,25 @@ fn tables_of_every_kind_give_the_same_contacts() {
 
 #[test]
 fn frames_at_rest_are_subtracted() {
+    let folder = Folder::new("frames-at-rest-are-subtracted");
     let offset = |volts: &f64| volts + 0.05;
     let pressed: Vec<f64> = readings().iter().map(offset).collect();
-    let file = Temporary::with("rest.csv", csv(&[vec![0.05; 256], vec![0.05; 256], pressed]));
-    let found = lines(&[file.name(), "--rest", "2"]);
+    let file = folder.with("rest.csv", csv(&[vec![0.05; 256], vec![0.05; 256], pressed]));
+    let found = lines(&[&file, "--rest", "2"]);
     assert_eq!((found.len(), found[0]["frame"].as_u64()), (1, Some(2)));
     assert_found(&found[0]);
 }
 
-/// Readings that `forward` has (V), row by row.
-fn forward(args: &[&str]) -> Vec<f64> {
-    let output = TACTOMO.run(&[&["forward", "--json"], args].concat());
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let rows = report["readings_v"].as_array().unwrap();
-    rows.iter().flat_map(|row| row.as_array().unwrap()).map(|volts| volts.as_f64().unwrap()).collect()
-}
-
 #[test]
 fn leakage_in_a_table_is_taken_off_under_load_as_live_takes_it_off() {
+    let folder = Folder::new("leakage-in-a-table-is-taken-off-under-load-as-live-takes-it-off");
     let (rest, pressed) =
         (forward(&["--fault", "leak:0.01"]), forward(&["--fault", "leak:0.01", "--contact", "9,-6,3,1e-3"]));
-    let file = Temporary::with("leak.csv", csv(&[vec![rest; 40], vec![pressed]].concat()));
-    let detector = Temporary::with("exact.toml", Detector::default().taken_as_exact().to_toml());
-    let solver = ["--solver", "contacts", "--detector", detector.name()];
+    let file = folder.with("leak.csv", csv(&[vec![rest; 40], vec![pressed]].concat()));
+    let detector = folder.with("exact.toml", Detector::default().taken_as_exact().to_toml());
+    let solver = ["--solver", "contacts", "--detector", &detector];
     for rest in [&["--rest", "40"][..], &[]] {
-        let found = lines(&[&[file.name()], &solver[..], rest].concat());
+        let found = lines(&[&[file.as_str()], &solver[..], rest].concat());
         let contacts = &found.last().unwrap()["contacts"];
         let ratio = contacts[0]["conductance_s"].as_f64().unwrap() / 1e-3;
         assert!((0.9..1.1).contains(&ratio) && contacts.as_array().unwrap().len() == 1, "{rest:?}: {contacts}");
@@ -121,13 +90,14 @@ fn leakage_in_a_table_is_taken_off_under_load_as_live_takes_it_off() {
 
 #[test]
 fn a_driving_sheet_that_nobody_described_is_in_the_standard_error_of_conductances() {
+    let folder = Folder::new("a-driving-sheet-that-nobody-described-is-in-the-standard-error-of-conductances");
     // Of a detector that is known but for its driving layer.
     let tolerances = Tolerances { driving_sheet_ohm: 100.0, ..Tolerances::EXACT };
-    let detector = Temporary::with("driven.toml", Detector { tolerances, ..Detector::default() }.to_toml());
+    let detector = folder.with("driven.toml", Detector { tolerances, ..Detector::default() }.to_toml());
     for (contact, conductance_s) in [("9,-6,3,3e-4", 3e-4), ("-14,11,3,1.5e-3", 1.5e-3), ("0,0,3,5e-3", 5e-3)] {
         let readings = forward(&["--fault", "driving-sheet:100", "--contact", contact]);
-        let file = Temporary::with("sheet.csv", csv(&[readings]));
-        let found = lines(&[file.name(), "--solver", "contacts", "--detector", detector.name()]);
+        let file = folder.with("sheet.csv", csv(&[readings]));
+        let found = lines(&[&file, "--solver", "contacts", "--detector", &detector]);
         let contacts = &found[0]["contacts"];
         let of = |name: &str| contacts[0][name].as_f64().unwrap();
         let off = (of("conductance_s") / conductance_s).ln() / (of("sigma_conductance_s") / of("conductance_s"));
@@ -137,28 +107,30 @@ fn a_driving_sheet_that_nobody_described_is_in_the_standard_error_of_conductance
 
 #[test]
 fn gains_that_the_detectors_file_tells_are_taken_off_the_readings() {
+    let folder = Folder::new("gains-that-the-detectors-file-tells-are-taken-off-the-readings");
     let mut detector = Detector::default();
     detector.electrodes.iter_mut().enumerate().for_each(|(e, pad)| pad.gain = [1.0, 1.05, 0.96][e % 3]);
-    let file = Temporary::with("gains.toml", detector.to_toml());
+    let file = folder.with("gains.toml", detector.to_toml());
     let amplified = readings().iter().enumerate().map(|(k, volts)| volts * detector.electrodes[k % 16].gain).collect();
-    let table = Temporary::with("gains.csv", csv(&[amplified]));
-    let found = |args: &[&str]| lines(&[&[table.name(), "--solver", "contacts"], args].concat()).remove(0);
+    let table = folder.with("gains.csv", csv(&[amplified]));
+    let found = |args: &[&str]| lines(&[&[&table, "--solver", "contacts"], args].concat()).remove(0);
     let error_m = |line: &Value| {
         let [x_m, y_m] = ["x_m", "y_m"].map(|name| line["contacts"][0][name].as_f64().unwrap());
         (x_m - 1e-3 * PLACE_MM[0]).hypot(y_m - 1e-3 * PLACE_MM[1])
     };
-    let [told, untold] = [&["--detector", file.name()][..], &[]].map(|args| error_m(&found(args)));
+    let [told, untold] = [&["--detector", &file][..], &[]].map(|args| error_m(&found(args)));
     assert!(told < 2e-4 && untold > 5.0 * told, "{told} {untold}");
 }
 
 #[test]
 fn a_recording_on_another_board_than_the_calibrated_one_is_reported() {
+    let folder = Folder::new("a-recording-on-another-board-than-the-calibrated-one-is-reported");
     let warning = |board: String| {
         let calibration = Calibration { board: Some(board), ..Calibration::default() };
         let detector = Detector { calibration: Some(calibration), ..Detector::default() };
-        let file = Temporary::with("calibrated.toml", detector.to_toml());
-        let recording = recording_of("calibrated.tactomo", 0..40);
-        let output = TACTOMO.run(&["reconstruct", recording.name(), "--detector", file.name(), "--json"]);
+        let file = folder.with("calibrated.toml", detector.to_toml());
+        let recording = recording_of(&folder, "calibrated.tactomo", 0..40);
+        let output = TACTOMO.run(&["reconstruct", &recording, "--detector", &file, "--json"]);
         assert_eq!(output.status.code(), Some(0));
         String::from_utf8(output.stderr).unwrap().contains("calibrated on another board")
     };
@@ -168,19 +140,19 @@ fn a_recording_on_another_board_than_the_calibrated_one_is_reported() {
 
 #[test]
 fn what_is_found_goes_into_files() {
-    let file = Temporary::with("in.csv", csv(&[vec![0.0; 256], readings()]));
-    let [table, archive] = ["out.csv", "out.npz"].map(Temporary::new);
+    let folder = Folder::new("what-is-found-goes-into-files");
+    let file = folder.with("in.csv", csv(&[vec![0.0; 256], readings()]));
+    let [table, archive] = ["out.csv", "out.npz"].map(|name| folder.path(name));
     for out in [&table, &archive] {
-        let output =
-            TACTOMO.run(&["reconstruct", file.name(), "--solver", "tikhonov", "--images", "--out", out.name()]);
+        let output = TACTOMO.run(&["reconstruct", &file, "--solver", "tikhonov", "--images", "--out", &out]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(output.stdout.is_empty());
         assert!(String::from_utf8_lossy(&output.stderr).contains("tikhonov: 2 frames, median"));
     }
-    let text = std::fs::read_to_string(&table.0).unwrap();
+    let text = std::fs::read_to_string(&table).unwrap();
     let columns: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
     assert_eq!(columns, [csv_heads().len(); 3], "{text}");
-    let Table::Arrays(arrays) = Table::read(&archive.0).unwrap() else { panic!("no arrays") };
+    let Table::Arrays(arrays) = Table::read(archive.as_ref()).unwrap() else { panic!("no arrays") };
     let array = |name: &str| arrays.iter().find(|(array, _)| array == name).unwrap().1.clone();
     assert_eq!(array("frame").values, [0.0, 1.0]);
     assert_eq!(array("contact_frame").values, [1.0]);
@@ -188,8 +160,8 @@ fn what_is_found_goes_into_files() {
 }
 
 /// A CSV file as rows of cells by the names of their columns.
-fn cells(file: &Temporary) -> Vec<Vec<(String, String)>> {
-    let text = std::fs::read_to_string(&file.0).unwrap();
+fn cells(file: &str) -> Vec<Vec<(String, String)>> {
+    let text = std::fs::read_to_string(file).unwrap();
     let split = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
     let mut lines = text.lines().map(split);
     let heads = lines.next().unwrap();
@@ -198,16 +170,17 @@ fn cells(file: &Temporary) -> Vec<Vec<(String, String)>> {
 
 #[test]
 fn json_csv_and_npz_have_every_figure_of_a_contact_and_agree() {
-    let file = Temporary::with("figures.csv", csv(&vec![readings(); 3]));
-    let [table, archive] = ["figures-out.csv", "figures-out.npz"].map(Temporary::new);
+    let folder = Folder::new("json-csv-and-npz-have-every-figure-of-a-contact-and-agree");
+    let file = folder.with("figures.csv", csv(&vec![readings(); 3]));
+    let [table, archive] = ["figures-out.csv", "figures-out.npz"].map(|name| folder.path(name));
     let arguments = ["--solver", "contacts"];
-    let found = lines(&[&[file.name()], &arguments[..]].concat());
+    let found = lines(&[&[file.as_str()], &arguments[..]].concat());
     for out in [&table, &archive] {
-        let arguments = [&["reconstruct", file.name()], &arguments[..], &["--out", out.name()]].concat();
+        let arguments = [&["reconstruct", &file], &arguments[..], &["--out", &out]].concat();
         assert_eq!(TACTOMO.run(&arguments).status.code(), Some(0));
     }
     let rows = cells(&table);
-    let Table::Arrays(arrays) = Table::read(&archive.0).unwrap() else { panic!("no arrays") };
+    let Table::Arrays(arrays) = Table::read(archive.as_ref()).unwrap() else { panic!("no arrays") };
     assert_eq!((found.len(), rows.len()), (3, 3));
     // JSON is read to the last digit but one.
     let near = |one: f64, other: f64| (one - other).abs() <= 1e-12 * other.abs();
@@ -242,44 +215,46 @@ fn json_csv_and_npz_have_every_figure_of_a_contact_and_agree() {
 
 #[test]
 fn files_are_replaced_only_with_force_and_never_the_one_that_is_read() {
-    let file = Temporary::with("force-in.csv", csv(&[readings()]));
-    let out = Temporary::with("force-out.csv", "precious");
-    let run = |more: &[&str]| TACTOMO.run(&[&["reconstruct", file.name(), "--out"], more].concat());
-    let refused = run(&[out.name()]);
+    let folder = Folder::new("files-are-replaced-only-with-force-and-never-the-one-that-is-read");
+    let file = folder.with("force-in.csv", csv(&[readings()]));
+    let out = folder.with("force-out.csv", "precious");
+    let run = |more: &[&str]| TACTOMO.run(&[&["reconstruct", &file, "--out"], more].concat());
+    let refused = run(&[&out]);
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("exists already: give another name, or --overwrite"));
-    assert_eq!(std::fs::read_to_string(&out.0).unwrap(), "precious");
-    let input = std::fs::read(&file.0).unwrap();
-    let itself = run(&[file.name(), "--force"]);
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), "precious");
+    let input = std::fs::read(&file).unwrap();
+    let itself = run(&[&file, "--force"]);
     assert!(String::from_utf8_lossy(&itself.stderr).contains("is the file that is read"));
-    assert_eq!(std::fs::read(&file.0).unwrap(), input);
-    assert_eq!(run(&[out.name(), "--overwrite"]).status.code(), Some(0));
-    assert!(std::fs::read_to_string(&out.0).unwrap().starts_with("frame,"));
+    assert_eq!(std::fs::read(&file).unwrap(), input);
+    assert_eq!(run(&[&out, "--overwrite"]).status.code(), Some(0));
+    assert!(std::fs::read_to_string(&out).unwrap().starts_with("frame,"));
     // What breaks in the middle leaves the file that was there.
-    let nan = Temporary::with("force-nan.csv", csv(&[readings(), vec![f64::NAN; 256]]));
-    let before = std::fs::read(&out.0).unwrap();
-    let broken = TACTOMO.run(&["reconstruct", nan.name(), "--out", out.name(), "--force"]);
+    let nan = folder.with("force-nan.csv", csv(&[readings(), vec![f64::NAN; 256]]));
+    let before = std::fs::read(&out).unwrap();
+    let broken = TACTOMO.run(&["reconstruct", &nan, "--out", &out, "--force"]);
     assert_eq!(broken.status.code(), Some(1));
-    assert_eq!(std::fs::read(&out.0).unwrap(), before);
+    assert_eq!(std::fs::read(&out).unwrap(), before);
 }
 
 #[test]
 fn millivolts_are_refused_as_volts_and_read_as_what_they_are() {
+    let folder = Folder::new("millivolts-are-refused-as-volts-and-read-as-what-they-are");
     let millivolts: Vec<f64> = readings().iter().map(|volts| volts * 1e3).collect();
-    let file = Temporary::with("millivolts.csv", csv(&[vec![0.0; 256], millivolts]));
-    let refused = TACTOMO.run(&["reconstruct", file.name(), "--json"]);
+    let file = folder.with("millivolts.csv", csv(&[vec![0.0; 256], millivolts]));
+    let refused = TACTOMO.run(&["reconstruct", &file, "--json"]);
     let message = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1));
     assert!(message.contains("are these millivolts? Give --unit mV"), "{message}");
     assert!(refused.stdout.is_empty(), "no contact is reported of readings that cannot be");
-    assert_found(&lines(&[file.name(), "--unit", "mV"])[1]);
+    assert_found(&lines(&[&file, "--unit", "mV"])[1]);
 }
 
 /// A recording of a board's Hello and of still frames with these numbers, one a chunk.
-fn recording_of(name: &str, numbers: impl Iterator<Item = u16>) -> Temporary {
-    let file = Temporary::new(name);
+fn recording_of(folder: &Folder, name: &str, numbers: impl Iterator<Item = u16>) -> String {
+    let file = folder.path(name);
     let header = Header { detector: "square-60".to_owned(), ..Header::default() };
-    let mut writer = RecordWriter::new(std::fs::File::create(&file.0).unwrap(), &header).unwrap();
+    let mut writer = RecordWriter::new(std::fs::File::create(&file).unwrap(), &header).unwrap();
     let mut wire = [0; MAX_WIRE];
     let length = encode_board(&BoardMessage::Hello(Hello::example(16)), &mut wire).unwrap();
     writer.write(0, &wire[..length]).unwrap();
@@ -294,35 +269,37 @@ fn recording_of(name: &str, numbers: impl Iterator<Item = u16>) -> Temporary {
 
 #[test]
 fn frames_missing_in_a_recording_are_reported() {
-    let run = |file: &Temporary| {
-        let output = TACTOMO.run(&["reconstruct", file.name(), "--json"]);
+    let folder = Folder::new("frames-missing-in-a-recording-are-reported");
+    let run = |file: &str| {
+        let output = TACTOMO.run(&["reconstruct", &file, "--json"]);
         assert_eq!(output.status.code(), Some(0));
         let lines: Vec<Value> =
             String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
         (lines, String::from_utf8(output.stderr).unwrap())
     };
-    let (_, messages) = run(&recording_of("whole.tactomo", 0..60));
+    let (_, messages) = run(&recording_of(&folder, "whole.tactomo", 0..60));
     assert!(!messages.contains("warning"), "{messages}");
-    let (lines, messages) = run(&recording_of("gap.tactomo", (0..40).chain(340..360)));
+    let (lines, messages) = run(&recording_of(&folder, "gap.tactomo", (0..40).chain(340..360)));
     assert!(messages.contains("warning") && messages.contains("300 frames are missing"), "{messages}");
     let of = |sequence: u64| lines.iter().find(|line| line["sequence"] == sequence).unwrap();
     assert_eq!((&of(340)["lost_before"], of(340)["frame"].as_u64()), (&Value::from(300), Some(40)));
     assert!(of(341).get("lost_before").is_none());
-    let file = recording_of("damaged.tactomo", 0..60);
-    let mut bytes = std::fs::read(&file.0).unwrap();
+    let file = recording_of(&folder, "damaged.tactomo", 0..60);
+    let mut bytes = std::fs::read(&file).unwrap();
     let middle = bytes.len() * 3 / 4;
     bytes[middle] ^= 0x10;
-    std::fs::write(&file.0, bytes).unwrap();
+    std::fs::write(&file, bytes).unwrap();
     let (_, messages) = run(&file);
     assert!(messages.contains("warning") && messages.contains("damaged"), "{messages}");
 }
 
 #[test]
 fn a_recording_is_read_with_its_board() {
-    let recording = Temporary::new("touch.tactomo");
-    let live = ["live", "--simulate", "--max-fps", "200", "--seconds", "1", "--json", "--record", recording.name()];
+    let folder = Folder::new("a-recording-is-read-with-its-board");
+    let recording = folder.path("touch.tactomo");
+    let live = ["live", "--simulate", "--max-fps", "200", "--seconds", "1", "--json", "--record", &recording];
     assert_eq!(TACTOMO.run(&live).status.code(), Some(0));
-    let found = lines(&[recording.name()]);
+    let found = lines(&[&recording]);
     assert!(found.len() > 20, "{} frames", found.len());
     assert_eq!(found[0]["frame"], 0, "frames are solved while the baseline is taken");
     assert!(found.last().unwrap()["time_s"].as_f64().unwrap() > 0.1);
@@ -330,6 +307,7 @@ fn a_recording_is_read_with_its_board() {
 
 #[test]
 fn a_kernel_learns_from_presses_on_any_channels() {
+    let folder = Folder::new("a-kernel-learns-from-presses-on-any-channels");
     let heard = |x: f64, y: f64, force: f64| {
         [[0.0, 0.0], [1.0, 0.1], [0.4, 1.0]].map(|[a, b]: [f64; 2]| force / (0.2 + (x - a).powi(2) + (y - b).powi(2)))
     };
@@ -344,51 +322,49 @@ fn a_kernel_learns_from_presses_on_any_channels() {
             format!("{x},{y},{force},{a},{b},{c}\n")
         })
         .collect();
-    let presses = Temporary::with("presses.csv", format!("x_m,y_m,force_n,a,b,c\n{taught}"));
-    let file = Temporary::with("skin.csv", csv(&[heard(0.4, 0.6, 1.5).to_vec()]));
-    let found = lines(&[file.name(), "--presses", presses.name()]);
+    let presses = folder.with("presses.csv", format!("x_m,y_m,force_n,a,b,c\n{taught}"));
+    let file = folder.with("skin.csv", csv(&[heard(0.4, 0.6, 1.5).to_vec()]));
+    let found = lines(&[&file, "--presses", &presses]);
     let contact = &found[0]["contacts"][0];
     for (key, truth) in [("x_m", 0.4), ("y_m", 0.6), ("force_n", 1.5)] {
         assert!((contact[key].as_f64().unwrap() - truth).abs() < 0.05, "{key}: {contact}");
     }
-    let other = TACTOMO.run(&["reconstruct", file.name(), "--presses", presses.name(), "--solver", "noser"]);
+    let other = TACTOMO.run(&["reconstruct", &file, "--presses", &presses, "--solver", "noser"]);
     assert!(String::from_utf8_lossy(&other.stderr).contains("leave out --solver"));
 }
 
 #[test]
 fn wrong_files_are_told() {
+    let folder = Folder::new("wrong-files-are-told");
     let some = |frame: Vec<f64>| csv(&[vec![0.0; frame.len()], frame]);
     let mut nan = vec![0.1; 256];
     nan[3 * 16 + 5] = f64::NAN;
-    let few = Temporary::with("few.csv", some(vec![0.1; 255]));
-    let nan = Temporary::with("nan.csv", some(nan));
-    let text = Temporary::with("letter.csv", "Dear reader,\nhow are you?");
+    let few = folder.with("few.csv", some(vec![0.1; 255]));
+    let nan = folder.with("nan.csv", some(nan));
+    let text = folder.with("letter.csv", "Dear reader,\nhow are you?");
     let typo =
-        Temporary::with("typo.csv", csv(&[vec![0.1; 256], vec![0.1; 256]]).replacen("0.1,0.1,0.1", "0.1,0.1,O.1", 1));
-    let broken = Temporary::with("broken.npz", b"PK\x03\x04 and no more");
-    let recording = Temporary::with("cut.tactomo", b"\x89TCTO\r\n\x1a\x02");
+        folder.with("typo.csv", csv(&[vec![0.1; 256], vec![0.1; 256]]).replacen("0.1,0.1,0.1", "0.1,0.1,O.1", 1));
+    let broken = folder.with("broken.npz", b"PK\x03\x04 and no more");
+    let recording = folder.with("cut.tactomo", b"\x89TCTO\r\n\x1a\x02");
     let told = |file: &str, more: &[&str]| {
         let output = TACTOMO.run(&[&["reconstruct", file], more].concat());
         assert_eq!(output.status.code(), Some(1));
         String::from_utf8(output.stderr).unwrap()
     };
     for (file, expected) in [
-        (few.name(), "has 255 readings a frame, but the detector square-60 with its 16 electrodes needs 256"),
-        (nan.name(), "frame 1: the reading of electrode 5 with electrode 3 grounded is not a finite number"),
-        (text.name(), "line 2, column 1: `how are you?` is not a number"),
-        (typo.name(), "line 1, column 3: `O.1` is not a number; to name the columns"),
-        (broken.name(), "not an NPZ file"),
-        (recording.name(), "is not a recording of tactomo, or too damaged"),
+        (few.as_str(), "has 255 readings a frame, but the detector square-60 with its 16 electrodes needs 256"),
+        (&nan, "frame 1: the reading of electrode 5 with electrode 3 grounded is not a finite number"),
+        (&text, "line 2, column 1: `how are you?` is not a number"),
+        (&typo, "line 1, column 3: `O.1` is not a number; to name the columns"),
+        (&broken, "not an NPZ file"),
+        (&recording, "is not a recording of tactomo, or too damaged"),
         ("no/such.csv", "cannot read no/such.csv: No such file"),
     ] {
         let message = told(file, &[]);
         assert!(message.contains(expected), "{message}");
     }
-    let folder = Path::new(few.name()).parent().unwrap().to_str().unwrap();
-    assert!(told(folder, &[]).contains("cannot read"));
-    assert!(told(few.name(), &["--out", "contacts.xls"]).contains("needs 256"));
-    assert!(told(nan.name(), &["--out", "contacts.xls"]).contains(".csv, .npz, .json or .jsonl"));
-    assert!(
-        told(nan.name(), &["--solver", "contacts", "--lambda", "0.1"]).contains("has no lambda: leave out --lambda")
-    );
+    assert!(told(&folder.path(""), &[]).contains("cannot read"));
+    assert!(told(&few, &["--out", "contacts.xls"]).contains("needs 256"));
+    assert!(told(&nan, &["--out", "contacts.xls"]).contains(".csv, .npz, .json or .jsonl"));
+    assert!(told(&nan, &["--solver", "contacts", "--lambda", "0.1"]).contains("has no lambda: leave out --lambda"));
 }

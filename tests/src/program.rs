@@ -49,6 +49,12 @@ impl Program {
         serde_json::from_slice(&self.succeeds(args)).unwrap()
     }
 
+    /// What it prints as lines of JSON; it has to succeed.
+    pub fn lines(self, args: &[&str]) -> Vec<Value> {
+        let printed = String::from_utf8(self.succeeds(args)).unwrap();
+        printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
     /// Exit code and stderr where it fails, or is used wrongly: then there is nothing on stdout.
     pub fn failure(self, args: &[&str]) -> (Option<i32>, String) {
         let output = self.run(args);

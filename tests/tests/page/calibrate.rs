@@ -107,11 +107,11 @@ async fn pictured(stage: &Stage<Live>, folder: Option<&Path>, name: &str) -> Res
     Ok(())
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_rub_finds_the_detector_that_was_built() -> Result<()> {
+#[test]
+fn a_rub_finds_the_detector_that_was_built() -> Result<()> {
     let folder = std::env::temp_dir().join(format!("tactomo-calibrate-{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
-    let outcome = in_front_of!(Live::as_built(3, &folder), stage, { calibrates(&stage, &folder).await });
+    let outcome = in_front_of(|| Live::as_built(3, &folder), async |stage| calibrates(stage, &folder).await);
     std::fs::remove_dir_all(&folder)?;
     outcome
 }

@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
@@ -12,8 +13,11 @@ use fantoccini::{Client, ClientBuilder, Locator};
 use hyper_util::client::legacy::connect::HttpConnector;
 use serde_json::{Value, json};
 use tactomo::solve::Method;
+use tokio::runtime::Runtime;
 
+/// How long the page is waited for, and time from one look at it to the next.
 const PATIENCE: Duration = Duration::from_secs(20);
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Whether Chromium is here; if not, says what to install, and fails if nothing may be skipped.
 pub fn is_here() -> Result<bool> {
@@ -29,27 +33,36 @@ pub fn is_here() -> Result<bool> {
     Ok(false)
 }
 
-/// A browser with one page.
-pub struct Browser {
-    pub client: Client,
+/// A browser with one window, and what its connection lives in.
+pub struct Chromium {
+    runtime: Runtime,
+    client: Client,
     driver: Child,
     profile: PathBuf,
 }
 
-impl Browser {
-    /// Opens `url` in a new browser with a new profile.
-    pub async fn open(url: &str) -> Result<Self> {
+impl Chromium {
+    /// The browser that tests share: it starts with the first that holds it, and ends with the last.
+    pub fn shared() -> Result<Arc<Self>> {
+        static RUNNING: Mutex<Weak<Chromium>> = Mutex::new(Weak::new());
+        let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(chromium) = running.upgrade() {
+            return Ok(chromium);
+        }
+        let chromium = Arc::new(Self::start()?);
+        *running = Arc::downgrade(&chromium);
+        Ok(chromium)
+    }
+
+    /// A browser of its own, with a new profile.
+    pub fn start() -> Result<Self> {
         static PROFILES: AtomicU32 = AtomicU32::new(0);
         let number = PROFILES.fetch_add(1, Ordering::Relaxed);
         let profile = std::env::temp_dir().join(format!("tactomo-chromium-{}-{number}", std::process::id()));
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
         let (mut driver, port) = start_driver()?;
-        match connect(port, &profile).await {
-            Ok(client) => {
-                let browser = Self { client, driver, profile };
-                browser.client.goto(url).await?;
-                browser.resize(1280, 800).await?;
-                Ok(browser)
-            }
+        match runtime.block_on(connect(port, &profile)) {
+            Ok(client) => Ok(Self { runtime, client, driver, profile }),
             Err(error) => {
                 driver.kill()?;
                 Err(error)
@@ -57,14 +70,59 @@ impl Browser {
         }
     }
 
-    /// Ends the browser.
-    pub async fn close(mut self) -> Result<()> {
-        let closed = self.client.close().await;
-        self.driver.kill()?;
-        self.driver.wait()?;
-        // Chromium may still be writing there.
+    /// Runs a test in the runtime of the connection.
+    pub fn block_on<T>(&self, test: impl Future<Output = T>) -> T {
+        self.runtime.block_on(test)
+    }
+
+    /// Opens `url` in the window, which is then of the usual size.
+    pub async fn open(&self, url: &str) -> Result<Page> {
+        let page = Page { client: self.client.clone() };
+        page.client.goto(url).await?;
+        page.resize(1280, 800).await?;
+        Ok(page)
+    }
+}
+
+impl Drop for Chromium {
+    fn drop(&mut self) {
+        // Whatever fails here, the test has said what it has to say; and Chromium may still be writing into its profile.
+        let _ = self.runtime.block_on(self.client.clone().close());
+        let _ = self.driver.kill().and_then(|()| self.driver.wait());
         let _ = std::fs::remove_dir_all(&self.profile);
-        Ok(closed?)
+    }
+}
+
+/// The page in a browser's window.
+pub struct Page {
+    pub client: Client,
+}
+
+impl Page {
+    /// Leaves it as if it had never been there.
+    pub async fn leave(&self) -> Result<()> {
+        self.client.release_actions().await?;
+        self.run("localStorage.clear()").await?;
+        Ok(self.client.goto("about:blank").await?)
+    }
+
+    /// Waits until what a script in the page returns is what is wanted.
+    pub async fn shows(&self, script: &str, wanted: impl Fn(&Value) -> bool) -> Result<Value> {
+        let begin = Instant::now();
+        loop {
+            let shown = self.run(script).await?;
+            if wanted(&shown) {
+                return Ok(shown);
+            }
+            ensure!(begin.elapsed() < PATIENCE, "the page never shows what it should, but {shown}");
+            tokio::time::sleep(LOOK_EVERY).await;
+        }
+    }
+
+    /// Waits until the element of this id shows this text.
+    pub async fn says(&self, id: &str, text: &str) -> Result<()> {
+        let script = format!("return document.getElementById('{id}').textContent");
+        self.shows(&script, |shown| shown == text).await.with_context(|| format!("{text:?} in {id}")).map(drop)
     }
 
     /// What the page tells through its root's `data-` attributes.
@@ -85,7 +143,7 @@ impl Browser {
             if begin.elapsed() > PATIENCE {
                 bail!("the page never tells of {what}; it tells {}", told.0);
             }
-            tokio::time::sleep(Duration::from_millis(50)).await;
+            tokio::time::sleep(LOOK_EVERY).await;
         }
     }
 

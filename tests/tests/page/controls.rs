@@ -15,7 +15,7 @@ use tactomo::simulate::Fault;
 use tactomo::solve::FoundContact;
 use tactomo_protocol::Hello;
 
-use crate::chromium::Browser;
+use crate::chromium::Page;
 use crate::script::{FINGER, Script};
 use crate::stage::{Stage, in_front_of};
 
@@ -32,13 +32,14 @@ fn damaged(position_s: f64, paused: bool, damage: Loss) -> Playing {
     Playing::Recording { position_s, length_s: 20.0, speed: 1.0, paused, looped: false, ended, damage }
 }
 
-async fn visible(browser: &Browser, id: &str) -> Result<bool> {
+async fn visible(browser: &Page, id: &str) -> Result<bool> {
     Ok(browser.client.find(Locator::Id(id)).await?.is_displayed().await?)
 }
 
-/// Waits until the page has shown a status that came after a change.
-async fn status_shown() {
-    tokio::time::sleep(Duration::from_millis(900)).await;
+/// Waits until the element of this id can be seen.
+async fn appears(browser: &Page, id: &str) -> Result<()> {
+    browser.shows(&format!("return document.getElementById('{id}').checkVisibility()"), |seen| seen == true).await?;
+    Ok(())
 }
 
 async fn asks(stage: &Stage<Script>, expected: Request) -> Result<()> {
@@ -47,16 +48,16 @@ async fn asks(stage: &Stage<Script>, expected: Request) -> Result<()> {
     Ok(())
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let simulated = Playing::Simulated { scene: SceneName::Rest, faults: Vec::new() };
         stage.behind.set(|snapshot| {
             (snapshot.playing, snapshot.hello) = (simulated, Some(hello()));
         });
-        status_shown().await;
+        appears(&stage.browser, "simulation").await?;
         stage.browser.select("scene", "five-fingers").await?;
-        asks(&stage, Request::Control(Control::Scene(SceneName::FiveFingers))).await?;
+        asks(stage, Request::Control(Control::Scene(SceneName::FiveFingers))).await?;
         for (scene, name) in [
             ("gripper", SceneName::Gripper),
             ("display", SceneName::Display),
@@ -65,13 +66,13 @@ async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
             ("hand", SceneName::Hand),
         ] {
             stage.browser.select("scene", scene).await?;
-            asks(&stage, Request::Control(Control::Scene(name))).await?;
+            asks(stage, Request::Control(Control::Scene(name))).await?;
         }
         let said = "return document.querySelector('#scene option[value=gripper]').textContent";
         let said = stage.browser.run(said).await?;
         ensure!(said == "gripper, scaled", "{said}: it was made for another detector than this one");
         stage.browser.select("fault", "open:3").await?;
-        asks(&stage, Request::Control(Control::Faults(vec![Fault::Open { electrode: 3 }]))).await?;
+        asks(stage, Request::Control(Control::Faults(vec![Fault::Open { electrode: 3 }]))).await?;
         stage.browser.run("document.getElementById('details-card').open = true").await?;
         stage.browser.select("average", "3").await?;
         stage
@@ -90,15 +91,15 @@ async fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
             select_us: Some(17),
             discarded: Some(1),
         };
-        asks(&stage, Request::Settings(settings)).await?;
+        asks(stage, Request::Settings(settings)).await?;
         stage.browser.click("rezero").await?;
-        asks(&stage, Request::Rezero).await
+        asks(stage, Request::Rezero).await
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn the_board_card_says_which_rows_are_scanned() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn the_board_card_says_which_rows_are_scanned() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let adaptive = |grounds: Vec<u8>, others| Scan { choice: ScanChoice::Adaptive, grounds, others };
         for (scan, said) in [
             (Scan::default(), "whole frames, 1\u{2009}400 frames/s"),
@@ -117,61 +118,54 @@ async fn the_board_card_says_which_rows_are_scanned() -> Result<()> {
                 (snapshot.hello, snapshot.scan) = (Some(hello()), scan);
                 snapshot.statistics.frames_per_s = 1400.0;
             });
-            status_shown().await;
             let shown = "return [...document.querySelectorAll('#details dt')].find((term) => term.textContent === 'Scan').nextSibling.textContent";
-            let shown = stage.browser.run(shown).await?;
-            ensure!(shown == said, "{shown}");
+            stage.browser.shows(shown, |shown| shown == said).await?;
         }
         Ok(())
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn recording_is_asked_for_and_its_file_shown() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn recording_is_asked_for_and_its_file_shown() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         stage.browser.click("record").await?;
-        asks(&stage, Request::Record(true)).await?;
+        asks(stage, Request::Record(true)).await?;
         stage.behind.set(|snapshot| snapshot.recording = Some("/tmp/touch.tactomo".into()));
-        status_shown().await;
-        let notice = stage.browser.run("return document.getElementById('notice').textContent").await?;
-        ensure!(notice == "Recording to /tmp/touch.tactomo", "{notice}");
+        stage.browser.says("notice", "Recording to /tmp/touch.tactomo").await?;
         stage.browser.client.find(Locator::Css("body")).await?.send_keys("r").await?;
-        asks(&stage, Request::Record(false)).await
+        asks(stage, Request::Record(false)).await
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn what_is_damaged_in_a_recording_is_said() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn what_is_damaged_in_a_recording_is_said() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let damage = Loss { damaged_places: 1, left_out_bytes: 70, ..Loss::default() };
         for (damage, said) in
             [(damage, "This recording is damaged: it is damaged in 1 place (70 bytes left out)"), (Loss::default(), "")]
         {
             stage.behind.set(|snapshot| snapshot.playing = damaged(1.0, false, damage));
-            status_shown().await;
-            let notice = stage.browser.run("return document.getElementById('notice').textContent").await?;
-            ensure!(notice == said, "{notice}");
+            stage.browser.says("notice", said).await?;
         }
         Ok(())
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_recording_is_held_sought_and_played_again() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn a_recording_is_held_sought_and_played_again() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         ensure!(!visible(&stage.browser, "transport").await?, "there is nothing to play");
         stage.behind.set(|snapshot| snapshot.playing = recording(5.0, false));
-        status_shown().await;
-        ensure!(visible(&stage.browser, "transport").await?, "there is something to play");
+        appears(&stage.browser, "transport").await?;
         stage.browser.click("play").await?;
-        asks(&stage, Request::Control(Control::Pause(true))).await?;
+        asks(stage, Request::Control(Control::Pause(true))).await?;
         stage.browser.client.find(Locator::Id("seek")).await?.send_keys(&char::from(Key::End).to_string()).await?;
-        asks(&stage, Request::Control(Control::Seek(20.0))).await?;
+        asks(stage, Request::Control(Control::Seek(20.0))).await?;
         stage.browser.select("speed", "0.25").await?;
-        asks(&stage, Request::Control(Control::Speed(0.25))).await?;
+        asks(stage, Request::Control(Control::Speed(0.25))).await?;
         stage.browser.click("loop").await?;
-        asks(&stage, Request::Control(Control::Loop(true))).await?;
-        ends_calmly(&stage).await
+        asks(stage, Request::Control(Control::Loop(true))).await?;
+        ends_calmly(stage).await
     })
 }
 
@@ -192,9 +186,9 @@ async fn ends_calmly(stage: &Stage<Script>) -> Result<()> {
     asks(stage, Request::Control(Control::Pause(false))).await
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_paused_picture_stands_still_while_frames_come() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn a_paused_picture_stands_still_while_frames_come() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         stage.browser.client.find(Locator::Css("body")).await?.send_keys("p").await?;
         let before = stage.browser.until("a pause", |told| told.text("frozen") == "true").await?;
         tokio::time::sleep(Duration::from_millis(300)).await;
@@ -208,9 +202,9 @@ async fn a_paused_picture_stands_still_while_frames_come() -> Result<()> {
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn shift_click_leaves_a_finger_down() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn shift_click_leaves_a_finger_down() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let click = |x: f64, y: f64, shift: bool| {
             format!(
                 "const box = document.getElementById('image').getBoundingClientRect();
@@ -245,9 +239,9 @@ fn is_near(contacts: &[Contact], places_mm: &[[f64; 2]]) -> bool {
     contacts.len() == places_mm.len() && contacts.iter().zip(places_mm).all(near)
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn picture_and_data_are_saved() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn picture_and_data_are_saved() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         stage.behind.contacts(vec![FoundContact { id: Some(3), ..FoundContact::flat(0.01, -0.005, 2e-4) }]);
         for (key, ending) in [("s", ".png"), ("c", ".csv")] {
             stage.browser.client.find(Locator::Css("body")).await?.send_keys(key).await?;

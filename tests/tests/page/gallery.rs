@@ -31,40 +31,40 @@ fn hand() -> Solution {
     Solution { contacts, residual: Some(1.0), choice: Some(choice), ..Solution::default() }
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn gallery() -> Result<()> {
+#[test]
+fn gallery() -> Result<()> {
     let Some(folder) = std::env::var_os("TACTOMO_GALLERY") else { return Ok(()) };
     let folder = Path::new(&folder);
     std::fs::create_dir_all(folder)?;
-    scripted(folder).await?;
-    solved(folder, SceneName::Ring, Method::Nonlinear, "ring-image").await?;
-    solved(folder, SceneName::Ring, Method::Auto, "ring").await?;
-    solved(folder, SceneName::Line, Method::Auto, "line").await?;
-    solved(folder, SceneName::FiveFingers, Method::Auto, "five-fingers").await
+    scripted(folder)?;
+    solved(folder, SceneName::Ring, Method::Nonlinear, "ring-image")?;
+    solved(folder, SceneName::Ring, Method::Auto, "ring")?;
+    solved(folder, SceneName::Line, Method::Auto, "line")?;
+    solved(folder, SceneName::FiveFingers, Method::Auto, "five-fingers")
 }
 
-async fn scripted(folder: &Path) -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+fn scripted(folder: &Path) -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let simulated = Playing::Simulated { scene: SceneName::FiveFingers, faults: Vec::new() };
         stage.behind.set(|snapshot| snapshot.playing = simulated);
-        shot(&stage, folder, "rest").await?;
+        shot(stage, folder, "rest").await?;
         stage.behind.solution(hand());
-        shot(&stage, folder, "hand").await?;
+        shot(stage, folder, "hand").await?;
         for (size, name) in
             [((1280, 760), "low"), ((390, 844), "phone"), ((820, 1100), "tablet"), ((1920, 1080), "wide")]
         {
             stage.browser.resize(size.0, size.1).await?;
-            shot(&stage, folder, name).await?;
+            shot(stage, folder, name).await?;
         }
         stage.browser.resize(1280, 800).await?;
         stage.browser.click("view-space").await?;
-        shot(&stage, folder, "space").await?;
+        shot(stage, folder, "space").await?;
         stage.browser.theme("dark").await?;
-        shot(&stage, folder, "space-dark").await?;
+        shot(stage, folder, "space-dark").await?;
         stage.browser.click("view-flat").await?;
-        shot(&stage, folder, "hand-dark").await?;
+        shot(stage, folder, "hand-dark").await?;
         stage.browser.theme("light").await?;
-        states(&stage, folder).await
+        states(stage, folder).await
     })
 }
 
@@ -103,16 +103,19 @@ async fn states(stage: &Stage<Script>, folder: &Path) -> Result<()> {
     shot(stage, folder, "silent").await
 }
 
-async fn solved(folder: &Path, scene: SceneName, method: Method, name: &str) -> Result<()> {
-    in_front_of!(Live::start(scene, &[]), stage, {
-        stage.browser.choose(method).await?;
-        tokio::time::sleep(Duration::from_secs(9)).await;
-        shot(&stage, folder, name).await?;
-        stage.browser.click("view-space").await?;
-        shot(&stage, folder, &format!("{name}-space")).await?;
-        eprintln!("{name}: drawn in {} ms", stage.browser.told().await?.text("drawMs"));
-        Ok(())
-    })
+fn solved(folder: &Path, scene: SceneName, method: Method, name: &str) -> Result<()> {
+    in_front_of(
+        || Live::start(scene, &[]),
+        async |stage| {
+            stage.browser.choose(method).await?;
+            tokio::time::sleep(Duration::from_secs(9)).await;
+            shot(stage, folder, name).await?;
+            stage.browser.click("view-space").await?;
+            shot(stage, folder, &format!("{name}-space")).await?;
+            eprintln!("{name}: drawn in {} ms", stage.browser.told().await?.text("drawMs"));
+            Ok(())
+        },
+    )
 }
 
 async fn shot<T>(stage: &Stage<T>, folder: &Path, name: &str) -> Result<()> {

@@ -1,53 +1,61 @@
 //! A browser in front of a page.
 
+use std::sync::{Mutex, PoisonError};
+
 use anyhow::Result;
-use tokio::sync::{Mutex, MutexGuard};
 
-use crate::chromium::{self, Browser};
+use crate::chromium::{self, Chromium, Page};
+use crate::live::Live;
+use crate::script::Script;
 
-/// One browser at a time: each has several processes, and frame rates are compared.
-static TURN: Mutex<()> = Mutex::const_new(());
+/// What a page is in front of.
+pub trait Behind {
+    /// Where the page is.
+    fn url(&self) -> String;
+}
+
+impl Behind for Live {
+    fn url(&self) -> String {
+        self.server.url()
+    }
+}
+
+impl Behind for Script {
+    fn url(&self) -> String {
+        self.server.url()
+    }
+}
 
 /// A browser in front of the page of `behind`.
 pub struct Stage<T> {
     pub behind: T,
-    pub browser: Browser,
-    _turn: MutexGuard<'static, ()>,
+    pub browser: Page,
 }
 
-impl<T> Stage<T> {
-    /// Sets it up; `None` without a browser on this machine.
-    pub async fn set(start: impl FnOnce() -> Result<T>, url: impl Fn(&T) -> String) -> Result<Option<Self>> {
-        if !chromium::is_here()? {
-            return Ok(None);
-        }
-        let turn = TURN.lock().await;
-        let behind = start()?;
-        let browser = Browser::open(&url(&behind)).await?;
-        let stage = Self { behind, browser, _turn: turn };
-        let ready =
-            stage.browser.until("frames", |told| told.text("state") == "streaming" && told.number("updates") > 5.0);
-        match ready.await {
-            Ok(_) => Ok(Some(stage)),
-            Err(error) => stage.end(Err(error)).await.map(|()| None),
-        }
+/// Runs a test in front of what `start` gives, in the browser that tests share; without a browser on this machine it says so and does nothing.
+pub fn in_front_of<T: Behind>(
+    start: impl FnOnce() -> Result<T>,
+    test: impl AsyncFnOnce(&Stage<T>) -> Result<()>,
+) -> Result<()> {
+    /// One page at a time: there is one window, and frame rates are compared.
+    static TURN: Mutex<()> = Mutex::new(());
+    if !chromium::is_here()? {
+        return Ok(());
     }
-
-    /// Ends the browser, whatever came of the test.
-    pub async fn end(self, outcome: Result<()>) -> Result<()> {
-        let closed = self.browser.close().await;
-        outcome.and(closed)
-    }
+    // Before it is this test's turn, so that the browser lives on from one to the next.
+    let chromium = Chromium::shared()?;
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let behind = start()?;
+    chromium.block_on(async {
+        let stage = Stage { browser: chromium.open(&behind.url()).await?, behind };
+        let outcome = played(&stage, test).await;
+        let left = stage.browser.leave().await;
+        outcome.and(left)
+    })
 }
 
-/// Runs `$body` with a [`Stage`] named `$stage` in front of what `$start` gives.
-macro_rules! in_front_of {
-    ($start:expr, $stage:ident, $body:block) => {{
-        let set = $crate::stage::Stage::set(|| $start, |behind| behind.server.url());
-        let Some($stage) = set.await? else { return Ok(()) };
-        let outcome: anyhow::Result<()> = async { $body }.await;
-        $stage.end(outcome).await
-    }};
+async fn played<T>(stage: &Stage<T>, test: impl AsyncFnOnce(&Stage<T>) -> Result<()>) -> Result<()> {
+    let ready = stage.browser.until("frames", |told| told.text("state") == "streaming" && told.number("updates") > 5.0);
+    ready.await?;
+    test(stage).await
 }
-
-pub(crate) use in_front_of;

@@ -3,30 +3,36 @@
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
 use tactomo::run::LinkState;
 use tactomo::solve::{Choice, Flags, FoundContact, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
-use crate::chromium::{Browser, Told};
+use crate::chromium::Told;
 use crate::script::Script;
 use crate::stage::{Stage, in_front_of};
 
 /// The place (mm) of the pixel of the flat picture that differs most from nothing, and by how much, 0 to 1.
-async fn hottest(browser: &Browser) -> Result<([f64; 2], f64)> {
-    let script = "const canvas = document.getElementById('image');
-        const { width, height } = canvas;
-        const { data } = canvas.getContext('2d').getImageData(0, 0, width, height);
-        const far = (i) => Math.hypot(data[i] - data[at], data[i + 1] - data[at + 1], data[i + 2] - data[at + 2]);
-        const at = 4 * (Math.floor(height * 0.97) * width + Math.floor(width * 0.97));
-        let best = 0, sum = [0, 0, 0];
-        for (let i = 0; i < data.length; i += 4) best = Math.max(best, far(i));
-        for (let i = 0; i < data.length; i += 4) {
-          if (far(i) < best - 3) continue;
-          sum = [sum[0] + 1, sum[1] + (i / 4) % width, sum[2] + Math.floor(i / 4 / width)];
-        }
-        return [(sum[1] / sum[0] / width - 0.5) * 60, (0.5 - sum[2] / sum[0] / height) * 60, best / 441];";
-    let found = browser.run(script).await?;
-    let number = |i: usize| found[i].as_f64().context("a number");
-    Ok(([number(0)?, number(1)?], number(2)?))
+const HOTTEST: &str = "const canvas = document.getElementById('image');
+    const { width, height } = canvas;
+    const { data } = canvas.getContext('2d').getImageData(0, 0, width, height);
+    const far = (i) => Math.hypot(data[i] - data[at], data[i + 1] - data[at + 1], data[i + 2] - data[at + 2]);
+    const at = 4 * (Math.floor(height * 0.97) * width + Math.floor(width * 0.97));
+    let best = 0, sum = [0, 0, 0];
+    for (let i = 0; i < data.length; i += 4) best = Math.max(best, far(i));
+    for (let i = 0; i < data.length; i += 4) {
+      if (far(i) < best - 3) continue;
+      sum = [sum[0] + 1, sum[1] + (i / 4) % width, sum[2] + Math.floor(i / 4 / width)];
+    }
+    return [(sum[1] / sum[0] / width - 0.5) * 60, (0.5 - sum[2] / sum[0] / height) * 60, best / 441];";
+
+/// How much the [`HOTTEST`] pixel differs; not a number if it is not told.
+fn heat(hottest: &Value) -> f64 {
+    hottest[2].as_f64().unwrap_or(f64::NAN)
+}
+
+/// Whether the [`HOTTEST`] pixel is within 1 mm of a place (mm).
+fn is_at(hottest: &Value, [x_mm, y_mm]: [f64; 2]) -> bool {
+    matches!((hottest[0].as_f64(), hottest[1].as_f64()), (Some(x), Some(y)) if (x - x_mm).hypot(y - y_mm) < 1.0)
 }
 
 fn contact(id: u32, [x_mm, y_mm]: [f64; 2], conductance_s: f64) -> FoundContact {
@@ -38,25 +44,21 @@ async fn settled(stage: &Stage<Script>) {
     tokio::time::sleep(Duration::from_millis(700)).await;
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn heat_is_drawn_where_a_contact_is() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
-        settled(&stage).await;
-        let (_, at_rest) = hottest(&stage.browser).await?;
-        ensure!(at_rest < 0.01, "at rest there are colours: {at_rest}");
+#[test]
+fn heat_is_drawn_where_a_contact_is() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
+        let at_rest = stage.browser.run(HOTTEST).await?;
+        ensure!(heat(&at_rest) < 0.01, "at rest there are colours: {at_rest}");
         for place in [[12.0, 9.0], [-14.0, -20.0]] {
             stage.behind.contacts(vec![contact(1, place, 3e-4)]);
-            settled(&stage).await;
-            let (found, heat) = hottest(&stage.browser).await?;
-            ensure!((found[0] - place[0]).hypot(found[1] - place[1]) < 1.0, "{found:?} instead of {place:?}");
-            ensure!(heat > 0.3, "hardly to be seen: {heat}");
+            stage.browser.shows(HOTTEST, |hottest| is_at(hottest, place) && heat(hottest) > 0.3).await?;
         }
         Ok(())
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_shape_is_named_outlined_and_listed_without_the_contacts_beside_it() -> Result<()> {
+#[test]
+fn a_shape_is_named_outlined_and_listed_without_the_contacts_beside_it() -> Result<()> {
     let line = FoundLine {
         from_m: [-0.018, -0.01],
         to_m: [0.014, 0.014],
@@ -73,7 +75,7 @@ async fn a_shape_is_named_outlined_and_listed_without_the_contacts_beside_it() -
             let most = 0; for (let i = 3; i < data.length; i += 4) most = Math.max(most, data[i]); return most; };
         return [document.getElementById('choice').textContent, document.getElementById('contacts').textContent,
             dark(-0.0032, 0.0036), dark(0.005, 0.015), dark(-0.01, 0.02)];";
-    in_front_of!(Script::start(), stage, {
+    in_front_of(Script::start, async |stage| {
         let shapes = [
             (FoundShape::Line(line), "Line, 40 mm", "to 14.0, 14.0", 2),
             (FoundShape::Ring(ring), "Ring, 26 mm", "5.0, 0.0", 3),
@@ -86,41 +88,38 @@ async fn a_shape_is_named_outlined_and_listed_without_the_contacts_beside_it() -
                 choice: Some(Choice { what: shape.name().to_owned(), why: "residual 1.0 x noise".to_owned() }),
                 ..Solution::default()
             });
-            settled(&stage).await;
-            let told = stage.browser.told().await?;
-            ensure!(told.text("shape") == shape.name() && told.text("contacts") == "0", "{told:?}");
-            let shown = stage.browser.run(script).await?;
-            let text = |i: usize| shown[i].as_str().unwrap_or_default().to_owned();
-            ensure!(text(0).starts_with(name) && text(1).contains(place), "{shown}");
-            ensure!(shown[outlined].as_u64() > Some(60), "its outline: {shown}");
+            let is_told = |told: &Told| told.text("shape") == shape.name() && told.text("contacts") == "0";
+            stage.browser.until(name, is_told).await?;
+            let is_shown = |shown: &Value| {
+                let text = |i: usize| shown[i].as_str().unwrap_or_default();
+                text(0).starts_with(name) && text(1).contains(place) && shown[outlined].as_u64() > Some(60)
+            };
+            let shown = stage.browser.shows(script, is_shown).await?;
             ensure!(shown[4].as_u64() == Some(0), "the contact beside it is drawn: {shown}");
         }
         Ok(())
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn while_a_touch_is_searched_nothing_says_that_nothing_touches() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
-        let said = "return ['choice', 'no-contacts'].map((id) => document.getElementById(id).textContent);";
-        for (what, expected) in [
-            ("searching", ["Something touches", "What touches is being searched."]),
-            ("nothing", ["Nothing touches", "Nothing touches."]),
+#[test]
+fn while_a_touch_is_searched_nothing_says_that_nothing_touches() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
+        for (what, headline, table) in [
+            ("searching", "Something touches", "What touches is being searched."),
+            ("nothing", "Nothing touches", "Nothing touches."),
         ] {
             let choice = Some(Choice { what: what.to_owned(), why: "residual 9.0 x noise".to_owned() });
             stage.behind.solution(Solution { choice, residual: Some(9.0), ..Solution::default() });
-            settled(&stage).await;
-            let shown = stage.browser.run(said).await?;
-            ensure!(shown[0] == expected[0] && shown[1] == expected[1], "{shown}");
+            stage.browser.says("choice", headline).await?;
+            stage.browser.says("no-contacts", table).await?;
         }
         Ok(())
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_warning_goes_with_its_answer_though_no_other_answer_comes() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
-        let chips = "return document.getElementById('warnings').textContent";
+#[test]
+fn a_warning_goes_with_its_answer_though_no_other_answer_comes() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let flagged = |misfit| Flags { misfit, ..Flags::default() };
         let answer = |misfit| Solution {
             contacts: vec![contact(1, [5.0, 5.0], 3e-4)],
@@ -129,18 +128,14 @@ async fn a_warning_goes_with_its_answer_though_no_other_answer_comes() -> Result
             ..Solution::default()
         };
         stage.behind.solution(answer(true));
-        settled(&stage).await;
-        let shown = stage.browser.run(chips).await?;
-        ensure!(shown == "readings do not fit", "{shown}");
+        stage.browser.says("warnings", "readings do not fit").await?;
         // The last answer has no warning, and then the stream stands still.
         stage.behind.solution(answer(false));
         let is_without = |told: &Told| told.text("flags").is_empty();
         stage.browser.until("an answer without a warning", is_without).await?;
         stage.behind.set(|snapshot| snapshot.frame = None);
-        tokio::time::sleep(Duration::from_millis(1500)).await;
-        let shown = stage.browser.run(chips).await?;
-        ensure!(shown == "", "{shown}: it is of an answer that is no longer shown");
-        Ok(())
+        // It would be of an answer that is no longer shown.
+        stage.browser.says("warnings", "").await
     })
 }
 
@@ -158,43 +153,42 @@ async fn still_scale(stage: &Stage<Script>) -> Result<f64> {
     bail!("the scale still moves after 20 s: {last} S/m2")
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn one_sharp_frame_changes_no_colours() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn one_sharp_frame_changes_no_colours() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         stage.behind.patch([5.0, 5.0], 2.0);
-        let before = still_scale(&stage).await?;
-        let (_, heat) = hottest(&stage.browser).await?;
-        ensure!(heat > 0.15, "an image of 2 S/m2 is hardly to be seen: {heat}");
+        let before = still_scale(stage).await?;
+        let hottest = stage.browser.run(HOTTEST).await?;
+        ensure!(heat(&hottest) > 0.15, "an image of 2 S/m2 is hardly to be seen: {hottest}");
         stage.behind.patch([5.0, 5.0], 200.0);
         stage.behind.publish(3);
         stage.behind.patch([5.0, 5.0], 2.0);
-        settled(&stage).await;
+        settled(stage).await;
         let after = stage.browser.told().await?.number("scaleMaxSPerM2");
         ensure!((after / before).ln().abs() < 0.3, "the scale went from {before} to {after} S/m2");
         Ok(())
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_light_touch_shows_soon_after_a_hard_one() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn a_light_touch_shows_soon_after_a_hard_one() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         stage.behind.patch([5.0, 5.0], 200.0);
         // The scale ends between the largest value on the grid, 187 S/m2, and 15 % above it.
         let hard = stage.browser.until("a hard press", |told| told.number("scaleMaxSPerM2") > 180.0);
         hard.await?;
         stage.behind.patch([5.0, 5.0], 0.5);
         tokio::time::sleep(Duration::from_millis(2500)).await;
-        let (_, heat) = hottest(&stage.browser).await?;
-        ensure!(heat > 0.1, "after 2.5 s a touch of 0.5 S/m2 is hardly to be seen: {heat}");
+        let hottest = stage.browser.run(HOTTEST).await?;
+        ensure!(heat(&hottest) > 0.1, "after 2.5 s a touch of 0.5 S/m2 is hardly to be seen: {hottest}");
         Ok(())
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn the_strip_chart_has_each_contacts_value() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn the_strip_chart_has_each_contacts_value() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         stage.behind.contacts(vec![contact(7, [5.0, 5.0], 2e-4), contact(9, [-5.0, 5.0], 4e-4)]);
-        settled(&stage).await;
         let script = "const strip = document.getElementById('strip');
             const { data } = strip.getContext('2d').getImageData(0, 0, strip.width, strip.height);
             const hue = (id) => getComputedStyle(document.documentElement).getPropertyValue(`--hue-${(id - 1) % 8}`).trim();
@@ -202,12 +196,12 @@ async fn the_strip_chart_has_each_contacts_value() -> Result<()> {
             const count = ([r, g, b]) => { let n = 0; for (let i = 0; i < data.length; i += 4)
               n += Math.hypot(data[i] - r, data[i + 1] - g, data[i + 2] - b) < 12 && data[i + 3] > 200; return n; };
             return [JSON.parse(strip.dataset.values), count(rgb(hue(7))), count(rgb(hue(9)))]";
-        let shown = stage.browser.run(script).await?;
-        for (id, value) in [("7", 2e-4), ("9", 4e-4)] {
-            let found = shown[0][id].as_f64().context("a value")?;
-            ensure!((found - value).abs() < 1e-6, "contact {id}: {found} S");
-        }
-        ensure!(shown[1].as_u64() > Some(5) && shown[2].as_u64() > Some(5), "both lines are drawn: {shown}");
+        let has = |shown: &Value, id, value_s: f64| shown[0][id].as_f64().is_some_and(|s| (s - value_s).abs() < 1e-6);
+        let is_drawn = |line: &Value| line.as_u64() > Some(5);
+        let both = |shown: &Value| {
+            has(shown, "7", 2e-4) && has(shown, "9", 4e-4) && is_drawn(&shown[1]) && is_drawn(&shown[2])
+        };
+        stage.browser.shows(script, both).await?;
         Ok(())
     })
 }
@@ -222,37 +216,35 @@ fn pressed(contact: FoundContact, force_n: f64, deviation_n: f64, is_beyond: boo
     }
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn newtons_are_shown_with_their_error_where_the_detector_has_a_law() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn newtons_are_shown_with_their_error_where_the_detector_has_a_law() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let script = "const cells = [...document.querySelectorAll('#contacts td.value')];
             return [document.getElementById('strength').textContent, ...cells.map((cell) => cell.textContent),
               ...cells.map((cell) => cell.title), JSON.parse(document.getElementById('strip').dataset.values)[4]]";
         stage.behind.contacts(vec![contact(4, [10.0, 0.0], 3e-4)]);
-        settled(&stage).await;
-        let shown = stage.browser.run(script).await?;
-        ensure!(shown[0] == "conductance" && shown[1] == "300\u{2009}µS", "{shown}");
+        stage.browser.shows(script, |shown| shown[0] == "conductance" && shown[1] == "300\u{2009}µS").await?;
         let light = pressed(contact(4, [10.0, 0.0], 3e-4), 0.734, 0.0612, false);
         stage.behind.contacts(vec![light, pressed(contact(5, [-10.0, 0.0], 5e-3), 7.5, 3.0, true)]);
-        settled(&stage).await;
-        let shown = stage.browser.run(script).await?;
-        ensure!(
-            shown[0] == "force" && shown[1] == "734 ± 61\u{2009}mN" && shown[2] == "\u{2273}\u{2009}7.50\u{2009}N",
-            "{shown}"
-        );
-        ensure!(shown[3] == "734 ± 61\u{2009}mN; 300\u{2009}µS", "{shown}");
         let told = "7.50 ± 3.00\u{2009}N, beyond the largest force that can be told; 5.00\u{2009}mS";
-        ensure!(shown[4] == told, "{shown}");
-        ensure!(shown[5].as_f64().is_some_and(|force_n| (force_n - 0.734).abs() < 1e-6), "{shown}");
+        let forces = |shown: &Value| {
+            shown[0] == "force"
+                && shown[1] == "734 ± 61\u{2009}mN"
+                && shown[2] == "\u{2273}\u{2009}7.50\u{2009}N"
+                && shown[3] == "734 ± 61\u{2009}mN; 300\u{2009}µS"
+                && shown[4] == told
+                && shown[5].as_f64().is_some_and(|force_n| (force_n - 0.734).abs() < 1e-6)
+        };
+        stage.browser.shows(script, forces).await?;
         Ok(())
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn the_view_in_space_rises_where_it_is_pressed() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn the_view_in_space_rises_where_it_is_pressed() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         stage.browser.click("view-space").await?;
-        settled(&stage).await;
+        settled(stage).await;
         let script = "const canvas = document.getElementById('space');
             const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
             let top = canvas.height, drawn = 0;
@@ -263,10 +255,10 @@ async fn the_view_in_space_rises_where_it_is_pressed() -> Result<()> {
         ensure!(rest[0].as_f64() > Some(0.1), "the detector covers {} of the picture", rest[0]);
         // Far from the eye, so that it rises over the edge behind.
         stage.behind.contacts(vec![contact(1, [-20.0, 24.0], 1e-3)]);
-        settled(&stage).await;
-        let pressed = stage.browser.run(script).await?;
-        ensure!(pressed[1].as_u64() > rest[1].as_u64().map(|colours| colours + 20), "{pressed} after {rest}");
-        ensure!(pressed[2].as_f64() < rest[2].as_f64(), "{pressed} after {rest}");
+        let rises = |pressed: &Value| {
+            pressed[1].as_u64() > rest[1].as_u64().map(|colours| colours + 20) && pressed[2].as_f64() < rest[2].as_f64()
+        };
+        stage.browser.shows(script, rises).await.with_context(|| format!("after {rest}"))?;
         eprintln!("drawn in {} ms", stage.browser.told().await?.text("drawMs"));
         Ok(())
     })
@@ -281,19 +273,19 @@ const OVERFLOW: &str = "const box = document.getElementById('tools').getBounding
     return [document.documentElement.scrollWidth - innerWidth, document.documentElement.scrollHeight - innerHeight,
       box.bottom - innerHeight, plot.width, wide.join(' ')]";
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn nothing_is_cut_off_on_a_phone_or_a_low_window() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn nothing_is_cut_off_on_a_phone_or_a_low_window() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let at = |i: u32| contact(i + 100, [10.0 * f64::from(i) - 20.0, 5.0], 1e-4);
         let five = (0..5).map(|i| pressed(at(i), 0.123 * f64::from(i + 1), 0.0456, i == 4)).collect();
         stage.behind.contacts(five);
         stage.behind.set(|snapshot| snapshot.baseline = Some("Something pressed at the start.".to_owned()));
         stage.browser.resize(1280, 760).await?;
-        settled(&stage).await;
+        settled(stage).await;
         let low = stage.browser.run(OVERFLOW).await?;
         ensure!(low[0] == 0 && low[1] == 0 && low[4] == "", "{low}");
         ensure!(low[2].as_f64() < Some(0.0) && low[3].as_f64() > Some(380.0), "{low}");
-        phone(&stage).await
+        phone(stage).await
     })
 }
 
@@ -309,19 +301,19 @@ async fn phone(stage: &Stage<Script>) -> Result<()> {
     Ok(())
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn the_board_card_leaves_the_readings_as_they_are() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn the_board_card_leaves_the_readings_as_they_are() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let script = "const map = document.getElementById('readings-map').getBoundingClientRect();
             const card = document.getElementById('readings-card').getBoundingClientRect();
             const board = document.getElementById('details-card').getBoundingClientRect();
             return [map.width, map.height, map.bottom <= card.bottom, card.bottom <= board.top]";
         for (width, height) in [(1280, 760), (1280, 560), (800, 900)] {
             stage.browser.resize(width, height).await?;
-            settled(&stage).await;
+            settled(stage).await;
             let before = stage.browser.run(script).await?;
             stage.browser.run("document.getElementById('details-card').open = true").await?;
-            settled(&stage).await;
+            settled(stage).await;
             let after = stage.browser.run(script).await?;
             ensure!(before == after, "{after} instead of {before}");
             ensure!(after[0] == after[1] && after[0].as_f64() > Some(150.0), "{after}");
@@ -332,9 +324,9 @@ async fn the_board_card_leaves_the_readings_as_they_are() -> Result<()> {
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_silent_board_is_never_live() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn a_silent_board_is_never_live() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let words = "The board has said Hello, and sends no frames: is its firmware stuck?";
         stage.behind.set(|snapshot| snapshot.link = LinkState::Silent(words.to_owned()));
         stage.browser.until("silence", |told| told.text("state") == "silent").await?;
@@ -348,9 +340,9 @@ async fn a_silent_board_is_never_live() -> Result<()> {
     })
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
-    in_front_of!(Script::start(), stage, {
+#[test]
+fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
         let sentence = "Something pressed at the start: let go, and re-zero.";
         stage.behind.set(|snapshot| snapshot.baseline = Some(sentence.to_owned()));
         let errors = Uncertainty { x_m: 0.004, y_m: 0.002, correlation: 0.3, conductance_s: 1e-6 };
@@ -358,19 +350,16 @@ async fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
         let flags = Flags { excluded: vec![3], ..Flags::default() };
         let contacts = vec![contact(1, [10.0, 0.0], 3e-4), blurred];
         stage.behind.solution(Solution { contacts, residual: Some(1.04), flags, ..Solution::default() });
-        settled(&stage).await;
-        let script =
-            "return ['choice', 'residual', 'warnings', 'notice'].map((id) => document.getElementById(id).textContent)";
-        let shown = stage.browser.run(script).await?;
-        ensure!(shown[0] == "2 contacts", "{shown}");
-        ensure!(shown[1].as_str().is_some_and(|text| text.starts_with("residual 1.0 × noise · answer ")), "{shown}");
-        ensure!(shown[2] == "electrode 3 left out" && shown[3] == sentence, "{shown}");
+        stage.browser.says("choice", "2 contacts").await?;
+        stage.browser.says("warnings", "electrode 3 left out").await?;
+        stage.browser.says("notice", sentence).await?;
+        let residual = "return document.getElementById('residual').textContent";
+        let is_told = |shown: &Value| shown.as_str().is_some_and(|s| s.starts_with("residual 1.0 × noise · answer "));
+        stage.browser.shows(residual, is_told).await?;
         let another = "my-skin was calibrated on another board.";
         stage.behind.set(|snapshot| (snapshot.baseline, snapshot.calibration) = (None, Some(another.to_owned())));
-        settled(&stage).await;
-        let script = "const notice = document.getElementById('notice'); return [notice.textContent, notice.className]";
-        let shown = stage.browser.run(script).await?;
-        ensure!(shown[0] == another && shown[1] == "warning", "{shown}");
+        stage.browser.says("notice", another).await?;
+        ensure!(stage.browser.run("return document.getElementById('notice').className").await? == "warning");
         Ok(())
     })
 }
