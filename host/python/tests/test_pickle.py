@@ -29,7 +29,7 @@ def curved(folder):
     lines = [f"v {x} {y} {z}" for rim in rims for x, y, z in rim]
     lines += [f"f {i} {i + 1} {i + 6} {i + 5}" for i in range(1, 5)]
     (folder / "quarter.obj").write_text("\n".join(lines))
-    places = [[x / 1e3, y, z / 1e3] for x, _, z in rims[0] for y in (-0.02, 0.0, 0.02)]
+    places = [[x / 1e3, y, z / 1e3] for x, _, z in rims[0][1:4] for y in (-0.02, 0.0, 0.02)]
     text = f"""
 surface = "quarter.obj"
 surface_unit = "mm"
@@ -45,12 +45,21 @@ diameter_m = 0.002
     return tactomo.Detector(path)
 
 
-def test_detectors_come_back_as_they_were(tmp_path):
+def test_detectors_come_back_as_they_were():
     plain = tactomo.Detector("display-140x70")
     calibrated = tactomo.Detector.from_toml(tactomo.Detector().to_toml() + CALIBRATION)
-    for detector in (plain, plain.as_built(3), calibrated, curved(tmp_path), tactomo.Detector().in_material("BC")):
+    for detector in (plain, plain.as_built(3), calibrated, tactomo.Detector().in_material("BC")):
         assert again(detector) == detector == copy.deepcopy(detector), detector
     assert again(calibrated).calibration.parameters == {"thickness": (0.0125, False), "gain:3": (0.003, True)}
+
+
+def test_a_curved_detector_brings_its_surface(tmp_path):
+    detector = curved(tmp_path)
+    (tmp_path / "quarter.obj").unlink()
+    back = again(detector)
+    # An OBJ file is in its own unit, so that the last bit may differ.
+    assert np.allclose(back.electrodes_m, detector.electrodes_m, atol=1e-12) and back.electrodes == 9
+    assert back.to_toml().count("quarter.obj") == 1 and back.name == detector.name == "quarter"
 
 
 def test_contacts_come_back_as_they_were():
@@ -87,6 +96,6 @@ def test_a_shape_comes_back_as_it_was_and_faults_too(simulator, detector):
     assert solution.shape.kind == "line" and same(again(solution), solution)
     assert repr(again(solution.shape)) == repr(solution.shape)
     broken, solver = tactomo.Simulator(detector, faults=["open:3"]), tactomo.Solver("contacts", detector)
-    for _ in range(200):
-        solution = solver.solve(broken.readings([PRESS]))
+    frames = (solver.solve(broken.readings([PRESS])) for _ in range(1000))
+    solution = next(solution for solution in frames if solution.flags.excluded)
     assert solution.flags.excluded == [3] and same(again(solution), solution)
