@@ -4,6 +4,7 @@
 //! what of that arrives through wires and a converter. Nothing here knows of solvers, boards or files of other programs. Units are
 //! SI, and in the names.
 
+pub mod algebra;
 pub mod causes;
 pub mod detector;
 pub mod forward;
