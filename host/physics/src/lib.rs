@@ -7,6 +7,7 @@
 /// Matrices in this package's signatures are of this version of it.
 pub use nalgebra;
 
+pub mod algebra;
 pub mod baseline;
 pub mod causes;
 pub mod detector;

@@ -14,12 +14,9 @@
 //! the gauge in which the fields' mean under the driving layer is zero, `c0` is that mean, and `-G` with the total conductance `G` of the leak
 //! takes the place of the zero.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
-use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
-use faer::{MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
+use crate::algebra::{Cholesky, gram_of_rows};
 use crate::detector::Detector;
 
 /// Contact unknowns of a detector, in any basis and any scaling of its unknowns.
@@ -31,7 +28,7 @@ pub struct ContactSystem<'a> {
     /// triangle is used.
     pub contacts: DMatrix<f64>,
     /// Fields of the unknowns at the electrodes, and the current to the driving layer that one unit of each carries:
-    /// `K x (n + 1)`.
+    /// `(n + 1) x K`.
     pub cross_and_current: DMatrix<f64>,
     /// Conductance that is spread evenly over the whole surface (S), and of which the fields know already; zero if there is none.
     pub leak_s: f64,
@@ -51,23 +48,16 @@ pub struct Contacted {
 impl ContactSystem<'_> {
     /// The impedance matrix (ohm) by the Cholesky factor `L` of the large block; `None` if that is not positive definite or nothing
     /// leads to the driving layer.
-    pub fn impedance_ohm(mut self) -> Option<DMatrix<f64>> {
-        Some(self.eliminate()?.0)
+    pub fn impedance_ohm(self) -> Option<DMatrix<f64>> {
+        Some(self.eliminate()?.impedance_ohm)
     }
 
     /// The impedance matrix and the unknowns; `None` as for [`impedance_ohm`](Self::impedance_ohm).
-    pub fn solve(mut self) -> Option<Contacted> {
-        let (impedance_ohm, constant_ohm) = self.eliminate()?;
-        let electrodes = self.electrodes.nrows();
-        let mut unknowns = self.cross_and_current;
-        let size = unknowns.nrows();
-        if size > 0 {
-            let factor = MatRef::from_column_major_slice(self.contacts.as_slice(), size, size);
-            let solved = MatMut::from_column_major_slice_mut(unknowns.as_mut_slice(), size, electrodes + 1);
-            solve_upper_triangular_in_place(factor.transpose(), solved, Par::Seq);
-        }
-        let unit = unknowns.column(electrodes).into_owned();
-        let unknowns = -unknowns.columns(0, electrodes) - unit * constant_ohm.transpose();
+    pub fn solve(self) -> Option<Contacted> {
+        let Eliminated { factor, mut rows, impedance_ohm, constant_ohm } = self.eliminate()?;
+        factor.backward(&mut rows);
+        let unit = constant_ohm.len();
+        let unknowns = DMatrix::from_fn(rows.ncols(), unit, |k, e| -rows[(e, k)] - rows[(unit, k)] * constant_ohm[e]);
         Some(Contacted { impedance_ohm, unknowns, constant_ohm })
     }
 
@@ -80,10 +70,11 @@ impl ContactSystem<'_> {
     }
 
     /// Factorises; gives impedances and constants.
-    fn eliminate(&mut self) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        self.factorise()?;
+    fn eliminate(self) -> Option<Eliminated> {
         let electrodes = self.electrodes.nrows();
-        let products = self.cross_and_current.transpose() * &self.cross_and_current;
+        let (factor, mut rows) = (Cholesky::new(self.contacts).ok()?, self.cross_and_current);
+        factor.forward(0, &mut rows);
+        let products = gram_of_rows(&rows);
         let conductance = products[(electrodes, electrodes)] + self.leak_s;
         if !(conductance.is_finite() && conductance > 0.0) {
             return None;
@@ -92,27 +83,19 @@ impl ContactSystem<'_> {
         let missing = DVector::from_fn(electrodes, |e, _| 1.0 - products[(electrodes, e)]);
         let constant_ohm = &missing / conductance;
         let impedance_ohm = DMatrix::from_fn(electrodes, electrodes, |i, j| {
-            self.electrodes[(i, j)] - products[(i, j)] + missing[i] * constant_ohm[j]
+            self.electrodes[(i, j)] - products[(i.max(j), i.min(j))] + missing[i] * constant_ohm[j]
         });
-        Some((impedance_ohm, constant_ohm))
+        Some(Eliminated { factor, rows, impedance_ohm, constant_ohm })
     }
+}
 
-    /// Leaves `L` in place of the contacts' block and `L^-1` times the right sides in their place.
-    fn factorise(&mut self) -> Option<()> {
-        let (size, electrodes) = (self.contacts.nrows(), self.electrodes.nrows());
-        if size == 0 {
-            return Some(());
-        }
-        let block = MatMut::from_column_major_slice_mut(self.contacts.as_mut_slice(), size, size);
-        let mut memory =
-            MemBuffer::try_new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Default::default())).ok()?;
-        let stack = MemStack::new(&mut memory);
-        cholesky_in_place(block, Default::default(), Par::Seq, stack, Default::default()).ok()?;
-        let factor = MatRef::from_column_major_slice(self.contacts.as_slice(), size, size);
-        let right = MatMut::from_column_major_slice_mut(self.cross_and_current.as_mut_slice(), size, electrodes + 1);
-        solve_lower_triangular_in_place(factor, right, Par::Seq);
-        Some(())
-    }
+/// A system whose unknowns are eliminated.
+struct Eliminated {
+    factor: Cholesky,
+    /// `L^-1` times each right side, as a row.
+    rows: DMatrix<f64>,
+    impedance_ohm: DMatrix<f64>,
+    constant_ohm: DVector<f64>,
 }
 
 /// The system of patches of surface that conduct (S, above zero), from the fields between them in any common gauge: between
@@ -135,7 +118,7 @@ pub fn conducting_patches<'a>(
     }
     let current = cross.ncols();
     let cross_and_current =
-        DMatrix::from_fn(scale.len(), current + 1, |k, e| scale[k] * if e == current { 1.0 } else { cross[(k, e)] });
+        DMatrix::from_fn(current + 1, scale.len(), |e, k| scale[k] * if e == current { 1.0 } else { cross[(k, e)] });
     ContactSystem { electrodes, contacts: patches, cross_and_current, leak_s: 0.0 }
 }
 

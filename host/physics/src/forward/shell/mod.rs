@@ -22,10 +22,9 @@ mod tests;
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use faer::Mat;
 use nalgebra::DMatrix;
 
-use self::inverse::{Inverse, Singular};
+use self::inverse::Inverse;
 use self::locate::Locator;
 pub use self::mesh::Mesh;
 use self::spots::{ShellSpots, SpotTable};
@@ -34,6 +33,7 @@ use super::contact::{ContactFields, ContactSystem, conducting_patches};
 use super::driving::DrivingLayer;
 use super::spots::SpotFields;
 use super::{ForwardError, ForwardModel, ImageMesh, check_image, leaks};
+use crate::algebra::NotPositive;
 use crate::detector::{Bond, Detector, Electrode};
 use crate::scene::Contact;
 
@@ -97,14 +97,14 @@ impl Shell {
         if let Some((_, bond)) = detector.bond() {
             return Err(joined_by_dots(detector, &bond));
         }
-        let singular = |_: Singular| singular(detector);
+        let singular = |_: NotPositive| singular(detector);
         let pad_impedance_ohm_m2: Vec<_> =
             detector.electrodes.iter().map(|pad| pad_impedance_ohm_m2(detector, pad)).collect();
         let sheet_conductance_s = detector.sheet_conductance_s();
         let mesh = Mesh::new(detector, nodes)?;
         let sheet_s =
             |triangle| detector.log_unevenness(detector.map_m(mesh.centroid_m(triangle))).exp() * sheet_conductance_s;
-        let system = System::new(&mesh, sheet_s, &pad_impedance_ohm_m2).map_err(singular)?;
+        let system = System::new(&mesh, sheet_s, &pad_impedance_ohm_m2);
         let node_areas_m2 = mesh.node_areas_m2();
         // Ground one pad by some conductance: with no net current none flows there, and the solution is the floating one.
         let factor = system.factorise([(system.pad(0), sheet_conductance_s)]).map_err(singular)?;
@@ -169,15 +169,15 @@ impl Shell {
         Some((conducting_patches(&self.electrode_fields_ohm, &cross, nodes, &conductances_s), conductances_s))
     }
 
-    fn between_nodes(&self) -> Result<BetweenNodes, Singular> {
-        let inverse = self.system.inverse(self.ground())?;
+    fn between_nodes(&self) -> Result<BetweenNodes, NotPositive> {
+        let factor = self.system.factorise([self.ground()])?;
         let areas_m2 = &self.image_mesh.node_areas_m2;
         let area_m2: f64 = areas_m2.iter().sum();
         let evenly = |i: usize| areas_m2.get(i).map_or(0.0, |node_area_m2| node_area_m2 / area_m2);
-        let currents_a = Mat::from_fn(self.system.pad(self.system.pads()), 1, |i, _| evenly(i));
-        let (nodes_ohm, _) = self.system.factorise([self.ground()])?.solve(currents_a);
+        let currents_a = DMatrix::from_fn(self.system.pad(self.system.pads()), 1, |i, _| evenly(i));
+        let (nodes_ohm, _) = factor.solve(currents_a);
         let mean_ohm = nodes_ohm.iter().enumerate().map(|(i, ohm)| evenly(i) * ohm).sum();
-        Ok(BetweenNodes { inverse, means_ohm: nodes_ohm.as_slice().to_vec(), mean_ohm })
+        Ok(BetweenNodes { inverse: factor.inverse(), means_ohm: nodes_ohm.as_slice().to_vec(), mean_ohm })
     }
 
     /// A pad grounded by some conductance (S): with no net current none flows there, and the solution is the floating one.
@@ -242,7 +242,8 @@ impl ForwardModel for Shell {
         let conductances_s = image_s.iter().zip(leaks_s).map(|(image_s, leak_s)| image_s + leak_s);
         let factor = self.system.factorise(conductances_s.enumerate()).map_err(|_| ForwardError::NoContact)?;
         let pads = self.system.pads();
-        let currents_a = Mat::from_fn(self.system.pad(pads), pads, |i, j| f64::from(u8::from(i == self.system.pad(j))));
+        let currents_a =
+            DMatrix::from_fn(self.system.pad(pads), pads, |i, j| f64::from(u8::from(i == self.system.pad(j))));
         let (nodes_ohm, impedance_ohm) = factor.solve(currents_a);
         Ok(ContactFields { impedance_ohm, nodes_ohm })
     }
@@ -338,7 +339,7 @@ fn floating_fields_ohm(
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let area_m2: f64 = node_areas_m2.iter().sum();
     let out_a = |i: usize| node_areas_m2.get(i).map_or(0.0, |node_area_m2| node_area_m2 / area_m2);
-    let mut currents_a = Mat::from_fn(system.pad(system.pads()), count, |i, _| -out_a(i));
+    let mut currents_a = DMatrix::from_fn(system.pad(system.pads()), count, |i, _| -out_a(i));
     for column in 0..count {
         into(column).into_iter().for_each(|(unknown, share)| currents_a[(unknown as usize, column)] += share);
     }

@@ -3,38 +3,36 @@
 //! Unknowns: the potential at each node, then of each pad. With sheet conductance `s` and contact impedance `z`, the energy is
 //! `1/2 int s |grad phi|^2 + 1/2 sum_pads int_pad (phi - U)^2 / z`, hence a symmetric matrix whose only null vector is the constant.
 
-use faer::Side;
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{SparseColMat, SymbolicSparseColMat};
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 
-use super::inverse::{Inverse, Singular};
+use super::inverse::Inverse;
 use super::mesh::Mesh;
+use crate::algebra::{self, NotPositive, Plan};
 use crate::geometry::cross;
 
 /// The matrix of a bare, floating detector, and the plan of its factorisation.
 pub struct System {
     nodes: usize,
     pads: usize,
-    matrix: SparseColMat<u32, f64>,
-    /// Where each unknown's diagonal element is among the matrix's values.
-    diagonal: Vec<usize>,
-    symbolic: SymbolicLlt<u32>,
+    plan: Arc<Plan>,
+    /// Elements of the matrix, those of the diagonal first, a zero for each unknown.
+    values: Vec<f64>,
 }
 
 /// A factorised system: potentials for currents.
 pub struct Factor {
     nodes: usize,
-    factor: Llt<u32, f64>,
+    factor: algebra::Factor,
 }
 
 impl System {
     /// Assembles the matrix; `sheet_s` gives the sheet conductance (S) of a triangle, `pad_impedance_ohm_m2`
     /// that of each pad.
-    pub fn new(mesh: &Mesh, sheet_s: impl Fn([u32; 3]) -> f64, pad_impedance_ohm_m2: &[f64]) -> Result<Self, Singular> {
+    pub fn new(mesh: &Mesh, sheet_s: impl Fn([u32; 3]) -> f64, pad_impedance_ohm_m2: &[f64]) -> Self {
         let (nodes, pads) = (mesh.nodes_m.len(), mesh.pad_triangles.len());
-        let mut entries = Vec::with_capacity(7 * mesh.triangles.len());
+        let mut entries: Vec<Entry> = (0..(nodes + pads) as u32).map(|unknown| ([unknown; 2], 0.0)).collect();
         for &triangle in &mesh.triangles {
             add_sheet(&mut entries, triangle, mesh.corners(triangle), sheet_s(triangle));
         }
@@ -45,28 +43,15 @@ impl System {
                 add_pad(&mut entries, triangle, (nodes + pad) as u32, conductance_s);
             }
         }
-        let (matrix, diagonal) = compress(entries, nodes + pads);
-        let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Lower).map_err(|_| Singular)?;
-        Ok(Self { nodes, pads, matrix, diagonal, symbolic })
+        let (places, values): (Vec<_>, _) = entries.into_iter().unzip();
+        Self { nodes, pads, plan: Plan::new(nodes + pads, &places), values }
     }
 
     /// Factorises the matrix with conductances to ground (S) added to some unknowns: nodes first, then pads.
-    pub fn factorise(&self, to_ground_s: impl IntoIterator<Item = (usize, f64)>) -> Result<Factor, Singular> {
-        let mut matrix = self.matrix.clone();
-        let values = matrix.val_mut();
-        for (unknown, conductance_s) in to_ground_s {
-            values[self.diagonal[unknown]] += conductance_s;
-        }
-        let factor =
-            Llt::try_new_with_symbolic(self.symbolic.clone(), matrix.as_ref(), Side::Lower).map_err(|_| Singular)?;
-        Ok(Factor { nodes: self.nodes, factor })
-    }
-
-    /// Elements of the matrix's inverse, with a conductance to ground (S) added to one unknown.
-    pub fn inverse(&self, (unknown, conductance_s): (usize, f64)) -> Result<Inverse, Singular> {
-        let mut matrix = self.matrix.clone();
-        matrix.val_mut()[self.diagonal[unknown]] += conductance_s;
-        Inverse::new(matrix.as_ref())
+    pub fn factorise(&self, to_ground_s: impl IntoIterator<Item = (usize, f64)>) -> Result<Factor, NotPositive> {
+        let mut values = self.values.clone();
+        to_ground_s.into_iter().for_each(|(unknown, conductance_s)| values[unknown] += conductance_s);
+        Ok(Factor { nodes: self.nodes, factor: self.plan.factorise(&values)? })
     }
 
     /// Number of the unknown that is a pad's potential.
@@ -83,22 +68,23 @@ impl System {
 impl Factor {
     /// Potentials at nodes (`nodes x columns`) and at pads (`pads x columns`) for the currents in each column of
     /// `currents_a` (`nodes + pads` rows).
-    pub fn solve(&self, mut currents_a: faer::Mat<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-        self.factor.solve_in_place(&mut currents_a);
-        let (nodes, columns) = (self.nodes, currents_a.ncols());
-        let pads = currents_a.nrows() - nodes;
-        (
-            DMatrix::from_fn(nodes, columns, |i, j| currents_a[(i, j)]),
-            DMatrix::from_fn(pads, columns, |i, j| currents_a[(nodes + i, j)]),
-        )
+    pub fn solve(&self, mut currents_a: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        self.factor.solve(&mut currents_a);
+        let pads = currents_a.nrows() - self.nodes;
+        (currents_a.rows(0, self.nodes).into_owned(), currents_a.rows(self.nodes, pads).into_owned())
+    }
+
+    /// Elements of the inverse.
+    pub fn inverse(self) -> Inverse {
+        Inverse::new(self.factor)
     }
 }
 
-/// An element of the lower triangle: column, row, value.
-type Entry = (u32, u32, f64);
+/// An element of the matrix, of one of both triangles: where it is, and its value.
+type Entry = ([u32; 2], f64);
 
 fn add(entries: &mut Vec<Entry>, i: u32, j: u32, value: f64) {
-    entries.push((i.min(j), i.max(j), value));
+    entries.push(([i, j], value));
 }
 
 /// Adds a triangle's `s int grad phi_i . grad phi_j`: the gradient of a linear shape function is its opposite edge, turned.
@@ -124,35 +110,4 @@ fn add_pad(entries: &mut Vec<Entry>, nodes: [u32; 3], pad: u32, conductance_s: f
         add(entries, nodes[i], pad, -conductance_s / 3.0);
     }
     add(entries, pad, pad, conductance_s);
-}
-
-/// Sums elements at equal places into a compressed lower triangle; also where its diagonal is.
-fn compress(entries: Vec<Entry>, unknowns: usize) -> (SparseColMat<u32, f64>, Vec<usize>) {
-    let mut columns = vec![0usize; unknowns + 1];
-    for &(column, ..) in &entries {
-        columns[column as usize + 1] += 1;
-    }
-    for column in 0..unknowns {
-        columns[column + 1] += columns[column];
-    }
-    let mut sorted = vec![(0u32, 0.0); entries.len()];
-    let mut next = columns.clone();
-    for (column, row, value) in entries {
-        sorted[next[column as usize]] = (row, value);
-        next[column as usize] += 1;
-    }
-    let (mut starts, mut rows, mut values) = (vec![0u32], Vec::new(), Vec::new());
-    let mut diagonal = Vec::with_capacity(unknowns);
-    for column in 0..unknowns {
-        let part = &mut sorted[columns[column]..columns[column + 1]];
-        part.sort_unstable_by_key(|&(row, _)| row);
-        diagonal.push(rows.len());
-        for same in part.chunk_by(|a, b| a.0 == b.0) {
-            rows.push(same[0].0);
-            values.push(same.iter().map(|&(_, value)| value).sum());
-        }
-        starts.push(rows.len() as u32);
-    }
-    let pattern = SymbolicSparseColMat::new_checked(unknowns, unknowns, starts, None, rows);
-    (SparseColMat::new(pattern, values), diagonal)
 }

@@ -273,7 +273,7 @@ fn one_contact_follows_the_closed_form_of_the_fields() -> Result<(), ForwardErro
     let factor = shell.system.factorise([(shell.system.pad(0), 1e-3)]).map_err(|_| ForwardError::NoContact)?;
     let areas_m2 = &shell.image_mesh.node_areas_m2;
     let area_m2: f64 = areas_m2.iter().sum();
-    let currents_a = Mat::from_fn(shell.system.pad(16), 1, |i, _| {
+    let currents_a = DMatrix::from_fn(shell.system.pad(16), 1, |i, _| {
         f64::from(u8::from(i == node)) - areas_m2.get(i).map_or(0.0, |node_area_m2| node_area_m2 / area_m2)
     });
     let (nodes, _) = factor.solve(currents_a);

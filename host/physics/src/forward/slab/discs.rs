@@ -242,13 +242,13 @@ impl Discs<'_> {
         let electrodes = self.slab.pads.electrodes();
         let size = self.discs.iter().map(|disc| disc.basis.len()).sum();
         let mut contacts = DMatrix::zeros(size, size);
-        let mut cross_and_current = DMatrix::zeros(size, electrodes + 1);
+        let mut cross_and_current = DMatrix::zeros(electrodes + 1, size);
         let mut row = 0;
         for (k, disc) in self.discs.iter().enumerate() {
             let scale = disc.conductance_s.sqrt();
-            cross_and_current[(row, electrodes)] = scale;
-            let cross = &disc.electrodes_ohm * scale;
-            cross_and_current.view_mut((row, 0), cross.shape()).copy_from(&cross);
+            cross_and_current[(electrodes, row)] = scale;
+            let cross = disc.electrodes_ohm.transpose() * scale;
+            cross_and_current.view_mut((0, row), cross.shape()).copy_from(&cross);
             let mut column = 0;
             for (l, other) in self.discs[..=k].iter().enumerate() {
                 let block = &self.between[k * (k + 1) / 2 + l] * (scale * other.conductance_s.sqrt());

@@ -4,12 +4,11 @@
 //! impedance between two cells is four look-ups in a table of differences and sums of their indices, without interpolation.
 //! Nodes lie on the edges too: half a cell and its mirror image in the wall are a whole one.
 
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::DMatrix;
 
 use super::pads::PadFields;
 use super::uneven::{Uneven, uneven_ohm};
+use crate::algebra::gram;
 use crate::forward::ImageMesh;
 use crate::forward::uneven_place::UnevenPlace;
 
@@ -131,24 +130,10 @@ impl CellFields {
 
     /// The lower triangle of the impedances (ohm) between some of the cells and themselves.
     pub fn within(&self, nodes: &[usize]) -> DMatrix<f64> {
-        let corrections = self.corrections.select_columns(nodes);
-        let (rows, count) = corrections.shape();
-        let all = MatRef::from_column_major_slice(corrections.as_slice(), rows, count);
-        let mut fields = DMatrix::zeros(count, count);
-        matmul(
-            MatMut::from_column_major_slice_mut(fields.as_mut_slice(), count, count),
-            BlockStructure::TriangularLower,
-            Accum::Replace,
-            all.transpose(),
-            BlockStructure::Rectangular,
-            all,
-            BlockStructure::Rectangular,
-            -1.0,
-            Par::Seq,
-        );
+        let mut fields = gram(&self.corrections.select_columns(nodes));
         for (column, node) in nodes.iter().enumerate() {
             for (row, other) in nodes.iter().enumerate().skip(column) {
-                fields[(row, column)] += self.without_pads(*node, *other);
+                fields[(row, column)] = self.without_pads(*node, *other) - fields[(row, column)];
             }
         }
         fields

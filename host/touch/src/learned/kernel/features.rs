@@ -1,6 +1,7 @@
 //! What of readings tells the place of a press: their direction, in the dimensions that presses take up, and their size.
 
-use faer::Mat;
+use nalgebra::DMatrix;
+use tactomo_physics::algebra::gram;
 
 use super::points::{Points, dot};
 use super::presses::Presses;
@@ -8,6 +9,8 @@ use crate::solve::fit::balance::balance;
 
 /// Dimensions that hold less of the directions' variance than this share are left out.
 const LEAST_SHARE: f64 = 1e-7;
+/// Steps of the eigenvalues' iteration for each channel, of which it needs a few: without a limit, numbers that are not finite would not end.
+const MOST_STEPS: usize = 100;
 /// Variance that rounding makes of directions that are all alike.
 const ROUNDING: f64 = 1e-28;
 
@@ -43,15 +46,17 @@ impl Features {
             .map(|channel| directions.iter().map(|direction| direction[channel]).sum::<f64>() / count as f64)
             .collect();
         let centred =
-            Mat::from_fn(count, presses.channels, |press, channel| directions[press][channel] - mean[channel]);
-        let decomposed = centred.thin_svd().ok()?;
-        let squares: Vec<f64> = decomposed.S().column_vector().iter().map(|value| value * value).collect();
-        let least = (LEAST_SHARE * squares.iter().sum::<f64>()).max(ROUNDING * count as f64);
-        let kept = squares.iter().take_while(|square| **square > least).count();
-        let axes = (0..kept).flat_map(|axis| decomposed.V().col(axis).iter().copied().collect::<Vec<_>>()).collect();
+            DMatrix::from_fn(count, presses.channels, |press, channel| directions[press][channel] - mean[channel]);
+        let decomposed = gram(&centred).try_symmetric_eigen(f64::EPSILON, MOST_STEPS * presses.channels)?;
+        let mut squares: Vec<_> = decomposed.eigenvalues.iter().zip(decomposed.eigenvectors.column_iter()).collect();
+        squares.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let least = (LEAST_SHARE * decomposed.eigenvalues.sum()).max(ROUNDING * count as f64);
+        let kept = squares.iter().take_while(|(square, _)| **square > least);
+        let axes: Vec<f64> = kept.flat_map(|(_, axis)| axis.iter().copied()).collect();
+        let differ = !axes.is_empty();
         let features = Self { drive_v, mean, axes };
         let described = presses.readings().map(|readings_v| features.describe(readings_v)).collect();
-        (kept > 0).then_some((features, described))
+        differ.then_some((features, described))
     }
 
     /// Number of dimensions.

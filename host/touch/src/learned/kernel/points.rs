@@ -1,8 +1,7 @@
 //! Presses as points: where their directions are, and how large their readings are. How alike two presses are is a kernel of their distance.
 
-use faer::Mat;
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Par};
+use nalgebra::DMatrix;
+use tactomo_physics::algebra::gram_of_rows;
 
 /// Sums that run side by side.
 const LANES: usize = 8;
@@ -107,16 +106,16 @@ impl Points {
         squares
     }
 
-    /// Adds the squares of the distances between some points in some coordinates: they add up over coordinates.
-    pub fn add_squares(&self, squares: &mut Mat<f64>, points: &[usize], coordinates: std::ops::Range<usize>) {
-        let part = Mat::from_fn(points.len(), coordinates.len(), |row, column| {
+    /// Adds the squares of the distances between some points in some coordinates to the lower triangle: they add up over coordinates.
+    pub fn add_squares(&self, squares: &mut DMatrix<f64>, points: &[usize], coordinates: std::ops::Range<usize>) {
+        let part = DMatrix::from_fn(points.len(), coordinates.len(), |row, column| {
             self.coordinates[points[row] * self.dimensions + coordinates.start + column]
         });
-        let norms: Vec<f64> = (0..points.len()).map(|row| part.row(row).squared_norm_l2()).collect();
-        matmul(squares.as_mut(), Accum::Add, part.as_ref(), part.transpose(), -2.0, Par::Seq);
+        let products = gram_of_rows(&part);
+        let norms = products.diagonal();
         for column in 0..points.len() {
-            for row in 0..points.len() {
-                squares[(row, column)] += norms[row] + norms[column];
+            for row in column..points.len() {
+                squares[(row, column)] += norms[row] + norms[column] - 2.0 * products[(row, column)];
             }
         }
     }
@@ -131,13 +130,13 @@ mod tests {
         let coordinates: Vec<f64> = (0..60).map(|i| f64::from(i * i % 17)).collect();
         let points = Points { dimensions: 20, coordinates, log_sizes: vec![0.0; 3] };
         let [few, many] = points.squares_to(points.at(2), 11, 20);
-        let mut squares = Mat::zeros(2, 2);
+        let mut squares = DMatrix::zeros(2, 2);
         for coordinates in [0..11, 11..20] {
             points.add_squares(&mut squares, &[0, 2], coordinates);
         }
         assert_eq!((few[2], many[2]), (0.0, 0.0));
         assert!((many[0] - square(points.at(0), points.at(2))).abs() < 1e-12);
         assert!((few[0] - square(&points.at(0)[..11], &points.at(2)[..11])).abs() < 1e-12);
-        assert!((squares[(0, 1)] - many[0]).abs() < 1e-9 && squares[(1, 1)].abs() < 1e-9);
+        assert!((squares[(1, 0)] - many[0]).abs() < 1e-9 && squares[(1, 1)].abs() < 1e-9);
     }
 }

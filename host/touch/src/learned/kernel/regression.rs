@@ -8,8 +8,8 @@
 //! Noise is the same in all readings, so that it turns the direction of light presses more than that of firm ones: by its share of their size.
 //! The ridge, which stands for the variance of noise, of a press is that of all over the square of its size in medians.
 
-use faer::linalg::triangular_inverse::invert_lower_triangular;
-use faer::{Mat, Par, Side};
+use nalgebra::{DMatrix, DVector};
+use tactomo_physics::algebra::Cholesky;
 
 use super::points::{Likeness, Points};
 
@@ -207,7 +207,7 @@ impl Lesson<'_> {
     /// What leaving one of some presses out says of each choice that can be used; choices rise.
     fn judge(&self, part: &[usize], grid: &Grid, tried: &[Choice], means: &[f64]) -> Vec<(f64, Choice)> {
         let mut judged = Vec::with_capacity(tried.len());
-        let (mut squares, mut summed) = (Mat::zeros(part.len(), part.len()), 0);
+        let (mut squares, mut summed) = (DMatrix::zeros(part.len(), part.len()), 0);
         for alike in tried.chunk_by(|a, b| a[..2] == b[..2]) {
             let likeness = grid.likeness(alike[0]);
             if likeness.components > summed {
@@ -224,16 +224,16 @@ impl Lesson<'_> {
         judged
     }
 
-    fn squares(&self, part: &[usize], components: usize) -> Mat<f64> {
-        let mut squares = Mat::zeros(part.len(), part.len());
+    fn squares(&self, part: &[usize], components: usize) -> DMatrix<f64> {
+        let mut squares = DMatrix::zeros(part.len(), part.len());
         self.points.add_squares(&mut squares, part, 0..components);
         squares
     }
 
     /// The lower half of the kernel's matrix.
-    fn kernel(&self, squares: &Mat<f64>, part: &[usize], likeness: Likeness) -> Mat<f64> {
+    fn kernel(&self, squares: &DMatrix<f64>, part: &[usize], likeness: Likeness) -> DMatrix<f64> {
         let log_sizes: Vec<f64> = part.iter().map(|&press| self.points.log_sizes[press]).collect();
-        Mat::from_fn(part.len(), part.len(), |row, column| {
+        DMatrix::from_fn(part.len(), part.len(), |row, column| {
             if row < column {
                 return 0.0;
             }
@@ -242,24 +242,19 @@ impl Lesson<'_> {
     }
 
     /// Weights, and what is missed of a press that is left out; `None` if the matrix is singular to rounding.
-    fn solve(&self, kernel: &Mat<f64>, part: &[usize], ridge: f64, means: &[f64]) -> Option<Solved> {
+    fn solve(&self, kernel: &DMatrix<f64>, part: &[usize], ridge: f64, means: &[f64]) -> Option<Solved> {
         let (rows, doubts) = (part.len(), doubts(self.points));
         let mut matrix = kernel.clone();
         part.iter().enumerate().for_each(|(row, &press)| matrix[(row, row)] += ridge * doubts[press]);
-        let factor = matrix.llt(Side::Lower).ok()?;
-        let mut inverse = Mat::zeros(rows, rows);
-        invert_lower_triangular(inverse.as_mut(), factor.L(), Par::Seq);
-        let target = |row: usize, target: usize| self.targets[part[row] * self.count + target] - means[target];
-        let weights = inverse.transpose() * (&inverse * Mat::from_fn(rows, self.count, target));
-        let mut missed = vec![0.0; self.count];
-        for row in 0..rows {
-            let diagonal = inverse.col(row).squared_norm_l2();
-            missed.iter_mut().enumerate().for_each(|(target, missed)| {
-                *missed += (weights[(row, target)] / diagonal).powi(2) / rows as f64;
-            });
+        let factor = Cholesky::new(matrix).ok()?;
+        let diagonal = factor.inverse_diagonal();
+        let (mut weights, mut missed) = (vec![0.0; rows * self.count], Vec::with_capacity(self.count));
+        for (target, mean) in means.iter().enumerate() {
+            let mut solved = DVector::from_fn(rows, |row, _| self.targets[part[row] * self.count + target] - mean);
+            factor.solve(&mut solved);
+            missed.push(solved.component_div(&diagonal).norm_squared() / rows as f64);
+            weights.iter_mut().skip(target).step_by(self.count).zip(&solved).for_each(|(to, weight)| *to = *weight);
         }
-        let weights: Vec<f64> =
-            (0..rows).flat_map(|row| weights.row(row).iter().copied().collect::<Vec<_>>()).collect();
         weights.iter().all(|weight| weight.is_finite()).then_some(Solved { weights, missed })
     }
 }

@@ -2,8 +2,6 @@
 
 use std::f64::consts::PI;
 
-use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
-use faer::{MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
 use super::glue::{Face, Unknown, kept};
@@ -92,18 +90,12 @@ impl DotCurrents<'_> {
                 *value += root * currents[ground] * wave(0, mode.m) * wave(1, mode.n);
             }
         }
-        let mut all: DVector<f64> = -pads.column(ground).into_owned();
-        let mut seen = all.rows_mut(*hidden, top.nrows());
-        seen -= top * modal;
+        let mut all: DVector<f64> = -pads.row(ground).transpose();
+        let mut seen = all.rows_mut(*hidden, top.ncols());
+        seen -= top.tr_mul(&modal);
         all.axpy(-root_ohm, through, 1.0);
         all *= ampere;
-        let size = factor.nrows();
-        let transposed = MatRef::from_column_major_slice(factor.as_slice(), size, size).transpose();
-        solve_upper_triangular_in_place(
-            transposed,
-            MatMut::from_column_major_slice_mut(all.as_mut_slice(), size, 1),
-            Par::Seq,
-        );
+        factor.solve_transposed(&mut all);
         Ok(self.dots.iter().map(|dot| dot.current(&all, self.slab)).collect())
     }
 }

@@ -1,15 +1,12 @@
 //! From two stacks of layers, their pads and the dots between them to the fields on the top: see [`super`].
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 use realfft::RealFftPlanner;
 
 use super::Dots;
 use super::glue::Joint;
 use super::transform::means;
+use crate::algebra::Cholesky;
 use crate::forward::slab::disc::DiscBasis;
 use crate::forward::slab::driving::{Covered, Mode};
 use crate::forward::slab::pads::{Eliminated, Pad, PadFields, modes, pad_modes, smallest_m, table_grid, uniform};
@@ -40,11 +37,11 @@ pub(super) struct Joined {
     pub modes: Vec<Mode>,
     /// How many have none.
     pub hidden: usize,
-    pub factor: DMatrix<f64>,
+    pub factor: Cholesky,
     /// `w / sqrt(k)`, and `1 / sqrt(k)`, of the current through all dots.
     pub through: DVector<f64>,
     pub root_ohm: f64,
-    /// `P X` of those that have fields, for the modes on the top, and `P Y`.
+    /// `P X` of those that have fields, a row for each mode on the top, and `P Y`, a row for each pad.
     pub top: DMatrix<f64>,
     pub pads: DMatrix<f64>,
     electrodes_ohm: DMatrix<f64>,
@@ -74,17 +71,16 @@ impl Stacks<'_> {
         let others: Vec<_> = (0..all_ohm.nrows()).filter(|i| !is_pad[*i]).collect();
         let hidden = self.first_seen() - uniform.len();
 
-        let mut factor = all_ohm.select_rows(&others).select_columns(&others);
-        factorise(&mut factor)?;
-        let mut right = all_ohm.select_rows(&others).select_columns(&uniform).insert_column(uniform.len(), 0.0);
-        (0..self.dots.len()).for_each(|dot| right[(self.through(dot) - uniform.len(), uniform.len())] = 1.0);
-        solve_lower(&factor, 0, &mut right);
-        let unit = right.column(uniform.len()).into_owned();
+        let factor = Cholesky::new(all_ohm.select_rows(&others).select_columns(&others)).ok()?;
+        let mut right = all_ohm.select_rows(&uniform).select_columns(&others).insert_row(uniform.len(), 0.0);
+        (0..self.dots.len()).for_each(|dot| right[(uniform.len(), self.through(dot) - uniform.len())] = 1.0);
+        factor.forward(0, &mut right);
+        let unit = right.row(uniform.len()).transpose();
         let root_ohm = 1.0 / unit.norm();
         let through = unit * root_ohm;
-        let mut pads = right.remove_column(uniform.len());
-        let mut top = fields.select_columns(&others[hidden..]).transpose();
-        solve_lower(&factor, hidden, &mut top);
+        let mut pads = right.remove_row(uniform.len());
+        let mut top = fields.select_columns(&others[hidden..]);
+        factor.forward(hidden, &mut top);
 
         let (top_ohm, pads_ohm) = (take_off(&mut top, &through, hidden), take_off(&mut pads, &through, 0));
         Some(Joined {
@@ -210,15 +206,15 @@ impl Stacks<'_> {
 impl Joined {
     /// What is left of pads and dots.
     fn eliminated(&self) -> Eliminated {
-        let seen = self.pads.rows(self.hidden, self.top.nrows());
-        let mut electrodes = &self.direct_ohm - self.top.tr_mul(&seen);
+        let seen = self.pads.columns(self.hidden, self.top.ncols());
+        let mut electrodes = &self.direct_ohm - &self.top * seen.transpose();
         electrodes.column_iter_mut().for_each(|mut column| column -= &self.top_ohm);
         let constant = self.root_ohm * self.root_ohm;
-        let mut electrodes_ohm = &self.electrodes_ohm - self.pads.tr_mul(&self.pads);
+        let mut electrodes_ohm = &self.electrodes_ohm - &self.pads * self.pads.transpose();
         for (f, mut column) in electrodes_ohm.column_iter_mut().enumerate() {
             column.iter_mut().zip(&self.pads_ohm).for_each(|(ohm, e)| *ohm += constant - e - self.pads_ohm[f]);
         }
-        Eliminated { electrodes_ohm, electrodes, correction: compressed(&self.top).transpose() }
+        Eliminated { electrodes_ohm, electrodes, correction: compressed(&self.top.transpose()).transpose() }
     }
 }
 
@@ -231,31 +227,12 @@ fn scale_dots(columns: &mut DMatrix<f64>, places: Option<&[UnevenPlace]>) {
     }
 }
 
-/// Takes the share of `through` off columns that begin with its entry `first`; returns what it was of each.
-fn take_off(columns: &mut DMatrix<f64>, through: &DVector<f64>, first: usize) -> DVector<f64> {
-    let along = through.rows(first, columns.nrows());
-    let shares = columns.tr_mul(&along);
-    columns.ger(-1.0, &along, &shares, 1.0);
+/// Takes the share of `through` off rows that begin with its entry `first`; returns what it was of each.
+fn take_off(rows: &mut DMatrix<f64>, through: &DVector<f64>, first: usize) -> DVector<f64> {
+    let along = through.rows(first, rows.ncols());
+    let shares = &*rows * along;
+    rows.ger(-1.0, &shares, &along, 1.0);
     shares
-}
-
-/// Puts Cholesky's factor in place of a matrix; `None` if that is not positive definite.
-fn factorise(matrix: &mut DMatrix<f64>) -> Option<()> {
-    let size = matrix.nrows();
-    let mut memory = MemBuffer::try_new(cholesky_in_place_scratch::<f64>(size, Par::Seq, Default::default())).ok()?;
-    let block = MatMut::from_column_major_slice_mut(matrix.as_mut_slice(), size, size);
-    cholesky_in_place(block, Default::default(), Par::Seq, MemStack::new(&mut memory), Default::default()).ok()?;
-    Some(())
-}
-
-/// Solves with the rows and columns of a factor from `first` on, in place.
-fn solve_lower(factor: &DMatrix<f64>, first: usize, right: &mut DMatrix<f64>) {
-    let size = factor.nrows();
-    let factor = MatRef::from_column_major_slice(factor.as_slice(), size, size);
-    let part = factor.submatrix(first, first, size - first, size - first);
-    let (rows, columns) = right.shape();
-    let right = MatMut::from_column_major_slice_mut(right.as_mut_slice(), rows, columns);
-    solve_lower_triangular_in_place(part, right, Par::Seq);
 }
 
 /// As few rows as give nearly the same products of columns, by Cholesky's factorisation with pivots: what is left out of `A^T A` is positive

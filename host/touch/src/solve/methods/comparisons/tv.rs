@@ -7,10 +7,8 @@
 //! by a weight of its own. A step solves with one sparse matrix for 16 right sides, since readings have no more dimensions
 //! ([`crate::solve::fit::linear`]).
 
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{Argsort, Pair, SparseColMat, SymbolicSparseColMat};
-use faer::{Mat, Side};
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::solve::answer::{Flags, Solution, SolveError};
@@ -20,6 +18,7 @@ use crate::solve::fit::locate::Locator;
 use crate::solve::fit::stiffness::stiffness;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
+use tactomo_physics::algebra::Plan;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
 use tactomo_physics::readings::Readings;
@@ -52,16 +51,9 @@ pub struct Tv {
     /// Nodes and stiffness of each triangle.
     triangles: Vec<([usize; 3], [[f64; 3]; 3])>,
     triangle_areas_m2: Vec<f64>,
-    pattern: Pattern,
+    plan: Arc<Plan>,
     to_image: Interpolation,
     locator: Locator,
-}
-
-/// Where elements of triangles and nodes are in the sparse matrix, and how it is factorised.
-struct Pattern {
-    columns: SymbolicSparseColMat<u32>,
-    order: Argsort<u32>,
-    factorisation: SymbolicLlt<u32>,
 }
 
 impl Tv {
@@ -73,10 +65,6 @@ impl Tv {
         let coarse = problem.model.on_image_of(NODES)?;
         let jacobian = Jacobian { detector: problem.detector().clone(), ..Jacobian::of(&*coarse) };
         let mesh = &jacobian.image_mesh;
-        let singular = || ForwardError::Detector {
-            detector: jacobian.detector.name.clone(),
-            what: "the image's mesh has triangles without area; use solver tikhonov".to_owned(),
-        };
         let decomposition = Decomposition::of(&jacobian);
         let mut operator = decomposition.images.transpose();
         for (mut row, value) in operator.row_iter_mut().zip(&decomposition.singular_values) {
@@ -97,7 +85,7 @@ impl Tv {
             areas_m2: mesh.node_areas_m2.clone(),
             triangles: mesh.triangles.iter().map(triangle).collect(),
             triangle_areas_m2: mesh.triangle_areas_m2(),
-            pattern: Pattern::new(mesh).ok_or_else(singular)?,
+            plan: plan(mesh),
             to_image: Interpolation::new(mesh, shown),
             locator: Locator::new(shown, &jacobian.detector),
         })
@@ -130,11 +118,10 @@ impl Tv {
         let on_triangles = self.triangles.iter().zip(smoothness).flat_map(|((_, stiffness), weight)| {
             (0..9).filter(|at| at / 3 >= at % 3).map(move |at| self.length2_m2 * weight * stiffness[at / 3][at % 3])
         });
-        let factor = self.pattern.factorise(on_nodes.chain(on_triangles).collect())?;
-        let (rank, nodes) = self.operator.shape();
-        let mut smoothed = Mat::from_fn(nodes, rank, |node, row| self.operator[(row, node)]);
-        factor.solve_in_place(&mut smoothed);
-        let smoothed = DMatrix::from_fn(nodes, rank, |node, row| smoothed[(node, row)]);
+        let factor = self.plan.factorise(&on_nodes.chain(on_triangles).collect::<Vec<_>>()).ok()?;
+        let mut smoothed = self.operator.transpose();
+        factor.solve(&mut smoothed);
+        let rank = self.operator.nrows();
         let normal = &self.operator * &smoothed + DMatrix::identity(rank, rank) * self.lambda2;
         let image = smoothed * normal.cholesky()?.solve(b);
         image.iter().all(|value| value.is_finite()).then_some(image)
@@ -185,27 +172,15 @@ impl Solver for Tv {
     }
 }
 
-impl Pattern {
-    /// Of a diagonal, then the lower triangles of a mesh's triangles.
-    fn new(mesh: &ImageMesh) -> Option<Self> {
-        let nodes = mesh.nodes_m.len();
-        let diagonal = (0..nodes as u32).map(|node| Pair::new(node, node));
-        let of = |triangle: &[u32; 3]| {
-            let [nodes, others] = [*triangle; 2];
-            let elements = (0..9).filter(|at| at / 3 >= at % 3);
-            elements.map(move |at| (nodes[at / 3], others[at % 3])).map(|(i, j)| Pair::new(i.max(j), i.min(j)))
-        };
-        let elements: Vec<_> = diagonal.chain(mesh.triangles.iter().flat_map(of)).collect();
-        let (columns, order) = SymbolicSparseColMat::try_new_from_indices(nodes, nodes, &elements).ok()?;
-        let factorisation = SymbolicLlt::try_new(columns.as_ref(), Side::Lower).ok()?;
-        Some(Self { columns, order, factorisation })
-    }
-
-    /// The factor of the matrix with such elements, in the order of [`new`](Self::new).
-    fn factorise(&self, elements: Vec<f64>) -> Option<Llt<u32, f64>> {
-        let matrix = SparseColMat::new_from_argsort(self.columns.clone(), &self.order, &elements).ok()?;
-        Llt::try_new_with_symbolic(self.factorisation.clone(), matrix.as_ref(), Side::Lower).ok()
-    }
+/// For a diagonal, then the lower triangles of a mesh's triangles.
+fn plan(mesh: &ImageMesh) -> Arc<Plan> {
+    let nodes = mesh.nodes_m.len();
+    let diagonal = (0..nodes as u32).map(|node| [node; 2]);
+    let of = |nodes: &[u32; 3]| {
+        let nodes = *nodes;
+        (0..9).filter(|at| at / 3 >= at % 3).map(move |at| [nodes[at / 3], nodes[at % 3]])
+    };
+    Plan::new(nodes, &diagonal.chain(mesh.triangles.iter().flat_map(of)).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

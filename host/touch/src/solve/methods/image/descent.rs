@@ -7,12 +7,11 @@
 //! ratio of the gain to that foretold, Nielsen, "Damping parameter in Marquardt's method", 1999). Nodes whose conductance
 //! vanishes drop out, and come back where the sum would fall with more: so a step costs what the touched surface costs.
 
-use faer::linalg::solvers::{DenseSolveCore, Solve};
-use faer::{Mat, MatRef, Side};
 use nalgebra::{DMatrix, DVector};
 
 use super::Target;
 use super::data::Data;
+use tactomo_physics::algebra::{Cholesky, gram, gram_of_rows};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ContactFields, Patches, readings_v};
 
@@ -156,7 +155,7 @@ struct Linear {
     pull: DVector<f64>,
     sparsity: f64,
     /// `A' A` or, if the data are fewer, `A A'`: lower triangle.
-    squares: Mat<f64>,
+    squares: DMatrix<f64>,
 }
 
 /// A step that was worth it.
@@ -181,7 +180,7 @@ impl Linear {
             data.derivative(&image.fields, node, 2.0 * root * scene.unit_s[node], column.as_mut_slice());
         }
         let pull = derivatives.tr_mul(&data.residual) - &roots * scene.sparsity;
-        let squares = squares(&derivatives);
+        let squares = if nodes.len() <= data.len() { gram(&derivatives) } else { gram_of_rows(&derivatives) };
         let all = image.roots.clone();
         Self { nodes, roots, all, derivatives, pull, sparsity: scene.sparsity, squares }
     }
@@ -198,12 +197,11 @@ impl Linear {
         let mut matrix = self.squares.clone();
         (0..size).for_each(|i| matrix[(i, i)] += self.sparsity);
         let prior = self.sparsity * self.roots.norm_squared();
-        let Ok(factor) = matrix.llt(Side::Lower) else {
+        let Ok(factor) = Cholesky::new(matrix) else {
             return Complexity { determined: size as f64, price: f64::INFINITY };
         };
-        let (lower, inverse) = (factor.L(), factor.inverse());
-        let over_prior: f64 = (0..size).map(|i| 2.0 * lower[(i, i)].ln() - self.sparsity.ln()).sum();
-        let left: f64 = (0..size).map(|i| self.sparsity * inverse[(i, i)]).sum();
+        let over_prior: f64 = factor.diagonal().iter().map(|l| 2.0 * l.ln() - self.sparsity.ln()).sum();
+        let left = self.sparsity * factor.inverse_diagonal().sum();
         Complexity { determined: size as f64 - left, price: prior + over_prior }
     }
 
@@ -213,18 +211,16 @@ impl Linear {
         let ridge = self.sparsity + damping;
         let mut matrix = self.squares.clone();
         (0..matrix.nrows()).for_each(|i| matrix[(i, i)] += ridge);
-        let factor = matrix.llt(Side::Lower).ok()?;
-        let solve = |right: &DVector<f64>| {
-            let mut solved = right.clone();
-            let rows = solved.len();
-            factor.solve_in_place(faer::MatMut::from_column_major_slice_mut(solved.as_mut_slice(), rows, 1));
-            solved
+        let factor = Cholesky::new(matrix).ok()?;
+        let solved = |mut right: DVector<f64>| {
+            factor.solve(&mut right);
+            right
         };
         let mut step = if nodes <= data {
-            solve(&self.pull)
+            solved(self.pull.clone())
         } else {
             // (A' A + r)^-1 b = (b - A' (A A' + r)^-1 A b) / r.
-            (&self.pull - self.derivatives.tr_mul(&solve(&(&self.derivatives * &self.pull)))) / ridge
+            (&self.pull - self.derivatives.tr_mul(&solved(&self.derivatives * &self.pull))) / ridge
         };
         let largest = step.amax();
         if largest > LARGEST_STEP {
@@ -247,25 +243,4 @@ impl Linear {
         let foretold = 2.0 * self.pull.dot(step) - along.norm_squared() - self.sparsity * step.norm_squared();
         (sum < now).then(|| Gain { image, sum, ratio: (now - sum) / foretold.max(f64::MIN_POSITIVE) })
     }
-}
-
-/// `A' A` or `A A'`, the smaller.
-fn squares(matrix: &DMatrix<f64>) -> Mat<f64> {
-    let (rows, columns) = matrix.shape();
-    let whole = MatRef::from_column_major_slice(matrix.as_slice(), rows, columns);
-    let (left, right) = if columns <= rows { (whole.transpose(), whole) } else { (whole, whole.transpose()) };
-    let size = rows.min(columns);
-    let mut product = Mat::zeros(size, size);
-    faer::linalg::matmul::triangular::matmul(
-        product.as_mut(),
-        faer::linalg::matmul::triangular::BlockStructure::TriangularLower,
-        faer::Accum::Replace,
-        left,
-        faer::linalg::matmul::triangular::BlockStructure::Rectangular,
-        right,
-        faer::linalg::matmul::triangular::BlockStructure::Rectangular,
-        1.0,
-        faer::Par::Seq,
-    );
-    product
 }

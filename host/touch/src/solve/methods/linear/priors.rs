@@ -9,14 +9,11 @@
 //! from it have Matern's covariance of smoothness 1 (Lindgren, Rue and Lindstrom, "An explicit link between Gaussian fields and
 //! Gaussian Markov random fields", 2011). Nothing flows over the edge, so images need not vanish there.
 
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::Llt;
-use faer::sparse::{SparseColMat, Triplet};
-use faer::{Mat, Side};
 use nalgebra::DMatrix;
 
 use crate::solve::fit::linear::Decomposition;
 use crate::solve::fit::stiffness::stiffness;
+use tactomo_physics::algebra::{Factor, NotPositive, Plan};
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
 
@@ -41,7 +38,7 @@ pub(super) fn smoothness(jacobian: &Jacobian) -> Result<Decomposition, ForwardEr
     let mesh = &jacobian.image_mesh;
     let area_m2: f64 = mesh.node_areas_m2.iter().sum();
     let length2_m2 = LENGTH * LENGTH * area_m2 / jacobian.electrodes() as f64;
-    let factor = factorise(mesh, length2_m2).ok_or_else(|| ForwardError::Detector {
+    let factor = factorise(mesh, length2_m2).map_err(|_| ForwardError::Detector {
         detector: jacobian.detector.name.clone(),
         what: "the image's mesh has triangles without area; use solver tikhonov".to_owned(),
     })?;
@@ -68,29 +65,26 @@ fn squares(jacobian: &Jacobian) -> Vec<f64> {
 }
 
 /// `H^-1 A H^-1` times columns.
-fn smoothed(factor: &Llt<u32, f64>, mesh: &ImageMesh, sources: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut columns = Mat::from_fn(sources.nrows(), sources.ncols(), |node, source| sources[(node, source)]);
-    factor.solve_in_place(&mut columns);
-    let mut columns = Mat::from_fn(columns.nrows(), columns.ncols(), |node, source| {
-        mesh.node_areas_m2[node] * columns[(node, source)]
-    });
-    factor.solve_in_place(&mut columns);
-    DMatrix::from_fn(columns.nrows(), columns.ncols(), |node, source| columns[(node, source)])
+fn smoothed(factor: &Factor, mesh: &ImageMesh, sources: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut columns = sources.clone();
+    factor.solve(&mut columns);
+    for (mut row, area_m2) in columns.row_iter_mut().zip(&mesh.node_areas_m2) {
+        row *= *area_m2;
+    }
+    factor.solve(&mut columns);
+    columns
 }
 
 /// The factorised `H`.
-fn factorise(mesh: &ImageMesh, length2_m2: f64) -> Option<Llt<u32, f64>> {
-    let mut elements: Vec<_> =
-        mesh.node_areas_m2.iter().enumerate().map(|(i, &area_m2)| Triplet::new(i as u32, i as u32, area_m2)).collect();
-    for &triangle in &mesh.triangles {
-        let stiffness = stiffness(triangle.map(|node| mesh.place_m(node as usize)));
-        for (i, row) in stiffness.iter().enumerate() {
-            let of_row = |j: usize| Triplet::new(triangle[i], triangle[j], length2_m2 * row[j]);
-            elements.extend((0..3).map(of_row));
-        }
-    }
-    let nodes = mesh.nodes_m.len();
-    SparseColMat::try_new_from_triplets(nodes, nodes, &elements).ok()?.sp_cholesky(Side::Lower).ok()
+fn factorise(mesh: &ImageMesh, length2_m2: f64) -> Result<Factor, NotPositive> {
+    let on_nodes = mesh.node_areas_m2.iter().enumerate().map(|(node, area_m2)| ([node as u32; 2], *area_m2));
+    let on_triangle = |&nodes: &[u32; 3]| {
+        let stiffness = stiffness(nodes.map(|node| mesh.place_m(node as usize)));
+        let lower = (0..9).map(|at| (at / 3, at % 3)).filter(|(i, j)| i >= j);
+        lower.map(move |(i, j)| ([nodes[i], nodes[j]], length2_m2 * stiffness[i][j]))
+    };
+    let (places, elements): (Vec<_>, Vec<_>) = on_nodes.chain(mesh.triangles.iter().flat_map(on_triangle)).unzip();
+    Plan::new(mesh.nodes_m.len(), &places).factorise(&elements)
 }
 
 #[cfg(test)]
