@@ -8,7 +8,7 @@
 
 use tactomo_physics::rest::RestSum;
 
-use super::judge::{Change, Judge};
+use super::classifier::{Change, RestClassifier};
 use super::state::LASTING_S;
 use crate::baseline::FRAMES;
 
@@ -60,10 +60,17 @@ impl Following {
     }
 
     /// Looks at the mean of some frames (V) at a time (s); `rest_v` is the baseline.
-    pub fn see(&mut self, judge: &Judge, rest_v: &[f64], readings_v: &[f64], frames: u32, time_s: f64) -> Seen {
+    pub fn see(
+        &mut self,
+        classifier: &RestClassifier,
+        rest_v: &[f64],
+        readings_v: &[f64],
+        frames: u32,
+        time_s: f64,
+    ) -> Seen {
         // A recording that is played again goes back in time.
         let away_s = (time_s - self.rest_s).max(0.0);
-        let change = judge.change(&less(readings_v, rest_v), frames, away_s);
+        let change = classifier.change(&less(readings_v, rest_v), frames, away_s);
         self.less = if change == Change::Less { self.less + frames } else { 0 };
         match change {
             Change::Touch => self.touch(time_s),
@@ -77,9 +84,9 @@ impl Following {
                 }
                 self.block.add(readings_v, frames);
                 // What is hardly known need not be looked at for long.
-                let enough = self.worth_after(judge, away_s).min(f64::from(FRAMES));
+                let enough = self.worth_after(classifier, away_s).min(f64::from(FRAMES));
                 let is_whole = f64::from(self.block.frames()) >= enough || (time_s - self.begun_s).abs() >= BLOCK_S;
-                if is_whole { self.settle(judge, rest_v, time_s) } else { Seen::Nothing }
+                if is_whole { self.settle(classifier, rest_v, time_s) } else { Seen::Nothing }
             }
         }
     }
@@ -95,29 +102,29 @@ impl Following {
     }
 
     /// A whole block: the baseline goes towards its mean unless that shows a touch.
-    fn settle(&mut self, judge: &Judge, rest_v: &[f64], time_s: f64) -> Seen {
+    fn settle(&mut self, classifier: &RestClassifier, rest_v: &[f64], time_s: f64) -> Seen {
         let block = std::mem::take(&mut self.block);
         let (block_v, frames) = (block.mean_v(), f64::from(block.frames()));
         let change_v = less(&block_v, rest_v);
         let away_s = (time_s - self.rest_s).max(0.0);
-        match judge.change(&change_v, block.frames(), away_s) {
+        match classifier.change(&change_v, block.frames(), away_s) {
             Change::Touch => return self.touch(time_s),
             // Single frames decide.
             Change::Less => return Seen::Nothing,
             Change::Rest => {}
         }
-        let share = self.share(judge, frames, away_s);
+        let share = self.share(classifier, frames, away_s);
         let mean_v: Vec<f64> = rest_v.iter().zip(&change_v).map(|(rest, change)| rest + share * change).collect();
         (self.rest_s, self.touched_s) = (time_s, None);
-        if let Some(place_m) = judge.drifted(&less(&mean_v, &self.taken_v)) {
+        if let Some(place_m) = classifier.drifted(&less(&mean_v, &self.taken_v)) {
             return Seen::Drifted(place_m);
         }
         Seen::Rest { mean_v, frames: self.worth }
     }
 
     /// How far the baseline goes towards the mean of so many frames, which it has not seen for `away_s` (s).
-    fn share(&mut self, judge: &Judge, frames: f64, away_s: f64) -> f64 {
-        self.worth = self.worth_after(judge, away_s);
+    fn share(&mut self, classifier: &RestClassifier, frames: f64, away_s: f64) -> f64 {
+        self.worth = self.worth_after(classifier, away_s);
         let by_frames = frames / (self.worth + frames);
         let is_sure = self.worth + frames > BEHIND;
         self.worth = (self.worth + frames).min(BEHIND);
@@ -125,8 +132,8 @@ impl Following {
     }
 
     /// Frames that the baseline is worth after so long without a look at the detector at rest (s).
-    fn worth_after(&self, judge: &Judge, away_s: f64) -> f64 {
-        let adc = &judge.detector().adc;
+    fn worth_after(&self, classifier: &RestClassifier, away_s: f64) -> f64 {
+        let adc = &classifier.detector().adc;
         let drift = DRIFT_CODES_PER_S * away_s * adc.lsb_v() / adc.deviation_v();
         1.0 / (1.0 / self.worth + drift * drift)
     }

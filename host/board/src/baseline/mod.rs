@@ -6,8 +6,8 @@
 //! Under load it stays as it was. What it cannot decide, a person is asked ([`BaselineState::notice`]). Live, of recordings and of tables it
 //! is the same; where a person has said which frames are the baseline ([`Baseline::told`]), it is neither judged nor followed.
 
+mod classifier;
 mod follow;
-mod judge;
 mod rest_rounds;
 mod state;
 #[cfg(test)]
@@ -15,8 +15,8 @@ mod tests;
 
 use std::sync::Arc;
 
+use self::classifier::{Absolute, RestClassifier};
 use self::follow::Following;
-use self::judge::{Absolute, Judge};
 use self::rest_rounds::RestRounds;
 pub use self::state::{BaselineState, LASTING_S};
 use tactomo_physics::forward::jacobian::Jacobian;
@@ -48,7 +48,7 @@ pub struct Baseline {
 /// A detector whose baseline is taken.
 #[derive(Clone, Debug)]
 struct Known {
-    judge: Judge,
+    classifier: RestClassifier,
     /// Conversions that a reading is the mean of.
     conversions: u32,
     following: Following,
@@ -87,7 +87,8 @@ impl Baseline {
 
     fn of(jacobian: Arc<Jacobian>, conversions: u32, frames: u32, is_told: bool) -> Self {
         let readings = jacobian.electrodes().pow(2);
-        let known = Known { judge: Judge::new(jacobian), conversions, following: Following::default(), is_told };
+        let known =
+            Known { classifier: RestClassifier::new(jacobian), conversions, following: Following::default(), is_told };
         Self { known: Some(known), ..Self::over(frames, readings) }
     }
 
@@ -137,7 +138,7 @@ impl Baseline {
         }
         let before = self.state;
         if let Some(known) = &mut self.known {
-            known.judge.leave_out(left_out);
+            known.classifier.leave_out(left_out);
         }
         match self.taking.take() {
             Some(taking) => self.take(taking, readings_v, frames, time_s),
@@ -162,7 +163,7 @@ impl Baseline {
     fn take(&mut self, mut taking: Taking, readings_v: &[f64], frames: u32, time_s: f64) {
         let asked = taking.asked;
         let judged = |readings_v: &[f64], frames: u32| match &self.known {
-            Some(known) if !known.is_told => known.judge.absolute(readings_v, frames, asked),
+            Some(known) if !known.is_told => known.classifier.absolute(readings_v, frames, asked),
             _ => Absolute::Rest,
         };
         // A press that begins in the last of the frames hardly shows in their mean.
@@ -184,12 +185,12 @@ impl Baseline {
     fn hold(&mut self, sum: &RestSum, time_s: f64, state: BaselineState) {
         (self.state, self.held) = (state, true);
         match &mut self.known {
-            Some(Known { judge, conversions, following, is_told }) => {
-                self.rest = sum.rest(&judge.detector().adc, judge.detector().ground_v, *conversions);
+            Some(Known { classifier, conversions, following, is_told }) => {
+                self.rest = sum.rest(&classifier.detector().adc, classifier.detector().ground_v, *conversions);
                 // Of frames that a person has called rest although something presses in them, nothing but the mean is known.
-                let presses = || matches!(judge.absolute(&sum.mean_v(), sum.frames(), true), Absolute::Pressed(_));
+                let presses = || matches!(classifier.absolute(&sum.mean_v(), sum.frames(), true), Absolute::Pressed(_));
                 let is_rest = !*is_told || !presses();
-                self.leakage_sheets = if is_rest { judge.leakage_sheets(self.rest.offset_v()) } else { 0.0 };
+                self.leakage_sheets = if is_rest { classifier.leakage_sheets(self.rest.offset_v()) } else { 0.0 };
                 *following = Following::from(self.rest.mean_v().to_vec(), sum.frames(), time_s);
             }
             None => self.rest.set(sum.mean_v(), f64::from(sum.frames())),
@@ -211,8 +212,8 @@ impl Baseline {
 
     /// Follows what drifts while nothing touches.
     fn follow(&mut self, readings_v: &[f64], frames: u32, time_s: f64) {
-        let Some(Known { judge, conversions, following, is_told: false }) = &mut self.known else { return };
-        let seen = following.see(judge, self.rest.mean_v(), readings_v, frames, time_s);
+        let Some(Known { classifier, conversions, following, is_told: false }) = &mut self.known else { return };
+        let seen = following.see(classifier, self.rest.mean_v(), readings_v, frames, time_s);
         match seen {
             follow::Seen::Nothing => {}
             follow::Seen::Lasting => self.state = BaselineState::Lasting,
@@ -220,7 +221,7 @@ impl Baseline {
             follow::Seen::Less => self.taking = Some(Taking::new(FRAMES, false)),
             follow::Seen::Rest { mean_v, frames } => {
                 self.rest.set(mean_v, frames * f64::from(*conversions));
-                self.leakage_sheets = judge.leakage_sheets(self.rest.offset_v());
+                self.leakage_sheets = classifier.leakage_sheets(self.rest.offset_v());
                 if !matches!(self.state, BaselineState::Doubtful(_)) {
                     self.state = BaselineState::Held;
                 }
@@ -239,7 +240,7 @@ impl Baseline {
         }
         self.rest.subtract(readings_v, touch_v);
         if let Some(known) = self.known.as_ref().filter(|_| self.leakage_sheets > LEAKAGE) {
-            known.judge.leakage().take_off(touch_v, self.leakage_sheets);
+            known.classifier.leakage().take_off(touch_v, self.leakage_sheets);
         }
     }
 }

@@ -44,7 +44,7 @@ fn contact_v(sheets: f64) -> Vec<f64> {
 }
 
 /// A detector and its baseline.
-struct Bench {
+struct Fixture {
     baseline: Baseline,
     noise: Noise,
     /// Offsets of the channels (codes), and readings by leakage (V), which drift by a factor.
@@ -56,7 +56,7 @@ struct Bench {
     step_s: f64,
 }
 
-impl Bench {
+impl Fixture {
     /// With leakage of so many sheet conductances.
     fn new(step_s: f64, leakage: f64) -> Self {
         // From -2.5 to 3.5 codes.
@@ -114,14 +114,14 @@ impl Bench {
 #[test]
 fn offsets_and_leakage_are_the_baseline() {
     for leakage in [0.0, 0.01, 0.05] {
-        let mut bench = Bench::new(1e-3, leakage);
-        assert!(bench.rest(FRAMES), "it is taken");
-        assert_eq!((bench.baseline.state(), bench.baseline.state().notice()), (BaselineState::Held, None));
+        let mut fixture = Fixture::new(1e-3, leakage);
+        assert!(fixture.rest(FRAMES), "it is taken");
+        assert_eq!((fixture.baseline.state(), fixture.baseline.state().notice()), (BaselineState::Held, None));
         // Noise of 32 frames; of offsets far below zero nothing is seen.
-        assert!(bench.error_lsb() < 0.6, "{leakage}: {}", bench.error_lsb());
-        assert!((bench.baseline.leakage_sheets() - leakage).abs() < 0.03 * leakage + 3e-4);
-        bench.rest(20 * FRAMES);
-        assert!(bench.error_lsb() < 0.4, "{leakage}: {}", bench.error_lsb());
+        assert!(fixture.error_lsb() < 0.6, "{leakage}: {}", fixture.error_lsb());
+        assert!((fixture.baseline.leakage_sheets() - leakage).abs() < 0.03 * leakage + 3e-4);
+        fixture.rest(20 * FRAMES);
+        assert!(fixture.error_lsb() < 0.4, "{leakage}: {}", fixture.error_lsb());
     }
 }
 
@@ -146,14 +146,14 @@ fn leakage_of_a_detector_that_is_not_as_described_is_told_from_touch_and_mostly_
     for seed in 0..6 {
         for sheets in [0.01, 0.05] {
             let built = as_built(seed);
-            let mut bench = Bench { leakage_v: leaking_v(&built, sheets, &[]), ..Bench::new(1e-3, 0.0) };
-            bench.rest(10 * FRAMES);
-            assert_eq!(bench.baseline.state(), BaselineState::Held, "{seed} {sheets}");
+            let mut fixture = Fixture { leakage_v: leaking_v(&built, sheets, &[]), ..Fixture::new(1e-3, 0.0) };
+            fixture.rest(10 * FRAMES);
+            assert_eq!(fixture.baseline.state(), BaselineState::Held, "{seed} {sheets}");
             let press = [Contact::flat(HERE[0], HERE[1], 0.003, built.sheet_conductance_s())];
             let (touch_v, both_v) = (leaking_v(&built, 0.0, &press), leaking_v(&built, sheets, &press));
-            let besides_v: Vec<f64> = both_v.iter().zip(&bench.leakage_v).map(|(both, rest)| both - rest).collect();
-            let (both_v, mut found_v) = (bench.true_v(&besides_v), vec![0.0; 256]);
-            bench.baseline.subtract(&both_v, &mut found_v);
+            let besides_v: Vec<f64> = both_v.iter().zip(&fixture.leakage_v).map(|(both, rest)| both - rest).collect();
+            let (both_v, mut found_v) = (fixture.true_v(&besides_v), vec![0.0; 256]);
+            fixture.baseline.subtract(&both_v, &mut found_v);
             let off = |volts: &[f64]| volts.iter().zip(&touch_v).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
             // Two or three in a hundred of a detector that is as described.
             let share = (off(&found_v) / off(&besides_v)).sqrt();
@@ -164,159 +164,168 @@ fn leakage_of_a_detector_that_is_not_as_described_is_told_from_touch_and_mostly_
 
 #[test]
 fn until_it_is_taken_the_mean_of_what_has_come_is_taken_off() {
-    let mut bench = Bench::new(1e-3, 0.02);
-    bench.rest(FRAMES / 2);
-    let (frame_v, mut touch_v) = (bench.measured_v(&[0.0; 256]), vec![0.0; 256]);
-    bench.baseline.subtract(&frame_v, &mut touch_v);
+    let mut fixture = Fixture::new(1e-3, 0.02);
+    fixture.rest(FRAMES / 2);
+    let (frame_v, mut touch_v) = (fixture.measured_v(&[0.0; 256]), vec![0.0; 256]);
+    fixture.baseline.subtract(&frame_v, &mut touch_v);
     let largest_v = touch_v.iter().map(|volts| volts.abs()).fold(0.0, f64::max);
-    assert!(bench.baseline.state().is_taking() && largest_v < 7e-3, "{largest_v} of 50 mV of leakage");
+    assert!(fixture.baseline.state().is_taking() && largest_v < 7e-3, "{largest_v} of 50 mV of leakage");
 }
 
 #[test]
 fn a_press_at_the_start_is_never_the_baseline() {
     for sheets in [0.006, 0.03, 3.0] {
-        let (mut bench, touch_v) = (Bench::new(1e-3, 0.0), contact_v(sheets));
-        bench.touch(&touch_v, 5 * FRAMES);
-        assert!(matches!(bench.baseline.state(), BaselineState::Pressed(_)), "{sheets}: {:?}", bench.baseline.state());
-        assert_eq!(bench.baseline.rest.mean_v(), [0.0; 256]);
+        let (mut fixture, touch_v) = (Fixture::new(1e-3, 0.0), contact_v(sheets));
+        fixture.touch(&touch_v, 5 * FRAMES);
+        assert!(
+            matches!(fixture.baseline.state(), BaselineState::Pressed(_)),
+            "{sheets}: {:?}",
+            fixture.baseline.state()
+        );
+        assert_eq!(fixture.baseline.rest.mean_v(), [0.0; 256]);
         if sheets > 0.1 {
-            bench.baseline.renew();
-            bench.touch(&touch_v, 2 * FRAMES);
-            assert!(matches!(bench.baseline.state(), BaselineState::Refused(_)), "the answer stays");
+            fixture.baseline.renew();
+            fixture.touch(&touch_v, 2 * FRAMES);
+            assert!(matches!(fixture.baseline.state(), BaselineState::Refused(_)), "the answer stays");
         }
         // It is taken as soon as nothing presses.
-        bench.rest(2 * FRAMES);
-        assert!(bench.baseline.state() == BaselineState::Held && bench.error_lsb() < 0.6, "{sheets}");
+        fixture.rest(2 * FRAMES);
+        assert!(fixture.baseline.state() == BaselineState::Held && fixture.error_lsb() < 0.6, "{sheets}");
     }
 }
 
 #[test]
 fn a_press_that_begins_while_the_baseline_is_taken_is_none_of_it() {
-    let (mut bench, touch_v) = (Bench::new(1e-3, 0.0), contact_v(0.3));
-    bench.rest(FRAMES - 1);
-    bench.touch(&touch_v, 1);
-    assert!(matches!(bench.baseline.state(), BaselineState::Pressed(_)));
-    bench.rest(FRAMES);
-    assert!(bench.error_lsb() < 0.6, "{}", bench.error_lsb());
+    let (mut fixture, touch_v) = (Fixture::new(1e-3, 0.0), contact_v(0.3));
+    fixture.rest(FRAMES - 1);
+    fixture.touch(&touch_v, 1);
+    assert!(matches!(fixture.baseline.state(), BaselineState::Pressed(_)));
+    fixture.rest(FRAMES);
+    assert!(fixture.error_lsb() < 0.6, "{}", fixture.error_lsb());
 }
 
 #[test]
 fn a_day_of_drift_is_followed_and_is_no_touch() {
-    let mut bench = Bench::new(10.0, 0.02);
-    bench.rest(2 * FRAMES);
+    let mut fixture = Fixture::new(10.0, 0.02);
+    fixture.rest(2 * FRAMES);
     let mut worst = 0.0_f64;
     for frame in 0..8640 {
-        bench.offsets.iter_mut().enumerate().for_each(|(e, offset)| *offset += [5.0, -0.5, 4.0][e % 3] / 8640.0);
-        bench.factor += 0.2 / 8640.0;
-        assert!(!bench.rest(1), "{:?} after {frame}", bench.baseline.state());
-        worst = worst.max(if frame > 256 { bench.error_lsb() } else { 0.0 });
+        fixture.offsets.iter_mut().enumerate().for_each(|(e, offset)| *offset += [5.0, -0.5, 4.0][e % 3] / 8640.0);
+        fixture.factor += 0.2 / 8640.0;
+        assert!(!fixture.rest(1), "{:?} after {frame}", fixture.baseline.state());
+        worst = worst.max(if frame > 256 { fixture.error_lsb() } else { 0.0 });
     }
     // Noise of 256 frames, and a lag of 43 minutes.
-    assert!(worst < 0.4 && (bench.baseline.leakage_sheets() - 0.024).abs() < 5e-4, "{worst}");
+    assert!(worst < 0.4 && (fixture.baseline.leakage_sheets() - 0.024).abs() < 5e-4, "{worst}");
 }
 
 #[test]
 fn slow_hands_are_not_learned() {
     // A fiftieth of a sheet conductance within five minutes, then held, at 100 frames/s.
-    let mut bench = Bench::new(0.01, 0.0);
-    bench.rest(20 * FRAMES);
-    let before = bench.learned();
+    let mut fixture = Fixture::new(0.01, 0.0);
+    fixture.rest(20 * FRAMES);
+    let before = fixture.learned();
     let steps: Vec<Vec<f64>> = (0..=300).map(|second| contact_v(0.02 * f64::from(second) / 300.0)).collect();
     for touch_v in &steps {
-        bench.touch(touch_v, 100);
+        fixture.touch(touch_v, 100);
     }
-    bench.touch(&steps[300], 3000);
-    assert!((bench.learned() - before).abs() < 3e-4, "{}", bench.learned() - before);
+    fixture.touch(&steps[300], 3000);
+    assert!((fixture.learned() - before).abs() < 3e-4, "{}", fixture.learned() - before);
 }
 
 #[test]
 fn what_is_too_slow_for_that_is_learned_up_to_a_limit_and_reported() {
     // Half a tenth of a sheet conductance within ten hours.
-    let mut bench = Bench::new(10.0, 0.0);
-    bench.rest(10 * FRAMES);
+    let mut fixture = Fixture::new(10.0, 0.0);
+    fixture.rest(10 * FRAMES);
     let full_v: Vec<f64> = contact_v(0.001).iter().map(|volts| 50.0 * volts).collect();
     for frame in 0..3600 {
         let touch_v: Vec<f64> = full_v.iter().map(|volts| volts * f64::from(frame) / 3600.0).collect();
-        bench.touch(&touch_v, 1);
+        fixture.touch(&touch_v, 1);
     }
-    let state = bench.baseline.state();
+    let state = fixture.baseline.state();
     let told = matches!(state, BaselineState::Drifted(_) | BaselineState::Lasting);
-    assert!(told && bench.learned() < 0.005, "{state:?} {}", bench.learned());
+    assert!(told && fixture.learned() < 0.005, "{state:?} {}", fixture.learned());
 }
 
 #[test]
 fn a_cup_for_an_hour_is_not_learned_and_afterwards_what_has_drifted_is() {
-    let mut bench = Bench::new(0.1, 0.01);
-    bench.rest(20 * FRAMES);
+    let mut fixture = Fixture::new(0.1, 0.01);
+    fixture.rest(20 * FRAMES);
     let rim =
         Touch::flat([0.004, 0.002], Shape::Ring { radius_m: 0.02, width_m: 0.002 }, detector().sheet_conductance_s());
     let cup_v = image_v(&FINE.image_mesh().conductances_s(&[rim]).unwrap());
-    let before_v = bench.baseline.rest.mean_v().to_vec();
+    let before_v = fixture.baseline.rest.mean_v().to_vec();
     for _ in 0..60 {
-        bench.offsets.iter_mut().for_each(|offset| *offset += 2.0 / 60.0);
-        bench.touch(&cup_v, 600);
+        fixture.offsets.iter_mut().for_each(|offset| *offset += 2.0 / 60.0);
+        fixture.touch(&cup_v, 600);
     }
-    assert_eq!(bench.baseline.rest.mean_v(), before_v, "nothing is taken under load");
-    assert_eq!(bench.baseline.state(), BaselineState::Lasting);
-    assert!(bench.error_lsb() > 1.5);
-    bench.rest(40);
-    assert!(bench.baseline.state() == BaselineState::Held && bench.error_lsb() < 0.7, "{}", bench.error_lsb());
+    assert_eq!(fixture.baseline.rest.mean_v(), before_v, "nothing is taken under load");
+    assert_eq!(fixture.baseline.state(), BaselineState::Lasting);
+    assert!(fixture.error_lsb() > 1.5);
+    fixture.rest(40);
+    assert!(fixture.baseline.state() == BaselineState::Held && fixture.error_lsb() < 0.7, "{}", fixture.error_lsb());
 }
 
 #[test]
 fn a_very_light_touch_at_the_start_is_forgotten_when_it_is_lifted() {
-    let mut bench = Bench::new(1e-3, 0.0);
-    bench.touch(&contact_v(0.002), FRAMES);
-    assert_eq!(bench.baseline.state(), BaselineState::Held, "a tenth of the lightest that solvers find well");
-    bench.rest(3 * FRAMES);
-    assert!(bench.error_lsb() < 0.6 && bench.learned().abs() < 3e-4, "{} {}", bench.error_lsb(), bench.learned());
+    let mut fixture = Fixture::new(1e-3, 0.0);
+    fixture.touch(&contact_v(0.002), FRAMES);
+    assert_eq!(fixture.baseline.state(), BaselineState::Held, "a tenth of the lightest that solvers find well");
+    fixture.rest(3 * FRAMES);
+    assert!(
+        fixture.error_lsb() < 0.6 && fixture.learned().abs() < 3e-4,
+        "{} {}",
+        fixture.error_lsb(),
+        fixture.learned()
+    );
 }
 
 #[test]
 fn a_person_may_take_a_light_touch_for_the_baseline_but_no_press() {
-    let mut bench = Bench::new(1e-3, 0.0);
-    bench.rest(FRAMES);
-    let before_v = bench.baseline.rest.mean_v().to_vec();
-    bench.baseline.renew();
-    assert!(bench.baseline.state().is_taking());
-    bench.touch(&contact_v(0.3), FRAMES);
-    let refused = matches!(bench.baseline.state(), BaselineState::Refused(volts) if volts > 0.1);
-    assert!(refused && bench.baseline.rest.mean_v() == before_v);
-    bench.rest(2 * FRAMES);
-    assert_eq!(bench.baseline.state(), BaselineState::Held, "once nothing presses");
-    bench.baseline.renew();
-    bench.touch(&contact_v(0.01), FRAMES);
-    let BaselineState::Doubtful(place_m) = bench.baseline.state() else { panic!("{:?}", bench.baseline.state()) };
+    let mut fixture = Fixture::new(1e-3, 0.0);
+    fixture.rest(FRAMES);
+    let before_v = fixture.baseline.rest.mean_v().to_vec();
+    fixture.baseline.renew();
+    assert!(fixture.baseline.state().is_taking());
+    fixture.touch(&contact_v(0.3), FRAMES);
+    let refused = matches!(fixture.baseline.state(), BaselineState::Refused(volts) if volts > 0.1);
+    assert!(refused && fixture.baseline.rest.mean_v() == before_v);
+    fixture.rest(2 * FRAMES);
+    assert_eq!(fixture.baseline.state(), BaselineState::Held, "once nothing presses");
+    fixture.baseline.renew();
+    fixture.touch(&contact_v(0.01), FRAMES);
+    let BaselineState::Doubtful(place_m) = fixture.baseline.state() else { panic!("{:?}", fixture.baseline.state()) };
     assert!((place_m[0] - HERE[0]).hypot(place_m[1] - HERE[1]) < 0.006, "{place_m:?}");
-    bench.rest(3 * FRAMES);
-    assert!(bench.baseline.state() == BaselineState::Held && bench.learned().abs() < 3e-4, "{}", bench.learned());
+    fixture.rest(3 * FRAMES);
+    assert!(fixture.baseline.state() == BaselineState::Held && fixture.learned().abs() < 3e-4, "{}", fixture.learned());
 }
 
 #[test]
 fn a_broken_wire_is_no_press() {
-    let mut bench = Bench::new(1e-3, 0.0);
+    let mut fixture = Fixture::new(1e-3, 0.0);
     for _ in 0..2 * FRAMES {
-        let mut readings_v = bench.measured_v(&[0.0; 256]);
+        let mut readings_v = fixture.measured_v(&[0.0; 256]);
         let floats = |i: &usize| i / 16 == 3 || i % 16 == 3;
         (0..256).filter(floats).for_each(|i| readings_v[i] = 0.6);
-        bench.baseline.add(&readings_v, 1, 0.0, &[3]);
+        fixture.baseline.add(&readings_v, 1, 0.0, &[3]);
     }
-    assert_eq!(bench.baseline.state(), BaselineState::Held);
+    assert_eq!(fixture.baseline.state(), BaselineState::Held);
 }
 
 #[test]
 fn more_noise_than_the_description_says_is_no_press() {
-    let mut bench = Bench::new(1e-3, 0.0);
+    let mut fixture = Fixture::new(1e-3, 0.0);
     let mut noise = Noise::new(2);
     for _ in 0..20 * FRAMES {
-        let true_v = bench.true_v(&[0.0; 256]).iter().map(|volts| volts + 3e-3 * noise.normal()).collect();
+        let true_v = fixture.true_v(&[0.0; 256]).iter().map(|volts| volts + 3e-3 * noise.normal()).collect();
         let readings = Readings::new(16, true_v).unwrap();
-        let readings_v = measured(&readings, &detector().adc, &mut bench.noise).volts().to_vec();
-        bench.baseline.add(&readings_v, 1, bench.time_s, &[]);
-        bench.time_s += 1e-3;
+        let readings_v = measured(&readings, &detector().adc, &mut fixture.noise).volts().to_vec();
+        fixture.baseline.add(&readings_v, 1, fixture.time_s, &[]);
+        fixture.time_s += 1e-3;
     }
-    assert_eq!(bench.baseline.state(), BaselineState::Held);
-    assert!(bench.error_lsb() < 0.8, "{}", bench.error_lsb());
+    assert_eq!(fixture.baseline.state(), BaselineState::Held);
+    assert!(fixture.error_lsb() < 0.8, "{}", fixture.error_lsb());
 }
 
 #[test]

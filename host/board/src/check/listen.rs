@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tactomo_physics::readings::Readings;
 use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Fault, Frame, Hello};
 
-use super::Heard;
+use super::UnframedBytes;
 use crate::link::Link;
 use crate::measured::Volts;
 use crate::sequence::Sequence;
@@ -26,12 +26,12 @@ pub enum ListenError {
     #[error(transparent)]
     Source(#[from] SourceError),
     /// No board says Hello.
-    #[error("{link}: no board said Hello within {seconds} s. {heard}", seconds = PATIENCE.as_secs())]
+    #[error("{link}: no board said Hello within {seconds} s. {unframed}", seconds = PATIENCE.as_secs())]
     Silent {
         /// Name of the link.
         link: String,
         /// What came instead.
-        heard: Heard,
+        unframed: UnframedBytes,
     },
     /// It answers what it was not asked.
     #[error("{link}: {error}")]
@@ -101,11 +101,11 @@ impl Listening {
         let mut link = source.open()?;
         let mut session = Session::new(settings);
         let mut receiver = BoardReceiver::default();
-        let (opened, mut heard) = (Instant::now(), Heard::default());
+        let (opened, mut unframed) = (Instant::now(), UnframedBytes::default());
         let mut buffer = [0; READ_BYTES];
         while opened.elapsed() < PATIENCE {
             let count = exchange(&mut *link, &mut session, &mut buffer)?;
-            heard.add(&buffer[..count]);
+            unframed.add(&buffer[..count]);
             let mut input = &buffer[..count];
             while let Some(message) = receiver.receive(&mut input) {
                 match message {
@@ -127,7 +127,7 @@ impl Listening {
         let link = link.name();
         Err(match session.stray() {
             Some((named, sent)) => ListenError::Stray { link, error: GreetError::Stray { named, sent } },
-            None => ListenError::Silent { link, heard },
+            None => ListenError::Silent { link, unframed },
         })
     }
 

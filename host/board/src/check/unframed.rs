@@ -27,12 +27,12 @@ const KNOWN: [(&str, &str); 5] = [
 
 /// Bytes that were no message of a board.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Heard {
+pub struct UnframedBytes {
     bytes: Vec<u8>,
     count: usize,
 }
 
-impl Heard {
+impl UnframedBytes {
     /// Takes what has come.
     pub fn add(&mut self, bytes: &[u8]) {
         self.count += bytes.len();
@@ -86,7 +86,7 @@ impl Heard {
     }
 }
 
-impl fmt::Display for Heard {
+impl fmt::Display for UnframedBytes {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} bytes came that were no message; {}", self.count, self.meaning())?;
         self.lines().iter().try_for_each(|line| write!(f, "\n    | {line}"))
@@ -97,32 +97,32 @@ impl fmt::Display for Heard {
 mod tests {
     use super::*;
 
-    fn heard(bytes: &[u8]) -> Heard {
-        let mut heard = Heard::default();
-        heard.add(bytes);
-        heard
+    fn unframed(bytes: &[u8]) -> UnframedBytes {
+        let mut unframed = UnframedBytes::default();
+        unframed.add(bytes);
+        unframed
     }
 
     #[test]
     fn boot_text_is_shown_and_explained() {
         let text = b"ets Jul 29 2019 12:21:46\r\n\r\nrst:0x1 (POWERON_RESET),boot:0x3 (DOWNLOAD_BOOT)\r\nwaiting for download\r\n";
-        let heard = heard(text);
-        assert!(heard.meaning().contains("GPIO 0"));
-        assert_eq!(heard.lines().last().map(String::as_str), Some("waiting for download"));
-        assert!(heard.to_string().contains("\n    | rst:0x1"), "{heard}");
+        let unframed = unframed(text);
+        assert!(unframed.meaning().contains("GPIO 0"));
+        assert_eq!(unframed.lines().last().map(String::as_str), Some("waiting for download"));
+        assert!(unframed.to_string().contains("\n    | rst:0x1"), "{unframed}");
     }
 
     #[test]
     fn silence_noise_and_other_programs_are_told_apart() {
         let noise: Vec<u8> = (0..500u32).map(|i| (i * 167 % 251) as u8 | 0x80).collect();
         for (bytes, told) in [(&b""[..], "cable"), (&noise, "--baud"), (b"hello from blinky\n", "another program")] {
-            assert!(heard(bytes).meaning().contains(told), "{}", heard(bytes));
+            assert!(unframed(bytes).meaning().contains(told), "{}", unframed(bytes));
         }
     }
 
     #[test]
     fn a_flood_is_counted_and_not_kept() {
-        let flood = heard(&[b'x'; 3 * KEPT]);
+        let flood = unframed(&[b'x'; 3 * KEPT]);
         assert_eq!((flood.count(), flood.bytes.len()), (3 * KEPT, KEPT));
     }
 }

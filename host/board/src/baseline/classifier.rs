@@ -36,7 +36,7 @@ const PRESSED: f64 = 0.05;
 
 /// Knows what a detector reads when nothing touches it.
 #[derive(Clone, Debug)]
-pub(super) struct Judge {
+pub(super) struct RestClassifier {
     jacobian: Arc<Jacobian>,
     patterns: RestPatterns,
     leakage: Leakage,
@@ -65,7 +65,7 @@ pub(super) enum Absolute {
     Pressed(f64),
 }
 
-impl Judge {
+impl RestClassifier {
     pub fn new(jacobian: Arc<Jacobian>) -> Self {
         let all: Vec<usize> = (0..jacobian.electrodes()).collect();
         let (patterns, leakage) = (RestPatterns::new(&jacobian, &all), Leakage::new(&jacobian, &all));
