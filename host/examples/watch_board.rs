@@ -11,7 +11,7 @@ use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo::board::source::{AnyBoard, Opened, Source};
 use tactomo::detector::Detector;
-use tactomo::run::plan::{Ends, Plan, Solving};
+use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::{Listener, TouchEvent, run};
 use tactomo::scene::{Hand, Scene, SceneName};
 use tactomo::simulate::Simulation;
@@ -22,8 +22,8 @@ struct Print;
 
 impl Listener for Print {
     fn touched(&mut self, event: &Arc<TouchEvent>) {
-        for contact in event.solution.contacts.iter().filter(|_| event.sequence.is_multiple_of(50)) {
-            println!("{:7.3} s  {:6.2} {:6.2} mm", event.time_s(), 1e3 * contact.x_m, 1e3 * contact.y_m);
+        for contact in event.solution.contacts.iter().filter(|_| event.frame.sequence.is_multiple_of(50)) {
+            println!("{:7.3} s  {:6.2} {:6.2} mm", event.frame.time_s(), 1e3 * contact.x_m, 1e3 * contact.y_m);
         }
     }
 }
@@ -40,15 +40,15 @@ fn main() -> Result<(), Box<dyn Error>> {
             Box::new(Opened::new(Box::new(board)))
         }
     };
-    let plan = Plan {
+    let options = RunOptions {
         solving: Some(Solving::new(Method::Auto, Problem::of(&detector)?)),
         listeners: vec![Box::new(Print)],
         seconds: Some(Duration::from_secs_f64(seconds)),
-        ..Plan::new(detector)
+        ..RunOptions::new(detector)
     };
     let (_request, requests) = mpsc::sync_channel(1);
     let snapshots = tokio::sync::watch::channel(Arc::default()).0;
-    let summary = run(&mut *source, plan, Ends { snapshots, requests, stop: Arc::new(AtomicBool::new(false)) })?;
+    let summary = run(&mut *source, options, Ends { snapshots, requests, stop: Arc::new(AtomicBool::new(false)) })?;
     println!("{summary:?}");
     Ok(())
 }

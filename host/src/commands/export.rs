@@ -11,7 +11,7 @@ use tactomo::board::frames::FileFrame;
 use tactomo::board::record::{RecordError, RecordReader};
 use tactomo::pointer::Pointer;
 use tactomo::readings::Readings;
-use tactomo::run::TouchEvent;
+use tactomo::run::{Arrival, Frame, TouchEvent};
 use tactomo::schema::FrameReport;
 use tactomo::sink::Delivery;
 use tactomo::sink::channels::Messages;
@@ -128,7 +128,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let arrived_s = frame.arrived_s.unwrap_or_default();
         let mut event = event(&reader, &frame, solution, (header.started(), lost))?;
         if let Some(pointer) = &mut pointer {
-            event.pointer_events = pointer.take(event.time_s(), &event.solution.contacts);
+            event.pointer_events = pointer.take(event.frame.time_s(), &event.solution.contacts);
         }
         out.write(&event.into(), fields, reader.frame() as u64)?;
         solved += 1;
@@ -171,23 +171,17 @@ fn event(
     let touch = reader.touch(frame).with_context(|| reader.place())?;
     let (measured, used) = frame.measured().zip(used).with_context(|| reader.place())?;
     let time_s = frame.time_s.unwrap_or_default().max(0.0);
-    let arrived_s = frame.arrived_s.unwrap_or(time_s).max(0.0);
-    Ok(TouchEvent {
+    let arrived = Duration::from_secs_f64(frame.arrived_s.unwrap_or(time_s).max(0.0));
+    let came = Frame {
         sequence: frame.sequence.unwrap_or_default(),
         board_time_us: (time_s * 1e6).round() as u64,
-        arrived_unix_ns: (started + Duration::from_secs_f64(arrived_s)).as_nanos() as u64,
-        age: None,
-        status: Default::default(),
-        readings: measured,
-        used: used.saying(|g, e| touch.says(g, e)),
-        touch,
-        averaged: 1,
         lost,
+        ..Frame::first(measured, used.saying(|g, e| touch.says(g, e)), Arrival::recorded(started + arrived))
+    };
+    Ok(TouchEvent {
         lost_before: frame.lost_before,
-        is_revision: false,
         is_taking_baseline: reader.is_taking_baseline(),
-        solution,
-        pointer_events: Vec::new(),
+        ..TouchEvent::new(came, touch, solution)
     })
 }
 

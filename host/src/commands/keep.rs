@@ -5,7 +5,7 @@ use std::path::Path;
 use tactomo::board::board_log::{BoardLog, ElfError};
 use tactomo::board::record::{Header, RecordError, Recorder};
 use tactomo::detector::Detector;
-use tactomo::run::plan::BeginRecording;
+use tactomo::run::options::BeginRecording;
 
 /// Begins a recording in a new file, if one is wanted.
 pub fn begin(file: Option<&Path>, header: &Header) -> Result<Option<Recorder>, RecordError> {

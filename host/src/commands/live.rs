@@ -13,7 +13,7 @@ use tactomo::board::source::Source;
 use tactomo::detector::Detector;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
-use tactomo::run::plan::{Ends, Plan, Solving, Summary};
+use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Listener, Request, Snapshot};
 use tactomo::scene::SceneName;
@@ -171,11 +171,11 @@ pub fn show(mut show: Show) -> anyhow::Result<()> {
     // Whatever cannot be is said before a page opens.
     show.streams.check(show.picture.json)?;
     let mut sinks = show.streams.begin(&problem, &show.source.name(), door(&show.picture), Arc::clone(&stop))?;
-    let plan = plan(&mut show, problem.clone(), sinks.listener())?;
+    let options = options(&mut show, problem.clone(), sinks.listener())?;
     let server = serve(&show, &problem, shown, request)?;
     // The page may outlive the pipeline, so the snapshots have a sender here too.
     let ends = Ends { snapshots: snapshots.clone(), requests, stop: Arc::clone(&stop) };
-    let summary = tactomo::run::run(&mut *show.source, plan, ends)?;
+    let summary = tactomo::run::run(&mut *show.source, options, ends)?;
     if sinks.reader_is_gone() {
         // As quietly as `head` ends.
         return Ok(sinks.finish()?);
@@ -206,9 +206,9 @@ fn method(args: &PictureArgs, problem: &Problem) -> Method {
     args.solver.or(problem.learned().map(Learned::method)).unwrap_or(Method::Auto)
 }
 
-fn plan(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) -> anyhow::Result<Plan> {
+fn options(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) -> anyhow::Result<RunOptions> {
     let detector = show.detector.clone();
-    Ok(Plan {
+    Ok(RunOptions {
         settings: show.settings,
         scan: show.scan.clone(),
         solving: Some(Solving::new(method(&show.picture, &problem), problem)),
@@ -218,7 +218,7 @@ fn plan(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) 
         pointer: show.picture.pointer,
         board_log: keep::board_log(show.elf.as_deref())?,
         seconds: show.seconds,
-        ..Plan::new(detector)
+        ..RunOptions::new(detector)
     })
 }
 

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use tactomo::board::record::{Header, Ring, Trigger};
-use tactomo::run::plan::{Ends, Plan, Solving};
+use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::{Listener, Request, Snapshot, TouchEvent};
 use tactomo::solve::{Method, Problem};
 use tokio::sync::watch;
@@ -105,11 +105,11 @@ fn recorded(
     let detector = source::described(board, detector_args.get_or(board.scene.preset())?);
     let (mut source, _) = source::board(board, detector_args, &detector)?;
     let header = Header { notes, ..Header::now(&detector, source.name()) };
-    let plan = Plan {
+    let options = RunOptions {
         settings: board.settings.requested(),
         recorder: keep::begin(Some(file), &header)?,
         seconds,
-        ..Plan::new(detector)
+        ..RunOptions::new(detector)
     };
     let (request, requests) = mpsc::sync_channel(REQUESTS);
     if stdin().is_terminal() {
@@ -122,7 +122,7 @@ fn recorded(
     }
     let (snapshots, _) = watch::channel(Arc::new(Snapshot::default()));
     let ends = Ends { snapshots, requests, stop: interrupt::flag()? };
-    let summary = tactomo::run::run(&mut *source, plan, ends)?;
+    let summary = tactomo::run::run(&mut *source, options, ends)?;
     message!("{}; kept in {}", live::sentence(&summary), file.display());
     Ok(())
 }
@@ -138,22 +138,22 @@ fn in_ring(
     let detector = source::described(board, detector_args.get_or(board.scene.preset())?);
     let (mut source, _) = source::board(board, detector_args, &detector)?;
     let ring = ring(Header::now(&detector, source.name()));
-    let mut plan = Plan { settings: board.settings.requested(), seconds, ..Plan::new(detector) };
+    let mut options = RunOptions { settings: board.settings.requested(), seconds, ..RunOptions::new(detector) };
     if save_on.contains(&SaveOn::Enter) {
         let trigger = ring.trigger();
         message!("press Enter to save the last seconds; Ctrl-C ends");
         on_lines(move |_| trigger.save())?;
     }
     if save_on.contains(&SaveOn::Touch) {
-        let problem = Problem::of(&plan.detector)?;
-        plan.solving = Some(Solving::new(Method::Contacts, problem));
-        plan.listeners.push(Box::new(SaveOnTouch { trigger: ring.trigger(), is_touched: true }));
+        let problem = Problem::of(&options.detector)?;
+        options.solving = Some(Solving::new(Method::Contacts, problem));
+        options.listeners.push(Box::new(SaveOnTouch { trigger: ring.trigger(), is_touched: true }));
     }
-    plan.ring = Some(ring);
+    options.ring = Some(ring);
     let (snapshots, _) = watch::channel(Arc::new(Snapshot::default()));
     let (_, requests) = mpsc::sync_channel(1);
     let ends = Ends { snapshots, requests, stop: interrupt::flag()? };
-    let summary = tactomo::run::run(&mut *source, plan, ends)?;
+    let summary = tactomo::run::run(&mut *source, options, ends)?;
     message!("{}", live::sentence(&summary));
     Ok(())
 }

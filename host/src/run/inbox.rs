@@ -2,16 +2,19 @@
 //!
 //! A follower that is busy finds, when it comes back, the newest frame and not a queue. Frames that it could not take by themselves are
 //! not lost for accuracy: as long as they differ by no more than noise, their mean is what it gets.
+//!
+//! Methods average over the answers that stand still (`before/still` of the solvers), and see only what is taken here. So without this mean the
+//! frames that a slow method skips would be lost to both, and without theirs a fast one would have one frame at a time.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_protocol::Status;
-use tactomo_touch::solve::{AdaptiveMean, Hypothesis, Look, Method, Parts, Solver};
+use tactomo_touch::solve::{Hypothesis, Look, Method, Parts, Solver, AdaptiveMean};
 
 use super::calibration::messages::{Calibrate, Outcome};
+use super::frame::{Frame, Rows};
 use super::order::Made;
 
 /// Frames of rows that wait at most: 50 ms of an ESP32's.
@@ -19,22 +22,11 @@ const MOST_ROWS: usize = 64;
 /// Longest wait before it is asked whether there is still something to wait for.
 const LONGEST_WAIT: Duration = Duration::from_millis(50);
 
-/// Rows of readings that came as a frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Rows {
-    /// Readings (V); those that are not in it say nothing.
-    pub readings: Readings,
-    /// Board time at their start, unwrapped, in microseconds (us).
-    pub time_us: u64,
-}
-
 /// A frame, or the mean of some that stood still.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taken {
-    /// Readings as measured (V), of the newest frame; of rows the latest of each.
-    pub measured: Readings,
-    /// The same as they are [used](tactomo_board::measured::Volts::used) (V).
-    pub newest: Readings,
+    /// The newest frame.
+    pub newest: Frame,
     /// The rows that came since the last one was taken, the oldest first; none of whole frames.
     pub rows: Vec<Rows>,
     /// The mean of the last frames as far as they stood still (V).
@@ -43,35 +35,12 @@ pub struct Taken {
     pub averaged: u32,
     /// Frames that came since the last one was taken, this one included.
     pub came: u32,
-    /// Frames lost on the way since the run began, up to this one.
-    pub lost: u64,
-    /// Number of the newest frame since the board started, unwrapped.
-    pub sequence: u64,
-    /// Board time at its start, unwrapped, in microseconds (us).
-    pub board_time_us: u64,
-    /// When its last byte came.
-    pub arrived: Instant,
-    /// What happened while it was scanned.
-    pub status: Status,
 }
 
-#[cfg(test)]
 impl Taken {
-    /// A frame of such readings (V) that comes now, the first of all.
-    pub fn of(readings: Readings) -> Self {
-        Self {
-            measured: readings.clone(),
-            newest: readings.clone(),
-            rows: Vec::new(),
-            mean: readings,
-            averaged: 1,
-            came: 1,
-            lost: 0,
-            sequence: 0,
-            board_time_us: 0,
-            arrived: Instant::now(),
-            status: Status::default(),
-        }
+    /// A frame by itself, and the rows that came in it.
+    pub fn new(frame: Frame, rows: Vec<Rows>) -> Self {
+        Self { mean: frame.used.clone(), newest: frame, rows, averaged: 1, came: 1 }
     }
 }
 
@@ -248,7 +217,7 @@ impl State {
             return;
         }
         let mut still = self.still.take().filter(|_| before.is_some()).unwrap_or_else(|| AdaptiveMean::new(noise_v));
-        still.add(&frame.newest);
+        still.add(&frame.newest.used);
         if let Some(before) = before {
             frame.came += before.came;
             frame.averaged = still.count() as u32;
@@ -261,10 +230,15 @@ impl State {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Instant;
+
+    use super::super::frame::Arrival;
     use super::*;
 
     fn frame(volts: f64, sequence: u64) -> Taken {
-        Taken { sequence, ..Taken::of(Readings::from_fn(4, |_, _| volts)) }
+        let readings = Readings::from_fn(4, |_, _| volts);
+        let first = Frame::first(readings.clone(), readings, Arrival::at(Instant::now()));
+        Taken::new(Frame { sequence, ..first }, Vec::new())
     }
 
     fn taken(inbox: &Inbox) -> Option<Taken> {
@@ -279,8 +253,8 @@ mod tests {
         let inbox = Inbox::new(false);
         (0..4_u64).for_each(|i| inbox.put_frame(frame(0.100 + 0.001 * i as f64, i), 0.002));
         let still = taken(&inbox).unwrap();
-        assert_eq!((still.sequence, still.came, still.averaged), (3, 4, 4));
-        assert!((still.mean.at(1, 2) - 0.1015).abs() < 1e-12 && (still.newest.at(1, 2) - 0.103).abs() < 1e-12);
+        assert_eq!((still.newest.sequence, still.came, still.averaged), (3, 4, 4));
+        assert!((still.mean.at(1, 2) - 0.1015).abs() < 1e-12 && (still.newest.used.at(1, 2) - 0.103).abs() < 1e-12);
         assert!(taken(&inbox).is_none());
         for (volts, sequence) in [(0.1, 4), (0.1, 5), (0.3, 6)] {
             inbox.put_frame(frame(volts, sequence), 0.002);
@@ -298,7 +272,7 @@ mod tests {
         };
         for i in 0..200 {
             let frame = std::iter::repeat_with(|| taken(&inbox)).flatten().next().unwrap();
-            assert_eq!((frame.sequence, frame.came), (i, 1));
+            assert_eq!((frame.newest.sequence, frame.came), (i, 1));
         }
         reader.join().unwrap();
         inbox.close();

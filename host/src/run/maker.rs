@@ -7,8 +7,8 @@ use tactomo_physics::causes::with_causes;
 use tactomo_touch::solve::{Method, Solver};
 
 use super::inbox::{Event, Inbox};
+use super::options::{BoxError, MakeSolver, Solving};
 use super::order::{Made, Order};
-use super::plan::{BoxError, MakeSolver, Solving};
 
 /// Which solver is in use, and what comes of the wish for another.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -4,26 +4,40 @@
 //! disk, a page or a solver. The follower answers to the newest frame, at the board's rate where the solver allows. The searcher
 //! finds thorough answers, from which the follower goes on once they explain the present better. What there is to show is published as
 //! [`Snapshot`]s through a cell that keeps the latest only, so that a slow page slows nothing. Pages answer with [`Request`]s.
+//!
+//! ```text
+//! reader      connection, recordings, frame    bytes to a Frame        -> inbox
+//! inbox                                        frames, and all events  -> follower
+//! follower    detector, solvers (maker)        a Frame to a TouchEvent -> answers
+//!             searcher, wires, calibration     slow work beside it     -> inbox
+//!             scanning                         the plan wanted next    -> reader
+//! answers     event, notice                    a TouchEvent, shared    -> listeners, snapshots
+//! ```
 
-mod board;
+mod answers;
 pub mod calibration;
+mod connection;
 pub mod course;
+mod detector;
 mod event;
 mod follower;
+mod frame;
 mod inbox;
-mod keeping;
 mod maker;
 mod notice;
+pub mod options;
 mod order;
-pub mod plan;
 mod reader;
+mod recordings;
 mod scanned;
 pub mod scanning;
 mod searcher;
+mod solvers;
 mod statistics;
-mod talk;
+mod wires;
 
 pub use self::event::{Listener, TouchEvent};
+pub use self::frame::{Arrival, Frame, NewestReadings};
 pub use self::maker::SolverState;
 pub use self::order::Order;
 pub use self::reader::run;
@@ -31,18 +45,15 @@ pub use self::scanned::Scan;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
 
 use tactomo_board::link::{Control, Playing};
 use tactomo_board::session::RequestedSettings;
-use tactomo_protocol::{Hello, Status};
+use tactomo_protocol::Hello;
 
 use self::calibration::{Calibrate, Calibrating};
 use self::course::Course;
 use tactomo_physics::detector::Detector;
-use tactomo_physics::readings::Readings;
-use tactomo_touch::pointer::PointerState;
-use tactomo_touch::solve::{Method, Solution};
+use tactomo_touch::solve::Method;
 
 /// What there is to show at a moment.
 #[derive(Clone, Debug, Default)]
@@ -51,8 +62,8 @@ pub struct Snapshot {
     pub link: LinkState,
     /// Who the board is, once it has said so.
     pub hello: Option<Hello>,
-    /// The newest frame, if one has come.
-    pub frame: Option<FrameSnapshot>,
+    /// The newest answered frame, if there is one.
+    pub answer: Option<Arc<TouchEvent>>,
     /// Which rows are scanned.
     pub scan: Scan,
     /// The solver, if there is to be one.
@@ -95,27 +106,6 @@ pub enum LinkState {
     Lost(String),
     /// The link has ended for good, for the reason given: the recording is over, the board speaks another protocol.
     Ended(String),
-}
-
-/// One frame and what was made of it.
-#[derive(Clone, Debug)]
-pub struct FrameSnapshot {
-    /// Number of the scan since the board started, unwrapped.
-    pub sequence: u64,
-    /// Board time at the start of the scan, unwrapped, in microseconds (us).
-    pub board_time_us: u64,
-    /// When its last byte came.
-    pub arrived: Instant,
-    /// What happened during the scan.
-    pub status: Status,
-    /// Readings as measured (V).
-    pub readings: Readings,
-    /// What the solver made of the readings less the baseline.
-    pub solution: Solution,
-    /// What the pointer has done, if a contact is one.
-    pub pointer: Option<PointerState>,
-    /// Whether the baseline is being taken.
-    pub rezeroing: bool,
 }
 
 /// Counts since the start.

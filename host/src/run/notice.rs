@@ -10,7 +10,7 @@ use super::statistics::Meter;
 use super::{LinkState, Snapshot};
 
 /// Shortest time between two snapshots: no screen shows more.
-const PUBLISH_EVERY: Duration = Duration::from_millis(8);
+pub(super) const PUBLISH_EVERY: Duration = Duration::from_millis(8);
 /// Longest time between two snapshots, so that the rate of a silent board falls.
 const PUBLISH_AT_LEAST: Duration = Duration::from_millis(250);
 

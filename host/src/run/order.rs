@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{FaultyElectrodes, Method, Solver};
 
-use super::plan::BoxError;
+use super::options::BoxError;
 
 /// What a solver is made for.
 #[derive(Clone, Debug, PartialEq)]

@@ -17,18 +17,18 @@ use tactomo_board::source::Source;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::SceneName;
-use tactomo_protocol::{BoardMessage, DecodeError, Frame, Hello};
-use tactomo_touch::solve::Latest;
+use tactomo_protocol::{BoardMessage, DecodeError, Hello};
 
+use super::connection::Connection;
 use super::course::Course;
 use super::follower::FollowThread;
-use super::inbox::{Event, Inbox, Rows, Taken};
-use super::keeping::Keeping;
+use super::frame::{Arrival, Frame, NewestReadings, Rows};
+use super::inbox::{Event, Inbox, Taken};
 use super::notice::NoticeBoard;
-use super::plan::{Ends, LiveError, Plan, Summary};
+use super::options::{Ends, LiveError, RunOptions, Summary};
+use super::recordings::Recordings;
 use super::scanned::Scanned;
-use super::scanning::{PlanAsk, PlanWish};
-use super::talk::Talk;
+use super::scanning::{PlanRequests, Planner, RequestedPlan};
 use super::{LinkState, Request};
 
 /// Time between two tries to open a link that was lost.
@@ -40,29 +40,30 @@ const READ_BYTES: usize = 4096;
 ///
 /// # Errors
 /// [`LiveError`] if the board cannot be used, its readings not be solved, or the recording not be kept.
-pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summary, LiveError> {
+pub fn run(source: &mut dyn Source, mut options: RunOptions, ends: Ends) -> Result<Summary, LiveError> {
     let Ends { snapshots, requests, stop } = ends;
     let inbox = Arc::new(Inbox::new(source.speed().is_infinite()));
     let notice = Arc::new(NoticeBoard::new(snapshots));
-    let solving = plan.solving.take();
-    let listeners = std::mem::take(&mut plan.listeners);
-    let folder = plan.folder.clone();
-    let (wish, scan) = (Arc::new(PlanWish::default()), plan.scan.clone());
+    let solving = options.solving.take();
+    let listeners = std::mem::take(&mut options.listeners);
+    let folder = options.folder.clone();
+    let (requested, scan) = (Arc::<RequestedPlan>::default(), options.scan.clone());
     let scanned = Scanned::new(scan.clone());
-    let start = |solving| FollowThread::start(solving, &inbox, &notice, listeners, folder, (scan, Arc::clone(&wish)));
+    let planner = Planner::new(scan, Arc::clone(&requested));
+    let start = |solving| FollowThread::start(solving, &inbox, Arc::clone(&notice), listeners, folder, planner);
     let started = solving.map(start).transpose();
     let follower = started.map_err(LiveError::Thread)?;
     if follower.is_some() {
         // Most boards measure as the detector's description says, so their first frame finds a solver.
-        inbox.put(Event::Board(Arc::new(plan.detector.clone())));
-        inbox.put(Event::Pointer(plan.pointer));
+        inbox.put(Event::Board(Arc::new(options.detector.clone())));
+        inbox.put(Event::Pointer(options.pointer));
         inbox.wait_until_ready(|| stop.load(Ordering::Relaxed));
     }
     let course = Course::default();
     notice.change(|snapshot| snapshot.course = course.clone());
     let mut reader = Reader {
-        keeping: Keeping::of(&mut plan, Arc::clone(&notice)),
-        plan,
+        recordings: Recordings::of(&mut options, Arc::clone(&notice)),
+        options,
         requests,
         stop,
         inbox: Arc::clone(&inbox),
@@ -74,14 +75,14 @@ pub fn run(source: &mut dyn Source, mut plan: Plan, ends: Ends) -> Result<Summar
         greeted: None,
         course: course.clone(),
         scanned,
-        latest: None,
-        scan: PlanAsk::new(wish),
+        newest: None,
+        plans: PlanRequests::new(requested),
     };
     let ended = reader.run(source);
     inbox.close();
     let solved = follower.map_or(Ok(()), FollowThread::join);
     // What ended the solving also ended the reading; a failure to keep the recording counts for more than either.
-    let ended = reader.keeping.finish().and(solved).and(ended);
+    let ended = reader.recordings.finish().and(solved).and(ended);
     if let Err(error) = &ended {
         notice.publish(|snapshot| snapshot.link = LinkState::Ended(with_causes(error)));
     }
@@ -106,7 +107,7 @@ fn summary(notice: &NoticeBoard, source: String, course: &Course) -> Summary {
     }
 }
 
-/// How the talk on a link ended.
+/// How a connection ended.
 enum End {
     /// Time is over, or the user has enough.
     Stopped,
@@ -117,7 +118,7 @@ enum End {
 }
 
 struct Reader {
-    plan: Plan,
+    options: RunOptions,
     requests: std::sync::mpsc::Receiver<Request>,
     stop: Arc<std::sync::atomic::AtomicBool>,
     inbox: Arc<Inbox>,
@@ -130,13 +131,13 @@ struct Reader {
     board: Option<Board>,
     /// When the first board said Hello.
     greeted: Option<Instant>,
-    keeping: Keeping,
+    recordings: Recordings,
     course: Course,
     scanned: Scanned,
-    /// The latest of each reading as measured and as used, while the board sends rows.
-    latest: Option<[Latest; 2]>,
-    /// The plan that the follower wishes, on its way to the board.
-    scan: PlanAsk,
+    /// All readings as measured and as used, while the board sends rows.
+    newest: Option<[NewestReadings; 2]>,
+    /// The scan plan that the follower requests, on its way to the board.
+    plans: PlanRequests,
 }
 
 /// Who has said Hello, and what its frames mean.
@@ -152,7 +153,7 @@ impl Reader {
     fn run(&mut self, source: &mut dyn Source) -> Result<String, LiveError> {
         let mut link = source.open()?;
         loop {
-            match self.talk(link.as_mut(), source.comes_back())? {
+            match self.serve(link.as_mut(), source.comes_back())? {
                 End::Stopped => return Ok(link.name()),
                 End::Over(reason) => {
                     tracing::info!("{reason}");
@@ -188,32 +189,32 @@ impl Reader {
     }
 
     /// Talks with the board on `link` to the end.
-    fn talk(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
-        let mut talk = Talk::new(self.plan.settings, comes_back);
-        self.scan.ask_again(&mut talk.session);
+    fn serve(&mut self, link: &mut dyn Link, comes_back: bool) -> Result<End, LiveError> {
+        let mut connection = Connection::new(self.options.settings, comes_back);
+        self.plans.ask_again(&mut connection.session);
         let mut buffer = [0; READ_BYTES];
         self.sequence.restart();
-        self.latest = None;
+        self.newest = None;
         self.enter(LinkState::Waiting);
         while !self.is_over() {
-            self.answer_requests(Some((&mut *link, &mut talk)));
-            self.scan.ask(&mut talk.session);
-            match talk.exchange(link, &mut buffer) {
+            self.answer_requests(Some((&mut *link, &mut connection)));
+            self.plans.ask(&mut connection.session);
+            match connection.exchange(link, &mut buffer) {
                 Ok(count) => {
                     if link.jumped() {
                         self.sequence.restart();
-                        self.latest = None;
-                        talk.jumped();
+                        self.newest = None;
+                        connection.jumped();
                         self.inbox.jump();
                     }
-                    self.receive(&mut talk, link, &buffer[..count])?;
+                    self.receive(&mut connection, link, &buffer[..count])?;
                 }
                 Err(error) => return lost(link, error, comes_back),
             }
-            if comes_back && let Some(error) = talk.in_vain() {
+            if comes_back && let Some(error) = connection.in_vain() {
                 return self.unanswered(error, link);
             }
-            self.show_link(link, &mut talk);
+            self.show_link(link, &mut connection);
         }
         let frames = self.notice.count(|meter| meter.statistics(Instant::now()).frames);
         if comes_back && frames == 0 && self.is_timed_out() {
@@ -230,21 +231,21 @@ impl Reader {
         Err(LiveError::Greet { link: link.name(), error })
     }
 
-    fn receive(&mut self, talk: &mut Talk, link: &dyn Link, bytes: &[u8]) -> Result<(), LiveError> {
+    fn receive(&mut self, connection: &mut Connection, link: &dyn Link, bytes: &[u8]) -> Result<(), LiveError> {
         let received = Instant::now();
         if bytes.is_empty() {
             return Ok(());
         }
         self.keep(bytes, received)?;
         let mut input = bytes;
-        while let Some(message) = talk.receiver.receive(&mut input) {
+        while let Some(message) = connection.receiver.receive(&mut input) {
             match message {
-                Ok(BoardMessage::Frame(frame)) => self.frame(talk, &frame, received),
-                Ok(BoardMessage::Hello(hello)) => self.hello(talk, hello, received)?,
-                Ok(BoardMessage::Log(log)) => self.plan.board_log.take(&log.0),
+                Ok(BoardMessage::Frame(frame)) => self.frame(connection, &frame, received),
+                Ok(BoardMessage::Hello(hello)) => self.hello(connection, hello, received)?,
+                Ok(BoardMessage::Log(log)) => self.options.board_log.take(&log.0),
                 Ok(BoardMessage::Fault(fault)) => {
                     // What answers a command is told where that is given up.
-                    if !talk.session.fault(&fault) {
+                    if !connection.session.fault(&fault) {
                         tracing::warn!("the board says: {}", session::explain(&fault));
                     }
                 }
@@ -252,37 +253,37 @@ impl Reader {
                 Err(_) => {}
             }
         }
-        let corrupt = talk.newly_corrupt();
+        let corrupt = connection.newly_corrupt();
         self.notice.count(|meter| meter.corrupt(corrupt));
         Ok(())
     }
 
     /// Keeps the bytes. Where that fails, the picture goes on; without one there is nothing else to do.
     fn keep(&mut self, bytes: &[u8], received: Instant) -> Result<(), LiveError> {
-        match self.keeping.push(bytes, received) {
+        match self.recordings.push(bytes, received) {
             Err(error) if !self.follows => Err(error.into()),
             Err(error) => {
-                self.keeping.give_up(error);
+                self.recordings.give_up(error);
                 Ok(())
             }
             Ok(()) => Ok(()),
         }
     }
 
-    fn hello(&mut self, talk: &mut Talk, hello: Hello, now: Instant) -> Result<(), LiveError> {
-        talk.session.hello(&hello, now);
-        if talk.answers && !talk.session.knows_the_board() {
+    fn hello(&mut self, connection: &mut Connection, hello: Hello, now: Instant) -> Result<(), LiveError> {
+        connection.session.hello(&hello, now);
+        if connection.answers && !connection.session.knows_the_board() {
             return Ok(());
         }
-        self.keeping.hello(&hello);
-        talk.junk.get_or_insert(talk.receiver.counters().corrupt);
+        self.recordings.hello(&hello);
+        connection.junk.get_or_insert(connection.receiver.counters().corrupt);
         self.greeted.get_or_insert(now);
         let known = self.board.as_ref();
         if known.is_none_or(|board| !is_same(&board.hello, &hello)) {
             let Hello { board, firmware_version, electrodes, .. } = &hello;
             tracing::info!("board {board} with firmware {firmware_version}: {electrodes} electrodes");
-            let measured = Arc::new(measured::as_measured(&self.plan.detector, &hello)?);
-            let solved = known.map_or(&self.plan.detector, |board| &board.detector);
+            let measured = Arc::new(measured::as_measured(&self.options.detector, &hello)?);
+            let solved = known.map_or(&self.options.detector, |board| &board.detector);
             if *solved != *measured {
                 self.inbox.put(Event::Board(Arc::clone(&measured)));
             }
@@ -303,11 +304,11 @@ impl Reader {
         Ok(())
     }
 
-    fn frame(&mut self, talk: &mut Talk, frame: &Frame, received: Instant) {
+    fn frame(&mut self, connection: &mut Connection, frame: &tactomo_protocol::Frame, received: Instant) {
         // Before Hello nobody knows what the readings mean.
-        let (Some(board), Some(_)) = (&self.board, talk.junk) else { return };
-        talk.session.frame(received);
-        talk.landed();
+        let (Some(board), Some(_)) = (&self.board, connection.junk) else { return };
+        connection.session.frame(received);
+        connection.landed();
         let Some(measured) = board.volts.measured(frame) else {
             return self.notice.count(|meter| meter.corrupt(1));
         };
@@ -316,71 +317,57 @@ impl Reader {
         self.notice.count(|meter| meter.frame(received, place.dropped));
         self.scanned.add(&frame.scope);
         if !frame.scope.is_whole() {
-            self.scan.wish.count(place.dropped);
+            self.plans.requested.count(place.dropped);
         }
         if !self.follows {
             return;
         }
-        // Elapsed time is nothing to the latest of all.
-        let readings = board.volts.used(measured.clone());
-        let (measured, newest, rows) = match frame.scope.is_whole() {
-            true => (measured, readings, Vec::new()),
+        let used = board.volts.used(measured.clone());
+        let (measured, used, rows) = match frame.scope.is_whole() {
+            true => {
+                self.newest = None;
+                (measured, used, Vec::new())
+            }
             false => {
-                let latest = self.latest.get_or_insert_with(|| [(); 2].map(|()| Latest::new(readings.electrodes())));
-                let [as_measured, as_used] = latest;
-                let [measured, newest] = [(as_measured, &measured), (as_used, &readings)].map(|(latest, rows)| {
-                    latest.add(rows, 0.0, None);
-                    latest.readings(f64::MAX, None)
-                });
-                (measured, newest, vec![Rows { readings, time_us: place.time_us }])
+                let none = || [(); 2].map(|()| NewestReadings::new(used.electrodes()));
+                let [as_measured, as_used] = self.newest.get_or_insert_with(none);
+                let whole = (as_measured.with(&measured), as_used.with(&used));
+                (whole.0, whole.1, vec![Rows { readings: used, time_us: place.time_us }])
             }
         };
-        if rows.is_empty() {
-            self.latest = None;
-        }
-        self.course.add(place.time_us, &newest);
-        let taken = Taken {
-            measured,
-            mean: newest.clone(),
-            newest,
-            rows,
-            averaged: 1,
-            came: 1,
-            lost: self.frames_lost,
-            sequence: place.sequence,
-            board_time_us: place.time_us,
-            arrived: received,
-            status: frame.head.status,
-        };
+        self.course.add(place.time_us, &used);
+        let (sequence, board_time_us, arrived) = (place.sequence, place.time_us, Arrival::at(received));
+        let (status, lost) = (frame.head.status, self.frames_lost);
+        let taken = Taken::new(Frame { sequence, board_time_us, arrived, status, lost, measured, used }, rows);
         self.inbox.put_frame(taken, board.noise_v);
     }
 
     fn is_timed_out(&self) -> bool {
-        self.plan.seconds.zip(self.greeted).is_some_and(|(limit, begin)| begin.elapsed() >= limit)
+        self.options.seconds.zip(self.greeted).is_some_and(|(limit, begin)| begin.elapsed() >= limit)
     }
 
     fn is_over(&self) -> bool {
         self.is_timed_out() || self.stop.load(Ordering::Relaxed) || self.inbox.is_closed()
     }
 
-    fn answer_requests(&mut self, mut open: Option<(&mut dyn Link, &mut Talk)>) {
+    fn answer_requests(&mut self, mut open: Option<(&mut dyn Link, &mut Connection)>) {
         while let Ok(request) = self.requests.try_recv() {
             match request {
                 Request::Rezero => self.inbox.put(Event::Rezero),
                 Request::Solver(method) => self.inbox.put(Event::Method(method)),
                 Request::Settings(settings) => {
-                    self.plan.settings = self.plan.settings.changed_by(settings);
-                    if let Some((_, talk)) = &mut open {
-                        talk.session.request(settings);
+                    self.options.settings = self.options.settings.changed_by(settings);
+                    if let Some((_, connection)) = &mut open {
+                        connection.session.request(settings);
                     }
                 }
                 Request::Record(true) => {
                     if let Some(board) = &self.board {
-                        self.keeping.begin(&board.hello);
+                        self.recordings.begin(&board.hello);
                     }
                 }
-                Request::Record(false) => self.keeping.end(),
-                Request::Mark(text) => self.keeping.mark(text),
+                Request::Record(false) => self.recordings.end(),
+                Request::Mark(text) => self.recordings.mark(text),
                 Request::Calibrate(ask) => {
                     let board = self.board.as_ref().map(|board| identity::identity(&board.hello));
                     self.inbox.put(Event::Calibrate(ask, board));
@@ -388,7 +375,7 @@ impl Reader {
                 Request::Control(control) => {
                     let refused = open.as_mut().and_then(|(link, _)| link.control(&control).err());
                     if let (None, Control::Scene(scene)) = (&refused, control) {
-                        self.inbox.put(Event::Pointer(self.plan.pointer || scene == SceneName::Pointer));
+                        self.inbox.put(Event::Pointer(self.options.pointer || scene == SceneName::Pointer));
                     }
                     self.notice.change(|snapshot| snapshot.refused = refused.map(|error| with_causes(&error)));
                 }
@@ -397,20 +384,20 @@ impl Reader {
     }
 
     /// Shows how the link fares.
-    fn show_link(&mut self, link: &dyn Link, talk: &mut Talk) {
-        if talk.session.is_mute(Instant::now()) {
+    fn show_link(&mut self, link: &dyn Link, connection: &mut Connection) {
+        if connection.session.is_mute(Instant::now()) {
             self.enter(LinkState::Silent(session::MUTE.to_owned()));
-        } else if talk.junk.is_some() {
+        } else if connection.junk.is_some() {
             self.enter(LinkState::Streaming);
         }
-        let refusal = talk.session.refusal();
-        if refusal != talk.refusal {
+        let refusal = connection.session.refusal();
+        if refusal != connection.refusal {
             self.notice.change(|snapshot| snapshot.refused = refusal.map(|refusal| refusal.to_string()));
-            talk.refusal = refusal;
+            connection.refusal = refusal;
         }
         let (playing, scan) = (link.playing(), self.scanned.scan());
         self.notice.change(|snapshot| (snapshot.playing, snapshot.scan) = (playing, scan));
-        self.keeping.found(self.notice.calibrated());
+        self.recordings.found(self.notice.calibrated());
         if !self.follows {
             self.notice.keep_fresh();
         }

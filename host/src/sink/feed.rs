@@ -10,7 +10,7 @@ use tactomo_touch::pointer::PointerEvent;
 use tokio::sync::{broadcast, watch};
 use tokio::time::timeout;
 
-use super::thin::Thin;
+use super::decimator::Decimator;
 use crate::run::{Listener, TouchEvent};
 
 /// Events that may wait for a file: 3.4 s at 1200 a second; of 12 kB each at most, with an image of a thousand nodes.
@@ -47,7 +47,7 @@ pub enum Keeps {
 pub struct Tail {
     events: broadcast::Receiver<Arc<TouchEvent>>,
     keeps: Keeps,
-    thin: Thin,
+    decimator: Decimator,
     losses: Losses,
     /// Frames lost by the link or the board until the event that was delivered last, if one was.
     lost: Option<u64>,
@@ -119,7 +119,7 @@ impl Taps {
     pub fn open(&self, name: &str, keeps: Keeps, most_per_s: Option<f64>) -> Option<Tail> {
         let events = self.events.upgrade()?.subscribe();
         let losses = Losses { name: name.to_owned(), before: 0, all: 0 };
-        Some(Tail { events, keeps, thin: Thin::new(most_per_s), losses, lost: None })
+        Some(Tail { events, keeps, decimator: Decimator::new(most_per_s), losses, lost: None })
     }
 
     /// Waits until there is nothing more to come.
@@ -134,16 +134,16 @@ impl Tail {
         loop {
             self.catch_up();
             let due = match timeout(QUIET, self.events.recv()).await {
-                Ok(Ok(event)) => self.thin.take(event),
+                Ok(Ok(event)) => self.decimator.take(event),
                 Ok(Err(broadcast::error::RecvError::Lagged(count))) => {
                     self.losses.add(count);
                     None
                 }
-                Ok(Err(broadcast::error::RecvError::Closed)) => match self.thin.held() {
+                Ok(Err(broadcast::error::RecvError::Closed)) => match self.decimator.held() {
                     Some(last) => Some(last),
                     None => return Next::End,
                 },
-                Err(_) => match self.thin.held() {
+                Err(_) => match self.decimator.held() {
                     Some(newest) => Some(newest),
                     None => return Next::Quiet,
                 },
@@ -156,7 +156,7 @@ impl Tail {
 
     /// Whether nothing waits, or what waits need not come soon.
     pub fn is_drained(&self) -> bool {
-        self.thin.is_on() || self.events.is_empty()
+        self.decimator.is_on() || self.events.is_empty()
     }
 
     /// Waits for what may take long: writing to a reader that stalls. What is lost meanwhile is counted, and said, while it is.
@@ -187,9 +187,10 @@ impl Tail {
     }
 
     fn deliver(&mut self, event: Arc<TouchEvent>, pointer_events: Vec<PointerEvent>) -> Delivery {
+        let lost = event.frame.lost;
         // What was lost before the first is no matter of this taker's.
-        let before = self.lost.replace(event.lost).unwrap_or(event.lost.saturating_sub(event.lost_before));
-        let lost_before = event.lost.saturating_sub(before);
+        let before = self.lost.replace(lost).unwrap_or(lost.saturating_sub(event.lost_before));
+        let lost_before = lost.saturating_sub(before);
         Delivery { event, lost_before, missed_before: std::mem::take(&mut self.losses.before), pointer_events }
     }
 }
@@ -217,13 +218,15 @@ mod tests {
     use tactomo_touch::solve::Solution;
 
     use super::*;
+    use crate::run::Frame;
 
     fn block_on<T>(future: impl Future<Output = T>) -> T {
         tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap().block_on(future)
     }
 
     fn event(sequence: u64, lost: u64) -> Arc<TouchEvent> {
-        Arc::new(TouchEvent { lost, ..TouchEvent::of(sequence, Solution::default()) })
+        let event = TouchEvent::of(sequence, Solution::default());
+        Arc::new(TouchEvent { frame: Frame { lost, ..event.frame }, ..event })
     }
 
     fn deliveries(mut tail: Tail) -> Vec<Delivery> {
@@ -261,7 +264,7 @@ mod tests {
         feed.touched(&event(1000, 0));
         drop(feed);
         let all = deliveries(tail);
-        assert_eq!((all[0].event.sequence, all[0].missed_before, all.len()), (999, 999, 2));
+        assert_eq!((all[0].event.frame.sequence, all[0].missed_before, all.len()), (999, 999, 2));
     }
 
     #[test]
@@ -272,8 +275,8 @@ mod tests {
         (0..count).for_each(|sequence| feed.touched(&event(sequence, 0)));
         drop(feed);
         let all = deliveries(file);
-        assert_eq!((all[0].event.sequence, all[0].missed_before, all.len()), (1000, 1000, QUEUE));
+        assert_eq!((all[0].event.frame.sequence, all[0].missed_before, all.len()), (1000, 1000, QUEUE));
         let newest = deliveries(live);
-        assert_eq!((newest[0].event.sequence, newest[0].missed_before, newest.len()), (count - 1, count - 1, 1));
+        assert_eq!((newest[0].event.frame.sequence, newest[0].missed_before, newest.len()), (count - 1, count - 1, 1));
     }
 }

@@ -52,7 +52,7 @@ impl<W: Write> McapFile<W> {
     /// # Errors
     /// If that fails: then nothing more can be written.
     pub fn write(&mut self, delivery: &Delivery) -> io::Result<()> {
-        let time_ns = delivery.event.arrived_unix_ns;
+        let time_ns = delivery.event.frame.arrived.unix_ns;
         for (channel, number) in Channel::ALL.into_iter().zip(self.channels) {
             self.out.clear();
             if self.messages.write(channel, delivery, &mut self.out)? {

@@ -3,6 +3,7 @@
 
 pub mod address;
 pub mod channels;
+mod decimator;
 pub mod door;
 mod feed;
 pub mod foxglove;
@@ -13,7 +14,6 @@ mod running;
 pub mod stream;
 pub mod target;
 mod tcp;
-mod thin;
 mod udp;
 mod web;
 

@@ -171,10 +171,10 @@ mod tests {
 
     impl Sink for Counting {
         fn take(&mut self, delivery: &Delivery, _: bool) -> io::Result<()> {
-            if delivery.event.sequence == self.1 {
+            if delivery.event.frame.sequence == self.1 {
                 return Err(self.2.into());
             }
-            self.0.lock().unwrap().push(delivery.event.sequence);
+            self.0.lock().unwrap().push(delivery.event.frame.sequence);
             Ok(())
         }
 

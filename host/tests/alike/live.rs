@@ -7,7 +7,7 @@ use std::time::Duration;
 use tactomo::board::record::{Header, Recorder};
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::board::source::Opened;
-use tactomo::run::plan::{Ends, Plan, Solving, Summary};
+use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
 use tactomo::run::{Listener, Snapshot, TouchEvent};
 use tactomo::scene::{Hand, Scene, SceneName, Touch};
 use tactomo::simulate::Simulation;
@@ -42,7 +42,7 @@ struct Keeper(Arc<Mutex<Vec<(u64, u64, Solution)>>>);
 
 impl Listener for Keeper {
     fn touched(&mut self, event: &Arc<TouchEvent>) {
-        self.0.lock().unwrap().push((event.sequence, event.board_time_us, event.solution.clone()));
+        self.0.lock().unwrap().push((event.frame.sequence, event.frame.board_time_us, event.solution.clone()));
     }
 }
 
@@ -57,17 +57,17 @@ impl Live {
             std::env::temp_dir().join(format!("tactomo-{}-{}-{name}.tactomo", std::process::id(), method.name()));
         let header = Header::of(&detector, "simulated board".to_owned(), 0);
         let kept = Arc::new(Mutex::new(Vec::new()));
-        let plan = Plan {
+        let options = RunOptions {
             solving: Some(Solving::new(method, problem.clone())),
             recorder: Some(Recorder::create(&recording, &header).unwrap()),
             listeners: vec![Box::new(Keeper(Arc::clone(&kept)))],
             seconds: Some(Duration::from_secs_f64(seconds)),
-            ..Plan::new(detector)
+            ..RunOptions::new(detector)
         };
         let (snapshots, _page) = watch::channel(Arc::new(Snapshot::default()));
         let (_requests, requests) = mpsc::sync_channel(1);
         let ends = Ends { snapshots, requests, stop: Arc::default() };
-        let summary = tactomo::run::run(&mut Opened::new(Box::new(board.unwrap())), plan, ends).unwrap();
+        let summary = tactomo::run::run(&mut Opened::new(Box::new(board.unwrap())), options, ends).unwrap();
         let kept = std::mem::take(&mut *kept.lock().unwrap());
         // Scene time begins with the first frame.
         let first_us = kept.first().map_or(0, |(sequence, time_us, _)| time_us - sequence * 832);

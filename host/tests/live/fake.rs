@@ -9,7 +9,7 @@ use tactomo::board::baseline::{BaselineTracker, FRAMES};
 use tactomo::board::link::{Control, ControlError, Link};
 use tactomo::board::source::{Source, SourceError};
 use tactomo::detector::Detector;
-use tactomo::run::plan::{Ends, MakeSolver, Plan, Solving};
+use tactomo::run::options::{Ends, MakeSolver, RunOptions, Solving};
 use tactomo::run::{Request, Snapshot};
 use tactomo::solve::Method;
 use tactomo_protocol::{
@@ -168,9 +168,9 @@ impl Source for Links {
     }
 }
 
-/// A plan for the default detector that finds nothing.
-pub fn plan() -> Plan {
-    Plan::new(Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact())
+/// Options of a run on the default detector that finds nothing.
+pub fn options() -> RunOptions {
+    RunOptions::new(Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact())
 }
 
 /// The other side of a pipeline's ends.

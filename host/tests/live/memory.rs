@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use crate::fake::{FakeBoard, Patient, ends, plan, solving};
+use crate::fake::{FakeBoard, Patient, ends, options, solving};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::run::plan::{MakeSolver, Plan};
+use tactomo::run::options::{MakeSolver, RunOptions};
 use tactomo::solve::{Lambda, Tikhonov, Variant};
 
 /// Resident memory of this process (kB).
@@ -25,7 +25,8 @@ fn resident_after(frames: u64) -> u64 {
 
     let (ends, _page) = ends();
     let mut source = Patient(Some(FakeBoard { skip_every: 1000, junk_every: 1000, ..FakeBoard::new(frames) }));
-    let summary = tactomo::run::run(&mut source, Plan { solving: Some(solving(make)), ..plan() }, ends).unwrap();
+    let summary =
+        tactomo::run::run(&mut source, RunOptions { solving: Some(solving(make)), ..options() }, ends).unwrap();
     assert_eq!(summary.frames, frames);
     let resident_kb = resident_kb();
     eprintln!(

@@ -11,24 +11,24 @@ use tactomo::board::source::{Opened, Recording};
 use tactomo::detector::{Calibration, Detector};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::forward::shell::Shell;
-use tactomo::run::plan::{LiveError, MakeSolver, Plan};
+use tactomo::run::options::{LiveError, MakeSolver, RunOptions};
 use tactomo::run::{LinkState, Request, Snapshot};
 use tactomo::scene::Contact;
 use tactomo::solve::{Lambda, Method, Tikhonov, Variant};
 use tactomo_protocol::Settings;
 
-use crate::fake::{FakeBoard, Links, Patient, ends, plan, solving};
+use crate::fake::{FakeBoard, Links, Patient, ends, options, solving};
 
 fn opened(link: impl Link + 'static) -> Opened {
     Opened::new(Box::new(link))
 }
 
-fn imaging() -> Plan {
+fn imaging() -> RunOptions {
     let make: MakeSolver = Arc::new(|order| {
         let jacobian = Jacobian::of(&Shell::with_nodes(&order.detector, 500)?);
         Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced)))
     });
-    Plan { solving: Some(solving(make)), ..plan() }
+    RunOptions { solving: Some(solving(make)), ..options() }
 }
 
 #[test]
@@ -40,9 +40,9 @@ fn frames_become_images_and_everything_is_counted() {
     assert_eq!((summary.frames, summary.dropped, summary.corrupt), (1000, 100, 40));
     assert!(summary.latency_us.p50 > 0.0 && summary.latency_us.p50 <= summary.latency_us.max);
     let snapshot = other.snapshots.borrow().clone();
-    let frame = snapshot.frame.as_ref().unwrap();
-    assert_eq!(frame.readings.electrodes(), 16);
-    assert!(frame.solution.image_s_per_m2.as_ref().is_some_and(|image| image.len() > 300));
+    let answer = snapshot.answer.as_ref().unwrap();
+    assert_eq!(answer.frame.measured.electrodes(), 16);
+    assert!(answer.solution.image_s_per_m2.as_ref().is_some_and(|image| image.len() > 300));
     assert!(matches!(&snapshot.link, LinkState::Ended(_)));
     assert_eq!(snapshot.hello.as_ref().unwrap().board, "fake");
 }
@@ -50,7 +50,7 @@ fn frames_become_images_and_everything_is_counted() {
 #[test]
 fn a_board_with_other_electrodes_than_the_detector_is_refused() {
     let board = FakeBoard { electrodes: 8, ..FakeBoard::new(10) };
-    let error = tactomo::run::run(&mut opened(board), plan(), ends().0).unwrap_err();
+    let error = tactomo::run::run(&mut opened(board), options(), ends().0).unwrap_err();
     assert!(matches!(error, LiveError::Mismatch(_)), "{error:?}");
 }
 
@@ -58,10 +58,10 @@ fn a_board_with_other_electrodes_than_the_detector_is_refused() {
 fn a_detector_that_was_calibrated_on_another_board_is_shown_as_such() {
     let calibration = |board: &str| Calibration { board: Some(board.to_owned()), ..Calibration::default() };
     let notice = |board: &str| {
-        let plan = plan();
-        let detector = Detector { calibration: Some(calibration(board)), ..plan.detector };
+        let options = options();
+        let detector = Detector { calibration: Some(calibration(board)), ..options.detector };
         let (ends, other) = ends();
-        tactomo::run::run(&mut opened(FakeBoard::new(5)), Plan { detector, ..plan }, ends).unwrap();
+        tactomo::run::run(&mut opened(FakeBoard::new(5)), RunOptions { detector, ..options }, ends).unwrap();
         let snapshot = other.snapshots.borrow().clone();
         (snapshot.calibration.clone(), identity(snapshot.hello.as_ref().unwrap()))
     };
@@ -75,27 +75,27 @@ fn settings_that_are_asked_for_reach_the_board() {
     let settings = Settings { settle_us: 70, average_log2: 3, ..Settings::default() };
     let wanted = RequestedSettings { settle_us: Some(70), average_log2: Some(3), ..RequestedSettings::default() };
     let (ends, other) = ends();
-    tactomo::run::run(&mut opened(FakeBoard::new(5)), Plan { settings: wanted, ..plan() }, ends).unwrap();
+    tactomo::run::run(&mut opened(FakeBoard::new(5)), RunOptions { settings: wanted, ..options() }, ends).unwrap();
     assert_eq!(other.snapshots.borrow().hello.as_ref().unwrap().settings, settings);
 }
 
 #[test]
 fn a_board_that_is_unplugged_is_waited_for() {
     let lost = FakeBoard { breaks: true, ..FakeBoard::new(50) };
-    let summary = tactomo::run::run(&mut Links(vec![lost, FakeBoard::new(70)]), plan(), ends().0).unwrap();
+    let summary = tactomo::run::run(&mut Links(vec![lost, FakeBoard::new(70)]), options(), ends().0).unwrap();
     assert_eq!((summary.frames, summary.dropped), (120, 0));
 }
 
 #[test]
 fn a_link_that_cannot_come_back_is_an_error() {
     let lost = FakeBoard { breaks: true, ..FakeBoard::new(50) };
-    let error = tactomo::run::run(&mut opened(lost), plan(), ends().0).unwrap_err();
+    let error = tactomo::run::run(&mut opened(lost), options(), ends().0).unwrap_err();
     assert!(matches!(error, LiveError::Link { .. }), "{error:?}");
 }
 
 #[test]
 fn a_board_of_a_newer_protocol_is_refused() {
-    let error = tactomo::run::run(&mut opened(Says(newer_hello())), plan(), ends().0).unwrap_err();
+    let error = tactomo::run::run(&mut opened(Says(newer_hello())), options(), ends().0).unwrap_err();
     let LiveError::Greet { error: GreetError::Version { found: NEWER }, .. } = &error else { panic!("{error:?}") };
     assert!(error.to_string().contains(&format!("version {NEWER}")), "{error}");
 }
@@ -119,7 +119,7 @@ fn presses_reach_the_simulated_detector_and_the_stop_ends_the_run() {
         other.requests.send(request).unwrap();
     }
     other.requests.send(Request::Rezero).unwrap();
-    let runs = std::thread::spawn(move || tactomo::run::run(&mut opened(board), plan(), ends).unwrap());
+    let runs = std::thread::spawn(move || tactomo::run::run(&mut opened(board), options(), ends).unwrap());
     while asked.lock().unwrap().len() < 2 {
         std::thread::yield_now();
     }
@@ -133,9 +133,10 @@ fn a_recording_plays_as_it_was_received() {
     let file = std::env::temp_dir().join(format!("tactomo-{}-pipeline", std::process::id()));
     let recorder = Recorder::create(&file, &Header::default()).unwrap();
     let board = FakeBoard { skip_every: 7, junk_every: 9, ..FakeBoard::new(500) };
-    let live = tactomo::run::run(&mut opened(board), Plan { recorder: Some(recorder), ..plan() }, ends().0).unwrap();
+    let live =
+        tactomo::run::run(&mut opened(board), RunOptions { recorder: Some(recorder), ..options() }, ends().0).unwrap();
     let mut recording = Recording { path: file.clone(), speed: f64::INFINITY, stays_open: false };
-    let played = tactomo::run::run(&mut recording, plan(), ends().0).unwrap();
+    let played = tactomo::run::run(&mut recording, options(), ends().0).unwrap();
     std::fs::remove_file(file).unwrap();
     assert_eq!((played.frames, played.dropped, played.corrupt), (live.frames, live.dropped, live.corrupt));
     assert_eq!(played.frames, 500);
@@ -153,10 +154,10 @@ fn the_solver_changes_while_frames_go_on() {
             _ => Ok(Box::new(Tikhonov::new(&jacobian, Lambda::default(), Variant::Balanced))),
         }
     });
-    let plan = Plan { solving: Some(solving(make)), ..plan() };
+    let options = RunOptions { solving: Some(solving(make)), ..options() };
     let (ends, other) = ends();
     let runs =
-        std::thread::spawn(move || tactomo::run::run(&mut opened(FakeBoard::new(u64::MAX)), plan, ends).unwrap());
+        std::thread::spawn(move || tactomo::run::run(&mut opened(FakeBoard::new(u64::MAX)), options, ends).unwrap());
     let told = |wanted: &dyn Fn(&Snapshot) -> bool| loop {
         let snapshot = other.snapshots.borrow().clone();
         if wanted(&snapshot) {
@@ -165,7 +166,7 @@ fn the_solver_changes_while_frames_go_on() {
         assert!(!runs.is_finished());
         std::thread::sleep(Duration::from_millis(1));
     };
-    told(&|snapshot| snapshot.frame.is_some());
+    told(&|snapshot| snapshot.answer.is_some());
     other.requests.send(Request::Solver(Method::Noser)).unwrap();
     let begun = told(&|snapshot| snapshot.solver.as_ref().is_some_and(|solver| solver.making == Some(Method::Noser)));
     let changed = told(&|snapshot| snapshot.solver.as_ref().is_some_and(|solver| solver.method == Method::Noser));

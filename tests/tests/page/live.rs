@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use tactomo::board::simulated::{Options, SimulatedBoard};
 use tactomo::board::source::Opened;
 use tactomo::detector::Detector;
-use tactomo::run::plan::{Ends, LiveError, Plan, Solving, Summary};
+use tactomo::run::options::{Ends, LiveError, RunOptions, Solving, Summary};
 use tactomo::run::{Snapshot, Statistics};
 use tactomo::scene::{Contact, Hand, Scene, SceneName};
 use tactomo::simulate::{Controls, Fault, Simulation, drawn};
@@ -66,13 +66,13 @@ impl Live {
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
         let board = SimulatedBoard::simulate(built, simulation, Options::default())?;
-        let plan = Plan {
+        let options = RunOptions {
             solving: Some(Solving::new(Method::Auto, problem)),
             folder: folder.to_owned(),
-            ..Plan::new(detector.clone())
+            ..RunOptions::new(detector.clone())
         };
         let mut source = Opened::new(Box::new(board));
-        let pipeline = Some(std::thread::spawn(move || tactomo::run::run(&mut source, plan, ends)));
+        let pipeline = Some(std::thread::spawn(move || tactomo::run::run(&mut source, options, ends)));
         Ok(Self { server, mouse, hand, snapshots: receiver, stop, pipeline })
     }
 

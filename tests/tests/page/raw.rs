@@ -127,12 +127,12 @@ impl RawPage {
         if std::mem::take(&mut self.holds) { self.say("\"taken\"") } else { Ok(()) }
     }
 
-    /// Takes messages until an update comes; its sequence number.
+    /// Takes messages until an update comes; its sequence number, which is the first of its words.
     pub fn next_sequence(&mut self) -> Result<u32> {
         loop {
             self.take()?;
             if let Heard::Binary(bytes) = self.hear()? {
-                let word = bytes.get(4..8).and_then(|word| word.try_into().ok()).context("an update of 24 bytes")?;
+                let word = bytes.get(..4).and_then(|word| word.try_into().ok()).context("an update")?;
                 return Ok(u32::from_le_bytes(word));
             }
         }

@@ -11,7 +11,7 @@ use tactomo::board::link::Control;
 use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
-use tactomo::run::{FrameSnapshot, LinkState, Request, Snapshot};
+use tactomo::run::{Arrival, Frame, LinkState, Request, Snapshot, TouchEvent};
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server};
 use tactomo::solve::{FoundContact, Solution};
 use tokio::sync::watch;
@@ -63,17 +63,8 @@ impl Script {
 
     /// Publishes frames with this solution from now on.
     pub fn solution(&self, solution: Solution) {
-        let frame = FrameSnapshot {
-            sequence: 0,
-            board_time_us: 0,
-            arrived: Instant::now(),
-            status: Default::default(),
-            readings: Readings::from_fn(16, |g, e| if g == e { 0.0 } else { 0.01 * (g + e) as f64 }),
-            solution,
-            pointer: None,
-            rezeroing: false,
-        };
-        self.set(|snapshot| snapshot.frame = Some(frame));
+        let readings = Readings::from_fn(16, |g, e| if g == e { 0.0 } else { 0.01 * (g + e) as f64 });
+        self.set(|snapshot| snapshot.answer = Some(Arc::new(answer(0, readings, solution))));
     }
 
     /// Publishes frames with these contacts from now on.
@@ -134,13 +125,20 @@ fn publish(
             let mut snapshot = now.lock().expect("no test panics with it").clone();
             let number = sequence.fetch_add(1, Ordering::Relaxed);
             snapshot.statistics.frames = number;
-            if let Some(frame) = &mut snapshot.frame {
-                (frame.sequence, frame.arrived) = (number, Instant::now());
+            if let Some(answer) = &mut snapshot.answer {
+                let frame = &mut Arc::make_mut(answer).frame;
+                (frame.sequence, frame.arrived) = (number, Arrival::at(Instant::now()));
             }
             snapshots.send_replace(Arc::new(snapshot));
             std::thread::sleep(PUBLISH_EVERY);
         }
     })
+}
+
+/// An answer to a frame that comes now.
+pub fn answer(sequence: u64, readings: Readings, solution: Solution) -> TouchEvent {
+    let first = Frame::first(readings.clone(), readings.clone(), Arrival::at(Instant::now()));
+    TouchEvent::new(Frame { sequence, ..first }, readings, solution)
 }
 
 /// A regular mesh over the whole detector.

@@ -11,7 +11,7 @@ use tactomo::board::link::Control;
 use tactomo::detector::Detector;
 use tactomo::forward::ImageMesh;
 use tactomo::readings::Readings;
-use tactomo::run::{FrameSnapshot, Request, Snapshot};
+use tactomo::run::{Request, Snapshot};
 use tactomo::scene::Contact;
 use tactomo::sink::door::{Door, Limits};
 use tactomo::sink::page::{Finger, Listen, PageSetup, Server, ServerError};
@@ -19,6 +19,7 @@ use tactomo::solve::{Method, Solution};
 use tokio::sync::watch;
 
 use crate::raw::{Heard, RawPage, ask, ask_socket, ask_socket_at};
+use crate::script::answer;
 
 const FINGER: Finger = Finger { radius_m: 0.003, conductance_s: 1e-4 };
 
@@ -57,17 +58,8 @@ impl Rig {
     }
 
     fn publish(&self, sequence: u64) {
-        let frame = FrameSnapshot {
-            arrived: std::time::Instant::now(),
-            sequence,
-            board_time_us: 0,
-            status: Default::default(),
-            readings: Readings::from_fn(16, |_, _| 0.0),
-            solution: Solution::default(),
-            pointer: None,
-            rezeroing: false,
-        };
-        self.snapshots.send_replace(Arc::new(Snapshot { frame: Some(frame), ..Snapshot::default() }));
+        let answer = Arc::new(answer(sequence, Readings::from_fn(16, |_, _| 0.0), Solution::default()));
+        self.snapshots.send_replace(Arc::new(Snapshot { answer: Some(answer), ..Snapshot::default() }));
     }
 
     fn request(&self) -> Result<Request> {
@@ -205,7 +197,9 @@ fn a_socket_whose_page_has_gone_without_a_word_ends() -> Result<()> {
 fn a_message_is_sent_when_the_last_was_taken() -> Result<()> {
     let rig = Rig::start(None)?;
     let mut page = RawPage::open(rig.server.port())?;
-    assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"setup","layout":9,"#)));
+    assert!(
+        matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"setup","layout":{"words":["sequence","#))
+    );
     assert!(page.is_silent_for(Duration::from_millis(400))?, "the setup was not taken");
     page.take()?;
     assert!(matches!(page.hear()?, Heard::Text(text) if text.starts_with(r#"{"type":"status","#)));

@@ -133,7 +133,7 @@ fn a_warning_goes_with_its_answer_though_no_other_answer_comes() -> Result<()> {
         stage.behind.solution(answer(false));
         let is_without = |told: &Told| told.text("flags").is_empty();
         stage.browser.until("an answer without a warning", is_without).await?;
-        stage.behind.set(|snapshot| snapshot.frame = None);
+        stage.behind.set(|snapshot| snapshot.answer = None);
         // It would be of an answer that is no longer shown.
         stage.browser.says("warnings", "").await
     })
@@ -202,6 +202,28 @@ fn the_strip_chart_has_each_contacts_value() -> Result<()> {
             has(shown, "7", 2e-4) && has(shown, "9", 4e-4) && is_drawn(&shown[1]) && is_drawn(&shown[2])
         };
         stage.browser.shows(script, both).await?;
+        Ok(())
+    })
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_label_and_its_row_tell_the_same_number_at_any_moment() -> Result<()> {
+    in_front_of!(Script::start(), stage, {
+        let script = "const row = document.querySelector('#contacts td.value');
+            return [JSON.parse(document.documentElement.dataset.labels), row?.textContent]";
+        stage.behind.contacts(vec![contact(4, [10.0, 0.0], 3e-4)]);
+        settled(&stage).await;
+        let mut told = Vec::new();
+        for i in 0..100 {
+            stage.behind.contacts(vec![contact(4, [10.0, 0.0], 3e-4 + 2e-6 * f64::from(i))]);
+            stage.behind.publish(1);
+            let shown = stage.browser.run(script).await?;
+            ensure!(shown[0].as_array().is_some_and(|labels| labels.len() == 1), "{shown}");
+            ensure!(shown[0][0] == shown[1], "{shown}");
+            told.push(shown[1].clone());
+        }
+        told.dedup();
+        ensure!(told.len() > 3, "the numbers stand still: {told:?}");
         Ok(())
     })
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::source::NamedPort;
 use tactomo::detector::Detector;
-use tactomo::run::plan::{Ends, LiveError, Plan, Summary};
+use tactomo::run::options::{Ends, LiveError, RunOptions, Summary};
 use tactomo::run::{Request, Snapshot};
 use tokio::sync::watch;
 
@@ -29,10 +29,10 @@ impl Host {
         let (snapshot, snapshots) = watch::channel(Arc::default());
         let (_requests, requests) = mpsc::channel();
         let stop = Arc::new(AtomicBool::new(false));
-        let plan = Plan::new(Detector::preset("square-60").unwrap());
+        let options = RunOptions::new(Detector::preset("square-60").unwrap());
         let ends = Ends { snapshots: snapshot, requests, stop: Arc::clone(&stop) };
         let mut source = NamedPort { port: port.to_str().unwrap().to_owned(), baud: DEFAULT_BAUD };
-        let thread = thread::spawn(move || tactomo::run::run(&mut source, plan, ends));
+        let thread = thread::spawn(move || tactomo::run::run(&mut source, options, ends));
         Self { snapshots, stop, thread, _requests }
     }
 

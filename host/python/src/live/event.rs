@@ -29,19 +29,19 @@ impl TouchEvent {
     /// Number of the scan since the board started.
     #[getter]
     fn sequence(&self) -> u64 {
-        self.0.sequence
+        self.0.frame.sequence
     }
 
     /// Board time at the start of the scan (s).
     #[getter]
     fn time_s(&self) -> f64 {
-        self.0.time_s()
+        self.0.frame.time_s()
     }
 
     /// When the frame's last byte came, by this machine's clock (s since 1970).
     #[getter]
     fn arrived_unix_s(&self) -> f64 {
-        self.0.arrived_unix_ns as f64 * 1e-9
+        self.0.frame.arrived.unix_ns as f64 * 1e-9
     }
 
     /// Age of the answer when it was ready: since the frame's last byte came (us); `None` of a frame from a file.
@@ -71,14 +71,14 @@ impl TouchEvent {
     /// Readings as measured (V), `(n, n)`: `readings_v[g][e]` is electrode `e` while `g` is grounded.
     #[getter]
     fn readings_v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        array(py, &self.0.readings)
+        array(py, &self.0.frame.measured)
     }
 
     /// The same as they are used (V), `(n, n)`: a reading within two deviations of the noise of an end of its converter's range is the bound
     /// there.
     #[getter]
     fn used_v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        array(py, &self.0.used)
+        array(py, &self.0.frame.used)
     }
 
     /// What the solver got (V), `(n, n)`: the mean of the last frames as far as they stood still, less the baseline.
@@ -126,7 +126,7 @@ impl TouchEvent {
     }
 
     fn __repr__(&self) -> String {
-        let (sequence, count) = (self.0.sequence, self.0.solution.contacts.len());
-        format!("TouchEvent(sequence={sequence}, time_s={:.6}, {count} contacts)", self.0.time_s())
+        let (sequence, count) = (self.0.frame.sequence, self.0.solution.contacts.len());
+        format!("TouchEvent(sequence={sequence}, time_s={:.6}, {count} contacts)", self.0.frame.time_s())
     }
 }

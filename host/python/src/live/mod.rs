@@ -17,7 +17,7 @@ use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::RequestedSettings;
 use tactomo::causes::with_causes;
 use tactomo::detector::Detector as Described;
-use tactomo::run::plan::{Ends, Plan, Solving};
+use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{LinkState, Request, Snapshot};
 use tactomo::scene::SceneName;
@@ -298,14 +298,14 @@ impl Live {
         let mut source = self.source.open(&self.detector)?;
         let problem = Problem::of(&self.detector).map_err(raised)?;
         let record = |path: &PathBuf| Recorder::create(path, &Header::now(&self.detector, source.name()));
-        let plan = Plan {
+        let options = RunOptions {
             recorder: self.record.as_ref().map(record).transpose().map_err(raised)?,
             settings: self.settings,
             scan: self.scan.clone(),
             solving: Some(Solving::new(self.method, problem)),
             listeners: vec![Box::new(Tail(Arc::clone(&self.queue)))],
             seconds: self.seconds,
-            ..Plan::new(self.detector.clone())
+            ..RunOptions::new(self.detector.clone())
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
@@ -313,7 +313,7 @@ impl Live {
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
         let queue = Arc::clone(&self.queue);
         let work = move || {
-            let run = std::panic::AssertUnwindSafe(|| tactomo::run::run(&mut *source, plan, ends));
+            let run = std::panic::AssertUnwindSafe(|| tactomo::run::run(&mut *source, options, ends));
             queue.end(ended(std::panic::catch_unwind(run)));
         };
         let thread = thread::Builder::new().name("tactomo".to_owned()).spawn(work);
@@ -350,7 +350,7 @@ impl Live {
 }
 
 /// How a run has ended, in words.
-fn ended(run: thread::Result<Result<tactomo::run::plan::Summary, tactomo::run::plan::LiveError>>) -> Ended {
+fn ended(run: thread::Result<Result<tactomo::run::options::Summary, tactomo::run::options::LiveError>>) -> Ended {
     match run {
         Ok(Ok(summary)) => serde_json::to_string(&summary).map_err(|error| error.to_string()),
         Ok(Err(error)) => Err(with_causes(&error)),

@@ -12,9 +12,9 @@ use tactomo::forward::ImageMesh;
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
 use tactomo::readings::Readings;
+use tactomo::run::NewestReadings;
 use tactomo::solve::{
-    ContactSettings, FaultTolerant, Kernel, Lambda, Latest, Method, Parameter, ParameterKind, Presses, Problem,
-    Solution, Solver,
+    ContactSettings, FaultTolerant, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver,
 };
 
 use tactomo_protocol::Hello;
@@ -105,7 +105,7 @@ enum Touch {
 
 /// What came before rows of readings.
 struct RowsBefore {
-    latest: Latest,
+    newest: NewestReadings,
     /// Board time of the newest (s).
     time_s: f64,
 }
@@ -236,12 +236,10 @@ impl Reader {
                     return Ok(solver.solve(&readings)?);
                 }
                 let time_s = frame.time_s.unwrap_or_default();
-                let RowsBefore { latest, time_s: before_s } = rows
-                    .get_or_insert_with(|| Box::new(RowsBefore { latest: Latest::new(readings.electrodes()), time_s }))
-                    .as_mut();
-                let elapsed_s = time_s - std::mem::replace(before_s, time_s);
-                latest.add(&readings, 0.0, None);
-                Ok(solver.solve_rows(&readings, &latest.readings(f64::MAX, None), elapsed_s)?)
+                let none = || Box::new(RowsBefore { newest: NewestReadings::new(readings.electrodes()), time_s });
+                let before = rows.get_or_insert_with(none);
+                let elapsed_s = time_s - std::mem::replace(&mut before.time_s, time_s);
+                Ok(solver.solve_rows(&readings, &before.newest.with(&readings), elapsed_s)?)
             }
             Touch::Kernel(kernel) => match kernel.press(&frame.volts) {
                 Ok(press) => Ok(press.map(|press| press.solution(kernel.strength())).unwrap_or_default()),

@@ -5,40 +5,22 @@ mod collected;
 mod fit;
 pub(super) mod messages;
 mod save;
+mod session;
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
-use std::time::{Duration, Instant};
 
 use tactomo_physics::detector::Detector;
-use tactomo_physics::readings::{Readings, Rounds};
-use tactomo_touch::calibrate::{HeldOut, Rub};
+use tactomo_touch::calibrate::Rub;
 use tactomo_touch::solve::FoundContact;
 
-use self::collected::Collected;
 pub use self::collected::Coverage;
-use self::fit::Task;
 pub use self::messages::Calibrate;
-use self::messages::Fitted;
 pub(super) use self::messages::Outcome;
-use super::inbox::{Event, Inbox};
-
-/// Cells with frames, light and firm ones counted apart, before the first fit: fewer do not spread over a detector.
-const ENOUGH: usize = 16;
-/// Shortest time from the end of a fit to the next; at least the fit's own time is left too, for the picture needs the cores.
-const PAUSE: Duration = Duration::from_secs(2);
-/// Share of the detector that has to be rubbed before it is done: fingertips hardly reach the corners.
-const WHOLE: f64 = 0.8;
-/// Share of the expected error before by which a fit has to better it for more to be worth it.
-const WORTH: f64 = 0.05;
-/// Frames of rows without a whole one between them from which on the board's plan has none: an adaptive plan of 32 electrodes has one in every 64.
-const NEVER_WHOLE: u64 = 500;
-/// Most that is said to be missing at a time.
-const TOLD: usize = 3;
-/// Time between two pictures of how it is: a person sees that at once.
-const SHOWN_EVERY: Duration = Duration::from_millis(80);
+use self::session::RubSession;
+use super::detector::DetectorState;
+use super::inbox::{Inbox, Taken};
+use super::notice::NoticeBoard;
 
 /// How far a calibration is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,261 +56,110 @@ pub struct Calibrating {
     pub used: bool,
 }
 
-/// A calibration under way, in the follower.
-pub(super) struct Desk {
-    /// Tells what comes of this one from what comes of others before.
-    number: u64,
+/// The calibration under way in the follower, if one is, and what is shown of it.
+pub(super) struct Calibration {
     inbox: Arc<Inbox>,
+    notice: Arc<NoticeBoard>,
+    /// Where calibrated detectors are saved.
     folder: PathBuf,
-    description: Arc<Detector>,
-    /// Identity of the board.
-    board: Option<String>,
-    collected: Collected,
-    rounds: Rounds,
-    shown: Calibrating,
-    cancelled: Arc<AtomicBool>,
-    next_fit: Instant,
-    fitted_frames: u64,
-    showed: Option<Instant>,
+    session: Option<RubSession>,
+    /// How many there have been.
+    begun: u64,
 }
 
-impl Drop for Desk {
-    fn drop(&mut self) {
-        self.cancelled.store(true, Ordering::Relaxed);
-    }
-}
-
-impl Desk {
-    /// Begins to collect frames of the detector of this description, for files in this folder.
-    pub fn new(
-        number: u64,
-        description: Arc<Detector>,
-        board: Option<String>,
-        folder: PathBuf,
-        inbox: Arc<Inbox>,
-    ) -> Self {
-        let collected = Collected::new(&description);
-        let shown = Calibrating {
-            stage: Stage::Rubbing,
-            coverage: collected.coverage.clone(),
-            touched: 0,
-            fitting: false,
-            errors_m: Vec::new(),
-            fit: None,
-            trouble: None,
-            saved: None,
-            used: false,
-        };
-        Self {
-            number,
-            inbox,
-            folder,
-            description,
-            board,
-            collected,
-            rounds: Rounds::default(),
-            shown,
-            cancelled: Arc::default(),
-            next_fit: Instant::now(),
-            fitted_frames: 0,
-            showed: None,
-        }
+impl Calibration {
+    /// None yet; what comes of them in other threads goes through `inbox`.
+    pub fn new(inbox: Arc<Inbox>, notice: Arc<NoticeBoard>, folder: PathBuf) -> Self {
+        Self { inbox, notice, folder, session: None, begun: 0 }
     }
 
-    /// Does what a person asks, but for what is the follower's.
-    pub fn ask(&mut self, ask: Calibrate) {
-        self.showed = None;
-        match (ask, self.shown.stage) {
-            (Calibrate::Begin, Stage::Done) => self.shown.stage = Stage::Rubbing,
-            (Calibrate::Finish, Stage::Rubbing) => self.finish(),
-            (Calibrate::Save, Stage::Done) => self.save(),
-            _ => {}
-        }
-    }
-
-    /// The detector to go on with, if there is one.
-    pub fn use_found(&mut self) -> Option<Arc<Detector>> {
-        let fit = self.shown.fit.as_ref().filter(|_| self.shown.stage == Stage::Done)?;
-        (self.shown.used, self.showed) = (true, None);
-        Some(Arc::new(fit.detector.clone()))
-    }
-
-    /// Takes a frame, or rows of one: readings (V) less the baseline, as the channels read them, their time (s), and the contacts found.
-    pub fn take(&mut self, readings: &Readings, time_s: f64, contacts: &[FoundContact]) {
-        if self.shown.stage != Stage::Rubbing {
-            return;
-        }
-        let Some(readings) = self.rounds.add(readings, time_s).filter(Readings::is_whole) else {
-            let waiting = self.rounds.waiting();
-            if waiting >= NEVER_WHOLE {
-                self.shown.trouble = Some(format!(
-                    "{waiting} frames of some grounds only are left out: calibrate with whole frames (without --scan)"
-                ));
+    /// Does what a person asks, on a detector of this description and a board of this identity; the detector to go on with, if one is to be.
+    pub fn ask(&mut self, ask: Calibrate, description: &Arc<Detector>, board: Option<String>) -> Option<Arc<Detector>> {
+        let mut used = None;
+        match (ask, &mut self.session) {
+            (Calibrate::Begin, None) => {
+                self.begun += 1;
+                let (description, inbox) = (Arc::clone(description), Arc::clone(&self.inbox));
+                self.session = Some(RubSession::new(self.begun, description, board, self.folder.clone(), inbox));
             }
-            return;
-        };
-        self.collected.take(&readings, contacts, &self.description);
-        let is_new = self.collected.touched > self.fitted_frames;
-        if is_new && !self.shown.fitting && self.collected.filled() >= ENOUGH && Instant::now() >= self.next_fit {
-            self.fit(false);
+            (Calibrate::End, _) => self.session = None,
+            (Calibrate::Use, Some(session)) => used = session.use_found(),
+            (ask, Some(session)) => session.ask(ask),
+            (_, None) => {}
         }
+        self.show();
+        used
     }
 
-    /// Takes what has come of work in another thread.
+    /// Ends it: the frames to come are those of another board, or of other settings of its converter.
+    pub fn end(&mut self) {
+        self.session = None;
+        self.show();
+    }
+
+    /// Takes the newest frame, or the rows that came, and the contacts found in it: less the baseline, as the channels read them.
+    pub fn take(&mut self, frame: &Taken, detector: &DetectorState, found: &[FoundContact]) {
+        let Some(session) = &mut self.session else { return };
+        if detector.baseline.state().is_taking() {
+            return;
+        }
+        for rows in &frame.rows {
+            session.take(&detector.less_baseline(&rows.readings), 1e-6 * rows.time_us as f64, found);
+        }
+        if frame.rows.is_empty() {
+            session.take(&detector.less_baseline(&frame.newest.used), frame.newest.time_s(), found);
+        }
+        self.show();
+    }
+
+    /// Takes what has come of work in another thread, for the calibration of this number.
     pub fn receive(&mut self, number: u64, outcome: Outcome) {
-        if number != self.number {
-            return;
+        if let Some(session) = &mut self.session {
+            session.receive(number, outcome);
         }
-        self.showed = None;
-        match outcome {
-            Outcome::Fitted(fitted) => self.fitted(*fitted),
-            Outcome::Saved(saved) => {
-                self.shown.trouble = saved.as_ref().err().cloned();
-                self.shown.saved = saved.ok();
-            }
-        }
+        self.show();
     }
 
-    /// How it is, if it is time to show that.
-    pub fn newly_shown(&mut self) -> Option<Calibrating> {
-        if self.showed.is_some_and(|showed| showed.elapsed() < SHOWN_EVERY) {
-            return None;
-        }
-        self.showed = Some(Instant::now());
-        self.shown.coverage.clone_from(&self.collected.coverage);
-        self.shown.touched = self.collected.touched;
-        Some(self.shown.clone())
-    }
-
-    fn finish(&mut self) {
-        self.shown.stage = Stage::Finishing;
-        // One that is under way is not of all frames: the last one follows it.
-        if !self.shown.fitting {
-            self.fit(true);
-        }
-    }
-
-    fn fit(&mut self, is_last: bool) {
-        let task = Task {
-            description: Arc::clone(&self.description),
-            board: self.board.clone(),
-            frames: self.collected.frames(),
-            before: self.shown.errors_m.len(),
-            is_last,
-            cancelled: Arc::clone(&self.cancelled),
-        };
-        self.fitted_frames = self.collected.touched;
-        match fit::begin(task, self.number, &self.inbox) {
-            Ok(()) => self.shown.fitting = true,
-            Err(error) => self.fail(format!("cannot start a thread: {error}")),
-        }
-    }
-
-    fn fail(&mut self, trouble: String) {
-        (self.shown.trouble, self.shown.stage) = (Some(trouble), Stage::Rubbing);
-    }
-
-    fn fitted(&mut self, Fitted { is_last, fit, took }: Fitted) {
-        self.shown.fitting = false;
-        self.next_fit = Instant::now() + PAUSE.max(took);
-        let is_asked = self.shown.stage == Stage::Finishing && !is_last;
-        match fit {
-            // On the way there may be too little yet; at the end that is the answer.
-            Err(trouble) => {
-                self.shown.trouble = Some(trouble);
-                self.shown.stage = if is_asked { Stage::Finishing } else { Stage::Rubbing };
-            }
-            Ok(fit) => {
-                let error_m = fit.place_error_m();
-                // An error that rose is not settled: of few presses, or of one firmness, it is not known what it will be.
-                let settled = |before_m: &f64| (error_m / before_m - 1.0).abs() < WORTH;
-                let is_settled = self.shown.errors_m.last().is_some_and(settled) && fit.helped();
-                let least_m = self.shown.errors_m.iter().copied().fold(f64::INFINITY, f64::min);
-                let unfinished = is_last.then(|| unfinished(&fit, least_m)).flatten();
-                self.shown.errors_m.push(error_m);
-                self.shown.fit = Some(Arc::new(fit));
-                (self.shown.trouble, self.shown.saved, self.shown.used) = (unfinished, None, false);
-                if is_last {
-                    self.shown.stage = if self.shown.trouble.is_none() { Stage::Done } else { Stage::Rubbing };
-                } else if !is_asked && is_settled && self.collected.coverage.share() >= WHOLE {
-                    self.finish();
+    /// Shows how it is, if that is due.
+    fn show(&mut self) {
+        match &mut self.session {
+            None => self.notice.change(|snapshot| snapshot.calibrating = None),
+            Some(session) => {
+                if let Some(shown) = session.newly_shown() {
+                    self.notice.change(|snapshot| snapshot.calibrating = Some(Arc::new(shown)));
                 }
             }
         }
-        if is_asked {
-            self.fit(true);
-        }
     }
-
-    fn save(&mut self) {
-        let (Some(fit), None) = (&self.shown.fit, &self.shown.saved) else { return };
-        let (fit, folder) = (Arc::clone(fit), self.folder.clone());
-        let (number, inbox) = (self.number, Arc::clone(&self.inbox));
-        let write = move || {
-            let saved = save::save(&fit.detector, &folder);
-            inbox.put(Event::Calibrated(number, Outcome::Saved(saved)));
-        };
-        if let Err(error) = thread::Builder::new().name("calibration file".to_owned()).spawn(write) {
-            self.shown.trouble = Some(format!("cannot start a thread: {error}"));
-        }
-    }
-}
-
-/// Why a detector that was found is not to be used, and what to do, as a sentence for a person; `None` if presses that it was not fitted to
-/// say that it has helped. An expected error that has risen from the least one before (m) is none to end with, while anything is missing.
-fn unfinished(found: &Rub, least_m: f64) -> Option<String> {
-    let error_m = found.place_error_m();
-    let has_risen = error_m > (1.0 + WORTH) * least_m && !found.missing.is_empty();
-    if found.helped() && !has_risen {
-        return None;
-    }
-    let why = match &found.held_out {
-        _ if found.helped() => {
-            format!("The expected error has risen from {:.2} to {:.2} mm", 1e3 * least_m, 1e3 * error_m)
-        }
-        None => "It is too little to tell whether it helps".to_owned(),
-        Some(HeldOut { residuals: [before, after], place_errors_m: [before_m, after_m], .. }) => format!(
-            "It has not helped: presses that were not used leave {before:.1} × noise before and {after:.1} after, and places are known to \
-             {:.2} mm before and {:.2} after",
-            1e3 * before_m,
-            1e3 * after_m
-        ),
-    };
-    let missing: Vec<_> = found.missing.iter().take(TOLD).map(ToString::to_string).collect();
-    let what = if missing.is_empty() { "rub on, with one fingertip alone".to_owned() } else { missing.join("; ") };
-    Some(format!("{why}. What is missing: {what}."))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use tactomo_touch::calibrate::Missing;
+    use tokio::sync::watch;
 
-    fn found(place_errors_m: [f64; 2], residuals: [f64; 2], missing: &[Missing]) -> Rub {
-        Rub {
-            detector: Detector::default(),
-            wires: None,
-            left_out: Vec::new(),
-            touched: 200,
-            single: 200,
-            presses: 160,
-            known: 0,
-            held_out: Some(HeldOut { presses: 24, residuals, place_errors_m }),
-            missing: missing.to_vec(),
-            chi_square: [9.0, 1.0],
-            place_errors_m: vec![([0.0; 2], place_errors_m[1])],
-        }
+    use super::super::Snapshot;
+    use super::*;
+
+    fn shown(notice: &NoticeBoard, shown: &watch::Receiver<Arc<Snapshot>>) -> Option<Stage> {
+        notice.publish(|_| {});
+        shown.borrow().calibrating.as_ref().map(|calibrating| calibrating.stage)
     }
 
     #[test]
-    fn what_rose_is_not_done_and_says_what_is_missing() {
-        assert_eq!(unfinished(&found([0.9e-3, 0.2e-3], [3.0, 1.0], &[]), 0.25e-3), None);
-        let risen = unfinished(&found([0.9e-3, 0.75e-3], [3.0, 1.0], &[Missing::Firm]), 0.68e-3).unwrap_or_default();
-        assert!(risen.contains("risen from 0.68 to 0.75 mm") && risen.contains("press harder"), "{risen}");
-        let worse = found([0.68e-3, 0.75e-3], [3.0, 1.0], &[Missing::Place([-0.02, 0.02])]);
-        let worse = unfinished(&worse, 0.75e-3).unwrap_or_default();
-        assert!(worse.contains("0.68 mm before and 0.75 after") && worse.contains("(-20, 20) mm"), "{worse}");
-        let none = Rub { held_out: None, ..found([0.9e-3, 0.2e-3], [3.0, 1.0], &[]) };
-        assert!(unfinished(&none, 0.3e-3).unwrap_or_default().contains("too little to tell"));
+    fn one_calibration_at_a_time_is_shown_until_it_ends() {
+        let (snapshots, receiver) = watch::channel(Arc::default());
+        let notice = Arc::new(NoticeBoard::new(snapshots));
+        let inbox = Arc::new(Inbox::new(false));
+        let mut calibration = Calibration::new(inbox, Arc::clone(&notice), PathBuf::from("."));
+        let description = Arc::new(Detector::default());
+        let mut ask = |ask| calibration.ask(ask, &description, None);
+        assert!(ask(Calibrate::Save).is_none() && shown(&notice, &receiver).is_none(), "there is none to save");
+        for _ in 0..2 {
+            ask(Calibrate::Begin);
+            assert_eq!(shown(&notice, &receiver), Some(Stage::Rubbing));
+        }
+        assert!(ask(Calibrate::Use).is_none(), "nothing is found yet");
+        ask(Calibrate::End);
+        assert_eq!((shown(&notice, &receiver), calibration.begun), (None, 1));
     }
 }

@@ -5,8 +5,9 @@
 //! new. Where the answer is a line, a ring or an image, or rows do not fit, whole frames are scanned.
 
 mod choice;
-mod wish;
+mod request;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
@@ -14,7 +15,7 @@ use tactomo_protocol::{MAX_PLAN_ROWS, Plan, Settings};
 use tactomo_touch::scanning::{Attention, FOCUS, spread, with_others};
 
 pub use self::choice::ScanChoice;
-pub(super) use self::wish::{PlanAsk, PlanWish};
+pub(super) use self::request::{PlanRequests, RequestedPlan};
 
 /// Rows of a frame of an adaptive plan: 1400 frames/s at 921600 baud, where one row would be 2100 and tell each time of one ground alone.
 const ROWS: usize = 2;
@@ -26,47 +27,49 @@ const MOST_DOUBLINGS: u8 = 2;
 /// Chooses plans.
 pub(super) struct Planner {
     choice: ScanChoice,
+    requested: Arc<RequestedPlan>,
     begun: Instant,
     attention: Attention,
-    /// Whether the plan of a choice that is not adaptive was wished.
-    is_wished: bool,
+    /// Whether the plan of a choice that is not adaptive was requested.
+    is_requested: bool,
     /// Doublings of the conversions for a reading.
     doublings: u8,
 }
 
 impl Planner {
-    pub fn new(choice: ScanChoice) -> Self {
-        Self { choice, begun: Instant::now(), attention: Attention::new(FOCUS), is_wished: false, doublings: 0 }
+    /// Begins with whole frames; plans go to `requested`.
+    pub fn new(choice: ScanChoice, requested: Arc<RequestedPlan>) -> Self {
+        let attention = Attention::new(FOCUS);
+        Self { choice, requested, begun: Instant::now(), attention, is_requested: false, doublings: 0 }
     }
 
     /// Begins anew, as with another board.
     pub fn restart(&mut self) {
-        *self = Self::new(self.choice.clone());
+        *self = Self::new(self.choice.clone(), Arc::clone(&self.requested));
     }
 
-    /// Wishes a plan, if it is time for another: `telling` are the grounds that tell most, so many as they are asked for, and
+    /// Requests a plan, if it is time for another: `telling` are the grounds that tell most, so many as they are asked for, and
     /// `touches` is whether anything touches, `conversions` how many a reading is the mean of by the settings.
     pub fn consider(
         &mut self,
-        wish: &PlanWish,
         detector: &Detector,
         (touches, conversions): (bool, u32),
         telling: impl FnOnce(usize) -> Option<Vec<usize>>,
     ) {
-        if self.choice == ScanChoice::Whole || wish.is_refused() {
+        if self.choice == ScanChoice::Whole || self.requested.is_refused() {
             return;
         }
         let is_new = match self.choice {
             ScanChoice::Adaptive => self.attention.consider(self.begun.elapsed().as_secs_f64(), touches, telling),
-            _ => !std::mem::replace(&mut self.is_wished, true),
+            _ => !std::mem::replace(&mut self.is_requested, true),
         };
-        let doubles = self.doublings < MOST_DOUBLINGS && wish.is_crowded();
+        let doubles = self.doublings < MOST_DOUBLINGS && self.requested.is_crowded();
         self.doublings += u8::from(doubles);
         if is_new || doubles {
             let plan = self.plan(detector);
             let average_log2 = conversions.max(1).ilog2() as u8 + self.doublings;
             let average_log2 = if plan.is_whole() { 0 } else { average_log2.min(Settings::MAX_AVERAGE_LOG2) };
-            wish.put(Plan { average_log2, ..plan });
+            self.requested.put(Plan { average_log2, ..plan });
         }
     }
 
@@ -113,12 +116,17 @@ fn plan(grounds: impl Iterator<Item = usize>, rows_a_frame: usize, electrodes: u
 mod tests {
     use std::time::Duration;
 
-    use super::wish::COUNTED;
+    use super::request::COUNTED;
     use super::*;
     use tactomo_touch::scanning::{PAUSE_S, SHORT_PAUSE_S};
 
     fn pause(pause_s: f64) {
         std::thread::sleep(Duration::from_secs_f64(pause_s));
+    }
+
+    fn planner(choice: ScanChoice) -> (Planner, Arc<RequestedPlan>) {
+        let requested = Arc::default();
+        (Planner::new(choice, Arc::clone(&requested)), requested)
     }
 
     fn detector() -> Detector {
@@ -141,35 +149,35 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_is_wished_when_what_touches_has_changed() {
-        let (wish, detector) = (PlanWish::default(), detector());
-        let mut planner = Planner::new(ScanChoice::Adaptive);
-        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![5, 10]));
-        let at_rest = wish.take().unwrap();
-        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![6, 9]));
-        assert_eq!(wish.take(), None, "too soon");
+    fn a_plan_is_requested_when_what_touches_has_changed() {
+        let (mut planner, requested) = planner(ScanChoice::Adaptive);
+        let detector = detector();
+        planner.consider(&detector, (false, 1), |_| Some(vec![5, 10]));
+        let at_rest = requested.take().unwrap();
+        planner.consider(&detector, (false, 1), |_| Some(vec![6, 9]));
+        assert_eq!(requested.take(), None, "too soon");
         pause(SHORT_PAUSE_S);
-        planner.consider(&wish, &detector, (true, 1), |count| Some(vec![1; count]));
-        let touched = wish.take().unwrap();
+        planner.consider(&detector, (true, 1), |count| Some(vec![1; count]));
+        let touched = requested.take().unwrap();
         assert!(touched != at_rest && touched.grounds[..3] == [1, 1, 1]);
         pause(PAUSE_S);
-        planner.consider(&wish, &detector, (true, 1), |_| None);
-        assert!(wish.take().unwrap().is_whole(), "an image takes whole frames");
-        wish.set_refused(true);
+        planner.consider(&detector, (true, 1), |_| None);
+        assert!(requested.take().unwrap().is_whole(), "an image takes whole frames");
+        requested.set_refused(true);
         pause(PAUSE_S);
-        planner.consider(&wish, &detector, (false, 1), |_| Some(vec![5, 10]));
-        assert_eq!(wish.take(), None);
+        planner.consider(&detector, (false, 1), |_| Some(vec![5, 10]));
+        assert_eq!(requested.take(), None);
     }
 
     #[test]
     fn a_line_without_room_makes_readings_means_of_more() {
-        let (wish, detector) = (PlanWish::default(), detector());
-        let mut planner = Planner::new(ScanChoice::Adaptive);
+        let (mut planner, requested) = planner(ScanChoice::Adaptive);
+        let detector = detector();
         let mut averages = Vec::new();
         for dropped in [0, 2, 2, 2, 0] {
-            (0..COUNTED).for_each(|_| wish.count(dropped));
-            planner.consider(&wish, &detector, (true, 1), |_| Some(vec![5, 10]));
-            averages.extend(wish.take().map(|plan| plan.average_log2));
+            (0..COUNTED).for_each(|_| requested.count(dropped));
+            planner.consider(&detector, (true, 1), |_| Some(vec![5, 10]));
+            averages.extend(requested.take().map(|plan| plan.average_log2));
             pause(PAUSE_S);
         }
         assert_eq!(averages, [0, 1, 2], "no more, and never fewer");
@@ -177,8 +185,8 @@ mod tests {
 
     #[test]
     fn whole_frames_are_nothing_to_ask_for() {
-        let wish = PlanWish::default();
-        Planner::new(ScanChoice::Whole).consider(&wish, &detector(), (true, 1), |_| Some(vec![1, 2]));
-        assert_eq!(wish.take(), None);
+        let (mut planner, requested) = planner(ScanChoice::Whole);
+        planner.consider(&detector(), (true, 1), |_| Some(vec![1, 2]));
+        assert_eq!(requested.take(), None);
     }
 }

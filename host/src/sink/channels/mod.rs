@@ -95,7 +95,7 @@ impl Messages {
     /// If memory ends, which `serde_json` cannot tell from anything else.
     pub fn write(&self, channel: Channel, delivery: &Delivery, out: &mut Vec<u8>) -> io::Result<bool> {
         let event = &*delivery.event;
-        let at = Stamp::of(event.arrived_unix_ns);
+        let at = Stamp::of(event.frame.arrived.unix_ns);
         match channel {
             Channel::Touch => put(&Fields::default().of(delivery), out),
             Channel::Contacts => put(&scene::update(&event.solution, self.usual_radius_m, at), out),
@@ -106,7 +106,7 @@ impl Messages {
                 _ => return Ok(false),
             },
             Channel::Readings => {
-                put(&packed::readings([&event.readings, &event.used, &event.touch], self.bounds_m, at), out)
+                put(&packed::readings([&event.frame.measured, &event.frame.used, &event.touch], self.bounds_m, at), out)
             }
         }?;
         Ok(true)
@@ -168,6 +168,7 @@ impl Pose {
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
+    use std::time::Duration;
 
     use data_encoding::BASE64;
     use serde_json::Value;
@@ -175,7 +176,7 @@ mod tests {
     use tactomo_touch::solve::{FoundContact, FoundRing, FoundShape, Solution};
 
     use super::*;
-    use crate::run::TouchEvent;
+    use crate::run::{Arrival, Frame, TouchEvent};
 
     fn messages() -> Messages {
         let mesh = ImageMesh { nodes_m: vec![[0.01, 0.02], [-0.01, 0.0]], ..ImageMesh::default() };
@@ -183,7 +184,8 @@ mod tests {
     }
 
     fn message(channel: Channel, event: TouchEvent) -> Option<Value> {
-        let event = Arc::new(TouchEvent { arrived_unix_ns: 1_700_000_000_123_456_789, ..event });
+        let arrived = Arrival::recorded(Duration::from_nanos(1_700_000_000_123_456_789));
+        let event = Arc::new(TouchEvent { frame: Frame { arrived, ..event.frame }, ..event });
         let delivery = Delivery { event, lost_before: 0, missed_before: 0, pointer_events: Vec::new() };
         let mut out = Vec::new();
         messages().write(channel, &delivery, &mut out).unwrap().then(|| serde_json::from_slice(&out).unwrap())
@@ -239,7 +241,8 @@ mod tests {
         let readings = Readings::from_fn(4, volts).saying(says);
         let touch = Readings::from_fn(4, |g, e| volts(g, e) / 7.0);
         let used = Readings::from_fn(4, |g, e| volts(g, e).max(1.0));
-        let event = TouchEvent { readings, used, touch, ..TouchEvent::of(0, Solution::default()) };
+        let event = TouchEvent::of(0, Solution::default());
+        let event = TouchEvent { frame: Frame { measured: readings, used, ..event.frame }, touch, ..event };
         let grid = message(Channel::Readings, event).unwrap();
         let (columns, stride) = (grid["column_count"].as_u64().unwrap(), grid["cell_stride"].as_u64().unwrap());
         assert_eq!((columns, stride, grid["row_stride"].as_u64()), (4, 24, Some(96)));

@@ -95,7 +95,7 @@ impl App<'_> {
     async fn send(&mut self, socket: &mut WebSocket, delivery: &Delivery) -> io::Result<()> {
         let Self { shared, subscriptions, tail: Some(tail), out, pulse } = self else { return Ok(()) };
         for (id, channel) in subscriptions {
-            protocol::begin_data(*id, delivery.event.arrived_unix_ns, out);
+            protocol::begin_data(*id, delivery.event.frame.arrived.unix_ns, out);
             if shared.messages.write(*channel, delivery, out)? {
                 // Waits here while the app does not read; nobody else waits for it.
                 tail.wait_for(pulse.send(socket, Message::binary(out.clone()))).await?;

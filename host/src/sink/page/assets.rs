@@ -49,6 +49,7 @@ const ASSETS: &[Asset] = &[
     ("/strip.js", SCRIPT, include_str!("web/strip.js")),
     ("/svg.js", SCRIPT, include_str!("web/svg.js")),
     ("/theme.js", SCRIPT, include_str!("web/theme.js")),
+    ("/told.js", SCRIPT, include_str!("web/told.js")),
     ("/trails.js", SCRIPT, include_str!("web/trails.js")),
     ("/transport.js", SCRIPT, include_str!("web/transport.js")),
     ("/triangles.js", SCRIPT, include_str!("web/triangles.js")),

@@ -14,7 +14,8 @@ use tokio_tungstenite::tungstenite::protocol::CloseFrame;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
 use super::messages::PageMessage;
-use super::{Shared, update, wire};
+use super::update::{self, Shown};
+use super::{Shared, wire};
 use crate::run::{Request, Snapshot};
 use crate::sink::web::{Beat, Pulse, WebSocket};
 
@@ -145,11 +146,12 @@ impl<'a> Page<'a> {
         // Cloned, so that the pipeline can publish the next while this one is encoded.
         let snapshot = self.snapshots.borrow_and_update().clone();
         self.update_due = Instant::now() + UPDATE_INTERVAL;
-        let frame = snapshot.frame.as_ref()?;
+        let answer = snapshot.answer.as_deref()?;
         let (course_v, points) = snapshot.course.points_since(self.course_points);
         self.course_points = points;
         let detector = &self.shared.setup.detector;
-        Some(Message::binary(update::update(frame, snapshot.statistics.frames, &course_v, detector)))
+        let shown = Shown { answer, frames: snapshot.statistics.frames, course_v: &course_v, detector };
+        Some(Message::binary(update::update(&shown)))
     }
 }
 

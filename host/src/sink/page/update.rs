@@ -1,49 +1,145 @@
-//! Updates: the newest frame, in bytes. The page's side is `web/protocol.js`.
+//! Updates: the newest answered frame, in bytes.
 //!
-//! Little-endian throughout. What is not known is not a number.
+//! What is in them stands in the tables below, once: the program writes by them, and the page reads by their names, which come with the
+//! [setup](super::wire) as its [`Layout`]. All numbers are little-endian. What is not known is not a number.
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 11 x u32 | [`LAYOUT`]; sequence number of the frame; frames received so far (both modulo 2^32); nodes `m`; electrodes `n`; contacts found `k`; shape: 0 none, 1 a line, 2 a ring; flags: 1 saturated, 2 the readings do not fit, 4 unfinished, 8 the detector differs from its description; electrodes left out: bit `e` is electrode `e`; those of them whose wires are exchanged; points of the [course](crate::run::course) `s` |
-//! | f32 | residual of the readings: root mean square, in standard deviations of the noise |
-//! | f32 | age of the answer when this was sent: since the last byte of its frame came (s) |
-//! | 4 x f32 | the pointer: sum of its motion along x and y (m), 1 while it is pressed, clicks so far; not numbers if no contact is one |
-//! | m x f32 | the image: contact conductance per area at each node (S/m2); `m` is 0 if the solver makes no image |
-//! | n n x f32 | the readings as measured (V), electrode `e` under ground `g` at `g n + e` |
-//! | s x f32 | points of the course of the readings (V) since the update before, 4 ms each |
-//! | k x (u32, 16 x f32) | the contacts found: number from frame to frame, 0 if it has none; their [columns](CONTACT_COLUMNS) after the id; x, y on the map (m), which are those in space on a flat detector |
-//! | 18 x f32 | with a shape: its [columns](tactomo_touch::schema::SHAPE_COLUMNS); then the contacts are beside it |
+//! | u32 each | the [words](WORDS) |
+//! | u32 each | lengths of the [arrays](ARRAYS), then how many contacts there are |
+//! | f32 each | the [numbers](NUMBERS) |
+//! | f32 each | the arrays, one after the other |
+//! | u32, then f32 each | of each contact its number from frame to frame, 0 if it has none; then its [numbers](contact_names) |
+//! | f32 each | with a shape: its [columns](SHAPE_COLUMNS); then the contacts are beside it |
 //! | the rest | UTF-8: what was chosen, a line feed, why; nothing if the solver does not choose |
 
-use crate::run::FrameSnapshot;
+use std::time::Instant;
+
+use serde::Serialize;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::pointer::PointerState;
-use tactomo_touch::schema::{CONTACT_COLUMNS, contact_values, shape_values};
-use tactomo_touch::solve::{ElectrodeFault, Flags, FoundContact, FoundShape};
+use tactomo_touch::schema::{CONTACT_COLUMNS, SHAPE_COLUMNS, contact_values, shape_values};
+use tactomo_touch::solve::{ElectrodeFault, Flags, FoundContact};
 
-/// Version of the layout; a page of another version says that it must be reloaded.
-pub(super) const LAYOUT: u32 = 9;
+use crate::run::TouchEvent;
 
-/// Numbers of a contact: the columns after its id, and its place on the map.
-const CONTACT_FLOATS: usize = CONTACT_COLUMNS.len() - 1 + 2;
+/// What an update is made of.
+pub(super) struct Shown<'a> {
+    pub answer: &'a TouchEvent,
+    /// Frames received so far.
+    pub frames: u64,
+    /// Points of the [course](crate::run::course) of the readings (V) since the update before, 4 ms each.
+    pub course_v: &'a [f32],
+    pub detector: &'a Detector,
+}
 
-/// An update; `frames` received so far, and the points of the course (V) since the last one.
-pub(super) fn update(frame: &FrameSnapshot, frames: u64, course_v: &[f32], detector: &Detector) -> Vec<u8> {
-    let solution = &frame.solution;
-    let age_s = frame.arrived.elapsed().as_secs_f32();
-    let image = solution.image_s_per_m2.as_deref().unwrap_or_default();
-    let counts = [image.len(), frame.readings.electrodes(), solution.contacts.len()].map(|count| count as u32);
-    // The page counts modulo 2^32.
-    let head = [LAYOUT, frame.sequence as u32, frames as u32].into_iter().chain(counts);
-    let head = head.chain([kind(solution.shape.as_ref())]).chain(flags(&solution.flags));
-    let head = head.chain([course_v.len() as u32]);
-    let readings = frame.readings.volts().iter().map(|&volt| volt as f32);
-    let first = [known(solution.residual), age_s].into_iter().chain(pointer(frame.pointer));
-    let values = first.chain(image.iter().copied()).chain(readings).chain(course_v.iter().copied());
-    let mut bytes: Vec<u8> = head.flat_map(u32::to_le_bytes).chain(values.flat_map(f32::to_le_bytes)).collect();
+/// What has a name and is read from what is shown.
+struct Named<T> {
+    name: &'static str,
+    of: fn(&Shown) -> T,
+}
+
+const fn named<T>(name: &'static str, of: fn(&Shown) -> T) -> Named<T> {
+    Named { name, of }
+}
+
+/// Whole numbers; counts are modulo 2^32. The shape is 0 for none, or the number of its [name](SHAPES) from 1 on; flags are bits, the first of
+/// [`FLAGS`] the lowest; electrodes are bits too: bit `e` is electrode `e`.
+const WORDS: [Named<u32>; 7] = [
+    named("sequence", |shown| shown.answer.frame.sequence as u32),
+    named("frames", |shown| shown.frames as u32),
+    named("electrodes", |shown| shown.answer.frame.measured.electrodes() as u32),
+    named("shape", |shown| {
+        let name = shown.answer.solution.shape.as_ref().map(|shape| shape.name());
+        SHAPES.iter().position(|known| Some(*known) == name).map_or(0, |index| index as u32 + 1)
+    }),
+    named("flags", |shown| {
+        let flags = &shown.answer.solution.flags;
+        FLAGS.iter().enumerate().map(|(bit, (_, is_set))| u32::from(is_set(flags)) << bit).sum::<u32>()
+    }),
+    named("excluded", |shown| bits(shown.answer.solution.flags.excluded.iter())),
+    named("exchanged", |shown| {
+        let Flags { excluded, faults, .. } = &shown.answer.solution.flags;
+        let exchanged = excluded.iter().zip(faults).filter(|(_, fault)| **fault == ElectrodeFault::Exchanged);
+        bits(exchanged.map(|(electrode, _)| electrode))
+    }),
+];
+
+/// Residual of the readings: root mean square, in standard deviations of the noise. Age of the answer when this is sent: since the last byte of
+/// its frame came. The pointer: sum of its motion, 1 while it is pressed, clicks so far; not numbers if no contact is one.
+const NUMBERS: [Named<f32>; 6] = [
+    named("residual", |shown| known(shown.answer.solution.residual)),
+    named("age_s", |shown| known(shown.answer.frame.arrived.age(Instant::now()).map(|age| age.as_secs_f64()))),
+    named("pointer_x_m", |shown| pointer(shown, |state| state.way_m[0])),
+    named("pointer_y_m", |shown| pointer(shown, |state| state.way_m[1])),
+    named("pointer_pressed", |shown| pointer(shown, |state| f64::from(u8::from(state.is_pressed)))),
+    named("pointer_clicks", |shown| pointer(shown, |state| state.clicks as f64)),
+];
+
+/// The image: contact conductance per area at each node, none if the solver makes no image. The readings as measured, electrode `e` under ground
+/// `g` at `g n + e`. The course of the readings.
+const ARRAYS: [Named<Vec<f32>>; 3] = [
+    named("image_s_per_m2", |shown| shown.answer.solution.image_s_per_m2.as_deref().unwrap_or_default().to_vec()),
+    named("readings_v", |shown| shown.answer.frame.measured.volts().iter().map(|&volt| volt as f32).collect()),
+    named("course_v", |shown| shown.course_v.to_vec()),
+];
+
+/// Flags of a solution.
+const FLAGS: [(&str, fn(&Flags) -> bool); 4] = [
+    ("saturated", |flags| flags.saturated),
+    ("misfit", |flags| flags.misfit),
+    ("unfinished", |flags| flags.unfinished),
+    ("calibrate", |flags| flags.calibrate),
+];
+
+/// Names of shapes.
+const SHAPES: [&str; 2] = ["line", "ring"];
+
+/// Place of a contact on the map (m), which is that in space on a flat detector.
+const MAP: [&str; 2] = ["map_x_m", "map_y_m"];
+
+/// The names of what is in an update, in its order.
+#[derive(Serialize)]
+pub(super) struct Layout {
+    words: Vec<&'static str>,
+    numbers: Vec<&'static str>,
+    arrays: Vec<&'static str>,
+    contact: Vec<&'static str>,
+    shape: Vec<&'static str>,
+    flags: Vec<&'static str>,
+    shapes: [&'static str; SHAPES.len()],
+}
+
+/// The layout of updates.
+pub(super) fn layout() -> Layout {
+    Layout {
+        words: WORDS.iter().map(|word| word.name).collect(),
+        numbers: NUMBERS.iter().map(|number| number.name).collect(),
+        arrays: ARRAYS.iter().map(|array| array.name).collect(),
+        contact: contact_names().collect(),
+        shape: SHAPE_COLUMNS.iter().map(|column| column.name).collect(),
+        flags: FLAGS.iter().map(|(name, _)| *name).collect(),
+        shapes: SHAPES,
+    }
+}
+
+/// Numbers of a contact: its columns after the id, and its place on the map.
+fn contact_names() -> impl Iterator<Item = &'static str> {
+    CONTACT_COLUMNS.iter().skip(1).map(|column| column.name).chain(MAP)
+}
+
+/// An update.
+pub(super) fn update(shown: &Shown) -> Vec<u8> {
+    let solution = &shown.answer.solution;
+    let arrays = ARRAYS.map(|array| (array.of)(shown));
+    let lengths = arrays.iter().map(|array| array.len()).chain([solution.contacts.len()]);
+    let words = WORDS.iter().map(|word| (word.of)(shown)).chain(lengths.map(|length| length as u32));
+    let numbers = NUMBERS.iter().map(|number| (number.of)(shown));
+    let numbers = numbers.chain(arrays.iter().flat_map(|array| array.iter().copied()));
+    let mut bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).chain(numbers.flat_map(f32::to_le_bytes)).collect();
     for found in &solution.contacts {
         bytes.extend(found.id.unwrap_or(0).to_le_bytes());
-        bytes.extend(contact(found, detector).into_iter().flat_map(f32::to_le_bytes));
+        bytes.extend(contact(found, shown.detector).flat_map(f32::to_le_bytes));
     }
     if let Some(shape) = &solution.shape {
         bytes.extend(shape_values(shape).into_iter().flat_map(f32::to_le_bytes));
@@ -54,38 +150,20 @@ pub(super) fn update(frame: &FrameSnapshot, frames: u64, course_v: &[f32], detec
     bytes
 }
 
-fn pointer(state: Option<PointerState>) -> [f32; 4] {
-    let of = |PointerState { way_m: [x_m, y_m], is_pressed, clicks }| {
-        [x_m as f32, y_m as f32, f32::from(u8::from(is_pressed)), clicks as f32]
-    };
-    state.map_or([f32::NAN; 4], of)
-}
-
-fn kind(shape: Option<&FoundShape>) -> u32 {
-    match shape {
-        None => 0,
-        Some(FoundShape::Line(_)) => 1,
-        Some(FoundShape::Ring(_)) => 2,
-    }
-}
-
-fn flags(flags: &Flags) -> [u32; 3] {
-    let bits = [flags.saturated, flags.misfit, flags.unfinished, flags.calibrate];
-    let told = bits.iter().enumerate().map(|(bit, set)| u32::from(*set) << bit).sum();
-    let bit = |e: &usize| 1_u32.checked_shl(*e as u32).unwrap_or_default();
-    let excluded = flags.excluded.iter().map(bit).fold(0, |all, bit| all | bit);
-    let exchanged = flags.excluded.iter().zip(&flags.faults).filter(|(_, fault)| **fault == ElectrodeFault::Exchanged);
-    [told, excluded, exchanged.map(|(e, _)| bit(e)).fold(0, |all, bit| all | bit)]
-}
-
-fn contact(found: &FoundContact, detector: &Detector) -> [f32; CONTACT_FLOATS] {
-    let mut values = [f32::NAN; CONTACT_FLOATS];
-    let (known, map) = values.split_at_mut(CONTACT_FLOATS - 2);
+/// In the order of [`contact_names`].
+fn contact(found: &FoundContact, detector: &Detector) -> impl Iterator<Item = f32> + use<> {
     // Errors in space are not those on the flat map of a curved detector.
     let uncertainty = found.uncertainty.filter(|_| detector.surface.is_none());
-    known.copy_from_slice(&contact_values(&FoundContact { uncertainty, ..*found }));
-    map.copy_from_slice(&detector.map_m([found.x_m, found.y_m, found.z_m]).map(|metres| metres as f32));
-    values
+    let map_m = detector.map_m([found.x_m, found.y_m, found.z_m]).map(|metres| metres as f32);
+    contact_values(&FoundContact { uncertainty, ..*found }).into_iter().chain(map_m)
+}
+
+fn pointer(shown: &Shown, of: fn(&PointerState) -> f64) -> f32 {
+    known(shown.answer.pointer.as_ref().map(of))
+}
+
+fn bits<'a>(electrodes: impl Iterator<Item = &'a usize>) -> u32 {
+    electrodes.map(|e| 1_u32.checked_shl(*e as u32).unwrap_or_default()).fold(0, |all, bit| all | bit)
 }
 
 fn known(value: Option<f64>) -> f32 {
@@ -94,22 +172,21 @@ fn known(value: Option<f64>) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
+    use crate::run::{Arrival, Frame};
     use tactomo_physics::readings::Readings;
-    use tactomo_touch::solve::{Choice, FoundRing, Solution, Uncertainty};
+    use tactomo_touch::solve::{Choice, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
     fn bytes_of(solution: Solution) -> Vec<u8> {
-        let frame = FrameSnapshot {
-            sequence: (7 << 32) + 9,
-            board_time_us: 0,
-            arrived: std::time::Instant::now(),
-            status: Default::default(),
-            readings: Readings::from_fn(2, |g, e| (2 * g + e) as f64),
-            solution,
-            pointer: Some(PointerState { way_m: [0.5, -0.25], is_pressed: true, clicks: 3 }),
-            rezeroing: false,
-        };
-        update(&frame, 300, &[0.25, 0.75], &Detector::preset(Detector::DEFAULT).unwrap())
+        let readings = Readings::from_fn(2, |g, e| (2 * g + e) as f64);
+        let first = Frame::first(readings.clone(), readings.clone(), Arrival::at(Instant::now()));
+        let frame = Frame { sequence: (7 << 32) + 9, ..first };
+        let pointer = Some(PointerState { way_m: [0.5, -0.25], is_pressed: true, clicks: 3 });
+        let answer = TouchEvent { pointer, ..TouchEvent::new(frame, readings, solution) };
+        let detector = &Detector::preset(Detector::DEFAULT).unwrap();
+        update(&Shown { answer: &answer, frames: 300, course_v: &[0.25, 0.75], detector })
     }
 
     fn words(bytes: &[u8]) -> Vec<u32> {
@@ -150,7 +227,7 @@ mod tests {
             certainty: Some(0.75),
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
-        assert_eq!(words(&bytes[..44]), [LAYOUT, 9, 300, 3, 2, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 2]);
+        assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 3, 4, 2, 2]);
         let head = floats(&bytes[44..104]);
         assert_eq!(head[0], 1.25);
         assert!((0.0..5.0).contains(&head[1]), "{} s old", head[1]);
@@ -175,7 +252,7 @@ mod tests {
             shape: Some(FoundShape::Ring(ring)),
             ..Solution::default()
         });
-        assert_eq!(words(&bytes[20..28]), [1, 2]);
+        assert_eq!((words(&bytes[12..16]), words(&bytes[40..44])), (vec![2], vec![1]));
         let shape = floats(&bytes[68 + 4 * 6 + 68..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
@@ -184,8 +261,39 @@ mod tests {
     #[test]
     fn nothing_found_is_head_and_readings_alone() {
         let bytes = bytes_of(Solution::default());
-        assert_eq!(words(&bytes[..44]), [LAYOUT, 9, 300, 0, 2, 0, 0, 0, 0, 0, 2]);
+        assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0, 0, 0, 0, 4, 2, 0]);
         assert!(floats(&bytes[44..48])[0].is_nan());
         assert_eq!(bytes.len(), 68 + 4 * 6);
+    }
+
+    /// Words of the page's script that stand behind one of these.
+    fn read_by_the_page(before: &[&str]) -> BTreeSet<&'static str> {
+        let script = include_str!("web/protocol.js");
+        // Not behind `layout.`, whose lists have the same names.
+        let behind = |before: &&str| {
+            let parts = script.split(*before).zip(script.split(*before).skip(1));
+            parts.filter(|(head, _)| !head.ends_with('.')).map(|(_, tail)| tail).collect::<Vec<_>>()
+        };
+        let word = |text: &'static str| text.split(|c: char| !c.is_alphanumeric() && c != '_').next();
+        before.iter().flat_map(behind).filter_map(word).collect()
+    }
+
+    #[test]
+    fn the_page_reads_by_names_of_what_is_written() {
+        let Layout { words, numbers, arrays, contact, shape, .. } = layout();
+        let written: BTreeSet<_> = [words, numbers, arrays, contact, shape].concat().into_iter().collect();
+        let read = read_by_the_page(&["words.", "numbers.", "arrays.", "values."]);
+        assert!(read.len() > 30, "{read:?}");
+        assert_eq!(read.difference(&written).collect::<Vec<_>>(), Vec::<&&str>::new());
+    }
+
+    #[test]
+    fn every_shape_has_a_name_of_the_table() {
+        let line =
+            FoundLine { from_m: [0.0; 2], to_m: [0.01, 0.0], width_m: 0.002, conductance_s: 1.0, uncertainty: None };
+        let ring =
+            FoundRing { centre_m: [0.0; 2], radius_m: 0.01, width_m: 1e-3, conductance_s: 1.0, uncertainty: None };
+        let names = [FoundShape::Line(line), FoundShape::Ring(ring)].map(|shape| shape.name());
+        assert_eq!(names, SHAPES);
     }
 }

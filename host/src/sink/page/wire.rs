@@ -2,10 +2,10 @@
 //!
 //! Program to page, one message at a time, the next only after the page has answered `"taken"`:
 //!
-//! - `setup`, JSON, once: what does not change while the program runs.
+//! - `setup`, JSON, once: what does not change while the program runs, and how updates are to be read.
 //! - `status`, JSON, four times a second, and ten times while the detector is calibrated: the link, the board, the counts, what is played and
 //!   recorded, and how the [calibration](super::calibrating) is.
-//! - an update, binary, at most about sixty times a second: the newest frame, as in [`update`](super::update).
+//! - an update, binary, at most about sixty times a second: the newest answered frame, as in [`update`](super::update).
 //!
 //! Page to program, JSON: see [`messages`](super::messages).
 
@@ -14,7 +14,7 @@ use tactomo_protocol::Hello;
 
 use super::PageSetup;
 use super::calibrating::CalibratingMessage;
-use super::update::LAYOUT;
+use super::update::{Layout, layout};
 use crate::run::{Latency, LinkState, Scan, Snapshot, SolverState};
 use tactomo_board::link::Playing;
 use tactomo_physics::scene::SceneName;
@@ -24,7 +24,8 @@ use tactomo_touch::vibration::{Peak, Spectrum};
 #[derive(Serialize)]
 struct SetupMessage<'a> {
     r#type: &'static str,
-    layout: u32,
+    /// How updates are to be read.
+    layout: Layout,
     detector: &'a str,
     bounds_m: [[f64; 2]; 2],
     outline_m: Vec<&'a [[f64; 2]]>,
@@ -73,7 +74,7 @@ pub(super) fn setup(setup: &PageSetup) -> serde_json::Result<String> {
     let (triangles, torn_triangles) = drawn_triangles(setup);
     serde_json::to_string(&SetupMessage {
         r#type: "setup",
-        layout: LAYOUT,
+        layout: layout(),
         detector: &detector.name,
         bounds_m: detector.outline.bounds(),
         outline_m: loops.map(Vec::as_slice).collect(),
@@ -247,7 +248,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
             amplitudes_v: amplitudes.into_iter().map(|amplitude| amplitude as f32).collect(),
             peak,
         }),
-        rezeroing: snapshot.frame.as_ref().is_some_and(|frame| frame.rezeroing),
+        rezeroing: snapshot.answer.as_ref().is_some_and(|answer| answer.is_taking_baseline),
         rezeros,
         playing: playing(&snapshot.playing),
         recording: snapshot.recording.as_ref().map(|path| path.display().to_string()),

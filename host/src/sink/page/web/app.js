@@ -17,6 +17,7 @@ import { saveData, savePicture } from "./save.js";
 import { Simulation } from "./simulation.js";
 import { StripChart } from "./strip.js";
 import { listenForTheme, theme } from "./theme.js";
+import { Told } from "./told.js";
 import { Transport } from "./transport.js";
 import { Verdict } from "./verdict.js";
 import { VibrationPanel } from "./vibration.js";
@@ -42,10 +43,11 @@ function start(setup) {
     if (text !== parts.text) location.reload();
     return;
   }
-  const picture = new Picture(setup, theme());
+  const told = new Told();
+  const picture = new Picture(setup, theme(), told);
   const history = new History(setup);
   parts = {
-    text, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
+    text, told, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
     calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup),
@@ -92,9 +94,9 @@ function draw(now) {
 function show(update, now) {
   shown = update;
   parts.history.take(update, now);
+  if (parts.told.take(update, now)) parts.table.show(update);
   parts.picture.show(update, now);
   parts.readings.show(update, now);
-  parts.table.show(update, now);
   parts.strip.draw(now);
   parts.pointer.show(update, now);
   vibration.draw(now);

@@ -20,9 +20,6 @@ export function placesOf(shape) {
 /** The largest standard error of a place (m), or null. */
 export const errorOf = ({ errorsM }) => (errorsM.includes(null) ? null : Math.max(...errorsM));
 
-/** What a label says of it, as of a contact. */
-export const labelled = ({ kind, conductanceS }) => ({ kind, id: null, forceN: null, beyondMaximum: false, conductanceS });
-
 /** A place (m) in the middle of the strip, for its label. */
 export const middleOf = (shape) => (shape.kind === "line"
   ? [0, 1].map((axis) => (shape.from[axis] + shape.to[axis]) / 2)

@@ -6,8 +6,6 @@ import { hueOf } from "./palette.js";
 import { count, millimetres, withError, withPrefix } from "./units.js";
 import { inPlaceOfContacts } from "./verdict.js";
 
-// Numbers that change faster cannot be read.
-const SHOWN_EVERY_MS = 120;
 // Rows that there is place for.
 const ROWS = 6;
 // Firmness in words and as a bar: conductance over the sheet conductance, from the lightest touch that linear theory describes
@@ -75,14 +73,11 @@ export class ContactTable {
     this.rest = document.getElementById("no-contacts");
     this.strength = document.getElementById("strength");
     this.more = document.getElementById("more-contacts");
-    this.shown = -Infinity;
   }
 
-  /** Shows the contacts of an update. */
-  show(update, now) {
+  /** Shows the contacts of the update that is told. */
+  show(update) {
     const { contacts, shape } = update;
-    if (now - this.shown < SHOWN_EVERY_MS) return;
-    this.shown = now;
     const sorted = [...contacts].sort((a, b) => (a.id ?? 0) - (b.id ?? 0) || b.conductanceS - a.conductanceS);
     const rows = shape ? [shapeRow(shape, this.sheetS)] : sorted.slice(0, ROWS).map((contact) => row(contact, this.sheetS));
     this.body.replaceChildren(...rows);

@@ -1,6 +1,6 @@
 // The flat picture: the detector from above, heat on one canvas, everything else on another over it.
 
-import { drawOutline, labelled, middleOf } from "./bars.js";
+import { drawOutline, middleOf } from "./bars.js";
 import { colourMaps } from "./colours.js";
 import { drawFrame, outlinePath } from "./frame.js";
 import { Layout, sizeCanvas } from "./layout.js";
@@ -41,13 +41,13 @@ export class FlatView {
       drawTrail(over, id, points, view.colours);
     }
     const spots = view.field.contacts.map((contact) => ({
-      contact, x: layout.x(contact.xM), y: layout.y(contact.yM), radius: view.field.radiusOf(contact) * layout.perM,
+      contact, text: view.labelOf(contact), x: layout.x(contact.xM), y: layout.y(contact.yM), radius: view.field.radiusOf(contact) * layout.perM,
     }));
     const { shape } = view.field;
     if (shape) {
       drawOutline(over, shape, { x: (xM) => layout.x(xM), y: (yM) => layout.y(yM), perM: layout.perM }, view.colours);
       const [xM, yM] = middleOf(shape);
-      spots.push({ contact: labelled(shape), x: layout.x(xM), y: layout.y(yM), radius: (shape.widthM * layout.perM) / 2 });
+      spots.push({ contact: shape, text: view.labelOf(shape), x: layout.x(xM), y: layout.y(yM), radius: (shape.widthM * layout.perM) / 2 });
     }
     for (const { contact, x, y } of spots.filter((spot) => !spot.contact.kind)) drawMark(over, contact, [x, y], layout.perM, view.colours);
     drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight });

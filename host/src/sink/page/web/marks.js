@@ -12,7 +12,7 @@ const TRAIL_WIDTH = 5;
 const PILL = { height: 22, badge: 9, font: "600 12.5px system-ui, sans-serif" };
 
 /** What a contact presses with, for people: newtons where they are known, "or more" where they are beyond what the detector can tell. */
-export const strengthOf = ({ forceN, beyondMaximum, conductanceS }) => (
+export const strengthOf = ({ forceN = null, beyondMaximum, conductanceS }) => (
   forceN === null ? (conductanceS === null ? "\u2013" : withPrefix(conductanceS, "S")) : `${beyondMaximum ? "\u2273\u2009" : ""}${withPrefix(forceN, "N")}`);
 
 /** The half axes (m) of one standard error and the direction of the longer (radians, anticlockwise), or null. */
@@ -101,14 +101,13 @@ function placeFor(width, { x, y, radius }, taken, box) {
   return best;
 }
 
-/** Labels of contacts: `spots` with the contact, its pixels `x`, `y` and its `radius` there; `box` that they stay in. */
+/** Labels of contacts: `spots` with the contact, the `text` of its label, its pixels `x`, `y` and its `radius` there; `box` that they stay in. */
 export function drawLabels(context, spots, colours, box) {
   context.font = PILL.font;
   context.textBaseline = "middle";
   const taken = spots.map(({ x, y, radius }) => ({ x: x - radius, y: y - radius, width: 2 * radius, height: 2 * radius }));
   for (const spot of spots) {
-    const { contact } = spot;
-    const text = strengthOf(contact);
+    const { contact, text } = spot;
     const badge = contact.id ? Math.max(2 * PILL.badge, context.measureText(String(contact.id)).width + 9) : 0;
     const pill = placeFor(badge + context.measureText(text).width + 16, spot, taken, box);
     taken.push(pill);

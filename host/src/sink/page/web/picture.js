@@ -2,6 +2,7 @@
 
 import { FlatView } from "./flat.js";
 import { HeatField, densityOf } from "./heat.js";
+import { strengthOf } from "./marks.js";
 import { palette } from "./palette.js";
 import { SteadyScale } from "./scale.js";
 import { SpaceView } from "./space.js";
@@ -14,8 +15,9 @@ const FIRM_SHARE = 0.3;
 
 /** Draws the touch; tells of it through `document.documentElement.dataset`. */
 export class Picture {
-  constructor(setup, theme) {
+  constructor(setup, theme, told) {
     this.setup = setup;
+    this.told = told;
     this.theme = theme;
     this.colours = palette();
     this.box = document.getElementById("plot");
@@ -104,6 +106,9 @@ export class Picture {
     return this.views.flat.layout.placeOf(clientX - box.left, clientY - box.top);
   }
 
+  /** What the label of a contact says, or of a shape. */
+  labelOf(contact) { return strengthOf(contact.kind ? this.told.shapeOf(contact) : this.told.contactOf(contact)); }
+
   /** The canvases of the view, lowest first. */
   layers() {
     return [document.getElementById(this.looking === "flat" ? "image" : "space"), document.getElementById("marks")];
@@ -115,9 +120,10 @@ export class Picture {
 
   #tell() {
     const { contacts, shape } = this.field;
+    const labels = [...contacts, ...(shape ? [shape] : [])].map((contact) => this.labelOf(contact));
     const places = contacts.map(({ xM, yM }) => [xM, yM].map((m) => Number((m * 1e3).toFixed(3))));
     Object.assign(document.documentElement.dataset, {
-      contacts: String(contacts.length), placesMm: JSON.stringify(places), image: String(Boolean(this.field.image)), shape: shape?.kind ?? "",
+      contacts: String(contacts.length), placesMm: JSON.stringify(places), labels: JSON.stringify(labels), image: String(Boolean(this.field.image)), shape: shape?.kind ?? "",
       scaleMaxSPerM2: String(this.scale.max), excluded: this.excluded.join(" "),
     });
   }

@@ -1,14 +1,6 @@
-// What passes the socket. The program's side is `wire.rs`, `messages.rs` and `update.rs`; the layout is described there and must be
-// the same.
+// What passes the socket. The program's side is `wire.rs`, `messages.rs` and `update.rs`. What is in an update, and in which order, the program says in
+// its setup as `layout`: everything is read by name here.
 
-/** Version of the layout below; the setup carries the program's. */
-export const LAYOUT = 9;
-
-const HEAD_WORDS = 11;
-// From the lowest bit on.
-const FLAGS = ["saturated", "misfit", "unfinished", "calibrate"];
-
-const known = (value) => (Number.isNaN(value) ? null : value);
 const bitsOf = (word) => Array.from({ length: 32 }, (_, bit) => bit).filter((bit) => (word >>> bit) & 1);
 
 // Takes little-endian numbers from a buffer, one after the other.
@@ -29,40 +21,66 @@ class Taker {
     return new Float32Array(this.buffer, this.offset - 4 * length, length);
   }
 
+  words(names) { return Object.fromEntries(names.map((name) => [name, this.word()])); }
+
+  // What is not known is null.
+  numbers(names) {
+    const values = this.floats(names.length);
+    return Object.fromEntries(names.map((name, i) => [name, Number.isNaN(values[i]) ? null : values[i]]));
+  }
+
   text() {
     return new TextDecoder().decode(new Uint8Array(this.buffer, this.offset));
   }
 }
 
-function contact(taker) {
+function contact(taker, names) {
   const id = taker.word() || null;
-  const [x, y, z, ...others] = taker.floats(16);
-  const [conductanceS, apparentS, radiusM, forceN, forceErrorN, beyond, xErrorM, yErrorM, correlation, errorS, depthM] = others.slice(0, 11).map(known);
-  const [xM, yM] = others.slice(11);
+  const values = taker.numbers(names);
   return {
-    id, xM, yM, conductanceS, apparentS, radiusM, forceN, forceErrorN, beyondMaximum: beyond === 1, xErrorM, yErrorM, correlation, errorS,
-    depthM, place: [x, y, z],
+    id,
+    xM: values.map_x_m,
+    yM: values.map_y_m,
+    place: [values.x_m, values.y_m, values.z_m],
+    conductanceS: values.conductance_s,
+    apparentS: values.apparent_conductance_s,
+    radiusM: values.radius_m,
+    forceN: values.force_n,
+    forceErrorN: values.force_deviation_n,
+    beyondMaximum: values.force_beyond_maximum === 1,
+    xErrorM: values.sigma_x_m,
+    yErrorM: values.sigma_y_m,
+    correlation: values.correlation,
+    errorS: values.sigma_conductance_s,
+    depthM: values.depth_m,
   };
 }
 
-/**
- * What the pointer has done, if a contact is one.
- * @param {Float32Array} numbers
- */
-function pointer([xM, yM, pressed, clicks]) {
-  return Number.isNaN(clicks) ? null : { wayM: [xM, yM], pressed: pressed === 1, clicks };
+// What touches as one: a line or a ring.
+function shape(taker, names, kind) {
+  const values = taker.numbers(names);
+  const both = {
+    kind, widthM: values.shape_width_m, conductanceS: values.shape_conductance_s, errorS: values.shape_sigma_conductance_s,
+  };
+  return kind === "line"
+    ? {
+      ...both,
+      from: [values.shape_from_x_m, values.shape_from_y_m],
+      to: [values.shape_to_x_m, values.shape_to_y_m],
+      errorsM: [values.shape_sigma_from_x_m, values.shape_sigma_from_y_m, values.shape_sigma_to_x_m, values.shape_sigma_to_y_m],
+    }
+    : {
+      ...both,
+      centre: [values.shape_x_m, values.shape_y_m],
+      radiusM: values.shape_radius_m,
+      errorsM: [values.shape_sigma_x_m, values.shape_sigma_y_m, values.shape_sigma_radius_m],
+    };
 }
 
-const SHAPES = [null, "line", "ring"];
-
-// What touches as one: a line or a ring.
-function shape(taker, kind) {
-  const [fromX, fromY, toX, toY, x, y, ...others] = [...taker.floats(18)].map(known);
-  const [radiusM, widthM, conductanceS] = others;
-  const errorsM = others.slice(3, 10);
-  return kind === "line"
-    ? { kind, from: [fromX, fromY], to: [toX, toY], widthM, conductanceS, errorsM: errorsM.slice(0, 4), errorS: others[11] }
-    : { kind, centre: [x, y], radiusM, widthM, conductanceS, errorsM: errorsM.slice(4), errorS: others[11] };
+// What the pointer has done, if a contact is one.
+function pointer(numbers) {
+  const [x, y, clicks] = [numbers.pointer_x_m, numbers.pointer_y_m, numbers.pointer_clicks];
+  return clicks === null ? null : { wayM: [x, y], pressed: numbers.pointer_pressed === 1, clicks };
 }
 
 function choice(text) {
@@ -74,22 +92,31 @@ function choice(text) {
  * An update: the newest frame and what the solver says of it. What is not known is null. Contacts beside a shape are not what touches, and
  * are kept apart from the others.
  */
-export function decodeUpdate(buffer) {
+export function decodeUpdate(buffer, layout) {
   const taker = new Taker(buffer);
-  const [layout, sequence, frames, nodes, electrodes, count, kind, flags, excluded, exchanged, points] =
-    Array.from({ length: HEAD_WORDS }, () => taker.word());
-  if (layout !== LAYOUT) throw new Error("The program is of another version than this page: reload it.");
-  const [residual, ageS] = [...taker.floats(2)].map(known);
-  const pointed = pointer(taker.floats(4));
-  const [image, readings, course] = [taker.floats(nodes), taker.floats(electrodes * electrodes), taker.floats(points)];
-  const contacts = Array.from({ length: count }, () => contact(taker));
+  const words = taker.words(layout.words);
+  const lengths = taker.words(layout.arrays);
+  const count = taker.word();
+  const numbers = taker.numbers(layout.numbers);
+  const arrays = Object.fromEntries(layout.arrays.map((name) => [name, taker.floats(lengths[name])]));
+  const contacts = Array.from({ length: count }, () => contact(taker, layout.contact));
+  const kind = layout.shapes[words.shape - 1] ?? null;
   return {
-    sequence, frames, residual, ageS, electrodes, flags: bitsOf(flags).map((bit) => FLAGS[bit]), excluded: bitsOf(excluded), exchanged: bitsOf(exchanged),
-    image, readings, course,
-    pointer: pointed,
+    sequence: words.sequence,
+    frames: words.frames,
+    electrodes: words.electrodes,
+    flags: bitsOf(words.flags).map((bit) => layout.flags[bit]),
+    excluded: bitsOf(words.excluded),
+    exchanged: bitsOf(words.exchanged),
+    residual: numbers.residual,
+    ageS: numbers.age_s,
+    image: arrays.image_s_per_m2,
+    readings: arrays.readings_v,
+    course: arrays.course_v,
+    pointer: pointer(numbers),
     contacts: kind ? [] : contacts,
     beside: kind ? contacts : [],
-    shape: kind ? shape(taker, SHAPES[kind]) : null,
+    shape: kind ? shape(taker, layout.shape, kind) : null,
     choice: choice(taker.text()),
   };
 }
@@ -135,11 +162,14 @@ export class Connection {
 
   #receive(data) {
     if (data instanceof ArrayBuffer) {
-      this.on.update(decodeUpdate(data));
+      this.on.update(decodeUpdate(data, this.layout));
       return;
     }
     const message = JSON.parse(data);
-    if (message.type === "setup") this.on.setup(message);
+    if (message.type === "setup") {
+      this.layout = message.layout;
+      this.on.setup(message);
+    }
     if (message.type === "status") this.on.status(message);
     this.taken();
   }

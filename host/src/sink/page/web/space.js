@@ -1,6 +1,6 @@
 // The view in space: height is pressure.
 
-import { labelled, middleOf } from "./bars.js";
+import { middleOf } from "./bars.js";
 import { Camera } from "./camera.js";
 import { colourMaps } from "./colours.js";
 import { drawBar } from "./frame.js";
@@ -81,12 +81,12 @@ export class SpaceView {
     }
     const spots = view.field.contacts.map((contact) => {
       const [x, y] = at(...shape.topOf(contact, view.field, view.scale));
-      return { contact, x, y, radius: 8 };
+      return { contact, text: view.labelOf(contact), x, y, radius: 8 };
     });
     if (view.field.shape) {
       const [xM, yM] = middleOf(view.field.shape);
       const [x, y] = at(...shape.topOf({ xM, yM, place: [xM, yM, 0] }, view.field, view.scale));
-      spots.push({ contact: labelled(view.field.shape), x, y, radius: 8 });
+      spots.push({ contact: view.field.shape, text: view.labelOf(view.field.shape), x, y, radius: 8 });
     }
     drawLabels(over, spots, view.colours, { width, height });
     const narrow = width < 520;

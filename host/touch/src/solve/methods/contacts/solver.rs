@@ -252,7 +252,7 @@ impl ContactTracker {
     pub fn let_go(&mut self) {
         (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
         self.doubt = Doubt::default();
-        self.rows = None;
+        (self.rows, self.recounted_s) = (None, None);
     }
 
     /// Forgets all.

@@ -38,7 +38,7 @@ pub type BeginRecording = Box<dyn FnMut(&Hello, Option<&Detector>) -> Result<Rec
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 
 /// What the run is to do.
-pub struct Plan {
+pub struct RunOptions {
     /// The detector that is connected; drive and ADC are the board's to tell.
     pub detector: Detector,
     /// Settings asked of the board.
@@ -65,7 +65,7 @@ pub struct Plan {
     pub seconds: Option<Duration>,
 }
 
-impl Plan {
+impl RunOptions {
     /// Receives the frames of a detector, without end, and does nothing else.
     pub fn new(detector: Detector) -> Self {
         Self {

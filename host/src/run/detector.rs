@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 use tactomo_board::baseline::BaselineTracker;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{ElectrodeWatch, Followed, Latest, Method, SolveError, Tracker};
+use tactomo_touch::solve::{ElectrodeWatch, Followed, Tracker, Method, SolveError};
 
-use super::inbox::{Rows, Taken};
+use super::frame::{NewestReadings, Rows};
+use super::inbox::Taken;
 use super::order::Order;
 
 /// Time for which rows that have waited are followed one after the other. A row of a contact takes 0.1 ms; of one that is as wide as a third of
@@ -18,14 +19,14 @@ use super::order::Order;
 const ROW_BY_ROW: Duration = Duration::from_millis(8);
 
 /// One detector at work.
-pub(super) struct BoardState {
+pub(super) struct DetectorState {
     /// As it is described, and as it is solved for: calibrated, or the same.
     pub description: Arc<Detector>,
     pub detector: Arc<Detector>,
     pub baseline: BaselineTracker,
     pub watch: ElectrodeWatch,
     /// `None` until the first solver is made.
-    pub follower: Option<Box<dyn Tracker>>,
+    pub tracker: Option<Box<dyn Tracker>>,
     /// Board time of the rows before (us).
     rows_us: Option<u64>,
 }
@@ -39,10 +40,10 @@ pub(super) struct Noted {
     pub electrodes: bool,
 }
 
-impl BoardState {
+impl DetectorState {
     /// Begins with a detector as it is described and as it is solved for.
     pub fn new(description: Arc<Detector>, detector: Arc<Detector>, baseline: BaselineTracker) -> Self {
-        Self { baseline, watch: ElectrodeWatch::new(&detector), description, detector, follower: None, rows_us: None }
+        Self { baseline, watch: ElectrodeWatch::new(&detector), description, detector, tracker: None, rows_us: None }
     }
 
     /// The solver of a method for this detector as it is.
@@ -50,8 +51,8 @@ impl BoardState {
         Order { method, detector: Arc::clone(&self.detector), faulty: self.watch.faulty().clone() }
     }
 
-    /// Readings less the baseline.
-    pub fn less_rest(&self, readings: &Readings) -> Readings {
+    /// Readings less the baseline, as the channels read them.
+    pub fn less_baseline(&self, readings: &Readings) -> Readings {
         let mut touch = readings.clone();
         self.baseline.subtract(readings.volts(), touch.volts_mut());
         touch
@@ -59,7 +60,7 @@ impl BoardState {
 
     /// The same as no channel differs from others.
     pub fn touch(&self, readings: &Readings) -> Readings {
-        let mut touch = self.less_rest(readings);
+        let mut touch = self.less_baseline(readings);
         touch.correct_channels(&self.detector);
         touch
     }
@@ -67,7 +68,7 @@ impl BoardState {
     /// Takes note of a frame: what it says of the baseline and of the electrodes. Of rows, once all were read.
     pub fn note(&mut self, frame: &Taken) -> Noted {
         if frame.rows.is_empty() {
-            let (time_s, left_out) = (1e-6 * frame.board_time_us as f64, self.left_out());
+            let (time_s, left_out) = (1e-6 * frame.newest.board_time_us as f64, self.left_out());
             let baseline = self.baseline.add(&frame.mean.touches_v(), frame.averaged, time_s, &left_out);
             let touch = self.touch(&frame.mean);
             return Noted { baseline, electrodes: self.watch.note(&touch) };
@@ -90,21 +91,21 @@ impl BoardState {
         self.watch.faulty().faults.iter().map(|(electrode, _)| *electrode).collect()
     }
 
-    /// The follower's answer to a frame with such readings less the baseline; `None` while there is no follower.
+    /// The tracker's answer to a frame with such readings less the baseline; `None` while there is no tracker.
     pub fn follow(&mut self, frame: &Taken, touch: &Readings) -> Result<Option<Followed>, SolveError> {
         let mut rows: VecDeque<Rows> = frame.rows.iter().cloned().collect();
         rows.iter_mut().for_each(|rows| rows.readings = self.touch(&rows.readings));
-        let Some(follower) = &mut self.follower else { return Ok(None) };
+        let Some(tracker) = &mut self.tracker else { return Ok(None) };
         if rows.is_empty() {
             self.rows_us = None;
-            return follower.follow(touch).map(Some);
+            return tracker.follow(touch).map(Some);
         }
         let begun = Instant::now();
         let mut followed = None;
         while let Some(Rows { readings, time_us }) = next_rows(&mut rows, begun.elapsed()) {
             let before_us = self.rows_us.replace(time_us).unwrap_or(time_us);
             let elapsed_s = 1e-6 * time_us.saturating_sub(before_us) as f64;
-            followed = Some(follower.follow_rows(&readings, touch, elapsed_s)?);
+            followed = Some(tracker.follow_rows(&readings, touch, elapsed_s)?);
         }
         Ok(followed)
     }
@@ -117,9 +118,9 @@ fn next_rows(rows: &mut VecDeque<Rows>, spent: Duration) -> Option<Rows> {
         return Some(first);
     }
     let newest_us = rows.back().map_or(first.time_us, |last| last.time_us);
-    let mut latest = Latest::new(first.readings.electrodes());
-    std::iter::once(first).chain(rows.drain(..)).for_each(|rows| latest.add(&rows.readings, 0.0, None));
-    Some(Rows { readings: latest.readings(f64::MAX, None), time_us: newest_us })
+    let mut newest = NewestReadings::new(first.readings.electrodes());
+    std::iter::once(first).chain(rows.drain(..)).for_each(|rows| newest.add(&rows.readings));
+    Some(Rows { readings: newest.readings(), time_us: newest_us })
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use tactomo_protocol::BoardReceiver;
 const PATIENCE: Duration = Duration::from_secs(6);
 
 /// One link, from its opening on.
-pub(super) struct Talk {
+pub(super) struct Connection {
     /// Whether there is a board that hears what it is asked: a recording has the answers that another host got.
     pub answers: bool,
     pub session: Session,
@@ -27,7 +27,7 @@ pub(super) struct Talk {
     pub refusal: Option<session::Refusal>,
 }
 
-impl Talk {
+impl Connection {
     /// A link that was just opened, to a board that such settings are asked of, and that answers or does not.
     pub fn new(settings: session::RequestedSettings, answers: bool) -> Self {
         Self {
@@ -101,30 +101,30 @@ mod tests {
     }
 
     /// Receives bytes in one read, and takes note of the frames in them; how many stretches are newly corrupt.
-    fn receive(talk: &mut Talk, bytes: &[u8]) -> u64 {
+    fn receive(connection: &mut Connection, bytes: &[u8]) -> u64 {
         let mut input = bytes;
-        while let Some(message) = talk.receiver.receive(&mut input) {
+        while let Some(message) = connection.receiver.receive(&mut input) {
             if message.is_ok() {
-                talk.landed();
+                connection.landed();
             }
         }
-        talk.newly_corrupt()
+        connection.newly_corrupt()
     }
 
     #[test]
     fn where_a_jump_lands_is_no_damage_and_what_comes_after_is() {
-        let mut talk = Talk::new(session::RequestedSettings::default(), false);
-        talk.junk = Some(0);
+        let mut connection = Connection::new(session::RequestedSettings::default(), false);
+        connection.junk = Some(0);
         let junk = b"\x09a rest\0";
-        assert_eq!(receive(&mut talk, &[junk, &frame()[..]].concat()), 1);
-        talk.jumped();
+        assert_eq!(receive(&mut connection, &[junk, &frame()[..]].concat()), 1);
+        connection.jumped();
         assert_eq!(
-            receive(&mut talk, &[junk, &frame()[..]].concat()),
+            receive(&mut connection, &[junk, &frame()[..]].concat()),
             0,
             "the rest of a packet, and a frame in the same read"
         );
-        assert_eq!(receive(&mut talk, &[junk, &frame()[..]].concat()), 1);
-        talk.jumped();
-        assert_eq!(receive(&mut talk, junk) + receive(&mut talk, &frame()), 0, "in two reads");
+        assert_eq!(receive(&mut connection, &[junk, &frame()[..]].concat()), 1);
+        connection.jumped();
+        assert_eq!(receive(&mut connection, junk) + receive(&mut connection, &frame()), 0, "in two reads");
     }
 }

@@ -1,4 +1,4 @@
-//! Plans on their way from the follower, which chooses them, to the reader, which asks the board for them.
+//! Scan plans on their way from the follower, which chooses them, to the reader, which asks the board for them.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,7 +14,7 @@ pub(super) const COUNTED: u64 = 400;
 
 /// The plan that is wanted, on its way from the follower to the reader, and how the line fares with it.
 #[derive(Debug, Default)]
-pub(in crate::run) struct PlanWish {
+pub(in crate::run) struct RequestedPlan {
     wanted: Mutex<Option<Plan>>,
     refused: AtomicBool,
     /// Frames that came, and those that the line had no room for.
@@ -22,7 +22,7 @@ pub(in crate::run) struct PlanWish {
     dropped: AtomicU64,
 }
 
-impl PlanWish {
+impl RequestedPlan {
     pub(super) fn put(&self, plan: Plan) {
         *self.wanted.lock().unwrap_or_else(PoisonError::into_inner) = Some(plan);
     }
@@ -62,21 +62,21 @@ impl PlanWish {
 
 /// The plan that is asked of the board.
 #[derive(Debug)]
-pub(in crate::run) struct PlanAsk {
-    pub wish: Arc<PlanWish>,
-    /// The last one that was wished.
+pub(in crate::run) struct PlanRequests {
+    pub requested: Arc<RequestedPlan>,
+    /// The last one.
     plan: Option<Plan>,
     is_refused: bool,
 }
 
-impl PlanAsk {
-    pub fn new(wish: Arc<PlanWish>) -> Self {
-        Self { wish, plan: None, is_refused: false }
+impl PlanRequests {
+    pub fn new(requested: Arc<RequestedPlan>) -> Self {
+        Self { requested, plan: None, is_refused: false }
     }
 
-    /// Asks for the rows that are wished, as far as the board takes plans at all.
+    /// Asks for the rows that are wanted, as far as the board takes plans at all.
     pub fn ask(&mut self, session: &mut Session) {
-        if let Some(plan) = self.wish.take() {
+        if let Some(plan) = self.requested.take() {
             session.request_plan(Some(plan.clone()));
             self.plan = Some(plan);
         }
@@ -85,7 +85,7 @@ impl PlanAsk {
             tracing::warn!("the board does not take the scan plan, so it goes on with whole frames");
         }
         self.is_refused = is_refused;
-        self.wish.set_refused(is_refused);
+        self.requested.set_refused(is_refused);
     }
 
     /// The same of a board that has come anew.

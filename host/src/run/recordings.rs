@@ -10,10 +10,10 @@ use tactomo_physics::detector::Detector;
 use tactomo_protocol::Hello;
 
 use super::notice::NoticeBoard;
-use super::plan::{BeginRecording, LiveError, Plan};
+use super::options::{BeginRecording, LiveError, RunOptions};
 
 /// What is kept of a run.
-pub(super) struct Keeping {
+pub(super) struct Recordings {
     recorder: Option<Recorder>,
     ring: Option<Ring>,
     begin: Option<BeginRecording>,
@@ -27,21 +27,21 @@ pub(super) struct Keeping {
     marks: u64,
 }
 
-impl Keeping {
-    /// What a plan wants to be kept.
-    pub fn of(plan: &mut Plan, notice: Arc<NoticeBoard>) -> Self {
-        let keeping = Self {
-            recorder: plan.recorder.take(),
-            ring: plan.ring.take(),
-            begin: plan.begin_recording.take(),
+impl Recordings {
+    /// What these options want to be kept.
+    pub fn of(options: &mut RunOptions, notice: Arc<NoticeBoard>) -> Self {
+        let recordings = Self {
+            recorder: options.recorder.take(),
+            ring: options.ring.take(),
+            begin: options.begin_recording.take(),
             notice,
             closing: Vec::new(),
             lost: None,
             found: None,
             marks: 0,
         };
-        keeping.show();
-        keeping
+        recordings.show();
+        recordings
     }
 
     /// Takes bytes as they came.

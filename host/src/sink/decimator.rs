@@ -12,7 +12,7 @@ type Due = (Arc<TouchEvent>, Vec<PointerEvent>);
 /// Lets so many events through a second of board time. What comes between waits: it is let through when the next one is due, unless a newer one
 /// has come by then, or when nothing more comes. What the pointer did is not lost with it.
 #[derive(Debug, Default)]
-pub(super) struct Thin {
+pub(super) struct Decimator {
     /// Least time between two (us); none lets all through.
     period_us: Option<u64>,
     /// Board time at which the next one is due (us).
@@ -21,7 +21,7 @@ pub(super) struct Thin {
     pointer_events: Vec<PointerEvent>,
 }
 
-impl Thin {
+impl Decimator {
     /// At most so many a second; all of them if that is not said.
     pub fn new(most_per_s: Option<f64>) -> Self {
         let period_us = most_per_s.map(|most_per_s| (1e6 / most_per_s) as u64);
@@ -40,7 +40,7 @@ impl Thin {
             return Some((event, pointer_events));
         };
         self.pointer_events.extend_from_slice(&event.pointer_events);
-        let now_us = event.board_time_us;
+        let now_us = event.frame.board_time_us;
         // A board that starts anew, or a recording that is played again, is due at once.
         let is_due = self.due_us.is_none_or(|due_us| now_us >= due_us || now_us + 2 * period_us < due_us);
         self.held = Some(event);
@@ -64,16 +64,21 @@ mod tests {
     use tactomo_touch::solve::Solution;
 
     use super::*;
+    use crate::run::Frame;
 
     fn event(time_us: u64, pointer_events: &[PointerEvent]) -> Arc<TouchEvent> {
         let event = TouchEvent::of(0, Solution::default());
-        Arc::new(TouchEvent { board_time_us: time_us, pointer_events: pointer_events.to_vec(), ..event })
+        let frame = Frame { board_time_us: time_us, ..event.frame };
+        Arc::new(TouchEvent { frame, pointer_events: pointer_events.to_vec(), ..event })
     }
 
     /// Board times of what is let through (us).
-    fn through(thin: &mut Thin, times_us: impl IntoIterator<Item = u64>) -> Vec<u64> {
+    fn through(decimator: &mut Decimator, times_us: impl IntoIterator<Item = u64>) -> Vec<u64> {
         let times_us = times_us.into_iter();
-        times_us.filter_map(|time_us| thin.take(event(time_us, &[]))).map(|(event, _)| event.board_time_us).collect()
+        times_us
+            .filter_map(|time_us| decimator.take(event(time_us, &[])))
+            .map(|(event, _)| event.frame.board_time_us)
+            .collect()
     }
 
     #[test]
@@ -81,27 +86,28 @@ mod tests {
         // 832 us a frame are 1202 frames a second; 20 s of them.
         let frames = || (0..24_038).map(|i| 832 * i);
         for most_per_s in [10.0, 60.0, 500.0, 1000.0] {
-            let count = through(&mut Thin::new(Some(most_per_s)), frames()).len() as f64;
+            let count = through(&mut Decimator::new(Some(most_per_s)), frames()).len() as f64;
             assert!((count - 20.0 * most_per_s).abs() <= 1.0 + 0.001 * count, "{most_per_s}: {count}");
         }
-        assert_eq!(through(&mut Thin::new(Some(5000.0)), frames()).len(), 24_038);
-        assert_eq!(through(&mut Thin::new(None), frames()).len(), 24_038);
+        assert_eq!(through(&mut Decimator::new(Some(5000.0)), frames()).len(), 24_038);
+        assert_eq!(through(&mut Decimator::new(None), frames()).len(), 24_038);
     }
 
     #[test]
     fn the_last_one_waits_until_nothing_more_comes_and_clocks_may_begin_again() {
-        let mut thin = Thin::new(Some(100.0));
-        assert_eq!(through(&mut thin, [0, 1000, 2000]), [0]);
-        assert_eq!(thin.held().map(|(event, _)| event.board_time_us), Some(2000));
-        assert!(thin.held().is_none());
-        assert_eq!(through(&mut thin, [50_000, 60_000, 500]), [50_000, 60_000, 500]);
+        let mut decimator = Decimator::new(Some(100.0));
+        assert_eq!(through(&mut decimator, [0, 1000, 2000]), [0]);
+        assert_eq!(decimator.held().map(|(event, _)| event.frame.board_time_us), Some(2000));
+        assert!(decimator.held().is_none());
+        assert_eq!(through(&mut decimator, [50_000, 60_000, 500]), [50_000, 60_000, 500]);
     }
 
     #[test]
     fn no_click_is_lost_between_two() {
-        let mut thin = Thin::new(Some(100.0));
+        let mut decimator = Decimator::new(Some(100.0));
         let given = [(0, vec![]), (1000, vec![PointerEvent::Press]), (2000, vec![]), (10_000, vec![])];
-        let due: Vec<_> = given.iter().filter_map(|(time_us, events)| thin.take(event(*time_us, events))).collect();
+        let due: Vec<_> =
+            given.iter().filter_map(|(time_us, events)| decimator.take(event(*time_us, events))).collect();
         assert_eq!((due.len(), &due[1].1), (2, &vec![PointerEvent::Press]));
     }
 }
