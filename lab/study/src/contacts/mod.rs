@@ -223,7 +223,7 @@ mod tests {
         assert!(all.contacts.visible > 0 && all.contacts.error_m.is_some());
         assert_eq!(report.worst.len(), 2);
         assert!(report.worst.iter().all(|trial| trial.cold_us > 0.0 && trial.next_us.len() == 1));
-        let text = table(&report);
+        let text = crate::view::text(&[view(&report)]);
         assert!(report.rows.iter().all(|row| text.contains(row.class)) && !text.contains("NaN"), "{text}");
     }
 

@@ -3,7 +3,7 @@
 use super::judge::TrueContact;
 use super::rows::{ContactFigures, Quantiles, Row, SceneFigures};
 use super::{Report, Trial};
-use crate::view::{Cell, Format, MM, PERCENT, PLAIN, Style, TEXT, Table, US, Value, View};
+use crate::view::{Cell, Format, MM, PERCENT, PLAIN, TEXT, Table, US, Value, View};
 use tactomo_touch::solve::FoundContact;
 
 const MILLISECONDS: Format = Format { factor: 1e-3, ..Format::new("ms", "us").digits(1) };
@@ -91,7 +91,6 @@ fn worst(trial: &Trial) -> Table {
         .cells("off", MM.digits(2), of(|truth| truth.found.map(|found| found.error_m)))
         .cells("in bounds", PLAIN.digits(1), of(|truth| truth.found.and_then(|found| found.over_bound)))
         .note(judged.choice.as_deref().unwrap_or_default())
-        .style(Style::Plain)
         .into()
 }
 

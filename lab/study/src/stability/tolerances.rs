@@ -7,7 +7,7 @@ use crate::scenes::SceneKind;
 use tactomo_physics::detector::{Detector, Tolerances};
 
 /// Times a hobbyist's bench: from nothing to hopeless.
-const TIMES: [f64; 6] = [0.0, 0.1, 0.3, 1.0, 3.0, 10.0];
+const TIMES: [f64; 6] = [0.0, 0.1, 0.3, 1.0, 2.0, 4.0];
 /// The same of all at once, which are hopeless sooner.
 const ALL_TIMES: [f64; 6] = [0.0, 0.03, 0.1, 0.3, 1.0, 2.0];
 const EXACT: Tolerances = Tolerances::EXACT;

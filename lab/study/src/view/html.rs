@@ -18,7 +18,7 @@ pub fn page(views: &[View], command: &str) -> String {
     let machine = Machine::this();
     let built = if machine.optimised { "" } else { ", **built without optimisation: times mean nothing**" };
     let Machine { processor, cores, system, version, .. } = &machine;
-    let mut body: String = views.iter().enumerate().map(|(index, view)| of_view(view, index)).collect();
+    let mut body: String = views.iter().map(of_view).collect();
     _ = write!(
         body,
         "<p class=\"note\">{}<br><code>{}</code></p>",
@@ -62,10 +62,8 @@ fn marked(text: &str) -> String {
     between(&between(&escaped(text), "**", "b"), "`", "code")
 }
 
-fn of_view(view: &View, index: usize) -> String {
-    let rank = if index == 0 { "h1" } else { "h2" };
-    let mut body =
-        format!("<{rank}>{}</{rank}>\n<p class=\"lead-in\">{}</p>\n", escaped(&view.title), marked(&view.lead));
+fn of_view(view: &View) -> String {
+    let mut body = format!("<h1>{}</h1>\n<p class=\"lead-in\">{}</p>\n", escaped(&view.title), marked(&view.lead));
     view.parts.iter().for_each(|part| body += &of_part(part));
     if !view.method.is_empty() {
         _ = writeln!(body, "<h2>How it was measured</h2>\n<p class=\"note\">{}</p>", marked(&view.method));
