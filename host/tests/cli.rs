@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
-use tactomo_tests::TACTOMO;
+use tactomo_tests::{Folder, TACTOMO};
 
 #[test]
 fn every_command_has_a_help_with_an_example() {
@@ -128,29 +128,24 @@ fn pipes_that_are_closed_end_the_program_without_a_panic() {
 
 #[test]
 fn reconstruct_ends_quietly_when_nobody_reads_on() {
-    let path = std::env::temp_dir().join(format!("tactomo-unread-{}.csv", std::process::id()));
     let frame = ["0.001"; 256].join(",") + "\n";
-    std::fs::write(&path, frame.repeat(2000)).unwrap();
-    let (code, messages) = with_closed(&["reconstruct", path.to_str().unwrap(), "--json"], [true, false]);
-    std::fs::remove_file(&path).unwrap();
+    let folder = Folder::new("unread");
+    let table = folder.with("unread.csv", frame.repeat(2000));
+    let (code, messages) = with_closed(&["reconstruct", &table, "--json"], [true, false]);
     assert_eq!(code, Some(0), "{messages}");
     assert!(!messages.contains("2000 frames"), "it went on for nobody: {messages}");
 }
 
 #[test]
 fn a_detector_goes_through_its_file_into_the_model() {
-    let path = std::env::temp_dir().join(format!("tactomo-{}.toml", std::process::id()));
-    let file = path.to_str().unwrap();
-    let shown = TACTOMO.run(&["detector", "show", "fingertip-10", "--material", "BC", "--toml"]);
-    std::fs::write(&path, &shown.stdout).unwrap();
-    let contact = ["--contact", "1,0,1,1e-3", "--json"];
-    let from_file = TACTOMO.run(&[&["forward", "--detector", file], &contact[..]].concat());
-    let preset = TACTOMO.run(&[&["forward", "--detector", "fingertip-10", "--material", "BC"], &contact[..]].concat());
-    let again = TACTOMO.run(&["detector", "show", file, "--toml"]);
-    std::fs::remove_file(&path).unwrap();
-    assert_eq!(from_file.status.code(), Some(0), "{}", String::from_utf8_lossy(&from_file.stderr));
-    assert_eq!(from_file.stdout, preset.stdout);
-    assert_eq!(again.stdout, shown.stdout);
+    let folder = Folder::new("detector");
+    let shown = TACTOMO.succeeds(&["detector", "show", "fingertip-10", "--material", "BC", "--toml"]);
+    let file = folder.with("detector.toml", &shown);
+    let read = |detector: &[&str]| {
+        TACTOMO.succeeds(&[&["forward", "--contact", "1,0,1,1e-3", "--json", "--detector"], detector].concat())
+    };
+    assert_eq!(read(&[&file]), read(&["fingertip-10", "--material", "BC"]));
+    assert_eq!(TACTOMO.succeeds(&["detector", "show", &file, "--toml"]), shown);
 }
 
 #[test]
@@ -158,9 +153,7 @@ fn scenes_faults_and_noise_repeat_with_their_seed() {
     let measured = |seed| {
         let faults = ["--fault", "open:3", "--fault", "contact-spread:0.3", "--fault", "uneven:0.2"];
         let scene = ["forward", "--scene", "several", "--force", "2", "--measured", "--json", "--seed", seed];
-        let output = TACTOMO.run(&[&scene[..], &faults].concat());
-        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        output.stdout
+        TACTOMO.succeeds(&[&scene[..], &faults].concat())
     };
     assert_eq!(measured("5"), measured("5"));
     assert_ne!(measured("5"), measured("6"));
@@ -168,11 +161,7 @@ fn scenes_faults_and_noise_repeat_with_their_seed() {
 
 #[test]
 fn foam_creeps_and_drifts_up_to_the_time_asked_for() {
-    let report = |more: &[&str]| -> serde_json::Value {
-        let output = TACTOMO.run(&[&["forward", "--contact", "0,0,3,1e-3", "--json"], more].concat());
-        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
-    };
+    let report = |more: &[&str]| TACTOMO.json(&[&["forward", "--contact", "0,0,3,1e-3", "--json"], more].concat());
     let conductance_s = |report: &serde_json::Value| report["touches"][0]["conductance_s"].as_f64().unwrap();
     let crept = report(&["--fault", "creep:0.2:3", "--time", "3"]);
     let expected_s = 1e-3 * (1.0 + 0.2 * (1.0 - (-1.0f64).exp()));
@@ -187,25 +176,17 @@ fn foam_creeps_and_drifts_up_to_the_time_asked_for() {
 #[test]
 fn what_was_built_is_told_and_can_be_simulated_again() {
     let contact = ["forward", "--contact", "3,-4,2.5,0.001", "--json", "--as-built"];
-    let report = |args: &[&str]| -> serde_json::Value {
-        let output = TACTOMO.run(args);
-        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
-    };
+    let report = |args: &[&str]| TACTOMO.json(args);
     let built = report(&[&contact[..], &["7"]].concat());
     let shown = TACTOMO.run(&["detector", "show", "square-60", "--as-built", "7"]);
     let toml = String::from_utf8(shown.stdout).unwrap();
     assert_eq!(built["as_built"].as_str().unwrap().trim_end(), toml.trim_end());
     assert_eq!(built["detector"], "square-60");
-    let path = std::env::temp_dir().join(format!("tactomo-as-built-{}.toml", std::process::id()));
-    std::fs::write(&path, toml).unwrap();
-    let again = report(&[&contact[..], &[path.to_str().unwrap()]].concat());
-    let exact =
-        TACTOMO.run(&["forward", "--contact", "0,0,1,1e-3", "--detector", path.to_str().unwrap(), "--as-built", "1"]);
-    std::fs::remove_file(&path).unwrap();
-    assert_eq!(again["readings_v"], built["readings_v"]);
-    assert_eq!(exact.status.code(), Some(1));
-    assert!(String::from_utf8(exact.stderr).unwrap().contains("nothing to draw"));
+    let folder = Folder::new("as-built");
+    let file = folder.with("as-built.toml", toml);
+    assert_eq!(report(&[&contact[..], &[&file]].concat())["readings_v"], built["readings_v"]);
+    let exact = ["forward", "--contact", "0,0,1,1e-3", "--detector", &file, "--as-built", "1"];
+    assert!(TACTOMO.refused(&exact).contains("nothing to draw"));
     let described = report(&contact[..4]);
     assert!(described.get("as_built").is_none() && described["readings_v"] != built["readings_v"]);
     assert_ne!(report(&[&contact[..], &["8"]].concat())["readings_v"], built["readings_v"]);
@@ -213,21 +194,14 @@ fn what_was_built_is_told_and_can_be_simulated_again() {
 
 #[test]
 fn touches_go_through_their_file() {
-    let path = std::env::temp_dir().join(format!("tactomo-touches-{}.json", std::process::id()));
+    let folder = Folder::new("touches");
     let ring = r#"[{"centre_m": [0.002, 0.0], "shape": {"ring": {"radius_m": 0.01, "width_m": 0.002}}, "conductance_s": 0.001}]"#;
-    std::fs::write(&path, ring).unwrap();
-    let forward = |more: &[&str]| {
-        TACTOMO.run(&[&["forward", "--nodes", "500", "--touches", path.to_str().unwrap()], more].concat())
-    };
-    let output = forward(&["--json"]);
-    std::fs::write(&path, ring.replace("width_m", "breadth_m")).unwrap();
-    let wrong = forward(&[]);
-    std::fs::remove_file(&path).unwrap();
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let touches = folder.with("touches.json", ring);
+    let report = TACTOMO.json(&["forward", "--nodes", "500", "--json", "--touches", &touches]);
     assert_eq!(report["touches"], serde_json::from_str::<serde_json::Value>(ring).unwrap());
     assert_eq!(report["readings_v"].as_array().unwrap().len(), 16);
-    let message = String::from_utf8(wrong.stderr).unwrap();
-    assert_eq!(wrong.status.code(), Some(1));
+    let wrong = folder.with("wrong.json", ring.replace("width_m", "breadth_m"));
+    let message = TACTOMO.refused(&["forward", "--nodes", "500", "--touches", &wrong]);
     assert!(message.contains("is no list of touches: missing field `width_m`"), "{message}");
 }
 

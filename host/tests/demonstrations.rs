@@ -4,15 +4,12 @@
 
 use serde_json::Value;
 use tactomo::scene::TEXTURE_HZ;
-use tactomo_tests::TACTOMO;
+use tactomo_tests::{Folder, TACTOMO};
 
 /// What `live --simulate --scene` says of a scene at the end.
 fn live(scene: &str, others: &[&str]) -> Value {
     let fixed = ["live", "--simulate", "--json", "--scene", scene];
-    let output = TACTOMO.command().args(fixed).args(others).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{said}");
-    serde_json::from_slice(&output.stdout).unwrap()
+    TACTOMO.json(&[&fixed, others].concat())
 }
 
 #[test]
@@ -28,9 +25,9 @@ fn the_frequency_of_the_texture_is_found_exact_and_as_built_and_on_another_detec
 
 #[test]
 fn the_pointer_moves_and_clicks_in_the_stream() {
-    let folder = new_folder("pointer");
-    let file = folder.join("touch.jsonl");
-    live("pointer", &["--seconds", "3.5", "--stream", file.to_str().unwrap()]);
+    let folder = Folder::new("pointer");
+    let file = folder.path("touch.jsonl");
+    live("pointer", &["--seconds", "3.5", "--stream", &file]);
     let text = std::fs::read_to_string(&file).unwrap();
     let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
     let events: Vec<Value> = lines.filter_map(|line| line.get("events")?.as_array().cloned()).flatten().collect();
@@ -44,12 +41,4 @@ fn the_pointer_moves_and_clicks_in_the_stream() {
     // From the first target to there, and a little of the way to the third one.
     let way_m: f64 = moves.iter().map(|event| event["dx_m"].as_f64().unwrap()).sum();
     assert!((0.10..0.13).contains(&way_m), "{way_m} m in {} steps", moves.len());
-    std::fs::remove_dir_all(folder).unwrap();
-}
-
-/// A new folder of that name.
-fn new_folder(name: &str) -> std::path::PathBuf {
-    let folder = std::env::temp_dir().join(format!("tactomo-{name}-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
 }

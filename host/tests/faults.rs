@@ -29,6 +29,8 @@ const SOLVED: usize = 6;
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Length of a press, where there are several (s).
 const PRESS_S: f64 = 0.5;
+/// Frames from one that is answered to the next: on a slow machine `live` answers no more of them.
+const ANSWER_EVERY: usize = 4;
 /// Exchanged wires are named at most this long after the first frame that is pressed (s).
 const NAMED_WITHIN_S: f64 = 2.0;
 
@@ -225,7 +227,7 @@ fn exchanged_wires_are_told_by_most_presses_on_every_board() {
     }
 }
 
-/// Counted in the board's time and in answers, one a frame as `live` has them: it is when the guard looks that is tested, not this machine.
+/// Counted in the board's time and in answers, one to [`ANSWER_EVERY`] frames: it is when the solver looks that is tested, not this machine.
 #[test]
 fn exchanged_wires_are_named_within_two_seconds_of_presses() {
     let impedances_ohm: Vec<_> = (1..=4).map(|seed| BENCH.touched_ohm(SceneName::Single, seed)).collect();
@@ -235,13 +237,13 @@ fn exchanged_wires_are_named_within_two_seconds_of_presses() {
         let pressing = Pressing { impedances_ohm: impedances_ohm.clone(), wires };
         let is_enough = |frames: &[(f64, Readings)]| frames.last().is_some_and(|(time_s, _)| *time_s > NAMED_WITHIN_S);
         let (problem, frames) = BENCH.recorded(model, Box::new(pressing), is_enough);
-        let mut guard = FaultTolerant::new(Method::Auto, &problem).unwrap();
-        let named = frames.iter().enumerate().find_map(|(answer, (time_s, readings))| {
-            guard.solve(readings).unwrap();
-            (!guard.excluded().is_empty()).then_some((answer, *time_s))
+        let mut solver = FaultTolerant::new(Method::Auto, &problem).unwrap();
+        let named = frames.iter().step_by(ANSWER_EVERY).enumerate().find_map(|(answer, (time_s, readings))| {
+            solver.solve(readings).unwrap();
+            (!solver.excluded().is_empty()).then_some((answer, *time_s))
         });
         let expected = [a, b].map(|e| (e, ElectrodeFault::Exchanged));
-        assert_eq!(guard.excluded(), expected, "{model:?} {a},{b}: named {named:?} in {} frames", frames.len());
+        assert_eq!(solver.excluded(), expected, "{model:?} {a},{b}: named {named:?} in {} frames", frames.len());
     }
 }
 
