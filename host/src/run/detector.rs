@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tactomo_board::baseline::BaselineTracker;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{ElectrodeWatch, Followed, Tracker, Method, SolveError};
+use tactomo_touch::solve::{ElectrodeWatch, Followed, Method, SolveError, Tracker};
 
 use super::frame::{NewestReadings, Rows};
 use super::inbox::Taken;

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{Hypothesis, Look, Method, Parts, Solver, AdaptiveMean};
+use tactomo_touch::solve::{AdaptiveMean, Hypothesis, Look, Method, Parts, Solver};
 
 use super::calibration::messages::{Calibrate, Outcome};
 use super::frame::{Frame, Rows};

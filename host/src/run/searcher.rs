@@ -6,7 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use tactomo_physics::readings::Readings;
-use tactomo_touch::solve::{Tracker, Hypothesis, Search, Solution};
+use tactomo_touch::solve::{Hypothesis, Search, Solution, Tracker};
 
 use super::inbox::{Event, Inbox, Searched};
 

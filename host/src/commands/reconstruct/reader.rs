@@ -14,7 +14,8 @@ use tactomo::learned::Learned;
 use tactomo::readings::Readings;
 use tactomo::run::NewestReadings;
 use tactomo::solve::{
-    ContactSettings, FaultTolerant, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution, Solver,
+    ContactSettings, FaultTolerant, Kernel, Lambda, Method, Parameter, ParameterKind, Presses, Problem, Solution,
+    Solver,
 };
 
 use tactomo_protocol::Hello;

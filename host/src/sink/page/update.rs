@@ -84,8 +84,11 @@ const ARRAYS: [Named<Vec<f32>>; 3] = [
     named("course_v", |shown| shown.course_v.to_vec()),
 ];
 
+/// Name of a flag, and whether it is set.
+type Flag = (&'static str, fn(&Flags) -> bool);
+
 /// Flags of a solution.
-const FLAGS: [(&str, fn(&Flags) -> bool); 4] = [
+const FLAGS: [Flag; 4] = [
     ("saturated", |flags| flags.saturated),
     ("misfit", |flags| flags.misfit),
     ("unfinished", |flags| flags.unfinished),
