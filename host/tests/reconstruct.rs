@@ -48,7 +48,7 @@ fn tables_of_every_kind_give_the_same_contacts() {
     writer.add("readings_v", &[2, 16, 16], &frames.concat()).unwrap();
     writer.finish().unwrap();
     let [from_text, from_archive] =
-        [&text, &archive].map(|file| lines(&[&file, "--solver", "tikhonov", "--lambda", "gcv"]));
+        [&text, &archive].map(|file| lines(&[file, "--solver", "tikhonov", "--lambda", "gcv"]));
     assert_eq!(from_text.len(), 2);
     assert_eq!(from_text[0]["contacts"], Value::Array(Vec::new()));
     assert_found(&from_text[1]);
@@ -144,7 +144,7 @@ fn what_is_found_goes_into_files() {
     let file = folder.with("in.csv", csv(&[vec![0.0; 256], readings()]));
     let [table, archive] = ["out.csv", "out.npz"].map(|name| folder.path(name));
     for out in [&table, &archive] {
-        let output = TACTOMO.run(&["reconstruct", &file, "--solver", "tikhonov", "--images", "--out", &out]);
+        let output = TACTOMO.run(&["reconstruct", &file, "--solver", "tikhonov", "--images", "--out", out]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(output.stdout.is_empty());
         assert!(String::from_utf8_lossy(&output.stderr).contains("tikhonov: 2 frames, median"));
@@ -176,7 +176,7 @@ fn json_csv_and_npz_have_every_figure_of_a_contact_and_agree() {
     let arguments = ["--solver", "contacts"];
     let found = lines(&[&[file.as_str()], &arguments[..]].concat());
     for out in [&table, &archive] {
-        let arguments = [&["reconstruct", &file], &arguments[..], &["--out", &out]].concat();
+        let arguments = [&["reconstruct", &file], &arguments[..], &["--out", out]].concat();
         assert_eq!(TACTOMO.run(&arguments).status.code(), Some(0));
     }
     let rows = cells(&table);
@@ -271,7 +271,7 @@ fn recording_of(folder: &Folder, name: &str, numbers: impl Iterator<Item = u16>)
 fn frames_missing_in_a_recording_are_reported() {
     let folder = Folder::new("frames-missing-in-a-recording-are-reported");
     let run = |file: &str| {
-        let output = TACTOMO.run(&["reconstruct", &file, "--json"]);
+        let output = TACTOMO.run(&["reconstruct", file, "--json"]);
         assert_eq!(output.status.code(), Some(0));
         let lines: Vec<Value> =
             String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
