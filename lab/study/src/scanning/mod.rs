@@ -278,13 +278,13 @@ mod tests {
         let still = at(&report, 0.0, Choice::Adaptive, 2);
         assert_eq!(still.arrived_m, still.middle_m);
         assert!(still.arrived_m < 2e-4 && still.bound_all_m.unwrap() < 0.5 * still.bound_rows_m, "{still:?}");
-        let view = view(&report);
-        let (page, table) = (page(&[view.clone()], &report.command), text(&[view.clone()]));
+        let views = [view(&report)];
+        let (page, table) = (page(&views, &report.command), text(&views));
         for part in ["adaptive", "in turn", "corners", "whole"] {
             assert!(page.contains(part) && table.contains(part), "{part}");
         }
         assert!(page.contains("tactomo &lt;tradeoff&gt; --scan") && !page.contains("NaN"));
-        assert_eq!(picture(&view).matches("<svg").count(), 3);
+        assert_eq!(picture(&views[0]).matches("<svg").count(), 3);
         let json = serde_json::to_value(&report).unwrap();
         assert_eq!((&json["points"][1]["choice"], &json["points"][1]["rows"]), (&"adaptive".into(), &1.into()));
         assert!(json["points"][0]["bound_all_m"].is_f64());

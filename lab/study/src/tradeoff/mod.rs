@@ -366,8 +366,8 @@ mod tests {
     #[test]
     fn page_and_text_show_every_solver_and_how_to_run_it_again() {
         let report = report();
-        let view = view(&report);
-        let (page, text) = (crate::view::page(std::slice::from_ref(&view), &report.command), text(&[view.clone()]));
+        let views = [view(&report)];
+        let (page, text) = (crate::view::page(&views, &report.command), text(&views));
         assert!(page.contains("2 detectors as built") && page.contains("calibrated without an error"));
         assert_eq!(text.matches("- 2 detectors as built, ").count(), 2, "{text}");
         assert!(page.contains(": by their description: error") && page.contains(": calibrated: error"), "{page}");
