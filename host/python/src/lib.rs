@@ -56,6 +56,7 @@ mod _tactomo {
         module.add("SCENES", PyTuple::new(py, SceneName::ALL.map(|name| name.to_string()))?)?;
         module.add("CONTACT_FIELDS", PyTuple::new(py, CONTACT_COLUMNS.iter().map(|column| column.name))?)?;
         FoundContact::add_fields(&module.getattr("FoundContact")?)?;
+        Shape::add_fields(&module.getattr("Shape")?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

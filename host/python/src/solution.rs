@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArrayDescr, PyUntypedArray};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyAttributeError;
+use pyo3::PyClass;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyCFunction, PyDict, PyList, PyTuple, PyType};
@@ -174,17 +174,28 @@ pub struct FoundContact(FoundDisc);
 impl FoundContact {
     /// Gives the class a property for each field of the schema.
     pub fn add_fields(class: &Bound<'_, PyAny>) -> PyResult<()> {
-        let py = class.py();
-        let property = py.import("builtins")?.getattr("property")?;
         CONTACT_COLUMNS.iter().try_for_each(|column| {
-            let get = move |arguments: &Bound<'_, PyTuple>, _: Option<&Bound<'_, PyDict>>| -> PyResult<Py<PyAny>> {
-                let contact = arguments.get_item(0)?.cast_into::<Self>()?;
+            add_property(class, column.name, column.what, |contact: &Bound<'_, Self>| {
                 Ok(field(column, contact.get(), contact.py())?.unbind())
-            };
-            let get = PyCFunction::new_closure(py, None, None, get)?;
-            class.setattr(column.name, property.call1((get, py.None(), py.None(), column.what))?)
+            })
         })
     }
+}
+
+/// Gives a class a property, which is computed from an object of that class.
+fn add_property<T: PyClass>(
+    class: &Bound<'_, PyAny>,
+    name: &str,
+    what: &str,
+    of: impl Fn(&Bound<'_, T>) -> PyResult<Py<PyAny>> + Send + Sync + 'static,
+) -> PyResult<()> {
+    let py = class.py();
+    let get = move |arguments: &Bound<'_, PyTuple>, _: Option<&Bound<'_, PyDict>>| -> PyResult<Py<PyAny>> {
+        of(&arguments.get_item(0)?.cast_into()?)
+    };
+    let get = PyCFunction::new_closure(py, None, None, get)?;
+    let property = py.import("builtins")?.getattr("property")?;
+    class.setattr(name, property.call1((get, py.None(), py.None(), what))?)
 }
 
 fn field<'py>(column: &ContactColumn, contact: &FoundContact, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -225,18 +236,24 @@ impl FoundContact {
 #[pyclass(frozen, module = "tactomo")]
 pub struct Shape(pub FoundShape);
 
+impl Shape {
+    /// Gives the class a property for each field of the schema.
+    pub fn add_fields(class: &Bound<'_, PyAny>) -> PyResult<()> {
+        SHAPE_COLUMNS.iter().try_for_each(|column| {
+            let name = column.name.trim_start_matches("shape_");
+            add_property(class, name, "Of a line or a ring; None where not known.", |shape: &Bound<'_, Self>| {
+                Ok(column.value(&shape.get().0).into_bound_py_any(shape.py())?.unbind())
+            })
+        })
+    }
+}
+
 #[pymethods]
 impl Shape {
     /// `line` or `ring`.
     #[getter]
     fn kind(&self) -> &'static str {
         self.0.name()
-    }
-
-    fn __getattr__(&self, name: &str) -> PyResult<Option<f64>> {
-        let column = SHAPE_COLUMNS.iter().find(|column| column.name.trim_start_matches("shape_") == name);
-        let no_attribute = || PyAttributeError::new_err(format!("'Shape' object has no attribute '{name}'"));
-        Ok(column.ok_or_else(no_attribute)?.value(&self.0))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Restored<'py, (ShapeValues,)>> {
@@ -246,11 +263,6 @@ impl Shape {
     #[classmethod]
     fn _restored(_class: &Bound<'_, PyType>, values: ShapeValues) -> PyResult<Self> {
         FoundShape::of_values(values).map(Self).ok_or_else(|| refused("these are no numbers of a shape"))
-    }
-
-    fn __dir__(&self) -> Vec<&'static str> {
-        let columns = SHAPE_COLUMNS.iter().map(|column| column.name.trim_start_matches("shape_"));
-        ["kind"].into_iter().chain(columns).collect()
     }
 
     fn __repr__(&self) -> PyResult<String> {

@@ -119,9 +119,9 @@ impl FollowLoop {
     fn be_quiet(&mut self) {
         self.answers.show_newest();
         if let (Some(detector), Some(answered)) = (self.solvers.detector(), &self.answered)
-            && let Some(follower) = &detector.tracker
+            && let Some(tracker) = &detector.tracker
         {
-            self.search.catch_up(&answered.touch, &**follower);
+            self.search.catch_up(&answered.touch, &**tracker);
         }
         self.answers.keep_fresh();
     }
@@ -166,9 +166,9 @@ impl FollowLoop {
         let is_last = searched.is_last;
         let Some(lead) = self.search.receive(searched) else { return Ok(()) };
         let (Some(detector), Some(answered)) = (self.solvers.detector(), &self.answered) else { return Ok(()) };
-        let Some(follower) = &mut detector.tracker else { return Ok(()) };
+        let Some(tracker) = &mut detector.tracker else { return Ok(()) };
         let begun = Instant::now();
-        let adopted = follower.adopt(lead, &answered.touch)?;
+        let adopted = tracker.adopt(lead, &answered.touch)?;
         if is_last {
             self.search.pause_after(&adopted.solution);
         }
@@ -208,9 +208,9 @@ impl FollowLoop {
         {
             self.wires.begin(detector.order(method), look, event.touch.clone());
         }
-        if let Some(follower) = &detector.tracker {
-            self.search.consider(search, solution, &event.touch, &**follower);
-            let telling = |count: usize| follower.telling_grounds(count);
+        if let Some(tracker) = &detector.tracker {
+            self.search.consider(search, solution, &event.touch, &**tracker);
+            let telling = |count: usize| tracker.telling_grounds(count);
             self.planner.consider(&detector.detector, (!solution.contacts.is_empty(), conversions), telling);
         }
         self.answered = Some(event);

@@ -3,7 +3,7 @@
 //! A follower that is busy finds, when it comes back, the newest frame and not a queue. Frames that it could not take by themselves are
 //! not lost for accuracy: as long as they differ by no more than noise, their mean is what it gets.
 //!
-//! Methods average over the answers that stand still (`before/still` of the solvers), and see only what is taken here. So without this mean the
+//! Methods average over the answers that stand still (`before/adaptive_mean` of the solvers), and see only what is taken here. So without this mean the
 //! frames that a slow method skips would be lost to both, and without theirs a fast one would have one frame at a time.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

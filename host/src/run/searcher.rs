@@ -66,18 +66,18 @@ impl SearchThread {
     }
 
     /// Searches something better than a solution of these readings, if that may be there (`search`) and the pause is over.
-    pub fn consider(&mut self, search: bool, solution: &Solution, readings: &Readings, follower: &dyn Tracker) {
+    pub fn consider(&mut self, search: bool, solution: &Solution, readings: &Readings, tracker: &dyn Tracker) {
         self.is_wanted = search;
         if search && !self.is_busy && self.pause.is_over(solution, Instant::now()) {
-            self.search(follower.hypothesis(), readings.clone());
+            self.search(tracker.hypothesis(), readings.clone());
         }
     }
 
     /// The same where no frame comes, if it was not searched before since the pause was not over.
-    pub fn catch_up(&mut self, readings: &Readings, follower: &dyn Tracker) {
+    pub fn catch_up(&mut self, readings: &Readings, tracker: &dyn Tracker) {
         if self.is_wanted && !self.is_busy && self.pause.is_past(Instant::now()) {
             self.is_wanted = false;
-            self.search(follower.hypothesis(), readings.clone());
+            self.search(tracker.hypothesis(), readings.clone());
         }
     }
 

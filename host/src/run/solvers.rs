@@ -85,8 +85,8 @@ impl Solvers {
 
     /// The frames to come do not follow those before.
     pub fn jumped(&mut self) {
-        let follower = self.detector.as_mut().and_then(|detector| detector.tracker.as_mut());
-        follower.into_iter().for_each(|follower| follower.reset());
+        let tracker = self.detector.as_mut().and_then(|detector| detector.tracker.as_mut());
+        tracker.into_iter().for_each(|tracker| tracker.reset());
     }
 
     /// Takes what a look at the wires has found.

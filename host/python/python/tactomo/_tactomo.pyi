@@ -6,6 +6,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self
 
+__all__ = [
+    "CONTACT_FIELDS",
+    "Calibration",
+    "Contact",
+    "Detector",
+    "Flags",
+    "FoundContact",
+    "Frame",
+    "Frames",
+    "Live",
+    "Mesh",
+    "Raster",
+    "Recording",
+    "SCENES",
+    "SOLVERS",
+    "Shape",
+    "Simulator",
+    "Solution",
+    "Solver",
+    "TactomoError",
+    "TouchEvent",
+    "__version__",
+    "forward",
+]
+
 _SolverName: TypeAlias = Literal[
     "auto",
     "contacts",
@@ -247,7 +272,42 @@ class FoundContact:
 class Shape:
     @property
     def kind(self) -> Literal["line", "ring"]: ...
-    def __getattr__(self, name: str) -> float | None: ...
+    @property
+    def from_x_m(self) -> float | None: ...
+    @property
+    def from_y_m(self) -> float | None: ...
+    @property
+    def to_x_m(self) -> float | None: ...
+    @property
+    def to_y_m(self) -> float | None: ...
+    @property
+    def x_m(self) -> float | None: ...
+    @property
+    def y_m(self) -> float | None: ...
+    @property
+    def radius_m(self) -> float | None: ...
+    @property
+    def width_m(self) -> float | None: ...
+    @property
+    def conductance_s(self) -> float | None: ...
+    @property
+    def sigma_from_x_m(self) -> float | None: ...
+    @property
+    def sigma_from_y_m(self) -> float | None: ...
+    @property
+    def sigma_to_x_m(self) -> float | None: ...
+    @property
+    def sigma_to_y_m(self) -> float | None: ...
+    @property
+    def sigma_x_m(self) -> float | None: ...
+    @property
+    def sigma_y_m(self) -> float | None: ...
+    @property
+    def sigma_radius_m(self) -> float | None: ...
+    @property
+    def sigma_width_m(self) -> float | None: ...
+    @property
+    def sigma_conductance_s(self) -> float | None: ...
 
 @final
 class Flags:
