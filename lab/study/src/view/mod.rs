@@ -1,4 +1,4 @@
-//! What a study shows, as data, and one renderer each for a [terminal](text), a self-contained [page](page) and [other programs](csv).
+//! What a study shows, as data, and one renderer each for a [terminal](text), a self-contained [page] and [other programs](csv).
 //!
 //! Every study fills a [`View`]: texts, [tables](Table) with typed columns, and figures. None writes markup or aligns columns itself.
 
