@@ -375,6 +375,6 @@ mod tests {
             assert!(page.contains(solver) && text.contains(solver), "{solver}");
         }
         assert!(page.contains("tactomo &lt;tradeoff&gt;") && page.contains(&report.machine.version));
-        assert!(!page.contains("NaN") && crate::view::picture(&view).contains("<svg"));
+        assert!(!page.contains("NaN") && crate::view::picture(&views[0]).contains("<svg"));
     }
 }
