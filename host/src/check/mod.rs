@@ -8,7 +8,7 @@
 
 mod advice;
 mod course;
-mod judge;
+mod diagnosis;
 mod picture;
 mod presser;
 mod report;

@@ -1,6 +1,6 @@
 //! Checks of simulated detectors, frame by frame: every fault is named, and none is invented.
 
-use super::judge::{column, neighbours};
+use super::diagnosis::{column, neighbours};
 use super::touch::median;
 use super::*;
 use tactomo_physics::detector::Detector;
