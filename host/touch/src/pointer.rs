@@ -15,8 +15,8 @@ const SETTLES_S: f64 = 0.1;
 const GONE_S: f64 = 0.15;
 /// Way below which motion is not reported (m): several times what the place of a resting ball strays by, 0.03 mm on `pad-257x182`.
 const STEP_M: f64 = 0.2e-3;
-/// A contact is not faster than a hand (m/s), but for what a better answer to the same frame puts right (m): more is another contact or a
-/// mistake, and no motion.
+/// A contact is not faster than a hand (m/s), but for what a better answer to the same frame puts right (m). An answer that is further away is
+/// not taken until a hand could be there: most are mistakes of a few frames, as after frames that were lost.
 const FASTEST_M_PER_S: f64 = 1.5;
 const PUT_RIGHT_M: f64 = 2e-3;
 /// A press is harder by this factor than the contact rests, and has ended below the second one. A ball under six times the force has an apparent
@@ -128,17 +128,17 @@ impl Pointer {
     /// Takes the contacts of a frame at `time_s` (s), or better ones of the same frame.
     pub fn take(&mut self, time_s: f64, contacts: &[FoundContact]) -> Vec<PointerEvent> {
         let mut events = Vec::new();
-        if self.held.as_ref().is_some_and(|held| time_s < held.seen_s || time_s > held.seen_s + GONE_S) {
-            self.let_go(time_s, &mut events);
-        }
-        match &mut self.held {
-            Some(held) => {
-                let same = contacts.iter().find(|contact| contact.id == Some(held.id));
-                if let Some(contact) = same {
-                    held.see(time_s, contact, &mut events);
-                }
+        if let Some(held) = &mut self.held {
+            let same = contacts.iter().find(|contact| contact.id == Some(held.id) && time_s >= held.seen_s);
+            match same {
+                // However long ago it was seen: frames may have been lost, or passed over by a busy machine.
+                Some(contact) => held.see(time_s, contact, &mut events),
+                None if (0.0..=GONE_S).contains(&(time_s - held.seen_s)) => {}
+                None => self.let_go(time_s, &mut events),
             }
-            None => self.held = Held::firmest(time_s, contacts),
+        }
+        if self.held.is_none() {
+            self.held = Held::firmest(time_s, contacts);
         }
         self.note(&events);
         events
@@ -187,20 +187,21 @@ impl Held {
     fn see(&mut self, time_s: f64, contact: &FoundContact, events: &mut Vec<PointerEvent>) {
         let since_s = time_s - self.seen_s;
         let place_m = [contact.x_m, contact.y_m];
-        let jumped = distance(place_m, self.place_m) > FASTEST_M_PER_S * since_s + PUT_RIGHT_M;
+        if distance(place_m, self.place_m) > FASTEST_M_PER_S * since_s + PUT_RIGHT_M {
+            return;
+        }
+        // By the answer before: where frames were lost while it came, it settles in one more.
+        let settles = self.seen_s - self.came_s < SETTLES_S;
         (self.seen_s, self.place_m) = (time_s, place_m);
         if distance(place_m, self.stands_m) > STILL_M {
             (self.stands_m, self.stands_s) = (place_m, time_s);
         }
         let firmness = firmness(contact).max(f64::MIN_POSITIVE).ln();
-        if time_s - self.came_s < SETTLES_S {
+        if settles {
             (self.told_m, self.rest) = (place_m, firmness);
             return;
         }
         self.feel(time_s, since_s, firmness, events);
-        if jumped {
-            self.told_m = place_m;
-        }
         self.go(events);
     }
 
@@ -385,6 +386,17 @@ mod tests {
         assert!(events.iter().all(|(time_s, event)| is_move(event) && *time_s < 2.01), "{events:?}");
         let way_m = 0.02 * (2.0 - SETTLES_S);
         assert!((pointer.state().way_m[0] - way_m).abs() < 4e-4, "{:?}", pointer.state());
+    }
+
+    #[test]
+    fn frames_that_a_busy_machine_passes_over_cost_no_motion() {
+        let mut pointer = Pointer::default();
+        let passed_over = |frame: &i32| (300..400).contains(frame);
+        for time_s in (0..700).filter(|frame| !passed_over(frame)).map(|frame| FRAME_S * f64::from(frame)) {
+            pointer.take(time_s, &[contact(1, [0.1 * time_s, 0.0], 1e-3)]);
+        }
+        let way_m = 0.1 * (700.0 * FRAME_S - SETTLES_S);
+        assert!((pointer.state().way_m[0] - way_m).abs() < 6e-4, "{:?}", pointer.state());
     }
 
     #[test]
