@@ -1,16 +1,27 @@
 //! Work on several cores.
 
+use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
+
+thread_local! {
+    static LEAVES_A_CORE: Cell<bool> = const { Cell::new(false) };
+}
 
 /// A function of each of some things, in their order, on as many threads as there are cores.
 pub fn map<T: Sync, R: Send>(all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<R> {
     map_on(cores(), all, function)
 }
 
-/// How many cores there are.
+/// How many cores there are for the work of this thread.
 pub fn cores() -> usize {
-    thread::available_parallelism().map_or(1, usize::from)
+    let all = thread::available_parallelism().map_or(1, usize::from);
+    if LEAVES_A_CORE.get() { all.saturating_sub(1).max(1) } else { all }
+}
+
+/// From now on leaves a core to others, whatever this thread works on: a live picture needs one.
+pub fn leave_a_core() {
+    LEAVES_A_CORE.set(true);
 }
 
 /// What a function makes of each, in their order, on at most so many threads.

@@ -109,12 +109,16 @@ pub struct PictureArgs {
     /// Leaves it to you to open the page: else the browser opens by itself where there is a desktop
     #[arg(long)]
     pub no_open: bool,
+    /// Takes the detector as it is described. Else, on a board, it is learned from what presses, and used once it helps; Calibrate on the page
+    /// saves it
+    #[arg(long)]
+    pub no_learning: bool,
     /// Makes a pointer of a contact: its motion, presses and clicks are `events` in `--stream`, and move a cursor on the page. The scene
     /// `pointer` does so by itself
     #[arg(long)]
     pub pointer: bool,
-    /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, skipped, solved, corrupt, latency_us, age_us, vibration?}` at the
-    /// end as JSON
+    /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, skipped, solved, corrupt, latency_us, age_us, vibration?,
+    /// learned?}` at the end as JSON
     #[arg(long)]
     pub json: bool,
 }
@@ -133,6 +137,8 @@ pub struct Show {
     pub settings: RequestedSettings,
     /// Which rows the board is asked to scan.
     pub scan: ScanChoice,
+    /// Whether it is a recording that is played: that is taken as it was.
+    pub is_recording: bool,
     /// Time from Hello to the end.
     pub seconds: Option<Duration>,
     /// Where all bytes are kept.
@@ -150,6 +156,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         Some(path) => source::recorded_detector(chosen, path)?,
         None => source::described(&args.board, chosen.get_or(args.board.scene.preset())?),
     };
+    let is_recording = args.replay.is_some();
     let (source, finger) = match args.replay {
         Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &args.picture.detector, &detector)?,
@@ -159,7 +166,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     let Args { mut picture, scan, seconds, record, streams, elf, .. } = args;
     scan.check(detector.electrodes.len()).map_err(|what| anyhow!("--scan {scan}: {what}"))?;
     picture.pointer |= is_pointer;
-    show(Show { source, finger, settings, scan, detector, picture, seconds, record, streams, elf })
+    show(Show { source, finger, settings, scan, is_recording, detector, picture, seconds, record, streams, elf })
 }
 
 /// Serves the page, or only counts, until the end.
@@ -208,10 +215,13 @@ fn method(args: &PictureArgs, problem: &Problem) -> Method {
 
 fn options(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) -> anyhow::Result<RunOptions> {
     let detector = show.detector.clone();
+    let PictureArgs { no_learning, learned, jacobian, .. } = &show.picture;
+    // What a person has brought in place of the model holds for the detector as it is described.
+    let learns = !(*no_learning || show.is_recording || learned.is_some() || jacobian.is_some());
     Ok(RunOptions {
         settings: show.settings,
         scan: show.scan.clone(),
-        solving: Some(Solving::new(method(&show.picture, &problem), problem)),
+        solving: Some(Solving { learns, ..Solving::new(method(&show.picture, &problem), problem) }),
         recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
         begin_recording: Some(keep::on_request(detector.clone(), show.source.name())),
         listeners: listener.into_iter().collect(),
@@ -281,14 +291,15 @@ fn report(summary: &Summary, json: bool) -> anyhow::Result<()> {
 
 /// A summary in a line.
 pub fn sentence(summary: &Summary) -> String {
-    let Summary { source, frames, frames_per_s, dropped, skipped, corrupt, solved, age_us, .. } = summary;
+    let Summary { source, frames, frames_per_s, dropped, skipped, corrupt, solved, age_us, learned, .. } = summary;
+    let learned = learned.map_or_else(String::new, |learned| format!("; {learned}"));
     let received =
         format!("{source}: {frames} frames, {frames_per_s:.0} a second, {dropped} dropped, {corrupt} corrupt");
     if *solved == 0 {
         return received;
     }
     format!(
-        "{received}; {solved} answers, {skipped} frames skipped by the solver; age of answers p50 {:.2} ms, p99 {:.2} ms, at most {:.2} ms",
+        "{received}; {solved} answers, {skipped} frames skipped by the solver; age of answers p50 {:.2} ms, p99 {:.2} ms, at most {:.2} ms{learned}",
         age_us.p50 * 1e-3,
         age_us.p99 * 1e-3,
         age_us.max * 1e-3

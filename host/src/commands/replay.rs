@@ -41,6 +41,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         finger: None,
         picture: args.picture,
         scan: ScanChoice::Whole,
+        is_recording: true,
         settings: RequestedSettings::default(),
         seconds: None,
         record: None,

@@ -20,8 +20,7 @@ const ROW_BY_ROW: Duration = Duration::from_millis(8);
 
 /// One detector at work.
 pub(super) struct DetectorState {
-    /// As it is described, and as it is solved for: calibrated, or the same.
-    pub description: Arc<Detector>,
+    /// As it is solved for: as described, or as a calibration has found it.
     pub detector: Arc<Detector>,
     pub baseline: BaselineTracker,
     pub watch: ElectrodeWatch,
@@ -41,9 +40,9 @@ pub(super) struct Noted {
 }
 
 impl DetectorState {
-    /// Begins with a detector as it is described and as it is solved for.
-    pub fn new(description: Arc<Detector>, detector: Arc<Detector>, baseline: BaselineTracker) -> Self {
-        Self { baseline, watch: ElectrodeWatch::new(&detector), description, detector, tracker: None, rows_us: None }
+    /// Begins with a detector as it is solved for.
+    pub fn new(detector: Arc<Detector>, baseline: BaselineTracker) -> Self {
+        Self { baseline, watch: ElectrodeWatch::new(&detector), detector, tracker: None, rows_us: None }
     }
 
     /// The solver of a method for this detector as it is.

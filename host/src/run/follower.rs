@@ -10,7 +10,7 @@ use tactomo_touch::solve::Parts;
 
 use super::Listener;
 use super::answers::Answers;
-use super::calibration::{Calibrate, Calibration};
+use super::calibration::Calibration;
 use super::event::TouchEvent;
 use super::inbox::{Event, Inbox, Searched, Taken};
 use super::notice::NoticeBoard;
@@ -37,13 +37,13 @@ impl FollowThread {
         folder: PathBuf,
         planner: Planner,
     ) -> std::io::Result<Self> {
-        let ours = || Arc::clone(inbox);
+        let (ours, learns) = (|| Arc::clone(inbox), solving.learns);
         let follow = FollowLoop {
             inbox: ours(),
             wires: WireLooks::new(ours(), Arc::clone(&solving.look_at_wires)),
             solvers: Solvers::new(solving, ours(), Arc::clone(&notice)),
             search: SearchThread::start(ours())?,
-            calibration: Calibration::new(ours(), Arc::clone(&notice), folder),
+            calibration: Calibration::new(ours(), Arc::clone(&notice), folder, learns),
             answers: Answers::new(notice, listeners),
             planner,
             answered: None,
@@ -108,8 +108,14 @@ impl FollowLoop {
                     self.solvers.looked(look, found);
                 }
                 Event::Searched(searched) => self.searched(searched)?,
-                Event::Calibrate(ask, board) => self.calibrate(ask, board),
-                Event::Calibrated(number, outcome) => self.calibration.receive(number, outcome),
+                Event::Calibrate(ask) => {
+                    let found = self.calibration.ask(ask);
+                    self.use_found(found);
+                }
+                Event::Calibrated(number, outcome) => {
+                    let found = self.calibration.receive(number, outcome);
+                    self.use_found(found);
+                }
                 Event::Frame(frame) => self.frame(frame)?,
             }
         }
@@ -137,16 +143,13 @@ impl FollowLoop {
     fn begin_with(&mut self, description: Arc<Detector>) {
         self.answered = None;
         self.planner.restart();
-        self.calibration.end();
+        self.calibration.begin_with(Arc::clone(&description));
         self.solvers.begin_with(description);
     }
 
-    /// Does what a person asks of the calibration.
-    fn calibrate(&mut self, ask: Calibrate, board: Option<String>) {
-        let Some(detector) = self.solvers.detector() else { return };
-        if let Some(found) = self.calibration.ask(ask, &detector.description, board) {
-            self.solvers.use_calibrated(found);
-        }
+    /// Goes on with the detector that a calibration has found, if it has.
+    fn use_found(&mut self, found: Option<Arc<Detector>>) {
+        found.into_iter().for_each(|found| self.solvers.use_calibrated(found));
     }
 
     /// Goes on with a solver that was made. The first one has to be.
@@ -157,6 +160,7 @@ impl FollowLoop {
         tracker.inherit(self.answers.contacts());
         self.search.change_solver(search);
         detector.tracker = Some(tracker);
+        self.calibration.is_in_use();
         self.inbox.set_ready();
         Ok(())
     }

@@ -64,8 +64,8 @@ pub enum Event {
     Method(Method),
     /// A contact is a pointer from now on, or is none.
     Pointer(bool),
-    /// Something is asked of the calibration, of a board of this identity.
-    Calibrate(Calibrate, Option<String>),
+    /// Something is asked of the calibration.
+    Calibrate(Calibrate),
     /// What has come of work for the calibration of this number.
     Calibrated(u64, Outcome),
     /// A frame.

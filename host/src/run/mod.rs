@@ -50,7 +50,7 @@ use tactomo_board::link::{Control, Playing};
 use tactomo_board::session::RequestedSettings;
 use tactomo_protocol::Hello;
 
-use self::calibration::{Calibrate, Calibrating};
+use self::calibration::{Calibrate, Calibrating, LearnedInUse};
 use self::course::Course;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::Method;
@@ -80,6 +80,8 @@ pub struct Snapshot {
     pub marks: u64,
     /// The detector that a calibration has found and that is in use.
     pub calibrated: Option<Arc<Detector>>,
+    /// What was learned of the detector while it was used, if that is in use.
+    pub learned: Option<LearnedInUse>,
     /// What was asked for last and cannot be, for the person who asked.
     pub refused: Option<String>,
     /// What to know of the baseline, as one sentence for a person; none if all is well.

@@ -3,9 +3,11 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use tactomo_board::identity::identity;
 use tactomo_physics::detector::Detector;
 use tokio::sync::watch;
 
+use super::calibration::LearnedInUse;
 use super::statistics::Meter;
 use super::{LinkState, Snapshot};
 
@@ -63,6 +65,16 @@ impl NoticeBoard {
     /// The detector that a calibration has found and that is in use.
     pub fn calibrated(&self) -> Option<Arc<Detector>> {
         self.lock().snapshot.calibrated.clone()
+    }
+
+    /// Identity of the board, once it has said Hello.
+    pub fn board(&self) -> Option<String> {
+        self.lock().snapshot.hello.as_ref().map(identity)
+    }
+
+    /// What was learned of the detector while it was used.
+    pub fn learned(&self) -> Option<LearnedInUse> {
+        self.lock().snapshot.learned
     }
 
     /// Whether a screen could show something newer than the last snapshot, and anybody looks.

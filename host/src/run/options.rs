@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 
+use super::calibration::LearnedInUse;
 use super::scanning::ScanChoice;
 use super::{Latency, Listener, Order, Request, Snapshot};
 use tactomo_board::baseline::BaselineTracker;
@@ -22,6 +23,7 @@ use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 #[cfg(doc)]
 use tactomo_physics::scene::SceneName;
+use tactomo_physics::threads;
 use tactomo_protocol::Hello;
 use tactomo_touch::solve::{self, Look, Method, Problem, SolveError, Solver};
 use tactomo_touch::vibration::Peak;
@@ -95,10 +97,12 @@ pub struct Solving {
     pub look_at_wires: LookAtWires,
     /// Begins the baseline once the board has said Hello.
     pub begin_baseline: BeginBaseline,
+    /// Whether the detector is learned from what presses, and what was learned used once it helps.
+    pub learns: bool,
 }
 
 impl Solving {
-    /// Reads the touch of a problem's detector by a method.
+    /// Reads the touch of a problem's detector by a method, and takes the detector as it is described.
     pub fn new(method: Method, problem: Problem) -> Self {
         problem.make_nuisance_beside();
         let at_rest = problem.clone();
@@ -115,6 +119,7 @@ impl Solving {
             begin_baseline: Arc::new(move |detector, conversions| {
                 BaselineTracker::new(at_rest.measured_as(detector).jacobian, conversions)
             }),
+            learns: false,
         }
     }
 }
@@ -145,9 +150,11 @@ impl Problems {
 }
 
 impl Problems {
-    /// That of another detector; what was learned on the sensor holds for it too, if it has as many electrodes.
+    /// That of another detector, with what is not known of it: the solver in use goes on meanwhile. What was learned on the sensor holds for it too, if it has as many electrodes.
     fn another(&self, detector: &Detector) -> Result<Problem, ForwardError> {
+        threads::leave_a_core();
         let problem = Problem::of(detector)?;
+        problem.nuisance();
         Ok(match self.described.learned() {
             Some(learned) => problem.clone().with_learned(learned.clone()).unwrap_or(problem),
             None => problem,
@@ -191,6 +198,9 @@ pub struct Summary {
     /// The frequency at which the mean reading swung in the last seconds, if one stands out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vibration: Option<Peak>,
+    /// What was learned of the detector, if that is in use at the end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub learned: Option<LearnedInUse>,
 }
 
 /// Why the run cannot go on.

@@ -104,6 +104,7 @@ fn summary(notice: &NoticeBoard, source: String, course: &Course) -> Summary {
         latency_us: statistics.latency,
         age_us: statistics.age,
         vibration: course.peak(),
+        learned: notice.learned(),
     }
 }
 
@@ -368,10 +369,7 @@ impl Reader {
                 }
                 Request::Record(false) => self.recordings.end(),
                 Request::Mark(text) => self.recordings.mark(text),
-                Request::Calibrate(ask) => {
-                    let board = self.board.as_ref().map(|board| identity::identity(&board.hello));
-                    self.inbox.put(Event::Calibrate(ask, board));
-                }
+                Request::Calibrate(ask) => self.inbox.put(Event::Calibrate(ask)),
                 Request::Control(control) => {
                     let refused = open.as_mut().and_then(|(link, _)| link.control(&control).err());
                     if let (None, Control::Scene(scene)) = (&refused, control) {

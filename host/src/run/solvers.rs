@@ -53,7 +53,7 @@ impl Solvers {
         let calibrated = |known: &Arc<Detector>| Arc::new(known.measured_as(&description));
         let detector = self.calibrated.as_ref().map_or_else(|| Arc::clone(&description), calibrated);
         let baseline = (self.begin_baseline)(&detector, self.conversions);
-        self.detector = Some(DetectorState::new(description, detector, baseline));
+        self.detector = Some(DetectorState::new(detector, baseline));
         self.order_again();
     }
 
@@ -190,6 +190,7 @@ mod tests {
             }),
             look_at_wires: Arc::new(|_, _, _| None),
             begin_baseline: Arc::new(|_, _| BaselineTracker::over(0, 256)),
+            learns: false,
         };
         (Solvers::new(solving, Arc::clone(&inbox), Arc::new(NoticeBoard::new(snapshots))), inbox, shown)
     }

@@ -8,14 +8,12 @@ use std::time::Instant;
 
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
+use tactomo_physics::threads;
 use tactomo_touch::calibrate::{Frame, Rub, RubSettings, rub};
 
 use super::messages::{Fitted, Outcome};
 use crate::date::today;
 use crate::run::inbox::{Event, Inbox};
-
-/// Presses that the first fit is of, and most that others on the way are, each of twice as many as the one before: they are to be quick.
-const PRESSES_ON_THE_WAY: [usize; 2] = [10, 60];
 
 /// What a fit is of.
 pub(super) struct Task {
@@ -23,8 +21,8 @@ pub(super) struct Task {
     /// Identity of the board.
     pub board: Option<String>,
     pub frames: Vec<Frame>,
-    /// Fits before this one.
-    pub before: usize,
+    /// Most presses that are fitted.
+    pub presses: usize,
     pub is_last: bool,
     pub cancelled: Arc<AtomicBool>,
 }
@@ -34,6 +32,7 @@ pub(super) fn begin(task: Task, number: u64, inbox: &Arc<Inbox>) -> std::io::Res
     let inbox = Arc::clone(inbox);
     let thread = thread::Builder::new().name("calibration".to_owned());
     let run = move || {
+        threads::leave_a_core();
         let (begun, is_last) = (Instant::now(), task.is_last);
         let fit = catch_unwind(AssertUnwindSafe(|| fit(&task)));
         let fit = fit.unwrap_or_else(|_| Err("the fit panicked: this is a mistake in the program".to_owned()));
@@ -43,11 +42,9 @@ pub(super) fn begin(task: Task, number: u64, inbox: &Arc<Inbox>) -> std::io::Res
 }
 
 fn fit(task: &Task) -> Result<Rub, String> {
-    let usual = RubSettings::default();
-    let [first, most] = PRESSES_ON_THE_WAY;
-    let presses = if task.is_last { usual.presses } else { (first << task.before.min(8)).min(most) };
+    let settings = RubSettings { presses: task.presses, ..RubSettings::default() };
     let goes_on = &mut |_| !task.cancelled.load(Ordering::Relaxed);
-    let found = rub(&task.description, &task.frames, &RubSettings { presses, ..usual }, goes_on);
+    let found = rub(&task.description, &task.frames, &settings, goes_on);
     let mut rub = found.map_err(|error| with_causes(&error))?;
     if let Some(calibration) = &mut rub.detector.calibration {
         calibration.board.clone_from(&task.board);

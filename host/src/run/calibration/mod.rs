@@ -1,5 +1,6 @@
-//! Calibration by rubbing, while the picture goes on: frames are collected, spread over the detector, and fitted every few seconds, so that a
-//! person sees where to rub and what it brings, until more brings nothing.
+//! Calibration while the picture goes on: frames of a contact are collected, spread over the detector, and fitted. Unasked, the detector is
+//! learned from whatever presses, and used once it helps. Where a person asks, it is fitted every few seconds, so that they see where to rub
+//! and what it brings, until more brings nothing.
 
 mod collected;
 mod fit;
@@ -7,6 +8,7 @@ pub(super) mod messages;
 mod save;
 mod session;
 
+use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -25,6 +27,8 @@ use super::notice::NoticeBoard;
 /// How far a calibration is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// Nobody has asked: it learns from what presses anyway.
+    Learning,
     /// Frames are collected.
     Rubbing,
     /// All of them are fitted.
@@ -56,45 +60,77 @@ pub struct Calibrating {
     pub used: bool,
 }
 
-/// The calibration under way in the follower, if one is, and what is shown of it.
+/// What was learned of the detector while it was used, and is in use.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct LearnedInUse {
+    /// Presses that it was fitted to.
+    pub presses: usize,
+    /// Standard error that places are expected to have (m): the median over the detector, of a press of medium firmness in one frame.
+    pub place_error_m: f64,
+}
+
+impl fmt::Display for LearnedInUse {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { presses, place_error_m } = self;
+        write!(formatter, "places known to {:.2} mm, learned from {presses} presses", 1e3 * place_error_m)
+    }
+}
+
+/// The calibration of the detector that is connected, in the follower, and what is shown of it.
 pub(super) struct Calibration {
     inbox: Arc<Inbox>,
     notice: Arc<NoticeBoard>,
     /// Where calibrated detectors are saved.
     folder: PathBuf,
+    /// Whether the detector is learned unasked.
+    learns: bool,
     session: Option<RubSession>,
     /// How many there have been.
     begun: u64,
+    /// Expected error of places (m) by the detector that was found last, for use.
+    known_m: f64,
+    /// What was learned unasked, if that is the one.
+    learned: Option<LearnedInUse>,
 }
 
 impl Calibration {
-    /// None yet; what comes of them in other threads goes through `inbox`.
-    pub fn new(inbox: Arc<Inbox>, notice: Arc<NoticeBoard>, folder: PathBuf) -> Self {
-        Self { inbox, notice, folder, session: None, begun: 0 }
+    /// None yet; what comes of them in other threads goes through `inbox`. With `learns`, the detector is learned from what presses anyway.
+    pub fn new(inbox: Arc<Inbox>, notice: Arc<NoticeBoard>, folder: PathBuf, learns: bool) -> Self {
+        Self { inbox, notice, folder, learns, session: None, begun: 0, known_m: f64::INFINITY, learned: None }
     }
 
-    /// Does what a person asks, on a detector of this description and a board of this identity; the detector to go on with, if one is to be.
-    pub fn ask(&mut self, ask: Calibrate, description: &Arc<Detector>, board: Option<String>) -> Option<Arc<Detector>> {
-        let mut used = None;
-        match (ask, &mut self.session) {
-            (Calibrate::Begin, None) => {
-                self.begun += 1;
-                let (description, inbox) = (Arc::clone(description), Arc::clone(&self.inbox));
-                self.session = Some(RubSession::new(self.begun, description, board, self.folder.clone(), inbox));
+    /// Begins with the detector of this description: frames before were those of another, or of other settings of its converter.
+    pub fn begin_with(&mut self, description: Arc<Detector>) {
+        self.begun += 1;
+        let ends = (Arc::clone(&self.inbox), Arc::clone(&self.notice));
+        self.session = Some(RubSession::new(self.begun, description, self.learns, self.folder.clone(), ends));
+        self.show();
+    }
+
+    /// Does what a person asks; the detector to go on with, if one is to be.
+    pub fn ask(&mut self, ask: Calibrate) -> Option<Arc<Detector>> {
+        let session = self.session.as_mut()?;
+        let used = match ask {
+            Calibrate::Use => session.use_found(),
+            ask => {
+                session.ask(ask);
+                None
             }
-            (Calibrate::End, _) => self.session = None,
-            (Calibrate::Use, Some(session)) => used = session.use_found(),
-            (ask, Some(session)) => session.ask(ask),
-            (_, None) => {}
-        }
+        };
         self.show();
-        used
+        used.map(|found| self.chosen(&found, None))
     }
 
-    /// Ends it: the frames to come are those of another board, or of other settings of its converter.
-    pub fn end(&mut self) {
-        self.session = None;
-        self.show();
+    /// Remembers what is to be used from now on.
+    fn chosen(&mut self, found: &Rub, learned: Option<LearnedInUse>) -> Arc<Detector> {
+        (self.known_m, self.learned) = (found.place_error_m(), learned);
+        Arc::new(found.detector.clone())
+    }
+
+    /// Shows what was learned, once there is a solver for it.
+    pub fn is_in_use(&mut self) {
+        let learned = self.learned;
+        self.notice.change(|snapshot| snapshot.learned = learned);
     }
 
     /// Takes the newest frame, or the rows that came, and the contacts found in it: less the baseline, as the channels read them.
@@ -112,23 +148,27 @@ impl Calibration {
         self.show();
     }
 
-    /// Takes what has come of work in another thread, for the calibration of this number.
-    pub fn receive(&mut self, number: u64, outcome: Outcome) {
-        if let Some(session) = &mut self.session {
-            session.receive(number, outcome);
-        }
+    /// Takes what has come of work in another thread, for the calibration of this number; the detector to go on with, if one was learned.
+    pub fn receive(&mut self, number: u64, outcome: Outcome) -> Option<Arc<Detector>> {
+        let session = self.session.as_mut().filter(|session| session.number == number)?;
+        session.receive(outcome);
+        let learned = session.learned(self.known_m);
         self.show();
+        let found = learned?;
+        let learned = LearnedInUse { presses: found.presses, place_error_m: found.place_error_m() };
+        tracing::info!("{learned}");
+        Some(self.chosen(&found, Some(learned)))
     }
 
     /// Shows how it is, if that is due.
     fn show(&mut self) {
         match &mut self.session {
-            None => self.notice.change(|snapshot| snapshot.calibrating = None),
-            Some(session) => {
+            Some(session) if session.is_open() => {
                 if let Some(shown) = session.newly_shown() {
                     self.notice.change(|snapshot| snapshot.calibrating = Some(Arc::new(shown)));
                 }
             }
+            _ => self.notice.change(|snapshot| snapshot.calibrating = None),
         }
     }
 }
@@ -150,9 +190,10 @@ mod tests {
         let (snapshots, receiver) = watch::channel(Arc::default());
         let notice = Arc::new(NoticeBoard::new(snapshots));
         let inbox = Arc::new(Inbox::new(false));
-        let mut calibration = Calibration::new(inbox, Arc::clone(&notice), PathBuf::from("."));
-        let description = Arc::new(Detector::default());
-        let mut ask = |ask| calibration.ask(ask, &description, None);
+        let mut calibration = Calibration::new(inbox, Arc::clone(&notice), PathBuf::from("."), true);
+        assert!(calibration.ask(Calibrate::Begin).is_none(), "there is no detector");
+        calibration.begin_with(Arc::new(Detector::default()));
+        let mut ask = |ask| calibration.ask(ask);
         assert!(ask(Calibrate::Save).is_none() && shown(&notice, &receiver).is_none(), "there is none to save");
         for _ in 0..2 {
             ask(Calibrate::Begin);
@@ -160,6 +201,6 @@ mod tests {
         }
         assert!(ask(Calibrate::Use).is_none(), "nothing is found yet");
         ask(Calibrate::End);
-        assert_eq!((shown(&notice, &receiver), calibration.begun), (None, 1));
+        assert_eq!(shown(&notice, &receiver), None);
     }
 }

@@ -1,4 +1,5 @@
-//! One calibration: frames are collected, fitted in other threads, saved and used as a person asks.
+//! One calibration: frames are collected, fitted in other threads, and used. It learns from whatever presses, unseen, until a person asks for
+//! more: then it guides, and saves what it has found.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -8,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::readings::{Readings, Rounds};
-use tactomo_touch::calibrate::{HeldOut, Rub};
+use tactomo_touch::calibrate::{HeldOut, Rub, RubSettings};
 use tactomo_touch::solve::FoundContact;
 
 use super::collected::Collected;
@@ -16,9 +17,16 @@ use super::fit::{self, Task};
 use super::messages::{Calibrate, Fitted, Outcome};
 use super::{Calibrating, Stage, save};
 use crate::run::inbox::{Event, Inbox};
+use crate::run::notice::NoticeBoard;
 
 /// Cells with frames, light and firm ones counted apart, before the first fit: fewer do not spread over a detector.
 const ENOUGH: usize = 16;
+/// Presses that the first fit that a person sees is of, and most that others on the way are, each of twice as many as the one before: they are
+/// to be quick.
+const PRESSES_ON_THE_WAY: [usize; 2] = [10, 60];
+/// Cells with frames, light and firm ones counted apart, before what presses anyway is first learned from; twice as many before each time after.
+/// On a detector drawn from the default tolerances 10 presses take a third of the error of places, 20 nearly half, and 58 hardly more.
+const FIRST_LEARNED: usize = 8;
 /// Shortest time from the end of a fit to the next; at least the fit's own time is left too, for the picture needs the cores.
 const PAUSE: Duration = Duration::from_secs(2);
 /// Share of the detector that has to be rubbed before it is done: fingertips hardly reach the corners.
@@ -35,12 +43,13 @@ const SHOWN_EVERY: Duration = Duration::from_millis(80);
 /// A calibration under way, in the follower.
 pub(super) struct RubSession {
     /// Tells what comes of this one from what comes of others before.
-    number: u64,
+    pub number: u64,
     inbox: Arc<Inbox>,
+    notice: Arc<NoticeBoard>,
     folder: PathBuf,
     description: Arc<Detector>,
-    /// Identity of the board.
-    board: Option<String>,
+    /// Cells that have to have frames before the next fit that nobody asks for; `None` if there is to be none.
+    learns_from: Option<usize>,
     collected: Collected,
     rounds: Rounds,
     shown: Calibrating,
@@ -57,17 +66,18 @@ impl Drop for RubSession {
 }
 
 impl RubSession {
-    /// Begins to collect frames of the detector of this description, for files in this folder.
+    /// Begins with the detector of this description, for files in this folder. One that is calibrated, or taken as exact, is not learned unasked.
     pub fn new(
         number: u64,
         description: Arc<Detector>,
-        board: Option<String>,
+        learns: bool,
         folder: PathBuf,
-        inbox: Arc<Inbox>,
+        (inbox, notice): (Arc<Inbox>, Arc<NoticeBoard>),
     ) -> Self {
         let collected = Collected::new(&description);
+        let is_known = description.calibration.is_some() || description.tolerances.is_exact();
         let shown = Calibrating {
-            stage: Stage::Rubbing,
+            stage: Stage::Learning,
             coverage: collected.coverage.clone(),
             touched: 0,
             fitting: false,
@@ -80,9 +90,10 @@ impl RubSession {
         Self {
             number,
             inbox,
+            notice,
             folder,
             description,
-            board,
+            learns_from: (learns && !is_known).then_some(FIRST_LEARNED),
             collected,
             rounds: Rounds::default(),
             shown,
@@ -97,23 +108,38 @@ impl RubSession {
     pub fn ask(&mut self, ask: Calibrate) {
         self.showed = None;
         match (ask, self.shown.stage) {
-            (Calibrate::Begin, Stage::Done) => self.shown.stage = Stage::Rubbing,
+            (Calibrate::End, _) => self.shown.stage = Stage::Learning,
+            (Calibrate::Begin, Stage::Learning | Stage::Done) => {
+                (self.shown.stage, self.shown.trouble) = (Stage::Rubbing, None)
+            }
             (Calibrate::Finish, Stage::Rubbing) => self.finish(),
             (Calibrate::Save, Stage::Done) => self.save(),
             _ => {}
         }
     }
 
-    /// The detector to go on with, if there is one.
-    pub fn use_found(&mut self) -> Option<Arc<Detector>> {
+    /// What a person has found, to go on with, if there is something.
+    pub fn use_found(&mut self) -> Option<Arc<Rub>> {
         let fit = self.shown.fit.as_ref().filter(|_| self.shown.stage == Stage::Done)?;
         (self.shown.used, self.showed) = (true, None);
-        Some(Arc::new(fit.detector.clone()))
+        Some(Arc::clone(fit))
+    }
+
+    /// What was learned unasked, if presses that it was not fitted to say that it helps, and places are known better than to `known_m` (m).
+    pub fn learned(&self, known_m: f64) -> Option<Arc<Rub>> {
+        let fit = self.shown.fit.as_ref().filter(|_| self.shown.stage == Stage::Learning)?;
+        (fit.helped() && fit.place_error_m() < (1.0 - WORTH) * known_m).then(|| Arc::clone(fit))
     }
 
     /// Takes a frame, or rows of one: readings (V) less the baseline, as the channels read them, their time (s), and the contacts found.
     pub fn take(&mut self, readings: &Readings, time_s: f64, contacts: &[FoundContact]) {
-        if self.shown.stage != Stage::Rubbing {
+        let takes = match self.shown.stage {
+            // What is one contact for sure: nobody has promised to press with one finger.
+            Stage::Learning => self.learns_from.is_some() && contacts.len() == 1,
+            Stage::Rubbing => true,
+            Stage::Finishing | Stage::Done => false,
+        };
+        if !takes {
             return;
         }
         let Some(readings) = self.rounds.add(readings, time_s).filter(Readings::is_whole) else {
@@ -126,17 +152,16 @@ impl RubSession {
             return;
         };
         self.collected.take(&readings, contacts, &self.description);
+        let enough = if self.shown.stage == Stage::Learning { self.learns_from.unwrap_or(usize::MAX) } else { ENOUGH };
         let is_new = self.collected.touched > self.fitted_frames;
-        if is_new && !self.shown.fitting && self.collected.filled() >= ENOUGH && Instant::now() >= self.next_fit {
+        if is_new && !self.shown.fitting && self.collected.filled() >= enough && Instant::now() >= self.next_fit {
+            self.learns_from = self.learns_from.map(|_| 2 * self.collected.filled());
             self.fit(false);
         }
     }
 
     /// Takes what has come of work in another thread.
-    pub fn receive(&mut self, number: u64, outcome: Outcome) {
-        if number != self.number {
-            return;
-        }
+    pub fn receive(&mut self, outcome: Outcome) {
         self.showed = None;
         match outcome {
             Outcome::Fitted(fitted) => self.fitted(*fitted),
@@ -145,6 +170,11 @@ impl RubSession {
                 self.shown.saved = saved.ok();
             }
         }
+    }
+
+    /// Whether a person sees it.
+    pub fn is_open(&self) -> bool {
+        self.shown.stage != Stage::Learning
     }
 
     /// How it is, if it is time to show that.
@@ -167,11 +197,17 @@ impl RubSession {
     }
 
     fn fit(&mut self, is_last: bool) {
+        let [first, most] = PRESSES_ON_THE_WAY;
+        let presses = match self.shown.stage {
+            _ if is_last => RubSettings::default().presses,
+            Stage::Learning => most,
+            _ => (first << self.shown.errors_m.len().min(8)).min(most),
+        };
         let task = Task {
             description: Arc::clone(&self.description),
-            board: self.board.clone(),
+            board: self.notice.board(),
             frames: self.collected.frames(),
-            before: self.shown.errors_m.len(),
+            presses,
             is_last,
             cancelled: Arc::clone(&self.cancelled),
         };
@@ -183,7 +219,10 @@ impl RubSession {
     }
 
     fn fail(&mut self, trouble: String) {
-        (self.shown.trouble, self.shown.stage) = (Some(trouble), Stage::Rubbing);
+        self.shown.trouble = Some(trouble);
+        if self.shown.stage == Stage::Finishing {
+            self.shown.stage = Stage::Rubbing;
+        }
     }
 
     fn fitted(&mut self, Fitted { is_last, fit, took }: Fitted) {
@@ -192,10 +231,8 @@ impl RubSession {
         let is_asked = self.shown.stage == Stage::Finishing && !is_last;
         match fit {
             // On the way there may be too little yet; at the end that is the answer.
-            Err(trouble) => {
-                self.shown.trouble = Some(trouble);
-                self.shown.stage = if is_asked { Stage::Finishing } else { Stage::Rubbing };
-            }
+            Err(trouble) if is_asked => self.shown.trouble = Some(trouble),
+            Err(trouble) => self.fail(trouble),
             Ok(fit) => {
                 let error_m = fit.place_error_m();
                 // An error that rose is not settled: of few presses, or of one firmness, it is not known what it will be.
@@ -206,10 +243,12 @@ impl RubSession {
                 self.shown.errors_m.push(error_m);
                 self.shown.fit = Some(Arc::new(fit));
                 (self.shown.trouble, self.shown.saved, self.shown.used) = (unfinished, None, false);
-                if is_last {
-                    self.shown.stage = if self.shown.trouble.is_none() { Stage::Done } else { Stage::Rubbing };
-                } else if !is_asked && is_settled && self.collected.coverage.share() >= WHOLE {
-                    self.finish();
+                let is_covered = self.collected.coverage.share() >= WHOLE;
+                match self.shown.stage {
+                    Stage::Finishing if is_last && self.shown.trouble.is_none() => self.shown.stage = Stage::Done,
+                    Stage::Finishing if is_last => self.shown.stage = Stage::Rubbing,
+                    Stage::Rubbing if is_settled && is_covered => self.finish(),
+                    _ => {}
                 }
             }
         }
@@ -260,6 +299,7 @@ fn unfinished(found: &Rub, least_m: f64) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tactomo_physics::detector::Calibration;
     use tactomo_touch::calibrate::Missing;
 
     fn found(place_errors_m: [f64; 2], residuals: [f64; 2], missing: &[Missing]) -> Rub {
@@ -276,6 +316,51 @@ mod tests {
             chi_square: [9.0, 1.0],
             place_errors_m: vec![([0.0; 2], place_errors_m[1])],
         }
+    }
+
+    fn session(learns: bool, description: Detector) -> RubSession {
+        let (snapshots, _) = tokio::sync::watch::channel(Arc::default());
+        let ends = (Arc::new(Inbox::new(false)), Arc::new(NoticeBoard::new(snapshots)));
+        RubSession::new(1, Arc::new(description), learns, PathBuf::from("."), ends)
+    }
+
+    /// Whether a frame with so many contacts is kept.
+    fn keeps(session: &mut RubSession, contacts: usize) -> bool {
+        let before = session.collected.touched;
+        let press = FoundContact::flat(0.01, 0.0, session.description.sheet_conductance_s());
+        session.take(&Readings::from_fn(16, |_, _| 0.1), 0.0, &vec![press; contacts]);
+        session.collected.touched > before
+    }
+
+    #[test]
+    fn unasked_it_learns_from_one_contact_and_asked_from_all_frames() {
+        let mut learning = session(true, Detector::default());
+        assert!(keeps(&mut learning, 1) && !keeps(&mut learning, 2));
+        learning.ask(Calibrate::Begin);
+        assert!(learning.is_open() && keeps(&mut learning, 2), "the fit sorts them out");
+        learning.ask(Calibrate::End);
+        assert!(!learning.is_open() && keeps(&mut learning, 1), "it goes on learning");
+        let calibrated = Detector { calibration: Some(Calibration::default()), ..Detector::default() };
+        for mut taken in [session(false, Detector::default()), session(true, calibrated)] {
+            assert!(!keeps(&mut taken, 1));
+            taken.ask(Calibrate::Begin);
+            assert!(keeps(&mut taken, 1));
+        }
+    }
+
+    #[test]
+    fn what_was_learned_is_used_only_if_it_helps_and_is_better_than_what_is_used() {
+        let mut learning = session(true, Detector::default());
+        assert!(learning.learned(f64::INFINITY).is_none(), "nothing is fitted");
+        let mut fitted = |place_errors_m, residuals, known_m| {
+            learning.shown.fit = Some(Arc::new(found(place_errors_m, residuals, &[])));
+            learning.learned(known_m).is_some()
+        };
+        assert!(fitted([0.9e-3, 0.2e-3], [3.0, 1.0], f64::INFINITY) && fitted([0.9e-3, 0.2e-3], [3.0, 1.0], 0.3e-3));
+        assert!(!fitted([0.9e-3, 0.2e-3], [3.0, 1.0], 0.205e-3), "hardly better");
+        assert!(!fitted([0.9e-3, 0.2e-3], [1.0, 1.3], f64::INFINITY), "presses that were not used fit worse");
+        learning.ask(Calibrate::Begin);
+        assert!(learning.learned(f64::INFINITY).is_none(), "now a person decides");
     }
 
     #[test]

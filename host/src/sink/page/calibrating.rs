@@ -41,6 +41,7 @@ impl<'a> CalibratingMessage<'a> {
     pub(super) fn of(calibrating: &'a Calibrating) -> Self {
         Self {
             stage: match calibrating.stage {
+                Stage::Learning => "learning",
                 Stage::Rubbing => "rubbing",
                 Stage::Finishing => "finishing",
                 Stage::Done => "done",

@@ -142,6 +142,8 @@ struct StatusMessage<'a> {
     refused: Option<&'a str>,
     baseline: Option<&'a str>,
     calibration: Option<&'a str>,
+    /// What was learned of the detector, as a part of a sentence.
+    learned: Option<String>,
     calibrating: Option<CalibratingMessage<'a>>,
 }
 
@@ -256,6 +258,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         refused: snapshot.refused.as_deref(),
         baseline: snapshot.baseline.as_deref(),
         calibration: snapshot.calibration.as_deref(),
+        learned: snapshot.learned.map(|learned| learned.to_string()),
         calibrating: snapshot.calibrating.as_deref().map(CalibratingMessage::of),
     })
 }

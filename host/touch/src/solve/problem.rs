@@ -147,7 +147,8 @@ impl Problem {
     pub fn make_nuisance_beside(&self) {
         let problem = self.clone();
         let made = move || {
-            problem.made_nuisance(threads::cores().saturating_sub(1).max(1));
+            threads::leave_a_core();
+            problem.made_nuisance(threads::cores());
         };
         // Without a thread, whoever asks first makes it.
         let thread = thread::Builder::new().name("unknowns".to_owned()).spawn(made);

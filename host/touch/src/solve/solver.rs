@@ -89,7 +89,7 @@ pub trait Tracker: Send {
     /// What is followed: where a search may begin.
     fn hypothesis(&self) -> Hypothesis;
 
-    /// Numbers contacts on from those that another tracker found before.
+    /// Goes on from contacts that another tracker found before, and from their numbers.
     fn inherit(&mut self, before: &[FoundContact]) {
         let _ = before;
     }

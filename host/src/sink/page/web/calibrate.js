@@ -100,7 +100,8 @@ export class CalibratePanel {
   }
 
   /** Shows a status message. */
-  show({ calibrating, link }) {
+  show({ calibrating, learned, link }) {
+    element("learned").textContent = learned ? `${learned[0].toUpperCase()}${learned.slice(1)}` : "";
     this.button.disabled = !calibrating && link.state !== "streaming";
     this.button.setAttribute("aria-pressed", String(Boolean(calibrating)));
     const text = JSON.stringify(calibrating);

@@ -115,7 +115,11 @@ impl ContactFinder {
 
     /// A first, rough contact in rows where something stands out.
     pub(super) fn glimpsed(&self, target: &Target) -> Option<ContactHypothesis> {
-        let begun = self.begun(target)?;
+        self.roughly_from(self.begun(target)?, target)
+    }
+
+    /// What these contacts are in another frame, roughly.
+    pub(super) fn roughly_from(&self, begun: Vec<Contact>, target: &Target) -> Option<ContactHypothesis> {
         let rough = DiscFitter { model: &*self.rough, ..self.disc_fitter() };
         let first = rough.fit(begun, target, GLIMPSE)?;
         let fit = self.disc_fitter().fit(first.contacts, target, Effort { steps: 1, ..GLIMPSE })?;

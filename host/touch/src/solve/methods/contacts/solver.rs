@@ -23,6 +23,7 @@ use crate::solve::solver::{
 };
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
+use tactomo_physics::scene::Contact;
 
 /// Fits contacts.
 pub struct Contacts {
@@ -57,6 +58,8 @@ pub(crate) struct ContactTracker {
     is_provisional: bool,
     /// What a calibration would bring, as all readings showed of what is followed.
     calibrated: Option<Calibrated>,
+    /// Contacts that another tracker has found: where it begins when something presses.
+    inherited: Vec<Contact>,
     association: Association,
     /// As it was before this frame: a frame that has several answers is one frame.
     before: Association,
@@ -136,6 +139,7 @@ impl ContactTracker {
             silent_s: 0.0,
             is_provisional: false,
             calibrated: None,
+            inherited: Vec::new(),
             before,
             association,
         }
@@ -172,7 +176,12 @@ impl ContactTracker {
     fn step_frame(&mut self, target: &Target) -> bool {
         self.before = self.association.clone();
         (self.rows, self.latest) = (None, None);
-        let Some(last) = self.last.take() else { return self.finder.stands_out(target) };
+        let Some(last) = self.last.take() else {
+            let search = self.finder.stands_out(target);
+            self.last = search.then(|| self.taken_over(target)).flatten();
+            self.is_stale = self.last.is_some();
+            return search;
+        };
         let Some(moved) = self.finder.follow(&last, target) else {
             (self.last, self.is_stale) = (Some(last), true);
             return true;
@@ -185,6 +194,12 @@ impl ContactTracker {
             || self.finder.is_outdated(target);
         self.last = Some(found);
         search
+    }
+
+    /// What contacts that another tracker found are in a frame in which something presses: for the time of a search better than none.
+    fn taken_over(&mut self, target: &Target) -> Option<ContactHypothesis> {
+        let inherited = std::mem::take(&mut self.inherited);
+        (!inherited.is_empty()).then(|| self.finder.roughly_from(inherited, target)).flatten()
     }
 
     /// Takes what a search has found in the mean of some frames, if it explains this frame better than what is followed; whether the search has to be repeated, because
@@ -230,8 +245,14 @@ impl ContactTracker {
         self.last.as_ref().map_or_else(nothing, |last| self.finder.evidence_of(&last.fit))
     }
 
-    /// Numbers contacts on from those that were found before.
+    /// Goes on from contacts that were found before, and from their numbers.
     pub fn inherit(&mut self, before: &[FoundContact]) {
+        let radius_m = self.finder.settings.radius_m;
+        let contact = |found: &FoundContact| {
+            let (conductance_s, radius_m) = (found.known_conductance_s()?, found.radius_m.unwrap_or(radius_m));
+            Some(Contact { x_m: found.x_m, y_m: found.y_m, z_m: found.z_m, radius_m, conductance_s })
+        };
+        self.inherited = before.iter().filter_map(contact).collect();
         self.association.inherit(before);
         self.before = self.association.clone();
     }

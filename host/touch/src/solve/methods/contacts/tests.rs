@@ -50,6 +50,23 @@ fn error_m((truth, found): &(Contact, FoundContact)) -> f64 {
 }
 
 #[test]
+fn a_tracker_goes_on_from_what_another_one_found_before_anything_is_searched() {
+    let truth = [contact(0.012, 0.004, 0.5), contact(-0.014, -0.01, 1.0)];
+    let mut noise = Noise::new(3);
+    let before = Box::new(solver()).solve(&frame(&truth, &mut noise)).unwrap().contacts;
+    let mut tracker = Box::new(solver()).split().tracker;
+    tracker.inherit(&before);
+    let gone = tracker.follow(&Readings::from_fn(16, |_, _| 0.0)).unwrap();
+    assert!(gone.solution.contacts.is_empty() && !gone.search, "nothing presses any more");
+    let taken = tracker.follow(&frame(&truth, &mut noise)).unwrap();
+    assert!(taken.search && taken.solution.flags.unfinished);
+    let pairs = matched(&truth, &taken.solution.contacts);
+    assert!(pairs.iter().all(|pair| error_m(pair) < 0.3e-3), "{pairs:?}");
+    let ids = |contacts: &[FoundContact]| contacts.iter().map(|contact| contact.id).collect::<Vec<_>>();
+    assert_eq!(ids(&taken.solution.contacts), ids(&before));
+}
+
+#[test]
 fn the_readings_follow_their_derivatives() {
     let solver = solver();
     let finder = solver.finder();

@@ -88,7 +88,8 @@ impl ContactTracker {
             self.rows = None;
             let search = self.finder.stands_out(&target);
             // A rough contact is better than none for the time of a search.
-            if let Some(begun) = search.then(|| self.finder.glimpsed(&target)).flatten() {
+            let begun = search.then(|| self.taken_over(&target).or_else(|| self.finder.glimpsed(&target)));
+            if let Some(begun) = begun.flatten() {
                 self.rows = Some(Box::new(RowState::new(&begun, &target)));
                 self.is_provisional = target.is_provisional();
                 (self.last, self.is_stale, self.is_glimpsed) = (Some(begun), true, true);
