@@ -53,7 +53,7 @@ fn error_m((truth, found): &(Contact, FoundContact)) -> f64 {
 fn a_tracker_goes_on_from_what_another_one_found_before_anything_is_searched() {
     let truth = [contact(0.012, 0.004, 0.5), contact(-0.014, -0.01, 1.0)];
     let mut noise = Noise::new(3);
-    let before = Box::new(solver()).solve(&frame(&truth, &mut noise)).unwrap().contacts;
+    let before = solver().solve(&frame(&truth, &mut noise)).unwrap().contacts;
     let mut tracker = Box::new(solver()).split().tracker;
     tracker.inherit(&before);
     let gone = tracker.follow(&Readings::from_fn(16, |_, _| 0.0)).unwrap();
