@@ -20,6 +20,7 @@ use tactomo::solve::{
     ElectrodeFault, ElectrodeWatch, FaultTolerant, FaultyElectrodes, FoundContact, FoundShape, Look, Method, Problem,
     Solver, without,
 };
+use tactomo_physics::threads;
 use tactomo_protocol::{BoardMessage, BoardReceiver};
 
 /// Frames of each board: an electrode is left out after 8 that show it, and the rest is averaged.
@@ -176,19 +177,20 @@ fn left_out_everywhere(model: BoardModel) {
     let (problem, healthy) = BENCH.frames(model, &impedance_ohm, None);
     let (expected, none) = answered(&problem, &healthy);
     assert_eq!((expected.len(), none), (1, vec![]), "{model:?}");
-    let cases = (0..16).flat_map(|e| {
-        let other = (e + 1) % 16;
-        [(format!("open:{e}"), ElectrodeFault::Open), (format!("short:{e},{other}"), ElectrodeFault::Shorted)]
-    });
-    let mut wrong = Vec::new();
-    for (fault, kind) in cases {
-        let (_, frames) = BENCH.frames(model, &impedance_ohm, Some(&fault));
+    let cases: Vec<_> = (0..16)
+        .flat_map(|e| {
+            let other = (e + 1) % 16;
+            [(format!("open:{e}"), ElectrodeFault::Open), (format!("short:{e},{other}"), ElectrodeFault::Shorted)]
+        })
+        .collect();
+    let wrong = |(fault, kind): &(String, ElectrodeFault)| {
+        let (_, frames) = BENCH.frames(model, &impedance_ohm, Some(fault));
         let (found, faults) = answered(&problem, &frames);
         let is_as_healthy = found.len() == 1 && apart(&found[0], &expected[0]) < 3.0;
-        if !is_as_healthy || faults != faults_of(&fault, kind) {
-            wrong.push((fault, faults, found));
-        }
-    }
+        let is_right = is_as_healthy && faults == faults_of(fault, *kind);
+        (!is_right).then(|| (fault.clone(), faults, found))
+    };
+    let wrong: Vec<_> = threads::map(&cases, wrong).into_iter().flatten().collect();
     assert!(wrong.is_empty(), "{model:?}: healthy {expected:?}, but {wrong:#?}");
 }
 
@@ -208,12 +210,13 @@ fn open_and_shorted_electrodes_change_no_answer_of_the_esp32c3() {
 }
 
 /// Pairs of neighbours, of electrodes far apart, and across the ESP32's converters.
-const EXCHANGED: [[usize; 2]; 5] = [[5, 6], [0, 1], [1, 9], [3, 12], [10, 14]];
+const EXCHANGED: [[usize; 2]; 7] = [[5, 6], [0, 1], [1, 9], [3, 12], [10, 14], [4, 11], [7, 8]];
 
 #[test]
 fn exchanged_wires_are_told_by_most_presses_on_every_board() {
     let faulty = FaultyElectrodes::default();
-    for (index, [a, b]) in EXCHANGED.into_iter().enumerate() {
+    let cases: Vec<_> = EXCHANGED.into_iter().enumerate().collect();
+    threads::map(&cases, |&(index, [a, b])| {
         let model = BoardModel::ALL[index % BoardModel::ALL.len()];
         let told: Vec<_> = (1..=3)
             .map(|seed| {
@@ -224,15 +227,16 @@ fn exchanged_wires_are_told_by_most_presses_on_every_board() {
             .collect();
         let right = told.iter().filter(|pair| **pair == Some([a, b])).count();
         assert!(right >= 2 && told.iter().flatten().all(|pair| *pair == [a, b]), "{model:?} {a},{b}: {told:?}");
-    }
+    });
 }
 
 /// Counted in the board's time and in answers, one to [`ANSWER_EVERY`] frames: it is when the solver looks that is tested, not this machine.
+/// It looks after as many answers whatever is exchanged: each board is tried with one pair.
 #[test]
 fn exchanged_wires_are_named_within_two_seconds_of_presses() {
     let impedances_ohm: Vec<_> = (1..=4).map(|seed| BENCH.touched_ohm(SceneName::Single, seed)).collect();
-    for (index, [a, b]) in EXCHANGED.into_iter().chain([[4, 11], [7, 8]]).enumerate() {
-        let model = BoardModel::ALL[index % BoardModel::ALL.len()];
+    let cases: Vec<_> = BoardModel::ALL.into_iter().zip(EXCHANGED).collect();
+    threads::map(&cases, |&(model, [a, b])| {
         let wires = BENCH.wires(Some(&format!("swap:{a},{b}")));
         let pressing = Pressing { impedances_ohm: impedances_ohm.clone(), wires };
         let is_enough = |frames: &[(f64, Readings)]| frames.last().is_some_and(|(time_s, _)| *time_s > NAMED_WITHIN_S);
@@ -244,12 +248,12 @@ fn exchanged_wires_are_named_within_two_seconds_of_presses() {
         });
         let expected = [a, b].map(|e| (e, ElectrodeFault::Exchanged));
         assert_eq!(solver.excluded(), expected, "{model:?} {a},{b}: named {named:?} in {} frames", frames.len());
-    }
+    });
 }
 
 #[test]
 fn a_wide_press_is_a_contact_and_a_ring_a_ring() {
-    for seed in 1..=3 {
+    threads::map(&[1, 2, 3], |&seed| {
         for (scene, is_ring) in [(SceneName::Wide, false), (SceneName::Ring, true)] {
             let (problem, frames) = BENCH.frames(BoardModel::Esp32, &BENCH.touched_ohm(scene, seed), None);
             let mut solver = Method::Auto.build(&problem).unwrap();
@@ -264,5 +268,5 @@ fn a_wide_press_is_a_contact_and_a_ring_a_ring() {
             let right = if is_ring { rings } else { FRAMES - rings };
             assert!(10 * right >= 9 * FRAMES, "{scene}, seed {seed}: {shapes:?}");
         }
-    }
+    });
 }
