@@ -13,6 +13,7 @@ use tactomo_physics::hertz::Hertz;
 use tactomo_physics::readings::Range;
 use tactomo_physics::scene::{Contact, Fingertip, Hand};
 use tactomo_physics::simulate::{Noise, drawn};
+use tactomo_physics::threads;
 
 /// Frames of two rows a second on the ESP32's line, and the time from one row to the next (s).
 const FRAME_S: f64 = 7e-4;
@@ -183,7 +184,8 @@ impl CoverageTrial {
     }
 
     /// Follows a press by the rows of an adaptive plan, and judges some of the answers.
-    fn follow(&self, press: Press, coverage: &mut Coverage) {
+    fn follow(&self, press: Press) -> Coverage {
+        let mut coverage = Coverage::default();
         let n = self.described.electrodes.len();
         let model = &self.built[press.seed as usize % self.built.len()];
         let course = Course::new(press, &self.described, model);
@@ -208,12 +210,12 @@ impl CoverageTrial {
                 coverage.add(&course.contact(middle_m), &solution.contacts);
             }
         }
+        coverage
     }
 
     fn coverage(&self, force_n: f64, speed_m_per_s: f64, seeds: std::ops::Range<u64>) -> Coverage {
-        let mut coverage = Coverage::default();
-        seeds.for_each(|seed| self.follow(Press { force_n, speed_m_per_s, seed }, &mut coverage));
-        coverage
+        let presses: Vec<_> = seeds.map(|seed| Press { force_n, speed_m_per_s, seed }).collect();
+        threads::map(&presses, |press| self.follow(*press)).into_iter().fold(Coverage::default(), Coverage::and)
     }
 }
 
