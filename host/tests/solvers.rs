@@ -15,6 +15,7 @@ use tactomo::readings::Readings;
 use tactomo::scene::Contact;
 use tactomo::simulate::{Noise, measured};
 use tactomo::solve::{FaultTolerant, Method, Problem, Solution, SolveError, Solver};
+use tactomo_physics::threads;
 
 /// No frame takes longer, on any machine with any load, unoptimised: a method whose steps have no bound takes for ever.
 const BOUND: Duration = Duration::from_secs(60);
@@ -34,13 +35,12 @@ fn detector() -> Detector {
     Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact()
 }
 
-/// All solvers that the model serves, which on the slab are all there are.
-fn solvers(problem: &Problem) -> Vec<Box<dyn Solver>> {
-    let built = Method::ALL.into_iter().map(|method| method.build(problem));
-    if problem.model.name() == "slab" {
-        return built.map(Result::unwrap).collect();
-    }
-    built.flatten().collect()
+/// Tries all solvers that the model serves, which on the slab are all there are, on all cores.
+fn try_each(problem: &Problem, try_it: impl Fn(&mut dyn Solver) + Sync) {
+    threads::map(&Method::ALL, |method| match method.build(problem) {
+        Ok(mut solver) => try_it(&mut *solver),
+        Err(error) => assert_ne!(problem.model.name(), "slab", "{}: {error}", method.name()),
+    });
 }
 
 /// A solver as `live` runs it.
@@ -144,23 +144,25 @@ fn touched(seed: u64) -> Readings {
 #[test]
 fn odd_readings_are_answered_sanely() {
     for problem in &*PROBLEMS {
-        for mut solver in solvers(problem) {
+        try_each(problem, |solver| {
             for readings in odd_readings() {
-                let solution = answer(&mut *solver, &readings).unwrap();
+                let solution = answer(solver, &readings).unwrap();
                 assert_sane(solver.name(), problem, &solution);
             }
-        }
+        });
+    }
+    threads::map(&*PROBLEMS, |problem| {
         let mut guarded = guarded(problem);
         for readings in odd_readings().iter().flat_map(|readings| std::iter::repeat_n(readings, FRAMES)) {
             assert_sane("guarded", problem, &answer(&mut *guarded, readings).unwrap());
         }
-    }
+    });
 }
 
 #[test]
 fn wrong_counts_and_no_numbers_are_refused_and_forgotten() {
     let touched = touched(1);
-    for mut solver in solvers(&PROBLEMS[0]) {
+    try_each(&PROBLEMS[0], |solver| {
         let sound = solver.solve(&touched).unwrap();
         let few = solver.solve(&Readings::from_fn(4, |_, _| 0.1));
         assert_eq!(few, Err(SolveError::Electrodes { found: 4, expected: 16 }), "{}", solver.name());
@@ -172,13 +174,14 @@ fn wrong_counts_and_no_numbers_are_refused_and_forgotten() {
         }
         solver.reset();
         assert_eq!(solver.solve(&touched).unwrap(), sound, "{}", solver.name());
-    }
+    });
 }
 
 #[test]
 fn after_a_reset_the_answer_is_a_new_solvers() {
     let frames: Vec<_> = (1..4).map(touched).chain([all(|_, _| 1.7), all(|_, _| 0.0)]).collect();
-    for (mut used, mut new) in solvers(&PROBLEMS[0]).into_iter().zip(solvers(&PROBLEMS[0])) {
+    threads::map(&Method::ALL, |method| {
+        let [mut used, mut new] = [(); 2].map(|()| method.build(&PROBLEMS[0]).unwrap());
         for readings in &frames {
             used.solve(readings).unwrap();
         }
@@ -186,7 +189,7 @@ fn after_a_reset_the_answer_is_a_new_solvers() {
         for readings in &frames {
             assert_eq!(used.solve(readings), new.solve(readings), "{}", new.name());
         }
-    }
+    });
 }
 
 /// Frames of nothing, less their mean, as the readings at rest are taken off. A converter gives no code below zero, so they are
@@ -205,20 +208,20 @@ fn frames_at_rest(count: usize) -> Vec<Readings> {
 #[test]
 fn a_contact_is_found_and_rest_is_none() {
     let rest = frames_at_rest(100);
-    for mut solver in solvers(&PROBLEMS[0]) {
+    try_each(&PROBLEMS[0], |solver| {
         let name = solver.name();
         assert!(!solver.solve(&touched(1)).unwrap().contacts.is_empty(), "{name}");
         solver.reset();
         for frame in &rest {
             assert_eq!(solver.solve(frame).unwrap().contacts, [], "{name}: noise is no contact");
         }
-    }
+    });
 }
 
 #[test]
 fn names_are_those_of_the_command_line() {
-    for (method, solver) in Method::ALL.into_iter().zip(solvers(&PROBLEMS[0])) {
-        assert_eq!(method.name(), solver.name());
+    for method in Method::ALL {
+        assert_eq!(method.name(), method.build(&PROBLEMS[0]).unwrap().name());
         assert_eq!(method.name().parse(), Ok(method));
         assert!(!method.explanation().is_empty());
     }
@@ -226,17 +229,25 @@ fn names_are_those_of_the_command_line() {
 
 #[test]
 fn any_readings_are_answered_sanely() {
-    let problem = &PROBLEMS[0];
-    let solvers = RefCell::new(solvers(problem).into_iter().chain([guarded(problem)]).collect::<Vec<_>>());
-    let config = ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() };
+    // Few methods take most of the time: each is tried on all cores.
+    threads::map(&[30, 30], |&cases| {
+        for method in Method::ALL {
+            answers_any_readings_sanely(&mut *method.build(&PROBLEMS[0]).unwrap(), cases);
+        }
+        answers_any_readings_sanely(&mut *guarded(&PROBLEMS[0]), cases);
+    });
+}
+
+fn answers_any_readings_sanely(solver: &mut dyn Solver, cases: u32) {
+    let solver = RefCell::new(solver);
+    let config = ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() };
     let frames = prop::collection::vec(any_readings(), 1..3);
     let outcome = TestRunner::new(config).run(&frames, |frames| {
-        for solver in solvers.borrow_mut().iter_mut() {
-            solver.reset();
-            for readings in &frames {
-                let solution = answer(&mut **solver, readings).unwrap();
-                assert_sane(solver.name(), problem, &solution);
-            }
+        let mut solver = solver.borrow_mut();
+        solver.reset();
+        for readings in &frames {
+            let solution = answer(&mut **solver, readings).unwrap();
+            assert_sane(solver.name(), &PROBLEMS[0], &solution);
         }
         Ok(())
     });
