@@ -133,13 +133,12 @@ impl RubSession {
 
     /// Takes a frame, or rows of one: readings (V) less the baseline, as the channels read them, their time (s), and the contacts found.
     pub fn take(&mut self, readings: &Readings, time_s: f64, contacts: &[FoundContact]) {
-        let takes = match self.shown.stage {
-            // What is one contact for sure: nobody has promised to press with one finger.
-            Stage::Learning => self.learns_from.is_some() && contacts.len() == 1,
+        let collects = match self.shown.stage {
+            Stage::Learning => self.learns_from.is_some(),
             Stage::Rubbing => true,
             Stage::Finishing | Stage::Done => false,
         };
-        if !takes {
+        if !collects {
             return;
         }
         let Some(readings) = self.rounds.add(readings, time_s).filter(Readings::is_whole) else {
@@ -151,6 +150,10 @@ impl RubSession {
             }
             return;
         };
+        // Nobody has promised to press with one finger, so what is not one contact is left out.
+        if self.shown.stage == Stage::Learning && contacts.len() != 1 {
+            return;
+        }
         self.collected.take(&readings, contacts, &self.description);
         let enough = if self.shown.stage == Stage::Learning { self.learns_from.unwrap_or(usize::MAX) } else { ENOUGH };
         let is_new = self.collected.touched > self.fitted_frames;
