@@ -160,7 +160,7 @@ impl FollowLoop {
         tracker.inherit(self.answers.contacts());
         self.search.change_solver(search);
         detector.tracker = Some(tracker);
-        self.calibration.is_in_use();
+        self.calibration.show_learned();
         self.inbox.set_ready();
         Ok(())
     }

@@ -128,7 +128,7 @@ impl Calibration {
     }
 
     /// Shows what was learned, once there is a solver for it.
-    pub fn is_in_use(&mut self) {
+    pub fn show_learned(&mut self) {
         let learned = self.learned;
         self.notice.change(|snapshot| snapshot.learned = learned);
     }
