@@ -7,11 +7,11 @@
 
 use std::f64::consts::PI;
 
-use realfft::RealFftPlanner;
+use nalgebra::DMatrix;
 
 use super::disc::DiscSelf;
 use super::quadrature::panels;
-use super::spline::Grid;
+use super::spline::{Grid, signs};
 
 /// `k R` at which the smooth part's factor has fallen to 2e-5.
 const SMOOTH_END: f64 = 6.6;
@@ -42,20 +42,19 @@ pub(super) struct SurfaceGreen {
 impl SurfaceGreen {
     /// Makes the tables: `response` is the surface's potential per normal current density for a wave number, `floating` what
     /// is left of it at zero, `sheet_s` the sheet conductance, `sigma` the conductivity at the surface.
-    pub fn new(
-        size_m: [f64; 2],
-        split_m: f64,
-        planner: &mut RealFftPlanner<f64>,
-        surface: &Surface<impl Fn(f64) -> f64>,
-    ) -> Self {
+    pub fn new(size_m: [f64; 2], split_m: f64, surface: &Surface<impl Fn(f64) -> f64>) -> Self {
         let grid = Grid::new(size_m, split_m / STEPS_IN_SPLIT);
         let area_m2 = size_m[0] * size_m[1];
         // The near part's own mean belongs to mode 0; the smooth part carries the rest of the floating response.
         let mean = surface.floating - split_m * split_m / (4.0 * surface.sheet_s);
-        let amplitude = modes(&grid, SMOOTH_END / split_m, |count, k| {
-            count / area_m2 * if k > 0.0 { (surface.response)(k) * (-0.25 * (k * split_m).powi(2)).exp() } else { mean }
-        });
-        let smooth = grid.synthesise(planner, amplitude);
+        let modes = grid.modes_within(SMOOTH_END / split_m);
+        let amplitude = |mode: &[usize; 2]| {
+            let k = grid.wave_number(0, mode[0]).hypot(grid.wave_number(1, mode[1]));
+            let value = if k > 0.0 { (surface.response)(k) * (-0.25 * (k * split_m).powi(2)).exp() } else { mean };
+            signs(*mode) / area_m2 * value
+        };
+        let amplitudes = DMatrix::from_iterator(1, modes.len(), modes.iter().map(amplitude));
+        let smooth = grid.synthesise(&modes, &amplitudes);
         Self {
             size_m,
             split_m,
@@ -166,21 +165,6 @@ pub(super) struct Surface<F: Fn(f64) -> f64> {
     pub sheet_s: f64,
     /// Conductivity at the surface (S/m).
     pub sigma: f64,
-}
-
-/// Amplitudes of all modes of a grid up to `k_end`: `amplitude(count, k)`, where `count` is 1, 2 or 4.
-pub(super) fn modes(grid: &Grid, k_end: f64, amplitude: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-    let width = grid.modes(1) + 1;
-    let mut all = vec![0.0; (grid.modes(0) + 1) * width];
-    for (i, value) in all.iter_mut().enumerate() {
-        let (m, n) = (i / width, i % width);
-        let k = grid.wave_number(0, m).hypot(grid.wave_number(1, n));
-        if k < k_end {
-            let count = if m == 0 { 1.0 } else { 2.0 } * if n == 0 { 1.0 } else { 2.0 };
-            *value = amplitude(count, k);
-        }
-    }
-    all
 }
 
 /// The near part by distance, as `r h(r)`, which is regular.

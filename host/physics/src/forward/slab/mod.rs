@@ -28,7 +28,6 @@ mod uneven_tests;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
-use realfft::RealFftPlanner;
 
 pub use self::bond::{DotCurrent, DotCurrents, Face};
 use self::bond::{Dots, Stacks};
@@ -151,7 +150,6 @@ impl Slab {
     ) -> Result<Self, ForwardError> {
         let wrong = |what: String| ForwardError::Detector { detector: detector.name.clone(), what };
         let size_m = check(detector).map_err(wrong)?;
-        let mut planner = RealFftPlanner::new();
         let bond = detector.bond();
         let stacks @ [lower, upper] = stacks(detector, size_m, driving);
         let split_m = stacks.map(|stack| split_m(stack.thickness_m(), size_m, widest_m(detector)));
@@ -162,8 +160,8 @@ impl Slab {
         let [bottom, top] = match as_even {
             Some(like) => [Arc::clone(&like.bottom), Arc::clone(&like.top)],
             None => [
-                SurfaceGreen::new(size_m, split_m[0], &mut planner, &bottom_surface(lower)).into(),
-                SurfaceGreen::new(size_m, split_m[1], &mut planner, &top_surface(upper)).into(),
+                SurfaceGreen::new(size_m, split_m[0], &mut &bottom_surface(lower)).into(),
+                SurfaceGreen::new(size_m, split_m[1], &mut &top_surface(upper)).into(),
             ],
         };
         let as_uneven = as_even.filter(|like| like.detector.unevenness == detector.unevenness);
@@ -171,7 +169,7 @@ impl Slab {
             Uneven::new(size_m, &detector.unevenness, stack.layers(), resolution.uneven_modes).map(Arc::new)
         };
         let bonded = bond.map(|(_, bond)| {
-            let dots = || Dots::new(bond, resolution.dot_degree, stacks, &mut planner).into();
+            let dots = || Dots::new(bond, resolution.dot_degree, stacks).into();
             let bonded = |like: &'_ Self| like.bonded.clone();
             Bonded {
                 dots: as_even.and_then(bonded).map_or_else(dots, |bonded| Arc::clone(&bonded.dots)),
@@ -195,20 +193,20 @@ impl Slab {
             bonded: bonded.map(Arc::new),
             image: Image::new(ImageGrid::new(size_m, IMAGE_NODES)).into(),
         };
-        slab.pads = slab.pad_fields(&mut planner).ok_or_else(|| slab.not_positive())?.into();
+        slab.pads = slab.pad_fields().ok_or_else(|| slab.not_positive())?.into();
         Ok(slab)
     }
 
     /// Eliminates the pads, and the dots of glue if there are any; `None` if they are not positive definite.
-    fn pad_fields(&self, planner: &mut RealFftPlanner<f64>) -> Option<PadFields> {
+    fn pad_fields(&self) -> Option<PadFields> {
         let impedances = self.pad_impedances();
         if let Some(bonded) = &self.bonded {
-            return self.stacks(bonded).fields(&impedances, planner);
+            return self.stacks(bonded).fields(&impedances);
         }
         let [_, covered] = stacks(&self.detector, self.size_m, self.driving);
         let basis = DiscBasis::of_degree(self.resolution.pad_degree);
         let steps_in_pad = self.resolution.steps_in_pad as f64;
-        PadFields::new(self.points.pads(), basis, impedances, &covered, self.uneven.as_deref(), steps_in_pad, planner)
+        PadFields::new(self.points.pads(), basis, impedances, &covered, self.uneven.as_deref(), steps_in_pad)
     }
 
     /// Impedances between all densities of the pads (ohm), below their layers alone.

@@ -10,15 +10,14 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix};
-use realfft::RealFftPlanner;
 
 use super::disc::{DiscBasis, DiscSelf};
 use super::driving::{Covered, Mode};
 use super::from_corner;
 use super::green::SurfaceGreen;
-use super::spline::Grid;
+use super::spline::{Grid, signs};
 use super::uneven::Uneven;
-use crate::detector::Detector;
+use crate::detector::{Detector, cosines};
 
 /// `k T` at which the field across the slab has fallen to 3e-5.
 const ACROSS_END: f64 = 11.0;
@@ -163,6 +162,8 @@ pub(super) struct PadFields {
     columns: usize,
     /// Spline coefficients: all columns of a node together.
     table: Vec<f32>,
+    /// The factor that unevenness has on all of them at a place.
+    roots: Option<Vec<f32>>,
     /// Between the electrodes (ohm): `n x n`.
     pub electrodes_ohm: DMatrix<f64>,
 }
@@ -177,7 +178,6 @@ impl PadFields {
         covered: &Covered<'_>,
         uneven: Option<&Uneven>,
         steps_in_pad: f64,
-        planner: &mut RealFftPlanner<f64>,
     ) -> Option<Self> {
         let grid = table_grid(covered, smallest_m(pads) / steps_in_pad);
         let modes = modes(covered, &grid);
@@ -193,36 +193,21 @@ impl PadFields {
 
         let correction = fields.select_columns(&others) * inverse.transpose();
         let electrodes = fields.select_columns(&uniform) - &correction * coupling;
-        Some(Self::of(grid, &modes, Eliminated { electrodes_ohm, electrodes, correction }, uneven, planner))
+        Some(Self::of(grid, &modes, Eliminated { electrodes_ohm, electrodes, correction }, uneven))
     }
 
     /// The table of fields that are given by modes.
-    pub fn of(
-        grid: Grid,
-        modes: &[Mode],
-        eliminated: Eliminated,
-        uneven: Option<&Uneven>,
-        planner: &mut RealFftPlanner<f64>,
-    ) -> Self {
+    pub fn of(grid: Grid, modes: &[Mode], eliminated: Eliminated, uneven: Option<&Uneven>) -> Self {
         let Eliminated { electrodes_ohm, electrodes, correction } = eliminated;
-        let columns = electrodes.ncols() + correction.ncols();
-        let mut table = vec![0.0; grid.nodes(0) * grid.nodes(1) * columns];
-        let all = electrodes.column_iter().chain(correction.column_iter());
-        let roots = uneven.map(|uneven| grid.values(|at_m| uneven.inverse_root(at_m)));
-        for (column, amplitudes) in all.enumerate() {
-            let mut amplitude = vec![0.0; (grid.modes(0) + 1) * (grid.modes(1) + 1)];
-            for (mode, value) in modes.iter().zip(amplitudes.iter()) {
-                amplitude[mode.m * (grid.modes(1) + 1) + mode.n] = *value;
-            }
-            if let Some(roots) = &roots {
-                amplitude = grid.multiply(planner, amplitude, roots);
-            }
-            let values = grid.synthesise(planner, amplitude);
-            for (node, value) in values.into_iter().enumerate() {
-                table[node * columns + column] = value as f32;
-            }
-        }
-        Self { grid, electrodes: electrodes.ncols(), columns, table, electrodes_ohm }
+        let (own, columns) = (electrodes.ncols(), electrodes.ncols() + correction.ncols());
+        let mut amplitudes = DMatrix::zeros(columns, modes.len());
+        amplitudes.rows_mut(0, own).tr_copy_from(&electrodes);
+        amplitudes.rows_mut(own, correction.ncols()).tr_copy_from(&correction);
+        let waves: Vec<_> = modes.iter().map(|mode| [mode.m, mode.n]).collect();
+        let single = |values: Vec<f64>| values.into_iter().map(|value| value as f32).collect();
+        let table = single(grid.synthesise(&waves, &amplitudes));
+        let roots = uneven.map(|uneven| single(grid.through(|at_m| uneven.inverse_root(at_m))));
+        Self { grid, electrodes: own, columns, table, roots, electrodes_ohm }
     }
 
     /// Number of electrodes.
@@ -239,14 +224,18 @@ impl PadFields {
     /// ohm), `out.len()` of them.
     pub fn sample(&self, at_m: [f64; 2], out: &mut [f32]) {
         let ((x, x_weights), (y, y_weights)) = (self.grid.taps(0, at_m[0]), self.grid.taps(1, at_m[1]));
+        let first = x * self.grid.nodes(1) + y;
+        let taps = |tap: usize| {
+            let (i, j) = (tap / 4, tap % 4);
+            (first + i * self.grid.nodes(1) + j, (x_weights[i] * y_weights[j]) as f32)
+        };
+        let root = self.roots.as_ref().map_or(1.0, |roots| {
+            (0..16).map(taps).map(|(node, weight)| weight * roots[node]).sum()
+        });
         out.fill(0.0);
-        for (i, wx) in x_weights.iter().enumerate() {
-            for (j, wy) in y_weights.iter().enumerate() {
-                let node = (x + i) * self.grid.nodes(1) + y + j;
-                let weight = (wx * wy) as f32;
-                let values = &self.table[node * self.columns..][..out.len()];
-                out.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
-            }
+        for (node, weight) in (0..16).map(taps) {
+            let values = &self.table[node * self.columns..][..out.len()];
+            out.iter_mut().zip(values).for_each(|(sum, value)| *sum += root * weight * value);
         }
     }
 
@@ -296,13 +285,12 @@ pub(super) fn table_grid(covered: &Covered<'_>, least_m: f64) -> Grid {
 pub(super) fn modes(covered: &Covered<'_>, grid: &Grid) -> Vec<Mode> {
     let area_m2 = covered.size_m()[0] * covered.size_m()[1];
     let end = (ACROSS_END / covered.thickness_m()).max(covered.finest());
-    let mode = |m: usize, n: usize| {
+    let amplitude = |[m, n]: [usize; 2]| {
         let k = grid.wave_number(0, m).hypot(grid.wave_number(1, n));
-        let count = if m == 0 { 1.0 } else { 2.0 } * if n == 0 { 1.0 } else { 2.0 };
-        let value = || if m + n == 0 { covered.floating().tb } else { covered.response(k).tb };
-        (k < end).then(|| Mode { m, n, amplitude: count * value() / area_m2 })
+        let value = if m + n == 0 { covered.floating().tb } else { covered.response(k).tb };
+        Mode { m, n, amplitude: signs([m, n]) * value / area_m2 }
     };
-    (0..=grid.modes(0)).flat_map(|m| (0..=grid.modes(1)).filter_map(move |n| mode(m, n)).collect::<Vec<_>>()).collect()
+    grid.modes_within(end).into_iter().map(amplitude).collect()
 }
 
 /// Amplitudes of the field on the top of each density of each pad: `modes x densities`; with unevenness but for the root of its factor at
@@ -318,13 +306,10 @@ pub(super) fn pad_modes(
     let mut all = DMatrix::zeros(modes.len(), pads.len() * basis.len());
     for (e, pad) in pads.iter().enumerate() {
         let nodes = basis.nodes_m(pad.centre_m, pad.radius_m);
-        let cosines = [0, 1].map(|axis| {
-            DMatrix::from_fn(nodes.len(), grid.modes(axis) + 1, |q, m| {
-                (grid.wave_number(axis, m) * nodes[q][axis]).cos()
-            })
-        });
+        let along = |axis: usize, at_m: &[f64; 2]| cosines(grid.modes(axis), at_m[axis] / grid.size_m()[axis]);
+        let waves: Vec<_> = nodes.iter().map(|at_m| [along(0, at_m), along(1, at_m)]).collect();
         let mut at_nodes = DMatrix::from_fn(nodes.len(), modes.len(), |q, i| {
-            modes[i].amplitude * cosines[0][(q, modes[i].m)] * cosines[1][(q, modes[i].n)]
+            modes[i].amplitude * waves[q][0][modes[i].m] * waves[q][1][modes[i].n]
         });
         if let Some(uneven) = uneven {
             for (node, mut at_node) in nodes.iter().zip(at_nodes.row_iter_mut()) {

@@ -1,6 +1,11 @@
-//! Even, periodic tables on a rectangle: cosine modes summed by a fast transform, read by cubic B-splines.
+//! Even, periodic tables on a rectangle: cosine modes summed side by side, read by cubic B-splines.
+//!
+//! The sums are products of matrices: along the fifty steps of a usual side they are quicker than fast transforms, and all tables of a detector
+//! are summed at once.
 
-use realfft::RealFftPlanner;
+use std::f64::consts::PI;
+
+use nalgebra::{DMatrix, DMatrixViewMut};
 
 /// A grid over `[0, size]` in both directions, with one cell more around it, so that a look-up never meets an edge.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +27,11 @@ impl Grid {
         Self { size_m, cells, cells_per_m }
     }
 
+    /// Of the rectangle (m).
+    pub fn size_m(&self) -> [f64; 2] {
+        self.size_m
+    }
+
     /// Nodes along a direction, with those around the rectangle.
     pub fn nodes(&self, axis: usize) -> usize {
         self.cells[axis] + 3
@@ -37,6 +47,12 @@ impl Grid {
         mode as f64 * std::f64::consts::PI / self.size_m[axis]
     }
 
+    /// Half waves along both sides of all modes with a wave number below `end` (1/m), in the order of [`synthesise`](Self::synthesise).
+    pub fn modes_within(&self, end: f64) -> Vec<[usize; 2]> {
+        let all = (0..=self.modes(0)).flat_map(|m| (0..=self.modes(1)).map(move |n| [m, n]));
+        all.filter(|[m, n]| self.wave_number(0, *m).hypot(self.wave_number(1, *n)) < end).collect()
+    }
+
     /// Weights at `u_m`, which is first folded back into the rectangle: the table is even about both of its edges.
     #[inline]
     pub fn taps(&self, axis: usize, u_m: f64) -> Taps {
@@ -47,44 +63,47 @@ impl Grid {
         (cell, cubic_weights(at - cell as f64))
     }
 
-    /// Values at the cells' corners, `x` running slowest, of a function of the place (m).
-    pub fn values(&self, function: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
-        let [nx, ny] = self.cells;
-        let at_m = |axis: usize, node: usize| node as f64 / self.cells_per_m[axis];
-        (0..=nx).flat_map(|i| (0..=ny).map(move |j| [i, j])).map(|[i, j]| function([at_m(0, i), at_m(1, j)])).collect()
-    }
-
-    /// Amplitudes of the cosine series with amplitudes given as for [`synthesise`](Self::synthesise), times [`values`](Self::values).
-    pub fn multiply(&self, planner: &mut RealFftPlanner<f64>, mut amplitude: Vec<f64>, values: &[f64]) -> Vec<f64> {
-        let [nx, ny] = self.cells;
-        cosine_transform_rows(planner, &mut amplitude, ny);
-        let mut turned = transpose(&amplitude, nx + 1, ny + 1);
-        cosine_transform_rows(planner, &mut turned, nx);
-        let mut products = transpose(&turned, ny + 1, nx + 1);
-        products.iter_mut().zip(values).for_each(|(product, value)| *product *= value);
-        analyse_rows(planner, &mut products, ny);
-        let mut turned = transpose(&products, nx + 1, ny + 1);
-        analyse_rows(planner, &mut turned, nx);
-        transpose(&turned, ny + 1, nx + 1)
-    }
-
-    /// Spline coefficients at all nodes, `x` running slowest, of the cosine series with `amplitude[m * (ny + 1) + n]`.
-    pub fn synthesise(&self, planner: &mut RealFftPlanner<f64>, mut amplitude: Vec<f64>) -> Vec<f64> {
-        let [nx, ny] = self.cells;
-        for (m, row) in amplitude.chunks_exact_mut(ny + 1).enumerate() {
-            let x_symbol = spline_symbol(m, nx);
-            row.iter_mut().enumerate().for_each(|(n, a)| *a /= x_symbol * spline_symbol(n, ny));
+    /// Spline coefficients of sums of cosine modes, given by half waves along both sides and `columns x modes` amplitudes; modes of as many half
+    /// waves along `x` follow each other. Of all nodes, `x` running slowest and columns fastest.
+    pub fn synthesise(&self, modes: &[[usize; 2]], amplitudes: &DMatrix<f64>) -> Vec<f64> {
+        let (columns, wide) = (amplitudes.nrows(), self.nodes(1));
+        let alike: Vec<_> = modes.chunk_by(|a, b| a[0] == b[0]).collect();
+        let y = self.cosines(1);
+        // For each number of half waves along x, the sum of those along y: `columns x nodes`.
+        let mut lines = DMatrix::zeros(columns * wide, alike.len());
+        let mut first = 0;
+        for (line, of) in lines.as_mut_slice().chunks_exact_mut((columns * wide).max(1)).zip(&alike) {
+            let waves = DMatrix::from_fn(of.len(), wide, |i, node| y[(of[i][1], node)]);
+            let mut line = DMatrixViewMut::from_slice(line, columns, wide);
+            line.gemm(1.0, &amplitudes.columns(first, of.len()), &waves, 0.0);
+            first += of.len();
         }
-        cosine_transform_rows(planner, &mut amplitude, ny);
-        let mut turned = transpose(&amplitude, nx + 1, ny + 1);
-        cosine_transform_rows(planner, &mut turned, nx);
-        let (wide_x, wide_y) = (self.nodes(0), self.nodes(1));
-        let reflect = |node: usize, cells: usize| {
-            let from_edge = node.abs_diff(1);
-            if from_edge > cells { 2 * cells - from_edge } else { from_edge }
-        };
-        (0..wide_x * wide_y).map(|i| turned[reflect(i % wide_y, ny) * (nx + 1) + reflect(i / wide_y, nx)]).collect()
+        let x = self.cosines(0);
+        let waves = DMatrix::from_fn(alike.len(), self.nodes(0), |i, node| x[(alike[i][0][0], node)]);
+        (lines * waves).data.into()
     }
+
+    /// Spline coefficients through the values of a function of the place (m): as [`synthesise`](Self::synthesise).
+    pub fn through(&self, function: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
+        let at_m = |axis: usize, node: usize| node as f64 / self.cells_per_m[axis];
+        let [nx, ny] = self.cells;
+        let values = DMatrix::from_fn(ny + 1, nx + 1, |j, i| function([at_m(0, i), at_m(1, j)]));
+        let [x, y] = [0, 1].map(|axis| analysis(self.cells[axis]).tr_mul(&self.cosines(axis)));
+        (y.tr_mul(&values) * x).data.into()
+    }
+
+    /// What each mode adds to the spline coefficients of each node along a direction: `modes x nodes`.
+    fn cosines(&self, axis: usize) -> DMatrix<f64> {
+        let cells = self.cells[axis];
+        let cosine = |phase: usize| (PI * (phase % (2 * cells)) as f64 / cells as f64).cos();
+        let symbol: Vec<f64> = (0..=cells).map(|mode| (2.0 + cosine(mode)) / 3.0).collect();
+        DMatrix::from_fn(cells + 1, self.nodes(axis), |mode, node| cosine(mode * node.abs_diff(1)) / symbol[mode])
+    }
+}
+
+/// In how many ways a mode's wave numbers can be signed: what it is weighted by in a sum over all modes.
+pub(super) fn signs(mode: [usize; 2]) -> f64 {
+    mode.iter().map(|waves| if *waves == 0 { 1.0 } else { 2.0 }).product()
 }
 
 /// Cubic B-spline weights of the four nodes around a point, `t` of the way from the second to the third.
@@ -96,47 +115,13 @@ fn cubic_weights(t: f64) -> [f64; 4] {
     [s_cubed, 4.0 * SIXTH - t * t + 3.0 * t_cubed, 4.0 * SIXTH - s * s + 3.0 * s_cubed, t_cubed]
 }
 
-/// Factor from the coefficients of a B-spline to its values at the nodes, for one mode.
-fn spline_symbol(mode: usize, cells: usize) -> f64 {
-    (2.0 + (std::f64::consts::PI * mode as f64 / cells as f64).cos()) / 3.0
-}
-
-/// The reverse of [`cosine_transform_rows`]: amplitudes of each row of values at the nodes, in place. Both are the same sum but for weights.
-fn analyse_rows(planner: &mut RealFftPlanner<f64>, rows: &mut [f64], cells: usize) {
-    let halve_ends = |rows: &mut [f64]| {
-        for row in rows.chunks_exact_mut(cells + 1) {
-            row[0] *= 0.5;
-            row[cells] *= 0.5;
-        }
-    };
-    halve_ends(rows);
-    cosine_transform_rows(planner, rows, cells);
-    halve_ends(rows);
-    rows.iter_mut().for_each(|value| *value *= 2.0 / cells as f64);
-}
-
-/// Sums each row's cosine series at its nodes: `a_m -> sum a_m cos(pi m j / cells)`, in place.
-fn cosine_transform_rows(planner: &mut RealFftPlanner<f64>, rows: &mut [f64], cells: usize) {
-    let transform = planner.plan_fft_forward(2 * cells);
-    let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
-    for row in rows.chunks_exact_mut(cells + 1) {
-        if row.iter().all(|&a| a == 0.0) {
-            continue;
-        }
-        input[..=cells].copy_from_slice(row);
-        for (m, a) in row.iter().enumerate().take(cells).skip(1) {
-            input[m] = 0.5 * a;
-            input[2 * cells - m] = 0.5 * a;
-        }
-        // The buffers were made by the plan itself, so their lengths fit.
-        if transform.process(&mut input, &mut output).is_ok() {
-            row.iter_mut().zip(&output).for_each(|(value, sum)| *value = sum.re);
-        }
-    }
-}
-
-fn transpose(matrix: &[f64], rows: usize, columns: usize) -> Vec<f64> {
-    (0..rows * columns).map(|i| matrix[(i % rows) * columns + i / rows]).collect()
+/// Amplitudes of cosine modes from values at the corners of so many cells: `modes x corners`.
+fn analysis(cells: usize) -> DMatrix<f64> {
+    let half_at_ends = |at: usize| if at == 0 || at == cells { 0.5 } else { 1.0 };
+    DMatrix::from_fn(cells + 1, cells + 1, |mode, corner| {
+        let cosine = (PI * (mode * corner % (2 * cells)) as f64 / cells as f64).cos();
+        2.0 / cells as f64 * half_at_ends(mode) * half_at_ends(corner) * cosine
+    })
 }
 
 #[cfg(test)]
@@ -147,14 +132,15 @@ mod tests {
     fn a_table_gives_back_the_series_it_was_made_of() {
         let grid = Grid::new([0.05, 0.03], 0.0012);
         let (kx, ky) = (grid.wave_number(0, 5), grid.wave_number(1, 3));
-        let mut amplitude = vec![0.0; (grid.modes(0) + 1) * (grid.modes(1) + 1)];
-        amplitude[5 * (grid.modes(1) + 1) + 3] = 2.0;
-        let table = grid.synthesise(&mut RealFftPlanner::new(), amplitude);
-        for (x, y) in [(0.0, 0.0), (0.0123, 0.0271), (0.05, 0.03), (-0.017, 0.041), (0.0999, 0.0)] {
-            let ((i, wx), (j, wy)) = (grid.taps(0, x), grid.taps(1, y));
-            let value: f64 =
-                (0..16).map(|tap| wx[tap / 4] * wy[tap % 4] * table[(i + tap / 4) * grid.nodes(1) + j + tap % 4]).sum();
-            assert!((value - 2.0 * (kx * x).cos() * (ky * y).cos()).abs() < 2e-4, "at {x} {y}: {value}");
+        let wave = |[x, y]: [f64; 2]| 2.0 * (kx * x).cos() * (ky * y).cos();
+        let of_series = grid.synthesise(&[[0, 1], [5, 2], [5, 3]], &DMatrix::from_row_slice(1, 3, &[0.0, 0.0, 2.0]));
+        for table in [of_series, grid.through(wave)] {
+            for at in [[0.0, 0.0], [0.0123, 0.0271], [0.05, 0.03], [-0.017, 0.041], [0.0999, 0.0]] {
+                let ((i, wx), (j, wy)) = (grid.taps(0, at[0]), grid.taps(1, at[1]));
+                let tap = |tap| wx[tap / 4] * wy[tap % 4] * table[(i + tap / 4) * grid.nodes(1) + j + tap % 4];
+                let value: f64 = (0..16).map(tap).sum();
+                assert!((value - wave(at)).abs() < 2e-4, "at {at:?}: {value}");
+            }
         }
     }
 }

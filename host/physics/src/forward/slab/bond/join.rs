@@ -1,7 +1,6 @@
 //! From two stacks of layers, their pads and the dots between them to the fields on the top: see [`super`].
 
 use nalgebra::{DMatrix, DVector};
-use realfft::RealFftPlanner;
 
 use super::Dots;
 use super::glue::Joint;
@@ -53,10 +52,10 @@ pub(super) struct Joined {
 
 impl Stacks<'_> {
     /// Fields on the top, from the impedances between all densities of the pads (ohm); `None` if they are not positive definite.
-    pub fn fields(&self, pads_ohm: &DMatrix<f64>, planner: &mut RealFftPlanner<f64>) -> Option<PadFields> {
+    pub fn fields(&self, pads_ohm: &DMatrix<f64>) -> Option<PadFields> {
         let joined = self.join(pads_ohm)?;
         let eliminated = joined.eliminated();
-        Some(PadFields::of(joined.grid, &joined.modes, eliminated, self.uneven[1], planner))
+        Some(PadFields::of(joined.grid, &joined.modes, eliminated, self.uneven[1]))
     }
 
     /// Joins them.

@@ -28,7 +28,6 @@ mod tests;
 mod transform;
 
 use nalgebra::DMatrix;
-use realfft::RealFftPlanner;
 
 pub use self::current::{DotCurrent, DotCurrents};
 pub use self::glue::Face;
@@ -67,15 +66,15 @@ struct DotFaces {
 
 impl Dots {
     /// The dots between two stacks, with current densities of a degree.
-    pub fn new(bond: Bond, degree: usize, [lower, upper]: [Covered<'_>; 2], planner: &mut RealFftPlanner<f64>) -> Self {
+    pub fn new(bond: Bond, degree: usize, [lower, upper]: [Covered<'_>; 2]) -> Self {
         let size_m = upper.size_m();
         let basis = DiscBasis::of_degree(degree);
         let centres_m: Vec<_> = bond.centres_m(size_m).iter().map(|at_m| from_corner(size_m, *at_m)).collect();
         let radius_m = bond.diameter_m / 2.0;
         let split_m = [lower, upper].map(|covered| split_m(covered.thickness_m(), size_m, radius_m));
         let kernels = [
-            SurfaceGreen::new(size_m, split_m[0], planner, &top_surface(lower)),
-            SurfaceGreen::new(size_m, split_m[1], planner, &bottom_surface(upper)),
+            SurfaceGreen::new(size_m, split_m[0], &top_surface(lower)),
+            SurfaceGreen::new(size_m, split_m[1], &bottom_surface(upper)),
         ];
         let [lower, upper] = kernels.map(|kernel| DotFaces {
             between_ohm: between_dots(&kernel, basis, &centres_m, radius_m),
