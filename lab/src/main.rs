@@ -10,6 +10,7 @@
 
 mod commands;
 mod heap;
+mod live;
 
 use std::process::ExitCode;
 

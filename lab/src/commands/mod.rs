@@ -2,6 +2,7 @@
 
 mod design;
 mod learn;
+mod live;
 mod score;
 mod shown;
 mod stability;
@@ -26,6 +27,7 @@ enum Command {
     Study(study::Args),
     Validate(validate::Args),
     Design(Box<design::Args>),
+    Live(live::Args),
     Learn(learn::Args),
     Score(score::Args),
 }
@@ -38,6 +40,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Study(args) => study::run(&args),
         Command::Validate(args) => validate::run(&args),
         Command::Design(args) => design::run(&args),
+        Command::Live(args) => live::run(&args),
         Command::Learn(args) => learn::run(&args),
         Command::Score(args) => score::run(&args),
     }

@@ -1,0 +1,153 @@
+//! Answers as they came, against a scene.
+
+use std::time::Instant;
+
+use tactomo_physics::detector::Detector;
+use tactomo_physics::scene::{Contact, Scene, Shape, Touch};
+use tactomo_touch::metrics::Matching;
+use tactomo_touch::solve::{FoundShape, Solution};
+
+/// Conductance of a contact that has to be found, in sheet conductances: `lab/examples/floor.rs` has lighter ones found in most frames, not in all.
+const PLAIN: f64 = 0.03;
+/// How far off a contact may be found, as a share of the shorter side: 10 mm on 60 mm. What is farther off is another one.
+const REACH: f64 = 1.0 / 6.0;
+/// Share of the reach by which a touch moves at most from an answer to the next.
+const MOVED: f64 = 0.3;
+/// Share of the run at its end that late errors are of.
+const LATE: f64 = 1.0 / 3.0;
+
+/// An answer as it came.
+pub struct Answer {
+    /// Number of its frame.
+    pub sequence: u64,
+    /// Time of its frame, by the board's clock (s).
+    pub time_s: f64,
+    /// When it was ready.
+    pub came: Instant,
+    pub solution: Solution,
+}
+
+/// Answers against the truth.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct Scored {
+    /// Answers.
+    pub answers: usize,
+    /// Share of the time in which what was shown was right: as many contacts as there are, each within reach, or the right shape.
+    pub right: f64,
+    /// Time from the first frame to the first right answer to a touch (s); `None` if there was none.
+    pub first_right_s: Option<f64>,
+    /// Error of places, median and 95 % (m).
+    pub error_m: Option<f64>,
+    pub error_p95_m: Option<f64>,
+    /// Median in the last third of the run (m).
+    pub late_error_m: Option<f64>,
+    /// Share of the answers with a contact that is not there.
+    pub invented: f64,
+    /// Share of the answers that say of themselves that they are doubtful.
+    pub doubtful: f64,
+    /// Times that a touch's contact changed its number.
+    pub id_changes: usize,
+    /// Longest time without an answer (s).
+    pub gap_s: f64,
+}
+
+/// Scores the answers to one scene.
+pub struct Scorer {
+    scene: Scene,
+    plain_s: f64,
+    reach_m: f64,
+}
+
+/// What an answer is worth.
+struct Worth {
+    is_touched: bool,
+    is_right: bool,
+    has_invented: bool,
+    errors_m: Vec<f64>,
+    /// Places of touches (m), and the numbers of their contacts.
+    ids: Vec<([f64; 2], u32)>,
+}
+
+impl Scorer {
+    /// For a scene on a detector.
+    pub fn new(detector: &Detector, scene: Scene) -> Self {
+        let [width_m, height_m] = detector.outline.size_m();
+        Self { scene, plain_s: PLAIN * detector.sheet_conductance_s(), reach_m: REACH * width_m.min(height_m) }
+    }
+
+    /// Scores all answers of a run.
+    pub fn of(&self, answers: &[Answer]) -> Scored {
+        let [Some(first), Some(last)] = [answers.first(), answers.last()] else { return Scored::default() };
+        // The scene begins with the first frame, which may have had no answer.
+        let period_s = (last.time_s - first.time_s) / (last.sequence - first.sequence).max(1) as f64;
+        let began_s = first.time_s - first.sequence as f64 * period_s;
+        let worth: Vec<_> =
+            answers.iter().map(|answer| self.worth(answer.time_s - began_s, &answer.solution)).collect();
+        let since = |answer: &Answer| answer.came.duration_since(first.came).as_secs_f64();
+        let shown_s: Vec<f64> = answers.windows(2).map(|pair| since(&pair[1]) - since(&pair[0])).collect();
+        let late_from = answers.partition_point(|answer| since(answer) < (1.0 - LATE) * since(last));
+        let share = |count: usize| count as f64 / answers.len() as f64;
+        let errors = |worth: &[Worth]| sorted(worth.iter().flat_map(|of| &of.errors_m).copied().collect());
+        let all_m = errors(&worth);
+        let right_s: f64 = worth.iter().zip(&shown_s).filter(|(of, _)| of.is_right).map(|(_, shown_s)| shown_s).sum();
+        let first_right = worth.iter().position(|of| of.is_touched && of.is_right);
+        Scored {
+            answers: answers.len(),
+            right: right_s / shown_s.iter().sum::<f64>().max(f64::MIN_POSITIVE),
+            first_right_s: first_right.map(|index| since(&answers[index]) + first.sequence as f64 * period_s),
+            error_m: quantile(&all_m, 0.5),
+            error_p95_m: quantile(&all_m, 0.95),
+            late_error_m: quantile(&errors(&worth[late_from..]), 0.5),
+            invented: share(worth.iter().filter(|of| of.has_invented).count()),
+            doubtful: share(answers.iter().filter(|answer| answer.solution.flags.is_doubtful()).count()),
+            id_changes: worth.windows(2).map(|pair| self.id_changes(&pair[0], &pair[1])).sum(),
+            gap_s: shown_s.iter().copied().fold(0.0, f64::max),
+        }
+    }
+
+    fn worth(&self, time_s: f64, solution: &Solution) -> Worth {
+        let truth = self.scene.at(time_s);
+        let is_touched = truth.iter().any(|touch| touch.conductance_s > self.plain_s);
+        let discs: Vec<Contact> = truth.iter().filter_map(Touch::disc).collect();
+        let other = truth.iter().find(|touch| touch.disc().is_none());
+        let found = if solution.is_contacts() { &solution.contacts[..] } else { &[] };
+        let matched = Matching::within(self.reach_m, &discs, found);
+        let is_missed = |index: &usize| discs[*index].conductance_s > self.plain_s;
+        let is_shape = match (other.map(|touch| &touch.shape), &solution.shape) {
+            (None, shape) => shape.is_none(),
+            (Some(Shape::Ring { .. }), shape) => matches!(shape, Some(FoundShape::Ring(_))),
+            (Some(_), shape) => matches!(shape, Some(FoundShape::Line(_))),
+        };
+        let is_invented = !matched.invented.is_empty() || solution.shape.is_some() && other.is_none();
+        let has_all = !matched.missed.iter().any(is_missed) && (other.is_some() || solution.is_contacts());
+        let ids = matched.pairs.iter().filter_map(|pair| {
+            let touch = &discs[pair.truth];
+            Some(([touch.x_m, touch.y_m], found[pair.found].id?))
+        });
+        Worth {
+            is_touched,
+            is_right: is_shape && has_all && !is_invented,
+            has_invented: is_invented,
+            errors_m: matched.pairs.iter().map(|pair| pair.distance_m).collect(),
+            ids: ids.collect(),
+        }
+    }
+
+    fn id_changes(&self, before: &Worth, after: &Worth) -> usize {
+        let is_other = |(at_m, id): &&([f64; 2], u32)| {
+            let apart_m = |other_m: &[f64; 2]| (at_m[0] - other_m[0]).hypot(at_m[1] - other_m[1]);
+            let nearest = before.ids.iter().min_by(|a, b| apart_m(&a.0).total_cmp(&apart_m(&b.0)));
+            nearest.is_some_and(|(other_m, other)| apart_m(other_m) < MOVED * self.reach_m && other != id)
+        };
+        after.ids.iter().filter(is_other).count()
+    }
+}
+
+fn sorted(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    sorted.get(((sorted.len() as f64 * share) as usize).min(sorted.len().saturating_sub(1))).copied()
+}
