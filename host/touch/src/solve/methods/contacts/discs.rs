@@ -183,13 +183,16 @@ impl DiscFitter<'_> {
 
     fn descend(&self, mut fit: DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
         let mut damping = Damping::new(SCHEDULE);
-        for _ in 0..effort.steps {
+        for done in 0..=effort.steps {
             let equations = NormalEquations { matrix: fit.normal.clone(), gradient: self.gradient(&fit, target) };
             let possible = equations.step(0.0).map(|step| equations.gradient.dot(&step));
             // A fit that is far off is wrong: it need not be wrong to many digits.
             let enough = effort.gain.max(effort.share * (fit.objective() - target.count() as f64));
             if possible.is_some_and(|possible| possible < enough) {
                 fit.settled = true;
+                break;
+            }
+            if done == effort.steps {
                 break;
             }
             let Some((next, expected)) = self.step(&fit, target, &equations, &mut damping) else {
