@@ -36,6 +36,8 @@ const CURVED: f64 = 0.05;
 /// Models of a detector in which one thing each is different.
 pub struct Nuisance {
     model: Arc<dyn ForwardModel>,
+    /// What the changed ones are a change of: as coarse as they are, which is fine enough for a covariance.
+    coarse: Arc<dyn ForwardModel>,
     parameters: Vec<Changed>,
     /// Steps of the parameters, in their standard deviations, in each direction: `parameters x directions`.
     directions: DMatrix<f64>,
@@ -150,11 +152,12 @@ impl Nuisance {
             let (parameter, square) = parameters[row];
             step_of(&unknowns[column], parameter) / square.sqrt()
         });
-        let changed = |(parameter, square): &(Parameter, f64)| Changed::new(model, *parameter, square.sqrt());
+        let coarse = model.coarse()?.unwrap_or_else(|| Arc::clone(model));
+        let changed = |(parameter, square): &(Parameter, f64)| Changed::new(&coarse, *parameter, square.sqrt());
         let parameters = threads::map_on(cores, &parameters, changed);
         let parameters = parameters.into_iter().collect::<Result<_, _>>()?;
         let pads_ohm = pads_ohm(&**model)?;
-        Ok(Some(Self { model: Arc::clone(model), parameters, directions, pads_ohm }))
+        Ok(Some(Self { model: Arc::clone(model), coarse, parameters, directions, pads_ohm }))
     }
 
     /// The nuisance parameters, seen through some of the electrodes, in this order, with some of all of them joined: `through` is the model so
@@ -186,7 +189,8 @@ impl Nuisance {
             [] => kept.iter().map(|e| self.pads_ohm[*e]).collect(),
             _ => pads_ohm(&**through)?,
         };
-        Ok(Self { model: Arc::clone(through), parameters, directions: self.directions.select_rows(&rows), pads_ohm })
+        let (model, coarse) = (Arc::clone(through), seen(&self.coarse));
+        Ok(Self { model, coarse, parameters, directions: self.directions.select_rows(&rows), pads_ohm })
     }
 
     /// Standard deviation of the logarithm of each contact's conductance by what of the detector no readings tell from it. Patterns leave it out.
@@ -215,7 +219,8 @@ impl Nuisance {
     /// [`ForwardError`] if a contact is not on the detector or none conducts.
     pub fn patterns_v(&self, contacts: &[Contact], measured: &Detector) -> Result<DMatrix<f64>, ForwardError> {
         let impedance_ohm = self.model.impedance_ohm(contacts)?;
-        let at = At { contacts, measured, readings: readings_v(&impedance_ohm, measured), impedance_ohm };
+        let coarse = readings_v(&self.coarse.impedance_ohm(contacts)?, measured);
+        let at = At { contacts, measured, readings: readings_v(&impedance_ohm, measured), impedance_ohm, coarse };
         let changes = self.parameters.iter().map(|changed| self.change_v(changed, &at));
         let changes = changes.collect::<Result<Vec<_>, _>>()?;
         let size = at.readings.volts().len();
@@ -232,7 +237,7 @@ impl Nuisance {
 
     fn change_v(&self, changed: &Changed, at: &At<'_>) -> Result<Change, ForwardError> {
         let odd = |odd| Ok(Change { odd, even: None });
-        let before = at.readings.volts();
+        let before = at.coarse.volts();
         match changed.parameter {
             Parameter::Gain(e) => {
                 odd(at.each(|_, read, volts| if read == e { changed.deviation * volts } else { 0.0 }))
@@ -283,6 +288,8 @@ struct At<'a> {
     measured: &'a Detector,
     readings: Readings,
     impedance_ohm: DMatrix<f64>,
+    /// Readings that the changed models are a change of.
+    coarse: Readings,
 }
 
 impl At<'_> {

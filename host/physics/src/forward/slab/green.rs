@@ -6,8 +6,9 @@
 //! alone, summed over those mirror images that are near.
 
 use std::f64::consts::PI;
+use std::sync::{LazyLock, OnceLock};
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::disc::DiscSelf;
 use super::quadrature::panels;
@@ -180,18 +181,19 @@ impl NearPart {
         let spread_m = SPREAD_SHARE * split_m;
         let spectrum = Spectrum::new(split_m, spread_m, surface);
         let scale = NEAR_END / (2.0 * PI * surface.sigma * split_m);
-        let mut reach_m = 3.0 * split_m;
-        // Three points, so that a zero crossing is not taken for the end.
-        while reach_m < 30.0 * split_m
-            && [0.9, 1.0, 1.1].iter().any(|share| spectrum.near_ohm(share * reach_m).abs() > scale)
-        {
-            reach_m *= 1.15;
-        }
+        let is_end = |reach: &Reach| {
+            let near = |(share, waves): (f64, DVectorView<'_, f64>)| spectrum.near_ohm(waves, share * reach.splits * split_m);
+            AROUND.into_iter().zip(reach.around.column_iter()).all(|pair| near(pair).abs() <= scale)
+        };
+        let reach = (0..REACHES.len()).map(Reach::of).find(|reach| is_end(reach));
+        let reach = reach.unwrap_or_else(|| Reach::of(REACHES.len() - 1));
+        let reach_m = reach.splits * split_m;
         let step_m = reach_m / NEAR_STEPS as f64;
         // Beyond the end the function is taken as nothing; the last step leads there.
-        let values = (0..NEAR_STEPS + 1)
-            .map(|i| if i < NEAR_STEPS { i as f64 * step_m * spectrum.near_ohm(i as f64 * step_m) } else { 0.0 })
-            .collect();
+        let near = |(i, waves): (usize, DVectorView<'_, f64>)| {
+            i as f64 * step_m * spectrum.near_ohm(waves, i as f64 * step_m)
+        };
+        let values = reach.waves().column_iter().enumerate().map(near).chain([0.0]).collect();
         Self { reach_m, spread_m, values }
     }
 
@@ -241,32 +243,71 @@ impl NearSpectrum {
 struct Spectrum {
     split_m: f64,
     sigma: f64,
-    /// Wave number (1/m) and weight.
-    rest: Vec<[f64; 2]>,
+    /// Of each of the [`NODES`].
+    weights: DVector<f64>,
+}
+
+/// Wave numbers, times the split length, and their weights.
+static NODES: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| {
+    // Eight points in a panel resolve J0(k r) over ten radians: fine panels where the layers speak, for a reach of ten split lengths and more, and
+    // wider ones for the tail that only a gradient has.
+    let edges: Vec<f64> = (0..16).map(|i| 0.5 * f64::from(i)).chain((8..=64).map(f64::from)).collect();
+    panels(&edges, 8)
+});
+
+/// A distance that the near part may reach, in split lengths, and `J0` of the way there for each of the [`NODES`]. In split lengths both are the
+/// same for all slabs, so they are made once.
+struct Reach {
+    splits: f64,
+    /// Of the shares [`AROUND`] the end: `nodes x shares`.
+    around: DMatrix<f64>,
+    /// Of the steps of a table: `nodes x steps`.
+    waves: OnceLock<DMatrix<f64>>,
+}
+
+/// Shares of a reach at which the near part has to be nothing: three, so that a zero crossing is not taken for the end.
+const AROUND: [f64; 3] = [0.9, 1.0, 1.1];
+/// The shortest reach, in split lengths, and how many times longer the next one is; the last of them is 30.
+const SHORTEST_REACH: f64 = 3.0;
+const NEXT_REACH: f64 = 1.15;
+static REACHES: [OnceLock<Reach>; 18] = [const { OnceLock::new() }; 18];
+
+impl Reach {
+    fn of(number: usize) -> &'static Self {
+        REACHES[number].get_or_init(|| {
+            let splits = SHORTEST_REACH * NEXT_REACH.powi(number as i32);
+            let around = bessel(AROUND.len(), |i| AROUND[i] * splits);
+            Self { splits, around, waves: OnceLock::new() }
+        })
+    }
+
+    fn waves(&self) -> &DMatrix<f64> {
+        self.waves.get_or_init(|| bessel(NEAR_STEPS, |i| self.splits * i as f64 / NEAR_STEPS as f64))
+    }
+}
+
+/// `J0` of each of the [`NODES`] at some distances, in split lengths.
+fn bessel(count: usize, splits: impl Fn(usize) -> f64) -> DMatrix<f64> {
+    DMatrix::from_fn(NODES.len(), count, |node, i| libm::j0(NODES[node][0] * splits(i)))
 }
 
 impl Spectrum {
     fn new(split_m: f64, spread_m: f64, surface: &Surface<impl Fn(f64) -> f64>) -> Self {
         let window = |k: f64| (-0.25 * (k * spread_m).powi(2)).exp() - (-0.25 * (k * split_m).powi(2)).exp();
-        // Eight points in a panel resolve J0(k r) over ten radians: fine panels where the layers speak, for a reach of ten
-        // split lengths and more, and wider ones for the tail that only a gradient has.
-        let edges: Vec<f64> = (0..16).map(|i| 0.5 * f64::from(i)).chain((8..=64).map(f64::from)).collect();
-        let all = panels(&edges, 8).into_iter().map(|[at, weight]| {
+        let weight = |[at, weight]: &[f64; 2]| {
             let k = at / split_m;
-            let rest = (surface.response)(k) - 1.0 / (surface.sigma * k);
-            [k, weight / split_m * k * rest * window(k) / (2.0 * PI)]
-        });
-        let negligible = 1e-9 / (2.0 * PI * surface.sigma * split_m);
-        let rest = all.filter(|[_, weight]| weight.abs() > negligible).collect();
-        Self { split_m, sigma: surface.sigma, rest }
+            weight / split_m * k * ((surface.response)(k) - 1.0 / (surface.sigma * k)) * window(k) / (2.0 * PI)
+        };
+        Self { split_m, sigma: surface.sigma, weights: NODES.iter().map(weight).collect::<Vec<_>>().into() }
     }
 
-    fn near_ohm(&self, distance_m: f64) -> f64 {
-        let rest: f64 = self.rest.iter().map(|[k, weight]| weight * libm::j0(k * distance_m)).sum();
+    /// At a distance, by `J0` of it and of each node.
+    fn near_ohm(&self, waves: DVectorView<'_, f64>, distance_m: f64) -> f64 {
         // The integral of exp(-k^2 R^2 / 4) J0(k r) over k.
         let s = distance_m * distance_m / (2.0 * self.split_m * self.split_m);
         let smooth = PI.sqrt() / self.split_m * scaled_bessel_i0(s);
-        rest + (1.0 / distance_m.max(1e-9 * self.split_m) - smooth) / (2.0 * PI * self.sigma)
+        let closed = (1.0 / distance_m.max(1e-9 * self.split_m) - smooth) / (2.0 * PI * self.sigma);
+        self.weights.dot(&waves) + closed
     }
 }
 
