@@ -14,6 +14,9 @@ use crate::scene::Contact;
 /// Degree of the densities that the kernel's changes are taken for.
 const CHANGE_DEGREE: usize = 1;
 
+/// Highest degree of a disc's own densities that its own kernel's changes are taken for, where it widens or sees its image.
+const OWN_CHANGE_DEGREE: usize = 4;
+
 /// Distance of a wall, in radii, up to which the image in it is near: further off, degree 1 has the changes to some per cent.
 const WALL_RADII: f64 = 2.5;
 
@@ -31,6 +34,50 @@ struct Disc {
     electrodes_ohm: DMatrix<f64>,
     inner: DMatrix<f64>,
     uneven: Option<UnevenPlace>,
+}
+
+/// The kernels of a disc before it changes: with each of the discs, and its [own](Slab::own_kernel).
+struct Before {
+    first: Vec<FirstKernel>,
+    own: DMatrix<f64>,
+}
+
+/// The kernel between the first points of two discs of an even slab (ohm), and its derivatives by the places of the first one's (ohm/m).
+struct FirstKernel {
+    even_ohm: DMatrix<f64>,
+    slopes: [DMatrix<f64>; 2],
+}
+
+impl FirstKernel {
+    /// The same where the first one's points are moved (m), or those of both where it is one disc.
+    fn moved(&self, ways_m: &[[f64; 2]], same: bool) -> DMatrix<f64> {
+        let by = |i: usize, j: usize| (0..2).map(|axis| self.slopes[axis][(i, j)] * ways_m[i][axis]).sum::<f64>();
+        let change = |i: usize, j: usize| by(i, j) + if same { by(j, i) } else { 0.0 };
+        let (rows, columns) = self.even_ohm.shape();
+        DMatrix::from_fn(rows, columns, |i, j| self.even_ohm[(i, j)] + change(i, j))
+    }
+}
+
+/// The kernel between the first densities of two discs, from that of their points on an even slab.
+fn first_densities(points_ohm: &DMatrix<f64>, disc: &Disc, other: &Disc) -> DMatrix<f64> {
+    let weights = DiscBasis::of_degree(CHANGE_DEGREE).weights();
+    let mut kernel = weights * points_ohm * weights.transpose();
+    on_uneven(&mut kernel, disc, other);
+    kernel
+}
+
+impl Disc {
+    fn first_nodes_m(&self) -> Vec<[f64; 2]> {
+        nodes_m(DiscBasis::of_degree(CHANGE_DEGREE), self.centre_m, self.contact.radius_m, self.cut)
+    }
+}
+
+/// Makes the kernel between densities of two discs on an even slab that of an uneven one.
+fn on_uneven(kernel: &mut DMatrix<f64>, disc: &Disc, other: &Disc) {
+    if let (Some(here), Some(there)) = (&disc.uneven, &other.uneven) {
+        kernel[(0, 0)] += here.correction_ohm(there);
+        *kernel *= here.inverse_root * there.inverse_root;
+    }
 }
 
 /// A point, and the current into it for each electrode.
@@ -135,16 +182,29 @@ impl Slab {
             let (other_basis, other_nodes) = of(other, degrees[1]);
             between(basis, &nodes, other_basis, &other_nodes, &self.top, &images, false)
         };
-        if let (Some(here), Some(there)) = (&disc.uneven, &other.uneven) {
-            kernel[(0, 0)] += here.correction_ohm(there);
-            kernel *= here.inverse_root * there.inverse_root;
-        }
+        on_uneven(&mut kernel, disc, other);
         kernel
     }
 
     /// The first densities' part of it, which has all but a per cent of how it changes with the disc.
-    fn first_between(&self, disc: &Disc, other: &Disc) -> DMatrix<f64> {
-        self.kernel_between(disc, other, [CHANGE_DEGREE; 2])
+    fn first_between(&self, disc: &Disc, other: &Disc) -> FirstKernel {
+        let nodes = [disc, other].map(Disc::first_nodes_m);
+        let images = self.top.images(disc.centre_m, other.centre_m, disc.contact.radius_m + other.contact.radius_m);
+        let same = std::ptr::eq(disc, other);
+        let mut all = [(); 3].map(|()| DMatrix::zeros(nodes[0].len(), nodes[1].len()));
+        for (i, a) in nodes[0].iter().enumerate() {
+            for (j, b) in nodes[1].iter().enumerate() {
+                let of = self.top.with_slopes(&images, same, *a, *b);
+                all.iter_mut().zip(of).for_each(|(matrix, value)| matrix[(i, j)] = value);
+            }
+        }
+        let [even_ohm, by_x, by_y] = all;
+        FirstKernel { even_ohm, slopes: [by_x, by_y] }
+    }
+
+    /// The kernel of a disc with itself, for those densities that have most of how it changes.
+    fn own_kernel(&self, disc: &Disc) -> DMatrix<f64> {
+        self.kernel_between(disc, disc, [disc.basis.degree().min(OWN_CHANGE_DEGREE); 2])
     }
 
     /// Whether a disc is so near to a wall that its image there bends its densities.
@@ -181,7 +241,7 @@ impl Discs<'_> {
         replaced: &[(usize, Contact)],
     ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), ForwardError> {
         let at = Solved::new(self)?;
-        let mut before: Vec<Option<Vec<DMatrix<f64>>>> = vec![None; self.discs.len()];
+        let mut before: Vec<Option<Before>> = (0..self.discs.len()).map(|_| None).collect();
         let changes = replaced.iter().map(|(k, contact)| {
             self.slab.check_contact(contact).map_err(|what| ForwardError::Contact { index: *k, what })?;
             let disc = &self.discs[*k];
@@ -189,12 +249,18 @@ impl Discs<'_> {
             if unscaled == disc.contact {
                 return Ok(self.change_of_conductance_ohm(&at, *k, contact));
             }
-            let of = |other: &Disc| self.slab.first_between(disc, other);
-            let before = before[*k].get_or_insert_with(|| self.discs.iter().map(of).collect());
+            let before = before[*k].get_or_insert_with(|| self.before(disc));
             Ok(self.change_of_place_ohm(&at, *k, contact, before))
         });
         let changes = changes.collect::<Result<_, _>>()?;
         Ok((at.contacted.impedance_ohm, changes))
+    }
+
+    fn before(&self, disc: &Disc) -> Before {
+        Before {
+            first: self.discs.iter().map(|other| self.slab.first_between(disc, other)).collect(),
+            own: self.slab.own_kernel(disc),
+        }
     }
 
     fn change_of_conductance_ohm(&self, at: &Solved, k: usize, contact: &Contact) -> DMatrix<f64> {
@@ -204,20 +270,26 @@ impl Discs<'_> {
         at.symmetric(k, self.scaled(at, k, factor) + (own - &self.own[k]) * at.of(k) * 0.5)
     }
 
-    fn change_of_place_ohm(&self, at: &Solved, k: usize, contact: &Contact, before: &[DMatrix<f64>]) -> DMatrix<f64> {
+    fn change_of_place_ohm(&self, at: &Solved, k: usize, contact: &Contact, before: &Before) -> DMatrix<f64> {
         let disc = &self.discs[k];
         let after = self.slab.disc(contact, disc.basis);
         let scale = after.conductance_s.sqrt();
         let mut change = (&after.electrodes_ohm - &disc.electrodes_ohm) * scale;
         change += (&disc.inner - &after.inner).tr_mul(&at.inner) * scale;
-        for (l, (other, before)) in self.discs.iter().zip(before).enumerate() {
+        let ways_m: Vec<_> = after
+            .first_nodes_m()
+            .into_iter()
+            .zip(disc.first_nodes_m())
+            .map(|(to, from)| [to[0] - from[0], to[1] - from[1]])
+            .collect();
+        for (l, (other, first)) in self.discs.iter().zip(&before.first).enumerate() {
             let (now, half) = if l == k { (&after, 0.5) } else { (other, 1.0) };
             let moved = if l == k && (after.contact.radius_m != disc.contact.radius_m || self.slab.is_at_wall(disc)) {
                 // Within a disc that widens, or sees its own image, all densities change.
-                let kernel = |disc: &Disc| self.slab.kernel_between(disc, disc, [disc.basis.degree(); 2]);
-                kernel(&after) - kernel(disc)
+                self.slab.own_kernel(&after) - &before.own
             } else {
-                self.slab.first_between(&after, now) - before
+                first_densities(&first.moved(&ways_m, l == k), &after, now)
+                    - first_densities(&first.even_ohm, disc, other)
             };
             let scales = half * scale * now.conductance_s.sqrt();
             let mut first = change.rows_mut(0, moved.nrows());

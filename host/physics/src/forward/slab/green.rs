@@ -97,6 +97,49 @@ impl SurfaceGreen {
         0.25 * sum
     }
 
+    /// Smooth part between two points (ohm), and its derivatives by the first one's place (ohm/m).
+    fn smooth_with_slopes(&self, a: [f64; 2], b: [f64; 2]) -> [f64; 3] {
+        let taps =
+            |axis: usize| [a[axis] - b[axis], a[axis] + b[axis]].map(|u_m| self.grid.taps_with_slopes(axis, u_m));
+        let (x, y) = (taps(0), taps(1));
+        let stride = self.grid.nodes(1);
+        let mut sums = [0.0; 3];
+        for ((row, y_weights), y_slopes) in &y {
+            // Four sums side by side, for the processor to do at once.
+            let mut lanes = [[0.0; 4]; 2];
+            for ((column, x_weights), x_slopes) in &x {
+                for (i, (weight, slope)) in x_weights.iter().zip(x_slopes).enumerate() {
+                    let start = (column + i) * stride + row;
+                    for (lane, value) in self.smooth[start..start + 4].iter().enumerate() {
+                        lanes[0][lane] += weight * value;
+                        lanes[1][lane] += slope * value;
+                    }
+                }
+            }
+            for lane in 0..4 {
+                sums[0] += lanes[0][lane] * y_weights[lane];
+                sums[1] += lanes[1][lane] * y_weights[lane];
+                sums[2] += lanes[0][lane] * y_slopes[lane];
+            }
+        }
+        sums.map(|sum| 0.25 * sum)
+    }
+
+    /// The kernel between a point and another one with its mirror images (ohm), and its derivatives by the first one's place (ohm/m); `same` as
+    /// for [`images_ohm`](Self::images_ohm).
+    pub fn with_slopes(&self, images: &[Image], same: bool, a: [f64; 2], b: [f64; 2]) -> [f64; 3] {
+        let mut all = self.smooth_with_slopes(a, b);
+        for image in images.iter().filter(|image| !(same && image.in_place())) {
+            let at = image.of(b);
+            let way_m = [a[0] - at[0], a[1] - at[1]];
+            let distance_m = way_m[0].hypot(way_m[1]);
+            let [value, slope] = self.near.with_slope(distance_m);
+            all[0] += value;
+            (0..2).for_each(|axis| all[1 + axis] += slope * way_m[axis] / distance_m.max(f64::MIN_POSITIVE));
+        }
+        all
+    }
+
     /// Near part between a point and mirror images of another (ohm); `same`: both are on one disc, of which the singular part is left out.
     pub fn images_ohm(&self, images: &[Image], same: bool, a: [f64; 2], b: [f64; 2]) -> f64 {
         let others = images.iter().filter(|image| !(same && image.in_place()));
@@ -182,7 +225,8 @@ impl NearPart {
         let spectrum = Spectrum::new(split_m, spread_m, surface);
         let scale = NEAR_END / (2.0 * PI * surface.sigma * split_m);
         let is_end = |reach: &Reach| {
-            let near = |(share, waves): (f64, DVectorView<'_, f64>)| spectrum.near_ohm(waves, share * reach.splits * split_m);
+            let near =
+                |(share, waves): (f64, DVectorView<'_, f64>)| spectrum.near_ohm(waves, share * reach.splits * split_m);
             AROUND.into_iter().zip(reach.around.column_iter()).all(|pair| near(pair).abs() <= scale)
         };
         let reach = (0..REACHES.len()).map(Reach::of).find(|reach| is_end(reach));
@@ -190,22 +234,29 @@ impl NearPart {
         let reach_m = reach.splits * split_m;
         let step_m = reach_m / NEAR_STEPS as f64;
         // Beyond the end the function is taken as nothing; the last step leads there.
-        let near = |(i, waves): (usize, DVectorView<'_, f64>)| {
-            i as f64 * step_m * spectrum.near_ohm(waves, i as f64 * step_m)
-        };
+        let near =
+            |(i, waves): (usize, DVectorView<'_, f64>)| i as f64 * step_m * spectrum.near_ohm(waves, i as f64 * step_m);
         let values = reach.waves().column_iter().enumerate().map(near).chain([0.0]).collect();
         Self { reach_m, spread_m, values }
     }
 
     fn at(&self, distance_m: f64) -> f64 {
-        let distance_m = distance_m.max(self.spread_m);
-        let at = distance_m / self.reach_m * NEAR_STEPS as f64;
+        self.with_slope(distance_m)[0]
+    }
+
+    /// At a distance (ohm), and its derivative (ohm/m).
+    #[inline]
+    fn with_slope(&self, distance_m: f64) -> [f64; 2] {
+        let spread_m = distance_m.max(self.spread_m);
+        let at = spread_m / self.reach_m * NEAR_STEPS as f64;
         let cell = at as usize;
         if cell >= NEAR_STEPS {
-            return 0.0;
+            return [0.0; 2];
         }
-        let part = at - cell as f64;
-        (self.values[cell] * (1.0 - part) + self.values[cell + 1] * part) / distance_m
+        let rise = self.values[cell + 1] - self.values[cell];
+        let value = (self.values[cell] + rise * (at - cell as f64)) / spread_m;
+        let slope = (rise * NEAR_STEPS as f64 / self.reach_m - value) / spread_m;
+        [value, if distance_m > self.spread_m { slope } else { 0.0 }]
     }
 }
 

@@ -160,8 +160,8 @@ impl Slab {
         let [bottom, top] = match as_even {
             Some(like) => [Arc::clone(&like.bottom), Arc::clone(&like.top)],
             None => [
-                SurfaceGreen::new(size_m, split_m[0], &mut &bottom_surface(lower)).into(),
-                SurfaceGreen::new(size_m, split_m[1], &mut &top_surface(upper)).into(),
+                SurfaceGreen::new(size_m, split_m[0], &bottom_surface(lower)).into(),
+                SurfaceGreen::new(size_m, split_m[1], &top_surface(upper)).into(),
             ],
         };
         let as_uneven = as_even.filter(|like| like.detector.unevenness == detector.unevenness);

@@ -229,9 +229,8 @@ impl PadFields {
             let (i, j) = (tap / 4, tap % 4);
             (first + i * self.grid.nodes(1) + j, (x_weights[i] * y_weights[j]) as f32)
         };
-        let root = self.roots.as_ref().map_or(1.0, |roots| {
-            (0..16).map(taps).map(|(node, weight)| weight * roots[node]).sum()
-        });
+        let root =
+            self.roots.as_ref().map_or(1.0, |roots| (0..16).map(taps).map(|(node, weight)| weight * roots[node]).sum());
         out.fill(0.0);
         for (node, weight) in (0..16).map(taps) {
             let values = &self.table[node * self.columns..][..out.len()];

@@ -56,11 +56,26 @@ impl Grid {
     /// Weights at `u_m`, which is first folded back into the rectangle: the table is even about both of its edges.
     #[inline]
     pub fn taps(&self, axis: usize, u_m: f64) -> Taps {
+        let (cell, t, _) = self.cell(axis, u_m);
+        (cell, cubic_weights(t))
+    }
+
+    /// The same with their derivatives by `u_m` (1/m).
+    #[inline]
+    pub fn taps_with_slopes(&self, axis: usize, u_m: f64) -> (Taps, [f64; 4]) {
+        let (cell, t, sign) = self.cell(axis, u_m);
+        ((cell, cubic_weights(t)), cubic_slopes(t).map(|slope| sign * self.cells_per_m[axis] * slope))
+    }
+
+    /// The cell that a place is folded into, how far into it, in cells, and the sign of the direction there.
+    #[inline]
+    fn cell(&self, axis: usize, u_m: f64) -> (usize, f64, f64) {
         let size_m = self.size_m[axis];
-        let folded_m = if u_m.abs() > size_m { (2.0 * size_m - u_m.abs()).abs() } else { u_m.abs() };
+        let is_beyond = u_m.abs() > size_m;
+        let folded_m = if is_beyond { (2.0 * size_m - u_m.abs()).abs() } else { u_m.abs() };
         let at = folded_m * self.cells_per_m[axis];
         let cell = (at as usize).min(self.cells[axis] - 1);
-        (cell, cubic_weights(at - cell as f64))
+        (cell, at - cell as f64, if is_beyond != (u_m < 0.0) { -1.0 } else { 1.0 })
     }
 
     /// Spline coefficients of sums of cosine modes, given by half waves along both sides and `columns x modes` amplitudes; modes of as many half
@@ -99,6 +114,13 @@ impl Grid {
         let symbol: Vec<f64> = (0..=cells).map(|mode| (2.0 + cosine(mode)) / 3.0).collect();
         DMatrix::from_fn(cells + 1, self.nodes(axis), |mode, node| cosine(mode * node.abs_diff(1)) / symbol[mode])
     }
+}
+
+/// Derivatives of [`cubic_weights`] by `t`.
+#[inline]
+fn cubic_slopes(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [-0.5 * s * s, 1.5 * t * t - 2.0 * t, 2.0 * s - 1.5 * s * s, 0.5 * t * t]
 }
 
 /// In how many ways a mode's wave numbers can be signed: what it is weighted by in a sum over all modes.
