@@ -158,10 +158,16 @@ mod tests {
         let of_series = grid.synthesise(&[[0, 1], [5, 2], [5, 3]], &DMatrix::from_row_slice(1, 3, &[0.0, 0.0, 2.0]));
         for table in [of_series, grid.through(wave)] {
             for at in [[0.0, 0.0], [0.0123, 0.0271], [0.05, 0.03], [-0.017, 0.041], [0.0999, 0.0]] {
-                let ((i, wx), (j, wy)) = (grid.taps(0, at[0]), grid.taps(1, at[1]));
-                let tap = |tap| wx[tap / 4] * wy[tap % 4] * table[(i + tap / 4) * grid.nodes(1) + j + tap % 4];
-                let value: f64 = (0..16).map(tap).sum();
+                let ((x, x_slopes), (y, _)) = (grid.taps_with_slopes(0, at[0]), grid.taps_with_slopes(1, at[1]));
+                assert_eq!((x, y), (grid.taps(0, at[0]), grid.taps(1, at[1])));
+                let sum = |x_weights: [f64; 4]| -> f64 {
+                    let at = |tap: usize| table[(x.0 + tap / 4) * grid.nodes(1) + y.0 + tap % 4];
+                    (0..16).map(|tap| x_weights[tap / 4] * y.1[tap % 4] * at(tap)).sum()
+                };
+                let [value, slope] = [sum(x.1), sum(x_slopes)];
                 assert!((value - wave(at)).abs() < 2e-4, "at {at:?}: {value}");
+                let expected = -2.0 * kx * (kx * at[0]).sin() * (ky * at[1]).cos();
+                assert!((slope - expected).abs() < 1e-3 * kx, "at {at:?}: {slope} {expected}");
             }
         }
     }

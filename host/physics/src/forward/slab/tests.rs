@@ -277,6 +277,7 @@ fn impedances_change_as_differences_do() {
         Contact::flat(-0.013, -0.004, 0.0042, 2e-2),
         // Cut by two walls.
         Contact::flat(0.0285, -0.029, 0.0027, 1e-3),
+        Contact::flat(-0.015, 0.016, 0.011, 2e-3),
     ];
     let mut replaced = Vec::new();
     for (k, contact) in contacts.iter().enumerate() {
