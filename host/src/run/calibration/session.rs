@@ -26,7 +26,7 @@ const ENOUGH: usize = 16;
 const PRESSES_ON_THE_WAY: [usize; 2] = [10, 60];
 /// Cells with frames, light and firm ones counted apart, before what presses anyway is first learned from; twice as many before each time after.
 /// On an independent detector as built 10 presses take a third of the mean error of places, 20 nearly half, and 58 hardly more.
-const FIRST_LEARNED: usize = 8;
+const FIRST_LEARNED: usize = 5;
 /// Shortest time from the end of a fit to the next; at least the fit's own time is left too, for the picture needs the cores.
 const PAUSE: Duration = Duration::from_secs(2);
 /// Share of the detector that has to be rubbed before it is done: fingertips hardly reach the corners.

@@ -61,6 +61,8 @@ pub struct Resolution {
     pub dot_degree: usize,
     /// Half waves along a side of the modes that unevenness couples.
     pub uneven_modes: usize,
+    /// Wave numbers, times the thickness, up to which the pads' fields reach the top: those above have fallen to 4 exp(-this).
+    pub across: usize,
     /// Most steps in a pad's radius of the table of the pads' fields: what limits it on layers that are thin against the pads.
     pub steps_in_pad: usize,
 }
@@ -68,12 +70,14 @@ pub struct Resolution {
 impl Resolution {
     /// Enough for readings within a few tenths of a per cent: against reference readings, one degree more changes nothing.
     pub const STANDARD: Self =
-        Self { pad_degree: 2, contact_degree: 2, dot_degree: 3, uneven_modes: 10, steps_in_pad: 10 };
+        Self { pad_degree: 2, contact_degree: 2, dot_degree: 3, uneven_modes: 10, across: 11, steps_in_pad: 10 };
     /// For how readings change from one detector to another: on `square-60` changes are off by up to 3 % of themselves, those with a pad's own
     /// impedance by a sixth.
-    pub const COARSE: Self = Self { pad_degree: 1, contact_degree: 2, dot_degree: 2, uneven_modes: 8, steps_in_pad: 3 };
+    pub const COARSE: Self =
+        Self { pad_degree: 1, contact_degree: 2, dot_degree: 2, uneven_modes: 8, across: 6, steps_in_pad: 3 };
     /// Finer than any solver needs.
-    pub const FINE: Self = Self { pad_degree: 3, contact_degree: 4, dot_degree: 4, uneven_modes: 16, steps_in_pad: 10 };
+    pub const FINE: Self =
+        Self { pad_degree: 3, contact_degree: 4, dot_degree: 4, uneven_modes: 16, across: 11, steps_in_pad: 10 };
 }
 
 /// A rectangular detector, layered in depth.
@@ -205,8 +209,7 @@ impl Slab {
         }
         let [_, covered] = stacks(&self.detector, self.size_m, self.driving);
         let basis = DiscBasis::of_degree(self.resolution.pad_degree);
-        let steps_in_pad = self.resolution.steps_in_pad as f64;
-        PadFields::new(self.points.pads(), basis, impedances, &covered, self.uneven.as_deref(), steps_in_pad)
+        PadFields::new(self.points.pads(), basis, impedances, &covered, self.uneven.as_deref(), self.resolution)
     }
 
     /// Impedances between all densities of the pads (ohm), below their layers alone.
@@ -222,7 +225,7 @@ impl Slab {
             uneven: [bonded.uneven.as_deref(), self.uneven.as_deref()],
             pads: self.points.pads(),
             basis: DiscBasis::of_degree(self.resolution.pad_degree),
-            steps_in_pad: self.resolution.steps_in_pad as f64,
+            resolution: self.resolution,
         }
     }
 

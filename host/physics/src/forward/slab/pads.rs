@@ -7,23 +7,21 @@
 //! `N(x, x') -> N(x, x') - w(x) . w(x')`.
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix};
 
 use super::disc::{DiscBasis, DiscSelf};
 use super::driving::{Covered, Mode};
-use super::from_corner;
 use super::green::SurfaceGreen;
 use super::spline::{Grid, signs};
 use super::uneven::Uneven;
+use super::{Resolution, from_corner};
 use crate::detector::{Detector, cosines};
 
-/// `k T` at which the field across the slab has fallen to 3e-5.
-const ACROSS_END: f64 = 11.0;
-
-/// Table steps in a thickness: the finest mode that crosses the slab still fits.
-const STEPS_IN_THICKNESS: f64 = 3.6;
+/// Table steps in the half wave of the finest mode that crosses the slab: it still fits.
+const STEPS_IN_WAVE: f64 = 1.03;
 
 /// A pad, from the corner (m).
 #[derive(Clone, Copy, Debug)]
@@ -100,7 +98,7 @@ impl PadPoints {
                 let mut block = basis.weights() * points * basis.weights().transpose();
                 if e == f {
                     let even = uneven.map_or(1.0, |uneven| uneven.inverse_root(pad.centre_m).powi(2));
-                    let area_m2 = std::f64::consts::PI * pad.radius_m * pad.radius_m;
+                    let area_m2 = PI * pad.radius_m * pad.radius_m;
                     let alike = own.take_if(|(radius_m, _)| *radius_m == pad.radius_m);
                     let local = alike.unwrap_or_else(|| (pad.radius_m, kernel.disc_self(pad.radius_m)));
                     block += local.1.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, even);
@@ -169,18 +167,16 @@ pub(super) struct PadFields {
 }
 
 impl PadFields {
-    /// Eliminates the pads from `impedances`; `None` if they are not positive definite. Finer modes than `steps_in_pad` to a pad's radius only matter at
-    /// the pads' rims.
+    /// Eliminates the pads from `impedances`; `None` if they are not positive definite.
     pub fn new(
         pads: &[Pad],
         basis: &DiscBasis,
         impedances: DMatrix<f64>,
         covered: &Covered<'_>,
         uneven: Option<&Uneven>,
-        steps_in_pad: f64,
+        resolution: Resolution,
     ) -> Option<Self> {
-        let grid = table_grid(covered, smallest_m(pads) / steps_in_pad);
-        let modes = modes(covered, &grid);
+        let (grid, modes) = across(covered, smallest_m(pads), resolution);
         let uniform = uniform(pads, basis);
         let fields = pad_modes(pads, basis, &grid, &modes, uneven);
         let [impedances, fields] = covered.connect([impedances, fields], &uniform, &grid, &modes);
@@ -274,22 +270,20 @@ pub(super) fn smallest_m(pads: &[Pad]) -> f64 {
     pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min)
 }
 
-/// The grid of a table of fields on the top, of steps of at least a length (m).
-pub(super) fn table_grid(covered: &Covered<'_>, least_m: f64) -> Grid {
-    let step_m = (covered.thickness_m() / STEPS_IN_THICKNESS).max(least_m);
-    Grid::new(covered.size_m(), step_m.min(std::f64::consts::PI / covered.finest()))
-}
-
-/// The modes that cross the layers.
-pub(super) fn modes(covered: &Covered<'_>, grid: &Grid) -> Vec<Mode> {
+/// The modes that cross the layers, and the grid of a table of fields on the top. Finer modes than some in the radius of the smallest pad or dot only
+/// matter at its rim.
+pub(super) fn across(covered: &Covered<'_>, smallest_m: f64, resolution: Resolution) -> (Grid, Vec<Mode>) {
+    let end = resolution.across as f64 / covered.thickness_m();
+    let step_m = (PI / end / STEPS_IN_WAVE).max(smallest_m / resolution.steps_in_pad as f64);
+    let grid = Grid::new(covered.size_m(), step_m.min(PI / covered.finest()));
     let area_m2 = covered.size_m()[0] * covered.size_m()[1];
-    let end = (ACROSS_END / covered.thickness_m()).max(covered.finest());
     let amplitude = |[m, n]: [usize; 2]| {
         let k = grid.wave_number(0, m).hypot(grid.wave_number(1, n));
         let value = if m + n == 0 { covered.floating().tb } else { covered.response(k).tb };
         Mode { m, n, amplitude: signs([m, n]) * value / area_m2 }
     };
-    grid.modes_within(end).into_iter().map(amplitude).collect()
+    let modes = grid.modes_within(end.max(covered.finest())).into_iter().map(amplitude).collect();
+    (grid, modes)
 }
 
 /// Amplitudes of the field on the top of each density of each pad: `modes x densities`; with unevenness but for the root of its factor at

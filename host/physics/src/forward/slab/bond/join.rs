@@ -6,9 +6,10 @@ use super::Dots;
 use super::glue::Joint;
 use super::transform::means;
 use crate::algebra::Cholesky;
+use crate::forward::slab::Resolution;
 use crate::forward::slab::disc::DiscBasis;
 use crate::forward::slab::driving::{Covered, Mode};
-use crate::forward::slab::pads::{Eliminated, Pad, PadFields, modes, pad_modes, smallest_m, table_grid, uniform};
+use crate::forward::slab::pads::{Eliminated, Pad, PadFields, across, pad_modes, smallest_m, uniform};
 use crate::forward::slab::spline::Grid;
 use crate::forward::slab::uneven::Uneven;
 use crate::forward::uneven_place::UnevenPlace;
@@ -25,8 +26,7 @@ pub(in crate::forward::slab) struct Stacks<'a> {
     pub pads: &'a [Pad],
     /// Of the pads.
     pub basis: &'a DiscBasis,
-    /// Most steps of the table in the radius of the smallest pad or dot.
-    pub steps_in_pad: f64,
+    pub resolution: Resolution,
 }
 
 /// All that is eliminated, by Cholesky's factor of its impedances: first what has no field on the top (what bends the current on pads and on the
@@ -61,8 +61,7 @@ impl Stacks<'_> {
     /// Joins them.
     pub(super) fn join(&self, pads_ohm: &DMatrix<f64>) -> Option<Joined> {
         let [_, covered] = self.covered;
-        let grid = table_grid(&covered, smallest_m(self.pads).min(self.dots.radius_m()) / self.steps_in_pad);
-        let modes = modes(&covered, &grid);
+        let (grid, modes) = across(&covered, smallest_m(self.pads).min(self.dots.radius_m()), self.resolution);
         let uniform = uniform(self.pads, self.basis);
         let fields = self.fields_on_top(&grid, &modes);
         let [all_ohm, fields] = covered.connect([self.impedances(pads_ohm), fields], &uniform, &grid, &modes);
@@ -135,8 +134,7 @@ impl Stacks<'_> {
     /// Impedances between densities of the pads and those on the dots' lower faces (ohm).
     fn pads_to_dots(&self, places: Option<&[UnevenPlace]>) -> DMatrix<f64> {
         let [covered, _] = self.covered;
-        let grid = table_grid(&covered, smallest_m(self.pads).min(self.dots.radius_m()) / self.steps_in_pad);
-        let modes = modes(&covered, &grid);
+        let (grid, modes) = across(&covered, smallest_m(self.pads).min(self.dots.radius_m()), self.resolution);
         let fields = pad_modes(self.pads, self.basis, &grid, &modes, self.uneven[0]);
         let mut all = fields.tr_mul(&means(self.dots.basis, &self.dots.centres_m, self.dots.radius_m(), &grid, &modes));
         scale_dots(&mut all, places);
