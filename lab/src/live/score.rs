@@ -151,3 +151,72 @@ fn sorted(mut values: Vec<f64>) -> Vec<f64> {
 fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     sorted.get(((sorted.len() as f64 * share) as usize).min(sorted.len().saturating_sub(1))).copied()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use tactomo_physics::scene::{Hand, SceneName};
+    use tactomo_touch::solve::{FoundContact, FoundRing};
+
+    const FRAME_S: f64 = 0.01;
+
+    fn scorer(name: SceneName) -> (Scorer, Scene) {
+        let detector = Detector::default();
+        let scene = Scene::new(name, &detector, Hand::relative(&detector), 1);
+        (Scorer::new(&detector, scene.clone()), scene)
+    }
+
+    /// The score of answers to the frames from one on, the first of a second after the board's start.
+    fn scored(scorer: &Scorer, first: u64, solutions: Vec<Solution>) -> Scored {
+        let begun = Instant::now();
+        let answer = |(index, solution): (usize, Solution)| {
+            let sequence = first + index as u64;
+            let time_s = sequence as f64 * FRAME_S;
+            Answer { sequence, time_s: 1.0 + time_s, came: begun + Duration::from_secs_f64(time_s), solution }
+        };
+        scorer.of(&solutions.into_iter().enumerate().map(answer).collect::<Vec<_>>())
+    }
+
+    fn contacts(all: Vec<FoundContact>) -> Solution {
+        Solution { contacts: all, ..Solution::default() }
+    }
+
+    #[test]
+    fn time_counts_in_which_all_contacts_are_within_reach_and_none_is_invented() {
+        let (scorer, scene) = scorer(SceneName::Single);
+        let truth = scene.at(0.0)[0].disc().unwrap();
+        let at =
+            |off_m: f64, id| FoundContact { id: Some(id), ..FoundContact::flat(truth.x_m + off_m, truth.y_m, 1e-4) };
+        let other = FoundContact::flat(-truth.x_m, -truth.y_m, 1e-4);
+        let found = scored(
+            &scorer,
+            5,
+            [
+                contacts(Vec::new()),
+                contacts(vec![at(0.001, 1)]),
+                contacts(vec![at(0.003, 2)]),
+                contacts(vec![at(0.001, 2), other]),
+            ]
+            .into_iter()
+            .chain([contacts(Vec::new())])
+            .collect(),
+        );
+        assert!((found.right - 0.5).abs() < 1e-9, "{found:?}");
+        assert!(found.first_right_s.is_some_and(|first_s| (first_s - 6.0 * FRAME_S).abs() < 1e-9), "{found:?}");
+        assert_eq!((found.answers, found.id_changes, found.invented), (5, 1, 0.2));
+        assert!(found.error_m.is_some_and(|error_m| (error_m - 0.001).abs() < 1e-9), "{found:?}");
+        assert!((found.gap_s - FRAME_S).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_ring_is_right_as_a_ring_alone() {
+        let (scorer, _) = scorer(SceneName::Ring);
+        let ring = || Solution { shape: Some(FoundShape::Ring(FoundRing::default())), ..Solution::default() };
+        let found = scored(&scorer, 0, vec![ring(), ring(), contacts(Vec::new()), ring()]);
+        assert!((found.right - 2.0 / 3.0).abs() < 1e-9 && found.invented == 0.0, "{found:?}");
+        let one = contacts(vec![FoundContact::flat(0.0, 0.0, 1e-4)]);
+        assert_eq!(scored(&scorer, 0, vec![one.clone(), one]).right, 0.0);
+    }
+}
