@@ -41,6 +41,16 @@ impl ContactFinder {
         if self.problem.nuisance().is_none() {
             return self.search_exact(from, target, better);
         }
+        // A few contacts are found soonest as if nothing were known of the readings' errors but their size; more may stand for something else.
+        let begun = match from {
+            Some(_) => None,
+            None => {
+                let rough = Target::provisional(&target.readings(), target.frames, &self.errors);
+                let begun = self.search_exact(None, &rough, &mut |_| ControlFlow::Continue(()));
+                begun.filter(|begun| begun.fit.contacts.len() <= policy::SUSPICIOUS_CONTACTS)
+            }
+        };
+        let from = from.or(begun.as_ref());
         // What was found before anything was known of the readings' errors is given with them first: to bring it to them takes a while.
         let provisional = from.filter(|from| from.error.is_none());
         if let Some(judged) = provisional.and_then(|from| self.informed_as_is(from, target))
