@@ -19,11 +19,11 @@ use tokio::sync::watch;
 /// Seed of scene and noise, and of the detector as built.
 const SEED: u64 = 1;
 const BUILT: u64 = 3;
-/// Longest wait until something is learned: 9 to 12 s on two quiet cores, of which a fit takes 4 s of one; 30 s on busy ones.
+/// Longest wait until something is learned: 2 to 6 s on two quiet cores, of which a fit takes 1 s of one.
 const PATIENCE: Duration = Duration::from_secs(90);
 /// Time for which places count then: a press and what is between two.
 const COUNTS: Duration = Duration::from_secs(4);
-/// Median error that is left (m): 0.17 to 0.19 mm were measured, and 0.3 to 3.1 mm from press to press as described.
+/// Median error that is left (m): 0.17 to 0.20 mm were measured, and 0.3 to 3.1 mm from press to press as described.
 const LEFT_M: f64 = 0.35e-3;
 
 /// Number of a frame, its time (s), and what was found in it.
@@ -90,7 +90,7 @@ fn what_presses_teaches_the_detector_and_places_get_better() {
     let scene = Scene::new(SceneName::Wandering, &detector, Hand::relative(&detector), SEED);
     let (summary, answers) = answers_once_learned(&detector, &scene);
     let learned = summary.learned.expect("something is learned");
-    assert!(learned.presses >= 8 && learned.place_error_m < 2e-4, "{learned:?}");
+    assert!(learned.presses >= 5 && learned.place_error_m < 3e-4, "{learned:?}");
     let off = |(_, time_s, found): &Answer| {
         let (truth, [found]) = (scene.at(*time_s).first()?.disc()?, &found[..]) else { return None };
         Some((found.x_m - truth.x_m).hypot(found.y_m - truth.y_m))
