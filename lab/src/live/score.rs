@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::{Contact, Scene, Shape, Touch};
+use tactomo_study::score::quantiles;
 use tactomo_touch::metrics::Matching;
 use tactomo_touch::solve::{FoundShape, Solution};
 
@@ -87,17 +88,17 @@ impl Scorer {
         let shown_s: Vec<f64> = answers.windows(2).map(|pair| since(&pair[1]) - since(&pair[0])).collect();
         let late_from = answers.partition_point(|answer| since(answer) < (1.0 - LATE) * since(last));
         let share = |count: usize| count as f64 / answers.len() as f64;
-        let errors = |worth: &[Worth]| sorted(worth.iter().flat_map(|of| &of.errors_m).copied().collect());
-        let all_m = errors(&worth);
+        let errors = |worth: &[Worth]| quantiles(worth.iter().flat_map(|of| &of.errors_m).copied(), [0.5, 0.95]);
+        let [error_m, error_p95_m] = errors(&worth).map_or([None; 2], |of| of.map(Some));
         let right_s: f64 = worth.iter().zip(&shown_s).filter(|(of, _)| of.is_right).map(|(_, shown_s)| shown_s).sum();
         let first_right = worth.iter().position(|of| of.is_touched && of.is_right);
         Scored {
             answers: answers.len(),
             right: right_s / shown_s.iter().sum::<f64>().max(f64::MIN_POSITIVE),
             first_right_s: first_right.map(|index| since(&answers[index]) + first.sequence as f64 * period_s),
-            error_m: quantile(&all_m, 0.5),
-            error_p95_m: quantile(&all_m, 0.95),
-            late_error_m: quantile(&errors(&worth[late_from..]), 0.5),
+            error_m,
+            error_p95_m,
+            late_error_m: errors(&worth[late_from..]).map(|[median_m, _]| median_m),
             invented: share(worth.iter().filter(|of| of.has_invented).count()),
             doubtful: share(answers.iter().filter(|answer| answer.solution.flags.is_doubtful()).count()),
             id_changes: worth.windows(2).map(|pair| self.id_changes(&pair[0], &pair[1])).sum(),
@@ -141,15 +142,6 @@ impl Scorer {
         };
         after.ids.iter().filter(is_other).count()
     }
-}
-
-fn sorted(mut values: Vec<f64>) -> Vec<f64> {
-    values.sort_by(f64::total_cmp);
-    values
-}
-
-fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    sorted.get(((sorted.len() as f64 * share) as usize).min(sorted.len().saturating_sub(1))).copied()
 }
 
 #[cfg(test)]

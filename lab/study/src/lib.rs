@@ -13,7 +13,7 @@ mod machine;
 mod presses;
 pub mod scanning;
 mod scenes;
-mod score;
+pub mod score;
 pub mod stability;
 pub mod stopwatch;
 pub mod tradeoff;

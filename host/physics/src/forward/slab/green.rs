@@ -318,7 +318,7 @@ struct Reach {
 
 /// Shares of a reach at which the near part has to be nothing: three, so that a zero crossing is not taken for the end.
 const AROUND: [f64; 3] = [0.9, 1.0, 1.1];
-/// The shortest reach, in split lengths, and how many times longer the next one is; the last of them is 30.
+/// The shortest reach, in split lengths, and how many times longer the next one is; the last of them is 32.
 const SHORTEST_REACH: f64 = 3.0;
 const NEXT_REACH: f64 = 1.15;
 static REACHES: [OnceLock<Reach>; 18] = [const { OnceLock::new() }; 18];

@@ -61,7 +61,7 @@ pub struct Resolution {
     pub dot_degree: usize,
     /// Half waves along a side of the modes that unevenness couples.
     pub uneven_modes: usize,
-    /// Wave numbers, times the thickness, up to which the pads' fields reach the top: those above have fallen to 4 exp(-this).
+    /// Wave numbers, times the thickness, up to which the pads' fields reach the top: those above have fallen to 2 exp(-this).
     pub across: usize,
     /// Most steps in a pad's radius of the table of the pads' fields: what limits it on layers that are thin against the pads.
     pub steps_in_pad: usize,
