@@ -63,6 +63,9 @@ pub(super) struct DiscFit {
     slopes: Arc<Slopes>,
     /// `J^T W^2 J` with what was known before.
     pub normal: DMatrix<f64>,
+    /// Half of the negative derivative of both sums of squares, where a descent ended: none where it is free to end, what pulls it over the edge
+    /// else. Zero of a fit that no descent has looked at.
+    pub pull: DVector<f64>,
     /// Whether more steps would change nothing.
     pub settled: bool,
 }
@@ -185,6 +188,7 @@ impl DiscFitter<'_> {
         let mut damping = Damping::new(SCHEDULE);
         for done in 0..=effort.steps {
             let equations = NormalEquations { matrix: fit.normal.clone(), gradient: self.gradient(&fit, target) };
+            fit.pull.clone_from(&equations.gradient);
             let possible = equations.step(0.0).map(|step| equations.gradient.dot(&step));
             // A fit that is far off is wrong: it need not be wrong to many digits.
             let enough = effort.gain.max(effort.share * (fit.objective() - target.count() as f64));
@@ -248,7 +252,8 @@ impl DiscFitter<'_> {
         };
         let (cost, known) = (target.cost(&volts), self.known(&contacts));
         let (slopes, normal) = (Arc::clone(&fit.slopes), fit.normal.clone());
-        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, settled: false })
+        let pull = DVector::zeros(normal.nrows());
+        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, pull, settled: false })
     }
 
     /// A fit with derivatives taken where it is.
@@ -261,7 +266,8 @@ impl DiscFitter<'_> {
     fn at(&self, contacts: Vec<Contact>, volts: Vec<f64>, slopes: Arc<Slopes>, target: &Target) -> Option<DiscFit> {
         let (cost, known) = (target.cost(&volts), self.known(&contacts));
         let normal = self.normal(&slopes, target);
-        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, settled: false })
+        let pull = DVector::zeros(normal.nrows());
+        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, pull, settled: false })
     }
 
     /// Covariance of a fit's parameters if its errors were those of another target; `None` where they are not determined.

@@ -16,6 +16,7 @@ mod marginals;
 #[cfg(test)]
 mod motion_tests;
 mod multiple_models;
+mod on_detector;
 #[cfg(test)]
 mod places_tests;
 mod rows;
@@ -29,11 +30,12 @@ mod tests;
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix2, Vector2};
 
-use self::discs::{DiscFit, PARAMETERS};
+use self::discs::{DiscFit, PARAMETERS, place_m};
 use self::evidence::Prior;
 use self::marginals::{Logs, Usual};
+use self::on_detector::{OnDetector, of_place};
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(crate) use self::solver::{ContactSearch, ContactTracker};
@@ -50,6 +52,7 @@ use crate::solve::problem::Problem;
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::Readings;
+use tactomo_physics::space;
 
 /// Places of the scan.
 const SCAN_PLACES: usize = 600;
@@ -289,24 +292,29 @@ impl ContactFinder {
         Solution { contacts, residual, flags, calibrated, ..Solution::default() }
     }
 
-    /// A contact of a fit with its standard errors: of a place no more than that of one anywhere on the detector.
+    /// A contact of a fit with its standard errors: near the edge, the mean of where on the detector it may be.
     fn contact(&self, fit: &DiscFit, k: usize, known: Option<(&DMatrix<f64>, Logs)>) -> FoundContact {
         let contact = fit.contacts[k];
         let conductance_s = known.map_or(contact.conductance_s, |(_, logs)| logs.conductance[0].exp());
-        let most_m = self.problem.detector().outline.size_m().map(|side_m| side_m / 12f64.sqrt());
+        let near_edge = known.and_then(|(covariance, _)| OnDetector::of(fit, k, covariance, &*self.fields));
         let uncertainty = known.map(|(covariance, logs)| {
-            let place = place_uncertainty(fit, k, covariance);
+            let covariance = near_edge.as_ref().map_or_else(|| of_place(covariance, k), |place| place.covariance);
             let conductance_s = conductance_s * logs.conductance[1];
-            Uncertainty { conductance_s, x_m: place.x_m.min(most_m[0]), y_m: place.y_m.min(most_m[1]), ..place }
+            Uncertainty { conductance_s, ..place_uncertainty(fit, k, &covariance) }
         });
         let radius =
             known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < policy::KNOWN_RADIUS_DEVIATION);
+        let [x_m, y_m, z_m] = near_edge.map_or(place_m(&contact), |place| {
+            let (along, unit_m) = fit.along(k);
+            let first_m = space::along(place_m(&contact), unit_m * place.mean.x, along[0]);
+            self.fields.footing(space::along(first_m, unit_m * place.mean.y, along[1])).0
+        });
         FoundContact {
-            z_m: contact.z_m,
+            z_m,
             apparent_conductance_s: Some(contact.conductance_s / (1.0 + fit.constriction(k))),
             uncertainty,
             radius_m: radius.map(|[mean, _]| mean.exp()),
-            ..FoundContact::flat(contact.x_m, contact.y_m, conductance_s)
+            ..FoundContact::flat(x_m, y_m, conductance_s)
         }
     }
 
@@ -328,7 +336,7 @@ impl ContactFinder {
         let is_off = exact.cost(&fit.volts) > freedom * misfit_limit(freedom);
         let known = self.disc_fitter().covariance(fit, &exact)?;
         let largest_m = |covariance: &DMatrix<f64>| {
-            let of = |k: usize| place_uncertainty(fit, k, covariance);
+            let of = |k: usize| place_uncertainty(fit, k, &of_place(covariance, k));
             (0..fit.contacts.len()).map(of).map(|place| place.x_m.max(place.y_m)).fold(0.0, f64::max)
         };
         let [now_m, calibrated_m] = [&fit.covariance()?, &known].map(largest_m);
@@ -347,15 +355,12 @@ impl ContactFinder {
     }
 }
 
-/// Standard errors of a contact's place.
-fn place_uncertainty(fit: &DiscFit, k: usize, covariance: &DMatrix<f64>) -> Uncertainty {
-    let of = |i: usize, j: usize| covariance[(PARAMETERS * k + i, PARAMETERS * k + j)];
+/// Standard errors of a contact's place, from its covariance in the parameters.
+fn place_uncertainty(fit: &DiscFit, k: usize, covariance: &Matrix2<f64>) -> Uncertainty {
     let (along, unit_m) = fit.along(k);
     // Directions along the surface to x and y.
-    let parts = |axis: usize| [along[0][axis], along[1][axis]];
-    let between = |a: [f64; 2], b: [f64; 2]| {
-        (0..4).map(|index| (index / 2, index % 2)).map(|(i, j)| a[i] * b[j] * of(i, j)).sum::<f64>()
-    };
+    let parts = |axis: usize| Vector2::new(along[0][axis], along[1][axis]);
+    let between = |a: Vector2<f64>, b: Vector2<f64>| a.dot(&(covariance * b));
     let [x, y] = [0, 1].map(|axis| between(parts(axis), parts(axis)).max(0.0).sqrt());
     let correlation = (between(parts(0), parts(1)) / (x * y).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
     Uncertainty { x_m: x * unit_m, y_m: y * unit_m, correlation, conductance_s: 0.0 }

@@ -7,6 +7,7 @@
 use std::f64::consts::TAU;
 
 use super::discs::{DiscFit, DiscFitter, Effort, place_m};
+use super::on_detector::OnDetector;
 use super::scan::Looks;
 use super::{Better, ContactFinder, ContactHypothesis};
 use crate::solve::fit::policy;
@@ -332,7 +333,11 @@ impl ContactFinder {
 
     /// Logarithm of the evidence for a fit.
     pub(super) fn evidence(&self, fit: &DiscFit) -> f64 {
-        self.prior.ln_evidence(fit)
+        let inside = fit.covariance().map_or(0.0, |covariance| {
+            let of = |k: usize| OnDetector::of(fit, k, &covariance, &*self.fields);
+            (0..fit.contacts.len()).filter_map(of).map(|place| place.ln_share).sum()
+        });
+        self.prior.ln_evidence(fit) + inside
     }
 
     /// Logarithm of the evidence for there being no contact.

@@ -22,7 +22,7 @@ fn detector() -> Detector {
     detector
 }
 
-fn solver() -> Contacts {
+pub(super) fn solver() -> Contacts {
     Contacts::new(&PROBLEM, ContactSettings::of(&PROBLEM)).unwrap()
 }
 
