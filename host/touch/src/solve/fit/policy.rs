@@ -147,6 +147,9 @@ pub(crate) const SHAPE_RIVALS: f64 = 2.0;
 pub(crate) const SHORTEST_LINE: f64 = 0.7;
 /// Smallest ring's radius, in mean distances of electrodes: discs of 6 mm on `square-60` are as well explained by rings of 4 mm.
 pub(crate) const SMALLEST_RING: f64 = 0.35;
+/// A shape that was chosen is kept as long as it is so large, as a share of what a search asks for: the width of a ring of 13 mm on detectors as built
+/// wanders from 7 to 9 mm, as the readings hardly tell it.
+pub(crate) const KEPT_SHAPE_SHARE: f64 = 0.6;
 /// A single contact of so many mean distances of electrodes in radius may be a ring.
 pub(crate) const RING_RADIUS: f64 = 0.4;
 

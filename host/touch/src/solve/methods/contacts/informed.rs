@@ -29,6 +29,12 @@ pub(super) struct Informed {
     pub target: Target,
 }
 
+impl Informed {
+    fn count(&self) -> usize {
+        self.hypothesis.fit.contacts.len()
+    }
+}
+
 impl ContactFinder {
     /// What explains a frame, from what explains it so far if that leads there, else from nothing. Each better explanation on the way
     /// goes to `better`, which may end the search.
@@ -41,34 +47,78 @@ impl ContactFinder {
         if self.problem.nuisance().is_none() {
             return self.search_exact(from, target, better);
         }
-        // A few contacts are found soonest as if nothing were known of the readings' errors but their size; more may stand for something else.
-        let begun = match from {
-            Some(_) => None,
-            None => {
-                let rough = Target::provisional(&target.readings(), target.frames, &self.errors);
-                let begun = self.search_exact(None, &rough, &mut |_| ControlFlow::Continue(()));
-                begun.filter(|begun| begun.fit.contacts.len() <= policy::SUSPICIOUS_CONTACTS)
-            }
-        };
-        let from = from.or(begun.as_ref());
-        // What was found before anything was known of the readings' errors is given with them first: to bring it to them takes a while.
-        let provisional = from.filter(|from| from.error.is_none());
-        if let Some(judged) = provisional.and_then(|from| self.informed_as_is(from, target))
-            && better(&judged).is_break()
-        {
-            return Some(judged);
+        match from {
+            Some(from) => self.search_from(from, target, better),
+            None => self.search_from_nothing(target, better),
         }
-        let followed = from.and_then(|from| self.caught_up(from, target));
-        let grown = followed.map(|followed| self.grown(followed, better));
-        if let Some(grown) = grown.as_ref().filter(|grown| !self.is_misfit(&grown.hypothesis.fit, &grown.target)) {
+    }
+
+    fn search_from_nothing(&self, target: &Target, better: &mut Better<'_>) -> Option<ContactHypothesis> {
+        let begun = self.begun_roughly(target);
+        if let Some(begun) = &begun {
+            if better(&begun.hypothesis).is_break() {
+                return Some(begun.hypothesis.clone());
+            }
+            if begun.count() == 1 {
+                let one = self.caught_up(&begun.hypothesis, target).map(|one| self.grown(one, better));
+                if let Some(one) = one.filter(|one| !self.is_misfit(&one.hypothesis.fit, &one.target)) {
+                    return Some(one.hypothesis);
+                }
+            }
+        }
+        let mut is_ended = false;
+        let anew = self.anew(target, &mut |found| {
+            let flow = better(found);
+            is_ended |= flow.is_break();
+            flow
+        });
+        // What was begun with needs no more if as many are found from one contact on.
+        let other = begun.filter(|begun| !is_ended && anew.as_ref().is_none_or(|anew| anew.count() != begun.count()));
+        let other = other.map(|begun| self.settled(begun));
+        let all = [other, anew].into_iter().flatten();
+        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.hypothesis)
+    }
+
+    /// What explains a frame, from what explains it so far if that leads there, else from nothing.
+    fn search_from(
+        &self,
+        from: &ContactHypothesis,
+        target: &Target,
+        better: &mut Better<'_>,
+    ) -> Option<ContactHypothesis> {
+        // What was found before anything was known of the readings' errors is given with them first: to bring it to them takes a while.
+        let provisional = if from.error.is_none() { self.informed_as_is(from, target) } else { None };
+        if let Some(judged) = provisional.filter(|judged| better(&judged.hypothesis).is_break()) {
+            return Some(judged.hypothesis);
+        }
+        let followed = self.caught_up(from, target);
+        let followed = followed.map(|followed| self.grown(followed, better));
+        if let Some(grown) = followed.as_ref().filter(|grown| !self.is_misfit(&grown.hypothesis.fit, &grown.target)) {
             return Some(grown.hypothesis.clone());
         }
-        let anew = self.alone(target).map(|one| match better(&one.hypothesis) {
+        let anew = self.anew(target, better);
+        let all = [followed, anew].into_iter().flatten();
+        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.hypothesis)
+    }
+
+    /// A few contacts, found as if nothing were known of the readings' errors but their size, which is soonest. More may stand for something
+    /// else.
+    fn begun_roughly(&self, target: &Target) -> Option<Informed> {
+        let rough = Target::provisional(&target.readings(), target.frames, &self.errors);
+        let begun = self.search_exact(None, &rough, &mut |_| ControlFlow::Continue(()))?;
+        if begun.fit.contacts.len() > policy::SUSPICIOUS_CONTACTS {
+            return None;
+        }
+        self.informed_as_is(&begun, target)
+    }
+
+    /// What explains a frame, from nothing: contact by contact.
+    fn anew(&self, target: &Target, better: &mut Better<'_>) -> Option<Informed> {
+        let one = self.alone(target)?;
+        Some(match better(&one.hypothesis) {
             ControlFlow::Break(()) => one,
             ControlFlow::Continue(()) => self.grown(one, better),
-        });
-        let all = [grown, anew].into_iter().flatten();
-        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.hypothesis)
+        })
     }
 
     /// The best single contact, if anything stands out.
@@ -84,9 +134,9 @@ impl ContactFinder {
     }
 
     /// An explanation as it is, by what its readings may be off by together.
-    fn informed_as_is(&self, from: &ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
+    fn informed_as_is(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
         let target = self.informed(target, &from.fit.contacts, None)?;
-        self.judged(from.clone(), &target)
+        Some(Informed { hypothesis: self.judged(from.clone(), &target)?, target })
     }
 
     fn caught_up(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {

@@ -127,16 +127,17 @@ impl ShapeFinder {
         let best = kinds.first()?.evidence().score();
         kinds.retain(|other| other.evidence().score() < policy::SHAPE_RIVALS * best);
         let fits = kinds.iter().filter_map(|fit| self.catch_up(fit, target));
-        fits.filter(|fit| self.is_clear(fit.strip())).min_by(lowest)
+        fits.filter(|fit| self.is_clear(fit.strip(), 1.0)).min_by(lowest)
     }
 
-    /// Whether it is more than a disc to the readings.
-    fn is_clear(&self, strip: &Strip) -> bool {
+    /// Whether it is more than a disc to the readings, by a share of what a search asks for.
+    fn is_clear(&self, strip: &Strip, share: f64) -> bool {
         let spacing_m = self.usual.spacing_m;
-        match strip.course {
-            Course::Line(_) => strip.course.length_m() > (2.0 * strip.width_m).max(policy::SHORTEST_LINE * spacing_m),
-            Course::Ring { radius_m, .. } => radius_m > (1.5 * strip.width_m).max(policy::SMALLEST_RING * spacing_m),
-        }
+        let (size_m, least_m) = match strip.course {
+            Course::Line(_) => (strip.course.length_m(), (2.0 * strip.width_m).max(policy::SHORTEST_LINE * spacing_m)),
+            Course::Ring { radius_m, .. } => (radius_m, (1.5 * strip.width_m).max(policy::SMALLEST_RING * spacing_m)),
+        };
+        size_m > share * least_m
     }
 
     /// Whether contacts may stand for a line or a ring: more than one, or a wide one.
@@ -240,7 +241,7 @@ impl ShapeTracker {
     pub fn follow(&mut self, target: &Target) -> bool {
         let Some((last, mut watch)) = self.last.take() else { return true };
         let moved = self.finder.follow(last, target);
-        if !self.finder.is_clear(moved.strip()) {
+        if !self.finder.is_clear(moved.strip(), policy::KEPT_SHAPE_SHARE) {
             return true;
         }
         let has_lost = watch.has_lost(moved.evidence(), target.count());
@@ -250,7 +251,10 @@ impl ShapeTracker {
 
     /// Takes what a search has found, if it explains this frame better than what is followed, and is still more than a disc in it.
     pub fn adopt(&mut self, found: &StripFit, target: &Target) {
-        let caught_up = self.finder.catch_up(found, target).filter(|fit| self.finder.is_clear(fit.strip()));
+        let caught_up = self
+            .finder
+            .catch_up(found, target)
+            .filter(|fit| self.finder.is_clear(fit.strip(), policy::KEPT_SHAPE_SHARE));
         let Some(caught_up) = caught_up else { return };
         let score = |fit: &StripFit| fit.evidence().score();
         if self.found().is_none_or(|last| score(&caught_up) <= score(last)) {
