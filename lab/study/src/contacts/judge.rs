@@ -30,6 +30,8 @@ pub struct Judged {
     pub invented: Vec<usize>,
     /// Whether the solver says that its answer does not explain the readings.
     pub misfit: bool,
+    /// Probability that the solver claims for its count.
+    pub certainty: Option<f64>,
     /// The solver's own residual.
     pub residual: Option<f64>,
     /// What the solver chose and why, if it says so.
@@ -125,6 +127,7 @@ impl Judged {
             found: found.to_vec(),
             invented,
             misfit: solution.flags.misfit,
+            certainty: solution.certainty,
             residual: solution.residual,
             choice: solution.choice.as_ref().map(|choice| format!("{}: {}", choice.what, choice.why)),
         }
@@ -138,6 +141,11 @@ impl Judged {
     /// Whether as many contacts were found as are there.
     pub fn is_count_right(&self) -> bool {
         self.found.len() == self.truth.len()
+    }
+
+    /// Whether as many contacts were found as are there, but for invisible ones.
+    pub fn is_visible_count_right(&self) -> bool {
+        (self.visible().count()..=self.truth.len()).contains(&self.found.len())
     }
 
     /// Contacts invented, and visible ones missed.

@@ -19,7 +19,7 @@ use tactomo_physics::scene::Touch;
 use tactomo_touch::solve::{Method, SolveError, Solver};
 
 pub use self::judge::{Judged, Match, Place, TrueContact};
-pub use self::rows::{ContactFigures, Quantiles, Row, SceneFigures};
+pub use self::rows::{Claims, ContactFigures, Quantiles, Row, SceneFigures};
 pub use self::view::view;
 
 /// Frames a scene has at least: the first is a cold start, and the time to follow is that of the third and those after it, as a solver that
@@ -72,6 +72,8 @@ pub struct Report {
     pub as_built: Option<u64>,
     /// A row for each class of scenes or contacts.
     pub rows: Vec<Row>,
+    /// How often what the answers claim is right.
+    pub claims: Vec<Claims>,
     /// The worst scenes, the worst first.
     pub worst: Vec<Trial>,
 }
@@ -125,6 +127,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         seed: plan.seed,
         as_built: plan.as_built,
         rows: rows::rows(&trials),
+        claims: rows::claims(&trials),
         worst: worst(trials, plan.worst),
     })
 }

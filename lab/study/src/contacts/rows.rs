@@ -8,6 +8,9 @@ use crate::score::quantiles;
 /// Strongest over lightest contact from which a scene is one of contrasts.
 const CONTRAST: f64 = 100.0;
 
+/// Classes of what is claimed: from so much on.
+const SURE: [f64; 4] = [0.95, 0.8, 0.5, 0.0];
+
 /// Figures of a class.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Row {
@@ -60,6 +63,32 @@ pub struct Quantiles {
     pub median: f64,
     /// The high one: 90 % below of errors, 95 % of times.
     pub high: f64,
+}
+
+/// How often answers that claim much alike are right: that as many were found as are there, but for invisible ones.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Claims {
+    /// Least that they claim of their count; `None` of those that claim nothing.
+    pub least: Option<f64>,
+    /// How many.
+    pub scenes: usize,
+    /// Mean of what they claim.
+    pub claimed: Option<f64>,
+    /// Share that is right.
+    pub right: f64,
+}
+
+/// What answers claim, from the surest on; classes without any are left out.
+pub(super) fn claims(trials: &[Trial]) -> Vec<Claims> {
+    let class = |claimed: Option<f64>| claimed.and_then(|claimed| SURE.into_iter().find(|least| claimed >= *least));
+    let of = |least: Option<f64>| {
+        let of_it = || trials.iter().filter(move |trial| class(trial.judged.certainty) == least);
+        let claimed: f64 = of_it().filter_map(|trial| trial.judged.certainty).sum();
+        let right = share(of_it().map(|trial| trial.judged.is_visible_count_right()).collect::<Vec<_>>().into_iter())?;
+        let scenes = of_it().count();
+        Some(Claims { least, scenes, claimed: least.map(|_| claimed / scenes as f64), right })
+    };
+    SURE.map(Some).into_iter().chain([None]).filter_map(of).collect()
 }
 
 /// Figures of all classes.
@@ -207,6 +236,20 @@ mod tests {
         assert_eq!(row(&rows, "below 0.1 sheets").contacts.found, Some(0.5));
         let firm = row(&rows, "above 1 sheet").contacts;
         assert!(firm.over_bound.is_some_and(|ratio| (ratio.median - 1.0).abs() < 1e-9), "{firm:?}");
+    }
+
+    #[test]
+    fn claims_are_held_against_how_often_they_are_right() {
+        let of = |off_mm: &[f64], certainty: Option<f64>| {
+            let mut trial = trial(&[(2.0, 0.5)], off_mm);
+            trial.judged.certainty = certainty;
+            trial
+        };
+        let all = [of(&[0.1], Some(0.99)), of(&[], Some(0.97)), of(&[9.0], Some(0.5)), of(&[], None)];
+        let row = |least, scenes, claimed, right| Claims { least, scenes, claimed, right };
+        let expected =
+            [row(Some(0.95), 2, Some(0.98), 0.5), row(Some(0.5), 1, Some(0.5), 1.0), row(None, 1, None, 0.0)];
+        assert_eq!(claims(&all), expected);
     }
 
     #[test]

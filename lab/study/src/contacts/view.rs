@@ -54,7 +54,16 @@ pub fn view(report: &Report) -> View {
              the bound on ln C is below 0.2; xy, ln C: within 1 and 2 claimed standard errors",
         )
         .data();
-    let view = View::new(title, "").with(table);
+    let claims = Table::of("What is claimed of the count", &report.claims)
+        .column("claimed", TEXT, |claims| match claims.least {
+            Some(least) => format!("{:.0} % or more", 100.0 * least),
+            None => "nothing".to_owned(),
+        })
+        .column("scenes", whole, |claims| claims.scenes)
+        .column("mean claim", PERCENT, |claims| claims.claimed)
+        .column("right", PERCENT, |claims| claims.right)
+        .note("right: as many found as are there, but for invisible ones");
+    let view = View::new(title, "").with(table).with(claims);
     let view = match report.threads {
         ..=1 => view,
         threads => view
