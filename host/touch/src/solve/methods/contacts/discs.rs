@@ -41,6 +41,8 @@ const LINEAR: f64 = 0.1;
 const NEAR: f64 = 3.0;
 const NEAR_AT_MOST: f64 = 0.4;
 const SIGNIFICANT: f64 = 3.0;
+/// A fit that may gain no more than this is settled, however it ended: it is within one standard error of the best.
+const SETTLED: f64 = 1.0;
 /// Share of the expected gain that a step has to bring, or derivatives are taken anew.
 const TRUE: f64 = 0.5;
 /// Widest radius of a disc, in halves of the side of a square of the detector's area, or of its outline's shorter side: what is wider
@@ -197,6 +199,7 @@ impl DiscFitter<'_> {
                 break;
             }
             if done == effort.steps {
+                fit.settled = possible.is_some_and(|possible| possible < SETTLED);
                 break;
             }
             let Some((next, expected)) = self.step(&fit, target, &equations, &mut damping) else {
