@@ -206,7 +206,10 @@ fn a_ring_that_closes_is_let_go_before_it_is_a_disc() {
         // A search would find it again, perhaps as what it is no longer.
         tracker.adopt(&fit, &target);
         if let Some(Solution { shape: Some(FoundShape::Ring(found)), .. }) = tracker.solution(&target) {
-            assert!(found.radius_m > 1.5 * found.width_m, "{found:?} of a ring of {radius_m} m");
+            assert!(
+                found.radius_m > policy::KEPT_SHAPE_SHARE * 1.5 * found.width_m,
+                "{found:?} of a ring of {radius_m} m"
+            );
         } else {
             assert!(is_lost);
             was_let_go = true;
