@@ -13,6 +13,11 @@ pub fn along(a: Place, share: f64, b: Place) -> Place {
     [a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]]
 }
 
+/// From a place by `steps` along two directions.
+pub fn moved(from: Place, steps: [f64; 2], directions: [Place; 2]) -> Place {
+    along(along(from, steps[0], directions[0]), steps[1], directions[1])
+}
+
 /// Scalar product.
 pub fn dot(a: Place, b: Place) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -28,7 +28,7 @@ pub(super) fn figures() -> Vec<Figure> {
 
 /// `auto` on random contacts.
 fn random() -> Vec<Figure> {
-    let says = "random contacts: of answers that claim 95 % of their count or more, those with as many as are there";
+    let says = "random contacts: of answers that are 95 % sure of their count or more, those with as many as are there";
     let sure =
         figure("contacts", "contacts.sure.right".to_owned(), says.to_owned(), "claims/least=0.95/right".to_owned());
     let mut all = vec![sure.per_cent().by(3.0)];

@@ -82,11 +82,11 @@ pub struct Claims {
 pub(super) fn claims(trials: &[Trial]) -> Vec<Claims> {
     let class = |claimed: Option<f64>| claimed.and_then(|claimed| SURE.into_iter().find(|least| claimed >= *least));
     let of = |least: Option<f64>| {
-        let of_it = || trials.iter().filter(move |trial| class(trial.judged.certainty) == least);
-        let claimed: f64 = of_it().filter_map(|trial| trial.judged.certainty).sum();
-        let right = share(of_it().map(|trial| trial.judged.is_visible_count_right()).collect::<Vec<_>>().into_iter())?;
-        let scenes = of_it().count();
-        Some(Claims { least, scenes, claimed: least.map(|_| claimed / scenes as f64), right })
+        let all: Vec<_> =
+            trials.iter().map(|trial| &trial.judged).filter(|judged| class(judged.certainty) == least).collect();
+        let right = share(all.iter().map(|judged| judged.is_visible_count_right()))?;
+        let claimed: Option<f64> = all.iter().map(|judged| judged.certainty).sum();
+        Some(Claims { least, scenes: all.len(), claimed: claimed.map(|sum| sum / all.len() as f64), right })
     };
     SURE.map(Some).into_iter().chain([None]).filter_map(of).collect()
 }

@@ -353,7 +353,7 @@ impl DiscFitter<'_> {
         let shorten = (LONGEST_WAY / first.hypot(*second)).min(1.0) * unit_m;
         let factor = |log: f64, longest: f64| log.clamp(-longest, longest).exp();
         let (from_m, along) = self.fields.footing(place_m(contact));
-        let to_m = space::along(space::along(from_m, shorten * first, along[0]), shorten * second, along[1]);
+        let to_m = space::moved(from_m, [shorten * first, shorten * second], along);
         let ([x_m, y_m, z_m], _) = self.fields.footing(to_m);
         let wider = factor(*by_m, LONGEST_RADIUS);
         // Of the contact's own, in what it was: no step makes it much better at once.

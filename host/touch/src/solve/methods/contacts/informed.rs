@@ -53,6 +53,7 @@ impl ContactFinder {
         }
     }
 
+    /// What explains a frame: first a few contacts, roughly, which a single one that fits makes the answer; else contact by contact.
     fn search_from_nothing(&self, target: &Target, better: &mut Better<'_>) -> Option<ContactHypothesis> {
         let begun = self.begun_roughly(target);
         if let Some(begun) = &begun {
@@ -75,8 +76,7 @@ impl ContactFinder {
         // What was begun with needs no more if as many are found from one contact on.
         let other = begun.filter(|begun| !is_ended && anew.as_ref().is_none_or(|anew| anew.count() != begun.count()));
         let other = other.map(|begun| self.settled(begun));
-        let all = [other, anew].into_iter().flatten();
-        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.hypothesis)
+        Some(self.more_likely(other, anew)?.hypothesis)
     }
 
     /// What explains a frame, from what explains it so far if that leads there, else from nothing.
@@ -97,8 +97,7 @@ impl ContactFinder {
             return Some(grown.hypothesis.clone());
         }
         let anew = self.anew(target, better);
-        let all = [followed, anew].into_iter().flatten();
-        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b))).map(|best| best.hypothesis)
+        Some(self.more_likely(followed, anew)?.hypothesis)
     }
 
     /// A few contacts, found as if nothing were known of the readings' errors but their size, which is soonest. More may stand for something
@@ -130,7 +129,7 @@ impl ContactFinder {
         let again = self.one(&settled.target)?;
         let again =
             Informed { hypothesis: ContactHypothesis::of(again, &settled.target), target: settled.target.clone() };
-        Some(self.better_informed(settled, again))
+        self.more_likely(Some(settled), Some(again))
     }
 
     /// An explanation as it is, by what its readings may be off by together.
@@ -223,8 +222,9 @@ impl ContactFinder {
         (best, ControlFlow::Continue(()))
     }
 
-    fn better_informed(&self, one: Informed, other: Informed) -> Informed {
-        if self.whole_evidence(&other) > self.whole_evidence(&one) { other } else { one }
+    fn more_likely(&self, one: Option<Informed>, other: Option<Informed>) -> Option<Informed> {
+        let all = [one, other].into_iter().flatten();
+        all.max_by(|a, b| self.whole_evidence(a).total_cmp(&self.whole_evidence(b)))
     }
 
     /// Logarithm of the evidence, with the determinant that explanations of one target have in common.

@@ -307,8 +307,7 @@ impl ContactFinder {
             known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < policy::KNOWN_RADIUS_DEVIATION);
         let [x_m, y_m, z_m] = near_edge.map_or(place_m(&contact), |place| {
             let (along, unit_m) = fit.along(k);
-            let first_m = space::along(place_m(&contact), unit_m * place.mean.x, along[0]);
-            self.fields.footing(space::along(first_m, unit_m * place.mean.y, along[1])).0
+            self.fields.footing(space::moved(place_m(&contact), (unit_m * place.mean).into(), along)).0
         });
         FoundContact {
             z_m,

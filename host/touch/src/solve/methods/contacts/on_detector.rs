@@ -19,11 +19,11 @@ const NEAR: f64 = 2.5;
 const POINTS: usize = 30;
 /// Most standard errors of the step that the fit would take: further on, the readings are not linear in the place.
 const FURTHEST: f64 = 3.0;
-/// Most standard error along each direction, in distances of electrodes over the root of what the contact reads (standard errors). No current
-/// flows across an edge, so that derivatives by the way to it vanish there, but second ones do not: over a distance of electrodes, readings change by
-/// about themselves. Of firm contacts fits that ended on the edge said 10 mm instead of 0.2. With 2, random places in corners are claimed too
-/// well (75 % within two); with 4, those in corners of detectors as built are off by twice as much.
-const WORSE: f64 = 3.0;
+/// Bound on a standard error: so many distances between electrodes over the root of the contact's signal in standard deviations. No current
+/// flows across an edge, so that the first derivative by the way to it vanishes there, but the second does not: over a distance between electrodes
+/// readings change by about themselves. Without it, fits of firm contacts that ended on the edge claimed 10 mm instead of 0.2. With 2, places
+/// in corners are claimed too well (75 % within two standard errors); with 4, errors in corners of detectors as built double.
+const LARGEST_ERROR: f64 = 3.0;
 /// A place is beyond the edge if the nearest one on the detector is off by this share of the way there, along the surface: curved ones leave
 /// their tangents by less.
 const BEYOND: f64 = 0.02;
@@ -68,7 +68,7 @@ impl OnDetector {
         let eigen = of_place(covariance, k).symmetric_eigen();
         let deviations = eigen.eigenvalues.map(|variance| variance.max(0.0).sqrt());
         let strength = PARAMETERS * k + 2;
-        let most = WORSE * spacing_m / unit_m / fit.normal[(strength, strength)].sqrt().sqrt();
+        let most = LARGEST_ERROR * spacing_m / unit_m / fit.normal[(strength, strength)].sqrt().sqrt();
         let deviations = deviations.map(|deviation| deviation.min(most));
         let towards = covariance.fixed_rows::<2>(PARAMETERS * k) * &fit.pull;
         let pull = (eigen.eigenvectors.transpose() * towards).component_div(&deviations);
@@ -92,7 +92,7 @@ impl Distribution<'_> {
     /// Whether a place is on the detector, so many standard errors from where the fit ended.
     fn is_on(&self, errors: Vector2<f64>) -> bool {
         let way = self.axes * errors * self.unit_m;
-        let to_m = space::along(space::along(self.from_m, way.x, self.along[0]), way.y, self.along[1]);
+        let to_m = space::moved(self.from_m, way.into(), self.along);
         let off_m = space::sub(self.fields.footing(to_m).0, to_m);
         let along_m = self.along.map(|direction| space::dot(off_m, direction));
         along_m[0].hypot(along_m[1]) <= BEYOND * way.norm()

@@ -213,7 +213,7 @@ impl ContactFinder {
         let split = |[a, b]: [f64; 2]| {
             let half = |sign: f64| {
                 let way_m = sign * wide.radius_m;
-                let to_m = space::along(space::along(place_m(&wide), way_m * a, along[0]), way_m * b, along[1]);
+                let to_m = space::moved(place_m(&wide), [way_m * a, way_m * b], along);
                 let [x_m, y_m, z_m] = self.fields.footing(to_m).0;
                 let radius_m = self.settings.radius_m;
                 Contact { x_m, y_m, z_m, radius_m, conductance_s: 0.5 * wide.conductance_s }
@@ -256,7 +256,7 @@ impl ContactFinder {
         let start = |turn: usize| {
             let (sin, cos) = (TAU * turn as f64 / BESIDE as f64).sin_cos();
             let away_m = self.apart_m();
-            let to_m = space::along(space::along(place_m(one), away_m * cos, along[0]), away_m * sin, along[1]);
+            let to_m = space::moved(place_m(one), [away_m * cos, away_m * sin], along);
             let [x_m, y_m, z_m] = self.fields.footing(to_m).0;
             vec![Contact { x_m, y_m, z_m, radius_m: self.settings.radius_m, ..*one }]
         };

@@ -130,6 +130,11 @@ impl ShapeFinder {
         fits.filter(|fit| self.is_clear(fit.strip(), 1.0)).min_by(lowest)
     }
 
+    /// Whether what was chosen is still more than a disc to the readings.
+    fn is_kept(&self, strip: &Strip) -> bool {
+        self.is_clear(strip, policy::KEPT_SHAPE_SHARE)
+    }
+
     /// Whether it is more than a disc to the readings, by a share of what a search asks for.
     fn is_clear(&self, strip: &Strip, share: f64) -> bool {
         let spacing_m = self.usual.spacing_m;
@@ -241,7 +246,7 @@ impl ShapeTracker {
     pub fn follow(&mut self, target: &Target) -> bool {
         let Some((last, mut watch)) = self.last.take() else { return true };
         let moved = self.finder.follow(last, target);
-        if !self.finder.is_clear(moved.strip(), policy::KEPT_SHAPE_SHARE) {
+        if !self.finder.is_kept(moved.strip()) {
             return true;
         }
         let has_lost = watch.has_lost(moved.evidence(), target.count());
@@ -251,10 +256,7 @@ impl ShapeTracker {
 
     /// Takes what a search has found, if it explains this frame better than what is followed, and is still more than a disc in it.
     pub fn adopt(&mut self, found: &StripFit, target: &Target) {
-        let caught_up = self
-            .finder
-            .catch_up(found, target)
-            .filter(|fit| self.finder.is_clear(fit.strip(), policy::KEPT_SHAPE_SHARE));
+        let caught_up = self.finder.catch_up(found, target).filter(|fit| self.finder.is_kept(fit.strip()));
         let Some(caught_up) = caught_up else { return };
         let score = |fit: &StripFit| fit.evidence().score();
         if self.found().is_none_or(|last| score(&caught_up) <= score(last)) {
