@@ -10,9 +10,10 @@ use anyhow::{Context, anyhow};
 use tactomo::board::record::Header;
 use tactomo::board::session::RequestedSettings;
 use tactomo::board::source::Source;
-use tactomo::detector::Detector;
+use tactomo::detector::{Chosen, Detector};
 use tactomo::forward::jacobian::Jacobian;
 use tactomo::learned::Learned;
+use tactomo::run::calibration::Learning;
 use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Listener, Request, Snapshot};
@@ -109,8 +110,8 @@ pub struct PictureArgs {
     /// Leaves it to you to open the page: else the browser opens by itself where there is a desktop
     #[arg(long)]
     pub no_open: bool,
-    /// Takes the detector as it is described. Else, on a board, it is learned from what presses, and used once it helps; Calibrate on the page
-    /// saves it
+    /// Takes the detector as it is described. Else, on a board, it is learned from what presses, and used once it helps. What is learned of a
+    /// detector that a file describes is kept beside it, my.learned.toml of my.toml, for the next time
     #[arg(long)]
     pub no_learning: bool,
     /// Makes a pointer of a contact: its motion, presses and clicks are `events` in `--stream`, and move a cursor on the page. The scene
@@ -137,8 +138,8 @@ pub struct Show {
     pub settings: RequestedSettings,
     /// Which rows the board is asked to scan.
     pub scan: ScanChoice,
-    /// Whether it is a recording that is played: that is taken as it was.
-    pub is_recording: bool,
+    /// How the detector is learned, if it is; a recording is taken as it was.
+    pub learning: Option<Learning>,
     /// Time from Hello to the end.
     pub seconds: Option<Duration>,
     /// Where all bytes are kept.
@@ -156,7 +157,8 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         Some(path) => source::recorded_detector(chosen, path)?,
         None => source::described(&args.board, chosen.get_or(args.board.scene.preset())?),
     };
-    let is_recording = args.replay.is_some();
+    let learning = learning(&args, &detector);
+    let detector = kept(learning.as_ref()).unwrap_or(detector);
     let (source, finger) = match args.replay {
         Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
         None => source::board(&args.board, &args.picture.detector, &detector)?,
@@ -166,7 +168,35 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     let Args { mut picture, scan, seconds, record, streams, elf, .. } = args;
     scan.check(detector.electrodes.len()).map_err(|what| anyhow!("--scan {scan}: {what}"))?;
     picture.pointer |= is_pointer;
-    show(Show { source, finger, settings, scan, is_recording, detector, picture, seconds, record, streams, elf })
+    show(Show { source, finger, settings, scan, learning, detector, picture, seconds, record, streams, elf })
+}
+
+/// How the detector is learned, if it is.
+fn learning(args: &Args, description: &Detector) -> Option<Learning> {
+    let PictureArgs { no_learning, learned, jacobian, detector, .. } = &args.picture;
+    // What a person has brought in place of the model holds for the detector as it is described.
+    if *no_learning || learned.is_some() || jacobian.is_some() || args.replay.is_some() {
+        return None;
+    }
+    let file = match &detector.detector {
+        // No two simulations are of one sensor.
+        Some(Chosen::File(path)) if !args.board.simulate => Some(path.as_path()),
+        _ => None,
+    };
+    Learning::of(description, file)
+}
+
+/// The detector as a run before has learned it, if one has.
+fn kept(learning: Option<&Learning>) -> Option<Detector> {
+    let Learning { file, .. } = learning?;
+    let kept = learning?.kept();
+    if let (Ok(Some(_)), Some(file)) = (&kept, file) {
+        message!("what was learned before is used: {}; --no-learning leaves it out", file.display());
+    }
+    kept.unwrap_or_else(|error| {
+        message!("{error}, so it is learned anew");
+        None
+    })
 }
 
 /// Serves the page, or only counts, until the end.
@@ -215,13 +245,11 @@ fn method(args: &PictureArgs, problem: &Problem) -> Method {
 
 fn options(show: &mut Show, problem: Problem, listener: Option<Box<dyn Listener>>) -> anyhow::Result<RunOptions> {
     let detector = show.detector.clone();
-    let PictureArgs { no_learning, learned, jacobian, .. } = &show.picture;
-    // What a person has brought in place of the model holds for the detector as it is described.
-    let learns = !(*no_learning || show.is_recording || learned.is_some() || jacobian.is_some());
+    let learning = show.learning.clone();
     Ok(RunOptions {
         settings: show.settings,
         scan: show.scan.clone(),
-        solving: Some(Solving { learns, ..Solving::new(method(&show.picture, &problem), problem) }),
+        solving: Some(Solving { learning, ..Solving::new(method(&show.picture, &problem), problem) }),
         recorder: keep::begin(show.record.as_deref(), &Header::now(&detector, show.source.name()))?,
         begin_recording: Some(keep::on_request(detector.clone(), show.source.name())),
         listeners: listener.into_iter().collect(),

@@ -41,7 +41,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         finger: None,
         picture: args.picture,
         scan: ScanChoice::Whole,
-        is_recording: true,
+        learning: None,
         settings: RequestedSettings::default(),
         seconds: None,
         record: None,

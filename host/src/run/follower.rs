@@ -30,20 +30,20 @@ pub(super) struct FollowThread(JoinHandle<Result<(), LiveError>>);
 impl FollowThread {
     /// Starts it; calibrated detectors are saved in `folder`.
     pub fn start(
-        solving: Solving,
+        mut solving: Solving,
         inbox: &Arc<Inbox>,
         notice: Arc<NoticeBoard>,
         listeners: Vec<Box<dyn Listener>>,
         folder: PathBuf,
         planner: Planner,
     ) -> std::io::Result<Self> {
-        let (ours, learns) = (|| Arc::clone(inbox), solving.learns);
+        let (ours, learning) = (|| Arc::clone(inbox), solving.learning.take());
         let follow = FollowLoop {
             inbox: ours(),
             wires: WireLooks::new(ours(), Arc::clone(&solving.look_at_wires)),
             solvers: Solvers::new(solving, ours(), Arc::clone(&notice)),
             search: SearchThread::start(ours())?,
-            calibration: Calibration::new(ours(), Arc::clone(&notice), folder, learns),
+            calibration: Calibration::new(ours(), Arc::clone(&notice), folder, learning),
             answers: Answers::new(notice, listeners),
             planner,
             answered: None,

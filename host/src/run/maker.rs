@@ -153,7 +153,7 @@ mod tests {
             make,
             look_at_wires: Arc::new(|_, _, _| None),
             begin_baseline: Arc::new(|_, _| BaselineTracker::over(0, 256)),
-            learns: false,
+            learning: None,
         };
         (Maker::new(solving, Arc::clone(&inbox)), inbox, go)
     }

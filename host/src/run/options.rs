@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 
-use super::calibration::LearnedInUse;
+use super::calibration::{LearnedInUse, Learning};
 use super::scanning::ScanChoice;
 use super::{Latency, Listener, Order, Request, Snapshot};
 use tactomo_board::baseline::BaselineTracker;
@@ -97,8 +97,8 @@ pub struct Solving {
     pub look_at_wires: LookAtWires,
     /// Begins the baseline once the board has said Hello.
     pub begin_baseline: BeginBaseline,
-    /// Whether the detector is learned from what presses, and what was learned used once it helps.
-    pub learns: bool,
+    /// How the detector is learned from what presses, and used once that helps; `None` if it is taken as it is.
+    pub learning: Option<Learning>,
 }
 
 impl Solving {
@@ -119,7 +119,7 @@ impl Solving {
             begin_baseline: Arc::new(move |detector, conversions| {
                 BaselineTracker::new(at_rest.measured_as(detector).jacobian, conversions)
             }),
-            learns: false,
+            learning: None,
         }
     }
 }

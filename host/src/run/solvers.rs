@@ -190,7 +190,7 @@ mod tests {
             }),
             look_at_wires: Arc::new(|_, _, _| None),
             begin_baseline: Arc::new(|_, _| BaselineTracker::over(0, 256)),
-            learns: false,
+            learning: None,
         };
         (Solvers::new(solving, Arc::clone(&inbox), Arc::new(NoticeBoard::new(snapshots))), inbox, shown)
     }

@@ -8,6 +8,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
+use tactomo::run::calibration::Learning;
 use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Listener, Snapshot, TouchEvent};
@@ -88,9 +89,10 @@ pub fn run(case: &Case) -> anyhow::Result<Found> {
     let board = SimulatedBoard::simulate(&truth, simulation, Options { seed: case.seed, model })?;
     let kept = Arc::new(Mutex::new(Vec::new()));
     let solving = Solving::new(case.method, Problem::of(&detector)?);
+    let learning = Learning::of(&detector, None).filter(|_| case.learns);
     let options = RunOptions {
         scan: case.scan.clone(),
-        solving: Some(Solving { learns: case.learns, ..solving }),
+        solving: Some(Solving { learning, ..solving }),
         listeners: vec![Box::new(Keeper(Arc::clone(&kept)))],
         seconds: Some(case.time),
         ..RunOptions::new(detector.clone())

@@ -13,6 +13,9 @@ pub struct Calibration {
     pub frames: usize,
     /// Presses that were used.
     pub presses: usize,
+    /// Standard error that places are expected to have (m): the median over the detector, of a press of medium firmness in one frame. `None` in
+    /// files that do not say it.
+    pub place_error_m: Option<f64>,
     /// Parameters, each with its standard error in its unit, and whether the readings said next to nothing of it.
     pub parameters: Vec<CalibratedParameter>,
     /// What is left unknown, as independent directions of one standard deviation: each has a step of each parameter, in their order.
@@ -53,13 +56,24 @@ impl super::Detector {
         };
         Unknowns { directions }
     }
+
+    /// Whether it may be what a calibration has made of a description: what none changes is alike.
+    pub fn may_be_of(&self, description: &Self) -> bool {
+        let unchanged = |detector: &Self| {
+            // Of a curved one the surface is, and the map's outline comes of that.
+            let outline = detector.surface.is_none().then(|| detector.outline.clone());
+            (detector.name.clone(), outline, detector.tolerances)
+        };
+        let counts = |detector: &Self| [detector.electrodes.len(), detector.layers.len()];
+        unchanged(self) == unchanged(description) && counts(self) == counts(description)
+    }
 }
 
 impl Calibration {
     /// What it says of some of the electrodes only.
     pub(super) fn keeping(self, kept: &[usize]) -> Self {
         // All fields by name, as in `Detector::keeping`.
-        let Self { board, date, frames, presses, parameters, directions } = self;
+        let Self { board, date, frames, presses, place_error_m, parameters, directions } = self;
         let renumbered = |known: &CalibratedParameter| match known.parameter.electrode() {
             Some(e) => kept.iter().position(|kept| *kept == e).map(|to| known.parameter.with_electrode(to)),
             None => Some(known.parameter),
@@ -76,6 +90,7 @@ impl Calibration {
             date,
             frames,
             presses,
+            place_error_m,
         }
     }
 

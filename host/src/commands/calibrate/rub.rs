@@ -186,7 +186,7 @@ struct ReportedHeldOut {
 }
 
 impl From<HeldOut> for ReportedHeldOut {
-    fn from(HeldOut { presses, residuals, place_errors_m }: HeldOut) -> Self {
+    fn from(HeldOut { presses, residuals, place_errors_m, .. }: HeldOut) -> Self {
         let ([residual_before, residual_after], [place_error_before_m, place_error_after_m]) =
             (residuals, place_errors_m);
         Self { presses, residual_before, residual_after, place_error_before_m, place_error_after_m }

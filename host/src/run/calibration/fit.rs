@@ -23,6 +23,8 @@ pub(super) struct Task {
     pub frames: Vec<Frame>,
     /// Most presses that are fitted.
     pub presses: usize,
+    /// The detector in use, if one was found before: the presses that are held out are tried on it.
+    pub rival: Option<Arc<Detector>>,
     pub is_last: bool,
     pub cancelled: Arc<AtomicBool>,
 }
@@ -42,7 +44,7 @@ pub(super) fn begin(task: Task, number: u64, inbox: &Arc<Inbox>) -> std::io::Res
 }
 
 fn fit(task: &Task) -> Result<Rub, String> {
-    let settings = RubSettings { presses: task.presses, ..RubSettings::default() };
+    let settings = RubSettings { presses: task.presses, rival: task.rival.as_deref(), ..RubSettings::default() };
     let goes_on = &mut |_| !task.cancelled.load(Ordering::Relaxed);
     let found = rub(&task.description, &task.frames, &settings, goes_on);
     let mut rub = found.map_err(|error| with_causes(&error))?;

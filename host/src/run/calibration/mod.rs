@@ -4,6 +4,7 @@
 
 mod collected;
 mod fit;
+mod learning;
 pub(super) mod messages;
 mod save;
 mod session;
@@ -11,12 +12,14 @@ mod session;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::thread;
 
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Calibration as Calibrated, Detector};
 use tactomo_touch::calibrate::Rub;
 use tactomo_touch::solve::FoundContact;
 
 pub use self::collected::Coverage;
+pub use self::learning::Learning;
 pub use self::messages::Calibrate;
 pub(super) use self::messages::Outcome;
 use self::session::RubSession;
@@ -69,6 +72,12 @@ pub struct LearnedInUse {
     pub place_error_m: f64,
 }
 
+impl LearnedInUse {
+    fn of(calibration: &Calibrated) -> Self {
+        Self { presses: calibration.presses, place_error_m: calibration.place_error_m.unwrap_or(f64::INFINITY) }
+    }
+}
+
 impl fmt::Display for LearnedInUse {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { presses, place_error_m } = self;
@@ -82,28 +91,40 @@ pub(super) struct Calibration {
     notice: Arc<NoticeBoard>,
     /// Where calibrated detectors are saved.
     folder: PathBuf,
-    /// Whether the detector is learned unasked.
-    learns: bool,
+    /// How the detector is learned unasked, if it is.
+    learning: Option<Learning>,
     session: Option<RubSession>,
     /// How many there have been.
     begun: u64,
-    /// Expected error of places (m) by the detector that was found last, for use.
-    known_m: f64,
+    /// The detector that was found, by this run or one before, and is in use.
+    used: Option<Arc<Detector>>,
     /// What was learned unasked, if that is the one.
     learned: Option<LearnedInUse>,
 }
 
 impl Calibration {
-    /// None yet; what comes of them in other threads goes through `inbox`. With `learns`, the detector is learned from what presses anyway.
-    pub fn new(inbox: Arc<Inbox>, notice: Arc<NoticeBoard>, folder: PathBuf, learns: bool) -> Self {
-        Self { inbox, notice, folder, learns, session: None, begun: 0, known_m: f64::INFINITY, learned: None }
+    /// None yet; what comes of them in other threads goes through `inbox`.
+    pub fn new(inbox: Arc<Inbox>, notice: Arc<NoticeBoard>, folder: PathBuf, learning: Option<Learning>) -> Self {
+        Self { inbox, notice, folder, learning, session: None, begun: 0, used: None, learned: None }
     }
 
-    /// Begins with the detector of this description: frames before were those of another, or of other settings of its converter.
-    pub fn begin_with(&mut self, description: Arc<Detector>) {
+    /// Begins with a board's detector: frames before were those of another, or of other settings of its converter.
+    pub fn begin_with(&mut self, detector: Arc<Detector>) {
         self.begun += 1;
         let ends = (Arc::clone(&self.inbox), Arc::clone(&self.notice));
-        self.session = Some(RubSession::new(self.begun, description, self.learns, self.folder.clone(), ends));
+        let described = self.learning.as_ref().map(|learning| Arc::new(learning.description.measured_as(&detector)));
+        // The run began with what was kept by one before.
+        if self.used.is_none()
+            && described.is_some()
+            && let Some(calibration) = &detector.calibration
+        {
+            (self.used, self.learned) = (Some(Arc::clone(&detector)), Some(LearnedInUse::of(calibration)));
+        }
+        let learns = described.is_some();
+        let description = described.unwrap_or(detector);
+        let mut session = RubSession::new(self.begun, description, learns, self.folder.clone(), ends);
+        session.set_used(self.used.clone());
+        self.session = Some(session);
         self.show();
     }
 
@@ -123,8 +144,20 @@ impl Calibration {
 
     /// Remembers what is to be used from now on.
     fn chosen(&mut self, found: &Rub, learned: Option<LearnedInUse>) -> Arc<Detector> {
-        (self.known_m, self.learned) = (found.place_error_m(), learned);
-        Arc::new(found.detector.clone())
+        let used = Arc::new(found.detector.clone());
+        (self.used, self.learned) = (Some(Arc::clone(&used)), learned);
+        self.session.iter_mut().for_each(|session| session.set_used(self.used.clone()));
+        used
+    }
+
+    /// Keeps what was learned for the next run, if it is to be: nobody waits for a disk.
+    fn keep(&self, learned: &Arc<Detector>) {
+        let Some(path) = self.learning.as_ref().and_then(|learning| learning.file.clone()) else { return };
+        let learned = Arc::clone(learned);
+        let write = move || learning::keep(&learned, &path).unwrap_or_else(|error| tracing::warn!("{error}"));
+        if let Err(error) = thread::Builder::new().name("learned file".to_owned()).spawn(write) {
+            tracing::warn!("what was learned is not kept: cannot start a thread: {error}");
+        }
     }
 
     /// Shows what was learned, once there is a solver for it.
@@ -152,12 +185,14 @@ impl Calibration {
     pub fn receive(&mut self, number: u64, outcome: Outcome) -> Option<Arc<Detector>> {
         let session = self.session.as_mut().filter(|session| session.number == number)?;
         session.receive(outcome);
-        let learned = session.learned(self.known_m);
+        let learned = session.learned();
         self.show();
         let found = learned?;
-        let learned = LearnedInUse { presses: found.presses, place_error_m: found.place_error_m() };
-        tracing::info!("{learned}");
-        Some(self.chosen(&found, Some(learned)))
+        let learned = found.detector.calibration.as_ref().map(LearnedInUse::of);
+        learned.iter().for_each(|learned| tracing::info!("{learned}"));
+        let used = self.chosen(&found, learned);
+        self.keep(&used);
+        Some(used)
     }
 
     /// Shows how it is, if that is due.
@@ -190,7 +225,7 @@ mod tests {
         let (snapshots, receiver) = watch::channel(Arc::default());
         let notice = Arc::new(NoticeBoard::new(snapshots));
         let inbox = Arc::new(Inbox::new(false));
-        let mut calibration = Calibration::new(inbox, Arc::clone(&notice), PathBuf::from("."), true);
+        let mut calibration = Calibration::new(inbox, Arc::clone(&notice), PathBuf::from("."), None);
         assert!(calibration.ask(Calibrate::Begin).is_none(), "there is no detector");
         calibration.begin_with(Arc::new(Detector::default()));
         let mut ask = |ask| calibration.ask(ask);

@@ -39,6 +39,8 @@ pub struct HeldOut {
     pub residuals: [f64; 2],
     /// Expected standard error of places (m) by what is known of the detector as described, and of the one found: median over the detector.
     pub place_errors_m: [f64; 2],
+    /// What a single contact leaves of them on [the other detector](super::RubSettings::rival) that was asked for.
+    pub rival: Option<f64>,
 }
 
 impl HeldOut {
@@ -132,7 +134,7 @@ mod tests {
 
     #[test]
     fn what_rose_has_not_helped() {
-        let of = |residuals, place_errors_m| HeldOut { presses: 24, residuals, place_errors_m }.helped();
+        let of = |residuals, place_errors_m| HeldOut { presses: 24, residuals, place_errors_m, rival: None }.helped();
         assert!(of([3.0, 1.1], [0.6e-3, 0.2e-3]), "both fell");
         assert!(of([1.0, 1.01], [0.6e-3, 0.2e-3]), "a detector that was as described");
         assert!(!of([1.0, 1.3], [0.6e-3, 0.2e-3]), "it fits worse");

@@ -20,18 +20,20 @@ use tactomo_physics::threads::map;
 
 /// How a rub is used.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RubSettings {
+pub struct RubSettings<'a> {
     /// Most presses that are fitted, spread over the detector.
     pub presses: usize,
     /// Standard deviation of known places (m).
     pub known_deviation_m: f64,
+    /// Another detector that the presses that are held out are tried on too, as one that was found before.
+    pub rival: Option<&'a Detector>,
 }
 
-impl Default for RubSettings {
+impl Default for RubSettings<'_> {
     /// 160 presses: twice as many bettered places on simulated detectors by less than a tenth. Places to a third of a millimetre, as a hand finds
     /// a mark.
     fn default() -> Self {
-        Self { presses: 160, known_deviation_m: 0.3e-3 }
+        Self { presses: 160, known_deviation_m: 0.3e-3, rival: None }
     }
 }
 
@@ -109,7 +111,7 @@ const LOST: f64 = 2.0;
 pub fn rub(
     nominal: &Detector,
     frames: &[Frame],
-    settings: &RubSettings,
+    settings: &RubSettings<'_>,
     report: &mut dyn FnMut(Step) -> bool,
 ) -> Result<Rub, CalibrateError> {
     // Readings are those of the channels: gains and offsets are fitted from none.
@@ -135,14 +137,17 @@ pub fn rub(
     }
     let posterior = Posterior::new(&last.information, bundle.information_of_press(&slopes), bundle.chi_square(&last))
         .ok_or_else(|| CalibrateError::Unfit { detector: nominal.name.clone(), residual: f64::INFINITY })?;
-    let mut detector = calibrated(nominal, &chosen, &bundle, &posterior);
-    detector.force.clone_from(&told_channels.force);
     let place_errors_m = place_errors_m(&bundle, &slopes, &posterior);
     let after_m = median_m(&place_errors_m);
+    let mut detector = calibrated(nominal, &chosen, &bundle, &posterior);
+    detector.force.clone_from(&told_channels.force);
+    detector.calibration.iter_mut().for_each(|calibration| calibration.place_error_m = Some(after_m));
     let residuals = [held_out::residual(&problem.model, &held)?, held_out::residual(&bundle.model, &held)?];
     let held_out = match residuals {
         [Some(before), Some(after)] => {
-            Some(HeldOut { presses: held.len(), residuals: [before, after], place_errors_m: [before_m, after_m] })
+            let rival = settings.rival.map(|rival| left_by(rival, &chosen, &held)).transpose()?.flatten();
+            let (residuals, place_errors_m) = ([before, after], [before_m, after_m]);
+            Some(HeldOut { presses: held.len(), residuals, place_errors_m, rival })
         }
         _ => None,
     };
@@ -220,6 +225,14 @@ fn place_errors_m(bundle: &Bundle, slopes: &Slopes, posterior: &Posterior) -> Ve
         Some((*at_m, bundle.place_error_m(&contact, slopes, &posterior.precision)?))
     };
     map(&places, error_m).into_iter().flatten().collect()
+}
+
+/// What single contacts leave of presses on another detector, whose electrodes are in the order of the channels.
+fn left_by(rival: &Detector, chosen: &Chosen, held: &[Mean]) -> Result<Option<f64>, CalibrateError> {
+    let problem = Problem::of(&rival.taken_as_exact())?;
+    let is_whole = chosen.kept.len() == rival.electrodes.len();
+    let problem = if is_whole { problem } else { problem.through(&chosen.kept, &[]) };
+    held_out::residual(&problem.model, held)
 }
 
 /// Orders of the wires that fit, the likeliest first.
@@ -306,7 +319,7 @@ fn searched<'a>(
 /// Means of frames that are fitted.
 struct Presses<'a> {
     means: &'a [Mean],
-    settings: &'a RubSettings,
+    settings: &'a RubSettings<'a>,
 }
 
 impl Presses<'_> {

@@ -30,6 +30,7 @@ board = \"esp32 \\\"A\\\"\"
 date = \"2025-03-01\"
 frames = 1200
 presses = 40
+place_error_m = 1.6e-4
 parameters = [\"thickness\", \"x:3\", \"uneven:1,0\", \"gain:2\"]
 standard_errors = [0.01, 1e-4, 0.02, 1e-3]
 left_at_prior = [\"gain:2\"]
@@ -56,7 +57,7 @@ fn unevenness_gains_tolerances_and_calibration_are_read() {
     assert_eq!(detector.tolerances, given, "what is not given is the default");
     let calibration = detector.calibration.unwrap();
     assert_eq!((calibration.board.as_deref(), calibration.date.as_str()), (Some("esp32 \"A\""), "2025-03-01"));
-    assert_eq!((calibration.frames, calibration.presses), (1200, 40));
+    assert_eq!((calibration.frames, calibration.presses, calibration.place_error_m), (1200, 40, Some(1.6e-4)));
     let known = |parameter, standard_error, is_prior| CalibratedParameter { parameter, standard_error, is_prior };
     assert_eq!(
         calibration.parameters,
@@ -186,6 +187,7 @@ fn calibrations() -> impl Strategy<Value = Calibration> {
             date,
             frames,
             presses: frames / 7,
+            place_error_m: (frames % 2 == 0).then_some(1e-6 * (frames + 1) as f64),
             parameters,
             directions,
         },

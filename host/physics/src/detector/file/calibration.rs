@@ -18,6 +18,7 @@ pub(super) struct CalibrationTable {
     date: String,
     frames: usize,
     presses: usize,
+    place_error_m: Option<f64>,
     parameters: Vec<String>,
     standard_errors: Vec<f64>,
     #[serde(default)]
@@ -42,6 +43,9 @@ impl CalibrationTable {
         if count.max(self.directions.len()) > MOST {
             return Err(Problem::new("calibration.parameters", format!("or directions are more than {MOST}")));
         }
+        if self.place_error_m.is_some_and(|error_m| !(error_m.is_finite() && error_m > 0.0)) {
+            return Err(Problem::new("calibration.place_error_m", "has to be a length above 0".to_owned()));
+        }
         each("calibration.standard_errors", &self.standard_errors)?;
         self.directions.iter().try_for_each(|direction| each("calibration.directions", direction))?;
         if let Some(other) = self.left_at_prior.iter().find(|name| !self.parameters.contains(name)) {
@@ -60,6 +64,7 @@ impl CalibrationTable {
             date: self.date,
             frames: self.frames,
             presses: self.presses,
+            place_error_m: self.place_error_m,
             directions: self.directions,
         })
     }
@@ -77,6 +82,9 @@ impl Calibration {
             writeln!(text, "board = {}", quoted(board))?;
         }
         writeln!(text, "date = {}\nframes = {}\npresses = {}", quoted(&self.date), self.frames, self.presses)?;
+        if let Some(error_m) = self.place_error_m {
+            writeln!(text, "place_error_m = {error_m:?}")?;
+        }
         writeln!(text, "parameters = {:?}", names(&|_| true))?;
         write!(text, "standard_errors = ")?;
         write_numbers(text, &errors)?;
