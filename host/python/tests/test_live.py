@@ -105,6 +105,20 @@ def test_stop_ends_an_iteration_in_another_thread():
     assert run.summary["frames"] > 0 and run.next(0.0) is None
 
 
+def test_what_is_learned_is_kept_for_the_next_time(tmp_path):
+    kept = tmp_path / "mine.learned.toml"
+    options = {"simulate": True, "as_built": 3, "learned": kept}
+    with tactomo.Live(seconds=90, **options) as run:
+        while not kept.exists() and run.next(1.0):
+            pass
+    with tactomo.Live(seconds=2, **options) as run:
+        assert sum(1 for _ in run) > 0
+    assert run.summary["learned"]["presses"] >= 5
+    kept.write_text("nonsense")
+    with pytest.raises(tactomo.TactomoError, match=r"mine\.learned\.toml"), tactomo.Live(**options):
+        pass
+
+
 @pytest.fixture
 def ctrl_c():
     """Python's own answer to SIGINT, which it does not set where it was started with SIGINT ignored, as in the background."""
@@ -141,6 +155,7 @@ def test_ctrl_c_ends_the_wait_for_a_silent_board():
         ({"simulate": True, "queue": 0}, "room for one"),
         ({"simulate": True, "port": "COM1"}, "one of port, simulate and replay"),
         ({"simulate": True, "seconds": -1.0}, "seconds"),
+        ({"simulate": True, "learn": False, "learned": "mine.learned.toml"}, "learned: nothing is learned"),
         ({"replay": "not-there.tactomo"}, "cannot open the recording not-there.tactomo"),
     ],
 )

@@ -194,7 +194,7 @@ fn kept(learning: Option<&Learning>) -> Option<Detector> {
         message!("what was learned before is used: {}; --no-learning leaves it out", file.display());
     }
     kept.unwrap_or_else(|error| {
-        message!("{error}, so it is learned anew");
+        message!("what was learned before cannot be used, so it is learned anew: {error}");
         None
     })
 }

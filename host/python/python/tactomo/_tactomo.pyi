@@ -409,6 +409,8 @@ class Live:
         replay: _Path | None = None,
         speed: float = 1.0,
         record: _Path | None = None,
+        learn: bool = True,
+        learned: _Path | None = None,
         scan: str = "whole",
         settle_us: int | None = None,
         average: int | None = None,

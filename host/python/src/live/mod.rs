@@ -17,6 +17,7 @@ use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::RequestedSettings;
 use tactomo::causes::with_causes;
 use tactomo::detector::Detector as Described;
+use tactomo::run::calibration::Learning;
 use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{LinkState, Request, Snapshot};
@@ -44,6 +45,9 @@ const REQUESTS: usize = 64;
 /// `replay` plays a recording, `speed` times as fast. `record` keeps every byte in a new file. `settle_us`, `average` (1, 2, 4 ... 256 conversions),
 /// `max_frames_per_s`, `select_us` and `discard` are asked of the board, and `scan`: `whole`, `four`, `adaptive`, or a list of grounds such as `"0,5,10,15"`.
 ///
+/// The detector of a board is learned from what presses on it, and used once that helps, unless `learn` is false. The file `learned` keeps that for
+/// the next time; what it holds is used from the start.
+///
 /// Up to `queue` events wait; if more come, the oldest are lost and counted in `lost`: a slow loop never slows the board.
 ///
 /// >>> with Live(simulate=True, seconds=1) as live:  # doctest: +SKIP
@@ -58,6 +62,7 @@ pub struct Live {
     settings: RequestedSettings,
     seconds: Option<Duration>,
     record: Option<PathBuf>,
+    learning: Option<Learning>,
     queue: Arc<Queue>,
     has_begun: AtomicBool,
     running: Mutex<Option<Running>>,
@@ -84,12 +89,12 @@ impl Live {
     #[new]
     #[pyo3(signature = (
         port = None, *, detector = None, solver = "auto", seconds = None, queue = 4096, simulate = false, scene = None, board = None,
-        faults = None, seed = None, as_built = None, replay = None, speed = 1.0, record = None, scan = "whole", settle_us = None, average = None,
+        faults = None, seed = None, as_built = None, replay = None, speed = 1.0, record = None, learn = true, learned = None, scan = "whole", settle_us = None, average = None,
         max_frames_per_s = None, select_us = None, discard = None, baud = DEFAULT_BAUD
     ))]
     #[pyo3(
         text_signature = "(port=None, *, detector=None, solver='auto', seconds=None, queue=4096, simulate=False, scene=None, board=None, \
-        faults=None, seed=None, as_built=None, replay=None, speed=1.0, record=None, scan='whole', settle_us=None, average=None, \
+        faults=None, seed=None, as_built=None, replay=None, speed=1.0, record=None, learn=True, learned=None, scan='whole', settle_us=None, average=None, \
         max_frames_per_s=None, select_us=None, discard=None, baud=921600)"
     )]
     #[allow(clippy::too_many_arguments)]
@@ -108,6 +113,8 @@ impl Live {
         replay: Option<PathBuf>,
         speed: f64,
         record: Option<PathBuf>,
+        learn: bool,
+        learned: Option<PathBuf>,
         scan: &str,
         settle_us: Option<u16>,
         average: Option<u16>,
@@ -140,7 +147,12 @@ impl Live {
             (port, false, None) => Chosen::Board { port, baud },
             _ => return Err(refused("give one of port, simulate and replay")),
         };
+        if learned.is_some() && (!learn || source.is_replay()) {
+            return Err(refused("learned: nothing is learned of a recording, or with learn=False"));
+        }
         let detector = source.detector(detector.map(|detector| detector.0.clone()))?;
+        let learning = Learning::of(&detector, None).filter(|_| learn && !source.is_replay());
+        let learning = learning.map(|learning| Learning { file: learned, ..learning });
         let scan: ScanChoice = scan.parse().map_err(|error: String| refused(format!("scan: {error}")))?;
         scan.check(detector.electrodes.len()).map_err(|error| refused(format!("scan: {error}")))?;
         let seconds = seconds.map(|seconds| {
@@ -161,6 +173,7 @@ impl Live {
             },
             seconds: seconds.transpose()?,
             record,
+            learning,
             queue: Arc::new(Queue::new(queue)),
             has_begun: AtomicBool::new(false),
             running: Mutex::new(None),
@@ -296,16 +309,18 @@ impl Live {
             return Err(refused("this Live has run: make another one"));
         }
         let mut source = self.source.open(&self.detector)?;
-        let problem = Problem::of(&self.detector).map_err(raised)?;
-        let record = |path: &PathBuf| Recorder::create(path, &Header::now(&self.detector, source.name()));
+        let kept = self.learning.as_ref().map(Learning::kept).transpose().map_err(refused)?.flatten();
+        let detector = kept.unwrap_or_else(|| self.detector.clone());
+        let problem = Problem::of(&detector).map_err(raised)?;
+        let record = |path: &PathBuf| Recorder::create(path, &Header::now(&detector, source.name()));
         let options = RunOptions {
             recorder: self.record.as_ref().map(record).transpose().map_err(raised)?,
             settings: self.settings,
             scan: self.scan.clone(),
-            solving: Some(Solving::new(self.method, problem)),
+            solving: Some(Solving { learning: self.learning.clone(), ..Solving::new(self.method, problem) }),
             listeners: vec![Box::new(Tail(Arc::clone(&self.queue)))],
             seconds: self.seconds,
-            ..RunOptions::new(self.detector.clone())
+            ..RunOptions::new(detector)
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));

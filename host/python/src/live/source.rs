@@ -37,6 +37,11 @@ pub struct Simulated {
 }
 
 impl Chosen {
+    /// Whether it is a recording.
+    pub fn is_replay(&self) -> bool {
+        matches!(self, Self::Replay { .. })
+    }
+
     /// The detector that is told, where `given` may be another one than the usual.
     pub fn detector(&self, given: Option<Described>) -> PyResult<Described> {
         match self {

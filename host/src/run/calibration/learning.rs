@@ -34,11 +34,7 @@ impl Learning {
         let Some(path) = self.file.as_ref().filter(|path| path.exists()) else { return Ok(None) };
         let kept = Detector::read(path).map_err(|error| with_causes(&error))?;
         if kept.calibration.is_none() || !kept.may_be_of(&self.description) {
-            return Err(format!(
-                "{} was not learned from {} as it is described now",
-                path.display(),
-                self.description.name
-            ));
+            return Err(format!("{} is not of {} as it is described now", path.display(), self.description.name));
         }
         // Newtons are not learned.
         Ok(Some(Detector { force: self.description.force.clone(), ..kept }))
