@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyCFunction, PyDict, PyList, PyTuple, PyType};
 use tactomo::schema::{CONTACT_COLUMNS, ContactColumn, FrameReport, Kind, SHAPE_COLUMNS};
-use tactomo::solve::{Calibrated, Choice, FoundContact as FoundDisc, FoundShape, Solution as Answer};
+use tactomo::solve::{Alternative, Calibrated, Choice, FoundContact as FoundDisc, FoundShape, Solution as Answer};
 
 use crate::error::{raised, refused};
 use crate::pickle::{Restored, restored};
@@ -16,12 +16,12 @@ use crate::pickle::{Restored, restored};
 type ContactValues = [Option<f64>; CONTACT_COLUMNS.len()];
 /// Numbers of a shape, likewise.
 type ShapeValues = [Option<f64>; SHAPE_COLUMNS.len()];
-/// What pickle keeps of a solution: contacts, shape and image; residual, certainty and `calibrated_m`; the choice; flags as JSON.
+/// What pickle keeps of a solution: contacts, shape and image; residual, certainty, `alternative` and `calibrated_m`; the choice; flags as JSON.
 type SolutionState = (
     Vec<ContactValues>,
     Option<ShapeValues>,
     Option<Py<PyArray1<f32>>>,
-    (Option<f64>, Option<f64>, Option<(f64, f64)>),
+    (Option<f64>, Option<f64>, Option<(usize, f64)>, Option<(f64, f64)>),
     Option<(String, String)>,
     String,
 );
@@ -87,6 +87,12 @@ impl Solution {
         self.answer.certainty
     }
 
+    /// The likeliest other number of contacts and its probability, where that has 5 % at least.
+    #[getter]
+    fn alternative(&self) -> Option<(usize, f64)> {
+        self.answer.alternative.map(|Alternative { contacts, certainty }| (contacts, certainty))
+    }
+
     /// What to know before this is believed.
     #[getter]
     fn flags(&self) -> Flags {
@@ -116,7 +122,7 @@ impl Solution {
             answer.contacts.iter().map(contact_values).collect(),
             answer.shape.as_ref().map(shape_values),
             image.as_ref().map(|image| image.clone_ref(slf.py())),
-            (answer.residual, answer.certainty, slf.get().calibrated_m()),
+            (answer.residual, answer.certainty, slf.get().alternative(), slf.get().calibrated_m()),
             slf.get().choice(),
             serde_json::to_string(&answer.flags).map_err(raised)?,
         );
@@ -126,7 +132,7 @@ impl Solution {
     #[classmethod]
     #[pyo3(signature = (*state))]
     fn _restored(_class: &Bound<'_, PyType>, state: &Bound<'_, PyTuple>) -> PyResult<Self> {
-        let (contacts, shape, image, (residual, certainty, calibrated_m), choice, flags): SolutionState =
+        let (contacts, shape, image, (residual, certainty, alternative, calibrated_m), choice, flags): SolutionState =
             state.extract()?;
         let answer = Answer {
             image_s_per_m2: None,
@@ -136,6 +142,7 @@ impl Solution {
             flags: serde_json::from_str(&flags).map_err(raised)?,
             calibrated: calibrated_m.map(|(now_m, calibrated_m)| Calibrated { now_m, calibrated_m }),
             certainty,
+            alternative: alternative.map(|(contacts, certainty)| Alternative { contacts, certainty }),
             choice: choice.map(|(what, why)| Choice { what, why }),
         };
         Ok(Self { answer, image })

@@ -72,7 +72,7 @@ def same(one, other):
     """Whether two solutions say the same, to the last bit."""
     assert one.array.tobytes() == other.array.tobytes() and repr(one) == repr(other)
     assert [repr(contact) for contact in one.contacts] == [repr(contact) for contact in other.contacts]
-    for name in ("residual", "certainty", "choice", "calibrated_m", "is_contacts"):
+    for name in ("residual", "certainty", "alternative", "choice", "calibrated_m", "is_contacts"):
         assert getattr(one, name) == getattr(other, name), name
     assert repr(one.shape) == repr(other.shape) and repr(one.flags) == repr(other.flags)
     assert np.array_equal(one.image, other.image) if one.image is not None else other.image is None

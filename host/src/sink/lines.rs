@@ -54,6 +54,7 @@ impl Fields {
             shape: all.shape.filter(|_| self.answer),
             residual: all.residual.filter(|_| self.answer),
             certainty: all.certainty.filter(|_| self.answer),
+            alternative: all.alternative.filter(|_| self.answer),
             flags: all.flags.filter(|_| self.answer),
             choice: all.choice.filter(|_| self.answer),
             image_s_per_m2: all.image_s_per_m2.filter(|_| self.image),

@@ -202,6 +202,6 @@ pub fn solving(make: MakeSolver) -> Solving {
         make,
         look_at_wires: Arc::new(|_, _, _| None),
         begin_baseline: Arc::new(|detector, _| BaselineTracker::over(FRAMES, detector.electrodes.len().pow(2))),
-        learns: false,
+        learning: None,
     }
 }

@@ -11,7 +11,7 @@ use serde::ser::Serializer;
 use tactomo_physics::readings::Readings;
 
 use crate::pointer::PointerEvent;
-use crate::solve::{Choice, Flags, FoundContact, FoundShape, Solution};
+use crate::solve::{Alternative, Choice, Flags, FoundContact, FoundShape, Solution};
 
 mod columns;
 mod events;
@@ -88,6 +88,9 @@ pub struct FrameReport<'a> {
     /// Probability that as many contacts touch as were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certainty: Option<f64>,
+    /// The likeliest other number of contacts, where it may be the right one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alternative: Option<Alternative>,
     /// What to know before this is believed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flags: Option<&'a Flags>,
@@ -136,6 +139,7 @@ impl<'a> FrameReport<'a> {
             shape: solution.shape.as_ref(),
             residual: solution.residual,
             certainty: solution.certainty,
+            alternative: solution.alternative,
             flags: Some(&solution.flags),
             choice: solution.choice.as_ref(),
             ..Self::default()
@@ -157,7 +161,7 @@ pub struct FrameColumn {
 }
 
 /// The numbers of a frame but for its contacts and image, in the order of every format.
-pub const FRAME_COLUMNS: [FrameColumn; 15] = [
+pub const FRAME_COLUMNS: [FrameColumn; 17] = [
     FrameColumn { name: "frame", kind: Kind::Integer, of: |frame| frame.frame.map(|frame| frame as f64) },
     FrameColumn { name: "sequence", kind: Kind::Integer, of: |frame| frame.sequence.map(|sequence| sequence as f64) },
     FrameColumn { name: "time_s", kind: Kind::Number, of: |frame| frame.time_s },
@@ -168,6 +172,16 @@ pub const FRAME_COLUMNS: [FrameColumn; 15] = [
     FrameColumn { name: "age_us", kind: Kind::Number, of: |frame| frame.age_us },
     FrameColumn { name: "residual", kind: Kind::Number, of: |frame| frame.residual },
     FrameColumn { name: "certainty", kind: Kind::Number, of: |frame| frame.certainty },
+    FrameColumn {
+        name: "alternative_contacts",
+        kind: Kind::Integer,
+        of: |frame| frame.alternative.map(|other| other.contacts as f64),
+    },
+    FrameColumn {
+        name: "alternative_certainty",
+        kind: Kind::Number,
+        of: |frame| frame.alternative.map(|other| other.certainty),
+    },
     FrameColumn { name: "saturated", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.saturated) },
     FrameColumn { name: "misfit", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.misfit) },
     FrameColumn { name: "unfinished", kind: Kind::Flag, of: |frame| frame.flag(|flags| flags.unfinished) },

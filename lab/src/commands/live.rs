@@ -113,6 +113,7 @@ fn view(runs: &[Found]) -> View {
         .column("board", TEXT, |run| run.board)
         .column("scan", TEXT, |run| run.scan.as_str())
         .column("right", PERCENT.digits(0), |run| run.scored.right)
+        .column("or named", PERCENT.digits(0), |run| run.scored.named)
         .column("first right", seconds, |run| run.scored.first_right_s)
         .column("error", MM.digits(2), |run| run.scored.error_m)
         .column("p95", MM.digits(2), |run| run.scored.error_p95_m)
@@ -124,7 +125,7 @@ fn view(runs: &[Found]) -> View {
         .column("age p99", US, |run| run.age_p99_us)
         .column("learned", seconds, |run| run.learned_s)
         .note(
-            "right: share of the time with as many contacts as touch, or the right shape. error: of places, median; late: in the last third. \
+            "right: share of the time with as many contacts as touch, or the right shape. or named: and with an answer that names that number as one it may be. error: of places, median; late: in the last third. \
              invented, doubtful: shares of the answers. gap: longest time without an answer. learned: when what presses taught was first used.",
         )
         .data();

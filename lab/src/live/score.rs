@@ -6,7 +6,7 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::{Contact, Scene, Shape, Touch};
 use tactomo_study::score::quantiles;
 use tactomo_touch::metrics::Matching;
-use tactomo_touch::solve::{FoundShape, Solution};
+use tactomo_touch::solve::{Alternative, FoundShape, Solution};
 
 /// Conductance of a contact that has to be found, in sheet conductances: `lab/examples/floor.rs` has lighter ones found in most frames, not in all.
 const PLAIN: f64 = 0.03;
@@ -35,6 +35,8 @@ pub struct Scored {
     pub answers: usize,
     /// Share of the time in which what was shown was right: as many contacts as there are, each within reach, or the right shape.
     pub right: f64,
+    /// Share of the time in which it was right, or the number of contacts there are was named as one that it may be.
+    pub named: f64,
     /// Time from the first frame to the first right answer to a touch (s); `None` if there was none.
     pub first_right_s: Option<f64>,
     /// Error of places, median and 95 % (m).
@@ -63,6 +65,7 @@ pub struct Scorer {
 struct Worth {
     is_touched: bool,
     is_right: bool,
+    is_named: bool,
     has_invented: bool,
     errors_m: Vec<f64>,
     /// Places of touches (m), and the numbers of their contacts.
@@ -90,11 +93,16 @@ impl Scorer {
         let share = |count: usize| count as f64 / answers.len() as f64;
         let errors = |worth: &[Worth]| quantiles(worth.iter().flat_map(|of| &of.errors_m).copied(), [0.5, 0.95]);
         let [error_m, error_p95_m] = errors(&worth).map_or([None; 2], |of| of.map(Some));
-        let right_s: f64 = worth.iter().zip(&shown_s).filter(|(of, _)| of.is_right).map(|(_, shown_s)| shown_s).sum();
+        let shown_in_all_s = shown_s.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let share_of = |is: fn(&Worth) -> bool| {
+            let of_it = worth.iter().zip(&shown_s).filter(|(of, _)| is(of));
+            of_it.fold(0.0, |sum, (_, shown_s)| sum + shown_s) / shown_in_all_s
+        };
         let first_right = worth.iter().position(|of| of.is_touched && of.is_right);
         Scored {
             answers: answers.len(),
-            right: right_s / shown_s.iter().sum::<f64>().max(f64::MIN_POSITIVE),
+            right: share_of(|of| of.is_right),
+            named: share_of(|of| of.is_right || of.is_named),
             first_right_s: first_right.map(|index| since(&answers[index]) + first.sequence as f64 * period_s),
             error_m,
             error_p95_m,
@@ -125,8 +133,11 @@ impl Scorer {
             let touch = &discs[pair.truth];
             Some(([touch.x_m, touch.y_m], found[pair.found].id?))
         });
+        let plain = discs.iter().filter(|disc| disc.conductance_s > self.plain_s).count();
+        let is_count = |other: &Alternative| (plain..=discs.len()).contains(&other.contacts);
         Worth {
             is_touched,
+            is_named: other.is_none() && solution.is_contacts() && solution.alternative.as_ref().is_some_and(is_count),
             is_right: is_shape && has_all && !is_invented,
             has_invented: is_invented,
             errors_m: matched.pairs.iter().map(|pair| pair.distance_m).collect(),
@@ -200,6 +211,19 @@ mod tests {
         assert_eq!((found.answers, found.id_changes, found.invented), (5, 1, 0.2));
         assert!(found.error_m.is_some_and(|error_m| (error_m - 0.001).abs() < 1e-9), "{found:?}");
         assert!((found.gap_s - FRAME_S).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_number_that_may_be_the_right_one_is_named_if_it_is_that() {
+        let (scorer, scene) = scorer(SceneName::FiveFingers);
+        let discs = scene.at(0.0).into_iter().filter_map(|touch| touch.disc());
+        let four: Vec<_> = discs.skip(1).map(|disc| FoundContact::flat(disc.x_m, disc.y_m, 1e-4)).collect();
+        let or = |other: usize| {
+            let alternative = Some(Alternative { contacts: other, certainty: 0.4 });
+            Solution { alternative, ..contacts(four.clone()) }
+        };
+        let found = scored(&scorer, 0, vec![or(5), or(3), contacts(four.clone()), contacts(four.clone()), or(5)]);
+        assert_eq!((found.right, found.named), (0.0, 0.25), "{found:?}");
     }
 
     #[test]

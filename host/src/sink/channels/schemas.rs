@@ -195,6 +195,7 @@ pub(super) fn touch() -> Value {
             ("shape?", shape()),
             ("residual?", number()),
             ("certainty?", number()),
+            ("alternative?", object(&[("contacts", integer()), ("certainty", number())])),
             ("flags", object(&flags)),
             ("choice?", object(&[("what", text()), ("why", text())])),
             ("events?", array(object(&event))),

@@ -228,6 +228,7 @@ mod tests {
             calibrated: None,
             shape: None,
             certainty: Some(0.75),
+            alternative: None,
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
         assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 3, 4, 2, 2]);

@@ -35,6 +35,8 @@ pub struct Solution {
     /// Probability that as many contacts touch as were found, against other numbers of contacts; of a method that weighs them. `None` where the
     /// answer [is doubtful](Flags::is_doubtful).
     pub certainty: Option<f64>,
+    /// The likeliest other number of contacts, where that has 5 % at least.
+    pub alternative: Option<Alternative>,
     /// What was chosen and why, by a solver that chooses.
     pub choice: Option<Choice>,
 }
@@ -44,6 +46,15 @@ impl Solution {
     pub fn is_contacts(&self) -> bool {
         self.shape.is_none() && self.image_s_per_m2.is_none()
     }
+}
+
+/// Another number of contacts than was found, which may be the right one.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Alternative {
+    /// How many contacts.
+    pub contacts: usize,
+    /// Probability that so many touch.
+    pub certainty: f64,
 }
 
 /// What to know before a solution is believed.

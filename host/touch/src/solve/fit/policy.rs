@@ -86,6 +86,9 @@ pub(crate) const FIRST_GAIN: f64 = 60.0;
 /// One more contact is less likely than one fewer by so many nats before anything is read: scenes of few contacts are more common, and places
 /// that are looked at are chosen.
 pub(crate) const FEWER_NATS: f64 = 1.5;
+/// Share of the evidence from which another number of contacts is named beside the one that was found: what is less than 95 % sure says what else
+/// it may be.
+pub(crate) const NAMED_SHARE: f64 = 0.05;
 /// Standard deviations of the sum of squares over what noise leaves, where another set of contacts is looked for.
 pub(crate) const OTHER_SET_DEVIATIONS: f64 = 1.5;
 /// Nats by which the evidence for another set of contacts has to be higher.

@@ -1,14 +1,14 @@
 //! What was chosen, in words.
 
-use crate::solve::answer::{Calibrated, Choice, FoundShape, Solution};
+use crate::solve::answer::{Alternative, Calibrated, Choice, FoundShape, Solution};
 
 /// The solution of contacts, and what it is.
 pub(super) fn as_contacts(solution: Solution, search: bool) -> Solution {
     if solution.contacts.is_empty() {
         return nothing(solution, search);
     }
-    let what = counted(solution.contacts.len());
-    let sure = solution.certainty.map(|certainty| format!("; count {:.0} % sure", 100.0 * certainty));
+    let what = either(solution.contacts.len(), solution.alternative);
+    let sure = solution.certainty.map(|certainty| sure(solution.contacts.len(), certainty, solution.alternative));
     let left = left(&solution) + &sure.unwrap_or_default() + &calibrate(&solution);
     let why = if search { format!("{left}; searching for a better answer") } else { left };
     chosen(solution, what, why)
@@ -61,6 +61,23 @@ fn figures(shape: &FoundShape) -> String {
 
 fn chosen(solution: Solution, what: String, why: String) -> Solution {
     Solution { choice: Some(Choice { what, why }), ..solution }
+}
+
+/// How many contacts, if it may be another number too.
+fn either(found: usize, alternative: Option<Alternative>) -> String {
+    let Some(Alternative { contacts: other, .. }) = alternative else { return counted(found) };
+    format!("{} or {}", found.min(other), counted(found.max(other)))
+}
+
+/// How sure their number is.
+fn sure(found: usize, certainty: f64, alternative: Option<Alternative>) -> String {
+    let percent = 100.0 * certainty;
+    match alternative {
+        Some(Alternative { contacts, certainty }) => {
+            format!("; {percent:.0} % sure of {found}, {:.0} % of {contacts}", 100.0 * certainty)
+        }
+        None => format!("; count {percent:.0} % sure"),
+    }
 }
 
 fn counted(contacts: usize) -> String {

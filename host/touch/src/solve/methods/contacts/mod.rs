@@ -39,7 +39,7 @@ use self::on_detector::{OnDetector, of_place};
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(crate) use self::solver::{ContactSearch, ContactTracker};
-use crate::solve::answer::{Calibrated, Flags, FoundContact, Solution, SolveError, Uncertainty, check};
+use crate::solve::answer::{Alternative, Calibrated, Flags, FoundContact, Solution, SolveError, Uncertainty, check};
 use crate::solve::before::adaptive_mean;
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::fit::approximation::ApproximationError;
@@ -111,10 +111,31 @@ pub(crate) struct ContactFinder {
 #[derive(Clone, Debug)]
 pub(crate) struct ContactHypothesis {
     fit: DiscFit,
-    /// Probability of their count, among the counts that were tried; none once it has changed without a search.
-    certainty: Option<f64>,
+    /// How sure their count is; none once it has changed without a search.
+    certainty: Option<Certainty>,
     /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
     error: Option<Arc<ApproximationError>>,
+}
+
+/// How sure a count of contacts is, among the counts that were tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Certainty {
+    /// Its probability.
+    share: f64,
+    /// The likeliest other count, if that is worth to be named.
+    alternative: Option<Alternative>,
+}
+
+impl Certainty {
+    /// Of so many contacts, by the logarithms of the evidence for each count; `None` if nothing can be said.
+    fn of(count: usize, by_count: &[f64]) -> Option<Self> {
+        let shares = || by_count.iter().map(|other| (other - by_count[count]).exp());
+        let share = Some(1.0 / shares().sum::<f64>()).filter(|share| share.is_finite())?;
+        let others = shares().enumerate().filter(|(other, _)| *other != count);
+        let other = others.max_by(|(_, a), (_, b)| a.total_cmp(b));
+        let other = other.map(|(contacts, of)| Alternative { contacts, certainty: of * share });
+        Some(Self { share, alternative: other.filter(|other| other.certainty >= policy::NAMED_SHARE) })
+    }
 }
 
 /// Takes each better explanation on the way of a search, and ends it if nothing more is wanted.
@@ -133,10 +154,7 @@ impl ContactHypothesis {
 
     /// A fit, with the logarithms of the evidence for each count.
     fn new(fit: DiscFit, by_count: &[f64], target: &Target) -> Self {
-        let of = by_count[fit.contacts.len()];
-        let all: f64 = by_count.iter().map(|other| (other - of).exp()).sum();
-        let certainty = Some(1.0 / all).filter(|share| share.is_finite());
-        Self { fit, certainty, error: target.error().cloned() }
+        Self { certainty: Certainty::of(fit.contacts.len(), by_count), fit, error: target.error().cloned() }
     }
 }
 

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::discs::{DiscFit, DiscFitter, Effort, place_m};
+use super::discs::{DiscFit, DiscFitter, Effort, PARAMETERS, place_m};
 use super::on_detector::OnDetector;
 use super::scan::Looks;
 use super::{Better, ContactFinder, ContactHypothesis};
@@ -190,7 +190,8 @@ impl ContactFinder {
         let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
         let looks = self.scan.beside(&self.spot_model, &*self.fields, &spots, fit, target);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
-        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::ONE_MORE_GAIN);
+        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::ONE_MORE_GAIN)
+            || self.may_hide_more(fit.contacts.len());
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
             return None;
         }
@@ -200,6 +201,12 @@ impl ContactFinder {
         }
         starts.extend(self.splits(fit));
         self.best_of(starts, target)
+    }
+
+    /// Whether beside so many contacts another may be where the linear theory cannot tell it. What light contacts do to balanced readings has as
+    /// many dimensions as there are electrodes, and each contact takes those of its parameters.
+    fn may_hide_more(&self, count: usize) -> bool {
+        PARAMETERS * (count + 1) >= self.spot_model.electrodes()
     }
 
     /// Starts with a wide contact taken for two beside each other, in some directions.

@@ -264,7 +264,9 @@ impl ContactTracker {
         solution.flags.unfinished |= self.is_stale;
         // Among explanations none of which explains the readings, or of which better ones are still sought, the share of one says nothing.
         let certainty = self.last.as_ref().and_then(|found| found.certainty);
-        solution.certainty = certainty.filter(|_| !solution.flags.is_doubtful());
+        let certainty = certainty.filter(|_| !solution.flags.is_doubtful());
+        solution.certainty = certainty.map(|certainty| certainty.share);
+        solution.alternative = certainty.and_then(|certainty| certainty.alternative);
         self.association.number(&mut solution.contacts);
         solution
     }
