@@ -4,13 +4,16 @@
 //! Derivatives are kept as long as the discs are near to where they were taken: then a step costs one answer of the forward model,
 //! and a very small one none, as the readings follow the derivatives.
 
+mod place_cost;
 mod slopes;
 
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+pub(super) use self::place_cost::PlaceCost;
 use self::slopes::Slopes;
+use super::on_detector::is_near_edge;
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::least_squares::{Damping, NormalEquations, Schedule, Trial, covariance};
 use crate::solve::fit::policy;
@@ -65,9 +68,8 @@ pub(super) struct DiscFit {
     slopes: Arc<Slopes>,
     /// `J^T W^2 J` with what was known before.
     pub normal: DMatrix<f64>,
-    /// Half of the negative derivative of both sums of squares, where a descent ended: none where it is free to end, what pulls it over the edge
-    /// else. Zero of a fit that no descent has looked at.
-    pub pull: DVector<f64>,
+    /// What it would leave with each contact elsewhere, of those near edges; none of a fit that no descent has ended with.
+    pub place_costs: Vec<Option<PlaceCost>>,
     /// Whether more steps would change nothing.
     pub settled: bool,
 }
@@ -190,7 +192,6 @@ impl DiscFitter<'_> {
         let mut damping = Damping::new(SCHEDULE);
         for done in 0..=effort.steps {
             let equations = NormalEquations { matrix: fit.normal.clone(), gradient: self.gradient(&fit, target) };
-            fit.pull.clone_from(&equations.gradient);
             let possible = equations.step(0.0).map(|step| equations.gradient.dot(&step));
             // A fit that is far off is wrong: it need not be wrong to many digits.
             let enough = effort.gain.max(effort.share * (fit.objective() - target.count() as f64));
@@ -217,7 +218,25 @@ impl DiscFitter<'_> {
                 fit = self.anew(fit.contacts, target)?;
             }
         }
+        fit.place_costs = self.place_costs(&fit, target);
         Some(fit)
+    }
+
+    /// What a fit would leave with each contact elsewhere, of those near edges.
+    fn place_costs(&self, fit: &DiscFit, target: &Target) -> Vec<Option<PlaceCost>> {
+        let Some(covariance) = fit.covariance() else { return Vec::new() };
+        let is_near = |k: usize| is_near_edge(fit, k, &covariance, self.fields);
+        let near: Vec<bool> = (0..fit.contacts.len()).map(is_near).collect();
+        if !near.contains(&true) {
+            return Vec::new();
+        }
+        let gradient = self.gradient(fit, target);
+        if near.len() == 1 {
+            return vec![self.place_cost(fit, target, &gradient)];
+        }
+        let step = &covariance * gradient;
+        let of = |(k, is_near): (usize, bool)| is_near.then(|| self.linear_place_cost(fit, k, &covariance, &step));
+        near.into_iter().enumerate().map(|near| of(near).flatten()).collect()
     }
 
     /// A step that lowers what is left, and by how much it was expected to; `None` if there is none.
@@ -255,8 +274,16 @@ impl DiscFitter<'_> {
         };
         let (cost, known) = (target.cost(&volts), self.known(&contacts));
         let (slopes, normal) = (Arc::clone(&fit.slopes), fit.normal.clone());
-        let pull = DVector::zeros(normal.nrows());
-        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, pull, settled: false })
+        cost.is_finite().then_some(DiscFit {
+            contacts,
+            volts,
+            cost,
+            known,
+            slopes,
+            normal,
+            place_costs: Vec::new(),
+            settled: false,
+        })
     }
 
     /// A fit with derivatives taken where it is.
@@ -269,8 +296,16 @@ impl DiscFitter<'_> {
     fn at(&self, contacts: Vec<Contact>, volts: Vec<f64>, slopes: Arc<Slopes>, target: &Target) -> Option<DiscFit> {
         let (cost, known) = (target.cost(&volts), self.known(&contacts));
         let normal = self.normal(&slopes, target);
-        let pull = DVector::zeros(normal.nrows());
-        cost.is_finite().then_some(DiscFit { contacts, volts, cost, known, slopes, normal, pull, settled: false })
+        cost.is_finite().then_some(DiscFit {
+            contacts,
+            volts,
+            cost,
+            known,
+            slopes,
+            normal,
+            place_costs: Vec::new(),
+            settled: false,
+        })
     }
 
     /// Covariance of a fit's parameters if its errors were those of another target; `None` where they are not determined.

@@ -314,8 +314,7 @@ impl ContactFinder {
     fn contact(&self, fit: &DiscFit, k: usize, known: Option<(&DMatrix<f64>, Logs)>) -> FoundContact {
         let contact = fit.contacts[k];
         let conductance_s = known.map_or(contact.conductance_s, |(_, logs)| logs.conductance[0].exp());
-        let near_edge =
-            known.and_then(|(covariance, _)| OnDetector::of(fit, k, covariance, (&*self.fields, self.spacing_m)));
+        let near_edge = known.and_then(|(covariance, _)| OnDetector::of(fit, k, covariance, &self.disc_fitter()));
         let uncertainty = known.map(|(covariance, logs)| {
             let covariance = near_edge.as_ref().map_or_else(|| of_place(covariance, k), |place| place.covariance);
             let conductance_s = conductance_s * logs.conductance[1];

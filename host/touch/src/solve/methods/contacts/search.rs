@@ -341,7 +341,7 @@ impl ContactFinder {
     /// Logarithm of the evidence for a fit.
     pub(super) fn evidence(&self, fit: &DiscFit) -> f64 {
         let inside = fit.covariance().map_or(0.0, |covariance| {
-            let of = |k: usize| OnDetector::of(fit, k, &covariance, (&*self.fields, self.spacing_m));
+            let of = |k: usize| OnDetector::of(fit, k, &covariance, &self.disc_fitter());
             (0..fit.contacts.len()).filter_map(of).map(|place| place.ln_share).sum()
         });
         self.prior.ln_evidence(fit) + inside

@@ -1,5 +1,7 @@
 //! Derivatives of the readings by the parameters of discs.
 
+use std::sync::OnceLock;
+
 use nalgebra::DMatrix;
 
 use super::{DiscFitter, PARAMETERS, place_m};
@@ -24,6 +26,8 @@ pub(super) struct Slopes {
     pub(super) by: Vec<Vec<f64>>,
     /// Constriction of each: the resistance of the crowded current under it over the contact's own, `S C`.
     pub(super) constriction: Vec<f64>,
+    /// Second derivatives by the place of a single contact (V), once they are needed; `None` if there are none.
+    pub(super) bends: OnceLock<Option<[Vec<f64>; 3]>>,
 }
 
 impl Slopes {
@@ -77,7 +81,7 @@ impl DiscFitter<'_> {
         let constriction = constriction.collect();
         let sound = volts.iter().chain(by.iter().flatten()).all(|value| value.is_finite());
         let along = at.iter().map(|contact| self.fields.footing(place_m(contact)).1).collect();
-        sound.then_some(Slopes { at, along, volts, by, constriction })
+        sound.then_some(Slopes { at, along, volts, by, constriction, bends: OnceLock::new() })
     }
 
     /// Derivative of the readings from a small change of the impedances: `V = Vcc (1 - Z[e][g] / L)`, `L = Z[g][g] + R_on`.
