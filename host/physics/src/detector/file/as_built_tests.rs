@@ -127,17 +127,19 @@ fn a_wrong_calibration_is_named_with_its_line_and_what_is_allowed() {
     let parameters = error("\"x:3\"", "\"x:4\"");
     assert_eq!(
         parameters,
-        "line 24: calibration.parameters names `x:4`, but the detector has 4 electrodes, counted from 0"
+        "line 25: calibration.parameters names `x:4`, but the detector has 4 electrodes, counted from 0"
     );
-    assert!(error("\"x:3\"", "\"z:3\"").starts_with("line 24: calibration.parameters `z:3` is no parameter of"));
+    assert!(error("\"x:3\"", "\"z:3\"").starts_with("line 25: calibration.parameters `z:3` is no parameter of"));
     let waves = error("uneven:1,0", "uneven:999999999999,0");
-    assert!(waves.contains("line 24") && waves.contains("up to 8 half waves"), "{waves}");
-    assert!(error("[0.01, 1e-4, 0.02, 1e-3]", "[0.01]").contains("line 25: calibration.standard_errors has 1 numbers"));
-    assert!(error("[0.01, 1e-4,", "[-0.01, 1e-4,").contains("line 25: calibration.standard_errors holds -0.01"));
-    assert!(error("[0.01, 1e-5, 0.0, 0.0]", "[0.01, inf, 0.0, 0.0]").contains("line 27: calibration.directions holds"));
-    assert!(error("[\"gain:2\"]", "[\"gain:1\"]").contains("line 26: calibration.left_at_prior names \"gain:1\""));
+    assert!(waves.contains("line 25") && waves.contains("up to 8 half waves"), "{waves}");
+    assert!(error("[0.01, 1e-4, 0.02, 1e-3]", "[0.01]").contains("line 26: calibration.standard_errors has 1 numbers"));
+    assert!(error("[0.01, 1e-4,", "[-0.01, 1e-4,").contains("line 26: calibration.standard_errors holds -0.01"));
+    assert!(error("[0.01, 1e-5, 0.0, 0.0]", "[0.01, inf, 0.0, 0.0]").contains("line 28: calibration.directions holds"));
+    assert!(error("[\"gain:2\"]", "[\"gain:1\"]").contains("line 27: calibration.left_at_prior names \"gain:1\""));
     assert!(error("frames = 1200", "frames = -1").contains("line 22"));
     assert!(error("date = \"2025-03-01\"\n", "").contains("missing field `date`"));
+    let of_places = error("place_error_m = 1.6e-4", "place_error_m = -1.0");
+    assert_eq!(of_places, "line 24: calibration.place_error_m has to be a length above 0");
 }
 
 #[test]
