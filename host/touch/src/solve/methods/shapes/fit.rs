@@ -21,6 +21,10 @@ const LONGEST_LOG: f64 = 0.5;
 const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-6, tries: 5 };
 /// Share of the sum that a step gains below which it is the last.
 const LEAST_GAIN: f64 = 2e-3;
+/// A descent that is so many times above its bound may hope for a factor that is this power of what its last step brought. Of 1957 starts for lines,
+/// rings and contacts (the example `shapes`), two that ended below their bound in five steps were given up on the way, and 45 % of the time saved.
+const FAR: f64 = 100.0;
+const HOPE: i32 = 12;
 /// Narrowest strip, in usual widths: below, the readings no longer tell.
 const NARROWEST: f64 = 0.02;
 /// Widest strip, in mean distances of electrodes: what is wider is a disc's or an image's business.
@@ -101,6 +105,8 @@ pub(super) struct Look {
 struct Descent<'a> {
     fitter: &'a StripFitter<'a>,
     target: &'a Target,
+    /// It is given up where it will hardly come below this sum.
+    most: f64,
 }
 
 impl LeastSquares for Descent<'_> {
@@ -124,7 +130,9 @@ impl LeastSquares for Descent<'_> {
     }
 
     fn goes_on(&self, before: &Look, after: &Look, _equations: &NormalEquations) -> bool {
-        self.sum(before) - self.sum(after) >= LEAST_GAIN * self.sum(before)
+        let (before, after) = (self.sum(before), self.sum(after));
+        let may_come_below = after < FAR * self.most || after * (after / before).powi(HOPE) < self.most;
+        before - after >= LEAST_GAIN * before && may_come_below
     }
 }
 
@@ -140,8 +148,13 @@ impl StripFitter<'_> {
 
     /// The nearest minimum from a start, in at most so many steps.
     pub fn fit(&self, start: Laid, target: &Target, steps: usize) -> StripFit {
+        self.fit_below(f64::INFINITY, start, target, steps)
+    }
+
+    /// The same, given up where it will hardly come below a sum of squares.
+    pub fn fit_below(&self, most: f64, start: Laid, target: &Target, steps: usize) -> StripFit {
         let start = self.look(start, target);
-        let found = minimise(&mut Descent { fitter: self, target }, start, steps, SCHEDULE);
+        let found = minimise(&mut Descent { fitter: self, target, most }, start, steps, SCHEDULE);
         let Minimum { at: look, matrix, settled } = found;
         let cost = look.residuals.rows(0, look.laid.volts.len()).norm_squared();
         StripFit { laid: look.laid, cost, covariance: matrix.as_ref().and_then(covariance), settled }

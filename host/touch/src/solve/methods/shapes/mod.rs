@@ -113,12 +113,13 @@ impl ShapeFinder {
         let coarse = self.fitter(&self.coarse);
         let starts = start::starts(contacts, self.usual.width_m, MOST_WEIGHT * self.usual.conductance_s);
         let starts = starts.into_iter().chain(from.map(|fit| *fit.strip()));
-        let begun = starts.filter_map(|start| Some(coarse.fit(coarse.lay(start)?, target, FIRST_STEPS)));
+        let most = policy::SHAPE_BEGUN_RIVALS * rival;
+        let begun = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, FIRST_STEPS)));
         let (lines, rings): (Vec<_>, Vec<_>) = begun.partition(|fit| fit.strip().is_line());
         let mut kinds: Vec<_> = [lines, rings]
             .into_iter()
             .filter_map(|begun| begun.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost)))
-            .filter(|best| best.cost < policy::SHAPE_BEGUN_RIVALS * rival)
+            .filter(|best| best.cost < most)
             .map(|best| coarse.fit(best.laid, target, COLD_STEPS))
             .filter(|best| best.evidence().score() < policy::SHAPE_RIVALS * rival)
             .collect();
