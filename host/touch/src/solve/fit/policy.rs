@@ -38,8 +38,6 @@ pub(crate) const PARAMETER_PRICE: f64 = 7.0;
 pub(crate) const MISFIT_DEVIATIONS: f64 = 5.0;
 /// Standard deviations of the sum of squares beyond which it is worth the time to look for another explanation: once in some hundred frames.
 pub(crate) const DOUBT_DEVIATIONS: f64 = 3.0;
-/// Mean square (squared deviations) of what a fit with the rough model leaves, where no other start is tried.
-pub(crate) const EXPLAINED_MEAN_SQUARE: f64 = 1.5;
 /// Mean square (squared deviations) of what a fit leaves, above which it is the contacts that are wrong: no starts around a single one are
 /// tried then, nor what the readings may be off by together.
 pub(crate) const WRONG_MEAN_SQUARE: f64 = 5.0;
@@ -80,6 +78,14 @@ pub(crate) const CALIBRATION_WORTH: f64 = 2.0;
 
 /// Gain in the sum of squares (squared deviations), in the linear theory, below which one more contact is not tried.
 pub(crate) const ONE_MORE_GAIN: f64 = 8.0;
+/// Nats of evidence that one more contact has to bring by what spots tell, to be fitted as a disc: as many below nothing as make an answer of 5 %
+/// worth to be named, and two for what spots are off.
+pub(crate) const ONE_MORE_NATS: f64 = -5.0;
+/// Starts whose spots are less likely than the best by so many nats are left: a mode that is 1 in 400 says nothing.
+pub(crate) const MODES_NATS: f64 = 6.0;
+/// Rise of the sum of squares (squared deviations), as spots tell it, above which other contacts than those of a fit, or one fewer, are not tried with
+/// discs: one contact takes 22 nats of evidence at most, and spots tell a rise up to twice too large.
+pub(crate) const LOST_SQUARES: f64 = 100.0;
 /// Gain in the sum of squares (squared deviations), in the linear theory, for there being any contact at all: noise alone has 1 in 10^7 frames
 /// above it.
 pub(crate) const FIRST_GAIN: f64 = 60.0;

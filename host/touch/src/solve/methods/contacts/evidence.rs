@@ -37,6 +37,16 @@ impl Prior {
         self.area_m2 / 12.0
     }
 
+    /// What one contact more, the one of such a number, adds to the logarithm of the evidence but for the readings' determinant: with places in a
+    /// unit (m), and the logarithm of the resistance of contact and crowded current, `over_contact` times the contact's own. Its radius is
+    /// what it was before anything was read.
+    pub fn ln_of_one_more(&self, number: usize, unit_m: f64, over_contact: f64) -> f64 {
+        -self.area_m2.ln() - policy::CONDUCTANCE_DEVIATION.ln() + TAU.ln() - policy::FEWER_NATS
+            + 2.0 * unit_m.ln()
+            + over_contact.ln()
+            + (number as f64).ln()
+    }
+
     /// Logarithm of the evidence for a fit; nothing speaks for one that is not determined.
     pub fn ln_evidence(&self, fit: &DiscFit) -> f64 {
         let Some(factor) = Cholesky::new(fit.normal.clone()) else { return f64::NEG_INFINITY };

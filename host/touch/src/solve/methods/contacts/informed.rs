@@ -199,16 +199,28 @@ impl ContactFinder {
         best
     }
 
-    /// One contact more at a time, each with what its readings may be off by, while there are too few.
+    /// As many contacts as their spots ask for, then one more at a time, each with what its readings may be off by, while there are too few.
     fn one_by_one(&self, first: Informed, better: &mut Better<'_>) -> (Informed, ControlFlow<()>) {
-        let (mut best, mut last) = (first.clone(), first);
+        let crowd = self.crowd(&first.hypothesis.fit, &first.target).map(|crowd| {
+            let (hypothesis, target) = (ContactHypothesis::of(crowd, &first.target), first.target.clone());
+            self.settled(Informed { hypothesis, target })
+        });
+        let is_likelier = |crowd: &Informed| self.whole_evidence(crowd) > self.whole_evidence(&first);
+        let crowd = crowd.filter(is_likelier);
+        if let Some(crowd) = &crowd
+            && better(&crowd.hypothesis).is_break()
+        {
+            return (crowd.clone(), ControlFlow::Break(()));
+        }
+        let mut best = crowd.unwrap_or(first);
+        let mut last = best.clone();
         while self.is_misfit(&best.hypothesis.fit, &best.target) {
             let Informed { hypothesis: ContactHypothesis { fit, .. }, target } = last;
             if fit.contacts.len() >= self.settings.most {
                 break;
             }
             let starts = self.pairs(&fit, &target);
-            let Some(more) = self.one_more(&fit, starts, &target) else { break };
+            let Ok(more) = self.one_more(&fit, starts, &target) else { break };
             last = self.settled(Informed { hypothesis: ContactHypothesis::of(more, &target), target });
             if self.whole_evidence(&last) > self.whole_evidence(&best) {
                 best = last.clone();

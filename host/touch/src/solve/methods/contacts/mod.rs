@@ -1,8 +1,8 @@
 //! A few contacts fitted to the full contact physics, off any grid.
 //!
-//! Each contact is a disc with a place, a conductance and a radius. Discs are fitted with the forward model itself ([`discs`]), one
-//! more at a time from where it would explain most ([`scan`], in which contacts are [spots](crate::solve::fit::spots) of a small circuit), as long as
-//! the evidence for it grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
+//! Each contact is a disc with a place, a conductance and a radius. Discs are fitted with the forward model itself ([`discs`]), from where contacts
+//! would explain most as [spots](crate::solve::fit::spots) of a small circuit ([`scan`], [`spot_fit`], [`starts`]), as long as the evidence for
+//! them grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
 
 #[cfg(test)]
 mod coverage_tests;
@@ -23,6 +23,8 @@ mod rows;
 mod scan;
 mod search;
 mod solver;
+mod spot_fit;
+mod starts;
 mod systematic_error;
 #[cfg(test)]
 mod tests;

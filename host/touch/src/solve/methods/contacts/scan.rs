@@ -4,7 +4,6 @@ use std::borrow::Cow;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::discs::DiscFit;
 use crate::solve::fit::balance;
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::spots::{LoadedSpot, SpotModel};
@@ -55,6 +54,16 @@ pub(super) struct Looks<'a> {
     gain: f64,
 }
 
+/// Contacts that are fitted, beside which more are looked for.
+pub(super) struct Fitted<'a> {
+    pub spots: &'a [LoadedSpot],
+    /// Whitened derivatives of the readings, a column for each parameter, and their normal matrix.
+    pub slopes: DMatrix<f64>,
+    pub normal: &'a DMatrix<f64>,
+    /// Whitened readings that are left.
+    pub left: DVector<f64>,
+}
+
 /// Contacts to start from, and by how much they lower the sum of squares, in the linear theory.
 pub(super) struct Candidate {
     /// Place in the scan, and conductance (S).
@@ -97,31 +106,27 @@ impl Scan {
         1.0 - explained / volts.norm_squared().max(f64::MIN_POSITIVE)
     }
 
-    /// Looks for more contacts beside those of a fit, which are `spots`: what they would explain that a change of those would not.
+    /// Looks for more contacts beside those that are fitted: what they would explain that a change of those would not.
     ///
-    /// With the fit's derivatives `S` and normal matrix `H`, of a pattern `p` only `p - S H^-1 S^T p` is new; what is left, `r`, has no
+    /// With the fit's whitened derivatives `S` and normal matrix `H`, of a pattern `p` only `p - S H^-1 S^T p` is new; what is left, `r`, has no
     /// part along `S`, as the fit is at its minimum.
     pub fn beside(
         &self,
         spot_model: &SpotModel,
         fields: &dyn SpotFields,
-        spots: &[LoadedSpot],
-        fit: &DiscFit,
+        fitted: &Fitted<'_>,
         target: &Target,
     ) -> Option<Looks<'_>> {
         let n = spot_model.electrodes();
-        let solved = spot_model.solve(spots, fields)?;
-        let target = target.at(&fit.volts);
+        let solved = spot_model.solve(fitted.spots, fields)?;
         let mut patterns = DMatrix::zeros(n * n, self.spots.len());
         for (mut column, spot) in patterns.column_iter_mut().zip(&self.spots) {
-            let potentials_ohm = spot_model.potentials_ohm(&solved, spots, spot, fields);
+            let potentials_ohm = spot_model.potentials_ohm(&solved, fitted.spots, spot, fields);
             spot_model.volts_per_s(&solved, &potentials_ohm, column.as_mut_slice());
             target.whiten(column.as_mut_slice());
         }
-        let whitened: Vec<_> = fit.slopes_v().iter().map(|slope| target.whitened(slope)).collect();
-        let slopes = DMatrix::from_fn(whitened.len(), n * n, |parameter, i| whitened[parameter][i]);
-        let mut shared = slopes * &patterns;
-        let factor = Cholesky::new(fit.normal.clone())?;
+        let mut shared = fitted.slopes.tr_mul(&patterns);
+        let factor = Cholesky::new(fitted.normal.clone())?;
         factor.l_dirty().solve_lower_triangular_mut(&mut shared);
         let news = patterns.column_iter().zip(shared.column_iter()).map(|(pattern, shared)| {
             let (all, old) = (pattern.norm_squared(), shared.norm_squared());
@@ -130,7 +135,7 @@ impl Scan {
         Some(Looks {
             squares: news.collect::<Vec<_>>().into(),
             patterns: Cow::Owned(patterns),
-            left: target.residuals(&fit.volts).into(),
+            left: fitted.left.clone(),
             load_ohm: &[],
             gain: 1.0,
         })

@@ -1,37 +1,31 @@
-//! How many contacts, and where each fit starts.
+//! How many contacts.
 //!
-//! One contact more at a time: what each place would explain that the contacts so far cannot ([`scan`](super::scan)), a fit of
-//! discs from the best of them, and the evidence for the answer ([`evidence`](super::evidence)). Then one fewer at a time, as long as
-//! that is more likely.
+//! As many at once as explain much each, as spots ([`spot_fit`](super::spot_fit)); then one more at a time: what each place would explain that the
+//! contacts so far cannot ([`scan`](super::scan)), spots there, discs from the best of these, and the evidence for the answer
+//! ([`evidence`](super::evidence)). Then one fewer at a time, as long as that is more likely.
 
-use std::f64::consts::TAU;
+use nalgebra::{DMatrix, DVector};
 
 use super::discs::{DiscFit, DiscFitter, Effort, PARAMETERS, place_m};
 use super::on_detector::OnDetector;
-use super::scan::Looks;
+use super::scan::{Fitted, Looks};
+use super::spot_fit::SpotFitter;
 use super::{Better, ContactFinder, ContactHypothesis};
 use crate::solve::fit::policy;
-use crate::solve::fit::spots::LoadedSpot;
 use crate::solve::fit::target::Target;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
-use tactomo_physics::space::{self, Place};
+use tactomo_physics::space;
 
-/// A few steps from each start, and the way to the minimum from the best.
+/// A few steps, more of them with the rough model, and all the way to the minimum.
 const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
 const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
-pub(super) const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
+pub(super) const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.1 };
 /// With radii free: each step of a wide disc costs as much as ten of a fingertip's.
 const RELEASED: Effort = Effort { steps: 6, gain: 0.2, share: 0.02 };
-/// Starts of one more contact, and how many of them go on.
+/// Starts of contacts, and how many of them go on.
 const STARTS: usize = 4;
 const FINALISTS: usize = 2;
-/// Starts around a single contact.
-const BESIDE: usize = 8;
-/// Directions along which a contact that may be two is split.
-const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]];
-/// Places of two fits that are so near, in radii, are taken for one.
-const ALIKE: f64 = 0.3;
 
 impl ContactFinder {
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
@@ -104,13 +98,19 @@ impl ContactFinder {
         if ones.first().is_none_or(|best| best.gain < policy::FIRST_GAIN) {
             return None;
         }
-        let starts = ones.iter().map(|candidate| self.discs_of(&self.scan.start(&looks, candidate)));
-        let best = self.best_of(starts.collect(), target)?;
+        let starts: Vec<_> = ones.iter().map(|one| self.discs_of(&self.scan.start(&looks, one))).collect();
+        let mut begun = self.begun_by(&mut SpotFitter::new(self, None, target), &starts);
+        begun.truncate(FINALISTS);
+        let best = self.best_of(begun, target)?;
         if best.cost > policy::WRONG_MEAN_SQUARE * target.count() as f64 {
             return Some(best);
         }
-        let beside = self.best_of(self.beside(&best.contacts[0], best.along(0).0), target);
-        Some(beside.filter(|beside| self.evidence(beside) > self.evidence(&best)).unwrap_or(best))
+        let beside = self.beside(&best.contacts[0], best.along(0).0);
+        let mut others = self.begun_by(&mut SpotFitter::new(self, Some(&best), target), &beside);
+        others.retain(|other| !self.is_alike(&best.contacts, &other.contacts) && self.may_be_as_good(other, &best));
+        others.truncate(FINALISTS);
+        let other = self.best_of(others, target);
+        Some(other.filter(|other| self.evidence(other) > self.evidence(&best)).unwrap_or(best))
     }
 
     /// A fit with radii free, if it is at the widest that is plausible; else what it is.
@@ -140,9 +140,23 @@ impl ContactFinder {
         let mut best = self.noted(first.clone(), &mut by_count);
         let _ = better(&ContactHypothesis::new(first.clone(), &by_count, target));
         best = Self::better_of(best, self.noted(self.released(first, target), &mut by_count));
+        if let Some(crowd) = self.crowd(&best.0, target) {
+            let crowd = self.noted(crowd, &mut by_count);
+            if crowd.1 > best.1 {
+                last = crowd.0.clone();
+                best = crowd;
+                let _ = better(&ContactHypothesis::new(best.0.clone(), &by_count, target));
+            }
+        }
         while last.contacts.len() < self.settings.most {
-            let Some(more) = self.one_more(&last, std::mem::take(&mut starts), target) else { break };
-            let more = self.noted(more, &mut by_count);
+            let more = match self.one_more(&last, std::mem::take(&mut starts), target) {
+                Ok(more) => self.noted(more, &mut by_count),
+                Err(evidence) => {
+                    let count = &mut by_count[last.contacts.len() + 1];
+                    *count = count.max(evidence);
+                    break;
+                }
+            };
             last = more.0.clone();
             if more.1 > best.1 {
                 best = more;
@@ -171,6 +185,15 @@ impl ContactFinder {
         ContactHypothesis::new(best.0, &by_count, target)
     }
 
+    /// As many contacts at once as their spots ask for, where those of a fit leave far more than noise.
+    pub(super) fn crowd(&self, fit: &DiscFit, target: &Target) -> Option<DiscFit> {
+        if fit.cost < policy::WRONG_MEAN_SQUARE * target.count() as f64 {
+            return None;
+        }
+        let crowd = SpotFitter::new(self, Some(fit), target).crowd(&fit.contacts)?;
+        self.plausible_fitter().fit(crowd, target, COLD)
+    }
+
     /// The more likely one.
     fn better_of(one: (DiscFit, f64), other: (DiscFit, f64)) -> (DiscFit, f64) {
         if other.1 > one.1 { other } else { one }
@@ -185,52 +208,49 @@ impl ContactFinder {
         (fit, evidence)
     }
 
-    /// The best fit with one more contact, from some starts or from where it would explain most; `None` if the readings ask for none.
-    pub(super) fn one_more(&self, fit: &DiscFit, mut starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
+    /// The best fit with one more contact, from some starts or from where it would explain most; the logarithm of the evidence for one, as their spots
+    /// tell it, if it is not worth a fit of discs.
+    pub(super) fn one_more(
+        &self,
+        fit: &DiscFit,
+        mut starts: Vec<Vec<Contact>>,
+        target: &Target,
+    ) -> Result<DiscFit, f64> {
         let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
-        let looks = self.scan.beside(&self.spot_model, &*self.fields, &spots, fit, target);
+        let at = target.at(&fit.volts);
+        let slopes: Vec<_> = fit.slopes_v().iter().map(|slope| DVector::from_vec(at.whitened(slope))).collect();
+        let (slopes, left) = (DMatrix::from_columns(&slopes), target.residuals(&fit.volts).into());
+        let fitted = Fitted { spots: &spots, slopes, normal: &fit.normal, left };
+        let looks = self.scan.beside(&self.spot_model, &*self.fields, &fitted, &at);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
         let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::ONE_MORE_GAIN)
             || self.may_hide_more(fit.contacts.len());
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
-            return None;
+            return Err(f64::NEG_INFINITY);
         }
         for (looks, one) in looks.iter().flat_map(|looks| ones.iter().map(move |one| (looks, one))) {
             let more = self.discs_of(&self.scan.start(looks, one));
             starts.push(fit.contacts.iter().copied().chain(more).collect());
         }
         starts.extend(self.splits(fit));
-        self.best_of(starts, target)
+        let mut spots = SpotFitter::new(self, Some(fit), target);
+        let mut begun = self.begun_by(&mut spots, &starts);
+        let best = begun.first().ok_or(f64::NEG_INFINITY)?;
+        let gain = 0.5 * (fit.cost - best.cost) + spots.ln_of_last(best).unwrap_or(f64::NEG_INFINITY);
+        // Of what contacts are not, as a ring, spots tell little.
+        if gain < policy::ONE_MORE_NATS && !self.is_misfit(fit, target) {
+            return Err(self.evidence(fit) + gain);
+        }
+        let most = best.cost + 2.0 * policy::MODES_NATS;
+        begun.retain(|start| start.cost <= most);
+        begun.truncate(if gain > 0.0 { FINALISTS } else { 1 });
+        self.best_of(begun, target).ok_or(f64::NEG_INFINITY)
     }
 
     /// Whether beside so many contacts another may be where the linear theory cannot tell it. What light contacts do to balanced readings has as
     /// many dimensions as there are electrodes, and each contact takes those of its parameters.
     fn may_hide_more(&self, count: usize) -> bool {
         PARAMETERS * (count + 1) >= self.spot_model.electrodes()
-    }
-
-    /// Starts with a wide contact taken for two beside each other, in some directions.
-    fn splits(&self, fit: &DiscFit) -> Vec<Vec<Contact>> {
-        let widest =
-            (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
-        let is_wide = |k: &usize| fit.contacts[*k].radius_m > policy::TWO_RADII * self.settings.radius_m;
-        let Some(k) = widest.filter(is_wide) else { return Vec::new() };
-        let wide = fit.contacts[k];
-        let (along, _) = fit.along(k);
-        let split = |[a, b]: [f64; 2]| {
-            let half = |sign: f64| {
-                let way_m = sign * wide.radius_m;
-                let to_m = space::moved(place_m(&wide), [way_m * a, way_m * b], along);
-                let [x_m, y_m, z_m] = self.fields.footing(to_m).0;
-                let radius_m = self.settings.radius_m;
-                Contact { x_m, y_m, z_m, radius_m, conductance_s: 0.5 * wide.conductance_s }
-            };
-            let mut contacts = fit.contacts.clone();
-            contacts[k] = half(1.0);
-            contacts.push(half(-1.0));
-            contacts
-        };
-        DIRECTIONS.map(split).into()
     }
 
     /// Whether a fit leaves a little more than noise should, or needs a contact as wide as may be.
@@ -253,21 +273,9 @@ impl ContactFinder {
             others.remove(k);
             let rough = DiscFitter { model: &*self.rough, ..self.plausible_fitter() };
             let fewer = rough.fit(others, target, FIRST)?;
-            let other = self.one_more(&fewer, Vec::new(), target)?;
+            let other = self.one_more(&fewer, Vec::new(), target).ok()?;
             (self.evidence(&other) > evidence + policy::OTHER_SET_NATS).then_some(other)
         })
-    }
-
-    /// Starts around a contact: near edges and pads there may be another minimum that is nearly as deep.
-    fn beside(&self, one: &Contact, along: [Place; 2]) -> Vec<Vec<Contact>> {
-        let start = |turn: usize| {
-            let (sin, cos) = (TAU * turn as f64 / BESIDE as f64).sin_cos();
-            let away_m = self.apart_m();
-            let to_m = space::moved(place_m(one), [away_m * cos, away_m * sin], along);
-            let [x_m, y_m, z_m] = self.fields.footing(to_m).0;
-            vec![Contact { x_m, y_m, z_m, radius_m: self.settings.radius_m, ..*one }]
-        };
-        (0..BESIDE).map(start).collect()
     }
 
     /// The best fit with one contact fewer: without each weak one, and with two that nearly touch taken for one.
@@ -289,53 +297,19 @@ impl ContactFinder {
                 merged
             })
         });
-        let fewer =
-            self.best_of(self.dispensable(fit, target).into_iter().map(without).chain(merged).collect(), target)?;
+        let fewer: Vec<_> = self.dispensable(fit, target).into_iter().map(without).collect();
+        let fewer = self.best_near(fit, &fewer, |start| self.may_be_as_good(start, fit), target);
+        // Two that are one wide contact are far from what spots tell.
+        let merged = self.best_near(fit, &merged.collect::<Vec<_>>(), |_| true, target);
+        let objective = |fit: &DiscFit| fit.cost + fit.known;
+        let all = [fewer, merged].into_iter().flatten();
+        let fewer = all.min_by(|a, b| objective(a).total_cmp(&objective(b)))?;
         Some(self.released(fewer, target))
     }
 
     /// Contacts that a fit may do without: weak ones, and of a detector that is not known exactly any, as they may stand for what it differs by.
     fn dispensable(&self, fit: &DiscFit, target: &Target) -> Vec<usize> {
         if target.error().is_some() { (0..fit.contacts.len()).collect() } else { self.weak(fit) }
-    }
-
-    fn merged(&self, a: &Contact, b: &Contact) -> Contact {
-        let conductance_s = a.conductance_s + b.conductance_s;
-        let share = b.conductance_s / conductance_s;
-        let between = |a: f64, b: f64| a + share * (b - a);
-        let place_m = [between(a.x_m, b.x_m), between(a.y_m, b.y_m), between(a.z_m, b.z_m)];
-        let [x_m, y_m, z_m] = self.fields.footing(place_m).0;
-        Contact { x_m, y_m, z_m, conductance_s, radius_m: a.radius_m.hypot(b.radius_m) }
-    }
-
-    /// The best fit from some starts: with the rough model a few steps from each, then more from the best; last with the full one.
-    fn best_of(&self, starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
-        let full = self.plausible_fitter();
-        let rough = DiscFitter { model: &*self.rough, ..full };
-        let objective = |fit: &DiscFit| fit.cost + fit.known;
-        let by_objective = |a: &DiscFit, b: &DiscFit| objective(a).total_cmp(&objective(b));
-        let mut fits = Vec::with_capacity(starts.len());
-        for fit in starts.into_iter().filter_map(|start| rough.fit(start, target, FIRST)) {
-            let explains = fit.cost < policy::EXPLAINED_MEAN_SQUARE * target.count() as f64;
-            fits.push(fit);
-            if explains {
-                break;
-            }
-        }
-        fits.sort_unstable_by(by_objective);
-        // Starts often lead to one minimum.
-        fits.dedup_by(|later, first| self.is_alike(first, later));
-        fits.truncate(FINALISTS);
-        let fits = fits.into_iter().filter_map(|fit| rough.go_on(&fit, target, ROUGH));
-        let best = fits.min_by(by_objective)?;
-        full.fit(best.contacts, target, COLD)
-    }
-
-    /// Whether each contact of one fit is where one of the other is.
-    fn is_alike(&self, a: &DiscFit, b: &DiscFit) -> bool {
-        let near =
-            |a: &Contact, b: &Contact| space::distance(place_m(a), place_m(b)) < ALIKE * a.radius_m.min(b.radius_m);
-        a.contacts.iter().all(|a| b.contacts.iter().any(|b| near(a, b)))
     }
 
     /// Logarithm of the evidence for a fit.
@@ -352,31 +326,7 @@ impl ContactFinder {
         -0.5 * target.cost_of_nothing()
     }
 
-    /// Starts nearer to each other are one (m).
-    fn apart_m(&self) -> f64 {
-        self.spacing_m / 3.0
-    }
-
-    /// Discs of the usual radius where spots are.
-    fn discs_of(&self, spots: &[LoadedSpot]) -> Vec<Contact> {
-        let disc = |spot: &LoadedSpot| {
-            let [x_m, y_m, z_m] = spot.spot.place_m;
-            // What is better than its own spreading allows is nearly perfect.
-            let ohm = (spot.ohm - spot.spot.own_ohm).max(0.2 * spot.spot.own_ohm);
-            let contact = Contact::flat(x_m, y_m, self.settings.radius_m, 1.0 / (ohm * spot.spot.share));
-            self.disc_fitter().held(Contact { z_m, ..contact })
-        };
-        spots.iter().map(disc).collect()
-    }
-
-    /// The spot that a disc acts as from afar: a wider one meets less of its own spreading resistance.
-    fn spot_of(&self, contact: &Contact) -> LoadedSpot {
-        let spot = self.fields.spot(place_m(contact));
-        let own_ohm = spot.own_ohm * self.settings.radius_m / contact.radius_m;
-        LoadedSpot { ohm: own_ohm + 1.0 / (spot.share * contact.conductance_s), spot }
-    }
-
-    fn plausible_fitter(&self) -> DiscFitter<'_> {
+    pub(super) fn plausible_fitter(&self) -> DiscFitter<'_> {
         let fitter = self.disc_fitter();
         DiscFitter { widest_m: fitter.widest_m.min(policy::PLAUSIBLE_RADII * self.settings.radius_m), ..fitter }
     }

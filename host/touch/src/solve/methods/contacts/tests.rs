@@ -27,11 +27,11 @@ pub(super) fn solver() -> Contacts {
 }
 
 /// A contact of so many sheet conductances.
-fn contact(x_m: f64, y_m: f64, sheets: f64) -> Contact {
+pub(super) fn contact(x_m: f64, y_m: f64, sheets: f64) -> Contact {
     Contact::flat(x_m, y_m, 0.0025, sheets * detector().sheet_conductance_s())
 }
 
-fn frame(contacts: &[Contact], noise: &mut Noise) -> Readings {
+pub(super) fn frame(contacts: &[Contact], noise: &mut Noise) -> Readings {
     let detector = detector();
     measured(&readings_v(&FINE.impedance_ohm(contacts).unwrap(), &detector), &detector.adc, noise)
 }
