@@ -83,9 +83,9 @@ impl<'a> SpotFitter<'a> {
     /// Contacts moved to where their spots fit best; `None` where spots make no sense.
     pub fn start(&mut self, contacts: &[Contact]) -> Option<Start> {
         let begun: Vec<_> = contacts.iter().map(|contact| self.finder.spot_of(contact)).collect();
-        let look = self.look(begun)?;
+        let look = self.look(begun.clone())?;
         let found = minimise(self, look, STEPS, SCHEDULE).at;
-        let contacts = self.contacts_of(contacts, &found.spots);
+        let contacts = self.contacts_of(contacts, &begun, &found.spots);
         Some(Start { contacts, cost: found.residuals.norm_squared(), spots: found.spots })
     }
 
@@ -112,7 +112,8 @@ impl<'a> SpotFitter<'a> {
     /// More contacts beside those that are fitted, one at a time, as long as each explains much of what is left; `None` if there are none.
     pub fn crowd(&mut self, contacts: &[Contact]) -> Option<Vec<Contact>> {
         let finder = self.finder;
-        let mut last = self.look(contacts.iter().map(|contact| finder.spot_of(contact)).collect())?;
+        let begun: Vec<_> = contacts.iter().map(|contact| finder.spot_of(contact)).collect();
+        let mut last = self.look(begun.clone())?;
         let enough = policy::WRONG_MEAN_SQUARE * self.target.count() as f64;
         while last.spots.len() < finder.settings.most && self.sum(&last) > enough {
             let looks: Vec<_> = self.one_more(&last).into_iter().filter_map(|start| self.look(start)).collect();
@@ -122,7 +123,7 @@ impl<'a> SpotFitter<'a> {
             let Some(best) = best.filter(is_worth_it) else { break };
             last = best;
         }
-        (last.spots.len() > contacts.len()).then(|| self.contacts_of(contacts, &last.spots))
+        (last.spots.len() > contacts.len()).then(|| self.contacts_of(contacts, &begun, &last.spots))
     }
 
     /// Whether the last spot is no part of a wide contact, which discs have to tell.
@@ -148,15 +149,19 @@ impl<'a> SpotFitter<'a> {
         ones.iter().map(with).collect()
     }
 
-    /// Contacts where their spots have moved to, and those of further spots.
-    fn contacts_of(&self, contacts: &[Contact], spots: &[LoadedSpot]) -> Vec<Contact> {
-        if let ([contact], [spot]) = (contacts, spots) {
-            // Alone it may be as wide as its resistance asks for; of several, others make up for it.
-            let radius_m = contact.radius_m.max(self.finder.perfect_radius_m(spot));
-            return vec![self.finder.disc_of(spot, radius_m)];
+    /// Contacts whose spots have moved, and those of further spots.
+    fn contacts_of(&self, contacts: &[Contact], from: &[LoadedSpot], to: &[LoadedSpot]) -> Vec<Contact> {
+        if let ([contact], [spot]) = (contacts, to) {
+            return vec![self.finder.disc_alone(spot, contact.radius_m)];
         }
-        let (moved, further) = spots.split_at(contacts.len());
-        let moved = contacts.iter().zip(moved).map(|(contact, spot)| self.finder.disc_of(spot, contact.radius_m));
+        let moved = |((contact, from), to): ((&Contact, &LoadedSpot), &LoadedSpot)| {
+            let [x_m, y_m, z_m] = to.spot.place_m;
+            let ohm = 1.0 / contact.conductance_s + from.spot.share * (to.ohm - from.ohm);
+            let conductance_s = 1.0 / ohm.max(f64::MIN_POSITIVE);
+            self.finder.disc_fitter().held(Contact { x_m, y_m, z_m, conductance_s, ..*contact })
+        };
+        let (kept, further) = to.split_at(contacts.len());
+        let moved = contacts.iter().zip(from).zip(kept).map(moved);
         moved.chain(self.finder.discs_of(further)).collect()
     }
 

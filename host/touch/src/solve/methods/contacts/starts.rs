@@ -16,7 +16,7 @@ use tactomo_physics::space::{self, Place};
 const BESIDE: usize = 8;
 /// Directions along which a contact that may be two is split.
 const DIRECTIONS: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]];
-/// Resistance of a contact that is nearly perfect, in that of the crowded current under it.
+/// Resistance of a contact that is nearly perfect, as a share of that of the crowded current under it.
 const PERFECT: f64 = 0.2;
 /// Places that are so near, in usual radii, are one.
 const ALIKE: f64 = 0.3;
@@ -118,21 +118,23 @@ impl ContactFinder {
 
     /// Discs of the usual radius where spots are.
     pub(super) fn discs_of(&self, spots: &[LoadedSpot]) -> Vec<Contact> {
-        spots.iter().map(|spot| self.disc_of(spot, self.settings.radius_m)).collect()
+        spots.iter().map(|spot| self.disc_of(spot, self.settings.radius_m, PERFECT)).collect()
     }
 
-    /// A disc of a radius (m) where a spot is.
-    pub(super) fn disc_of(&self, LoadedSpot { spot, ohm }: &LoadedSpot, radius_m: f64) -> Contact {
+    /// A disc of a radius (m) where a spot is, with at least a share of the crowded current's resistance under it for its own.
+    pub(super) fn disc_of(&self, LoadedSpot { spot, ohm }: &LoadedSpot, radius_m: f64, least: f64) -> Contact {
         let own_ohm = spot.own_ohm * self.settings.radius_m / radius_m;
-        // What is better than its own spreading allows is nearly perfect.
-        let conductance_s = 1.0 / (spot.share * (ohm - own_ohm).max(PERFECT * own_ohm));
+        let conductance_s = 1.0 / (spot.share * (ohm - own_ohm).max(least * own_ohm));
         let [x_m, y_m, z_m] = spot.place_m;
-        self.plausible_fitter().held(Contact { x_m, y_m, z_m, radius_m, conductance_s })
+        self.disc_fitter().held(Contact { x_m, y_m, z_m, radius_m, conductance_s })
     }
 
-    /// Radius of a nearly perfect disc under which the current crowds no more than a spot says (m).
-    pub(super) fn perfect_radius_m(&self, LoadedSpot { spot, ohm }: &LoadedSpot) -> f64 {
-        (1.0 + PERFECT) * spot.own_ohm / ohm * self.settings.radius_m
+    /// A disc alone where a spot is: as wide as that resists little, up to what is plausible, and no better than the crowding under it, which tells
+    /// nothing more of how firm it is.
+    pub(super) fn disc_alone(&self, spot: &LoadedSpot, radius_m: f64) -> Contact {
+        let wide_m = 2.0 * spot.spot.own_ohm / spot.ohm * self.settings.radius_m;
+        let most_m = policy::PLAUSIBLE_RADII * self.settings.radius_m;
+        self.disc_of(spot, radius_m.max(wide_m).min(most_m), 1.0)
     }
 
     /// The spot that a disc acts as from afar: a wider one meets less of its own spreading resistance.
