@@ -38,6 +38,8 @@ pub(crate) const PARAMETER_PRICE: f64 = 7.0;
 pub(crate) const MISFIT_DEVIATIONS: f64 = 5.0;
 /// Standard deviations of the sum of squares beyond which it is worth the time to look for another explanation: once in some hundred frames.
 pub(crate) const DOUBT_DEVIATIONS: f64 = 3.0;
+/// Mean square (squared deviations) of what a fit with the rough model leaves, where no other start is tried.
+pub(crate) const EXPLAINED_MEAN_SQUARE: f64 = 1.5;
 /// Mean square (squared deviations) of what a fit leaves, above which it is the contacts that are wrong: no starts around a single one are
 /// tried then, nor what the readings may be off by together.
 pub(crate) const WRONG_MEAN_SQUARE: f64 = 5.0;

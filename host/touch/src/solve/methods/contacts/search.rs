@@ -18,14 +18,14 @@ use tactomo_physics::scene::Contact;
 use tactomo_physics::space;
 
 /// A few steps, more of them with the rough model, and all the way to the minimum.
-const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
-const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
-pub(super) const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.1 };
+pub(super) const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
+pub(super) const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
+pub(super) const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
 /// With radii free: each step of a wide disc costs as much as ten of a fingertip's.
 const RELEASED: Effort = Effort { steps: 6, gain: 0.2, share: 0.02 };
 /// Starts of contacts, and how many of them go on.
 const STARTS: usize = 4;
-const FINALISTS: usize = 2;
+pub(super) const FINALISTS: usize = 2;
 
 impl ContactFinder {
     /// Mean square of what one contact leaves of readings, in what noise and model error make; `None` if there is none.
@@ -98,19 +98,13 @@ impl ContactFinder {
         if ones.first().is_none_or(|best| best.gain < policy::FIRST_GAIN) {
             return None;
         }
-        let starts: Vec<_> = ones.iter().map(|one| self.discs_of(&self.scan.start(&looks, one))).collect();
-        let mut begun = self.begun_by(&mut SpotFitter::new(self, None, target), &starts);
-        begun.truncate(FINALISTS);
-        let best = self.best_of(begun, target)?;
+        let starts = ones.iter().map(|one| self.discs_of(&self.scan.start(&looks, one)));
+        let best = self.best_alone(starts.collect(), target)?;
         if best.cost > policy::WRONG_MEAN_SQUARE * target.count() as f64 {
             return Some(best);
         }
-        let beside = self.beside(&best.contacts[0], best.along(0).0);
-        let mut others = self.begun_by(&mut SpotFitter::new(self, Some(&best), target), &beside);
-        others.retain(|other| !self.is_alike(&best.contacts, &other.contacts) && self.may_be_as_good(other, &best));
-        others.truncate(FINALISTS);
-        let other = self.best_of(others, target);
-        Some(other.filter(|other| self.evidence(other) > self.evidence(&best)).unwrap_or(best))
+        let beside = self.best_alone(self.beside(&best.contacts[0], best.along(0).0), target);
+        Some(beside.filter(|beside| self.evidence(beside) > self.evidence(&best)).unwrap_or(best))
     }
 
     /// A fit with radii free, if it is at the widest that is plausible; else what it is.

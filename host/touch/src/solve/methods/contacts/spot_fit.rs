@@ -151,9 +151,6 @@ impl<'a> SpotFitter<'a> {
 
     /// Contacts whose spots have moved, and those of further spots.
     fn contacts_of(&self, contacts: &[Contact], from: &[LoadedSpot], to: &[LoadedSpot]) -> Vec<Contact> {
-        if let ([contact], [spot]) = (contacts, to) {
-            return vec![self.finder.disc_alone(spot, contact.radius_m)];
-        }
         let moved = |((contact, from), to): ((&Contact, &LoadedSpot), &LoadedSpot)| {
             let [x_m, y_m, z_m] = to.spot.place_m;
             let ohm = 1.0 / contact.conductance_s + from.spot.share * (to.ohm - from.ohm);

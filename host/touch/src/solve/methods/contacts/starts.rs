@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::ContactFinder;
-use super::discs::{DiscFit, place_m};
-use super::search::COLD;
+use super::discs::{DiscFit, DiscFitter, place_m};
+use super::search::{COLD, FINALISTS, FIRST, ROUGH};
 use super::spot_fit::{SpotFitter, Start};
 use crate::solve::fit::policy;
 use crate::solve::fit::spots::LoadedSpot;
@@ -77,6 +77,29 @@ impl ContactFinder {
         begun
     }
 
+    /// The best single disc from some starts: a few steps from each and more from the best with the rough model, which tells how wide it is as spots
+    /// do not; last with the full one.
+    pub(super) fn best_alone(&self, starts: Vec<Vec<Contact>>, target: &Target) -> Option<DiscFit> {
+        let full = self.plausible_fitter();
+        let rough = DiscFitter { model: &*self.rough, ..full };
+        let objective = |fit: &DiscFit| fit.cost + fit.known;
+        let by_objective = |a: &DiscFit, b: &DiscFit| objective(a).total_cmp(&objective(b));
+        let mut fits = Vec::with_capacity(starts.len());
+        for fit in starts.into_iter().filter_map(|start| rough.fit(start, target, FIRST)) {
+            let explains = fit.cost < policy::EXPLAINED_MEAN_SQUARE * target.count() as f64;
+            fits.push(fit);
+            if explains {
+                break;
+            }
+        }
+        fits.sort_unstable_by(by_objective);
+        // Starts often lead to one minimum.
+        fits.dedup_by(|later, first| self.is_alike(&first.contacts, &later.contacts));
+        fits.truncate(FINALISTS);
+        let fits = fits.into_iter().filter_map(|fit| rough.go_on(&fit, target, ROUGH));
+        full.fit(fits.min_by(by_objective)?.contacts, target, COLD)
+    }
+
     /// The best fit from some starts.
     pub(super) fn best_of(&self, begun: Vec<Start>, target: &Target) -> Option<DiscFit> {
         let fitter = self.plausible_fitter();
@@ -118,23 +141,14 @@ impl ContactFinder {
 
     /// Discs of the usual radius where spots are.
     pub(super) fn discs_of(&self, spots: &[LoadedSpot]) -> Vec<Contact> {
-        spots.iter().map(|spot| self.disc_of(spot, self.settings.radius_m, PERFECT)).collect()
-    }
-
-    /// A disc of a radius (m) where a spot is, with at least a share of the crowded current's resistance under it for its own.
-    pub(super) fn disc_of(&self, LoadedSpot { spot, ohm }: &LoadedSpot, radius_m: f64, least: f64) -> Contact {
-        let own_ohm = spot.own_ohm * self.settings.radius_m / radius_m;
-        let conductance_s = 1.0 / (spot.share * (ohm - own_ohm).max(least * own_ohm));
-        let [x_m, y_m, z_m] = spot.place_m;
-        self.disc_fitter().held(Contact { x_m, y_m, z_m, radius_m, conductance_s })
-    }
-
-    /// A disc alone where a spot is: as wide as that resists little, up to what is plausible, and no better than the crowding under it, which tells
-    /// nothing more of how firm it is.
-    pub(super) fn disc_alone(&self, spot: &LoadedSpot, radius_m: f64) -> Contact {
-        let wide_m = 2.0 * spot.spot.own_ohm / spot.ohm * self.settings.radius_m;
-        let most_m = policy::PLAUSIBLE_RADII * self.settings.radius_m;
-        self.disc_of(spot, radius_m.max(wide_m).min(most_m), 1.0)
+        let disc = |spot: &LoadedSpot| {
+            let [x_m, y_m, z_m] = spot.spot.place_m;
+            // What is better than its own spreading allows is nearly perfect.
+            let ohm = (spot.ohm - spot.spot.own_ohm).max(PERFECT * spot.spot.own_ohm);
+            let contact = Contact::flat(x_m, y_m, self.settings.radius_m, 1.0 / (ohm * spot.spot.share));
+            self.disc_fitter().held(Contact { z_m, ..contact })
+        };
+        spots.iter().map(disc).collect()
     }
 
     /// The spot that a disc acts as from afar: a wider one meets less of its own spreading resistance.
