@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread;
 
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Calibration as Calibrated, Detector};
 use tactomo_touch::calibrate::Rub;
 use tactomo_touch::solve::FoundContact;
@@ -154,9 +155,9 @@ impl Calibration {
     fn keep(&self, learned: &Arc<Detector>) {
         let Some(path) = self.learning.as_ref().and_then(|learning| learning.file.clone()) else { return };
         let learned = Arc::clone(learned);
-        let write = move || learning::keep(&learned, &path).unwrap_or_else(|error| tracing::warn!("{error}"));
+        let write = move || learning::keep(&learned, &path).unwrap_or_else(|why| tracing::warn!("{why}"));
         if let Err(error) = thread::Builder::new().name("learned file".to_owned()).spawn(write) {
-            tracing::warn!("what was learned is not kept: cannot start a thread: {error}");
+            tracing::warn!("what was learned is not kept: cannot start a thread: {}", with_causes(&error));
         }
     }
 

@@ -20,7 +20,7 @@ use tactomo_physics::space;
 /// A few steps, more of them with the rough model, and all the way to the minimum.
 pub(super) const FIRST: Effort = Effort { steps: 3, gain: 1.0, share: 0.02 };
 pub(super) const ROUGH: Effort = Effort { steps: 10, gain: 1.0, share: 0.02 };
-pub(super) const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.02 };
+pub(super) const COLD: Effort = Effort { steps: 20, gain: 0.02, share: 0.1 };
 /// With radii free: each step of a wide disc costs as much as ten of a fingertip's.
 const RELEASED: Effort = Effort { steps: 6, gain: 0.2, share: 0.02 };
 /// Starts of contacts, and how many of them go on.
@@ -184,7 +184,12 @@ impl ContactFinder {
         if fit.cost < policy::WRONG_MEAN_SQUARE * target.count() as f64 {
             return None;
         }
-        let crowd = SpotFitter::new(self, Some(fit), target).crowd(&fit.contacts)?;
+        // A fit that is far off is as wide as it may be, which tells nothing of the contacts that it stands for.
+        let usual = |contact: &Contact| Contact { radius_m: self.settings.radius_m, ..*contact };
+        let begun: Vec<_> = fit.contacts.iter().map(usual).collect();
+        let mut spots = SpotFitter::new(self, None, target);
+        let begun = spots.start(&begun)?;
+        let crowd = spots.crowd(&begun.contacts)?;
         self.plausible_fitter().fit(crowd, target, COLD)
     }
 
