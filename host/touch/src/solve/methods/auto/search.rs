@@ -59,7 +59,7 @@ impl AutoSearch {
         from: Option<&(Whole, String)>,
         mean: &Mean,
     ) -> Option<StripFit> {
-        let finder = self.finder.as_ref()?;
+        let finder = self.finder.as_ref().filter(|_| !contacts.is_begun())?;
         let target = finder.target_of(mean, Some(contacts.error()?)).ok()?;
         let evidence = finder.evidence_of_found(contacts);
         if !evidence.is_misfit(target.count()) || is_partial(&target) {

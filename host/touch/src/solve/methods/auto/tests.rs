@@ -8,7 +8,7 @@ use crate::solve::solver::Hypothesis;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v, touched_impedance_ohm};
 use tactomo_physics::scene::{Contact, Shape, Touch};
-use tactomo_physics::simulate::{Noise, measured};
+use tactomo_physics::simulate::{Noise, drawn, measured};
 
 /// The solver, with what a finer model of the detector reads.
 struct AutoTrial {
@@ -211,4 +211,23 @@ fn a_shape_and_contacts_of_the_past_do_not_replace_each_other() {
     assert_eq!((what(&kept.solution), kept.search), ("line", false));
     let lifted = tracker.follow(&trial.measured(&pair)).unwrap();
     assert!(lifted.search, "two fingers are no bar");
+}
+
+#[test]
+fn a_press_at_a_wall_of_a_detector_that_is_far_from_its_description_is_one_contact() {
+    // A quarter thicker. As described, two contacts explain the press better than one, and a ring better than these.
+    let described = Detector::preset(Detector::DEFAULT).unwrap();
+    let built = drawn(&described, 2005);
+    let fine = Slab::with_resolution(&built, Resolution::FINE).unwrap();
+    let mut auto = Auto::new(&Problem::of(&described).unwrap()).unwrap();
+    let mut noise = Noise::new(5);
+    for (x_m, y_m, sheets) in [(-0.0257, 0.0207, 0.6), (-0.0219, -0.0255, 1.3)] {
+        let press = Contact::flat(x_m, y_m, 0.003, sheets * described.sheet_conductance_s());
+        let exact = readings_v(&fine.impedance_ohm(&[press]).unwrap(), &built);
+        auto.reset();
+        let solution = auto.solve(&measured(&exact, &built.adc, &mut noise)).unwrap();
+        let [found] = &solution.contacts[..] else { panic!("{solution:?}") };
+        assert_eq!(what(&solution), "1 contact");
+        assert!((found.x_m - x_m).hypot(found.y_m - y_m) < 2e-3, "{found:?}");
+    }
 }

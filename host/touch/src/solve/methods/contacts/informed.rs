@@ -135,7 +135,8 @@ impl ContactFinder {
     /// An explanation as it is, by what its readings may be off by together.
     fn informed_as_is(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
         let target = self.informed(target, &from.fit.contacts, None)?;
-        Some(Informed { hypothesis: self.judged(from.clone(), &target)?, target })
+        let hypothesis = ContactHypothesis { is_begun: true, ..self.judged(from.clone(), &target)? };
+        Some(Informed { hypothesis, target })
     }
 
     fn caught_up(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
@@ -164,7 +165,8 @@ impl ContactFinder {
             let renewed = self.informed(target, contacts, near.as_ref());
             let fitted = renewed.and_then(|target| {
                 let fit = self.disc_fitter().fit(contacts.clone(), &target, COLD)?;
-                let hypothesis = ContactHypothesis { fit, error: target.error().cloned(), ..hypothesis.clone() };
+                let error = target.error().cloned();
+                let hypothesis = ContactHypothesis { fit, error, is_begun: false, ..hypothesis.clone() };
                 Some(Informed { hypothesis, target })
             });
             let Some(fitted) = fitted else { break };

@@ -54,7 +54,7 @@ impl ContactFinder {
         let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
         let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
         let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
-        Some(ContactHypothesis { fit, certainty, error: last.error.clone() })
+        Some(ContactHypothesis { fit, certainty, ..last.clone() })
     }
 
     /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each

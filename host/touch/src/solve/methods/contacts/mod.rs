@@ -117,6 +117,8 @@ pub(crate) struct ContactHypothesis {
     certainty: Option<Certainty>,
     /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
     error: Option<Arc<ApproximationError>>,
+    /// Whether it was found before anything was known of that error, to be shown soon: as it is, it may fit worse than it would.
+    is_begun: bool,
 }
 
 /// How sure a count of contacts is, among the counts that were tried.
@@ -149,14 +151,19 @@ impl ContactHypothesis {
         self.error.as_ref()
     }
 
+    /// Whether it was found before anything was known of what the readings may be off by together: that it does not fit tells nothing then.
+    pub fn is_begun(&self) -> bool {
+        self.is_begun
+    }
+
     /// A fit whose count was not compared with others.
     fn of(fit: DiscFit, target: &Target) -> Self {
-        Self { fit, certainty: None, error: target.error().cloned() }
+        Self { fit, certainty: None, error: target.error().cloned(), is_begun: false }
     }
 
     /// A fit, with the logarithms of the evidence for each count.
     fn new(fit: DiscFit, by_count: &[f64], target: &Target) -> Self {
-        Self { certainty: Certainty::of(fit.contacts.len(), by_count), fit, error: target.error().cloned() }
+        Self { certainty: Certainty::of(fit.contacts.len(), by_count), ..Self::of(fit, target) }
     }
 }
 

@@ -110,7 +110,7 @@ impl ContactFinder {
         let stays = state.systematic_error.covariance(&fit);
         let covariance = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
         (fit.normal, fit.settled) = (covariance().unwrap_or_else(|| known.clone()), true);
-        Step::Followed(ContactHypothesis { fit, certainty: last.certainty, error: last.error }, Box::new(state), search)
+        Step::Followed(ContactHypothesis { fit, ..last }, Box::new(state), search)
     }
 
     /// A first, rough contact in rows where something stands out.
