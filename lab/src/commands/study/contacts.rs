@@ -40,6 +40,9 @@ pub struct Args {
     /// the solver knows
     #[arg(long, value_name = "SEED")]
     as_built: Option<u64>,
+    /// Calibrates each detector as built before, with so many single presses at unknown places
+    #[arg(long, value_name = "PRESSES", default_value_t = 0, requires = "as_built")]
+    rub: usize,
     /// Scenes tried at a time; times are right with one only
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     threads: u8,
@@ -65,6 +68,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         worst: usize::from(args.worst),
         seed: args.seed,
         as_built: args.as_built,
+        rub: args.rub,
     };
     let files = args.shown.files()?;
     let report = contacts::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;

@@ -11,9 +11,11 @@ use std::thread;
 
 use self::scenes::RandomScene;
 use super::bound::cramer_rao;
+use super::calibrate::{Calibrate, Calibrated};
 use super::experiment::{Experiment, StudyError};
 use super::machine::Machine;
 use super::stopwatch::timed;
+use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::{Detector, FOAMS, Layer};
 use tactomo_physics::scene::Touch;
 use tactomo_touch::solve::{Method, SolveError, Solver};
@@ -47,6 +49,8 @@ pub struct Plan {
     pub seed: u64,
     /// If given, readings are those of detectors as they were built with this seed; bounds are of the detectors on paper.
     pub as_built: Option<u64>,
+    /// Single presses at unknown places that each detector as built is calibrated with before; none leaves it as described.
+    pub rub: usize,
 }
 
 /// What came out.
@@ -70,6 +74,8 @@ pub struct Report {
     pub seed: u64,
     /// The seed of the detectors as they were built, if readings are of such.
     pub as_built: Option<u64>,
+    /// Presses that these were calibrated with.
+    pub rub: usize,
     /// A row for each class of scenes or contacts.
     pub rows: Vec<Row>,
     /// How often what the answers claim is right.
@@ -112,7 +118,15 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
     let mut experiments = Vec::with_capacity(plan.detectors.len());
     for detector in &plan.detectors {
         progress(&format!("{}: model", detector.name));
-        experiments.push(Experiment::of(detector, plan.as_built)?);
+        let experiment = Experiment::of(detector, plan.as_built)?;
+        experiments.push(match plan.rub {
+            0 => experiment,
+            presses => {
+                let Calibrated { detector, refused } = Calibrate::Rub(presses).find(&experiment, plan.seed)?;
+                refused.iter().for_each(|why| progress(&with_causes(why)));
+                experiment.known_as(&detector)?
+            }
+        });
     }
     progress(&format!("{} scenes", plan.scenes));
     let trials = try_all(plan, &experiments, &scenes::random(&plan.detectors, plan.scenes, plan.seed))?;
@@ -126,6 +140,7 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         threads: plan.threads,
         seed: plan.seed,
         as_built: plan.as_built,
+        rub: plan.rub,
         rows: rows::rows(&trials),
         claims: rows::claims(&trials),
         worst: worst(trials, plan.worst),
