@@ -10,6 +10,7 @@
 //! `V(t) + P (s - t)`, so that the nominal model is wrong by `V(t) - V(0) - P t` in the mean: no more is said of the detector than before,
 //! but its square is right.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -33,7 +34,7 @@ pub(crate) struct Linearised {
 /// Mean and covariance of what readings are off by.
 #[derive(Clone, Default)]
 pub(crate) struct ApproximationError {
-    pub(crate) directions: Vec<Direction>,
+    directions: Directions,
     /// Mean (V); none if it is zero.
     pub(crate) mean_v: Vec<f64>,
     /// Patterns of steps of the detector (V).
@@ -45,39 +46,58 @@ pub(crate) struct ApproximationError {
 
 impl std::fmt::Debug for ApproximationError {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.debug_struct("ApproximationError").field("directions", &self.directions.len()).finish_non_exhaustive()
+        let directions = self.directions.variances_v2().len();
+        formatter.debug_struct("ApproximationError").field("directions", &directions).finish_non_exhaustive()
     }
 }
 
-/// A direction, in the readings from some one on.
-#[derive(Clone, Debug)]
-pub(crate) struct Direction {
-    pub start: usize,
-    pub unit: Vec<f64>,
-    /// Variance along it (V2).
-    pub variance_v2: f64,
+/// Orthonormal directions of readings, with the variance along each (V2).
+#[derive(Clone)]
+enum Directions {
+    /// One in the readings of each ground, row by row.
+    Rows { units: Vec<f64>, variances_v2: Vec<f64> },
+    /// Any, a column each, and the same a row each.
+    Any { units: DMatrix<f64>, transposed: DMatrix<f64>, variances_v2: Vec<f64> },
 }
 
-impl Direction {
-    /// Takes a share of volts along this direction away.
-    pub fn shrink(&self, volts: &mut [f64], share: f64) {
-        let part = &mut volts[self.start..self.start + self.unit.len()];
-        let along = share * dot(part, &self.unit);
-        part.iter_mut().zip(&self.unit).for_each(|(volts, unit)| *volts -= along * unit);
+impl Default for Directions {
+    fn default() -> Self {
+        Self::Rows { units: Vec::new(), variances_v2: Vec::new() }
+    }
+}
+
+impl Directions {
+    fn variances_v2(&self) -> &[f64] {
+        match self {
+            Self::Rows { variances_v2, .. } | Self::Any { variances_v2, .. } => variances_v2,
+        }
+    }
+
+    /// Visits each: its number, the readings that it is in, and what it is there.
+    fn each(&self, mut visit: impl FnMut(usize, Range<usize>, &[f64])) {
+        match self {
+            Self::Rows { units, variances_v2 } => {
+                let electrodes = (units.len() / variances_v2.len().max(1)).max(1);
+                let rows = units.chunks_exact(electrodes).enumerate();
+                rows.for_each(|(g, unit)| visit(g, g * electrodes..(g + 1) * electrodes, unit));
+            }
+            Self::Any { units, .. } => {
+                units.column_iter().enumerate().for_each(|(i, unit)| visit(i, 0..units.nrows(), unit.as_slice()));
+            }
+        }
     }
 }
 
 impl ApproximationError {
     /// Of patterns of one ground each (V), row by row.
     pub fn of_rows(patterns_v: &[f64], electrodes: usize) -> Self {
-        let direction = |(g, row): (usize, &[f64])| {
-            let variance_v2 = dot(row, row);
-            let scale = if variance_v2 > 0.0 { 1.0 / variance_v2.sqrt() } else { 0.0 };
-            let unit = row.iter().map(|volts| scale * volts).collect();
-            Direction { start: g * electrodes, unit, variance_v2 }
+        let variances_v2: Vec<_> = patterns_v.chunks_exact(electrodes).map(|row| dot(row, row)).collect();
+        let unit = |(i, volts): (usize, &f64)| match variances_v2[i / electrodes] {
+            variance_v2 if variance_v2 > 0.0 => volts / variance_v2.sqrt(),
+            _ => 0.0,
         };
-        let directions = patterns_v.chunks_exact(electrodes).enumerate().map(direction).collect();
-        Self { directions, ..Self::default() }
+        let units = patterns_v.iter().enumerate().map(unit).collect();
+        Self { directions: Directions::Rows { units, variances_v2 }, ..Self::default() }
     }
 
     /// Of any patterns (V), a column each, the first of which are steps of the detector, for readings `made_for` (V) with noise of at least
@@ -86,15 +106,35 @@ impl ApproximationError {
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(patterns_v.tr_mul(patterns_v));
         let least_v2 = LEAST_VARIANCE * least_v * least_v;
         let kept: Vec<_> = (0..eigenvalues.len()).filter(|i| eigenvalues[*i] > least_v2).collect();
-        let units = patterns_v * eigenvectors.select_columns(&kept);
-        let direction = |(column, i): (usize, &usize)| {
-            let variance_v2 = eigenvalues[*i];
-            let scale = 1.0 / variance_v2.sqrt();
-            Direction { start: 0, unit: units.column(column).iter().map(|volts| scale * volts).collect(), variance_v2 }
-        };
-        let directions = kept.iter().enumerate().map(direction).collect();
+        let variances_v2: Vec<_> = kept.iter().map(|i| eigenvalues[*i]).collect();
+        let mut units = patterns_v * eigenvectors.select_columns(&kept);
+        units.column_iter_mut().zip(&variances_v2).for_each(|(mut unit, variance_v2)| unit /= variance_v2.sqrt());
+        let directions = Directions::Any { transposed: units.transpose(), units, variances_v2 };
         let patterns_v = patterns_v.columns(0, steps).into_owned();
         Self { directions, mean_v: Vec::new(), patterns_v, linearised: None, made_for }
+    }
+
+    /// Takes the share `k` of what volts have along each direction away.
+    pub fn shrink(&self, volts: &mut [f64], shares: &[f64]) {
+        self.directions.each(|i, readings, unit| {
+            let part = &mut volts[readings];
+            let along = shares[i] * dot(part, unit);
+            part.iter_mut().zip(unit).for_each(|(volts, unit)| *volts -= along * unit);
+        });
+    }
+
+    /// The same for each column.
+    pub fn shrink_columns(&self, columns_v: &mut DMatrix<f64>, shares: &[f64]) {
+        match &self.directions {
+            Directions::Rows { .. } => {
+                columns_v.column_iter_mut().for_each(|mut column| self.shrink(column.as_mut_slice(), shares));
+            }
+            Directions::Any { units, transposed, .. } => {
+                let mut along = transposed * &*columns_v;
+                along.row_iter_mut().zip(shares).for_each(|(mut row, share)| row *= *share);
+                columns_v.gemm(-1.0, units, &along, 1.0);
+            }
+        }
     }
 
     /// This error, about a detector with such readings of the scene (V).
@@ -113,11 +153,11 @@ impl ApproximationError {
     pub fn likely_v(&self, pulls: &[f64]) -> Vec<f64> {
         let mut off_v = self.mean_v.clone();
         off_v.resize(pulls.len(), 0.0);
-        for direction in &self.directions {
-            let part = direction.start..direction.start + direction.unit.len();
-            let along = direction.variance_v2 * dot(&direction.unit, &pulls[part.clone()]);
-            off_v[part].iter_mut().zip(&direction.unit).for_each(|(off, unit)| *off += along * unit);
-        }
+        let variances_v2 = self.directions.variances_v2();
+        self.directions.each(|i, readings, unit| {
+            let along = variances_v2[i] * dot(unit, &pulls[readings.clone()]);
+            off_v[readings].iter_mut().zip(unit).for_each(|(off, unit)| *off += along * unit);
+        });
         off_v
     }
 
@@ -133,7 +173,7 @@ impl ApproximationError {
     /// `k` of each direction, at a standard deviation of noise (V).
     pub fn shares(&self, deviation_v: f64) -> Vec<f64> {
         let share = |variance_v2: f64| 1.0 - 1.0 / (1.0 + variance_v2 / (deviation_v * deviation_v)).sqrt();
-        self.directions.iter().map(|direction| share(direction.variance_v2)).collect()
+        self.directions.variances_v2().iter().map(|variance_v2| share(*variance_v2)).collect()
     }
 
     /// Whether other readings (V) would have other patterns.

@@ -10,7 +10,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVectorViewMut};
 
 use super::approximation::ApproximationError;
 use super::dot::dot;
@@ -244,8 +244,25 @@ impl Target {
         self.shrink(volts);
     }
 
+    /// Whitened volts, a column each.
+    pub fn whitened_columns(&self, columns_v: &[Vec<f64>]) -> DMatrix<f64> {
+        let volts = columns_v.iter().flatten().copied();
+        let mut all = DMatrix::from_iterator(self.volts.len(), columns_v.len(), volts);
+        self.whiten_columns(&mut all);
+        all
+    }
+
+    /// Makes the errors of the volts in each column alike, independent and of deviation one.
+    pub fn whiten_columns(&self, columns_v: &mut DMatrix<f64>) {
+        let weigh = |mut column: DVectorViewMut<'_, f64>| {
+            column.iter_mut().zip(&self.weights).for_each(|(volts, weight)| *volts *= weight);
+        };
+        columns_v.column_iter_mut().for_each(weigh);
+        self.error.shrink_columns(columns_v, &self.shares);
+    }
+
     fn shrink(&self, volts: &mut [f64]) {
-        self.error.directions.iter().zip(&self.shares).for_each(|(direction, share)| direction.shrink(volts, *share));
+        self.error.shrink(volts, &self.shares);
     }
 
     /// A whitened copy of volts.

@@ -314,13 +314,12 @@ impl DiscFitter<'_> {
     }
 
     fn normal(&self, slopes: &Slopes, target: &Target) -> DMatrix<f64> {
-        let target = target.at(&slopes.volts);
-        let whitened: Vec<_> = slopes.by.iter().map(|slope| target.whitened(slope)).collect();
-        let size = whitened.len();
+        let size = slopes.by.len();
+        let whitened = target.at(&slopes.volts).whitened_columns(&slopes.by);
         let mut normal = DMatrix::zeros(size, size);
         for i in 0..size {
             for j in 0..=i {
-                let product = dot(&whitened[i], &whitened[j]);
+                let product = dot(whitened.column(i).as_slice(), whitened.column(j).as_slice());
                 (normal[(i, j)], normal[(j, i)]) = (product, product);
             }
         }

@@ -123,8 +123,8 @@ impl Scan {
         for (mut column, spot) in patterns.column_iter_mut().zip(&self.spots) {
             let potentials_ohm = spot_model.potentials_ohm(&solved, fitted.spots, spot, fields);
             spot_model.volts_per_s(&solved, &potentials_ohm, column.as_mut_slice());
-            target.whiten(column.as_mut_slice());
         }
+        target.whiten_columns(&mut patterns);
         let mut shared = fitted.slopes.tr_mul(&patterns);
         let factor = Cholesky::new(fitted.normal.clone())?;
         factor.l_dirty().solve_lower_triangular_mut(&mut shared);

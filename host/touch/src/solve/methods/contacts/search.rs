@@ -4,8 +4,6 @@
 //! contacts so far cannot ([`scan`](super::scan)), spots there, discs from the best of these, and the evidence for the answer
 //! ([`evidence`](super::evidence)). Then one fewer at a time, as long as that is more likely.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::discs::{DiscFit, DiscFitter, Effort, PARAMETERS, place_m};
 use super::on_detector::OnDetector;
 use super::scan::{Fitted, Looks};
@@ -217,8 +215,8 @@ impl ContactFinder {
     ) -> Result<DiscFit, f64> {
         let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
         let at = target.at(&fit.volts);
-        let slopes: Vec<_> = fit.slopes_v().iter().map(|slope| DVector::from_vec(at.whitened(slope))).collect();
-        let (slopes, left) = (DMatrix::from_columns(&slopes), target.residuals(&fit.volts).into());
+        let slopes = at.whitened_columns(fit.slopes_v());
+        let left = target.residuals(&fit.volts).into();
         let fitted = Fitted { spots: &spots, slopes, normal: &fit.normal, left };
         let looks = self.scan.beside(&self.spot_model, &*self.fields, &fitted, &at);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));

@@ -191,8 +191,7 @@ impl<'a> SpotFitter<'a> {
             let mut column = all.column_mut(PARAMETERS * k + 2);
             self.readings_change(&at.solved, |e, g| at.spots[k].ohm * current[e] * current[g], column.as_mut_slice());
         }
-        let target = self.target.at(&at.volts);
-        all.column_iter_mut().for_each(|mut column| target.whiten(column.as_mut_slice()));
+        self.target.at(&at.volts).whiten_columns(&mut all);
         all
     }
 
