@@ -226,6 +226,7 @@ mod tests {
             worst: 2,
             seed: 3,
             as_built: None,
+            rub: 0,
         }
     }
 

@@ -20,13 +20,14 @@ pub fn view(report: &Report) -> View {
     let high = |pair: Option<Quantiles>| pair.map(|pair| pair.high);
     let median = |pair: Option<Quantiles>| pair.map(|pair| pair.median);
     let (whole, two) = (PLAIN.digits(0), PLAIN.digits(2));
+    let rubbed = if report.rub > 0 { format!(" and calibrated with {} presses", report.rub) } else { String::new() };
     let title = format!(
         "{} on {}; {} scenes, seed {}{}, judged at frame {}",
         report.solver,
         report.detectors.join(", "),
         report.scenes,
         report.seed,
-        report.as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}")),
+        report.as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}{rubbed}")),
         report.frames
     );
     let table = Table::of("", &report.rows)

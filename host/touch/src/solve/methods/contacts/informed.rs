@@ -91,6 +91,10 @@ impl ContactFinder {
         if let Some(judged) = provisional.filter(|judged| better(&judged.hypothesis).is_break()) {
             return Some(judged.hypothesis);
         }
+        // A contact that comes is shown as soon as it is found beside the others. Whether it is one, and not what the detector differs by, takes longer.
+        if let Some(joined) = self.joined(from, target).filter(|joined| better(joined).is_break()) {
+            return Some(joined);
+        }
         let followed = self.caught_up(from, target);
         let followed = followed.map(|followed| self.grown(followed, better));
         if let Some(grown) = followed.as_ref().filter(|grown| !self.is_misfit(&grown.hypothesis.fit, &grown.target)) {
@@ -98,6 +102,21 @@ impl ContactFinder {
         }
         let anew = self.anew(target, better);
         Some(self.more_likely(followed, anew)?.hypothesis)
+    }
+
+    /// What explains a frame so far with one contact more, if it does not fit without; linear about the detector as it was found so far.
+    fn joined(&self, from: &ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
+        let error = from.error.as_ref()?;
+        let as_before = Target::of_mean(&target.readings(), target.frames, &self.errors, Some(error));
+        let fit = self.disc_fitter().go_on(&from.fit, &as_before, COLD)?;
+        if !self.is_misfit(&fit, &as_before) || fit.contacts.len() >= self.settings.most {
+            return None;
+        }
+        let target = self.informed(target, &fit.contacts, error.linearised.as_ref())?;
+        let fit = self.disc_fitter().go_on(&fit, &target, COLD)?;
+        let more = self.is_misfit(&fit, &target).then(|| self.one_more(&fit, Vec::new(), &target))?.ok()?;
+        let is_likelier = self.evidence(&more) > self.evidence(&fit);
+        is_likelier.then(|| ContactHypothesis { is_begun: true, ..ContactHypothesis::of(more, &target) })
     }
 
     /// A few contacts, found as if nothing were known of the readings' errors but their size, which is soonest. More may stand for something

@@ -41,7 +41,7 @@ pub(super) struct RowState {
 /// What has come of a frame.
 pub(super) enum Step {
     /// The contacts, and whether they have to be searched.
-    Followed(ContactHypothesis, Box<RowState>, bool),
+    Followed(Box<ContactHypothesis>, Box<RowState>, bool),
     /// Nothing touches any more.
     Gone,
     /// They could not be brought to the frame.
@@ -110,7 +110,7 @@ impl ContactFinder {
         let stays = state.systematic_error.covariance(&fit);
         let covariance = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());
         (fit.normal, fit.settled) = (covariance().unwrap_or_else(|| known.clone()), true);
-        Step::Followed(ContactHypothesis { fit, ..last }, Box::new(state), search)
+        Step::Followed(Box::new(ContactHypothesis { fit, ..last }), Box::new(state), search)
     }
 
     /// A first, rough contact in rows where something stands out.

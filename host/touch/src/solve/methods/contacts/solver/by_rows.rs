@@ -99,7 +99,7 @@ impl ContactTracker {
         let state = self.rows.take().unwrap_or_else(|| Box::new(RowState::new(&last, &target)));
         match self.finder.step(last.clone(), *state, &target, elapsed_s) {
             Step::Followed(found, state, search) => {
-                (self.last, self.rows, self.is_stale) = (Some(found), Some(state), false);
+                (self.last, self.rows, self.is_stale) = (Some(*found), Some(state), false);
                 (target, search)
             }
             Step::Gone => {
