@@ -57,6 +57,18 @@ pub const JOBS: &[Job] = &[
     ),
     slow("drawn-rubbed", "tactomo-lab study built --detectors 4 --presses 8 --seed 1001 --rub 60 --solver auto"),
     job("contacts", "tactomo-lab study contacts --solver auto --scenes 180 --seed 21"),
+    slow(
+        "contacts-built",
+        "tactomo-lab study contacts --solver auto --scenes 60 --seed 40 --detector square-60 --as-built 20",
+    ),
+    slow(
+        "contacts-built-5",
+        "tactomo-lab study contacts --solver auto --scenes 60 --seed 40 --detector square-60 --as-built 20 --rub 5",
+    ),
+    slow(
+        "contacts-built-20",
+        "tactomo-lab study contacts --solver auto --scenes 60 --seed 40 --detector square-60 --as-built 20 --rub 20",
+    ),
     job("materials", "tactomo-lab study materials --seed 1"),
     job("samples", "tactomo-lab study samples --seed 1"),
     job("bonding", "tactomo-lab study bonding"),

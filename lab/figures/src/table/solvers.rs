@@ -23,7 +23,7 @@ const CLASSES: [(&str, &str, bool); 15] = [
 ];
 
 pub(super) fn figures() -> Vec<Figure> {
-    [random(), built(), speed(), rows()].concat()
+    [random(), random_built(), built(), speed(), rows()].concat()
 }
 
 /// `auto` on random contacts.
@@ -54,6 +54,36 @@ fn random() -> Vec<Figure> {
             of("conductance-2", "conductances within two standard errors", "contacts/conductance_within/1")
                 .per_cent()
                 .by(4.0),
+        ]);
+    }
+    all
+}
+
+/// `auto` on random contacts of a detector as built, described and after some presses of use.
+fn random_built() -> Vec<Figure> {
+    let mut all = Vec::new();
+    for (job, says_of) in [
+        ("contacts-built", "as described"),
+        ("contacts-built-5", "after 5 presses"),
+        ("contacts-built-20", "after 20 presses"),
+    ] {
+        let of = |field: &str, says: &str, path: &str| {
+            let says = format!("random contacts on a detector as built, {says_of}: {says}");
+            figure(job, format!("{job}.{field}"), says, path.to_owned())
+        };
+        let row = |path: &str| format!("rows/class=all/{path}");
+        all.extend([
+            of("right", "all visible ones found and none invented", &row("scenes/all_found")).per_cent().by(5.0),
+            of("found", "visible ones found", &row("contacts/found")).per_cent().by(4.0),
+            of("error", "error, median", &row("contacts/error_m/median")).mm().share(0.15),
+            of("error-p90", "error, 90 % below", &row("contacts/error_m/high")).mm().share(0.3),
+            of("within-1", "coordinates within one standard error", &row("contacts/place_within/0")).per_cent().by(5.0),
+            of("within-2", "coordinates within two standard errors", &row("contacts/place_within/1"))
+                .per_cent()
+                .by(5.0),
+            of("sure", "of answers 95 % sure or more of their count, the right ones", "claims/least=0.95/right")
+                .per_cent()
+                .by(5.0),
         ]);
     }
     all
