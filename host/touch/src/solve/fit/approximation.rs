@@ -94,7 +94,7 @@ impl ApproximationError {
     pub fn of_rows(patterns_v: &[f64], electrodes: usize) -> Self {
         let variances_v2: Vec<_> = patterns_v.chunks_exact(electrodes).map(|row| dot(row, row)).collect();
         let unit = |(i, volts): (usize, &f64)| match variances_v2[i / electrodes] {
-            variance_v2 if variance_v2 > 0.0 => volts / variance_v2.sqrt(),
+            variance_v2 if variance_v2 > 0.0 => (1.0 / variance_v2.sqrt()) * volts,
             _ => 0.0,
         };
         let units = patterns_v.iter().enumerate().map(unit).collect();

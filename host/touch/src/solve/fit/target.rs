@@ -10,7 +10,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVectorViewMut};
+use nalgebra::DMatrix;
 
 use super::approximation::ApproximationError;
 use super::dot::dot;
@@ -246,18 +246,20 @@ impl Target {
 
     /// Whitened volts, a column each.
     pub fn whitened_columns(&self, columns_v: &[Vec<f64>]) -> DMatrix<f64> {
-        let volts = columns_v.iter().flatten().copied();
-        let mut all = DMatrix::from_iterator(self.volts.len(), columns_v.len(), volts);
-        self.whiten_columns(&mut all);
+        let mut all = DMatrix::zeros(self.weights.len(), columns_v.len());
+        for (mut column, volts) in all.column_iter_mut().zip(columns_v) {
+            let weighed = volts.iter().zip(&self.weights).map(|(volts, weight)| volts * weight);
+            column.as_mut_slice().iter_mut().zip(weighed).for_each(|(to, volts)| *to = volts);
+        }
+        self.error.shrink_columns(&mut all, &self.shares);
         all
     }
 
     /// Makes the errors of the volts in each column alike, independent and of deviation one.
     pub fn whiten_columns(&self, columns_v: &mut DMatrix<f64>) {
-        let weigh = |mut column: DVectorViewMut<'_, f64>| {
-            column.iter_mut().zip(&self.weights).for_each(|(volts, weight)| *volts *= weight);
-        };
-        columns_v.column_iter_mut().for_each(weigh);
+        for mut column in columns_v.column_iter_mut() {
+            column.as_mut_slice().iter_mut().zip(&self.weights).for_each(|(volts, weight)| *volts *= weight);
+        }
         self.error.shrink_columns(columns_v, &self.shares);
     }
 
