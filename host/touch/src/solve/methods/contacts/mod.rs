@@ -117,7 +117,7 @@ pub(crate) struct ContactHypothesis {
     certainty: Option<Certainty>,
     /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
     error: Option<Arc<ApproximationError>>,
-    /// Whether it was found before anything was known of that error, to be shown soon: as it is, it may fit worse than it would.
+    /// Whether it is to be shown soon, before it and that error were brought to agree: as it is, it may fit worse than it would.
     is_begun: bool,
 }
 
@@ -151,7 +151,7 @@ impl ContactHypothesis {
         self.error.as_ref()
     }
 
-    /// Whether it was found before anything was known of what the readings may be off by together: that it does not fit tells nothing then.
+    /// Whether it and what the readings may be off by together were not brought to agree yet: that it does not fit tells nothing then.
     pub fn is_begun(&self) -> bool {
         self.is_begun
     }
