@@ -23,6 +23,17 @@ pub enum Says {
     Nothing,
 }
 
+impl Says {
+    /// What the mean of two readings says: one with a bound is a bound.
+    pub fn of_mean(self, other: Self) -> Self {
+        match (self, other) {
+            (one, other) if one == other => one,
+            (Self::Voltage, bound) | (bound, Self::Voltage) => bound,
+            _ => Self::Nothing,
+        }
+    }
+}
+
 /// What a converter's readings can tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {

@@ -180,11 +180,7 @@ fn mean_of(group: &[&Frame]) -> Readings {
     let mean_v = |g, e| group.iter().map(|frame| frame.readings.at(g, e)).sum::<f64>() / group.len() as f64;
     let says = |g, e| {
         let all = group.iter().map(|frame| frame.readings.says(g, e));
-        all.reduce(|a, b| match (a, b) {
-            (a, b) if a == b => a,
-            (Says::Voltage, bound) | (bound, Says::Voltage) => bound,
-            _ => Says::Nothing,
-        })
+        all.reduce(Says::of_mean)
     };
     Readings::from_fn(n, mean_v).saying(|g, e| says(g, e).unwrap_or_default())
 }

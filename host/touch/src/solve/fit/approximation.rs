@@ -145,6 +145,11 @@ impl ApproximationError {
         Self { mean_v: mean_v.collect(), linearised: Some(Arc::clone(linearised)), ..self }
     }
 
+    /// Its mean alone.
+    pub fn mean_alone(&self) -> Self {
+        Self { directions: Directions::default(), ..self.clone() }
+    }
+
     /// Steps of the detector that are most likely, from residuals times the inverse of their covariance (1/V).
     pub fn steps(&self, pulls: &[f64]) -> Vec<f64> {
         self.patterns_v.tr_mul(&DVector::from_column_slice(pulls)).as_slice().to_vec()

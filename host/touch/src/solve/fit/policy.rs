@@ -97,6 +97,10 @@ pub(crate) const FEWER_NATS: f64 = 1.5;
 /// Share of the evidence from which another number of contacts is named beside the one that was found: what is less than 95 % sure says what else
 /// it may be.
 pub(crate) const NAMED_SHARE: f64 = 0.05;
+/// Standard deviation of the logarithm of a contact's conductance about its mean in frames that are explained together: a factor of e.
+pub(crate) const STRENGTH_DEVIATION: f64 = 1.0;
+/// The same of its radius, where it may grow: a ball's does with the cube root of the force (Hertz, 1882).
+pub(crate) const GROWTH_DEVIATION: f64 = 1.0 / 3.0;
 /// Standard deviations of the sum of squares over what noise leaves, where another set of contacts is looked for.
 pub(crate) const OTHER_SET_DEVIATIONS: f64 = 1.5;
 /// Nats by which the evidence for another set of contacts has to be higher.

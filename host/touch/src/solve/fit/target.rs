@@ -42,7 +42,7 @@ pub(crate) struct Errors {
 
 impl Errors {
     /// Standard deviation of the mean of some frames by noise (V).
-    fn of_mean_v(&self, frames: usize) -> f64 {
+    pub fn of_mean_v(&self, frames: usize) -> f64 {
         let [all, fixed] = [self.noise_v, self.rounding_v].map(|deviation_v| deviation_v * deviation_v);
         (fixed + (all - fixed).max(0.0) / frames.max(1) as f64).sqrt()
     }
@@ -196,6 +196,20 @@ impl Target {
     pub(crate) fn with(&self, error: ApproximationError) -> Self {
         let shares = error.shares(self.deviation_v());
         Self { error: Arc::new(error), is_informed: true, is_provisional: false, shares, ..self.clone() }
+    }
+
+    /// The target with so much more that each reading by itself is off by in every frame alike (V).
+    pub(crate) fn with_model_error(&self, model_v: f64) -> Self {
+        let before_v = self.deviation_v();
+        let smaller = before_v / before_v.hypot(model_v);
+        let weights = self.weights.iter().map(|weight| smaller * weight).collect();
+        let fixed_v = self.fixed_v.hypot(model_v);
+        Self { weights, fixed_v, shares: self.error.shares(before_v / smaller), ..self.clone() }
+    }
+
+    /// The target without what the readings may be off by together, but for the mean of that.
+    pub(crate) fn without_unknowns(&self) -> Self {
+        self.with(self.error.mean_alone())
     }
 
     /// The target as if the detector were as described; `None` if it is taken as that already.

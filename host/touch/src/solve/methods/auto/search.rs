@@ -137,6 +137,7 @@ impl Search for AutoSearch {
         let FrameHypothesis { contacts, whole: from, .. } = from;
         let contacts = contacts.filter(|_| from.is_none());
         let search = ContactSearch::new(Arc::clone(&finder));
+        let is_of_key_frames = contacts.as_ref().is_some_and(|contacts| contacts.is_of_key_frames());
         let mut early = None;
         let mut better = |better: ContactHypothesis| {
             early = self.early(&search, &better, from.as_ref(), &mean);
@@ -154,6 +155,13 @@ impl Search for AutoSearch {
         let Some((contacts, solution)) = contacts else {
             return Ok(Hypothesis::of(FrameHypothesis { mean: Some(mean), ..FrameHypothesis::default() }));
         };
+        if is_of_key_frames {
+            return Ok(Hypothesis::of(FrameHypothesis {
+                contacts: Some(Box::new(contacts)),
+                whole: None,
+                mean: Some(mean),
+            }));
+        }
         let target = finder.target_of(&mean, contacts.error())?;
         let whole = match early {
             Some(shape) => Some(Whole::Shape(Box::new(shape))),

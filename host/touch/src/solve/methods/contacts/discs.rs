@@ -6,6 +6,7 @@
 
 mod place_cost;
 mod slopes;
+mod still;
 
 use std::sync::Arc;
 
@@ -13,6 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 pub(super) use self::place_cost::PlaceCost;
 use self::slopes::Slopes;
+pub(super) use self::still::{STAYING, Still, among};
 use super::on_detector::is_near_edge;
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::least_squares::{Damping, NormalEquations, Schedule, Trial, covariance};
@@ -65,6 +67,8 @@ pub(super) struct DiscFit {
     pub cost: f64,
     /// Sum of squares of the parameters' deviations from what was known before.
     pub known: f64,
+    /// What frames before say of their places and radii, if that is what was known.
+    pub still: Option<Arc<Still>>,
     slopes: Arc<Slopes>,
     /// `J^T W^2 J` with what was known before.
     pub normal: DMatrix<f64>,
@@ -126,9 +130,15 @@ impl DiscFit {
         self.slopes.constriction[k] * now.conductance_s / before.conductance_s * before.radius_m / now.radius_m
     }
 
+    /// The fit, with nothing known any more of where those of its contacts stay that have moved; `None` if none has.
+    pub fn letting_move(&self, moved: &[Contact]) -> Option<Self> {
+        let still = self.still.as_ref()?.letting_move(moved)?;
+        Some(Self { still: Some(Arc::new(still)), ..self.clone() })
+    }
+
     /// Units of the places' parameters (m), a contact each.
     pub fn units_m(&self) -> Vec<f64> {
-        self.slopes.at.iter().map(|contact| contact.radius_m).collect()
+        self.slopes.units_m()
     }
 
     /// How far other contacts are from these, in the parameters.
@@ -178,14 +188,25 @@ impl DiscFit {
 impl DiscFitter<'_> {
     /// The nearest minimum from a start; `None` if the start makes no sense.
     pub fn fit(&self, start: Vec<Contact>, target: &Target, effort: Effort) -> Option<DiscFit> {
+        self.fit_still(start, None, target, effort)
+    }
+
+    /// The same of contacts that stay where they are.
+    pub fn fit_still(
+        &self,
+        start: Vec<Contact>,
+        still: Option<Arc<Still>>,
+        target: &Target,
+        effort: Effort,
+    ) -> Option<DiscFit> {
         let start = start.into_iter().map(|contact| self.held(contact)).collect();
-        self.descend(self.anew(start, target)?, target, effort)
+        self.descend(self.anew(start, still, target)?, target, effort)
     }
 
     /// The nearest minimum for other readings from a fit to some.
     pub fn go_on(&self, from: &DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
         let (contacts, volts) = (from.contacts.clone(), from.volts.clone());
-        self.descend(self.at(contacts, volts, Arc::clone(&from.slopes), target)?, target, effort)
+        self.descend(self.at((contacts, volts), Arc::clone(&from.slopes), from.still.clone(), target)?, target, effort)
     }
 
     fn descend(&self, mut fit: DiscFit, target: &Target, effort: Effort) -> Option<DiscFit> {
@@ -206,7 +227,7 @@ impl DiscFitter<'_> {
             let Some((next, expected)) = self.step(&fit, target, &equations, &mut damping) else {
                 // The derivatives may be too old for a step that lowers anything.
                 if fit.contacts != fit.slopes.at {
-                    fit = self.anew(fit.contacts, target)?;
+                    fit = self.anew(fit.contacts, fit.still, target)?;
                     continue;
                 }
                 fit.settled = true;
@@ -215,7 +236,7 @@ impl DiscFitter<'_> {
             let gained = fit.objective() - next.objective();
             fit = next;
             if gained < TRUE * expected && fit.contacts != fit.slopes.at {
-                fit = self.anew(fit.contacts, target)?;
+                fit = self.anew(fit.contacts, fit.still, target)?;
             }
         }
         fit.place_costs = self.place_costs(&fit, target);
@@ -260,7 +281,7 @@ impl DiscFitter<'_> {
     pub fn next(&self, fit: &DiscFit, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
         let offset = fit.slopes.offset(&contacts);
         if fit.is_far(&offset) {
-            return self.anew(contacts, target);
+            return self.anew(contacts, fit.still.clone(), target);
         }
         let volts = match fit.bend(&offset).max(fit.bend_of_crowding(&offset)) < LINEAR {
             true => {
@@ -272,13 +293,14 @@ impl DiscFitter<'_> {
             }
             false => self.volts(&contacts)?,
         };
-        let (cost, known) = (target.cost(&volts), self.known(&contacts));
-        let (slopes, normal) = (Arc::clone(&fit.slopes), fit.normal.clone());
+        let (cost, known) = (target.cost(&volts), self.known(&contacts, fit.still.as_deref()));
+        let (slopes, normal, still) = (Arc::clone(&fit.slopes), fit.normal.clone(), fit.still.clone());
         cost.is_finite().then_some(DiscFit {
             contacts,
             volts,
             cost,
             known,
+            still,
             slopes,
             normal,
             place_costs: Vec::new(),
@@ -287,20 +309,26 @@ impl DiscFitter<'_> {
     }
 
     /// A fit with derivatives taken where it is.
-    fn anew(&self, contacts: Vec<Contact>, target: &Target) -> Option<DiscFit> {
+    fn anew(&self, contacts: Vec<Contact>, still: Option<Arc<Still>>, target: &Target) -> Option<DiscFit> {
         let slopes = Arc::new(self.slopes(contacts)?);
-        let (contacts, volts) = (slopes.at.clone(), slopes.volts.clone());
-        self.at(contacts, volts, slopes, target)
+        self.at((slopes.at.clone(), slopes.volts.clone()), slopes, still, target)
     }
 
-    fn at(&self, contacts: Vec<Contact>, volts: Vec<f64>, slopes: Arc<Slopes>, target: &Target) -> Option<DiscFit> {
-        let (cost, known) = (target.cost(&volts), self.known(&contacts));
-        let normal = self.normal(&slopes, target);
+    fn at(
+        &self,
+        (contacts, volts): (Vec<Contact>, Vec<f64>),
+        slopes: Arc<Slopes>,
+        still: Option<Arc<Still>>,
+        target: &Target,
+    ) -> Option<DiscFit> {
+        let (cost, known) = (target.cost(&volts), self.known(&contacts, still.as_deref()));
+        let normal = self.normal(&slopes, still.as_deref(), target);
         cost.is_finite().then_some(DiscFit {
             contacts,
             volts,
             cost,
             known,
+            still,
             slopes,
             normal,
             place_costs: Vec::new(),
@@ -310,10 +338,10 @@ impl DiscFitter<'_> {
 
     /// Covariance of a fit's parameters if its errors were those of another target; `None` where they are not determined.
     pub fn covariance(&self, fit: &DiscFit, target: &Target) -> Option<DMatrix<f64>> {
-        covariance(&self.normal(&fit.slopes, target))
+        covariance(&self.normal(&fit.slopes, fit.still.as_deref(), target))
     }
 
-    fn normal(&self, slopes: &Slopes, target: &Target) -> DMatrix<f64> {
+    fn normal(&self, slopes: &Slopes, still: Option<&Still>, target: &Target) -> DMatrix<f64> {
         let size = slopes.by.len();
         let whitened = target.at(&slopes.volts).whitened_columns(&slopes.by);
         let mut normal = DMatrix::zeros(size, size);
@@ -326,13 +354,19 @@ impl DiscFitter<'_> {
         for (k, contact) in slopes.at.iter().enumerate() {
             let place = contact.radius_m * contact.radius_m / self.place_variance_m2;
             (0..2).for_each(|i| normal[(PARAMETERS * k + i, PARAMETERS * k + i)] += place);
-            let weight = policy::CONDUCTANCE_DEVIATION.powi(-2);
+            let weight = self.usual_strength(still, k)[1].powi(-2);
             let [by_first, by_second] = by_parameters(slopes.constriction[k]);
             let (c, r) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
             normal[(c, c)] += by_first * by_first * weight;
             normal[(c, r)] += by_first * by_second * weight;
             normal[(r, c)] += by_first * by_second * weight;
-            normal[(r, r)] += by_second * by_second * weight + self.radius_deviation.powi(-2);
+            normal[(r, r)] += by_second * by_second * weight;
+            if still.is_none() {
+                normal[(r, r)] += self.radius_deviation.powi(-2);
+            }
+        }
+        if let Some(still) = still {
+            still.add_to_normal(&mut normal, &slopes.units_m());
         }
         normal
     }
@@ -343,25 +377,48 @@ impl DiscFitter<'_> {
         target.whiten_transposed(&mut residuals);
         let mut gradient: Vec<_> = fit.slopes.by.iter().map(|slope| dot(slope, &residuals)).collect();
         for (k, contact) in fit.contacts.iter().enumerate() {
-            let [conductance, radius] = self.unusual(contact);
-            let pull = conductance / policy::CONDUCTANCE_DEVIATION;
+            let still = fit.still.as_deref();
+            let pull = self.unusual_strength(contact, still, k) / self.usual_strength(still, k)[1];
             let [by_first, by_second] = by_parameters(fit.slopes.constriction[k]);
             gradient[PARAMETERS * k + 2] -= by_first * pull;
-            gradient[PARAMETERS * k + 3] -= by_second * pull + radius / self.radius_deviation;
+            gradient[PARAMETERS * k + 3] -= by_second * pull;
+            if still.is_none() {
+                gradient[PARAMETERS * k + 3] -= self.unusual_radius(contact) / self.radius_deviation;
+            }
+        }
+        if let Some(still) = &fit.still {
+            still.add_to_gradient(&mut gradient, &fit.contacts, &fit.units_m());
         }
         gradient.into()
     }
 
-    /// How far a contact's conductance and radius are from what is usual, in standard deviations.
-    fn unusual(&self, contact: &Contact) -> [f64; 2] {
-        [
-            (contact.conductance_s / self.sheet_s).ln() / policy::CONDUCTANCE_DEVIATION,
-            (contact.radius_m / self.usual_radius_m).ln() / self.radius_deviation,
-        ]
+    /// Mean and standard deviation of the logarithm of a contact's conductance (S) before anything is read.
+    pub fn usual_strength(&self, still: Option<&Still>, k: usize) -> [f64; 2] {
+        match still {
+            Some(still) => [still.level(k), policy::STRENGTH_DEVIATION],
+            None => [self.sheet_s.ln(), policy::CONDUCTANCE_DEVIATION],
+        }
     }
 
-    fn known(&self, contacts: &[Contact]) -> f64 {
-        contacts.iter().flat_map(|contact| self.unusual(contact)).map(|deviation| deviation * deviation).sum()
+    /// How far a contact's conductance is from what is usual, in standard deviations.
+    fn unusual_strength(&self, contact: &Contact, still: Option<&Still>, k: usize) -> f64 {
+        let [usual, deviation] = self.usual_strength(still, k);
+        (contact.conductance_s.ln() - usual) / deviation
+    }
+
+    /// The same of its radius, where nothing else is known of that.
+    fn unusual_radius(&self, contact: &Contact) -> f64 {
+        (contact.radius_m / self.usual_radius_m).ln() / self.radius_deviation
+    }
+
+    fn known(&self, contacts: &[Contact], still: Option<&Still>) -> f64 {
+        let strengths =
+            contacts.iter().enumerate().map(|(k, contact)| self.unusual_strength(contact, still, k).powi(2));
+        let staying = match still {
+            Some(still) => still.cost(contacts),
+            None => contacts.iter().map(|contact| self.unusual_radius(contact).powi(2)).sum(),
+        };
+        strengths.sum::<f64>() + staying
     }
 
     /// Readings of the forward model (V).

@@ -47,19 +47,28 @@ impl Prior {
             + (number as f64).ln()
     }
 
+    /// Logarithm of the density of places and radii at its peak, with places in these units (m), a contact each.
+    pub fn ln_peak_of_staying(&self, units_m: &[f64]) -> f64 {
+        let of_one = -self.area_m2.ln() - (self.radius_deviation * TAU.sqrt()).ln();
+        units_m.iter().map(|unit_m| of_one + 2.0 * unit_m.ln()).sum()
+    }
+
     /// Logarithm of the evidence for a fit; nothing speaks for one that is not determined.
     pub fn ln_evidence(&self, fit: &DiscFit) -> f64 {
         let Some(factor) = Cholesky::new(fit.normal.clone()) else { return f64::NEG_INFINITY };
         let ln_determinant: f64 = 2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let count = fit.contacts.len();
-        let peak = -self.area_m2.ln() - (policy::CONDUCTANCE_DEVIATION * self.radius_deviation * TAU).ln();
-        // Places are in units of their own.
-        let units: f64 = (0..count).map(|k| 2.0 * fit.along(k).1.ln()).sum();
+        let deviation = if fit.still.is_some() { policy::STRENGTH_DEVIATION } else { policy::CONDUCTANCE_DEVIATION };
+        let peak = -(deviation * TAU.sqrt()).ln();
+        let peak_of_staying = match &fit.still {
+            Some(still) => still.ln_peak(&fit.units_m()),
+            None => self.ln_peak_of_staying(&fit.units_m()),
+        };
         let from_logs: f64 = (0..count).map(|k| fit.constriction(k).ln_1p()).sum();
         let orders: f64 = (1..=count).map(|k| (k as f64).ln()).sum();
         -0.5 * (fit.cost + fit.known)
             + count as f64 * (peak - policy::FEWER_NATS)
-            + units
+            + peak_of_staying
             + from_logs
             + orders
             + 0.5 * (PARAMETERS * count) as f64 * TAU.ln()

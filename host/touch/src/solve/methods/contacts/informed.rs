@@ -8,6 +8,8 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
+
 use super::discs::DiscFit;
 use super::search::COLD;
 use super::{Better, ContactFinder, ContactHypothesis};
@@ -44,6 +46,9 @@ impl ContactFinder {
         target: &Target,
         better: &mut Better<'_>,
     ) -> Option<ContactHypothesis> {
+        if let Some((from, keys)) = from.and_then(|from| Some((from, from.keys.as_ref()?))) {
+            return Some(self.staying(from, keys, target).unwrap_or_else(|| from.clone()));
+        }
         if self.problem.nuisance().is_none() {
             return self.search_exact(from, target, better);
         }
@@ -267,7 +272,22 @@ impl ContactFinder {
 
     /// The target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
     /// if the detector is known exactly, or contacts make no sense.
-    fn informed(&self, target: &Target, contacts: &[Contact], near: Option<&Arc<Linearised>>) -> Option<Target> {
+    pub(super) fn informed(
+        &self,
+        target: &Target,
+        contacts: &[Contact],
+        near: Option<&Arc<Linearised>>,
+    ) -> Option<Target> {
+        Some(self.informed_with_patterns(target, contacts, near)?.0)
+    }
+
+    /// The same with what unknown things change in the readings (V), each by its standard deviation, a column each.
+    pub(super) fn informed_with_patterns(
+        &self,
+        target: &Target,
+        contacts: &[Contact],
+        near: Option<&Arc<Linearised>>,
+    ) -> Option<(Target, DMatrix<f64>)> {
         let detector = self.problem.detector();
         let nuisance = self.problem.nuisance()?;
         let mut patterns_v = nuisance.patterns_v(contacts, detector).ok()?;
@@ -280,10 +300,11 @@ impl ContactFinder {
         let least_v = self.errors.least_v(made_for.largest_v());
         let made_for = made_for.volts().to_vec();
         let error = ApproximationError::of(&patterns_v, nuisance.directions(), made_for, least_v);
-        Some(target.with(match near {
+        let informed = target.with(match near {
             Some(near) => error.about(near, near.detector.readings_v(contacts, detector).ok()?.volts()),
             None => error,
-        }))
+        });
+        Some((informed, patterns_v))
     }
 
     /// The detector that a fit makes most likely, if it is far from where the target is linear.

@@ -1,5 +1,7 @@
 //! Contacts from one frame to the next, and which of them are still there.
 
+use std::sync::Arc;
+
 use super::discs::{DiscFit, Effort, PARAMETERS};
 use super::{ContactFinder, ContactHypothesis};
 use crate::solve::fit::policy;
@@ -33,17 +35,15 @@ impl ContactFinder {
         if weak.is_empty() && !self.is_misfit(&found.fit, target) {
             return Some(found);
         }
-        let evidence = self.evidence(&found.fit);
+        let evidence = self.evidence(&found.fit) + needed(&found.fit);
         if self.evidence_of_nothing(target) > evidence {
             return None;
         }
-        let kept =
-            found.fit.contacts.iter().enumerate().filter(|(k, _)| !weak.contains(k)).map(|(_, contact)| *contact);
-        let kept: Vec<_> = kept.collect();
+        let kept: Vec<_> = (0..found.fit.contacts.len()).filter(|k| !weak.contains(k)).collect();
         if weak.is_empty() || kept.is_empty() {
             return Some(found);
         }
-        match self.disc_fitter().fit(kept, target, WARM) {
+        match self.some_of(&found.fit, &kept, target) {
             Some(fit) if self.evidence(&fit) > evidence => Some(ContactHypothesis { fit, certainty: None, ..found }),
             _ => Some(found),
         }
@@ -52,6 +52,10 @@ impl ContactFinder {
     /// Contacts brought to the next frame, less those that were let go; `None` if that makes no sense.
     pub(super) fn follow(&self, last: &ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
         let fit = self.disc_fitter().go_on(&last.fit, target, WARM)?;
+        let fit = match last.fit.letting_move(&fit.contacts) {
+            Some(freer) => self.disc_fitter().go_on(&freer, target, WARM)?,
+            None => fit,
+        };
         let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
         let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
         Some(ContactHypothesis { fit, certainty, ..last.clone() })
@@ -62,15 +66,21 @@ impl ContactFinder {
     fn without_lifted(&self, before: &DiscFit, fit: DiscFit, target: &Target) -> DiscFit {
         let is_lighter =
             |(now, before): &(&Contact, &Contact)| now.conductance_s < policy::LIFTED_SHARE * before.conductance_s;
-        let kept = fit.contacts.iter().zip(&before.contacts).filter(|pair| !is_lighter(pair)).map(|(now, _)| *now);
-        let kept: Vec<_> = kept.collect();
+        let pairs = fit.contacts.iter().zip(&before.contacts).enumerate();
+        let kept: Vec<_> = pairs.filter(|(_, pair)| !is_lighter(pair)).map(|(k, _)| k).collect();
         if kept.is_empty() || kept.len() == fit.contacts.len() {
             return fit;
         }
-        match self.disc_fitter().fit(kept, target, WARM) {
-            Some(fewer) if self.evidence(&fewer) > self.evidence(&fit) => fewer,
+        match self.some_of(&fit, &kept, target) {
+            Some(fewer) if self.evidence(&fewer) > self.evidence(&fit) + needed(&fit) => fewer,
             _ => fit,
         }
+    }
+
+    /// A fit of some of the contacts of another one.
+    fn some_of(&self, fit: &DiscFit, kept: &[usize], target: &Target) -> Option<DiscFit> {
+        let still = fit.still.as_ref().and_then(|still| still.of(kept)).map(Arc::new);
+        self.disc_fitter().fit_still(kept.iter().map(|k| fit.contacts[*k]).collect(), still, target, WARM)
     }
 
     /// Contacts so weak that they may not be there. The conductance of a firm one is not known well either: more of it would change
@@ -85,4 +95,10 @@ impl ContactFinder {
         };
         (0..fit.contacts.len()).filter(is_weak).collect()
     }
+}
+
+/// Nats by which contacts of a fit have to be less likely than fewer to be let go: what several frames say is not forgotten for what one of them does not
+/// need.
+pub(super) fn needed(fit: &DiscFit) -> f64 {
+    if fit.still.is_some() { policy::GONE_NATS } else { 0.0 }
 }

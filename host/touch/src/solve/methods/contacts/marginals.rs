@@ -8,7 +8,6 @@
 //! on `square-60` is 0.2 to 0.35 times the square of the change of that square (mm2) from 2 to 4.6 mm.
 
 use super::discs::{DiscFit, PARAMETERS, by_parameters};
-use crate::solve::fit::policy;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 /// Points along each parameter, and how far they reach (standard deviations).
@@ -28,6 +27,8 @@ pub(super) struct Logs {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Usual {
     pub conductance_s: f64,
+    /// Standard deviation of its logarithm.
+    pub conductance_deviation: f64,
     pub most_s: f64,
     pub radius_m: f64,
     pub radius_deviation: f64,
@@ -41,7 +42,7 @@ impl Usual {
         let of = |i: usize, j: usize| covariance[(start + i, start + j)];
         let posterior = Matrix2::new(of(0, 0), of(0, 1), of(1, 0), of(1, 1));
         let constriction = fit.constriction(k);
-        let weights = [policy::CONDUCTANCE_DEVIATION.powi(-2), self.radius_deviation.powi(-2)];
+        let weights = [self.conductance_deviation.powi(-2), self.radius_deviation.powi(-2)];
         // Of the likelihood alone: without the prior's curvature, and with what pulls against the prior's slope.
         let by_conductance = Vector2::from(by_parameters(constriction));
         let by_radius = Vector2::new(0.0, 1.0);

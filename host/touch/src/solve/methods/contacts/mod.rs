@@ -28,6 +28,7 @@ mod starts;
 mod systematic_error;
 #[cfg(test)]
 mod tests;
+mod window;
 
 use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
@@ -41,6 +42,7 @@ use self::on_detector::{OnDetector, of_place};
 use self::scan::Scan;
 pub use self::solver::Contacts;
 pub(crate) use self::solver::{ContactSearch, ContactTracker};
+use self::window::KeyFrame;
 use crate::solve::answer::{Alternative, Calibrated, Flags, FoundContact, Solution, SolveError, Uncertainty, check};
 use crate::solve::before::adaptive_mean;
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
@@ -117,6 +119,8 @@ pub(crate) struct ContactHypothesis {
     certainty: Option<Certainty>,
     /// What the readings may be off by together, by which it was compared with others; none of a detector that is as described.
     error: Option<Arc<ApproximationError>>,
+    /// Key frames of what is followed, for a search that is to look at these alone.
+    keys: Option<Arc<[KeyFrame]>>,
     /// Whether it is to be shown soon, before it and that error were brought to agree: as it is, it may fit worse than it would.
     is_begun: bool,
 }
@@ -156,9 +160,14 @@ impl ContactHypothesis {
         self.is_begun
     }
 
+    /// Whether a search looks at key frames alone, and leaves it as it is if these say nothing new.
+    pub fn is_of_key_frames(&self) -> bool {
+        self.keys.is_some()
+    }
+
     /// A fit whose count was not compared with others.
     fn of(fit: DiscFit, target: &Target) -> Self {
-        Self { fit, certainty: None, error: target.error().cloned(), is_begun: false }
+        Self { fit, certainty: None, error: target.error().cloned(), keys: None, is_begun: false }
     }
 
     /// A fit, with the logarithms of the evidence for each count.
@@ -371,8 +380,10 @@ impl ContactFinder {
 
     /// What the readings say of a contact's conductance and radius.
     fn logs(&self, fit: &DiscFit, k: usize, covariance: Option<&DMatrix<f64>>) -> Option<Logs> {
+        let [ln_conductance, conductance_deviation] = self.disc_fitter().usual_strength(fit.still.as_deref(), k);
         let usual = Usual {
-            conductance_s: self.sheet_s,
+            conductance_s: ln_conductance.exp(),
+            conductance_deviation,
             most_s: policy::CONDUCTANCES_SHEETS[1] * self.sheet_s,
             radius_m: self.settings.radius_m,
             radius_deviation: self.settings.radius_deviation,

@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use super::discs::DiscFit;
 use super::doubt::Doubt;
+use super::keep::needed;
 use super::rows::RowState;
+use super::window::KeyFrames;
 use super::{ContactFinder, ContactHypothesis, ContactSettings};
 use crate::solve::after::association::Association;
 use crate::solve::answer::{Calibrated, FoundContact, Solution, SolveError};
@@ -54,6 +56,10 @@ pub(crate) struct ContactTracker {
     doubt: Doubt,
     /// Time for which no row has said more than that its readings are below the converter's range (s).
     silent_s: f64,
+    /// What is followed over a longer time.
+    keys: KeyFrames,
+    /// Whether a search is to look at these alone.
+    is_of_key_frames: bool,
     /// Whether it was found when what the readings may be off by together was not known yet.
     is_provisional: bool,
     /// What a calibration would bring, as all readings showed of what is followed.
@@ -118,6 +124,11 @@ impl Contacts {
     pub(super) fn finder(&self) -> &ContactFinder {
         &self.tracker.contacts.finder
     }
+
+    #[cfg(test)]
+    pub(super) fn found(&self) -> Option<&ContactHypothesis> {
+        self.tracker.contacts.last.as_ref()
+    }
 }
 
 impl ContactTracker {
@@ -137,6 +148,8 @@ impl ContactTracker {
             recounted_s: None,
             doubt: Doubt::default(),
             silent_s: 0.0,
+            keys: KeyFrames::default(),
+            is_of_key_frames: false,
             is_provisional: false,
             calibrated: None,
             inherited: Vec::new(),
@@ -152,7 +165,8 @@ impl ContactTracker {
 
     /// What is followed.
     pub fn found(&self) -> Option<ContactHypothesis> {
-        self.last.clone()
+        let keys = self.is_of_key_frames.then(|| self.keys.all());
+        self.last.clone().map(|last| ContactHypothesis { keys, ..last })
     }
 
     /// Derivatives of the readings by the parameters of what is followed (V).
@@ -176,6 +190,7 @@ impl ContactTracker {
     fn step_frame(&mut self, target: &Target) -> bool {
         self.before = self.association.clone();
         (self.rows, self.latest) = (None, None);
+        self.is_of_key_frames = false;
         let Some(last) = self.last.take() else {
             let search = self.finder.stands_out(target);
             self.last = search.then(|| self.taken_over(target)).flatten();
@@ -192,8 +207,10 @@ impl ContactTracker {
             || target.frames >= policy::MORE_FRAMES * self.searched.frames
             || target.is_stale(&found.fit.volts)
             || self.finder.is_outdated(target);
+        self.keys.take(target, &found.fit, &self.finder.errors);
+        self.is_of_key_frames = !search && self.keys.are_ripe();
         self.last = Some(found);
-        search
+        search || self.is_of_key_frames
     }
 
     /// What contacts that another tracker found are in a frame in which something presses: for the time of a search better than none.
@@ -209,6 +226,12 @@ impl ContactTracker {
         let expected_v = self.expected_v().map(<[f64]>::to_vec);
         let count = |found: &Option<ContactHypothesis>| found.as_ref().map_or(0, |found| found.fit.contacts.len());
         let before = count(&self.last);
+        let found = found.map(|found| {
+            if found.is_of_key_frames() {
+                self.keys.looked_at();
+            }
+            ContactHypothesis { keys: None, ..found }
+        });
         let left = found.as_ref().map_or(0.0, |found| found.fit.cost);
         let caught_up = found.and_then(|found| self.finder.catch_up(found, target));
         self.last = self.last.take().and_then(|last| self.finder.judged(last, target));
@@ -216,7 +239,9 @@ impl ContactTracker {
             let of = |found: &ContactHypothesis| self.finder.evidence(&found.fit);
             found.as_ref().map_or_else(|| self.finder.evidence_of_nothing(target), of)
         };
-        if self.is_stale || evidence(&caught_up) >= evidence(&self.last) {
+        let are_fewer = count(&caught_up) < count(&self.last);
+        let needed = self.last.as_ref().filter(|_| are_fewer).map_or(0.0, |last| needed(&last.fit));
+        if self.is_stale || evidence(&caught_up) >= evidence(&self.last) + needed {
             (self.last, self.is_stale) = (caught_up, false);
         }
         self.recounted_s = (count(&self.last) != before).then_some(0.0);
@@ -275,6 +300,7 @@ impl ContactTracker {
     pub fn let_go(&mut self) {
         (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
         self.doubt = Doubt::default();
+        (self.keys, self.is_of_key_frames) = (KeyFrames::default(), false);
         (self.rows, self.recounted_s) = (None, None);
     }
 

@@ -31,6 +31,11 @@ pub(super) struct Slopes {
 }
 
 impl Slopes {
+    /// Units of the places' parameters (m), a contact each.
+    pub(super) fn units_m(&self) -> Vec<f64> {
+        self.at.iter().map(|contact| contact.radius_m).collect()
+    }
+
     /// How far contacts are from where the derivatives were taken, in the parameters.
     pub(super) fn offset(&self, contacts: &[Contact]) -> Vec<f64> {
         let of = |(k, now): (usize, &Contact)| {

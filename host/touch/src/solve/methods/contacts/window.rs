@@ -1,0 +1,164 @@
+//! Contacts that stay where they are while their strengths change: several frames explained together.
+//!
+//! Where two fingers are so near that one wide contact explains a frame as well, that contact moves as weight goes from one finger to the other,
+//! and no single place of it explains all frames: two that stay do. So [key frames](key_frames) of what is followed are fitted together, with one place and
+//! one radius of each contact for all frames, and conductances that are each frame's own, about a common level. What is not known of the
+//! detector is the same in all frames too, and linear. ([`frames`], [`together`]).
+//!
+//! Explanations are compared by the logarithm of their evidence as in [`evidence`](super::evidence), by Laplace's approximation over all
+//! parameters. The rival of one contact more that stays are as many contacts as before that move, about a mean place, by as much as they did.
+
+mod frames;
+mod key_frames;
+#[cfg(test)]
+mod tests;
+mod together;
+
+use std::sync::Arc;
+
+use self::frames::Window;
+pub(super) use self::key_frames::{KeyFrame, KeyFrames};
+use self::together::{Motion, Together};
+use super::discs::{Effort, STAYING, Still, place_m};
+use super::search::COLD;
+use super::{Certainty, ContactFinder, ContactHypothesis};
+use crate::solve::fit::evidence::misfit_limit;
+use crate::solve::fit::policy;
+use crate::solve::fit::target::Target;
+use tactomo_physics::scene::Contact;
+use tactomo_physics::space;
+
+/// How often the detector that readings are linear near is sought anew.
+const RENEWALS: usize = 3;
+/// No step.
+const AS_IT_IS: Effort = Effort { steps: 0, ..COLD };
+
+impl ContactFinder {
+    /// More contacts than are followed, that stay where they are while their strengths change, if key frames together say so.
+    pub(super) fn staying(
+        &self,
+        from: &ContactHypothesis,
+        keys: &[KeyFrame],
+        target: &Target,
+    ) -> Option<ContactHypothesis> {
+        let followed: Vec<_> = keys.iter().map(|key| key.contacts.clone()).collect();
+        // What a detector differs by that is only described can make one contact seem two that stay.
+        let is_known = self.problem.nuisance().is_none() || self.problem.detector().calibration.is_some();
+        (is_known || followed[0].len() > 1).then_some(())?;
+        let (middle, spread_m) = middle(&followed);
+        let mut near = from.error.as_ref().and_then(|error| error.linearised.clone());
+        let (mut window, mut moving) = (None, None);
+        // As many contacts as are followed explain each frame by itself. Where they do not explain all, readings are linear near another detector.
+        for _ in 0..RENEWALS {
+            let tried = Window::new(self, keys, &followed, near)?;
+            let found = tried.explained(followed.clone(), Motion::By(spread_m))?;
+            near = tried.nearer(&found);
+            let is_done = tried.fits(&found) || near.is_none();
+            (window, moving) = (Some(tried), Some(found));
+            if is_done {
+                break;
+            }
+        }
+        let (window, moving) = window.zip(moving).filter(|(window, moving)| window.fits(moving))?;
+        let (best, by_count) = window.grown(vec![middle; keys.len()], &moving)?;
+        (best.count() > followed[0].len() && window.fits(&best)).then_some(())?;
+        let last = best.at.fits.last()?;
+        let contacts = last.contacts.clone();
+        let still = Still::about(last, best.staying.clone(), best.levels());
+        let target = self.informed(target, &contacts, window.near.as_ref()).unwrap_or_else(|| target.clone());
+        let fit = self.disc_fitter().fit_still(contacts, Some(Arc::new(still)), &target, COLD)?;
+        let certainty = Certainty::of(best.count(), &by_count);
+        let keys = from.keys.clone();
+        let found = ContactHypothesis { certainty, keys, ..ContactHypothesis::of(fit, &target) };
+        (!self.is_misfit(&found.fit, &target)).then_some(found)
+    }
+}
+
+/// Contacts at their mean places, with mean radii and conductances, and by how much places of a contact differ (m).
+fn middle(frames: &[Vec<Contact>]) -> (Vec<Contact>, f64) {
+    let count = frames.len() as f64;
+    let mean = |k: usize, of: &dyn Fn(&Contact) -> f64| frames.iter().map(|all| of(&all[k])).sum::<f64>() / count;
+    let of = |k: usize| Contact {
+        x_m: mean(k, &|contact| contact.x_m),
+        y_m: mean(k, &|contact| contact.y_m),
+        z_m: mean(k, &|contact| contact.z_m),
+        radius_m: mean(k, &|contact| contact.radius_m.ln()).exp(),
+        conductance_s: mean(k, &|contact| contact.conductance_s.ln()).exp(),
+    };
+    let means: Vec<_> = (0..frames[0].len()).map(of).collect();
+    let apart = |all: &Vec<Contact>| -> f64 {
+        all.iter().zip(&means).map(|(one, mean)| space::distance(place_m(one), place_m(mean)).powi(2)).sum()
+    };
+    let squares: f64 = frames.iter().map(apart).sum();
+    let spread_m = (squares / (2.0 * count * means.len() as f64)).sqrt();
+    (means, spread_m)
+}
+
+impl Window<'_> {
+    /// The likeliest number of contacts that stay, from some; their rival is that as many move. Gives the logarithm of the evidence for each count too.
+    fn grown(&self, from: Vec<Vec<Contact>>, moving: &Together) -> Option<(Together, Vec<f64>)> {
+        let still = self.explained(from, Motion::Still)?;
+        let mut by_count = vec![f64::NEG_INFINITY; self.finder.settings.most + 1];
+        let rival = moving.ln_evidence.max(still.ln_evidence);
+        by_count[still.count()] = rival;
+        let needed = |found: &Together| rival + policy::GONE_NATS * (found.count() - moving.count()) as f64;
+        // What has gone far is not explained by contacts that stay.
+        let is_near = still.at.cost < policy::WRONG_WIDE_MEAN_SQUARE * self.count();
+        let (mut best, mut last) = (None, still);
+        while is_near && last.count() < self.finder.settings.most {
+            let Some(more) = self.one_more(&last).filter(|more| self.may_be(more)) else { break };
+            by_count[more.count()] = more.ln_evidence;
+            let is_worse = more.ln_evidence < last.ln_evidence;
+            last = more;
+            let gain = last.ln_evidence - needed(&last);
+            if gain > best.as_ref().map_or(0.0, |best: &Together| best.ln_evidence - needed(best)) {
+                best = Some(last.clone());
+            }
+            if is_worse {
+                break;
+            }
+        }
+        Some((best?, by_count))
+    }
+
+    /// Whether contacts are what they are called. What cover each other partly are one of another shape than a disc; and one that is lighter against
+    /// the firmest than readings are unknown may be what the detector differs by.
+    fn may_be(&self, found: &Together) -> bool {
+        let contacts = &found.at.fits[0].contacts;
+        let is_over = |a: &Contact, b: &Contact| space::distance(place_m(a), place_m(b)) < a.radius_m + b.radius_m;
+        let are_apart = (0..contacts.len()).all(|k| !contacts[..k].iter().any(|other| is_over(&contacts[k], other)));
+        let unknown = self.frames.iter().map(|frame| frame.unknown).fold(0.0, f64::max);
+        let levels = found.levels();
+        let [lightest, firmest] = [f64::min, f64::max].map(|of| levels.iter().copied().reduce(of).unwrap_or_default());
+        are_apart && lightest - firmest > unknown.ln()
+    }
+
+    /// One contact more that stays, from where it would explain most of the frame that is explained worst.
+    fn one_more(&self, found: &Together) -> Option<Together> {
+        let left = |index: &usize| self.frames[*index].alone.cost(&found.at.fits[*index].volts);
+        let worst = (0..self.frames.len()).max_by(|a, b| left(a).total_cmp(&left(b)))?;
+        let alone = &self.frames[worst].alone;
+        let fit = self.fitter.go_on(&found.at.fits[worst], alone, AS_IT_IS)?;
+        let more = self.finder.one_more(&fit, Vec::new(), alone).ok()?;
+        // What changes is where they are; how much firmer each is in other frames stays as it was.
+        let start = found.at.fits.iter().map(|fit| {
+            let ratios = fit.contacts.iter().zip(&found.at.fits[worst].contacts);
+            let ratios = ratios.map(|(here, there)| here.conductance_s / there.conductance_s);
+            let pairs = more.contacts.iter().zip(ratios.chain(std::iter::repeat(1.0)));
+            pairs.map(|(one, ratio)| Contact { conductance_s: ratio * one.conductance_s, ..*one }).collect()
+        });
+        self.explained(start.collect(), Motion::Still)
+    }
+
+    /// Readings that count.
+    fn count(&self) -> f64 {
+        self.frames.iter().map(|frame| frame.target.count()).sum::<usize>() as f64
+    }
+
+    /// Whether no more is left than noise and model error leave.
+    fn fits(&self, found: &Together) -> bool {
+        let parameters = found.count() * (STAYING + self.frames.len());
+        let freedom = (self.count() - parameters as f64).max(1.0);
+        found.at.cost <= freedom * misfit_limit(freedom)
+    }
+}

@@ -1,0 +1,150 @@
+//! Key frames as they are fitted together: what readings are off by in all of them.
+//!
+//! What is not known of the detector is the same in all frames, and linear near some detector. So is what each reading by itself is off by, but for
+//! noise: the baseline's error is the same in all frames, and the model's in proportion to what is read. Taken as independent from frame to frame,
+//! both made light contacts beside a firm one that is pressed more and less.
+
+use std::sync::Arc;
+
+use nalgebra::allocator::Allocator;
+use nalgebra::{Cholesky, DMatrix, DVector, DefaultAllocator, Dim, Dyn, OMatrix};
+
+use super::super::ContactFinder;
+use super::super::discs::{DiscFit, DiscFitter};
+use super::KeyFrame;
+use super::together::Together;
+use crate::solve::fit::approximation::Linearised;
+use crate::solve::fit::target::Target;
+use tactomo_physics::scene::Contact;
+
+/// Frames that a baseline is the mean of at first (`host/board/src/baseline`).
+const BASELINE_FRAMES: f64 = 32.0;
+/// Share by which what steps of a detector change in the readings is wrong, as it is found with coarse models and taken as linear: without it, fits to
+/// detectors as built leave 1.1 times what noise does, with a hundredth half of that.
+const PATTERN_ERROR: f64 = 0.01;
+
+/// A key frame as it is fitted.
+pub(super) struct Frame {
+    /// With the errors of noise and model alone.
+    pub target: Target,
+    /// With what the readings may be off by together: for fits of this frame alone.
+    pub alone: Target,
+    /// What steps of the detector change, whitened, a column each.
+    pub patterns: DMatrix<f64>,
+    transposed: DMatrix<f64>,
+    /// What readings change by with steps of the detector, as a share of the largest.
+    pub unknown: f64,
+    /// What the model is wrong by in each of them (V).
+    model_v: f64,
+}
+
+/// Key frames, to be explained together.
+pub(super) struct Window<'a> {
+    pub finder: &'a ContactFinder,
+    pub fitter: DiscFitter<'a>,
+    pub frames: Vec<Frame>,
+    /// The detector near which readings are taken as linear, if not the described one.
+    pub near: Option<Arc<Linearised>>,
+    /// Information of all frames about steps of the detector, with what is known of these before.
+    pub of_detector: DMatrix<f64>,
+    /// Inverse of the covariance, between frames, of what each reading by itself is off by.
+    pub between: DMatrix<f64>,
+    /// Of `of_detector`.
+    pub factor: Cholesky<f64, Dyn>,
+}
+
+impl ContactFinder {
+    /// Inverse of the covariance between frames of what each reading by itself is off by, in its deviations of each frame: noise is each frame's own, the
+    /// baseline's error the same in all, and the model's in proportion to what is read.
+    fn between(&self, frames: &[Frame]) -> Option<DMatrix<f64>> {
+        let baseline_v = self.errors.noise_v / BASELINE_FRAMES.sqrt();
+        let fixed = |frame: &Frame| {
+            let deviation_v = frame.target.deviation_v();
+            [baseline_v / deviation_v, frame.model_v / deviation_v]
+        };
+        let all: Vec<_> = frames.iter().map(fixed).collect();
+        let covariance =
+            |i: usize, j: usize| f64::from(u8::from(i == j)) + all[i][0] * all[j][0] + all[i][1] * all[j][1];
+        Some(Cholesky::new(DMatrix::from_fn(frames.len(), frames.len(), covariance))?.inverse())
+    }
+}
+
+impl<'a> Window<'a> {
+    /// Of key frames, where contacts in each are about these; readings are linear near a detector, or else the described one.
+    pub fn new(
+        finder: &'a ContactFinder,
+        keys: &[KeyFrame],
+        about: &[Vec<Contact>],
+        near: Option<Arc<Linearised>>,
+    ) -> Option<Self> {
+        let frame = |(key, contacts): (&KeyFrame, &Vec<Contact>)| {
+            finder.check(&key.mean.readings).ok()?;
+            let alone = Target::of_mean(&key.mean.readings, key.mean.frames, &finder.errors, None);
+            let model_v = finder.errors.model * alone.readings().largest_v();
+            let Some((alone, mut patterns)) = finder.informed_with_patterns(&alone, contacts, near.as_ref()) else {
+                let patterns = DMatrix::zeros(alone.readings().volts().len(), 0);
+                return Some(Frame {
+                    target: alone.clone(),
+                    alone,
+                    transposed: patterns.transpose(),
+                    patterns,
+                    unknown: 0.0,
+                    model_v,
+                });
+            };
+            let of_steps = patterns.columns(0, finder.problem.nuisance()?.directions());
+            let unknown_v = (of_steps.norm_squared() / patterns.nrows() as f64).sqrt();
+            let unknown = unknown_v / alone.readings().largest_v();
+            let of_patterns_v = PATTERN_ERROR * unknown_v;
+            let (alone, model_v) = (alone.with_model_error(of_patterns_v), model_v.hypot(of_patterns_v));
+            let target = alone.without_unknowns();
+            target.whiten_columns(&mut patterns);
+            Some(Frame { target, alone, transposed: patterns.transpose(), patterns, unknown, model_v })
+        };
+        let frames: Vec<_> = keys.iter().zip(about).map(frame).collect::<Option<_>>()?;
+        let unknowns = frames.first()?.patterns.ncols();
+        let between = finder.between(&frames)?;
+        let patterns: Vec<_> = frames.iter().map(|frame| frame.patterns.clone()).collect();
+        let information = |sum: DMatrix<f64>, (frame, all): (&Frame, DMatrix<f64>)| sum + &frame.transposed * all;
+        let of_detector = DMatrix::identity(unknowns, unknowns);
+        let of_detector = frames.iter().zip(across(&between, &patterns)).fold(of_detector, information);
+        let factor = Cholesky::new(of_detector.clone())?;
+        Some(Self { fitter: finder.disc_fitter(), of_detector, factor, finder, near, between, frames })
+    }
+
+    /// The detector that an explanation makes likeliest, if it is far from where readings are linear.
+    pub fn nearer(&self, found: &Together) -> Option<Arc<Linearised>> {
+        let nuisance = self.finder.problem.nuisance()?;
+        let steps = self.factor.solve(&self.pull(&self.residuals(&found.at.fits).0)?);
+        let steps = steps.as_slice()[..nuisance.directions()].to_vec();
+        let is_far =
+            |frame: &Frame| frame.alone.error().is_some_and(|error| error.is_far(&steps, frame.target.deviation_v()));
+        self.frames.iter().any(is_far).then_some(())?;
+        let detector = nuisance.similar(&steps).ok()?;
+        Some(Arc::new(Linearised { steps, detector }))
+    }
+
+    /// Residuals of all frames times what is [between](Self::between) them, and their sum of squares.
+    pub fn residuals(&self, fits: &[DiscFit]) -> (Vec<DVector<f64>>, f64) {
+        let of = |(fit, frame): (&DiscFit, &Frame)| DVector::from_vec(frame.target.residuals(&fit.volts));
+        let own: Vec<_> = fits.iter().zip(&self.frames).map(of).collect();
+        let all = across(&self.between, &own);
+        let squares = own.iter().zip(&all).map(|(own, all)| own.dot(all)).sum();
+        (all, squares)
+    }
+
+    /// What all frames' residuals pull the detector by.
+    pub fn pull(&self, residuals: &[DVector<f64>]) -> Option<DVector<f64>> {
+        let pulls = self.frames.iter().zip(residuals).map(|(frame, left)| &frame.transposed * left);
+        pulls.reduce(|sum, pull| sum + pull)
+    }
+}
+
+/// A matrix between frames times what each frame has.
+pub(super) fn across<R: Dim, C: Dim>(between: &DMatrix<f64>, all: &[OMatrix<f64, R, C>]) -> Vec<OMatrix<f64, R, C>>
+where
+    DefaultAllocator: Allocator<R, C>,
+{
+    let row = |i: usize| all.iter().enumerate().map(|(j, of)| of * between[(i, j)]).reduce(|sum, one| sum + one);
+    (0..all.len()).filter_map(row).collect()
+}

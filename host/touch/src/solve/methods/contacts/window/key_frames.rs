@@ -1,0 +1,131 @@
+//! Key frames of contacts that are followed: means over short times in which their strengths differ.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::super::discs::DiscFit;
+use crate::solve::before::adaptive_mean::Mean;
+use crate::solve::fit::evidence::misfit_limit;
+use crate::solve::fit::target::{Errors, Target};
+use tactomo_physics::readings::{Readings, Says};
+use tactomo_physics::scene::Contact;
+
+/// Frames that a key frame is the mean of: a tenth of a second of the paper's board. Fewer, but not less than these, where readings change by more
+/// than a share of themselves: over a tenth, what their mean has beside the readings of mean strengths is a two-thousandth.
+const AVERAGED: usize = 25;
+const AVERAGED_AT_LEAST: usize = 5;
+const CHANGED: f64 = 0.1;
+/// Key frames that are kept, and fewest that are explained together; so many new ones are waited for before they are again.
+const KEPT: usize = 8;
+const FEWEST: usize = 4;
+
+/// The mean of some frames, with the contacts as they were followed at its end.
+#[derive(Clone, Debug)]
+pub(in super::super) struct KeyFrame {
+    pub mean: Mean,
+    pub contacts: Vec<Contact>,
+}
+
+/// The newest key frames of as many contacts as are followed.
+#[derive(Clone, Debug, Default)]
+pub(in super::super) struct KeyFrames {
+    kept: VecDeque<KeyFrame>,
+    /// How many came since they were looked at.
+    new: usize,
+    /// The first of the frames since the last one (V), their sum, what they say, and their number.
+    first_v: Vec<f64>,
+    sum_v: Vec<f64>,
+    says: Vec<Says>,
+    frames: usize,
+}
+
+impl KeyFrames {
+    /// Takes the next frame with what is followed.
+    pub fn take(&mut self, target: &Target, fit: &DiscFit, errors: &Errors) {
+        if self.kept.back().is_some_and(|last| last.contacts.len() != fit.contacts.len()) {
+            *self = Self::default();
+        }
+        let readings = target.readings();
+        if self.frames > 0 && self.have_changed(&readings, errors.noise_v) {
+            self.end(fit, errors);
+        }
+        self.add(&readings);
+        if self.frames == AVERAGED {
+            self.end(fit, errors);
+        }
+    }
+
+    /// Whether readings have changed by so much since the last key frame that their mean is none of contacts.
+    fn have_changed(&self, readings: &Readings, noise_v: f64) -> bool {
+        let pairs = readings.volts().iter().zip(&self.first_v);
+        let squares = pairs.map(|(now, first)| [(now - first).powi(2), first * first]);
+        let [change_v2, all_v2] = squares.fold([0.0; 2], |sum, squares| [sum[0] + squares[0], sum[1] + squares[1]]);
+        change_v2 - 2.0 * self.first_v.len() as f64 * noise_v * noise_v > CHANGED * CHANGED * all_v2
+    }
+
+    /// Makes a key frame of the frames since the last one, if they are enough and differ from it.
+    fn end(&mut self, fit: &DiscFit, errors: &Errors) {
+        let frames = std::mem::take(&mut self.frames);
+        if frames < AVERAGED_AT_LEAST {
+            return;
+        }
+        let mean = self.mean(frames);
+        if self.kept.back().is_some_and(|last| !differs(&last.mean, &mean, errors)) {
+            return;
+        }
+        if self.kept.len() == KEPT {
+            self.kept.pop_front();
+        }
+        self.kept.push_back(KeyFrame { mean, contacts: fit.contacts.clone() });
+        self.new += 1;
+    }
+
+    fn add(&mut self, readings: &Readings) {
+        let volts = readings.volts();
+        let says = (0..volts.len()).map(|i| readings.all_say().get(i).copied().unwrap_or_default());
+        if self.frames == 0 {
+            self.first_v.clear();
+            self.first_v.extend_from_slice(volts);
+            self.sum_v.clone_from(&self.first_v);
+            self.says.clear();
+            self.says.extend(says);
+        } else {
+            self.sum_v.iter_mut().zip(volts).for_each(|(sum, volts)| *sum += volts);
+            self.says.iter_mut().zip(says).for_each(|(ours, theirs)| *ours = ours.of_mean(theirs));
+        }
+        self.frames += 1;
+    }
+
+    fn mean(&self, frames: usize) -> Mean {
+        let electrodes = self.sum_v.len().isqrt();
+        let at = |g: usize, e: usize| g * electrodes + e;
+        let readings = Readings::from_fn(electrodes, |g, e| self.sum_v[at(g, e)] / frames as f64);
+        Mean { readings: readings.saying(|g, e| self.says[at(g, e)]), frames }
+    }
+
+    /// Whether they are worth a look.
+    pub fn are_ripe(&self) -> bool {
+        self.kept.len() >= FEWEST && self.new >= FEWEST
+    }
+
+    /// They were looked at.
+    pub fn looked_at(&mut self) {
+        self.new = 0;
+    }
+
+    /// All of them.
+    pub fn all(&self) -> Arc<[KeyFrame]> {
+        self.kept.iter().cloned().collect()
+    }
+}
+
+/// Whether two means differ by more than noise.
+fn differs(one: &Mean, other: &Mean, errors: &Errors) -> bool {
+    let n = one.readings.electrodes();
+    let is_voltage = |i: &usize| [one, other].iter().all(|mean| mean.readings.says(i / n, i % n) == Says::Voltage);
+    let square = |i: usize| (one.readings.volts()[i] - other.readings.volts()[i]).powi(2);
+    let (sum_v2, count) =
+        (0..n * n).filter(is_voltage).fold((0.0, 0.0), |(sum, count), i| (sum + square(i), count + 1.0));
+    let noise_v2 = errors.of_mean_v(one.frames).powi(2) + errors.of_mean_v(other.frames).powi(2);
+    sum_v2 > noise_v2 * count * misfit_limit(count)
+}
