@@ -207,7 +207,7 @@ impl ContactTracker {
             || target.frames >= policy::MORE_FRAMES * self.searched.frames
             || target.is_stale(&found.fit.volts)
             || self.finder.is_outdated(target);
-        self.keys.take(target, &found.fit, &self.finder.errors);
+        self.keys.take(target, &found.fit, &self.finder);
         self.is_of_key_frames = !search && self.keys.are_ripe();
         self.last = Some(found);
         search || self.is_of_key_frames

@@ -34,6 +34,11 @@ const RENEWALS: usize = 3;
 const AS_IT_IS: Effort = Effort { steps: 0, ..COLD };
 
 impl ContactFinder {
+    /// Distance of two usual contacts that lie side by side (m). Nearer ones that stay are not told from one that moves.
+    fn side_by_side_m(&self) -> f64 {
+        2.0 * self.settings.radius_m
+    }
+
     /// More contacts than are followed, that stay where they are while their strengths change, if key frames together say so.
     pub(super) fn staying(
         &self,
@@ -121,11 +126,12 @@ impl Window<'_> {
         Some((best?, by_count))
     }
 
-    /// Whether contacts are what they are called. What cover each other partly are one of another shape than a disc; and one that is lighter against
-    /// the firmest than readings are unknown may be what the detector differs by.
+    /// Whether contacts are what they are called. What are not side by side are one that moves, or that is no disc; and one that is lighter against the
+    /// firmest than readings are unknown may be what the detector differs by.
     fn may_be(&self, found: &Together) -> bool {
         let contacts = &found.at.fits[0].contacts;
-        let is_over = |a: &Contact, b: &Contact| space::distance(place_m(a), place_m(b)) < a.radius_m + b.radius_m;
+        let beside_m = |a: &Contact, b: &Contact| self.finder.side_by_side_m().max(a.radius_m + b.radius_m);
+        let is_over = |a: &Contact, b: &Contact| space::distance(place_m(a), place_m(b)) < beside_m(a, b);
         let are_apart = (0..contacts.len()).all(|k| !contacts[..k].iter().any(|other| is_over(&contacts[k], other)));
         let unknown = self.frames.iter().map(|frame| frame.unknown).fold(0.0, f64::max);
         let levels = found.levels();

@@ -3,12 +3,14 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::super::discs::DiscFit;
+use super::super::ContactFinder;
+use super::super::discs::{DiscFit, place_m};
 use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::fit::evidence::misfit_limit;
 use crate::solve::fit::target::{Errors, Target};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::scene::Contact;
+use tactomo_physics::space;
 
 /// Frames that a key frame is the mean of: a tenth of a second of the paper's board. Fewer, but not less than these, where readings change by more
 /// than a share of themselves: over a tenth, what their mean has beside the readings of mean strengths is a two-thousandth.
@@ -26,6 +28,14 @@ pub(in super::super) struct KeyFrame {
     pub contacts: Vec<Contact>,
 }
 
+impl KeyFrame {
+    /// How far the nearest of its contacts is from another one (m).
+    fn nearest_m(&self, other: &Contact) -> f64 {
+        let apart_m = self.contacts.iter().map(|contact| space::distance(place_m(contact), place_m(other)));
+        apart_m.fold(f64::INFINITY, f64::min)
+    }
+}
+
 /// The newest key frames of as many contacts as are followed.
 #[derive(Clone, Debug, Default)]
 pub(in super::super) struct KeyFrames {
@@ -41,17 +51,18 @@ pub(in super::super) struct KeyFrames {
 
 impl KeyFrames {
     /// Takes the next frame with what is followed.
-    pub fn take(&mut self, target: &Target, fit: &DiscFit, errors: &Errors) {
+    pub fn take(&mut self, target: &Target, fit: &DiscFit, finder: &ContactFinder) {
+        let errors = &finder.errors;
         if self.kept.back().is_some_and(|last| last.contacts.len() != fit.contacts.len()) {
             *self = Self::default();
         }
         let readings = target.readings();
         if self.frames > 0 && self.have_changed(&readings, errors.noise_v) {
-            self.end(fit, errors);
+            self.end(fit, finder);
         }
         self.add(&readings);
         if self.frames == AVERAGED {
-            self.end(fit, errors);
+            self.end(fit, finder);
         }
     }
 
@@ -64,16 +75,21 @@ impl KeyFrames {
     }
 
     /// Makes a key frame of the frames since the last one, if they are enough and differ from it.
-    fn end(&mut self, fit: &DiscFit, errors: &Errors) {
+    fn end(&mut self, fit: &DiscFit, finder: &ContactFinder) {
         let frames = std::mem::take(&mut self.frames);
         if frames < AVERAGED_AT_LEAST {
             return;
         }
         let mean = self.mean(frames);
-        if self.kept.back().is_some_and(|last| !differs(&last.mean, &mean, errors)) {
+        if self.kept.back().is_some_and(|last| !differs(&last.mean, &mean, &finder.errors)) {
             return;
         }
         if self.kept.len() == KEPT {
+            self.kept.pop_front();
+        }
+        // What has gone that far is not explained by contacts that stay.
+        let are_near = |key: &KeyFrame| fit.contacts.iter().all(|now| key.nearest_m(now) < finder.side_by_side_m());
+        while self.kept.front().is_some_and(|oldest| !are_near(oldest)) {
             self.kept.pop_front();
         }
         self.kept.push_back(KeyFrame { mean, contacts: fit.contacts.clone() });

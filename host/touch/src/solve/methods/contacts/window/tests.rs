@@ -65,10 +65,10 @@ fn a_finger_that_was_told_so_is_let_go_when_it_lifts_and_followed_when_it_moves(
         all[0].y_m -= away_m;
         all
     };
-    let found = followed(2.0, moved);
+    let found = followed(2.6, moved);
     let error_m = largest_error_m(&moved(2.0)[..1], &found[320].contacts);
     assert!(error_m < 1e-3, "{error_m}");
-    let error_m = largest_error_m(&moved(2.0), &found.last().unwrap().contacts);
+    let error_m = largest_error_m(&moved(2.6), &found.last().unwrap().contacts);
     assert!(found.last().unwrap().contacts.len() == 5 && error_m < 1e-3, "{error_m} {:?}", counts(&found));
 }
 

@@ -239,14 +239,15 @@ impl Window<'_> {
 
     /// All frames' contacts after a step of what they have in common, and of each frame's own that follows.
     fn moved(&self, at: &Point, equations: &Equations, step: &DVector<f64>, motion: Motion) -> Option<Point> {
-        let of = |((fit, frame), (own, per_common)): ((&DiscFit, &Frame), &(DVector<f64>, DMatrix<f64>))| {
+        let of = |(index, fit): (usize, &DiscFit)| {
+            let (own, per_common) = &equations.own[index];
             let mut all = step.rows(0, PARAMETERS * fit.contacts.len()).into_owned();
             let own = own - per_common * step;
             let (parameters, _) = self.own_parameters(fit, motion);
             parameters.iter().zip(own.iter()).for_each(|(parameter, own)| all[*parameter] += own);
-            self.fitter.next(fit, self.fitter.moved(fit, all.as_slice()), &frame.target)
+            self.fitter.next(fit, self.fitter.moved(fit, all.as_slice()), &self.frames[index].target)
         };
-        let fits = at.fits.iter().zip(&self.frames).zip(&equations.own).map(of).collect::<Option<_>>()?;
+        let fits = at.fits.iter().enumerate().map(of).collect::<Option<_>>()?;
         self.at(fits, motion)
     }
 
