@@ -65,10 +65,11 @@ impl SearchThread {
         self.is_wanted = false;
     }
 
-    /// Searches something better than a solution of these readings, if that may be there (`search`) and the pause is over.
+    /// Searches something better than a solution of these readings, if that may be there (`search`), and the pause is over or there are news.
     pub fn consider(&mut self, search: bool, solution: &Solution, readings: &Readings, tracker: &dyn Tracker) {
         self.is_wanted = search;
-        if search && !self.is_busy && self.pause.is_over(solution, Instant::now()) {
+        let is_time = self.pause.is_over(solution, Instant::now()) || tracker.has_news();
+        if search && !self.is_busy && is_time {
             self.search(tracker.hypothesis(), readings.clone());
         }
     }

@@ -86,6 +86,11 @@ pub trait Tracker: Send {
         None
     }
 
+    /// Whether a search has something to look at that none has seen, so that it need not wait.
+    fn has_news(&self) -> bool {
+        false
+    }
+
     /// What is followed: where a search may begin.
     fn hypothesis(&self) -> Hypothesis;
 

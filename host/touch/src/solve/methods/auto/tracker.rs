@@ -287,6 +287,10 @@ impl Tracker for AutoTracker {
         contacts.telling_grounds(count)
     }
 
+    fn has_news(&self) -> bool {
+        matches!(self.answer, Answer::Contacts) && self.contacts.as_ref().is_some_and(ContactTracker::has_news)
+    }
+
     fn hypothesis(&self) -> Hypothesis {
         let whole = match &self.answer {
             Answer::Contacts => None,

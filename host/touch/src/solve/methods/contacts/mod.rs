@@ -2,7 +2,8 @@
 //!
 //! Each contact is a disc with a place, a conductance and a radius. Discs are fitted with the forward model itself ([`discs`]), from where contacts
 //! would explain most as [spots](crate::solve::fit::spots) of a small circuit ([`scan`], [`spot_fit`], [`starts`]), as long as the evidence for
-//! them grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was.
+//! them grows ([`search`], [`evidence`]). From one frame to the next the fit starts where it was. Where single frames do not tell how many contacts stay
+//! while their strengths change, several do together ([`window`]).
 
 #[cfg(test)]
 mod coverage_tests;

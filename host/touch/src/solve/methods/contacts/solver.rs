@@ -158,6 +158,11 @@ impl ContactTracker {
         }
     }
 
+    /// Whether a search is to look at key frames that none has seen.
+    pub fn has_news(&self) -> bool {
+        self.is_of_key_frames
+    }
+
     /// What finds the contacts.
     pub fn finder(&self) -> &Arc<ContactFinder> {
         &self.finder
@@ -208,7 +213,7 @@ impl ContactTracker {
             || target.is_stale(&found.fit.volts)
             || self.finder.is_outdated(target);
         self.keys.take(target, &found.fit, &self.finder);
-        self.is_of_key_frames = !search && self.keys.are_ripe();
+        self.is_of_key_frames = self.keys.are_ripe() && !self.finder.is_misfit(&found.fit, target);
         self.last = Some(found);
         search || self.is_of_key_frames
     }
@@ -350,6 +355,10 @@ impl Tracker for FrameTracker {
 
     fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
         self.contacts.telling_grounds(count)
+    }
+
+    fn has_news(&self) -> bool {
+        self.contacts.has_news()
     }
 
     fn hypothesis(&self) -> Hypothesis {
