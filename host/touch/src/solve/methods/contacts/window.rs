@@ -47,8 +47,8 @@ impl ContactFinder {
         target: &Target,
     ) -> Option<ContactHypothesis> {
         let followed: Vec<_> = keys.iter().map(|key| key.contacts.clone()).collect();
-        // What a detector differs by that is only described can make one contact seem two that stay.
-        let is_known = self.problem.nuisance().is_none() || self.problem.detector().calibration.is_some();
+        // What a detector differs by, even what is left of that once it is learned, can make one contact seem two that stay.
+        let is_known = self.problem.nuisance().is_none();
         (is_known || followed[0].len() > 1).then_some(())?;
         let (middle, spread_m) = middle(&followed);
         let mut near = from.error.as_ref().and_then(|error| error.linearised.clone());
