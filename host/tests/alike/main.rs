@@ -64,7 +64,9 @@ fn live_says_what_offline_says() {
         for method in Method::ALL {
             let is_chosen = matches!(scene, SceneName::Several | SceneName::Ring | SceneName::Moving);
             let is_usual = method == Method::Auto || is_chosen && method != Method::Kernel && asked.is_empty();
-            let is_usual = is_usual && (asked.is_empty() || asked == scene.to_string());
+            // Its fifth finger is told by key frames, of which a second has hardly enough: it is compared where it is asked for.
+            let is_soon = scene != SceneName::FiveFingers;
+            let is_usual = is_usual && (asked.is_empty() && is_soon || asked == scene.to_string());
             if (all || is_usual) && !is_alike(&problem, method, scene, if all { 3.0 } else { 1.0 }) {
                 worse.push((method.name(), scene.to_string()));
             }
