@@ -29,10 +29,21 @@ pub(in super::super) struct KeyFrame {
 }
 
 impl KeyFrame {
-    /// How far the nearest of its contacts is from another one (m).
-    fn nearest_m(&self, other: &Contact) -> f64 {
-        let apart_m = self.contacts.iter().map(|contact| space::distance(place_m(contact), place_m(other)));
-        apart_m.fold(f64::INFINITY, f64::min)
+    /// As many other contacts, in the order of its own: each is the nearest that is left.
+    fn in_order(&self, others: &[Contact]) -> Vec<Contact> {
+        let mut left = others.to_vec();
+        let nearest = |own: &Contact| {
+            let apart_m = |other: &Contact| space::distance(place_m(own), place_m(other));
+            let nearest = (0..left.len()).min_by(|a, b| apart_m(&left[*a]).total_cmp(&apart_m(&left[*b])));
+            nearest.map(|index| left.swap_remove(index))
+        };
+        self.contacts.iter().filter_map(nearest).collect()
+    }
+
+    /// Whether none of other contacts in the same order is so far from its own (m).
+    fn is_near(&self, others: &[Contact], far_m: f64) -> bool {
+        let mut pairs = self.contacts.iter().zip(others);
+        pairs.all(|(own, other)| space::distance(place_m(own), place_m(other)) < far_m)
     }
 }
 
@@ -87,12 +98,13 @@ impl KeyFrames {
         if self.kept.len() == KEPT {
             self.kept.pop_front();
         }
+        // A search may have found the same contacts in another order.
+        let contacts = self.kept.back().map_or_else(|| fit.contacts.clone(), |last| last.in_order(&fit.contacts));
         // What has gone that far is not explained by contacts that stay.
-        let are_near = |key: &KeyFrame| fit.contacts.iter().all(|now| key.nearest_m(now) < finder.side_by_side_m());
-        while self.kept.front().is_some_and(|oldest| !are_near(oldest)) {
+        while self.kept.front().is_some_and(|oldest| !oldest.is_near(&contacts, finder.side_by_side_m())) {
             self.kept.pop_front();
         }
-        self.kept.push_back(KeyFrame { mean, contacts: fit.contacts.clone() });
+        self.kept.push_back(KeyFrame { mean, contacts });
         self.new += 1;
     }
 
