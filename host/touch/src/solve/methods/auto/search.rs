@@ -155,16 +155,11 @@ impl Search for AutoSearch {
         let Some((contacts, solution)) = contacts else {
             return Ok(Hypothesis::of(FrameHypothesis { mean: Some(mean), ..FrameHypothesis::default() }));
         };
-        if is_of_key_frames {
-            return Ok(Hypothesis::of(FrameHypothesis {
-                contacts: Some(Box::new(contacts)),
-                whole: None,
-                mean: Some(mean),
-            }));
-        }
         let target = finder.target_of(&mean, contacts.error())?;
         let whole = match early {
             Some(shape) => Some(Whole::Shape(Box::new(shape))),
+            // Whether they are contacts at all is not asked by every look at more frames of them.
+            None if is_of_key_frames => None,
             None => self.whole((finder.evidence_of_found(&contacts), &solution), from, &target, readings)?,
         };
         let whole = whole.map(|whole| (whole, instead_of(&solution)));

@@ -56,7 +56,6 @@ impl Prior {
     /// Logarithm of the evidence for a fit; nothing speaks for one that is not determined.
     pub fn ln_evidence(&self, fit: &DiscFit) -> f64 {
         let Some(factor) = Cholesky::new(fit.normal.clone()) else { return f64::NEG_INFINITY };
-        let ln_determinant: f64 = 2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let count = fit.contacts.len();
         let deviation = if fit.still.is_some() { policy::STRENGTH_DEVIATION } else { policy::CONDUCTANCE_DEVIATION };
         let peak = -(deviation * TAU.sqrt()).ln();
@@ -72,6 +71,6 @@ impl Prior {
             + from_logs
             + orders
             + 0.5 * (PARAMETERS * count) as f64 * TAU.ln()
-            - 0.5 * ln_determinant
+            - 0.5 * factor.ln_determinant()
     }
 }

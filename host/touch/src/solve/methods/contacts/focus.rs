@@ -38,11 +38,8 @@ impl ContactFinder {
             true => BEFORE[i % PARAMETERS].powi(-2),
             false => 0.0,
         });
-        let ln_determinant = |matrix: DMatrix<f64>| {
-            Cholesky::new(matrix).map_or(f64::NEG_INFINITY, |factor| {
-                factor.l_dirty().diagonal().iter().map(|value| 2.0 * value.ln()).sum::<f64>()
-            })
-        };
+        let ln_determinant =
+            |matrix: DMatrix<f64>| Cholesky::new(matrix).map_or(f64::NEG_INFINITY, |factor| factor.ln_determinant());
         let mut chosen = Vec::with_capacity(count);
         for _ in 0..count {
             let gain = |g: &usize| ln_determinant(&known + &rows[*g]);

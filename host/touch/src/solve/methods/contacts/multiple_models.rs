@@ -168,10 +168,7 @@ impl Filter {
         self.information += &rows.information;
         let after = Cholesky::new(self.information.clone())?;
         let step = after.solve(&pull);
-        let ln_determinant = |factor: &Cholesky<f64, nalgebra::Dyn>| {
-            2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>()
-        };
-        self.likelihood -= 0.5 * (cost - pull.dot(&step) + ln_determinant(&after) - ln_determinant(&before));
+        self.likelihood -= 0.5 * (cost - pull.dot(&step) + after.ln_determinant() - before.ln_determinant());
         self.mean += step;
         self.likelihood.is_finite().then_some(())
     }

@@ -3,7 +3,7 @@
 //! Where two fingers are so near that one wide contact explains a frame as well, that contact moves as weight goes from one finger to the other,
 //! and no single place of it explains all frames: two that stay do. So [key frames](key_frames) of what is followed are fitted together, with one place and
 //! one radius of each contact for all frames, and conductances that are each frame's own, about a common level. What is not known of the
-//! detector is the same in all frames too, and linear. ([`frames`], [`together`]).
+//! detector is the same in all frames too, and linear ([`frames`], [`together`]).
 //!
 //! Explanations are compared by the logarithm of their evidence as in [`evidence`](super::evidence), by Laplace's approximation over all
 //! parameters. The rival of one contact more that stays are as many contacts as before that move, about a mean place, by as much as they did.
@@ -22,6 +22,7 @@ use self::together::{Motion, Together};
 use super::discs::{Effort, STAYING, Still, place_m};
 use super::search::COLD;
 use super::{Certainty, ContactFinder, ContactHypothesis};
+use crate::solve::fit::approximation::Linearised;
 use crate::solve::fit::evidence::misfit_limit;
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
@@ -51,31 +52,39 @@ impl ContactFinder {
         let is_known = self.problem.nuisance().is_none();
         (is_known || followed[0].len() > 1).then_some(())?;
         let (middle, spread_m) = middle(&followed);
-        let mut near = from.error.as_ref().and_then(|error| error.linearised.clone());
-        let (mut window, mut moving) = (None, None);
-        // As many contacts as are followed explain each frame by itself. Where they do not explain all, readings are linear near another detector.
-        for _ in 0..RENEWALS {
-            let tried = Window::new(self, keys, &followed, near)?;
-            let found = tried.explained(followed.clone(), Motion::By(spread_m))?;
-            near = tried.nearer(&found);
-            let is_done = tried.fits(&found) || near.is_none();
-            (window, moving) = (Some(tried), Some(found));
-            if is_done {
-                break;
-            }
-        }
-        let (window, moving) = window.zip(moving).filter(|(window, moving)| window.fits(moving))?;
+        let near = from.error.as_ref().and_then(|error| error.linearised.clone());
+        let (window, moving) = self.window_of(keys, near, &followed, Motion::By(spread_m))?;
         let (best, by_count) = window.grown(vec![middle; keys.len()], &moving)?;
         (best.count() > followed[0].len() && window.fits(&best)).then_some(())?;
         let last = best.at.fits.last()?;
         let contacts = last.contacts.clone();
-        let still = Still::about(last, best.staying.clone(), best.levels());
+        let still = Still::about(last, best.staying()?, best.levels());
         let target = self.informed(target, &contacts, window.near.as_ref()).unwrap_or_else(|| target.clone());
         let fit = self.disc_fitter().fit_still(contacts, Some(Arc::new(still)), &target, COLD)?;
         let certainty = Certainty::of(best.count(), &by_count);
         let keys = from.keys.clone();
         let found = ContactHypothesis { certainty, keys, ..ContactHypothesis::of(fit, &target) };
         (!self.is_misfit(&found.fit, &target)).then_some(found)
+    }
+
+    /// Key frames that the contacts that are followed explain if they move, as they explain each by itself. Where they do not explain all,
+    /// readings are linear near another detector, or no verdict is possible.
+    fn window_of(
+        &self,
+        keys: &[KeyFrame],
+        mut near: Option<Arc<Linearised>>,
+        followed: &[Vec<Contact>],
+        motion: Motion,
+    ) -> Option<(Window<'_>, Together)> {
+        for _ in 0..RENEWALS {
+            let window = Window::new(self, keys, near)?;
+            let moving = window.explained(followed.to_vec(), motion)?;
+            if window.fits(&moving) {
+                return Some((window, moving));
+            }
+            near = Some(window.nearer(&moving)?);
+        }
+        None
     }
 }
 

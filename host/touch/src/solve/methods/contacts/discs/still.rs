@@ -109,9 +109,8 @@ impl Still {
     /// Logarithm of its density at its peak, in parameters whose places have these units (m).
     pub fn ln_peak(&self, units_m: &[f64]) -> f64 {
         let Some(factor) = Cholesky::new(self.information.clone()) else { return f64::NEG_INFINITY };
-        let ln_root: f64 = factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum();
         let units: f64 = self.factors(units_m).iter().map(|factor| factor.ln()).sum();
-        ln_root + units - 0.5 * self.information.nrows() as f64 * TAU.ln()
+        0.5 * factor.ln_determinant() + units - 0.5 * self.information.nrows() as f64 * TAU.ln()
     }
 
     /// What is known of some of the contacts, whatever the others do; `None` if that is nothing.

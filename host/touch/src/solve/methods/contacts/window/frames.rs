@@ -15,12 +15,11 @@ use super::KeyFrame;
 use super::together::Together;
 use crate::solve::fit::approximation::Linearised;
 use crate::solve::fit::target::Target;
-use tactomo_physics::scene::Contact;
 
 /// Frames that a baseline is the mean of at first (`host/board/src/baseline`).
 const BASELINE_FRAMES: f64 = 32.0;
 /// Share by which what steps of a detector change in the readings is wrong, as it is found with coarse models and taken as linear: without it, fits to
-/// detectors as built leave 1.1 times what noise does, with a hundredth half of that.
+/// detectors as built leave 1.1 times the squares of noise and contacts are invented; with a hundredth a third, and with 0.03 five fingers are not told.
 const PATTERN_ERROR: f64 = 0.01;
 
 /// A key frame as it is fitted.
@@ -29,8 +28,7 @@ pub(super) struct Frame {
     pub target: Target,
     /// With what the readings may be off by together: for fits of this frame alone.
     pub alone: Target,
-    /// What steps of the detector change, whitened, a column each.
-    pub patterns: DMatrix<f64>,
+    /// What steps of the detector change, whitened, a row each.
     transposed: DMatrix<f64>,
     /// What readings change by with steps of the detector, as a share of the largest.
     pub unknown: f64,
@@ -49,6 +47,8 @@ pub(super) struct Window<'a> {
     pub of_detector: DMatrix<f64>,
     /// Inverse of the covariance, between frames, of what each reading by itself is off by.
     pub between: DMatrix<f64>,
+    /// That times what steps of the detector change in each frame, whitened, a column each.
+    pub patterns: Vec<DMatrix<f64>>,
     /// Of `of_detector`.
     pub factor: Cholesky<f64, Dyn>,
 }
@@ -70,46 +70,35 @@ impl ContactFinder {
 }
 
 impl<'a> Window<'a> {
-    /// Of key frames, where contacts in each are about these; readings are linear near a detector, or else the described one.
-    pub fn new(
-        finder: &'a ContactFinder,
-        keys: &[KeyFrame],
-        about: &[Vec<Contact>],
-        near: Option<Arc<Linearised>>,
-    ) -> Option<Self> {
-        let frame = |(key, contacts): (&KeyFrame, &Vec<Contact>)| {
+    /// Of key frames whose readings are linear near a detector, or else the described one.
+    pub fn new(finder: &'a ContactFinder, keys: &[KeyFrame], near: Option<Arc<Linearised>>) -> Option<Self> {
+        let frame = |key: &KeyFrame| {
             finder.check(&key.mean.readings).ok()?;
             let alone = Target::of_mean(&key.mean.readings, key.mean.frames, &finder.errors, None);
-            let model_v = finder.errors.model * alone.readings().largest_v();
-            let Some((alone, mut patterns)) = finder.informed_with_patterns(&alone, contacts, near.as_ref()) else {
-                let patterns = DMatrix::zeros(alone.readings().volts().len(), 0);
-                return Some(Frame {
-                    target: alone.clone(),
-                    alone,
-                    transposed: patterns.transpose(),
-                    patterns,
-                    unknown: 0.0,
-                    model_v,
-                });
+            let model_v = finder.errors.model * key.mean.readings.largest_v();
+            let Some((alone, mut patterns)) = finder.informed_with_patterns(&alone, &key.contacts, near.as_ref())
+            else {
+                let transposed = DMatrix::zeros(0, key.mean.readings.volts().len());
+                return Some(Frame { target: alone.clone(), alone, transposed, unknown: 0.0, model_v });
             };
             let of_steps = patterns.columns(0, finder.problem.nuisance()?.directions());
             let unknown_v = (of_steps.norm_squared() / patterns.nrows() as f64).sqrt();
-            let unknown = unknown_v / alone.readings().largest_v();
+            let unknown = unknown_v / key.mean.readings.largest_v();
             let of_patterns_v = PATTERN_ERROR * unknown_v;
             let (alone, model_v) = (alone.with_model_error(of_patterns_v), model_v.hypot(of_patterns_v));
             let target = alone.without_unknowns();
             target.whiten_columns(&mut patterns);
-            Some(Frame { target, alone, transposed: patterns.transpose(), patterns, unknown, model_v })
+            Some(Frame { target, alone, transposed: patterns.transpose(), unknown, model_v })
         };
-        let frames: Vec<_> = keys.iter().zip(about).map(frame).collect::<Option<_>>()?;
-        let unknowns = frames.first()?.patterns.ncols();
+        let frames: Vec<_> = keys.iter().map(frame).collect::<Option<_>>()?;
+        let unknowns = frames.first()?.transposed.nrows();
         let between = finder.between(&frames)?;
-        let patterns: Vec<_> = frames.iter().map(|frame| frame.patterns.clone()).collect();
-        let information = |sum: DMatrix<f64>, (frame, all): (&Frame, DMatrix<f64>)| sum + &frame.transposed * all;
-        let of_detector = DMatrix::identity(unknowns, unknowns);
-        let of_detector = frames.iter().zip(across(&between, &patterns)).fold(of_detector, information);
+        let patterns: Vec<_> = frames.iter().map(|frame| frame.transposed.transpose()).collect();
+        let patterns = across(&between, &patterns);
+        let information = |sum: DMatrix<f64>, (frame, all): (&Frame, &DMatrix<f64>)| sum + &frame.transposed * all;
+        let of_detector = frames.iter().zip(&patterns).fold(DMatrix::identity(unknowns, unknowns), information);
         let factor = Cholesky::new(of_detector.clone())?;
-        Some(Self { fitter: finder.disc_fitter(), of_detector, factor, finder, near, between, frames })
+        Some(Self { fitter: finder.disc_fitter(), of_detector, factor, finder, near, between, patterns, frames })
     }
 
     /// The detector that an explanation makes likeliest, if it is far from where readings are linear.

@@ -53,8 +53,8 @@ struct Equations {
 pub(super) struct Together {
     pub at: Point,
     pub ln_evidence: f64,
-    /// Information about places and radii alone.
-    pub staying: DMatrix<f64>,
+    /// Information about what all frames have in common.
+    common: Cholesky<f64, Dyn>,
 }
 
 impl Point {
@@ -71,6 +71,13 @@ impl Point {
 impl Together {
     pub fn count(&self) -> usize {
         self.at.fits.first().map_or(0, |fit| fit.contacts.len())
+    }
+
+    /// Information about places and radii alone, whatever else frames have in common.
+    pub fn staying(&self) -> Option<DMatrix<f64>> {
+        let staying: Vec<usize> = (0..STAYING * self.count()).map(among).collect();
+        let covariance = self.common.inverse().select_rows(&staying).select_columns(&staying);
+        Some(Cholesky::new(covariance)?.inverse())
     }
 
     /// Mean of the logarithm of each contact's conductance (S).
@@ -182,17 +189,15 @@ impl Window<'_> {
         // What is known before is one of each unknown of the detector.
         matrix.view_mut((discs, discs), (unknowns, unknowns)).copy_from(&self.of_detector);
         let (mut own, mut ln_determinant) = (Vec::new(), 0.0);
-        let columns = |(fit, frame): (&DiscFit, &Frame)| {
-            let slopes = frame.target.at(&fit.volts).whitened_columns(fit.slopes_v());
-            let mut all = slopes.resize_horizontally(size, 0.0);
-            all.columns_mut(discs, unknowns).copy_from(&frame.patterns);
-            all
-        };
-        let all: Vec<_> = at.fits.iter().zip(&self.frames).map(columns).collect();
+        let slopes = |(fit, frame): (&DiscFit, &Frame)| frame.target.at(&fit.volts).whitened_columns(fit.slopes_v());
+        let slopes: Vec<_> = at.fits.iter().zip(&self.frames).map(slopes).collect();
+        let across = across(&self.between, &slopes);
         let (residuals, _) = self.residuals(&at.fits);
-        for (index, (fit, across)) in at.fits.iter().zip(across(&self.between, &all)).enumerate() {
-            let slopes = all[index].columns(0, discs).transpose();
-            let rows = &slopes * across;
+        for (index, fit) in at.fits.iter().enumerate() {
+            let slopes = slopes[index].transpose();
+            let mut rows = DMatrix::zeros(discs, size);
+            rows.columns_mut(0, discs).copy_from(&(&slopes * &across[index]));
+            rows.columns_mut(discs, unknowns).copy_from(&(&slopes * &self.patterns[index]));
             matrix.rows_mut(0, discs).add_assign(&rows);
             let pull = &slopes * &residuals[index];
             gradient.rows_mut(0, discs).add_assign(&pull);
@@ -205,7 +210,7 @@ impl Window<'_> {
                 pull[i] -= off * deviation.powi(-2);
             }
             let factor = Cholesky::new(inner)?;
-            ln_determinant += ln_determinant_of(&factor);
+            ln_determinant += factor.ln_determinant();
             let (step, per_common) = (factor.solve(&pull), factor.solve(&coupling));
             let transposed = coupling.transpose();
             matrix -= &transposed * &per_common;
@@ -264,7 +269,7 @@ impl Window<'_> {
         let from_logs: f64 = (0..count).map(|k| fits[0].constriction(k).ln_1p()).sum();
         let orders: f64 = (1..=count).map(|k| (k as f64).ln()).sum();
         let parameters = PARAMETERS * count + fits.len() * deviations.len();
-        let ln_determinant = Cholesky::new(equations.common.matrix.clone()).map(|factor| ln_determinant_of(&factor));
+        let common = Cholesky::new(equations.common.matrix.clone())?;
         let ln_evidence = -0.5 * (cost + known)
             + count as f64 * peak
             + self.finder.prior.ln_peak_of_staying(&fits[0].units_m())
@@ -272,8 +277,8 @@ impl Window<'_> {
             + peaks_of_own
             + orders
             + 0.5 * parameters as f64 * TAU.ln()
-            - 0.5 * (equations.ln_determinant + ln_determinant.unwrap_or(f64::INFINITY));
-        Some(Together { ln_evidence, staying: staying(&equations.common.matrix, count)?, at })
+            - 0.5 * (equations.ln_determinant + common.ln_determinant());
+        Some(Together { ln_evidence, common, at })
     }
 }
 
@@ -288,15 +293,4 @@ fn ln_radius(contact: &Contact) -> f64 {
 /// Mean of something of a contact over all frames.
 fn mean_of(fits: &[DiscFit], k: usize, of: &dyn Fn(&Contact) -> f64) -> f64 {
     fits.iter().map(|fit| of(&fit.contacts[k])).sum::<f64>() / fits.len() as f64
-}
-
-/// Information about places and radii of so many contacts alone, of that about what frames have in common with all else.
-fn staying(matrix: &DMatrix<f64>, count: usize) -> Option<DMatrix<f64>> {
-    let staying: Vec<usize> = (0..STAYING * count).map(among).collect();
-    let covariance = Cholesky::new(matrix.clone())?.inverse().select_rows(&staying).select_columns(&staying);
-    Some(Cholesky::new(covariance)?.inverse())
-}
-
-fn ln_determinant_of(factor: &Cholesky<f64, Dyn>) -> f64 {
-    factor.l_dirty().diagonal().iter().map(|value| 2.0 * value.ln()).sum()
 }
