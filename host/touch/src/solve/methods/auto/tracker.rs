@@ -92,7 +92,9 @@ impl AutoTracker {
             return Followed { solution: nothing(Solution::default(), search), search };
         };
         let search = contacts.follow(target);
-        Followed { solution: as_contacts(contacts.solution(target), search), search }
+        // That more frames of the same are looked at casts no doubt on what is shown.
+        let is_doubted = search && !contacts.has_news();
+        Followed { solution: as_contacts(contacts.solution(target), is_doubted), search }
     }
 
     fn follow_shape(&mut self, target: &Target, why: &str) -> Option<Followed> {
