@@ -53,8 +53,8 @@ impl ContactFinder {
         (is_known || followed[0].len() > 1).then_some(())?;
         let (middle, spread_m) = middle(&followed);
         let near = from.error.as_ref().and_then(|error| error.linearised.clone());
-        let (window, moving) = self.window_of(keys, near, &followed, Motion::By(spread_m))?;
-        let (best, by_count) = window.grown(vec![middle; keys.len()], &moving)?;
+        let (window, growing) = self.window_of(keys, near, &followed, spread_m)?;
+        let (best, by_count) = window.grown(&middle, &growing, spread_m)?;
         (best.count() > followed[0].len() && window.fits(&best)).then_some(())?;
         let last = best.at.fits.last()?;
         let contacts = last.contacts.clone();
@@ -74,18 +74,25 @@ impl ContactFinder {
         keys: &[KeyFrame],
         mut near: Option<Arc<Linearised>>,
         followed: &[Vec<Contact>],
-        motion: Motion,
+        spread_m: f64,
     ) -> Option<(Window<'_>, Together)> {
         for _ in 0..RENEWALS {
             let window = Window::new(self, keys, near)?;
-            let moving = window.explained(followed.to_vec(), motion)?;
-            if window.fits(&moving) {
-                return Some((window, moving));
+            let growing = window.explained(followed.to_vec(), Motion::Growing(spread_m))?;
+            if window.fits(&growing) {
+                return Some((window, growing));
             }
-            near = Some(window.nearer(&moving)?);
+            near = Some(window.nearer(&growing)?);
         }
         None
     }
+}
+
+/// Contacts in each frame, with the radii of others.
+fn of_radii(mut frames: Vec<Vec<Contact>>, others: &[Contact]) -> Vec<Vec<Contact>> {
+    let pairs = frames.iter_mut().flat_map(|contacts| contacts.iter_mut().zip(others));
+    pairs.for_each(|(contact, other)| contact.radius_m = other.radius_m);
+    frames
 }
 
 /// Contacts at their mean places, with mean radii and conductances, and by how much places of a contact differ (m).
@@ -109,17 +116,23 @@ fn middle(frames: &[Vec<Contact>]) -> (Vec<Contact>, f64) {
 }
 
 impl Window<'_> {
-    /// The likeliest number of contacts that stay, from some; their rival is that as many move. Gives the logarithm of the evidence for each count too.
-    fn grown(&self, from: Vec<Vec<Contact>>, moving: &Together) -> Option<(Together, Vec<f64>)> {
-        let still = self.explained(from, Motion::Still)?;
+    /// The likeliest number of contacts that stay, from as many as are followed; their rival is that those move, grow or not. Gives the logarithm of the
+    /// evidence for each count too.
+    fn grown(&self, from: &[Contact], growing: &Together, spread_m: f64) -> Option<(Together, Vec<f64>)> {
+        let still = self.explained(vec![from.to_vec(); self.frames.len()], Motion::Still)?;
+        // What has gone far is not explained by contacts that stay. And frame by frame one more is hardly told from contacts that move and grow, so that it
+        // explains about as much as those.
+        let is_near = still.at.cost < policy::WRONG_MEAN_SQUARE * self.count();
+        let may_gain = still.at.cost - growing.at.cost > 2.0 * policy::GONE_NATS;
+        (is_near && may_gain).then_some(())?;
+        let moving = self.explained(of_radii(growing.at.contacts(), from), Motion::Moving(spread_m));
+        let rivals = [Some(growing), moving.as_ref(), Some(&still)].into_iter().flatten();
+        let rival = rivals.map(|rival| rival.ln_evidence).fold(f64::NEG_INFINITY, f64::max);
         let mut by_count = vec![f64::NEG_INFINITY; self.finder.settings.most + 1];
-        let rival = moving.ln_evidence.max(still.ln_evidence);
         by_count[still.count()] = rival;
-        let needed = |found: &Together| rival + policy::GONE_NATS * (found.count() - moving.count()) as f64;
-        // What has gone far is not explained by contacts that stay.
-        let is_near = still.at.cost < policy::WRONG_WIDE_MEAN_SQUARE * self.count();
+        let needed = |found: &Together| rival + policy::GONE_NATS * (found.count() - from.len()) as f64;
         let (mut best, mut last) = (None, still);
-        while is_near && last.count() < self.finder.settings.most {
+        while last.count() < self.finder.settings.most {
             let Some(more) = self.one_more(&last).filter(|more| self.may_be(more)) else { break };
             by_count[more.count()] = more.ln_evidence;
             let is_worse = more.ln_evidence < last.ln_evidence;

@@ -31,11 +31,16 @@ fn largest_error_m(truth: &[Contact], found: &[FoundContact]) -> f64 {
     truth.iter().map(nearest_m).fold(0.0, f64::max)
 }
 
+/// The contacts of a scene at a time (s).
+fn contacts_of(name: SceneName, seed: u64) -> impl Fn(f64) -> Vec<Contact> {
+    let detector = Detector::preset(Detector::DEFAULT).unwrap();
+    let scene = Scene::new(name, &detector, Hand::relative(&detector), seed);
+    move |time_s| scene.at(time_s).iter().filter_map(|touch| touch.disc()).collect()
+}
+
 /// Five fingers whose weight goes from one to the next.
 fn five_fingers() -> impl Fn(f64) -> Vec<Contact> {
-    let detector = Detector::preset(Detector::DEFAULT).unwrap();
-    let scene = Scene::new(SceneName::FiveFingers, &detector, Hand::relative(&detector), 1);
-    move |time_s| scene.at(time_s).iter().filter_map(|touch| touch.disc()).collect()
+    contacts_of(SceneName::FiveFingers, 1)
 }
 
 #[test]
@@ -80,6 +85,10 @@ fn one_finger_that_presses_more_and_less_or_moves_is_no_two_that_stay() {
         let moving = |time_s: f64| vec![contact(speed * time_s, 0.009, 0.7 + 0.4 * (4.0 * time_s).sin())];
         let counts = counts(&followed(1.2, moving));
         assert!(counts.iter().all(|count| *count == 1), "{speed} m/s: {counts:?}");
+    }
+    for seed in [1, 2] {
+        let counts = counts(&followed(5.0, contacts_of(SceneName::RollingBall, seed)));
+        assert!(counts.iter().all(|count| *count == 1), "a ball, seed {seed}: {counts:?}");
     }
 }
 

@@ -26,8 +26,19 @@ const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-7, tries: 6 };
 pub(super) enum Motion {
     /// Not at all.
     Still,
-    /// By this standard deviation of each coordinate (m).
-    By(f64),
+    /// Places, by this standard deviation of each coordinate (m).
+    Moving(f64),
+    /// Places likewise, and radii.
+    Growing(f64),
+}
+
+impl Motion {
+    fn spread_m(self) -> Option<f64> {
+        match self {
+            Self::Still => None,
+            Self::Moving(spread_m) | Self::Growing(spread_m) => Some(spread_m),
+        }
+    }
 }
 
 /// Contacts in each frame.
@@ -156,9 +167,13 @@ impl Window<'_> {
         for (k, unit_m) in units_m.iter().enumerate() {
             parameters.push(PARAMETERS * k + 2);
             deviations.push(policy::STRENGTH_DEVIATION / (1.0 + fit.constriction(k)));
-            if let Motion::By(spread_m) = motion {
-                parameters.extend([PARAMETERS * k, PARAMETERS * k + 1, PARAMETERS * k + 3]);
-                deviations.extend([spread_m / unit_m, spread_m / unit_m, policy::GROWTH_DEVIATION]);
+            if let Some(spread_m) = motion.spread_m() {
+                parameters.extend([PARAMETERS * k, PARAMETERS * k + 1]);
+                deviations.extend([spread_m / unit_m; 2]);
+            }
+            if let Motion::Growing(_) = motion {
+                parameters.push(PARAMETERS * k + 3);
+                deviations.push(policy::GROWTH_DEVIATION);
             }
         }
         (parameters, deviations)
@@ -171,11 +186,13 @@ impl Window<'_> {
         for (k, contact) in fit.contacts.iter().enumerate() {
             let mean = |of: &dyn Fn(&Contact) -> f64| mean_of(fits, k, of);
             all.push((contact.conductance_s.ln() - mean(&ln_conductance)) / (1.0 + fit.constriction(k)));
-            if matches!(motion, Motion::By(_)) {
+            if motion.spread_m().is_some() {
                 let (along, unit_m) = fit.along(k);
                 let mean_m = [0, 1, 2].map(|axis| mean(&|contact| place_m(contact)[axis]));
                 let way_m = space::sub(place_m(contact), mean_m);
                 all.extend(along.map(|direction| space::dot(direction, way_m) / unit_m));
+            }
+            if let Motion::Growing(_) = motion {
                 all.push(contact.radius_m.ln() - mean(&ln_radius));
             }
         }
