@@ -31,6 +31,10 @@ fn times_behind(scene: SceneName) -> f64 {
     if matches!(scene, SceneName::Texture | SceneName::Hand | SceneName::FiveFingers) { 6.0 } else { 1.0 }
 }
 
+/// How often a scene is run before live counts as worse: another process may take the cores for most of a run. With two busy loops beside it, `hand`
+/// was worse in two runs of six; without, in none of eight.
+const TRIES: usize = 3;
+
 /// Runs a solver on a scene both ways; whether live is as good as offline.
 fn is_alike(problem: &Problem, method: Method, scene: SceneName, seconds: f64) -> bool {
     let live = Live::run(problem, method, scene, seconds);
@@ -65,7 +69,8 @@ fn live_says_what_offline_says() {
             let is_chosen = matches!(scene, SceneName::Several | SceneName::Ring | SceneName::Moving);
             let is_usual = method == Method::Auto || is_chosen && method != Method::Kernel && asked.is_empty();
             let is_usual = is_usual && (asked.is_empty() || asked == scene.to_string());
-            if (all || is_usual) && !is_alike(&problem, method, scene, if all { 3.0 } else { 1.0 }) {
+            let seconds = if all { 3.0 } else { 1.0 };
+            if (all || is_usual) && !(0..TRIES).any(|_| is_alike(&problem, method, scene, seconds)) {
                 worse.push((method.name(), scene.to_string()));
             }
         }
