@@ -1,5 +1,7 @@
 //! The commands, one file each: its arguments and what it does.
 
+#[cfg(feature = "ablation")]
+mod ablate;
 mod design;
 mod learn;
 mod live;
@@ -30,6 +32,8 @@ enum Command {
     Live(live::Args),
     Learn(learn::Args),
     Score(score::Args),
+    #[cfg(feature = "ablation")]
+    Ablate(ablate::Args),
 }
 
 /// Runs the command that was asked for.
@@ -43,5 +47,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Live(args) => live::run(&args),
         Command::Learn(args) => learn::run(&args),
         Command::Score(args) => score::run(&args),
+        #[cfg(feature = "ablation")]
+        Command::Ablate(args) => ablate::run(&args),
     }
 }

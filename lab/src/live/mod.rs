@@ -19,8 +19,7 @@ use tactomo_physics::scene::{Hand, Scene, SceneName};
 use tactomo_physics::simulate::{Simulation, try_drawn};
 use tactomo_touch::solve::{Method, Problem};
 
-pub use self::score::Scored;
-use self::score::{Answer, Scorer};
+pub use self::score::{Answer, Scored, Scorer};
 
 /// One run.
 #[derive(Clone, Debug)]

@@ -37,8 +37,12 @@ pub use self::answer::{
 pub use self::before::adaptive_mean::AdaptiveMean;
 pub(crate) use self::before::adaptive_mean::rounding_v;
 pub use self::before::latest::Latest;
+#[cfg(feature = "ablation")]
+pub use self::fit::ablation::Threshold;
 pub use self::fit::interpolate::Interpolation;
 pub use self::fit::lambda::{Lambda, UnknownLambda};
+#[cfg(feature = "ablation")]
+pub use self::fit::policy::all as thresholds;
 pub use self::health::electrodes::faulty_electrodes;
 pub(crate) use self::health::electrodes::{Pair as PairOfLoads, loads};
 pub use self::health::watch::{ElectrodeWatch, FaultyElectrodes, Look};

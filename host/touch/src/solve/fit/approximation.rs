@@ -184,12 +184,12 @@ impl ApproximationError {
 
     /// Whether other readings (V) would have other patterns.
     pub fn is_stale(&self, volts: &[f64]) -> bool {
-        self.is_moved(volts, policy::STALE_SHARE)
+        self.is_moved(volts, policy::stale_share())
     }
 
     /// Whether other readings (V) are those that the patterns are of, as near as a search needs.
     pub fn is_settled(&self, volts: &[f64]) -> bool {
-        !self.is_moved(volts, policy::SETTLED_SHARE)
+        !self.is_moved(volts, policy::settled_share())
     }
 
     fn is_moved(&self, volts: &[f64], share: f64) -> bool {

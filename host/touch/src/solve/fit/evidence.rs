@@ -22,7 +22,7 @@ impl Evidence {
     /// Of so many parameters, each of which has the same price.
     pub fn of(cost: f64, parameters: usize) -> Self {
         let parameters = parameters as f64;
-        Self { cost, price: policy::PARAMETER_PRICE * parameters, parameters }
+        Self { cost, price: policy::parameter_price() * parameters, parameters }
     }
 
     /// The sum of squares with the price: of two explanations the lower one is believed.
@@ -32,13 +32,13 @@ impl Evidence {
 
     /// Whether more is left of so many readings than noise and the model's error make.
     pub fn is_misfit(&self, readings: usize) -> bool {
-        self.exceeds(1.0, policy::MISFIT_DEVIATIONS, readings)
+        self.exceeds(1.0, policy::misfit_deviations(), readings)
     }
 
     /// Whether more is left than noise alone makes, whose variance is this share of that of the errors: a model that is righter than it claims
     /// could do better.
     pub fn may_be_better(&self, noise_share: f64, readings: usize) -> bool {
-        self.exceeds(noise_share, policy::DOUBT_DEVIATIONS, readings)
+        self.exceeds(noise_share, policy::doubt_deviations(), readings)
     }
 
     fn exceeds(&self, share: f64, deviations: f64, readings: usize) -> bool {
@@ -49,7 +49,7 @@ impl Evidence {
 
 /// Mean square of what is left, in what noise and model error make, above which readings do not fit.
 pub(crate) fn misfit_limit(freedom: f64) -> f64 {
-    limit(policy::MISFIT_DEVIATIONS, freedom)
+    limit(policy::misfit_deviations(), freedom)
 }
 
 /// The mean of `freedom` squares of normal numbers is 1, and its variance two over their number.
@@ -73,12 +73,12 @@ impl Watch {
     /// Takes the next frame; whether a search may explain it better.
     pub fn has_lost(&mut self, now: Evidence, readings: usize) -> bool {
         self.mean += NEWEST_FRAME * (now.cost - self.mean);
-        self.mean > (1.0 + policy::RISE) * self.searched || self.is_worse(now, readings)
+        self.mean > (1.0 + policy::rise()) * self.searched || self.is_worse(now, readings)
     }
 
     /// Whether a frame by itself is explained much worse than the searched one.
     pub fn is_worse(&self, now: Evidence, readings: usize) -> bool {
-        now.cost > (policy::WORSE * self.searched).max(readings as f64)
+        now.cost > (policy::worse() * self.searched).max(readings as f64)
     }
 }
 

@@ -5,174 +5,178 @@
 //! or sizes of a grid, stay with it. Those of electrodes that cannot be right are in `health`. Whoever changes one runs `cargo lab study
 //! contacts` on a seed that was not used to choose it.
 
-// What readings say.
+use super::ablation::thresholds;
 
-/// Readings above this share of the converter's range, or of the drive, say nothing.
-pub(crate) const FULL_SHARE: f64 = 0.995;
-/// Readings that stand for no contact: so many standard deviations of noise and quantisation for the largest of them.
-pub(crate) const NO_CONTACT_DEVIATIONS: f64 = 5.0;
-/// Readings do not fit if more than this share of them is what no image gives; of touches of any shape it was 0.07 at most, of shorted,
-/// exchanged and inverted electrodes more than 0.09.
-pub(crate) const OUTSIDE_SHARE: f64 = 0.08;
-/// What no image gives counts where it is above so many standard deviations of noise.
-pub(crate) const OUTSIDE_DEVIATIONS: f64 = 3.0;
+thresholds! {
+    // What readings say.
 
-// Whether frames are of one scene.
+    /// Readings above this share of the converter's range, or of the drive, say nothing.
+    full_share: f64 = 0.995;
+    /// Readings that stand for no contact: so many standard deviations of noise and quantisation for the largest of them.
+    no_contact_deviations: f64 = 5.0;
+    /// Readings do not fit if more than this share of them is what no image gives; of touches of any shape it was 0.07 at most, of shorted,
+    /// exchanged and inverted electrodes more than 0.09.
+    outside_share: f64 = 0.08;
+    /// What no image gives counts where it is above so many standard deviations of noise.
+    outside_deviations: f64 = 3.0;
 
-/// Share of still frames in which a contact is taken to move, by each of the tests of a contact in each window of one frame. Windows
-/// of more frames overlap, and have as many times more.
-pub(crate) const FALSE_ALARMS: f64 = 3e-5;
-/// Share of still frames in which a contact may have begun to move, so that the first frames are averaged no longer than others.
-pub(crate) const FALSE_DOUBTS: f64 = 0.003;
-/// Standard deviations by which the mean square of all differences is over what noise leaves, of frames that are not of one scene: of
-/// 256 readings noise alone does so in 1 of 30 000.
-pub(crate) const OTHER_SCENE_DEVIATIONS: f64 = 4.4;
+    // Whether frames are of one scene.
 
-// Whether readings are explained.
+    /// Share of still frames in which a contact is taken to move, by each of the tests of a contact in each window of one frame. Windows
+    /// of more frames overlap, and have as many times more.
+    false_alarms: f64 = 3e-5;
+    /// Share of still frames in which a contact may have begun to move, so that the first frames are averaged no longer than others.
+    false_doubts: f64 = 0.003;
+    /// Standard deviations by which the mean square of all differences is over what noise leaves, of frames that are not of one scene: of
+    /// 256 readings noise alone does so in 1 of 30 000.
+    other_scene_deviations: f64 = 4.4;
 
-/// Price of a parameter (squared deviations), by which it has to lower the sum of squares: the Bayesian information criterion for 256
-/// readings asks for 5.5; this leaves room for the many places that are looked at.
-pub(crate) const PARAMETER_PRICE: f64 = 7.0;
-/// Standard deviations of the sum of squares beyond which readings do not fit: noise alone is there a few times in a million frames. A contact
-/// that comes leaves hundreds in a few rows.
-pub(crate) const MISFIT_DEVIATIONS: f64 = 5.0;
-/// Standard deviations of the sum of squares beyond which it is worth the time to look for another explanation: once in some hundred frames.
-pub(crate) const DOUBT_DEVIATIONS: f64 = 3.0;
-/// Mean square (squared deviations) of what a fit with the rough model leaves, where no other start is tried.
-pub(crate) const EXPLAINED_MEAN_SQUARE: f64 = 1.5;
-/// Mean square (squared deviations) of what a fit leaves, above which it is the contacts that are wrong: no starts around a single one are
-/// tried then, nor what the readings may be off by together.
-pub(crate) const WRONG_MEAN_SQUARE: f64 = 5.0;
-/// Mean square (squared deviations) of what a fit of wide contacts leaves with the rough model, above which it is wrong with any.
-pub(crate) const WRONG_WIDE_MEAN_SQUARE: f64 = 50.0;
+    // Whether readings are explained.
 
-// When is searched again.
+    /// Price of a parameter (squared deviations), by which it has to lower the sum of squares: the Bayesian information criterion for 256
+    /// readings asks for 5.5; this leaves room for the many places that are looked at.
+    parameter_price: f64 = 7.0;
+    /// Standard deviations of the sum of squares beyond which readings do not fit: noise alone is there a few times in a million frames. A contact
+    /// that comes leaves hundreds in a few rows.
+    misfit_deviations: f64 = 5.0;
+    /// Standard deviations of the sum of squares beyond which it is worth the time to look for another explanation: once in some hundred frames.
+    doubt_deviations: f64 = 3.0;
+    /// Mean square (squared deviations) of what a fit with the rough model leaves, where no other start is tried.
+    explained_mean_square: f64 = 1.5;
+    /// Mean square (squared deviations) of what a fit leaves, above which it is the contacts that are wrong: no starts around a single one are
+    /// tried then, nor what the readings may be off by together.
+    wrong_mean_square: f64 = 5.0;
+    /// Mean square (squared deviations) of what a fit of wide contacts leaves with the rough model, above which it is wrong with any.
+    wrong_wide_mean_square: f64 = 50.0;
 
-/// What is followed explains a frame as long as its sum of squares is below this times what the last search left, or would leave of as many
-/// frames.
-pub(crate) const WORSE: f64 = 1.3;
-/// Rise of the running mean of the sum of squares, as a share, that asks for a new search: many frames show what one frame's noise hides.
-pub(crate) const RISE: f64 = 0.12;
-/// A scene that has not changed is searched again with so many times the frames: many frames show what one frame's noise hides.
-pub(crate) const MORE_FRAMES: usize = 2;
-/// Frames of rows in a row that do not fit, after which a search is worth it.
-pub(crate) const UNFIT_FRAMES: u32 = 3;
-/// How much more rows that do not fit count than those that do: noise alone does not make them, and those of the grounds that are scanned most
-/// fit long before the others.
-pub(crate) const UNFIT_WEIGHT: f64 = 5.0;
-/// Time for which rows do not fit, so weighed, less that for which they do, from which they are not enough (s): that of 60 ms of which none fits,
-/// in which all were read twice, and searched.
-pub(crate) const UNFIT_S: f64 = 0.3;
-/// Share of the readings, in the root of the sum of squares, by which those of what is followed may differ from those that the patterns of what
-/// they may be off by together were made for.
-pub(crate) const STALE_SHARE: f64 = 0.25;
-/// Share of the readings, likewise, by which they may differ where a search ends.
-pub(crate) const SETTLED_SHARE: f64 = 0.02;
-/// What an image leaves may be so many times what the last fresh start left before the next one: jumping presses leave hundreds of times as
-/// much, a scene that moves 2 mm a frame twice as much.
-pub(crate) const IMAGE_WORSE: f64 = 4.0;
-/// After so many frames with an image, contacts and shapes are tried again; doubled each time, up to the second.
-pub(crate) const IMAGE_PATIENCE: [u32; 2] = [2, 64];
-/// Factor on the standard errors of places from which a calibration is worth to be asked for.
-pub(crate) const CALIBRATION_WORTH: f64 = 2.0;
+    // When is searched again.
 
-// How many contacts.
+    /// What is followed explains a frame as long as its sum of squares is below this times what the last search left, or would leave of as many
+    /// frames.
+    worse: f64 = 1.3;
+    /// Rise of the running mean of the sum of squares, as a share, that asks for a new search: many frames show what one frame's noise hides.
+    rise: f64 = 0.12;
+    /// A scene that has not changed is searched again with so many times the frames: many frames show what one frame's noise hides.
+    more_frames: usize = 2;
+    /// Frames of rows in a row that do not fit, after which a search is worth it.
+    unfit_frames: u32 = 3;
+    /// How much more rows that do not fit count than those that do: noise alone does not make them, and those of the grounds that are scanned most
+    /// fit long before the others.
+    unfit_weight: f64 = 5.0;
+    /// Time for which rows do not fit, so weighed, less that for which they do, from which they are not enough (s): that of 60 ms of which none fits,
+    /// in which all were read twice, and searched.
+    unfit_s: f64 = 0.3;
+    /// Share of the readings, in the root of the sum of squares, by which those of what is followed may differ from those that the patterns of what
+    /// they may be off by together were made for.
+    stale_share: f64 = 0.25;
+    /// Share of the readings, likewise, by which they may differ where a search ends.
+    settled_share: f64 = 0.02;
+    /// What an image leaves may be so many times what the last fresh start left before the next one: jumping presses leave hundreds of times as
+    /// much, a scene that moves 2 mm a frame twice as much.
+    image_worse: f64 = 4.0;
+    /// After so many frames with an image, contacts and shapes are tried again; doubled each time, up to the second.
+    image_patience: [u32; 2] = [2, 64];
+    /// Factor on the standard errors of places from which a calibration is worth to be asked for.
+    calibration_worth: f64 = 2.0;
 
-/// Gain in the sum of squares (squared deviations), in the linear theory, below which one more contact is not tried.
-pub(crate) const ONE_MORE_GAIN: f64 = 8.0;
-/// Nats of evidence that one more contact has to bring by what spots tell, to be fitted as a disc: as many below nothing as make an answer of 5 %
-/// worth to be named, and two for what spots are off.
-pub(crate) const ONE_MORE_NATS: f64 = -5.0;
-/// Starts whose spots are less likely than the best by so many nats are left: a mode that is 1 in 400 says nothing.
-pub(crate) const MODES_NATS: f64 = 6.0;
-/// Rise of the sum of squares (squared deviations), as spots tell it, above which other contacts than those of a fit, or one fewer, are not tried with
-/// discs: one contact takes 22 nats of evidence at most, and spots tell a rise up to twice too large.
-pub(crate) const LOST_SQUARES: f64 = 100.0;
-/// Gain in the sum of squares (squared deviations), in the linear theory, for there being any contact at all: noise alone has 1 in 10^7 frames
-/// above it.
-pub(crate) const FIRST_GAIN: f64 = 60.0;
-/// One more contact is less likely than one fewer by so many nats before anything is read: scenes of few contacts are more common, and places
-/// that are looked at are chosen.
-pub(crate) const FEWER_NATS: f64 = 1.5;
-/// Share of the evidence from which another number of contacts is named beside the one that was found: what is less than 95 % sure says what else
-/// it may be.
-pub(crate) const NAMED_SHARE: f64 = 0.05;
-/// Standard deviation of the logarithm of a contact's conductance about its mean in frames that are explained together: a factor of e.
-pub(crate) const STRENGTH_DEVIATION: f64 = 1.0;
-/// The same of its radius, where it may grow: a ball's does with the cube root of the force (Hertz, 1882).
-pub(crate) const GROWTH_DEVIATION: f64 = 1.0 / 3.0;
-/// Standard deviations of the sum of squares over what noise leaves, where another set of contacts is looked for.
-pub(crate) const OTHER_SET_DEVIATIONS: f64 = 1.5;
-/// Nats by which the evidence for another set of contacts has to be higher.
-pub(crate) const OTHER_SET_NATS: f64 = 0.5;
-/// Radius, in usual ones, above which a contact may be two.
-pub(crate) const TWO_RADII: f64 = 1.6;
-/// Radii that contacts may have while their number is not yet right, in usual ones: too few contacts would be made as wide as may be.
-pub(crate) const PLAUSIBLE_RADII: f64 = 3.0;
-/// Contacts nearer to each other than so many sums of their radii may be one.
-pub(crate) const TOUCHING_SUMS: f64 = 2.0;
-/// Peaks of a linear image at least so high, over the highest, are contacts.
-pub(crate) const FURTHER_PEAK_SHARE: f32 = 0.6;
-/// What stands out around a peak of a linear image: above this share of it.
-pub(crate) const STANDS_OUT_SHARE: f32 = 0.7;
-/// What has less than this share of the conductance is no contact of the network: of pairs of like contacts on detectors as built the count is
-/// right in 71 % with it, and in 56 % without. What it leaves out of three is a hundredth of the others.
-pub(crate) const NETWORK_LEAST_SHARE: f64 = 0.01;
+    // How many contacts.
 
-// What is known of a contact.
+    /// Gain in the sum of squares (squared deviations), in the linear theory, below which one more contact is not tried.
+    one_more_gain: f64 = 8.0;
+    /// Nats of evidence that one more contact has to bring by what spots tell, to be fitted as a disc: as many below nothing as make an answer of 5 %
+    /// worth to be named, and two for what spots are off.
+    one_more_nats: f64 = -5.0;
+    /// Starts whose spots are less likely than the best by so many nats are left: a mode that is 1 in 400 says nothing.
+    modes_nats: f64 = 6.0;
+    /// Rise of the sum of squares (squared deviations), as spots tell it, above which other contacts than those of a fit, or one fewer, are not tried with
+    /// discs: one contact takes 22 nats of evidence at most, and spots tell a rise up to twice too large.
+    lost_squares: f64 = 100.0;
+    /// Gain in the sum of squares (squared deviations), in the linear theory, for there being any contact at all: noise alone has 1 in 10^7 frames
+    /// above it.
+    first_gain: f64 = 60.0;
+    /// One more contact is less likely than one fewer by so many nats before anything is read: scenes of few contacts are more common, and places
+    /// that are looked at are chosen.
+    fewer_nats: f64 = 1.5;
+    /// Share of the evidence from which another number of contacts is named beside the one that was found: what is less than 95 % sure says what else
+    /// it may be.
+    named_share: f64 = 0.05;
+    /// Standard deviation of the logarithm of a contact's conductance about its mean in frames that are explained together: a factor of e.
+    strength_deviation: f64 = 1.0;
+    /// The same of its radius, where it may grow: a ball's does with the cube root of the force (Hertz, 1882).
+    growth_deviation: f64 = 1.0 / 3.0;
+    /// Standard deviations of the sum of squares over what noise leaves, where another set of contacts is looked for.
+    other_set_deviations: f64 = 1.5;
+    /// Nats by which the evidence for another set of contacts has to be higher.
+    other_set_nats: f64 = 0.5;
+    /// Radius, in usual ones, above which a contact may be two.
+    two_radii: f64 = 1.6;
+    /// Radii that contacts may have while their number is not yet right, in usual ones: too few contacts would be made as wide as may be.
+    plausible_radii: f64 = 3.0;
+    /// Contacts nearer to each other than so many sums of their radii may be one.
+    touching_sums: f64 = 2.0;
+    /// Peaks of a linear image at least so high, over the highest, are contacts.
+    further_peak_share: f32 = 0.6;
+    /// What stands out around a peak of a linear image: above this share of it.
+    stands_out_share: f32 = 0.7;
+    /// What has less than this share of the conductance is no contact of the network: of pairs of like contacts on detectors as built the count is
+    /// right in 71 % with it, and in 56 % without. What it leaves out of three is a hundredth of the others.
+    network_least_share: f64 = 0.01;
 
-/// Smallest and largest conductance (sheet conductances): what is lighter is nothing, what is firmer makes no difference.
-pub(crate) const CONDUCTANCES_SHEETS: [f64; 2] = [1e-6, 300.0];
-/// Conductance of a contact (sheet conductances) above which it is taken as saturated.
-pub(crate) const SATURATED_SHEETS: f64 = 270.0;
-/// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
-pub(crate) const CONDUCTANCE_DEVIATION: f64 = 4.0;
-/// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
-pub(crate) const KNOWN_RADIUS_DEVIATION: f64 = 0.2;
-/// A filter less likely than the best by so many nats goes on from it: noise alone does that to the right one in 1 of 400.
-pub(crate) const BEHIND_NATS: f64 = 15.0;
+    // What is known of a contact.
 
-// When a contact goes.
+    /// Smallest and largest conductance (sheet conductances): what is lighter is nothing, what is firmer makes no difference.
+    conductances_sheets: [f64; 2] = [1e-6, 300.0];
+    /// Conductance of a contact (sheet conductances) above which it is taken as saturated.
+    saturated_sheets: f64 = 270.0;
+    /// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
+    conductance_deviation: f64 = 4.0;
+    /// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
+    known_radius_deviation: f64 = 0.2;
+    /// A filter less likely than the best by so many nats goes on from it: noise alone does that to the right one in 1 of 400.
+    behind_nats: f64 = 15.0;
 
-/// Nats by which frames of late have to speak for no contact before it is let go.
-pub(crate) const GONE_NATS: f64 = 12.0;
-/// Conductance (sheet conductances) below which a contact cannot be distinguished from nothing: a hundredth of the lightest that is found well.
-pub(crate) const VANISHING_SHEETS: f64 = 1e-5;
-/// A contact is lost when the logarithm of its conductance is known no better than this standard deviation, and it is light.
-pub(crate) const WEAK_DEVIATION: f64 = 0.3;
-/// Share of the conductance of the frame before, below which a contact may be let go.
-pub(crate) const LIFTED_SHARE: f64 = 0.6;
-/// Frames for which a contact that is lost keeps its number: a tenth of a second of 1200 frames/s.
-pub(crate) const LOST_FRAMES: u32 = 120;
-/// Frames for which a contact that is lost is expected to go on as it went. Longer, its velocity says less than where it was.
-pub(crate) const COASTING_FRAMES: f64 = 12.0;
+    // When a contact goes.
 
-// Contacts, or something else.
+    /// Nats by which frames of late have to speak for no contact before it is let go.
+    gone_nats: f64 = 12.0;
+    /// Conductance (sheet conductances) below which a contact cannot be distinguished from nothing: a hundredth of the lightest that is found well.
+    vanishing_sheets: f64 = 1e-5;
+    /// A contact is lost when the logarithm of its conductance is known no better than this standard deviation, and it is light.
+    weak_deviation: f64 = 0.3;
+    /// Share of the conductance of the frame before, below which a contact may be let go.
+    lifted_share: f64 = 0.6;
+    /// Frames for which a contact that is lost keeps its number: a tenth of a second of 1200 frames/s.
+    lost_frames: u32 = 120;
+    /// Frames for which a contact that is lost is expected to go on as it went. Longer, its velocity says less than where it was.
+    coasting_frames: f64 = 12.0;
 
-/// So many contacts may stand for something else, if they leave more than noise does.
-pub(crate) const SUSPICIOUS_CONTACTS: usize = 3;
-/// By how much the score of a shape has to be lower than that of contacts (squared deviations) on a detector that is not known exactly. Two
-/// contacts on one of those were a line by 2; lines and rings, on three others, were so by 23 or more.
-pub(crate) const SHAPE_GAIN: f64 = 10.0;
-/// A shape that leaves so many times the rival's score after the first steps is given up.
-pub(crate) const SHAPE_BEGUN_RIVALS: f64 = 4.0;
-/// A shape of so many times the rival's score after all steps on the coarse mesh is given up.
-pub(crate) const SHAPE_RIVALS: f64 = 2.0;
-/// Shortest line, in mean distances of electrodes.
-pub(crate) const SHORTEST_LINE: f64 = 0.7;
-/// Smallest ring's radius, in mean distances of electrodes: discs of 6 mm on `square-60` are as well explained by rings of 4 mm.
-pub(crate) const SMALLEST_RING: f64 = 0.35;
-/// A shape that was chosen is kept as long as it is so large, as a share of what a search asks for: the width of a ring of 13 mm on detectors as built
-/// wanders from 7 to 9 mm, as the readings hardly tell it.
-pub(crate) const KEPT_SHAPE_SHARE: f64 = 0.6;
-/// A single contact of so many mean distances of electrodes in radius may be a ring.
-pub(crate) const RING_RADIUS: f64 = 0.4;
+    // Contacts, or something else.
 
-// Exchanged wires.
+    /// So many contacts may stand for something else, if they leave more than noise does.
+    suspicious_contacts: usize = 3;
+    /// By how much the score of a shape has to be lower than that of contacts (squared deviations) on a detector that is not known exactly. Two
+    /// contacts on one of those were a line by 2; lines and rings, on three others, were so by 23 or more.
+    shape_gain: f64 = 10.0;
+    /// A shape that leaves so many times the rival's score after the first steps is given up.
+    shape_begun_rivals: f64 = 4.0;
+    /// A shape of so many times the rival's score after all steps on the coarse mesh is given up.
+    shape_rivals: f64 = 2.0;
+    /// Shortest line, in mean distances of electrodes.
+    shortest_line: f64 = 0.7;
+    /// Smallest ring's radius, in mean distances of electrodes: discs of 6 mm on `square-60` are as well explained by rings of 4 mm.
+    smallest_ring: f64 = 0.35;
+    /// A shape that was chosen is kept as long as it is so large, as a share of what a search asks for: the width of a ring of 13 mm on detectors as built
+    /// wanders from 7 to 9 mm, as the readings hardly tell it.
+    kept_shape_share: f64 = 0.6;
+    /// A single contact of so many mean distances of electrodes in radius may be a ring.
+    ring_radius: f64 = 0.4;
 
-/// Mean square of what one contact leaves with two wires exchanged back, as a share of that before, that shows an exchange.
-pub(crate) const HEALED_SHARE: f64 = 0.1;
-/// Mean square of what one contact leaves with two wires exchanged back (squared deviations), below which it fits.
-pub(crate) const HEALED_MEAN_SQUARE: f64 = 6.0;
-/// Share of what is left without an exchange up to which, in the linear theory, it is tried with fits.
-pub(crate) const HEALED_SHARE_ROUGHLY: f64 = 0.5;
+    // Exchanged wires.
+
+    /// Mean square of what one contact leaves with two wires exchanged back, as a share of that before, that shows an exchange.
+    healed_share: f64 = 0.1;
+    /// Mean square of what one contact leaves with two wires exchanged back (squared deviations), below which it fits.
+    healed_mean_square: f64 = 6.0;
+    /// Share of what is left without an exchange up to which, in the linear theory, it is tried with fits.
+    healed_share_roughly: f64 = 0.5;
+}

@@ -46,7 +46,7 @@ impl AutoSearch {
         let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
         let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
         // What is not known of a detector makes explanations more alike than their evidence tells.
-        let margin = if target.error().is_some() || target.is_provisional() { policy::SHAPE_GAIN } else { 0.0 };
+        let margin = if target.error().is_some() || target.is_provisional() { policy::shape_gain() } else { 0.0 };
         (shape.evidence().score() < evidence.score() - margin).then_some(shape)
     }
 
@@ -107,7 +107,7 @@ impl AutoSearch {
         // Of a provisional target nothing is claimed that another model could do better than.
         let noise_share = if target.is_provisional() { 1.0 } else { (target.noise_v / target.deviation_v()).powi(2) };
         let is_doubtful =
-            solution.contacts.len() >= policy::SUSPICIOUS_CONTACTS && best.may_be_better(noise_share, target.count());
+            solution.contacts.len() >= policy::suspicious_contacts() && best.may_be_better(noise_share, target.count());
         if !(is_doubtful || best.is_misfit(target.count())) {
             return Ok(shape);
         }

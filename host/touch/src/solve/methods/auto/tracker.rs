@@ -62,7 +62,7 @@ impl AutoTracker {
             image,
             answer: Answer::Contacts,
             skip: 0,
-            patience: policy::IMAGE_PATIENCE[0],
+            patience: policy::image_patience()[0],
         }
     }
 
@@ -161,11 +161,11 @@ impl AutoTracker {
         match &answer {
             Answer::Image(_) => {
                 self.skip = self.patience;
-                self.patience = (2 * self.patience).min(policy::IMAGE_PATIENCE[1]);
+                self.patience = (2 * self.patience).min(policy::image_patience()[1]);
             }
             _ => {
                 self.image.go_on_from(None);
-                (self.skip, self.patience) = (0, policy::IMAGE_PATIENCE[0]);
+                (self.skip, self.patience) = (0, policy::image_patience()[0]);
             }
         }
         self.answer = answer;

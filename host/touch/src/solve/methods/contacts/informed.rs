@@ -129,7 +129,7 @@ impl ContactFinder {
     fn begun_roughly(&self, target: &Target) -> Option<Informed> {
         let rough = Target::provisional(&target.readings(), target.frames, &self.errors);
         let begun = self.search_exact(None, &rough, &mut |_| ControlFlow::Continue(()))?;
-        if begun.fit.contacts.len() > policy::SUSPICIOUS_CONTACTS {
+        if begun.fit.contacts.len() > policy::suspicious_contacts() {
             return None;
         }
         self.informed_as_is(&begun, target)
@@ -175,7 +175,7 @@ impl ContactFinder {
         for renewal in 0..RENEWALS {
             let Informed { hypothesis, target } = &found;
             // What contacts are missing for says nothing of the detector.
-            let is_hopeless = hypothesis.fit.cost > policy::WRONG_MEAN_SQUARE * target.count() as f64;
+            let is_hopeless = hypothesis.fit.cost > policy::wrong_mean_square() * target.count() as f64;
             if is_hopeless && renewal > 0 {
                 break;
             }

@@ -143,7 +143,7 @@ impl Certainty {
         let others = shares().enumerate().filter(|(other, _)| *other != count);
         let other = others.max_by(|(_, a), (_, b)| a.total_cmp(b));
         let other = other.map(|(contacts, of)| Alternative { contacts, certainty: of * share });
-        Some(Self { share, alternative: other.filter(|other| other.certainty >= policy::NAMED_SHARE) })
+        Some(Self { share, alternative: other.filter(|other| other.certainty >= policy::named_share()) })
     }
 }
 
@@ -313,7 +313,7 @@ impl ContactFinder {
             logs.iter().enumerate().map(|(k, logs)| self.contact(fit, k, covariance.as_ref().zip(*logs))).collect();
         self.add_unseen_scale(fit, &mut contacts);
         // A standard error more and it is as good as perfect.
-        let perfect = (policy::SATURATED_SHEETS * self.sheet_s).ln();
+        let perfect = (policy::saturated_sheets() * self.sheet_s).ln();
         let is_perfect = |logs: &Option<Logs>| {
             logs.is_some_and(|Logs { conductance: [mean, deviation], .. }| mean + deviation > perfect)
         };
@@ -340,7 +340,7 @@ impl ContactFinder {
             Uncertainty { conductance_s, ..place_uncertainty(fit, k, &covariance) }
         });
         let radius =
-            known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < policy::KNOWN_RADIUS_DEVIATION);
+            known.map(|(_, logs)| logs.radius).filter(|[_, deviation]| *deviation < policy::known_radius_deviation());
         let [x_m, y_m, z_m] = near_edge.map_or(place_m(&contact), |place| {
             let (along, unit_m) = fit.along(k);
             self.fields.footing(space::moved(place_m(&contact), (unit_m * place.mean).into(), along)).0
@@ -376,7 +376,7 @@ impl ContactFinder {
             (0..fit.contacts.len()).map(of).map(|place| place.x_m.max(place.y_m)).fold(0.0, f64::max)
         };
         let [now_m, calibrated_m] = [&fit.covariance()?, &known].map(largest_m);
-        (is_off && now_m > policy::CALIBRATION_WORTH * calibrated_m).then_some(Calibrated { now_m, calibrated_m })
+        (is_off && now_m > policy::calibration_worth() * calibrated_m).then_some(Calibrated { now_m, calibrated_m })
     }
 
     /// What the readings say of a contact's conductance and radius.
@@ -385,7 +385,7 @@ impl ContactFinder {
         let usual = Usual {
             conductance_s: ln_conductance.exp(),
             conductance_deviation,
-            most_s: policy::CONDUCTANCES_SHEETS[1] * self.sheet_s,
+            most_s: policy::conductances_sheets()[1] * self.sheet_s,
             radius_m: self.settings.radius_m,
             radius_deviation: self.settings.radius_deviation,
         };

@@ -97,14 +97,14 @@ impl ContactFinder {
         }
         let Some(mut fit) = self.moved_by(last.fit.clone(), &mut state.filters, target) else { return Step::Lost };
         let counted = target.at(&fit.volts).count() as f64;
-        let noise = counted + policy::MISFIT_DEVIATIONS * (2.0 * counted).sqrt();
+        let noise = counted + policy::misfit_deviations() * (2.0 * counted).sqrt();
         state.unfit = if fit.cost > noise { state.unfit + 1 } else { 0 };
         // What is gone shows in the rows alone: what they say for it is what a contact of that kind would have taken off.
         state.gone = (state.gone + 0.5 * (fit.cost - target.cost_of_nothing())).max(0.0);
-        if state.gone > policy::GONE_NATS || self.is_vanishing(&fit) {
+        if state.gone > policy::gone_nats() || self.is_vanishing(&fit) {
             return Step::Gone;
         }
-        let search = state.unfit >= policy::UNFIT_FRAMES;
+        let search = state.unfit >= policy::unfit_frames();
         state.systematic_error.add(&fit, target, &self.errors, self.spacing_m);
         let known = state.filters.information();
         let stays = state.systematic_error.covariance(&fit);
@@ -128,7 +128,7 @@ impl ContactFinder {
 
     /// Whether what is followed has become so light that it cannot be distinguished from nothing.
     fn is_vanishing(&self, fit: &DiscFit) -> bool {
-        let least_s = policy::VANISHING_SHEETS * self.sheet_s;
+        let least_s = policy::vanishing_sheets() * self.sheet_s;
         fit.contacts.iter().all(|contact| contact.conductance_s < least_s)
     }
 

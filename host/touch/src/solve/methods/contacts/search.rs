@@ -49,7 +49,7 @@ impl ContactFinder {
     /// Whether there is any contact at all, as far as single ones tell.
     pub fn stands_out(&self, target: &Target) -> bool {
         let looks = self.looks(target);
-        self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= policy::FIRST_GAIN)
+        self.scan.ones(&looks, 1, self.apart_m()).first().is_some_and(|best| best.gain >= policy::first_gain())
     }
 
     /// What explains a frame of a detector that is as described, from what explains it so far if that leads there, else from nothing. Each better
@@ -86,19 +86,19 @@ impl ContactFinder {
     pub(super) fn begun(&self, target: &Target) -> Option<Vec<Contact>> {
         let looks = self.looks(target);
         let best = self.scan.ones(&looks, 1, self.apart_m()).into_iter().next()?;
-        (best.gain >= policy::FIRST_GAIN).then(|| self.discs_of(&self.scan.start(&looks, &best)))
+        (best.gain >= policy::first_gain()).then(|| self.discs_of(&self.scan.start(&looks, &best)))
     }
 
     /// The best single contact, if anything stands out.
     pub(super) fn one(&self, target: &Target) -> Option<DiscFit> {
         let looks = self.looks(target);
         let ones = self.scan.ones(&looks, STARTS, self.apart_m());
-        if ones.first().is_none_or(|best| best.gain < policy::FIRST_GAIN) {
+        if ones.first().is_none_or(|best| best.gain < policy::first_gain()) {
             return None;
         }
         let starts = ones.iter().map(|one| self.discs_of(&self.scan.start(&looks, one)));
         let best = self.best_alone(starts.collect(), target)?;
-        if best.cost > policy::WRONG_MEAN_SQUARE * target.count() as f64 {
+        if best.cost > policy::wrong_mean_square() * target.count() as f64 {
             return Some(best);
         }
         let beside = self.best_alone(self.beside(&best.contacts[0], best.along(0).0), target);
@@ -107,14 +107,14 @@ impl ContactFinder {
 
     /// A fit with radii free, if it is at the widest that is plausible; else what it is.
     fn released(&self, fit: DiscFit, target: &Target) -> DiscFit {
-        let is_wide = |contact: &Contact| contact.radius_m > 0.99 * policy::PLAUSIBLE_RADII * self.settings.radius_m;
+        let is_wide = |contact: &Contact| contact.radius_m > 0.99 * policy::plausible_radii() * self.settings.radius_m;
         if !fit.contacts.iter().any(is_wide) {
             return fit;
         }
         let full = self.disc_fitter();
         let rough = DiscFitter { model: &*self.rough, ..full };
         let free = rough.fit(fit.contacts.clone(), target, ROUGH);
-        let free = free.filter(|free| free.cost < policy::WRONG_WIDE_MEAN_SQUARE * target.count() as f64);
+        let free = free.filter(|free| free.cost < policy::wrong_wide_mean_square() * target.count() as f64);
         let free = free.and_then(|free| full.fit(free.contacts, target, RELEASED));
         free.unwrap_or(fit)
     }
@@ -179,7 +179,7 @@ impl ContactFinder {
 
     /// As many contacts at once as their spots ask for, where those of a fit leave far more than noise.
     pub(super) fn crowd(&self, fit: &DiscFit, target: &Target) -> Option<DiscFit> {
-        if fit.cost < policy::WRONG_MEAN_SQUARE * target.count() as f64 {
+        if fit.cost < policy::wrong_mean_square() * target.count() as f64 {
             return None;
         }
         // A fit that is far off is as wide as it may be, which tells nothing of the contacts that it stands for.
@@ -220,7 +220,7 @@ impl ContactFinder {
         let fitted = Fitted { spots: &spots, slopes, normal: &fit.normal, left };
         let looks = self.scan.beside(&self.spot_model, &*self.fields, &fitted, &at);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
-        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::ONE_MORE_GAIN)
+        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::one_more_gain())
             || self.may_hide_more(fit.contacts.len());
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
             return Err(f64::NEG_INFINITY);
@@ -235,10 +235,10 @@ impl ContactFinder {
         let best = begun.first().ok_or(f64::NEG_INFINITY)?;
         let gain = 0.5 * (fit.cost - best.cost) + spots.ln_of_last(best).unwrap_or(f64::NEG_INFINITY);
         // Of what contacts are not, as a ring, spots tell little.
-        if gain < policy::ONE_MORE_NATS && !self.is_misfit(fit, target) {
+        if gain < policy::one_more_nats() && !self.is_misfit(fit, target) {
             return Err(self.evidence(fit) + gain);
         }
-        let most = best.cost + 2.0 * policy::MODES_NATS;
+        let most = best.cost + 2.0 * policy::modes_nats();
         begun.retain(|start| start.cost <= most);
         begun.truncate(if gain > 0.0 { FINALISTS } else { 1 });
         self.best_of(begun, target).ok_or(f64::NEG_INFINITY)
@@ -253,9 +253,9 @@ impl ContactFinder {
     /// Whether a fit leaves a little more than noise should, or needs a contact as wide as may be.
     pub(super) fn is_doubtful(&self, fit: &DiscFit, target: &Target) -> bool {
         let freedom = self.freedom(fit, target);
-        let widest_m = 0.95 * policy::PLAUSIBLE_RADII * self.settings.radius_m;
+        let widest_m = 0.95 * policy::plausible_radii() * self.settings.radius_m;
         let is_wide = fit.contacts.len() > 1 && fit.contacts.iter().any(|contact| contact.radius_m > widest_m);
-        fit.cost > freedom + policy::OTHER_SET_DEVIATIONS * (2.0 * freedom).sqrt() || is_wide
+        fit.cost > freedom + policy::other_set_deviations() * (2.0 * freedom).sqrt() || is_wide
     }
 
     /// A more likely fit with one of the contacts taken away and put where it explains most.
@@ -271,7 +271,7 @@ impl ContactFinder {
             let rough = DiscFitter { model: &*self.rough, ..self.plausible_fitter() };
             let fewer = rough.fit(others, target, FIRST)?;
             let other = self.one_more(&fewer, Vec::new(), target).ok()?;
-            (self.evidence(&other) > evidence + policy::OTHER_SET_NATS).then_some(other)
+            (self.evidence(&other) > evidence + policy::other_set_nats()).then_some(other)
         })
     }
 
@@ -287,7 +287,7 @@ impl ContactFinder {
         let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (a, b)));
         let merged = pairs.filter_map(|(a, b)| {
             let [one, other] = [a, b].map(|k| fit.contacts[k]);
-            let near_m = policy::TOUCHING_SUMS * (one.radius_m + other.radius_m);
+            let near_m = policy::touching_sums() * (one.radius_m + other.radius_m);
             (space::distance(place_m(&one), place_m(&other)) < near_m).then(|| {
                 let mut merged = without(a);
                 merged[b] = self.merged(&one, &other);
@@ -325,7 +325,7 @@ impl ContactFinder {
 
     pub(super) fn plausible_fitter(&self) -> DiscFitter<'_> {
         let fitter = self.disc_fitter();
-        DiscFitter { widest_m: fitter.widest_m.min(policy::PLAUSIBLE_RADII * self.settings.radius_m), ..fitter }
+        DiscFitter { widest_m: fitter.widest_m.min(policy::plausible_radii() * self.settings.radius_m), ..fitter }
     }
 
     pub(super) fn disc_fitter(&self) -> DiscFitter<'_> {

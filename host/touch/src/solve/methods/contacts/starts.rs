@@ -26,7 +26,7 @@ impl ContactFinder {
     pub(super) fn splits(&self, fit: &DiscFit) -> Vec<Vec<Contact>> {
         let widest =
             (0..fit.contacts.len()).max_by(|a, b| fit.contacts[*a].radius_m.total_cmp(&fit.contacts[*b].radius_m));
-        let is_wide = |k: &usize| fit.contacts[*k].radius_m > policy::TWO_RADII * self.settings.radius_m;
+        let is_wide = |k: &usize| fit.contacts[*k].radius_m > policy::two_radii() * self.settings.radius_m;
         let Some(k) = widest.filter(is_wide) else { return Vec::new() };
         let wide = fit.contacts[k];
         let (along, _) = fit.along(k);
@@ -86,7 +86,7 @@ impl ContactFinder {
         let by_objective = |a: &DiscFit, b: &DiscFit| objective(a).total_cmp(&objective(b));
         let mut fits = Vec::with_capacity(starts.len());
         for fit in starts.into_iter().filter_map(|start| rough.fit(start, target, FIRST)) {
-            let explains = fit.cost < policy::EXPLAINED_MEAN_SQUARE * target.count() as f64;
+            let explains = fit.cost < policy::explained_mean_square() * target.count() as f64;
             fits.push(fit);
             if explains {
                 break;
@@ -124,7 +124,7 @@ impl ContactFinder {
 
     /// Whether discs that begin there may be as likely as a fit that is near, of as many contacts or one more.
     pub(super) fn may_be_as_good(&self, start: &Start, near: &DiscFit) -> bool {
-        start.cost < near.cost + policy::LOST_SQUARES
+        start.cost < near.cost + policy::lost_squares()
     }
 
     /// Whether each of some contacts is where one of the others is.

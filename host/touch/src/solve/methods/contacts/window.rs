@@ -122,15 +122,15 @@ impl Window<'_> {
         let still = self.explained(vec![from.to_vec(); self.frames.len()], Motion::Still)?;
         // What has gone far is not explained by contacts that stay. And frame by frame one more is hardly told from contacts that move and grow, so that it
         // explains about as much as those.
-        let is_near = still.at.cost < policy::WRONG_MEAN_SQUARE * self.count();
-        let may_gain = still.at.cost - growing.at.cost > 2.0 * policy::GONE_NATS;
+        let is_near = still.at.cost < policy::wrong_mean_square() * self.count();
+        let may_gain = still.at.cost - growing.at.cost > 2.0 * policy::gone_nats();
         (is_near && may_gain).then_some(())?;
         let moving = self.explained(of_radii(growing.at.contacts(), from), Motion::Moving(spread_m));
         let rivals = [Some(growing), moving.as_ref(), Some(&still)].into_iter().flatten();
         let rival = rivals.map(|rival| rival.ln_evidence).fold(f64::NEG_INFINITY, f64::max);
         let mut by_count = vec![f64::NEG_INFINITY; self.finder.settings.most + 1];
         by_count[still.count()] = rival;
-        let needed = |found: &Together| rival + policy::GONE_NATS * (found.count() - from.len()) as f64;
+        let needed = |found: &Together| rival + policy::gone_nats() * (found.count() - from.len()) as f64;
         let (mut best, mut last) = (None, still);
         while last.count() < self.finder.settings.most {
             let Some(more) = self.one_more(&last).filter(|more| self.may_be(more)) else { break };

@@ -88,7 +88,7 @@ impl ShapeFinder {
             width_m: WIDTH * spacing_m,
             width_deviation: WIDTH_DEVIATION,
             conductance_s: detector.sheet_conductance_s(),
-            conductance_deviation: policy::CONDUCTANCE_DEVIATION,
+            conductance_deviation: policy::conductance_deviation(),
             spacing_m,
             bounds_m: geometry::bounds(&mesh.nodes_m),
         };
@@ -113,7 +113,7 @@ impl ShapeFinder {
         let coarse = self.fitter(&self.coarse);
         let starts = start::starts(contacts, self.usual.width_m, MOST_WEIGHT * self.usual.conductance_s);
         let starts = starts.into_iter().chain(from.map(|fit| *fit.strip()));
-        let most = policy::SHAPE_BEGUN_RIVALS * rival;
+        let most = policy::shape_begun_rivals() * rival;
         let begun = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, FIRST_STEPS)));
         let (lines, rings): (Vec<_>, Vec<_>) = begun.partition(|fit| fit.strip().is_line());
         let mut kinds: Vec<_> = [lines, rings]
@@ -121,27 +121,29 @@ impl ShapeFinder {
             .filter_map(|begun| begun.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost)))
             .filter(|best| best.cost < most)
             .map(|best| coarse.fit(best.laid, target, COLD_STEPS))
-            .filter(|best| best.evidence().score() < policy::SHAPE_RIVALS * rival)
+            .filter(|best| best.evidence().score() < policy::shape_rivals() * rival)
             .collect();
         let lowest = |a: &StripFit, b: &StripFit| a.evidence().score().total_cmp(&b.evidence().score());
         kinds.sort_unstable_by(lowest);
         let best = kinds.first()?.evidence().score();
-        kinds.retain(|other| other.evidence().score() < policy::SHAPE_RIVALS * best);
+        kinds.retain(|other| other.evidence().score() < policy::shape_rivals() * best);
         let fits = kinds.iter().filter_map(|fit| self.catch_up(fit, target));
         fits.filter(|fit| self.is_clear(fit.strip(), 1.0)).min_by(lowest)
     }
 
     /// Whether what was chosen is still more than a disc to the readings.
     fn is_kept(&self, strip: &Strip) -> bool {
-        self.is_clear(strip, policy::KEPT_SHAPE_SHARE)
+        self.is_clear(strip, policy::kept_shape_share())
     }
 
     /// Whether it is more than a disc to the readings, by a share of what a search asks for.
     fn is_clear(&self, strip: &Strip, share: f64) -> bool {
         let spacing_m = self.usual.spacing_m;
         let (size_m, least_m) = match strip.course {
-            Course::Line(_) => (strip.course.length_m(), (2.0 * strip.width_m).max(policy::SHORTEST_LINE * spacing_m)),
-            Course::Ring { radius_m, .. } => (radius_m, (1.5 * strip.width_m).max(policy::SMALLEST_RING * spacing_m)),
+            Course::Line(_) => {
+                (strip.course.length_m(), (2.0 * strip.width_m).max(policy::shortest_line() * spacing_m))
+            }
+            Course::Ring { radius_m, .. } => (radius_m, (1.5 * strip.width_m).max(policy::smallest_ring() * spacing_m)),
         };
         size_m > share * least_m
     }
@@ -150,7 +152,7 @@ impl ShapeFinder {
     pub fn may_be(&self, contacts: &[FoundContact]) -> bool {
         match contacts {
             [] => false,
-            [one] => one.radius_m.is_some_and(|radius_m| radius_m > policy::RING_RADIUS * self.usual.spacing_m),
+            [one] => one.radius_m.is_some_and(|radius_m| radius_m > policy::ring_radius() * self.usual.spacing_m),
             _ => true,
         }
     }
