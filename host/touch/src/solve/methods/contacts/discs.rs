@@ -4,6 +4,7 @@
 //! Derivatives are kept as long as the discs are near to where they were taken: then a step costs one answer of the forward model,
 //! and a very small one none, as the readings follow the derivatives.
 
+mod fit;
 mod place_cost;
 mod slopes;
 mod still;
@@ -12,6 +13,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+pub(super) use self::fit::DiscFit;
 pub(super) use self::place_cost::PlaceCost;
 use self::slopes::Slopes;
 pub(super) use self::still::{STAYING, Still, among};
@@ -39,13 +41,6 @@ pub(super) const PARAMETERS: usize = 4;
 const LONGEST_WAY: f64 = 2.0;
 const LONGEST_CONDUCTANCE: f64 = 1.0;
 const LONGEST_RADIUS: f64 = 0.25;
-/// What the readings' curvature makes of the way from where derivatives were taken, in standard deviations: up to the first, readings are
-/// taken as linear; up to the second, the derivatives serve for steps, if no parameter has changed by more than the third and by so
-/// many of its standard errors.
-const LINEAR: f64 = 0.1;
-const NEAR: f64 = 3.0;
-const NEAR_AT_MOST: f64 = 0.4;
-const SIGNIFICANT: f64 = 3.0;
 /// A fit that may gain no more than this is settled, however it ended: it is within one standard error of the best.
 const SETTLED: f64 = 1.0;
 /// Share of the expected gain that a step has to bring, or derivatives are taken anew.
@@ -56,27 +51,6 @@ const WIDEST: f64 = 0.6;
 const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-7, tries: 6 };
 /// Smallest radius, in usual ones.
 const NARROWEST: f64 = 0.05;
-
-/// Discs that fit best.
-#[derive(Clone, Debug)]
-pub(super) struct DiscFit {
-    pub contacts: Vec<Contact>,
-    /// Readings that they predict (V).
-    pub volts: Vec<f64>,
-    /// Sum of squares of the weighted residuals, without what was known before.
-    pub cost: f64,
-    /// Sum of squares of the parameters' deviations from what was known before.
-    pub known: f64,
-    /// What frames before say of their places and radii, if that is what was known.
-    pub still: Option<Arc<Still>>,
-    slopes: Arc<Slopes>,
-    /// `J^T W^2 J` with what was known before.
-    pub normal: DMatrix<f64>,
-    /// What it would leave with each contact elsewhere, of those near edges; none of a fit that no descent has ended with.
-    pub place_costs: Vec<Option<PlaceCost>>,
-    /// Whether more steps would change nothing.
-    pub settled: bool,
-}
 
 /// How far a fit goes.
 #[derive(Clone, Copy, Debug)]
@@ -111,78 +85,6 @@ pub(super) fn widest_m(problem: &Problem) -> f64 {
     let area_m2: f64 = problem.jacobian.image_mesh.node_areas_m2.iter().sum();
     let [width_m, height_m] = problem.detector().outline.size_m();
     0.5 * WIDEST * area_m2.sqrt().min(width_m).min(height_m)
-}
-
-impl DiscFit {
-    /// Covariance of the parameters, [`PARAMETERS`] for each contact; `None` where they are not determined.
-    pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        covariance(&self.normal)
-    }
-
-    /// Unit vectors of the directions that the parameters of a contact's place are along, and their unit (m).
-    pub fn along(&self, k: usize) -> ([Place; 2], f64) {
-        (self.slopes.along[k], self.slopes.at[k].radius_m)
-    }
-
-    /// Constriction: the resistance of the crowded current under a contact over its own.
-    pub fn constriction(&self, k: usize) -> f64 {
-        let (before, now) = (self.slopes.at[k], self.contacts[k]);
-        self.slopes.constriction[k] * now.conductance_s / before.conductance_s * before.radius_m / now.radius_m
-    }
-
-    /// The fit, with nothing known any more of where those of its contacts stay that have moved; `None` if none has.
-    pub fn letting_move(&self, moved: &[Contact]) -> Option<Self> {
-        let still = self.still.as_ref()?.letting_move(moved)?;
-        Some(Self { still: Some(Arc::new(still)), ..self.clone() })
-    }
-
-    /// Units of the places' parameters (m), a contact each.
-    pub fn units_m(&self) -> Vec<f64> {
-        self.slopes.units_m()
-    }
-
-    /// How far other contacts are from these, in the parameters.
-    pub fn way_to(&self, contacts: &[Contact]) -> Vec<f64> {
-        let (from, to) = (self.slopes.offset(&self.contacts), self.slopes.offset(contacts));
-        to.iter().zip(from).map(|(to, from)| to - from).collect()
-    }
-
-    /// Derivatives of the readings by all parameters (V).
-    pub fn slopes_v(&self) -> &[Vec<f64>] {
-        &self.slopes.by
-    }
-
-    /// What the curvature of the readings makes of an offset, in standard deviations: a change by one radius, or of a logarithm by one,
-    /// changes derivatives by about themselves.
-    fn bend(&self, offset: &[f64]) -> f64 {
-        let of = |(i, offset): (usize, &f64)| 0.5 * offset * offset * self.normal[(i, i)].sqrt();
-        offset.iter().enumerate().map(of).fold(0.0, f64::max)
-    }
-
-    /// What the curvature of the crowded current alone makes of an offset, in standard deviations, if its resistance were `S (1 - ln(r / r0))` in
-    /// place of `S r0 / r`: of a firm contact little else resists. It may be less, so that derivatives serve for steps all the same.
-    fn bend_of_crowding(&self, offset: &[f64]) -> f64 {
-        let of = |(k, constriction): (usize, &f64)| {
-            let (resistance, radius) = (PARAMETERS * k + 2, PARAMETERS * k + 3);
-            let share = constriction / (1.0 + constriction);
-            0.5 * offset[radius] * offset[radius] * share * self.normal[(resistance, resistance)].sqrt()
-        };
-        self.slopes.constriction.iter().enumerate().map(of).fold(0.0, f64::max)
-    }
-
-    /// Whether an offset is too far for the derivatives to serve. A light contact that noise moves about is not: what the derivatives are
-    /// wrong by is little against its standard error.
-    fn is_far(&self, offset: &[f64]) -> bool {
-        let is_long = |(i, offset): (usize, &f64)| {
-            offset.abs() > NEAR_AT_MOST && offset.abs() * self.normal[(i, i)].sqrt() > SIGNIFICANT
-        };
-        self.bend(offset) > NEAR || offset.iter().enumerate().any(is_long)
-    }
-
-    /// What the fit lowers: both sums of squares.
-    fn objective(&self) -> f64 {
-        self.cost + self.known
-    }
 }
 
 impl DiscFitter<'_> {
@@ -283,7 +185,7 @@ impl DiscFitter<'_> {
         if fit.is_far(&offset) {
             return self.anew(contacts, fit.still.clone(), target);
         }
-        let volts = match fit.bend(&offset).max(fit.bend_of_crowding(&offset)) < LINEAR {
+        let volts = match fit.is_linear(&offset) {
             true => {
                 let mut volts = fit.slopes.volts.clone();
                 for (slope, offset) in fit.slopes.by.iter().zip(&offset) {
