@@ -60,6 +60,8 @@ pub struct Figures {
     pub error_m: [f64; 2],
     /// Time for all answers (s).
     pub time_s: f64,
+    /// Scenes that were followed: name, which of the two detectors, and the share of time in which it is right.
+    pub scenes: Vec<(String, usize, f64)>,
     /// Places, for a comparison.
     #[serde(skip)]
     answers: Vec<Vec<f64>>,
@@ -67,6 +69,7 @@ pub struct Figures {
 
 /// A scene's readings.
 struct Recording {
+    name: SceneName,
     scene: Scene,
     detector: Detector,
     problem: Problem,
@@ -120,6 +123,7 @@ fn recordings(plan: &Plan) -> Result<Vec<Recording>, StudyError> {
             let experiment = Experiment::of(&detector, as_built)?;
             let frames = experiment.frames(&touches, seed)?.into_iter().map(|frame| frame.readings).collect();
             all.push(Recording {
+                name,
                 scene: scene.clone(),
                 detector: detector.clone(),
                 problem: experiment.problem,
@@ -178,6 +182,7 @@ impl Recording {
             answers.push(Answer { sequence, time_s, came: began + Duration::from_secs_f64(time_s), solution });
         }
         let scored = Scorer::new(&self.detector, self.scene.clone()).of(&answers);
+        found.scenes.push((self.name.to_string(), self.which, scored.right));
         found.followed[self.which] += scored.right / of;
         found.error_m[self.which] += scored.error_m.unwrap_or_default() / of;
         Ok(())

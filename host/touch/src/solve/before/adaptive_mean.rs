@@ -201,7 +201,7 @@ impl AdaptiveMean {
             let alarm = -2.0 * (policy::false_alarms() * newest as f64).ln();
             // A reading that is no voltage of a board makes sums that nothing can be concluded from.
             if difference.overall.is_nan()
-                || difference.overall > policy::other_scene_deviations()
+                || difference.overall > policy::misfit_deviations()
                 || difference.of_contacts > alarm
             {
                 self.begin_with_newest(newest);

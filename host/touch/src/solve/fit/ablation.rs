@@ -44,7 +44,7 @@ mod changed {
         pub name: &'static str,
         /// Its value, as it is written.
         pub value: &'static str,
-        /// Bits of the factor on it; zero is none.
+        /// Bits of the factor on it.
         factor: AtomicU64,
         reads: AtomicU64,
     }
@@ -57,21 +57,17 @@ mod changed {
 
     impl Threshold {
         pub(in crate::solve::fit) const fn new(name: &'static str, value: &'static str) -> Self {
-            Self { name, value, factor: AtomicU64::new(0), reads: AtomicU64::new(0) }
+            Self { name, value, factor: AtomicU64::new(1f64.to_bits()), reads: AtomicU64::new(0) }
         }
 
         pub(in crate::solve::fit) fn of<T: Scaled>(&self, value: T) -> T {
             self.reads.fetch_add(1, Ordering::Relaxed);
-            match self.factor.load(Ordering::Relaxed) {
-                0 => value,
-                bits => value.times(f64::from_bits(bits)),
-            }
+            value.times(f64::from_bits(self.factor.load(Ordering::Relaxed)))
         }
 
         /// Makes it so many times as large as it is written, for the whole program; 1 makes it what it is.
         pub fn scale(&self, factor: f64) {
-            let bits = if factor == 1.0 { 0 } else { factor.to_bits() };
-            self.factor.store(bits, Ordering::Relaxed);
+            self.factor.store(factor.to_bits(), Ordering::Relaxed);
         }
 
         /// How often it was read since it was asked last.

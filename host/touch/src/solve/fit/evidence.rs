@@ -4,9 +4,6 @@
 
 use crate::solve::fit::policy;
 
-/// Weight of the newest frame in the running mean of the sum of squares.
-const NEWEST_FRAME: f64 = 0.1;
-
 /// What an explanation leaves of a frame, and what it takes for that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Evidence {
@@ -57,28 +54,19 @@ fn limit(deviations: f64, freedom: f64) -> f64 {
     1.0 + deviations * (2.0 / freedom.max(1.0)).sqrt()
 }
 
-/// Watches whether what is followed goes on to explain the frames.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Watch {
-    searched: f64,
-    mean: f64,
-}
+/// What a search has left, at least what noise makes: what is followed has to leave about as little.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Searched(f64);
 
-impl Watch {
-    /// Begins with what a search has left, in this frame and in its own.
-    pub fn new(now: Evidence, searched: Evidence, readings: usize) -> Self {
-        Self { searched: searched.cost.max(readings as f64 - searched.parameters), mean: now.cost }
+impl Searched {
+    /// What a search has left of so many readings.
+    pub fn new(left: Evidence, readings: usize) -> Self {
+        Self(left.cost.max(readings as f64 - left.parameters))
     }
 
-    /// Takes the next frame; whether a search may explain it better.
-    pub fn has_lost(&mut self, now: Evidence, readings: usize) -> bool {
-        self.mean += NEWEST_FRAME * (now.cost - self.mean);
-        self.mean > (1.0 + policy::rise()) * self.searched || self.is_worse(now, readings)
-    }
-
-    /// Whether a frame by itself is explained much worse than the searched one.
+    /// Whether much more is left of a frame.
     pub fn is_worse(&self, now: Evidence, readings: usize) -> bool {
-        now.cost > (policy::worse() * self.searched).max(readings as f64)
+        now.cost > (policy::worse() * self.0).max(readings as f64)
     }
 }
 
@@ -108,12 +96,9 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_are_worse_at_once_or_on_the_whole_are_lost() {
-        let begun = evidence(250.0, 6);
-        let watch = Watch::new(begun, begun, 256);
-        assert!(!watch.clone().has_lost(evidence(300.0, 6), 256));
-        assert!(watch.clone().has_lost(evidence(400.0, 6), 256));
-        let mut slow = watch;
-        assert_eq!((0..40).position(|_| slow.has_lost(evidence(300.0, 6), 256)), Some(8));
+    fn frames_that_are_much_worse_than_the_searched_one_are_lost() {
+        let searched = Searched::new(evidence(250.0, 6), 256);
+        assert!(!searched.is_worse(evidence(300.0, 6), 256));
+        assert!(searched.is_worse(evidence(400.0, 6), 256));
     }
 }

@@ -200,7 +200,7 @@ impl LinearImage {
         let beyond = |volts: f64| volts.abs() > self.drive_v;
         let outside_v2 = spectrum.noise_v2();
         let misfit = spectrum.outside() > policy::outside_share()
-            && outside_v2.sqrt() > policy::outside_deviations() * self.noise_v;
+            && outside_v2.sqrt() > policy::doubt_deviations() * self.noise_v;
         Flags {
             saturated: readings.largest_v() >= self.full_v,
             misfit: misfit || readings.volts().iter().copied().any(beyond),

@@ -2,8 +2,9 @@
 //!
 //! One name for one thing, in standard deviations, in squares of those ("squared deviations", as sums of squares and scores are), in nats
 //! (logarithms of odds or of evidence), or in shares, each with its source or the measurement behind it. Constants of a computation, as steps of a fit
-//! or sizes of a grid, stay with it. Those of electrodes that cannot be right are in `health`. Whoever changes one runs `cargo lab study
-//! contacts` on a seed that was not used to choose it.
+//! or sizes of a grid, stay with it. Those of electrodes that cannot be right are in `health`. Whoever changes one runs `cargo lab
+//! --features ablation ablate` and `cargo lab study contacts` on a seed that was not used to choose it: `ablate` shows what it is worth, and one that is worth
+//! nothing goes.
 
 use super::ablation::thresholds;
 
@@ -12,13 +13,12 @@ thresholds! {
 
     /// Readings above this share of the converter's range, or of the drive, say nothing.
     full_share: f64 = 0.995;
-    /// Readings that stand for no contact: so many standard deviations of noise and quantisation for the largest of them.
-    no_contact_deviations: f64 = 5.0;
     /// Readings do not fit if more than this share of them is what no image gives; of touches of any shape it was 0.07 at most, of shorted,
     /// exchanged and inverted electrodes more than 0.09.
     outside_share: f64 = 0.08;
-    /// What no image gives counts where it is above so many standard deviations of noise.
-    outside_deviations: f64 = 3.0;
+
+    /// Peaks of a linear image at least so high, over the highest, are contacts, and a contact is where the image is so high, over its peak.
+    peak_share: f32 = 0.6;
 
     // Whether frames are of one scene.
 
@@ -27,35 +27,27 @@ thresholds! {
     false_alarms: f64 = 3e-5;
     /// Share of still frames in which a contact may have begun to move, so that the first frames are averaged no longer than others.
     false_doubts: f64 = 0.003;
-    /// Standard deviations by which the mean square of all differences is over what noise leaves, of frames that are not of one scene: of
-    /// 256 readings noise alone does so in 1 of 30 000.
-    other_scene_deviations: f64 = 4.4;
 
     // Whether readings are explained.
 
     /// Price of a parameter (squared deviations), by which it has to lower the sum of squares: the Bayesian information criterion for 256
     /// readings asks for 5.5; this leaves room for the many places that are looked at.
     parameter_price: f64 = 7.0;
-    /// Standard deviations of the sum of squares beyond which readings do not fit: noise alone is there a few times in a million frames. A contact
-    /// that comes leaves hundreds in a few rows.
+    /// Standard deviations of the sum of squares beyond which readings do not fit, frames are not of one scene, or a reading is of a contact: noise alone
+    /// is there a few times in a million frames. A contact that comes leaves hundreds in a few rows.
     misfit_deviations: f64 = 5.0;
     /// Standard deviations of the sum of squares beyond which it is worth the time to look for another explanation: once in some hundred frames.
     doubt_deviations: f64 = 3.0;
-    /// Mean square (squared deviations) of what a fit with the rough model leaves, where no other start is tried.
-    explained_mean_square: f64 = 1.5;
     /// Mean square (squared deviations) of what a fit leaves, above which it is the contacts that are wrong: no starts around a single one are
-    /// tried then, nor what the readings may be off by together.
+    /// tried then, nor what the readings may be off by together. Below it, a start of the rough model explains enough for others not to be tried, and
+    /// an exchange of wires is one.
     wrong_mean_square: f64 = 5.0;
-    /// Mean square (squared deviations) of what a fit of wide contacts leaves with the rough model, above which it is wrong with any.
-    wrong_wide_mean_square: f64 = 50.0;
 
     // When is searched again.
 
     /// What is followed explains a frame as long as its sum of squares is below this times what the last search left, or would leave of as many
     /// frames.
     worse: f64 = 1.3;
-    /// Rise of the running mean of the sum of squares, as a share, that asks for a new search: many frames show what one frame's noise hides.
-    rise: f64 = 0.12;
     /// A scene that has not changed is searched again with so many times the frames: many frames show what one frame's noise hides.
     more_frames: usize = 2;
     /// Frames of rows in a row that do not fit, after which a search is worth it.
@@ -81,16 +73,9 @@ thresholds! {
 
     // How many contacts.
 
-    /// Gain in the sum of squares (squared deviations), in the linear theory, below which one more contact is not tried.
-    one_more_gain: f64 = 8.0;
-    /// Nats of evidence that one more contact has to bring by what spots tell, to be fitted as a disc: as many below nothing as make an answer of 5 %
-    /// worth to be named, and two for what spots are off.
-    one_more_nats: f64 = -5.0;
-    /// Starts whose spots are less likely than the best by so many nats are left: a mode that is 1 in 400 says nothing.
+    /// Starts whose spots are less likely than the best by so many nats are left, and one more contact if it is so much less likely than none by what
+    /// spots tell: a mode that is 1 in 400 says nothing.
     modes_nats: f64 = 6.0;
-    /// Rise of the sum of squares (squared deviations), as spots tell it, above which other contacts than those of a fit, or one fewer, are not tried with
-    /// discs: one contact takes 22 nats of evidence at most, and spots tell a rise up to twice too large.
-    lost_squares: f64 = 100.0;
     /// Gain in the sum of squares (squared deviations), in the linear theory, for there being any contact at all: noise alone has 1 in 10^7 frames
     /// above it.
     first_gain: f64 = 60.0;
@@ -104,20 +89,11 @@ thresholds! {
     strength_deviation: f64 = 1.0;
     /// The same of its radius, where it may grow: a ball's does with the cube root of the force (Hertz, 1882).
     growth_deviation: f64 = 1.0 / 3.0;
-    /// Standard deviations of the sum of squares over what noise leaves, where another set of contacts is looked for.
-    other_set_deviations: f64 = 1.5;
-    /// Nats by which the evidence for another set of contacts has to be higher.
-    other_set_nats: f64 = 0.5;
-    /// Radius, in usual ones, above which a contact may be two.
+    /// Radius, in usual ones, above which a contact may be two: without it hands of five are four for longer. And the distance, in sums of their radii,
+    /// below which two may be one: with 1, two of 80 scenes more are wrong.
     two_radii: f64 = 1.6;
     /// Radii that contacts may have while their number is not yet right, in usual ones: too few contacts would be made as wide as may be.
     plausible_radii: f64 = 3.0;
-    /// Contacts nearer to each other than so many sums of their radii may be one.
-    touching_sums: f64 = 2.0;
-    /// Peaks of a linear image at least so high, over the highest, are contacts.
-    further_peak_share: f32 = 0.6;
-    /// What stands out around a peak of a linear image: above this share of it.
-    stands_out_share: f32 = 0.7;
     /// What has less than this share of the conductance is no contact of the network: of pairs of like contacts on detectors as built the count is
     /// right in 71 % with it, and in 56 % without. What it leaves out of three is a hundredth of the others.
     network_least_share: f64 = 0.01;
@@ -126,18 +102,15 @@ thresholds! {
 
     /// Smallest and largest conductance (sheet conductances): what is lighter is nothing, what is firmer makes no difference.
     conductances_sheets: [f64; 2] = [1e-6, 300.0];
-    /// Conductance of a contact (sheet conductances) above which it is taken as saturated.
-    saturated_sheets: f64 = 270.0;
     /// Standard deviation of the logarithm of a conductance around the sheet's before anything is read: nearly nothing is known.
     conductance_deviation: f64 = 4.0;
     /// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
     known_radius_deviation: f64 = 0.2;
-    /// A filter less likely than the best by so many nats goes on from it: noise alone does that to the right one in 1 of 400.
-    behind_nats: f64 = 15.0;
 
     // When a contact goes.
 
-    /// Nats by which frames of late have to speak for no contact before it is let go.
+    /// Nats by which frames of late have to speak for no contact before it is let go, or for one more that stays. A filter of rows that is as far behind
+    /// the best goes on from that: noise alone does that to the right one in 1 of 400 000.
     gone_nats: f64 = 12.0;
     /// Conductance (sheet conductances) below which a contact cannot be distinguished from nothing: a hundredth of the lightest that is found well.
     vanishing_sheets: f64 = 1e-5;
@@ -157,26 +130,21 @@ thresholds! {
     /// By how much the score of a shape has to be lower than that of contacts (squared deviations) on a detector that is not known exactly. Two
     /// contacts on one of those were a line by 2; lines and rings, on three others, were so by 23 or more.
     shape_gain: f64 = 10.0;
-    /// A shape that leaves so many times the rival's score after the first steps is given up.
-    shape_begun_rivals: f64 = 4.0;
-    /// A shape of so many times the rival's score after all steps on the coarse mesh is given up.
-    shape_rivals: f64 = 2.0;
+    /// A shape of so many times the rival's score is given up, after the first steps on the coarse mesh and after all.
+    shape_rivals: f64 = 4.0;
     /// Shortest line, in mean distances of electrodes.
     shortest_line: f64 = 0.7;
-    /// Smallest ring's radius, in mean distances of electrodes: discs of 6 mm on `square-60` are as well explained by rings of 4 mm.
+    /// Smallest ring's radius, in mean distances of electrodes, and that of a single contact which may be one: discs of 6 mm on `square-60` are as well
+    /// explained by rings of 4 mm.
     smallest_ring: f64 = 0.35;
     /// A shape that was chosen is kept as long as it is so large, as a share of what a search asks for: the width of a ring of 13 mm on detectors as built
     /// wanders from 7 to 9 mm, as the readings hardly tell it.
     kept_shape_share: f64 = 0.6;
-    /// A single contact of so many mean distances of electrodes in radius may be a ring.
-    ring_radius: f64 = 0.4;
 
     // Exchanged wires.
 
     /// Mean square of what one contact leaves with two wires exchanged back, as a share of that before, that shows an exchange.
     healed_share: f64 = 0.1;
-    /// Mean square of what one contact leaves with two wires exchanged back (squared deviations), below which it fits.
-    healed_mean_square: f64 = 6.0;
     /// Share of what is left without an exchange up to which, in the linear theory, it is tried with fits.
     healed_share_roughly: f64 = 0.5;
 }

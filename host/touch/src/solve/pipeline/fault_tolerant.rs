@@ -110,7 +110,7 @@ impl Look {
                 let others = faulty.but(&pair);
                 let kept = others.kept(problem.detector().electrodes.len());
                 let left = one_contact(problem, &kept, &others)?.left_by_one(&readings.of(&kept))?;
-                (left < policy::healed_mean_square()).then_some(pair)
+                (left < policy::wrong_mean_square()).then_some(pair)
             }
         }
     }
@@ -147,7 +147,7 @@ fn exchanged(problem: &Problem, faulty: &FaultyElectrodes, readings: &Readings) 
     }
     let scored = tried.iter().take(TRIED).filter_map(|(_, pair)| Some((residual(&exchanging(*pair))?, *pair)));
     let (after, pair) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (after < policy::healed_mean_square() && after < policy::healed_share() * before)
+    (after < policy::wrong_mean_square() && after < policy::healed_share() * before)
         .then_some(pair.map(|place| kept[place]))
 }
 

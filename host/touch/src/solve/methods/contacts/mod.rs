@@ -312,8 +312,8 @@ impl ContactFinder {
         let mut contacts: Vec<_> =
             logs.iter().enumerate().map(|(k, logs)| self.contact(fit, k, covariance.as_ref().zip(*logs))).collect();
         self.add_unseen_scale(fit, &mut contacts);
-        // A standard error more and it is as good as perfect.
-        let perfect = (policy::saturated_sheets() * self.sheet_s).ln();
+        // A standard error more and it is as firm as makes a difference.
+        let perfect = (policy::conductances_sheets()[1] * self.sheet_s).ln();
         let is_perfect = |logs: &Option<Logs>| {
             logs.is_some_and(|Logs { conductance: [mean, deviation], .. }| mean + deviation > perfect)
         };

@@ -147,8 +147,8 @@ impl MultipleModels {
         self.best = likelihoods.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(best, _)| best);
         let believed = self.filters[self.best].clone();
         for filter in &mut self.filters {
-            if filter.likelihood < believed.likelihood - policy::behind_nats() {
-                let likelihood = believed.likelihood - policy::behind_nats();
+            if filter.likelihood < believed.likelihood - policy::gone_nats() {
+                let likelihood = believed.likelihood - policy::gone_nats();
                 *filter = Filter { likelihood, ..believed.clone() };
             }
             filter.mean -= &believed.mean;

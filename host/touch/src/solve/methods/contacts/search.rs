@@ -114,7 +114,7 @@ impl ContactFinder {
         let full = self.disc_fitter();
         let rough = DiscFitter { model: &*self.rough, ..full };
         let free = rough.fit(fit.contacts.clone(), target, ROUGH);
-        let free = free.filter(|free| free.cost < policy::wrong_wide_mean_square() * target.count() as f64);
+        let free = free.filter(|free| free.cost < policy::wrong_mean_square() * target.count() as f64);
         let free = free.and_then(|free| full.fit(free.contacts, target, RELEASED));
         free.unwrap_or(fit)
     }
@@ -220,7 +220,7 @@ impl ContactFinder {
         let fitted = Fitted { spots: &spots, slopes, normal: &fit.normal, left };
         let looks = self.scan.beside(&self.spot_model, &*self.fields, &fitted, &at);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
-        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::one_more_gain())
+        let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::parameter_price())
             || self.may_hide_more(fit.contacts.len());
         if !is_worth_a_try && !self.is_doubtful(fit, target) {
             return Err(f64::NEG_INFINITY);
@@ -235,7 +235,7 @@ impl ContactFinder {
         let best = begun.first().ok_or(f64::NEG_INFINITY)?;
         let gain = 0.5 * (fit.cost - best.cost) + spots.ln_of_last(best).unwrap_or(f64::NEG_INFINITY);
         // Of what contacts are not, as a ring, spots tell little.
-        if gain < policy::one_more_nats() && !self.is_misfit(fit, target) {
+        if gain < -policy::modes_nats() && !self.is_misfit(fit, target) {
             return Err(self.evidence(fit) + gain);
         }
         let most = best.cost + 2.0 * policy::modes_nats();
@@ -255,7 +255,7 @@ impl ContactFinder {
         let freedom = self.freedom(fit, target);
         let widest_m = 0.95 * policy::plausible_radii() * self.settings.radius_m;
         let is_wide = fit.contacts.len() > 1 && fit.contacts.iter().any(|contact| contact.radius_m > widest_m);
-        fit.cost > freedom + policy::other_set_deviations() * (2.0 * freedom).sqrt() || is_wide
+        fit.cost > freedom + policy::doubt_deviations() * (2.0 * freedom).sqrt() || is_wide
     }
 
     /// A more likely fit with one of the contacts taken away and put where it explains most.
@@ -271,7 +271,7 @@ impl ContactFinder {
             let rough = DiscFitter { model: &*self.rough, ..self.plausible_fitter() };
             let fewer = rough.fit(others, target, FIRST)?;
             let other = self.one_more(&fewer, Vec::new(), target).ok()?;
-            (self.evidence(&other) > evidence + policy::other_set_nats()).then_some(other)
+            (self.evidence(&other) > *evidence).then_some(other)
         })
     }
 
@@ -287,7 +287,7 @@ impl ContactFinder {
         let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (a, b)));
         let merged = pairs.filter_map(|(a, b)| {
             let [one, other] = [a, b].map(|k| fit.contacts[k]);
-            let near_m = policy::touching_sums() * (one.radius_m + other.radius_m);
+            let near_m = policy::two_radii() * (one.radius_m + other.radius_m);
             (space::distance(place_m(&one), place_m(&other)) < near_m).then(|| {
                 let mut merged = without(a);
                 merged[b] = self.merged(&one, &other);
@@ -295,9 +295,9 @@ impl ContactFinder {
             })
         });
         let fewer: Vec<_> = self.dispensable(fit, target).into_iter().map(without).collect();
-        let fewer = self.best_near(fit, &fewer, |start| self.may_be_as_good(start, fit), target);
+        let fewer = self.best_near(fit, &fewer, target);
         // Two that are one wide contact are far from what spots tell.
-        let merged = self.best_near(fit, &merged.collect::<Vec<_>>(), |_| true, target);
+        let merged = self.best_near(fit, &merged.collect::<Vec<_>>(), target);
         let objective = |fit: &DiscFit| fit.cost + fit.known;
         let all = [fewer, merged].into_iter().flatten();
         let fewer = all.min_by(|a, b| objective(a).total_cmp(&objective(b)))?;

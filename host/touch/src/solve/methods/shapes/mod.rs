@@ -25,7 +25,7 @@ use self::fit::{StripFitter, Usual};
 use self::found::found_shape;
 use self::strip::{Course, Ground, Strip};
 use crate::solve::answer::{Flags, FoundContact, FoundShape, Solution};
-use crate::solve::fit::evidence::{Evidence, Watch};
+use crate::solve::fit::evidence::{Evidence, Searched};
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
@@ -113,7 +113,7 @@ impl ShapeFinder {
         let coarse = self.fitter(&self.coarse);
         let starts = start::starts(contacts, self.usual.width_m, MOST_WEIGHT * self.usual.conductance_s);
         let starts = starts.into_iter().chain(from.map(|fit| *fit.strip()));
-        let most = policy::shape_begun_rivals() * rival;
+        let most = policy::shape_rivals() * rival;
         let begun = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, FIRST_STEPS)));
         let (lines, rings): (Vec<_>, Vec<_>) = begun.partition(|fit| fit.strip().is_line());
         let mut kinds: Vec<_> = [lines, rings]
@@ -152,7 +152,7 @@ impl ShapeFinder {
     pub fn may_be(&self, contacts: &[FoundContact]) -> bool {
         match contacts {
             [] => false,
-            [one] => one.radius_m.is_some_and(|radius_m| radius_m > policy::ring_radius() * self.usual.spacing_m),
+            [one] => one.radius_m.is_some_and(|radius_m| radius_m > policy::smallest_ring() * self.usual.spacing_m),
             _ => true,
         }
     }
@@ -225,7 +225,7 @@ impl ShapeFinder {
 /// Follows a line or a ring from frame to frame.
 pub(crate) struct ShapeTracker {
     finder: Arc<ShapeFinder>,
-    last: Option<(StripFit, Watch)>,
+    last: Option<(StripFit, Searched)>,
 }
 
 impl ShapeTracker {
@@ -247,14 +247,13 @@ impl ShapeTracker {
     /// Brings the shape to the next frame; whether it has to be searched. What has become a disc to the readings is let go: it is no answer in
     /// any frame.
     pub fn follow(&mut self, target: &Target) -> bool {
-        let Some((last, mut watch)) = self.last.take() else { return true };
+        let Some((last, searched)) = self.last.take() else { return true };
         let moved = self.finder.follow(last, target);
         if !self.finder.is_kept(moved.strip()) {
             return true;
         }
-        let has_lost = watch.has_lost(moved.evidence(), target.count());
-        self.last = Some((moved, watch));
-        has_lost
+        self.last = Some((moved, searched));
+        self.has_lost(target)
     }
 
     /// Takes what a search has found, if it explains this frame better than what is followed, and is still more than a disc in it.
@@ -263,14 +262,13 @@ impl ShapeTracker {
         let Some(caught_up) = caught_up else { return };
         let score = |fit: &StripFit| fit.evidence().score();
         if self.found().is_none_or(|last| score(&caught_up) <= score(last)) {
-            let watch = Watch::new(caught_up.evidence(), found.evidence(), target.count());
-            self.last = Some((caught_up, watch));
+            self.last = Some((caught_up, Searched::new(found.evidence(), target.count())));
         }
     }
 
-    /// Whether what was adopted does not explain this frame as well as its own.
+    /// Whether what is followed does not explain this frame as well as what was searched explained its own.
     pub fn has_lost(&self, target: &Target) -> bool {
-        self.last.as_ref().is_none_or(|(fit, watch)| watch.is_worse(fit.evidence(), target.count()))
+        self.last.as_ref().is_none_or(|(fit, searched)| searched.is_worse(fit.evidence(), target.count()))
     }
 
     /// What is followed, as a solution.
