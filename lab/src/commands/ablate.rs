@@ -14,7 +14,7 @@ use crate::ablate::{self, Change, Figures, Plan};
 /// exchanged wires are hardly read by them.
 ///
 /// Examples:
-///   cargo lab --features ablation ablate
+///   tactomo-lab ablate
 ///   tactomo-lab ablate --threshold fewer_nats --factor 0 --factor 4 --seed 7
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]

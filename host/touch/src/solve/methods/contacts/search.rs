@@ -275,7 +275,7 @@ impl ContactFinder {
         })
     }
 
-    /// The best fit with one contact fewer: without each weak one, and with two that nearly touch taken for one.
+    /// The best fit with one contact fewer: without any of them, and with two that nearly touch taken for one.
     fn one_fewer(&self, fit: &DiscFit, target: &Target) -> Option<DiscFit> {
         let count = fit.contacts.len();
         if count < 2 {
@@ -294,7 +294,7 @@ impl ContactFinder {
                 merged
             })
         });
-        let fewer: Vec<_> = self.dispensable(fit, target).into_iter().map(without).collect();
+        let fewer: Vec<_> = (0..count).map(without).collect();
         let fewer = self.best_near(fit, &fewer, target);
         // Two that are one wide contact are far from what spots tell.
         let merged = self.best_near(fit, &merged.collect::<Vec<_>>(), target);
@@ -302,11 +302,6 @@ impl ContactFinder {
         let all = [fewer, merged].into_iter().flatten();
         let fewer = all.min_by(|a, b| objective(a).total_cmp(&objective(b)))?;
         Some(self.released(fewer, target))
-    }
-
-    /// Contacts that a fit may do without: weak ones, and of a detector that is not known exactly any, as they may stand for what it differs by.
-    fn dispensable(&self, fit: &DiscFit, target: &Target) -> Vec<usize> {
-        if target.error().is_some() { (0..fit.contacts.len()).collect() } else { self.weak(fit) }
     }
 
     /// Logarithm of the evidence for a fit.
