@@ -41,6 +41,9 @@ thresholds! {
     /// tried then, nor what the readings may be off by together. Below it, a start of the rough model explains enough for others not to be tried, and
     /// an exchange of wires is one.
     wrong_mean_square: f64 = 5.0;
+    /// Mean square (squared deviations) of what a fit of wide contacts leaves with the rough model, above which it is wrong with any. With 5, one of 32
+    /// presses on some rubbed detectors is found 5 mm off.
+    wrong_wide_mean_square: f64 = 50.0;
 
     // When is searched again.
 

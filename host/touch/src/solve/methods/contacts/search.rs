@@ -114,7 +114,7 @@ impl ContactFinder {
         let full = self.disc_fitter();
         let rough = DiscFitter { model: &*self.rough, ..full };
         let free = rough.fit(fit.contacts.clone(), target, ROUGH);
-        let free = free.filter(|free| free.cost < policy::wrong_mean_square() * target.count() as f64);
+        let free = free.filter(|free| free.cost < policy::wrong_wide_mean_square() * target.count() as f64);
         let free = free.and_then(|free| full.fit(free.contacts, target, RELEASED));
         free.unwrap_or(fit)
     }
