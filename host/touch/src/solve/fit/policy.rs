@@ -78,6 +78,9 @@ thresholds! {
     /// Starts whose spots are less likely than the best by so many nats are left, and one more contact if it is so much less likely than none by what
     /// spots tell: a mode that is 1 in 400 says nothing.
     modes_nats: f64 = 6.0;
+    /// Rise of the sum of squares (squared deviations), as spots tell it, above which one contact fewer is not tried with discs: one contact takes 22 nats
+    /// of evidence at most, and spots tell a rise up to twice too large. Without it a frame of several contacts takes three times as long.
+    lost_squares: f64 = 100.0;
     /// Gain in the sum of squares (squared deviations), in the linear theory, for there being any contact at all: noise alone has 1 in 10^7 frames
     /// above it.
     first_gain: f64 = 60.0;

@@ -295,9 +295,9 @@ impl ContactFinder {
             })
         });
         let fewer: Vec<_> = (0..count).map(without).collect();
-        let fewer = self.best_near(fit, &fewer, target);
+        let fewer = self.best_near(fit, &fewer, |start| self.may_be_as_good(start, fit), target);
         // Two that are one wide contact are far from what spots tell.
-        let merged = self.best_near(fit, &merged.collect::<Vec<_>>(), target);
+        let merged = self.best_near(fit, &merged.collect::<Vec<_>>(), |_| true, target);
         let objective = |fit: &DiscFit| fit.cost + fit.known;
         let all = [fewer, merged].into_iter().flatten();
         let fewer = all.min_by(|a, b| objective(a).total_cmp(&objective(b)))?;

@@ -108,11 +108,23 @@ impl ContactFinder {
         fits.min_by(|a, b| objective(a).total_cmp(&objective(b)))
     }
 
-    /// The fit from the start whose spots fit best, near a fit.
-    pub(super) fn best_near(&self, fit: &DiscFit, starts: &[Vec<Contact>], target: &Target) -> Option<DiscFit> {
+    /// The fit from the start whose spots fit best, near a fit, if that `is_worth_it`.
+    pub(super) fn best_near(
+        &self,
+        fit: &DiscFit,
+        starts: &[Vec<Contact>],
+        is_worth_it: impl Fn(&Start) -> bool,
+        target: &Target,
+    ) -> Option<DiscFit> {
         let mut begun = self.begun_by(&mut SpotFitter::new(self, Some(fit), target), starts);
         begun.truncate(1);
+        begun.retain(is_worth_it);
         self.best_of(begun, target)
+    }
+
+    /// Whether discs that begin there may be as likely as a fit that is near, of as many contacts or one more.
+    pub(super) fn may_be_as_good(&self, start: &Start, near: &DiscFit) -> bool {
+        start.cost < near.cost + policy::lost_squares()
     }
 
     /// Whether each of some contacts is where one of the others is.
