@@ -18,7 +18,7 @@ const PERIOD_S: f64 = 0.004;
 /// What is tried.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Names of the thresholds.
+    /// The thresholds that are changed, one at a time.
     pub thresholds: Vec<&'static Threshold>,
     /// Factors on each.
     pub factors: Vec<f64>,

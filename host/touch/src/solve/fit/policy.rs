@@ -15,7 +15,6 @@ thresholds! {
     /// Readings do not fit if more than this share of them is what no image gives; of touches of any shape it was 0.07 at most, of shorted,
     /// exchanged and inverted electrodes more than 0.09.
     outside_share: f64 = 0.08;
-
     /// Peaks of a linear image at least so high, over the highest, are contacts, and a contact is where the image is so high, over its peak.
     peak_share: f32 = 0.6;
 
@@ -39,7 +38,7 @@ thresholds! {
     doubt_deviations: f64 = 3.0;
     /// Mean square (squared deviations) of what a fit leaves, above which it is the contacts that are wrong: no starts around a single one are
     /// tried then, nor what the readings may be off by together. Below it, a start of the rough model explains enough for others not to be tried, and
-    /// an exchange of wires is one.
+    /// one contact fits once two exchanged wires are exchanged back.
     wrong_mean_square: f64 = 5.0;
     /// Mean square (squared deviations) of what a fit of wide contacts leaves with the rough model, above which it is wrong with any. With 5, one of 32
     /// presses on some rubbed detectors is found 5 mm off.

@@ -18,6 +18,7 @@ const LINEAR: f64 = 0.1;
 const NEAR: f64 = 3.0;
 const NEAR_AT_MOST: f64 = 0.4;
 const SIGNIFICANT: f64 = 3.0;
+
 /// Discs that fit best.
 #[derive(Clone, Debug)]
 pub(in super::super) struct DiscFit {
