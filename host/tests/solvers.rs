@@ -101,6 +101,7 @@ fn odd_readings() -> Vec<Readings> {
         all(|_, _| 1e300),
         all(|_, _| f64::MAX),
         all(|g, e| if (g + e) % 2 == 0 { f64::MAX } else { f64::MIN }),
+        all(|g, e| [0.4, 1e260, 2.4, 3.3, -0.3, 0.1, 1e-200][(5 * g + e) % 7]),
         all(|g, e| if g == e { 0.0 } else { 2.0 }),
         all(|g, _| if g == 5 { 2.0 } else { 0.0 }),
         all(|_, e| if e == 5 { 2.0 } else { 0.0 }),

@@ -47,6 +47,16 @@ impl Errors {
         (fixed + (all - fixed).max(0.0) / frames.max(1) as f64).sqrt()
     }
 
+    /// Readings as a board can give them: none is far beyond its drive. Numbers from elsewhere may be so large that their squares are not finite.
+    fn held<'a>(&self, readings: &'a Readings) -> Cow<'a, Readings> {
+        let most_v = 2.0 * self.drive_v;
+        if readings.volts().iter().all(|volts| volts.abs() <= most_v) {
+            return Cow::Borrowed(readings);
+        }
+        let held = Readings::from_fn(readings.electrodes(), |g, e| readings.at(g, e).clamp(-most_v, most_v));
+        Cow::Owned(held.saying(|g, e| readings.says(g, e)))
+    }
+
     /// What readings may be off by, but for noise, on a detector that is as described (V): a column for each ground's pad, and two for each
     /// converter, its gain and its bow.
     pub fn patterns_v(&self, readings: &Readings) -> DMatrix<f64> {
@@ -115,6 +125,8 @@ impl Target {
         errors: &Errors,
         error: Option<&Arc<ApproximationError>>,
     ) -> Self {
+        let held = errors.held(readings);
+        let readings = &*held;
         let noise_v = errors.of_mean_v(frames);
         let deviation_v = noise_v.hypot(errors.model * readings.largest_v());
         let weight = |volts: &f64| if *volts < errors.full_v { 1.0 / deviation_v } else { 0.0 };

@@ -267,12 +267,10 @@ impl ContactFinder {
 
     /// What is known where there is no contact.
     pub fn nothing(&self, target: &Target) -> Solution {
-        // No voltage of a board is far beyond its drive.
-        let held = |volts: &f64| volts.clamp(-2.0 * self.errors.drive_v, 2.0 * self.errors.drive_v);
         let readings = target.readings();
         let n = readings.electrodes();
         let touch_v = (0..n * n).map(|i| readings.touch_v(i / n, i % n));
-        let squares: f64 = touch_v.map(|volts| (held(&volts) / target.noise_v).powi(2)).sum();
+        let squares: f64 = touch_v.map(|volts| (volts / target.noise_v).powi(2)).sum();
         let residual = Some((squares / target.count().max(1) as f64).sqrt());
         Solution { residual, ..Solution::default() }
     }
