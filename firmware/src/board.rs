@@ -69,7 +69,7 @@ pub enum Activity {
     },
     /// One row of a frame.
     Row,
-    /// The last row of a frame: it is on its way.
+    /// The last row of a frame, which is to be sent.
     Frame,
 }
 
@@ -82,9 +82,8 @@ pub struct Board<M, S, L, C, const READINGS: usize, const WIRE: usize> {
     inbox: Inbox,
     receiver: CommandReceiver,
     scan: Scan<READINGS>,
-    uplink: Uplink<WIRE>,
+    uplink: Uplink<READINGS, WIRE>,
     pace: Pace,
-    sequence: u16,
     /// Whether the host knows that the converter is stuck.
     stuck_reported: bool,
     /// What went wrong before the reset, until a host has surely heard of it.
@@ -125,7 +124,6 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             scan,
             uplink,
             pace: Pace::default(),
-            sequence: 0,
             stuck_reported: false,
             boot_fault: None,
         })
@@ -168,7 +166,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
                 Ok(request) => self.obey(request),
                 Err(DecodeError::Version(version)) => self.fault(Fault::UnknownVersion(version)),
                 // Noise is dropped; a body that this version does not know cannot be answered.
-                Err(DecodeError::Corrupt | DecodeError::Body) => {}
+                Err(DecodeError::Corrupt | DecodeError::Body | DecodeError::Key) => {}
             }
         }
         self.inbox.clear();
@@ -213,7 +211,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         }
     }
 
-    /// Ends the stream; up to two frames that are already on their way may follow.
+    /// Ends the stream; a frame that is already on its way may follow.
     fn stop(&mut self) {
         self.hello.is_streaming = false;
         self.scan.abandon();
@@ -276,9 +274,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             self.fault(Fault::AdcStuck);
         }
         self.stuck_reported = scanned.stuck;
-        // A frame that is dropped for it shows as a gap in the numbers.
-        self.uplink.frame(scanned.head(self.sequence), self.scan.scope(), self.scan.readings());
-        self.sequence = self.sequence.wrapping_add(1);
+        self.uplink.frame(&scanned, self.scan.scope(), self.scan.readings());
     }
 
     /// Says Hello in answer to the command with this tag, or, with 0, by itself.
@@ -292,13 +288,17 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
 }
 
 /// The line while a row is scanned.
-struct Line<'a, L, const WIRE: usize> {
-    uplink: &'a mut Uplink<WIRE>,
+struct Line<'a, L, const READINGS: usize, const WIRE: usize> {
+    uplink: &'a mut Uplink<READINGS, WIRE>,
     serial: &'a mut L,
     inbox: &'a mut Inbox,
 }
 
-impl<L: Serial, C: Chip, const WIRE: usize> Attended<C> for Line<'_, L, WIRE> {
+impl<L: Serial, C: Chip, const READINGS: usize, const WIRE: usize> Attended<C> for Line<'_, L, READINGS, WIRE> {
+    fn has_room(&self) -> bool {
+        self.uplink.has_room()
+    }
+
     fn push(&mut self, chip: &mut C) {
         self.uplink.poll(self.serial, chip);
     }

@@ -16,8 +16,8 @@
 //! ```
 //!
 //! Guarantees: no allocation, no floating point, no wait without a bound. Sending overlaps sampling: bytes are pushed between
-//! conversions and during waits, as many as the line takes at that moment, so a slow host never delays the scan. A frame that finds no room is
-//! dropped, and the gap shows in the sequence numbers. A [`Board16`] takes about 3 kB of RAM.
+//! conversions and during waits, as many as the line takes at that moment, so a slow host never delays the scan. While the line has no
+//! room for a frame its rows are scanned again, and their mean is sent. A [`Board16`] takes about 4 kB of RAM.
 #![no_std]
 
 mod adc;
@@ -33,7 +33,7 @@ mod parts;
 mod row;
 mod scan;
 mod side_by_side;
-pub mod uplink;
+mod uplink;
 
 pub use adc::Adc;
 pub use board::{Activity, Board, Board16, Board32, Identity, NewBoardError};

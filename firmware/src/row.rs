@@ -41,6 +41,9 @@ pub(crate) type Sums = [u32; MAX_ELECTRODES];
 
 /// The line to the host, while a scan goes on.
 pub(crate) trait Attended<C> {
+    /// Whether a frame that is done now could begin to be sent.
+    fn has_room(&self) -> bool;
+
     /// Sends what the line takes at this moment.
     fn push(&mut self, chip: &mut C);
 

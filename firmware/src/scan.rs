@@ -1,4 +1,7 @@
 //! The scan: rows of readings, one ground after the other, as the plan says.
+//!
+//! While the line has no room for a frame that is done, its rows are scanned again, and what is sent is the mean: no conversion is for nothing, and a
+//! plan goes on with its next frame when this one has gone.
 
 use core::mem;
 
@@ -13,6 +16,10 @@ use crate::{Chip, Mux, Sampler};
 #[derive(Debug)]
 pub struct Scan<const READINGS: usize> {
     readings: [u16; READINGS],
+    /// Sums of the readings of all scans of this frame, if it is scanned again.
+    totals: [u32; READINGS],
+    /// Scans of this frame that are done.
+    scans: u8,
     /// Sums of the codes of the row under way; zero between rows.
     sums: Sums,
     ceilings: Ceilings,
@@ -23,7 +30,8 @@ pub struct Scan<const READINGS: usize> {
     next_frame: usize,
     /// The row of the frame that comes next.
     row: usize,
-    time_us: u64,
+    /// Board time at which the frame's first scan began (us).
+    begun_us: u64,
     status: Status,
     timed_out: u16,
 }
@@ -31,8 +39,10 @@ pub struct Scan<const READINGS: usize> {
 /// What a whole frame met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scanned {
-    /// Board time at its start (us).
+    /// Board time in the middle between its start and its end (us).
     pub time_us: u64,
+    /// Scans beside the first, of which the readings are the mean.
+    pub folded: u8,
     /// Saturated and timed-out conversions.
     pub status: Status,
     /// Bits below one code that averaging has won.
@@ -44,7 +54,8 @@ pub struct Scanned {
 impl Scanned {
     /// The head of the frame.
     pub fn head(&self, sequence: u16) -> FrameHead {
-        FrameHead { sequence, time_us: self.time_us as u32, status: self.status, fraction_bits: self.fraction_bits }
+        let Self { time_us, folded, status, fraction_bits, .. } = *self;
+        FrameHead { sequence, time_us: time_us as u32, status, folded, fraction_bits }
     }
 }
 
@@ -71,13 +82,15 @@ impl<const READINGS: usize> Scan<READINGS> {
         let scope = Scope::whole(electrodes)?;
         (scope.readings() <= READINGS.min(MAX_READINGS)).then_some(Self {
             readings: [0; READINGS],
+            totals: [0; READINGS],
+            scans: 0,
             sums: [0; MAX_ELECTRODES],
             ceilings: adc.ceilings(electrodes),
             plan: Plan::default(),
             scope,
             next_frame: 0,
             row: 0,
-            time_us: 0,
+            begun_us: 0,
             status: Status::default(),
             timed_out: 0,
         })
@@ -108,17 +121,18 @@ impl<const READINGS: usize> Scan<READINGS> {
         fits
     }
 
-    /// Whether some rows of a frame are done and others not.
+    /// Whether some rows of a frame are done and it is not.
     pub fn is_under_way(&self) -> bool {
-        self.row != 0
+        self.row != 0 || self.scans != 0
     }
 
     /// Abandons the frame under way; the next one is the plan's first.
     pub fn abandon(&mut self) {
-        (self.row, self.next_frame) = (0, 0);
+        (self.row, self.scans, self.next_frame) = (0, 0, 0);
     }
 
-    /// Grounds the next electrode, waits the settle time and reads what is to be read. Returns what the frame met once its last row is done.
+    /// Grounds the next electrode, waits the settle time and reads what is to be read. Returns what the frame met once its last row is done, and the
+    /// line has room for it or it was scanned as often as can be.
     ///
     /// # Errors
     /// If a pin of the multiplexer cannot be driven; the frame is then abandoned.
@@ -129,7 +143,7 @@ impl<const READINGS: usize> Scan<READINGS> {
         if self.row == 0 {
             self.begin(front_end.chip.now_us());
         }
-        let row = mem::take(&mut self.row);
+        let (row, scans) = (mem::take(&mut self.row), mem::take(&mut self.scans));
         let average_log2 = if self.plan.is_whole() { front_end.settings.average_log2 } else { self.plan.average_log2 };
         front_end.mux.ground(self.scope.ground(row))?;
         let Settings { settle_us, select_us, discarded, .. } = front_end.settings;
@@ -155,22 +169,57 @@ impl<const READINGS: usize> Scan<READINGS> {
         sampled?;
         let next = row + 1;
         if next < self.scope.rows() {
-            self.row = next;
+            (self.row, self.scans) = (next, scans);
             return Ok(None);
         }
-        let stuck = usize::from(self.timed_out) == self.scope.readings();
-        Ok(Some(Scanned { time_us: self.time_us, status, fraction_bits, stuck }))
+        self.scans = scans + 1;
+        if scans > 0 {
+            self.fold();
+        }
+        // A reading that timed out is zero, and no mean with others.
+        let is_full = scans == FrameHead::MOST_FOLDED || self.timed_out > 0;
+        Ok((is_full || front_end.line.has_room()).then(|| self.end(front_end.chip.now_us(), fraction_bits)))
     }
 
     fn begin(&mut self, now_us: u64) {
-        self.time_us = now_us;
-        self.status = Status::default();
-        self.timed_out = 0;
-        let stays_whole = self.plan.is_whole() && self.scope.is_whole();
-        if !stays_whole && let Some(scope) = self.plan.scope(self.next_frame, self.scope.electrodes()) {
-            self.scope = scope;
+        match self.scans {
+            0 => {
+                self.begun_us = now_us;
+                self.status = Status::default();
+                self.timed_out = 0;
+                let stays_whole = self.plan.is_whole() && self.scope.is_whole();
+                if !stays_whole && let Some(scope) = self.plan.scope(self.next_frame, self.scope.electrodes()) {
+                    self.scope = scope;
+                }
+            }
+            1 => self.totals.iter_mut().zip(&self.readings).for_each(|(total, reading)| *total = (*reading).into()),
+            _ => {}
+        }
+    }
+
+    /// Adds the readings to the totals.
+    fn fold(&mut self) {
+        let is_late = |reading: u16| reading == 0 && self.timed_out > 0;
+        for (total, reading) in self.totals.iter_mut().zip(self.readings) {
+            *total = if is_late(reading) { 0 } else { *total + u32::from(reading) };
+        }
+    }
+
+    /// Ends a frame; the next one is the plan's next.
+    fn end(&mut self, now_us: u64, fraction_bits: u8) -> Scanned {
+        let scans = mem::take(&mut self.scans);
+        if scans > 1 {
+            let mean = |total: u32| ((total + u32::from(scans / 2)) / u32::from(scans)) as u16;
+            self.readings.iter_mut().zip(&self.totals).for_each(|(reading, total)| *reading = mean(*total));
         }
         self.next_frame = if self.next_frame + 1 < self.plan.frames() { self.next_frame + 1 } else { 0 };
+        Scanned {
+            time_us: self.begun_us.midpoint(now_us),
+            folded: scans - 1,
+            status: self.status,
+            fraction_bits,
+            stuck: usize::from(self.timed_out) == self.scope.readings(),
+        }
     }
 
     /// Keeps the means of a row's conversions, in units of `2^-fraction_bits` codes, rounded to the nearest: the sums less `shift` bits.

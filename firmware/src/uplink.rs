@@ -1,11 +1,11 @@
 //! The way to the host: packets wait here, and go out as the line takes them.
 //!
-//! Answers and faults go first, then frames; a packet of log may go between two frames. Of frames that wait, only the newest is
-//! kept: when the line is slow the host gets fewer frames, but fresh ones.
+//! Answers and faults go first, then frames; a packet of log may go between two frames. There is room for one frame, until all of it has gone.
 
 use heapless::Deque;
-use tactomo_protocol::{BoardMessage, FrameHead, MAX_LOG, Scope, encode_board, encode_log, encode_rows, wire_bytes};
+use tactomo_protocol::{BoardMessage, Keys, MAX_LOG, Scope, encode_board, encode_keyed, encode_log, wire_bytes};
 
+use crate::scan::Scanned;
 use crate::{Chip, Serial};
 
 /// Bytes of answers and faults that can wait: three of the longest, four of a board with two converters.
@@ -41,16 +41,21 @@ enum Sending {
     Log,
 }
 
-/// Packets on their way to the host; a frame takes `WIRE` bytes at most.
+/// Packets on their way to the host; a frame has `READINGS` readings and takes `WIRE` bytes at most.
 #[derive(Debug)]
-pub struct Uplink<const WIRE: usize> {
+pub struct Uplink<const READINGS: usize, const WIRE: usize> {
     /// Whole packets, each with its closing zero.
     control: Deque<u8, CONTROL_BYTES>,
-    /// One being sent or free, one being filled or waiting; `outgoing` says which is which.
-    frames: [Packet<WIRE>; 2],
-    outgoing: usize,
+    frame: Packet<WIRE>,
+    /// Whether no byte of the frame is gone yet.
     frame_waits: bool,
+    /// Number of the frame that was encoded last.
+    sequence: u16,
+    /// The keys that the host has.
+    keys: Keys<READINGS>,
     log: Packet<LOG_PACKET>,
+    /// Where bytes of the log are pulled to. On the stack it would be cleared in each idle look at the line: 17 000 instructions a frame.
+    pulled: [u8; MAX_LOG],
     sending: Sending,
     /// Bytes of the frame or log under way that are gone.
     gone: usize,
@@ -58,7 +63,7 @@ pub struct Uplink<const WIRE: usize> {
     after_frame: bool,
 }
 
-impl<const WIRE: usize> Default for Uplink<WIRE> {
+impl<const READINGS: usize, const WIRE: usize> Default for Uplink<READINGS, WIRE> {
     /// Begins with a lone zero, which cuts off whatever the boot loader said on the line.
     fn default() -> Self {
         let mut control = Deque::new();
@@ -66,10 +71,12 @@ impl<const WIRE: usize> Default for Uplink<WIRE> {
         let _ = control.push_back(0);
         Self {
             control,
-            frames: [Packet::EMPTY; 2],
-            outgoing: 0,
+            frame: Packet::EMPTY,
             frame_waits: false,
+            sequence: u16::MAX,
+            keys: Keys::default(),
             log: Packet::EMPTY,
+            pulled: [0; MAX_LOG],
             sending: Sending::Nothing,
             gone: 0,
             after_frame: false,
@@ -77,7 +84,7 @@ impl<const WIRE: usize> Default for Uplink<WIRE> {
     }
 }
 
-impl<const WIRE: usize> Uplink<WIRE> {
+impl<const READINGS: usize, const WIRE: usize> Uplink<READINGS, WIRE> {
     /// Queues an answer or a fault; returns whether there was room. Without it the message is lost: the host has left
     /// several of them unread.
     pub fn message(&mut self, message: &BoardMessage) -> bool {
@@ -90,20 +97,28 @@ impl<const WIRE: usize> Uplink<WIRE> {
         fits
     }
 
-    /// Queues a frame in the place of those of which no byte is gone; returns whether nothing was dropped for it.
-    pub fn frame(&mut self, head: FrameHead, scope: &Scope, readings: &[u16]) -> bool {
-        let stalled = self.sending == Sending::Frame && self.gone == 0;
-        if stalled {
-            self.sending = Sending::Nothing;
+    /// Whether no frame waits or is being sent.
+    pub fn has_room(&self) -> bool {
+        !self.frame_waits && self.sending != Sending::Frame
+    }
+
+    /// Encodes a frame, by what it differs by from its key if it has one. It takes the place and the number of one of which no byte is gone. It is
+    /// dropped if another is being sent.
+    pub fn frame(&mut self, scanned: &Scanned, scope: &Scope, readings: &[u16]) {
+        if self.frame_waits {
+            // The host has not got the last frame, nor its key.
+            self.keys.clear();
+            if self.sending == Sending::Frame {
+                self.sending = Sending::Nothing;
+            }
+        } else if self.sending == Sending::Frame {
+            return;
+        } else {
+            self.sequence = self.sequence.wrapping_add(1);
         }
-        let free = !core::mem::take(&mut self.frame_waits) && !stalled;
-        let packet = &mut self.frames[1 - self.outgoing];
-        match encode_rows(head, scope, readings, &mut packet.bytes) {
-            Ok(length) => packet.length = length,
-            Err(_) => return false,
-        }
-        self.frame_waits = true;
-        free
+        let head = scanned.head(self.sequence);
+        self.frame.length = encode_keyed(head, scope, readings, &mut self.keys, &mut self.frame.bytes).unwrap_or(0);
+        self.frame_waits = self.frame.length > 0;
     }
 
     /// Pushes as many bytes as `serial` takes at this moment; never waits. Log bytes come from `chip`.
@@ -126,8 +141,6 @@ impl<const WIRE: usize> Uplink<WIRE> {
         } else if (self.after_frame || !self.frame_waits) && self.fill_log(chip) {
             Sending::Log
         } else if self.frame_waits {
-            self.frame_waits = false;
-            self.outgoing = 1 - self.outgoing;
             Sending::Frame
         } else {
             Sending::Nothing
@@ -136,9 +149,8 @@ impl<const WIRE: usize> Uplink<WIRE> {
     }
 
     fn fill_log(&mut self, chip: &mut impl Chip) -> bool {
-        let mut bytes = [0; MAX_LOG];
-        let count = chip.pull_log(&mut bytes).min(MAX_LOG);
-        let Some(bytes) = bytes.get(..count).filter(|bytes| !bytes.is_empty()) else { return false };
+        let count = chip.pull_log(&mut self.pulled).min(MAX_LOG);
+        let Some(bytes) = self.pulled.get(..count).filter(|bytes| !bytes.is_empty()) else { return false };
         self.log.length = encode_log(bytes, &mut self.log.bytes).unwrap_or(0);
         true
     }
@@ -148,9 +160,10 @@ impl<const WIRE: usize> Uplink<WIRE> {
         let done = match self.sending {
             Sending::Nothing => true,
             Sending::Control => self.push_control(serial),
-            Sending::Frame => push_from(&self.frames[self.outgoing], &mut self.gone, serial),
+            Sending::Frame => push_from(&self.frame, &mut self.gone, serial),
             Sending::Log => push_from(&self.log, &mut self.gone, serial),
         };
+        self.frame_waits &= self.sending != Sending::Frame || self.gone == 0;
         if done {
             self.sending = Sending::Nothing;
         }

@@ -173,15 +173,15 @@ impl Recording {
         let mut solver = Method::Auto.build(&self.problem)?;
         let began = Instant::now();
         let mut answers = Vec::with_capacity(self.frames.len());
-        for (sequence, readings) in (0..).zip(&self.frames) {
+        for (index, readings) in self.frames.iter().enumerate() {
             let (solution, time) = timed(|| solver.solve(readings));
             let solution = solution.map_err(refused)?;
             found.time_s += time.as_secs_f64();
             found.answers.push(solution.contacts.iter().flat_map(|one| [one.x_m, one.y_m]).collect());
-            let time_s = sequence as f64 * PERIOD_S;
-            answers.push(Answer { sequence, time_s, came: began + Duration::from_secs_f64(time_s), solution });
+            let time_s = index as f64 * PERIOD_S;
+            answers.push(Answer { time_s, came: began + Duration::from_secs_f64(time_s), solution });
         }
-        let scored = Scorer::new(&self.detector, self.scene.clone()).of(&answers);
+        let scored = Scorer::new(&self.detector, self.scene.clone()).of(&answers, 0.0);
         found.scenes.push((self.name.to_string(), self.which, scored.right));
         found.followed[self.which] += scored.right / of;
         found.error_m[self.which] += scored.error_m.unwrap_or_default() / of;

@@ -2,9 +2,10 @@
 
 use heapless::Vec;
 
+use crate::coded::Keys;
 use crate::frame::{self, Frame, FrameHead, HEAD_BYTES};
-use crate::message::{BoardMessage, Hello, Kind, Log, Request};
-use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_WIRE, Scope, VERSION, cobs};
+use crate::message::{BoardMessage, Fault, Hello, Kind, Log, Request};
+use crate::{CRC, CRC_BYTES, MAX_COMMAND, MAX_READINGS, MAX_WIRE, OLDEST, Scope, VERSION, cobs};
 
 /// Why bytes between two zeros are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -15,6 +16,9 @@ pub enum DecodeError {
     /// A whole packet in another version of the protocol.
     #[error("the peer speaks version {0} of the protocol, this side version {VERSION}")]
     Version(u8),
+    /// A whole packet of a frame whose [key](crate::coded) did not come.
+    #[error("a frame whose key frame did not come")]
+    Key,
     /// A whole packet whose kind or body breaks the rules of the protocol.
     #[error("a whole packet that breaks the rules of the protocol")]
     Body,
@@ -25,6 +29,8 @@ pub enum DecodeError {
 pub struct Counters {
     /// Messages received.
     pub messages: u64,
+    /// Whole frames whose key did not come: after a key that was lost, and before the first.
+    pub without_key: u64,
     /// Stretches of bytes between two zeros that were not a message.
     pub corrupt: u64,
     /// Bytes in those stretches.
@@ -41,8 +47,13 @@ pub struct Receiver<const N: usize> {
     counters: Counters,
 }
 
-/// The host's receiver.
-pub type BoardReceiver = Receiver<MAX_WIRE>;
+/// The host's receiver, which remembers key frames.
+#[derive(Debug, Default)]
+pub struct BoardReceiver {
+    receiver: Receiver<MAX_WIRE>,
+    keys: Keys<MAX_READINGS>,
+}
+
 /// The board's receiver.
 pub type CommandReceiver = Receiver<MAX_COMMAND>;
 
@@ -61,7 +72,7 @@ impl<const N: usize> Receiver<N> {
     fn receive_with<M>(
         &mut self,
         input: &mut &[u8],
-        parse: impl Fn(&[u8]) -> Result<M, DecodeError>,
+        mut parse: impl FnMut(&[u8]) -> Result<M, DecodeError>,
     ) -> Option<Result<M, DecodeError>> {
         while let Some(end) = memchr::memchr(0, input) {
             self.hold(&input[..end]);
@@ -69,7 +80,7 @@ impl<const N: usize> Receiver<N> {
             let length = self.held.len() + self.lost;
             // Zeros in a row separate nothing.
             if length > 0 {
-                let message = self.unstuffed().and_then(parse);
+                let message = self.unstuffed().and_then(&mut parse);
                 self.held.clear();
                 self.lost = 0;
                 self.count(&message, length);
@@ -100,6 +111,7 @@ impl<const N: usize> Receiver<N> {
     fn count<M>(&mut self, packet: &Result<M, DecodeError>, length: usize) {
         match packet {
             Ok(_) => self.counters.messages += 1,
+            Err(DecodeError::Key) => self.counters.without_key += 1,
             Err(_) => {
                 self.counters.corrupt += 1;
                 self.counters.dropped_bytes += length as u64;
@@ -112,7 +124,13 @@ impl BoardReceiver {
     /// Takes bytes from the front of `input` up to the end of the next packet or stretch of junk; `None` when `input` is
     /// used up.
     pub fn receive(&mut self, input: &mut &[u8]) -> Option<Result<BoardMessage, DecodeError>> {
-        self.receive_with(input, board_message)
+        let Self { receiver, keys } = self;
+        receiver.receive_with(input, |packet| board_message(packet, keys))
+    }
+
+    /// What was received and dropped so far.
+    pub fn counters(&self) -> Counters {
+        self.receiver.counters()
     }
 }
 
@@ -124,26 +142,42 @@ impl CommandReceiver {
     }
 }
 
-/// Checks the CRC and the version; returns the kind's bits and the body.
-fn open(packet: &[u8]) -> Result<(u8, &[u8]), DecodeError> {
+/// Checks the CRC and the version; returns the version, the kind's bits and the body.
+fn open(packet: &[u8]) -> Result<(u8, u8, &[u8]), DecodeError> {
     let (content, crc) = packet.split_last_chunk::<CRC_BYTES>().ok_or(DecodeError::Corrupt)?;
     let (head, body) = content.split_first().ok_or(DecodeError::Corrupt)?;
     if CRC.checksum(content) != u32::from_le_bytes(*crc) {
         return Err(DecodeError::Corrupt);
     }
     match head >> 4 {
-        VERSION => Ok((head & 15, body)),
+        version @ OLDEST..=VERSION => Ok((version, head & 15, body)),
         version => Err(DecodeError::Version(version)),
     }
 }
 
-fn board_message(packet: &[u8]) -> Result<BoardMessage, DecodeError> {
-    let (kind, body) = open(packet)?;
+fn board_message(packet: &[u8], keys: &mut Keys<MAX_READINGS>) -> Result<BoardMessage, DecodeError> {
+    let (version, kind, body) = open(packet)?;
     Ok(match Kind::from_bits(kind).ok_or(DecodeError::Body)? {
-        Kind::Hello => BoardMessage::Hello(hello(body)?),
-        Kind::Frame => BoardMessage::Frame(frame(body).ok_or(DecodeError::Body)?),
+        Kind::Hello => {
+            let hello = hello(body)?;
+            // A board that has just started numbers its frames anew.
+            if hello.answers == 0 {
+                keys.clear();
+            }
+            BoardMessage::Hello(hello)
+        }
+        Kind::Frame => {
+            let frame = frame(body).ok_or(DecodeError::Body)?;
+            keys.remember(&frame.head, &frame.scope, &frame.readings);
+            BoardMessage::Frame(frame)
+        }
+        Kind::CodedFrame => BoardMessage::Frame(coded_frame(body, keys)?),
         Kind::Log => BoardMessage::Log(log(body)?),
-        Kind::Fault => BoardMessage::Fault(from_postcard(body)?),
+        Kind::Fault => match from_postcard(body)? {
+            // Its frames could be read, but it obeys nobody of this version.
+            Fault::UnknownVersion(_) if version < VERSION => return Err(DecodeError::Version(version)),
+            fault => BoardMessage::Fault(fault),
+        },
         Kind::Command => return Err(DecodeError::Body),
     })
 }
@@ -158,7 +192,7 @@ fn log(body: &[u8]) -> Result<Log, DecodeError> {
 }
 
 fn request(packet: &[u8]) -> Result<Request, DecodeError> {
-    let (kind, body) = open(packet)?;
+    let (_, kind, body) = open(packet)?;
     if kind != Kind::Command as u8 {
         return Err(DecodeError::Body);
     }
@@ -176,9 +210,24 @@ fn from_postcard<'a, T: serde::Deserialize<'a>>(body: &'a [u8]) -> Result<T, Dec
 
 fn frame(body: &[u8]) -> Option<Frame> {
     let (head, rest) = body.split_first_chunk::<HEAD_BYTES>()?;
-    let (head, width) = FrameHead::from_bytes(*head);
+    let (head, bits) = FrameHead::from_bytes(*head);
+    let width = bits + 1;
     let (scope, packed) = Scope::read(rest)?;
     let fits = packed.len() == frame::packed_bytes(width, scope.readings());
     let readings = fits.then(|| frame::unpack(packed, width, scope.readings()))??;
     Some(Frame { head, scope, readings })
+}
+
+fn coded_frame(body: &[u8], keys: &Keys<MAX_READINGS>) -> Result<Frame, DecodeError> {
+    let split = || {
+        let (head, rest) = body.split_first_chunk::<HEAD_BYTES>()?;
+        let (age, rest) = rest.split_first()?;
+        Some((FrameHead::from_bytes(*head), *age, Scope::read(rest)?))
+    };
+    let ((head, k), age, (scope, bytes)) = split().filter(|(_, age, _)| *age > 0).ok_or(DecodeError::Body)?;
+    if keys.age(&head, &scope) != Some(age) {
+        return Err(DecodeError::Key);
+    }
+    let readings = keys.read(k, &scope, bytes).ok_or(DecodeError::Body)?;
+    Ok(Frame { head, scope, readings })
 }

@@ -6,6 +6,7 @@
 
 use serde::Serialize;
 
+use crate::coded::{AGE_BYTES, Keys};
 use crate::frame::{self, FrameHead, HEAD_BYTES};
 use crate::message::{BoardMessage, Kind, Request};
 use crate::{CRC, CRC_BYTES, MAX_ELECTRODES, MAX_LOG, MIN_ELECTRODES, Scope, VERSION, cobs, wire_bytes};
@@ -85,6 +86,62 @@ pub fn encode_frame(head: FrameHead, readings: &[u16], out: &mut [u8]) -> Result
 /// # Errors
 /// [`EncodeError`] if `out` is too short, there are more or fewer readings, or too many fraction bits.
 pub fn encode_rows(head: FrameHead, scope: &Scope, readings: &[u16], out: &mut [u8]) -> Result<usize, EncodeError> {
+    check(head, scope, readings)?;
+    let width = frame::width(readings);
+    let length = HEAD_BYTES + scope.byte_count() + frame::packed_bytes(width, readings.len());
+    write(Kind::Frame, length, out, |body| {
+        let (start, rest) = body.split_at_mut(HEAD_BYTES);
+        start.copy_from_slice(&head.to_bytes(width - 1));
+        frame::pack(readings, width, scope.write(rest));
+    })
+}
+
+/// Encodes a frame into `out` as its differences from its [key](crate::coded), if that takes less than three quarters of what it is packed; else as
+/// [`encode_rows`], and remembers it as a key. Returns the packet's length in bytes.
+///
+/// # Errors
+/// As of [`encode_rows`].
+pub fn encode_keyed<const READINGS: usize>(
+    head: FrameHead,
+    scope: &Scope,
+    readings: &[u16],
+    keys: &mut Keys<READINGS>,
+    out: &mut [u8],
+) -> Result<usize, EncodeError> {
+    check(head, scope, readings)?;
+    if let Some(length) = encode_coded(head, scope, readings, keys, out) {
+        return Ok(length);
+    }
+    keys.remember(&head, scope, readings);
+    encode_rows(head, scope, readings, out)
+}
+
+/// Encodes a frame as its differences; `None` if it has no key, or does not gain by them.
+fn encode_coded<const READINGS: usize>(
+    head: FrameHead,
+    scope: &Scope,
+    readings: &[u16],
+    keys: &Keys<READINGS>,
+    out: &mut [u8],
+) -> Option<usize> {
+    let age = keys.age_to_code(&head, scope)?;
+    let start = cobs::overhead(out.len());
+    let end = out.len().checked_sub(CRC_BYTES + 1)?;
+    let (head_bytes, rest) = out.get_mut(start + 1..end)?.split_at_mut_checked(HEAD_BYTES)?;
+    let (age_byte, rest) = rest.split_at_mut_checked(AGE_BYTES)?;
+    let scope_bytes = scope.byte_count();
+    let written = keys.write(scope, readings, rest.get_mut(scope_bytes..)?)?;
+    if 4 * written.bytes >= 3 * frame::packed_bytes(written.width, readings.len()) {
+        return None;
+    }
+    head_bytes.copy_from_slice(&head.to_bytes(written.k));
+    age_byte.fill(age);
+    scope.write(rest);
+    Some(seal(Kind::CodedFrame, start, HEAD_BYTES + AGE_BYTES + scope_bytes + written.bytes, out))
+}
+
+/// Checks that a frame can be sent.
+fn check(head: FrameHead, scope: &Scope, readings: &[u16]) -> Result<(), EncodeError> {
     let (found, expected) = (readings.len(), scope.readings());
     if found != expected {
         return Err(EncodeError::ScopeReadings { found, expected });
@@ -92,13 +149,7 @@ pub fn encode_rows(head: FrameHead, scope: &Scope, readings: &[u16], out: &mut [
     if head.fraction_bits > 15 {
         return Err(EncodeError::FractionBits(head.fraction_bits));
     }
-    let width = frame::width(readings);
-    let length = HEAD_BYTES + scope.byte_count() + frame::packed_bytes(width, readings.len());
-    write(Kind::Frame, length, out, |body| {
-        let (start, rest) = body.split_at_mut(HEAD_BYTES);
-        start.copy_from_slice(&head.to_bytes(width));
-        frame::pack(readings, width, scope.write(rest));
-    })
+    Ok(())
 }
 
 /// Encodes bytes of the defmt stream into `out`; returns the packet's length in bytes.
@@ -124,11 +175,17 @@ fn write(kind: Kind, body: usize, out: &mut [u8], fill: impl FnOnce(&mut [u8])) 
     let packet = 1 + body + CRC_BYTES;
     let out = out.get_mut(..wire_bytes(packet)).ok_or(EncodeError::Full)?;
     let start = cobs::overhead(packet);
-    let (content, crc) = out[start..start + packet].split_at_mut(1 + body);
+    fill(&mut out[start + 1..start + 1 + body]);
+    Ok(seal(kind, start, body, out))
+}
+
+/// Makes a whole packet of the `body` bytes behind `start` and a byte more, with room for a checksum and a zero behind them; returns its length in bytes.
+fn seal(kind: Kind, start: usize, body: usize, out: &mut [u8]) -> usize {
+    let end = start + 1 + body + CRC_BYTES;
+    let (content, crc) = out[start..end].split_at_mut(1 + body);
     content[0] = VERSION << 4 | kind as u8;
-    fill(&mut content[1..]);
     crc.copy_from_slice(&CRC.checksum(content).to_le_bytes());
-    let length = cobs::stuff(&mut out[..start + packet], start);
+    let length = cobs::stuff(&mut out[..end], start);
     out[length] = 0;
-    Ok(length + 1)
+    length + 1
 }

@@ -3,8 +3,8 @@
 //! | bytes | what |
 //! |---|---|
 //! | 2 | sequence number, little-endian, wraps |
-//! | 4 | board time at the start of the scan in microseconds, little-endian, wraps |
-//! | 1 | [status bits](Status) |
+//! | 4 | board time in the middle of the scan in microseconds, little-endian, wraps |
+//! | 1 | [status bits](Status) (low four), scans that are [folded](FrameHead::folded) in (high four) |
 //! | 1 | width of a reading in bits less one (low four), fraction bits (high four) |
 //! | 2 and up | which readings it holds: its [scope](crate::Scope) |
 //! | rest | readings, row by row, least significant bit first, no gaps; the last byte is filled with zeros |
@@ -32,12 +32,14 @@ pub struct Frame {
 /// Everything of a frame but its scope and its readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameHead {
-    /// Number of the frame, modulo 65536; frames that were dropped for want of room on the link count.
+    /// Number of the frame among those that were sent, modulo 65536: what is missing was lost on the way.
     pub sequence: u16,
-    /// Board time at the start of the scan, in microseconds (us), modulo 2^32.
+    /// Board time in the middle of the scan, or of all that are [folded](Self::folded) into it, in microseconds (us), modulo 2^32.
     pub time_us: u32,
     /// What happened during the scan.
     pub status: Status,
+    /// The readings are the mean of this scan and of so many more, that had no place on the line: 0 to 15.
+    pub folded: u8,
     /// Bits below one ADC code that averaging has won: 0 to 15.
     pub fraction_bits: u8,
 }
@@ -66,23 +68,28 @@ impl Status {
 }
 
 impl FrameHead {
-    /// The head as bytes, for readings of `width` bits.
-    pub(crate) fn to_bytes(self, width: u32) -> [u8; HEAD_BYTES] {
+    /// Most scans that can be [folded](Self::folded) into another.
+    pub const MOST_FOLDED: u8 = 15;
+
+    /// The head as bytes; `bits` tells how readings are packed or coded, 0 to 15.
+    pub(crate) fn to_bytes(self, bits: u32) -> [u8; HEAD_BYTES] {
         let [s0, s1] = self.sequence.to_le_bytes();
         let [t0, t1, t2, t3] = self.time_us.to_le_bytes();
-        let shape = (width - 1) as u8 | self.fraction_bits << 4;
-        [s0, s1, t0, t1, t2, t3, self.status.0 & Status::NAMED, shape]
+        let shape = bits as u8 | self.fraction_bits << 4;
+        let status = self.status.0 & Status::NAMED | self.folded.min(FrameHead::MOST_FOLDED) << 4;
+        [s0, s1, t0, t1, t2, t3, status, shape]
     }
 
-    /// The head and the width of a reading in bits.
+    /// The head, and how readings are packed or coded.
     pub(crate) fn from_bytes([s0, s1, t0, t1, t2, t3, status, shape]: [u8; HEAD_BYTES]) -> (Self, u32) {
         let head = Self {
             sequence: u16::from_le_bytes([s0, s1]),
             time_us: u32::from_le_bytes([t0, t1, t2, t3]),
             status: Status(status & Status::NAMED),
+            folded: status >> 4,
             fraction_bits: shape >> 4,
         };
-        (head, u32::from(shape & 15) + 1)
+        (head, u32::from(shape & 15))
     }
 }
 

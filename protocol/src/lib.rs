@@ -25,7 +25,7 @@
 //!
 //! let mut command = [0; MAX_COMMAND];
 //! let length = encode_request(&Request { tag: 7, command: Command::Start }, &mut command)?;
-//! assert_eq!(command[..length], [0x08, 0x38, 0x07, 0x01, 0x6B, 0xCB, 0x7F, 0xED, 0x00]);
+//! assert_eq!(command[..length], [0x08, 0x48, 0x07, 0x01, 0x3B, 0xA3, 0x8E, 0xB9, 0x00]);
 //!
 //! let mut line = *b"ets Jul 29 2019\r\n\0.............";
 //! let length = encode_board(&BoardMessage::Fault(Fault::AdcStuck), &mut line[18..])?;
@@ -48,6 +48,7 @@
 extern crate std;
 
 mod cobs;
+pub mod coded;
 mod coding;
 pub mod decode;
 pub mod encode;
@@ -55,16 +56,19 @@ pub mod frame;
 pub mod message;
 pub mod scope;
 
+pub use coded::Keys;
 pub use decode::{BoardReceiver, CommandReceiver, Counters, DecodeError, Receiver};
-pub use encode::{EncodeError, encode_board, encode_frame, encode_log, encode_request, encode_rows};
+pub use encode::{EncodeError, encode_board, encode_frame, encode_keyed, encode_log, encode_request, encode_rows};
 pub use frame::{Frame, FrameHead, Status};
 pub use message::{
     BoardMessage, Command, ConverterErrors, Fault, Hello, Kind, Log, MAX_LOG, MAX_RANGES, Range, Request, Settings,
 };
 pub use scope::{MAX_PLAN_ROWS, MAX_ROWS, Plan, Scope};
 
-/// Version of the protocol that this crate speaks: 1 to 15. Boards and hosts refuse every other.
-pub const VERSION: u8 = 3;
+/// Version of the protocol that this crate speaks: 1 to 15. Boards and hosts refuse later ones, and those before [`OLDEST`].
+pub const VERSION: u8 = 4;
+/// Oldest version that is taken: it has no coded frames, and nothing else that is different.
+pub const OLDEST: u8 = 3;
 /// Most electrodes that a frame can carry.
 pub const MAX_ELECTRODES: usize = 32;
 /// Fewest electrodes that a frame can carry.

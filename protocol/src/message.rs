@@ -24,13 +24,16 @@ pub enum Kind {
     Log = 2,
     /// [`Fault`], board to host.
     Fault = 3,
+    /// [`Frame`], board to host, as the [differences](crate::coded) from another.
+    CodedFrame = 4,
     /// [`Request`], host to board.
     Command = 8,
 }
 
 impl Kind {
     pub(crate) fn from_bits(bits: u8) -> Option<Self> {
-        [Self::Hello, Self::Frame, Self::Log, Self::Fault, Self::Command].into_iter().find(|kind| *kind as u8 == bits)
+        let all = [Self::Hello, Self::Frame, Self::Log, Self::Fault, Self::CodedFrame, Self::Command];
+        all.into_iter().find(|kind| *kind as u8 == bits)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Bytes on the wire of scans by the thin-shell model, for four codings of the readings:
+//! Bytes on the wire of scans by the thin-shell model, for five codings of the readings:
 //! `cargo test -p tactomo-tests --test wire_size -- --nocapture`.
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should")]
 
@@ -7,7 +7,9 @@ use tactomo::forward::shell::Shell;
 use tactomo::forward::{ForwardModel, readings_v};
 use tactomo::scene::Contact;
 use tactomo_protocol::frame::HEAD_BYTES;
-use tactomo_protocol::{BoardMessage, BoardReceiver, CRC_BYTES, FrameHead, MAX_WIRE, encode_frame, wire_bytes};
+use tactomo_protocol::{
+    BoardMessage, BoardReceiver, CRC_BYTES, FrameHead, Keys, MAX_WIRE, Scope, encode_frame, encode_keyed, wire_bytes,
+};
 
 const ELECTRODES: usize = 16;
 /// What a whole frame says of its scope: electrodes, and no rows.
@@ -47,14 +49,14 @@ impl Noise {
     }
 }
 
-/// What a 12-bit converter makes of the scene: 3.3 V full scale, 1.5 LSB of noise.
-fn scan(shell: &Shell, contacts: &[Contact], noise: &mut Noise) -> Vec<u16> {
+/// What a 12-bit converter of 3.3 V makes of the scene, with a noise of so many codes.
+fn scan(shell: &Shell, contacts: &[Contact], noise_codes: f64, noise: &mut Noise) -> Vec<u16> {
     let volts = if contacts.is_empty() {
         vec![0.0; ELECTRODES * ELECTRODES]
     } else {
         readings_v(&shell.impedance_ohm(contacts).unwrap(), shell.detector()).volts().to_vec()
     };
-    let code = |volt: &f64| (volt * 4096.0 / 3.3 + 1.5 * noise.gaussian()).round().clamp(0.0, 4095.0) as u16;
+    let code = |volt: &f64| (volt * 4096.0 / 3.3 + noise_codes * noise.gaussian()).round().clamp(0.0, 4095.0) as u16;
     volts.iter().map(code).collect()
 }
 
@@ -83,14 +85,28 @@ fn row_wise_bytes(readings: &[u16]) -> usize {
     readings.chunks(ELECTRODES).map(row_bits).sum::<usize>().div_ceil(8)
 }
 
+/// Bytes of a frame on the wire after one of the same scene with other noise.
+fn coded_bytes(shell: &Shell, contacts: &[Contact], noise_codes: f64, noise: &mut Noise) -> usize {
+    let (mut keys, scope) = (Keys::<256>::default(), Scope::whole(16).unwrap());
+    let mut out = [0; MAX_WIRE];
+    let mut next = |sequence| {
+        let head = FrameHead { sequence, ..FrameHead::default() };
+        encode_keyed(head, &scope, &scan(shell, contacts, noise_codes, noise), &mut keys, &mut out).unwrap()
+    };
+    next(0);
+    next(1)
+}
+
 #[test]
 fn frames_of_real_scans_take_402_bytes_at_most() {
     let shell = Shell::new(&Detector::preset("square-60").unwrap()).unwrap();
     let mut noise = Noise(1);
-    println!("| scene | largest reading | plain postcard | 12 bits each | row-wise | this protocol |");
-    println!("|---|---|---|---|---|---|");
+    println!(
+        "| scene | largest reading | plain postcard | 12 bits each | row-wise | a frame | coded | with noise of six codes |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
     for (name, contacts) in scenes() {
-        let readings = scan(&shell, &contacts, &mut noise);
+        let readings = scan(&shell, &contacts, 1.5, &mut noise);
         let mut out = [0; MAX_WIRE];
         let ours = encode_frame(FrameHead::default(), &readings, &mut out).unwrap();
         let BoardMessage::Frame(frame) = BoardReceiver::default().receive(&mut &out[..ours]).unwrap().unwrap() else {
@@ -101,7 +117,10 @@ fn frames_of_real_scans_take_402_bytes_at_most() {
         let fixed = wire(readings.len() * 12 / 8);
         let row_wise = wire(row_wise_bytes(&readings));
         let largest = readings.iter().max().unwrap();
-        println!("| {name} | {largest} | {plain} | {fixed} | {row_wise} | {ours} |");
+        let [coded, noisy] = [1.5, 6.0].map(|codes| coded_bytes(&shell, &contacts, codes, &mut noise));
+        println!("| {name} | {largest} | {plain} | {fixed} | {row_wise} | {ours} | {coded} | {noisy} |");
+        // Independent Gaussian noise of 1.5 and of 6 codes in each of two frames takes 3.1 and 5.1 bits a difference, and a frame 20 bytes more.
+        assert!(coded < 140 && noisy < 210, "{name}: {coded} and {noisy} bytes coded");
         assert!(ours <= fixed && ours < plain && fixed == 402, "{name}: {ours} bytes");
         assert!(ours <= row_wise + row_wise / 20, "{name}: a row-wise coding takes {row_wise} bytes, this one {ours}");
     }

@@ -1,6 +1,6 @@
-//! Recordings: the raw bytes of a board, with the times at which they came.
+//! Recordings: the bytes of a board, with the times at which they came.
 //!
-//! Nothing is decoded before it is written, so a recording holds what the board said, whatever becomes of the decoder.
+//! What is not understood is kept too, as it came. Only coded frames are written as [plain ones](PlainPackets), which need no other to be read.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -24,6 +24,7 @@ mod header;
 mod loss;
 mod note;
 mod packets;
+mod plain;
 mod reader;
 mod recorder;
 mod ring;
@@ -37,6 +38,7 @@ mod writer;
 pub use header::Header;
 pub use loss::{HeaderDamage, Loss};
 pub use note::Note;
+pub use plain::PlainPackets;
 pub use reader::{Entry, RecordReader};
 pub use recorder::{Closing, Recorder};
 pub use ring::{Ring, Trigger};

@@ -7,7 +7,7 @@ use tactomo_protocol::FrameHead;
 pub struct Place {
     /// Number of the scan, unwrapped.
     pub sequence: u64,
-    /// Board time at the start of the scan, unwrapped, in microseconds (us).
+    /// Board time in the middle of the scan, unwrapped, in microseconds (us).
     pub time_us: u64,
     /// Scans missing since the frame before.
     pub dropped: u64,

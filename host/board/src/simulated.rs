@@ -119,6 +119,7 @@ pub enum SimulatedBoardError {
 /// ```
 pub struct SimulatedBoard {
     line: Arc<Line>,
+    circuit: Arc<Circuit>,
     model: BoardModel,
     /// `None` if the physics are given from outside.
     controls: Option<Controls>,
@@ -154,11 +155,27 @@ impl SimulatedBoard {
         let line = Arc::new(Line::default());
         let step = firmware(detector, physics, options, &circuit, &line)?;
         let thread = {
-            let line = Arc::clone(&line);
+            let (line, circuit) = (Arc::clone(&line), Arc::clone(&circuit));
             thread::Builder::new().name("simulated board".to_owned()).spawn(move || run(step, &circuit, &line))
         };
         let thread = Some(thread.map_err(SimulatedBoardError::Thread)?);
-        Ok(Self { line, model: options.model, controls: None, thread })
+        Ok(Self { line, circuit, model: options.model, controls: None, thread })
+    }
+
+    /// A clock that tells when the scene began.
+    pub fn scene_clock(&self) -> SceneClock {
+        SceneClock(Arc::clone(&self.circuit))
+    }
+}
+
+/// When the scene of a simulated board began.
+#[derive(Clone, Debug)]
+pub struct SceneClock(Arc<Circuit>);
+
+impl SceneClock {
+    /// Board time at which the scene began (s): with the first scan; `None` before.
+    pub fn began_s(&self) -> Option<f64> {
+        self.0.scene_began_ns().map(pads::seconds)
     }
 }
 

@@ -118,7 +118,7 @@ pub struct PictureArgs {
     /// `pointer` does so by itself
     #[arg(long)]
     pub pointer: bool,
-    /// Serves no page, and prints `{source, solver, frames, frames_per_s, dropped, skipped, solved, corrupt, latency_us, age_us, vibration?,
+    /// Serves no page, and prints `{source, solver, frames, frames_per_s, folded, dropped, skipped, solved, corrupt, latency_us, age_us, vibration?,
     /// learned?}` at the end as JSON
     #[arg(long)]
     pub json: bool,
@@ -319,10 +319,15 @@ fn report(summary: &Summary, json: bool) -> anyhow::Result<()> {
 
 /// A summary in a line.
 pub fn sentence(summary: &Summary) -> String {
-    let Summary { source, frames, frames_per_s, dropped, skipped, corrupt, solved, age_us, learned, .. } = summary;
+    let Summary { source, frames, frames_per_s, folded, dropped, skipped, corrupt, solved, age_us, learned, .. } =
+        summary;
     let learned = learned.map_or_else(String::new, |learned| format!("; {learned}"));
+    let scans = match *folded {
+        0 => String::new(),
+        folded => format!(" (the mean of {:.1} scans each)", 1.0 + folded as f64 / *frames as f64),
+    };
     let received =
-        format!("{source}: {frames} frames, {frames_per_s:.0} a second, {dropped} dropped, {corrupt} corrupt");
+        format!("{source}: {frames} frames, {frames_per_s:.0} a second{scans}, {dropped} lost, {corrupt} corrupt");
     if *solved == 0 {
         return received;
     }

@@ -4,6 +4,7 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use tactomo_board::link::Link;
+use tactomo_board::record::PlainPackets;
 use tactomo_board::session::{self, GreetError, Session};
 use tactomo_protocol::BoardReceiver;
 
@@ -15,6 +16,8 @@ pub(super) struct Connection {
     /// Whether there is a board that hears what it is asked: a recording has the answers that another host got.
     pub answers: bool,
     pub session: Session,
+    /// Bytes pass it before they are kept and received.
+    pub plain: PlainPackets,
     pub receiver: BoardReceiver,
     opened: Instant,
     /// Stretches of junk until the board said Hello, in answer to what it was asked; `None` before.
@@ -33,6 +36,7 @@ impl Connection {
         Self {
             answers,
             session: Session::new(settings),
+            plain: PlainPackets::default(),
             receiver: BoardReceiver::default(),
             opened: Instant::now(),
             junk: None,
@@ -62,7 +66,7 @@ impl Connection {
 
     /// Forgets the packet under way: what follows it is elsewhere.
     pub fn jumped(&mut self) {
-        self.receiver = BoardReceiver::default();
+        (self.plain, self.receiver) = (PlainPackets::default(), BoardReceiver::default());
         (self.junk, self.counted, self.landing) = (self.junk.map(|_| 0), 0, true);
     }
 

@@ -11,7 +11,7 @@ use tactomo_touch::solve::Latest;
 pub struct Frame {
     /// Number of the scan since the board started, unwrapped.
     pub sequence: u64,
-    /// Board time at the start of the scan, unwrapped, in microseconds (us).
+    /// Board time in the middle of the scan, unwrapped, in microseconds (us).
     pub board_time_us: u64,
     /// When its last byte came.
     pub arrived: Arrival,
@@ -32,7 +32,7 @@ impl Frame {
         Self { sequence: 0, board_time_us: 0, arrived, status: Status::default(), lost: 0, measured, used }
     }
 
-    /// Board time at the start of the scan (s).
+    /// Board time in the middle of the scan (s).
     pub fn time_s(&self) -> f64 {
         self.board_time_us as f64 / 1e6
     }

@@ -183,7 +183,9 @@ pub struct Summary {
     pub frames: u64,
     /// Frames a second, from the first to the last.
     pub frames_per_s: f64,
-    /// Frames that the sequence numbers say are missing: the link or the board lost them.
+    /// Scans for which the line had no room, so that their readings are in the mean of a frame.
+    pub folded: u64,
+    /// Frames that the sequence numbers say are missing: they were lost on the line.
     pub dropped: u64,
     /// Frames that came and were not answered by themselves, because newer ones had come.
     pub skipped: u64,

@@ -97,6 +97,7 @@ fn summary(notice: &NoticeBoard, source: String, course: &Course) -> Summary {
         solver: notice.solver_name().to_owned(),
         frames: statistics.frames,
         frames_per_s,
+        folded: statistics.folded,
         dropped: statistics.dropped,
         skipped: statistics.skipped,
         solved: statistics.solved,
@@ -237,8 +238,9 @@ impl Reader {
         if bytes.is_empty() {
             return Ok(());
         }
-        self.keep(bytes, received)?;
-        let mut input = bytes;
+        let bytes = connection.plain.pass(bytes);
+        self.keep(&bytes, received)?;
+        let mut input = &bytes[..];
         while let Some(message) = connection.receiver.receive(&mut input) {
             match message {
                 Ok(BoardMessage::Frame(frame)) => self.frame(connection, &frame, received),
@@ -315,11 +317,8 @@ impl Reader {
         };
         let place = self.sequence.place(&frame.head);
         self.frames_lost += place.dropped;
-        self.notice.count(|meter| meter.frame(received, place.dropped));
+        self.notice.count(|meter| meter.frame(received, &frame.head, place.dropped));
         self.scanned.add(&frame.scope);
-        if !frame.scope.is_whole() {
-            self.plans.requested.count(place.dropped);
-        }
         if !self.follows {
             return;
         }

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use tactomo_protocol::FrameHead;
+
 use super::{Latency, Statistics};
 
 /// Time over which the shown frame rate is taken.
@@ -14,6 +16,7 @@ const BUCKETS: usize = ((u64::BITS - MANTISSA_BITS + 1) as usize) << MANTISSA_BI
 /// Counts what is received and what becomes of it.
 #[derive(Debug, Default)]
 pub struct Meter {
+    folded: u64,
     dropped: u64,
     corrupt: u64,
     skipped: u64,
@@ -42,7 +45,8 @@ struct Recent {
 
 impl Meter {
     /// Counts a frame whose last byte came at `received`, after `dropped` missing ones.
-    pub fn frame(&mut self, received: Instant, dropped: u64) {
+    pub fn frame(&mut self, received: Instant, head: &FrameHead, dropped: u64) {
+        self.folded += u64::from(head.folded);
         self.dropped += dropped;
         self.received.add(received);
     }
@@ -66,6 +70,7 @@ impl Meter {
         Statistics {
             frames: self.received.count,
             frames_per_s: self.received.recent_per_s(now),
+            folded: self.folded,
             dropped: self.dropped,
             skipped: self.skipped,
             solved: self.solved.count,
@@ -198,13 +203,17 @@ mod tests {
         let mut meter = Meter::default();
         let start = Instant::now();
         for i in 0..=250 {
-            meter.frame(start + Duration::from_millis(10 * i), u64::from(i == 7));
+            meter.frame(
+                start + Duration::from_millis(10 * i),
+                &FrameHead { folded: 1, ..FrameHead::default() },
+                u64::from(i == 7),
+            );
         }
         meter.solved(3, Duration::from_micros(70), Duration::from_micros(20));
         meter.solved(0, Duration::from_micros(90), Duration::from_micros(20));
         meter.corrupt(3);
         let statistics = meter.statistics(start + Duration::from_millis(2500));
-        assert_eq!((statistics.frames, statistics.dropped, statistics.corrupt), (251, 1, 3));
+        assert_eq!((statistics.frames, statistics.folded, statistics.dropped, statistics.corrupt), (251, 251, 1, 3));
         assert_eq!((statistics.solved, statistics.skipped), (2, 2));
         assert!((statistics.frames_per_s - 100.0).abs() < 1.5, "{}", statistics.frames_per_s);
         assert!((meter.overall_frames_per_s() - 100.0).abs() < 1e-6);

@@ -69,7 +69,7 @@ struct Keeper(Arc<Mutex<Vec<Answer>>>);
 impl Listener for Keeper {
     fn touched(&mut self, event: &Arc<TouchEvent>) {
         let (frame, solution) = (&event.frame, event.solution.clone());
-        let answer = Answer { sequence: frame.sequence, time_s: frame.time_s(), came: Instant::now(), solution };
+        let answer = Answer { time_s: frame.time_s(), came: Instant::now(), solution };
         // A thread that panicked has ended the run anyway.
         if let Ok(mut all) = self.0.lock() {
             all.push(answer);
@@ -86,7 +86,7 @@ pub fn run(case: &Case) -> anyhow::Result<Found> {
     let truth = case.built.map_or_else(|| Ok(detector.clone()), |seed| try_drawn(&detector, seed))?;
     let simulation = Simulation::new(&truth, scene.clone(), &[], case.seed)?;
     let board = SimulatedBoard::simulate(&truth, simulation, Options { seed: case.seed, model })?;
-    let kept = Arc::new(Mutex::new(Vec::new()));
+    let (clock, kept) = (board.scene_clock(), Arc::new(Mutex::new(Vec::new())));
     let solving = Solving::new(case.method, Problem::of(&detector)?);
     let learning = Learning::of(&detector, None).filter(|_| case.learns);
     let options = RunOptions {
@@ -115,7 +115,7 @@ pub fn run(case: &Case) -> anyhow::Result<Found> {
         detector: case.built.map_or_else(|| "as described".to_owned(), |seed| format!("as built {seed}")),
         board: model.name(),
         scan: case.scan.to_string(),
-        scored: Scorer::new(&detector, scene).of(&answers),
+        scored: Scorer::new(&detector, scene).of(&answers, clock.began_s().unwrap_or_default()),
         age_p99_us: summary.age_us.p99,
         learned_from: summary.learned.as_ref().map(|learned| learned.presses),
         learned_s: learned.zip(began).map(|(learned, began)| learned.duration_since(began).as_secs_f64()),

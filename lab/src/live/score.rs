@@ -19,8 +19,6 @@ const LATE: f64 = 1.0 / 3.0;
 
 /// An answer as it came.
 pub struct Answer {
-    /// Number of its frame.
-    pub sequence: u64,
     /// Time of its frame, by the board's clock (s).
     pub time_s: f64,
     /// When it was ready.
@@ -79,12 +77,9 @@ impl Scorer {
         Self { scene, plain_s: PLAIN * detector.sheet_conductance_s(), reach_m: REACH * width_m.min(height_m) }
     }
 
-    /// Scores all answers of a run.
-    pub fn of(&self, answers: &[Answer]) -> Scored {
+    /// Scores all answers of a run whose scene began at this board time (s).
+    pub fn of(&self, answers: &[Answer], began_s: f64) -> Scored {
         let [Some(first), Some(last)] = [answers.first(), answers.last()] else { return Scored::default() };
-        // The scene begins with the first frame, which may have had no answer.
-        let period_s = (last.time_s - first.time_s) / (last.sequence - first.sequence).max(1) as f64;
-        let began_s = first.time_s - first.sequence as f64 * period_s;
         let worth: Vec<_> =
             answers.iter().map(|answer| self.worth(answer.time_s - began_s, &answer.solution)).collect();
         let since = |answer: &Answer| answer.came.duration_since(first.came).as_secs_f64();
@@ -103,7 +98,7 @@ impl Scorer {
             answers: answers.len(),
             right: share_of(|of| of.is_right),
             named: share_of(|of| of.is_right || of.is_named),
-            first_right_s: first_right.map(|index| since(&answers[index]) + first.sequence as f64 * period_s),
+            first_right_s: first_right.map(|index| since(&answers[index]) + first.time_s - began_s),
             error_m,
             error_p95_m,
             late_error_m: errors(&worth[late_from..]).map(|[median_m, _]| median_m),
@@ -177,9 +172,9 @@ mod tests {
         let answer = |(index, solution): (usize, Solution)| {
             let sequence = first + index as u64;
             let time_s = sequence as f64 * FRAME_S;
-            Answer { sequence, time_s: 1.0 + time_s, came: begun + Duration::from_secs_f64(time_s), solution }
+            Answer { time_s: 1.0 + time_s, came: begun + Duration::from_secs_f64(time_s), solution }
         };
-        scorer.of(&solutions.into_iter().enumerate().map(answer).collect::<Vec<_>>())
+        scorer.of(&solutions.into_iter().enumerate().map(answer).collect::<Vec<_>>(), 1.0)
     }
 
     fn contacts(all: Vec<FoundContact>) -> Solution {

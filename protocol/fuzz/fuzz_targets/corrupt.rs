@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Log, MAX_WIRE, Plan, Range,
-    Request, Scope, Settings, encode_board, encode_request,
+    BoardMessage, BoardReceiver, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Keys, Log, MAX_WIRE, Plan,
+    Range, Request, Scope, Settings, encode_board, encode_keyed, encode_request,
 };
 
 /// Packets in a stream at most.
@@ -16,6 +16,8 @@ const PACKETS: usize = 8;
 
 enum Sent {
     Board(BoardMessage),
+    /// A frame that is received if its key was.
+    Coded(BoardMessage),
     Host(Request),
 }
 
@@ -26,6 +28,7 @@ static PACKETS_SENT: LazyLock<Vec<(Sent, Vec<u8>)>> = LazyLock::new(|| {
         let length = encode_board(&message, &mut out).expect("within the limits");
         sent.push((Sent::Board(message), out[..length].to_vec()));
     }
+    sent.push(coded());
     for request in requests() {
         let length = encode_request(&request, &mut out).expect("within the limits");
         sent.push((Sent::Host(request), out[..length].to_vec()));
@@ -66,6 +69,21 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Fault(Fault::BadPlan { answers: 9 }),
         BoardMessage::Fault(Fault::Reset("watchdog".try_into().expect("short"))),
     ]
+}
+
+/// A frame whose key is the whole one of 16 electrodes with the number 2.
+fn coded() -> (Sent, Vec<u8>) {
+    let scope = Scope::whole(16).expect("within the limits");
+    let (mut keys, mut out) = (Keys::<256>::default(), [0; MAX_WIRE]);
+    let mut encoded = |sequence: u16, add: u16| {
+        let head = FrameHead { sequence, time_us: 7 * u32::from(sequence), ..FrameHead::default() };
+        let readings: [u16; 256] = std::array::from_fn(|i| (i * i % 2000) as u16 + add * (i % 5) as u16);
+        let length = encode_keyed(head, &scope, &readings, &mut keys, &mut out).expect("within the limits");
+        let frame = Frame { head, scope: scope.clone(), readings: readings.into_iter().collect() };
+        (Sent::Coded(BoardMessage::Frame(frame)), out[..length].to_vec())
+    };
+    encoded(2, 0);
+    encoded(6, 1)
 }
 
 fn requests() -> Vec<Request> {
@@ -130,7 +148,8 @@ fn check_host(choice: &[u8], mut stream: &[u8]) {
     let mut accepted = 0;
     while let Some(result) = receiver.receive(&mut stream) {
         let Ok(message) = result else { continue };
-        let sent = |choice: &u8| matches!(&chosen(*choice).0, Sent::Board(sent) if *sent == message);
+        let sent =
+            |choice: &u8| matches!(&chosen(*choice).0, Sent::Board(sent) | Sent::Coded(sent) if *sent == message);
         assert!(choice.iter().any(sent), "never sent: {message:?}");
         accepted += 1;
     }

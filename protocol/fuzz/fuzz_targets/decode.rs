@@ -2,7 +2,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tactomo_protocol::{BoardReceiver, CommandReceiver, MAX_COMMAND, MAX_WIRE, encode_board, encode_request};
+use tactomo_protocol::{
+    BoardReceiver, CommandReceiver, FrameHead, MAX_COMMAND, MAX_WIRE, encode_board, encode_frame, encode_request,
+};
 
 fuzz_target!(|input: &[u8]| {
     let Some((&chunk, bytes)) = input.split_first() else { return };
@@ -10,7 +12,16 @@ fuzz_target!(|input: &[u8]| {
     receive(bytes, chunk);
     // A fuzzer does not guess checksums: the same bytes as a packet whose checksum is right.
     receive(&packet(bytes), chunk);
+    // The same behind a key frame, so that it can be a coded one.
+    receive(&[key(), packet(bytes)].concat(), chunk);
 });
+
+/// A frame of four electrodes, with number 0.
+fn key() -> Vec<u8> {
+    let mut out = [0; MAX_WIRE];
+    let length = encode_frame(FrameHead::default(), &[1000; 16], &mut out).expect("a frame");
+    out[..length].to_vec()
+}
 
 fn receive(bytes: &[u8], chunk: usize) {
     let mut host = BoardReceiver::default();

@@ -79,7 +79,7 @@ fn reads(electrodes: u8) -> impl Strategy<Value = u32> {
 }
 
 /// Whole frames, and rows of any kind that hold no more than a whole one.
-fn scope() -> impl Strategy<Value = Scope> {
+pub fn scope() -> impl Strategy<Value = Scope> {
     let rows = (4..=32u8).prop_flat_map(|n| (Just(n), prop::collection::vec(0..n, 1..=32), reads(n)));
     let some = rows.prop_map(|(n, mut grounds, reads)| {
         grounds.truncate((usize::from(n).pow(2) / reads.count_ones() as usize).min(grounds.len()));
@@ -89,11 +89,12 @@ fn scope() -> impl Strategy<Value = Scope> {
 }
 
 fn frame() -> impl Strategy<Value = BoardMessage> {
-    let head = (any::<u16>(), any::<u32>(), 0..=3u8, 0..=15u8);
-    let head = head.prop_map(|(sequence, time_us, status, fraction_bits)| FrameHead {
+    let head = (any::<u16>(), any::<u32>(), 0..=3u8, 0..=15u8, 0..=15u8);
+    let head = head.prop_map(|(sequence, time_us, status, folded, fraction_bits)| FrameHead {
         sequence,
         time_us,
         status: Status(status),
+        folded,
         fraction_bits,
     });
     let readings = (scope(), 0..=16u32).prop_flat_map(|(scope, bits)| {

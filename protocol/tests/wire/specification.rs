@@ -6,10 +6,11 @@ use std::fmt::Debug;
 
 use heapless::Vec as Fixed;
 use tactomo_protocol::{
-    BoardMessage, Command, DecodeError, Fault, Frame, FrameHead, Log, Plan, Request, Scope, Settings, Status,
+    BoardMessage, BoardReceiver, Command, DecodeError, Fault, Frame, FrameHead, Keys, Log, MAX_WIRE, Plan, Request,
+    Scope, Settings, Status, encode_keyed,
 };
 
-use crate::common::{board_wire, hello, packet, receive_board, receive_command, request_wire};
+use crate::common::{board_wire, hello, packet, receive_command, request_wire};
 
 const PAGE: &str = include_str!("../../../docs/protocol-examples.md");
 
@@ -35,8 +36,8 @@ fn frame(head: FrameHead, scope: Option<Scope>, readings: &[u16]) -> BoardMessag
 
 /// One of every kind of message, and the edges of a frame's coding.
 fn board_messages() -> Vec<BoardMessage> {
-    let head = FrameHead { sequence: 513, time_us: 67_305_985, status: Status(0), fraction_bits: 0 };
-    let mut timed_out = FrameHead { sequence: 65535, fraction_bits: 4, ..head };
+    let head = FrameHead { sequence: 513, time_us: 67_305_985, status: Status(0), folded: 0, fraction_bits: 0 };
+    let mut timed_out = FrameHead { sequence: 65535, folded: 2, fraction_bits: 4, ..head };
     timed_out.status.insert(Status::SATURATED);
     timed_out.status.insert(Status::TIMED_OUT);
     vec![
@@ -88,14 +89,39 @@ fn expected() -> Vec<Example> {
     let boards = board_messages().into_iter().map(|message| (board_wire(&message), Ok(message)));
     let [reset, scan, longest] = too_long();
     let refused = [
-        (packet(0x40, &[0xC0, 0xDE]), Err(DecodeError::Version(4))),
+        (packet(0x50, &[0xC0, 0xDE]), Err(DecodeError::Version(5))),
         (board_wire(&BoardMessage::Fault(Fault::AdcStuck))[1..].to_vec(), Err(DecodeError::Corrupt)),
         (reset, Err(DecodeError::Body)),
     ];
     let hosts = requests().into_iter().map(|request| (request_wire(&request), Ok(request)));
     let hosts = hosts.chain([(scan, Err(DecodeError::Body)), (longest, Err(DecodeError::Corrupt))]);
-    let boards = boards.chain(refused).map(|(wire, result)| (format!("board: {}", described(&result)), wire));
+    let boards =
+        boards.chain(coded()).chain(refused).map(|(wire, result)| (format!("board: {}", described(&result)), wire));
     boards.chain(hosts.map(|(wire, result)| (format!("host: {}", described(&result)), wire))).collect()
+}
+
+/// A key frame, a frame coded by it, of which one reading is far off, and one whose key did not come.
+fn coded() -> Vec<(Vec<u8>, Result<BoardMessage, DecodeError>)> {
+    let head = |sequence| FrameHead { sequence, time_us: 67_305_985, ..FrameHead::default() };
+    let scope = Scope::whole(4);
+    let key = [3000, 3001, 2999, 0, 5, 3010, 3011, 3012, 7, 8, 3013, 3014, 9, 10, 11, 3015];
+    let readings = [3002, 3000, 2999, 0, 9, 3009, 3015, 3006, 6, 8, 2200, 3013, 10, 12, 11, 3018];
+    let frame = |sequence, readings: &[u16]| frame(head(sequence), scope.clone(), readings);
+    let mut keys = Keys::<16>::default();
+    let scope = scope.clone().unwrap();
+    keys.remember(&head(513), &scope, &key);
+    let coded = |sequence, keys: &mut Keys<16>| {
+        let mut out = [0; MAX_WIRE];
+        let length = encode_keyed(head(sequence), &scope, &readings, keys, &mut out).unwrap();
+        out[..length].to_vec()
+    };
+    let by_the_key = coded(515, &mut keys);
+    keys.remember(&head(516), &scope, &key);
+    vec![
+        (board_wire(&frame(513, &key)), Ok(frame(513, &key))),
+        (by_the_key, Ok(frame(515, &readings))),
+        (coded(517, &mut keys), Err(DecodeError::Key)),
+    ]
 }
 
 /// A fault and a plan whose lengths have six bytes, and the longest plan with a length of two.
@@ -103,7 +129,7 @@ fn too_long() -> [Vec<u8>; 3] {
     let reset = [&[1, 0x82, 0x80, 0x80, 0x80, 0x80, 0][..], b"ok"].concat();
     let scan = [13, 4, 0x81, 0x80, 0x80, 0x80, 0x80, 0, 3, 1, 1, 0];
     let longest = [&[14, 4, 0xE0, 0][..], &[7; 96], &[0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 32, 8]].concat();
-    [packet(0x33, &reset), packet(0x38, &scan), packet(0x38, &longest)]
+    [packet(0x43, &reset), packet(0x48, &scan), packet(0x48, &longest)]
 }
 
 fn page_text(examples: &[Example]) -> String {
@@ -126,10 +152,14 @@ fn the_examples_are_what_is_sent() {
 
 #[test]
 fn the_examples_are_what_is_taken() {
+    // One host reads all that boards send, so that it has the keys of coded frames.
+    let mut host = BoardReceiver::default();
     for (expected, wire) in examples() {
+        let mut bytes = &wire[..];
         let taken = match expected.split_once(": ") {
             Some(("board", _)) => {
-                receive_board(&[&wire]).0.iter().map(|result| format!("board: {}", described(result))).collect()
+                let results = std::iter::from_fn(|| host.receive(&mut bytes));
+                results.map(|result| format!("board: {}", described(&result))).collect()
             }
             _ => {
                 receive_command(&wire).0.iter().map(|result| format!("host: {}", described(result))).collect::<Vec<_>>()

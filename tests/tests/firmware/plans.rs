@@ -37,6 +37,27 @@ fn rows_come_round_and_round_and_each_frame_says_which_they_are() {
     assert_eq!(u64::from(step_us), 2 * (20 + 6 * CONVERSION_US));
 }
 
+/// As fast as a slow line is, whatever it takes.
+#[test]
+fn a_slow_line_carries_each_frame_of_a_plan_in_turn() {
+    let outside = Outside::default();
+    outside.set_room(1);
+    let mut board = simple_board(&outside, restless);
+    outside.send(Command::Scan(plan(&[3, 0, 9, 1, 12], 0xFFFF, 1, 0)));
+    outside.send(Command::Start);
+    scan(&mut board, 100);
+    outside.set_room(usize::MAX);
+    board.step().unwrap();
+    let messages = outside.messages();
+    let (frames, turn) = (frames(&messages), [3, 0, 9, 1, 12]);
+    assert!(frames.len() >= 100);
+    for (frame, ground) in frames.iter().zip(turn.iter().cycle()) {
+        assert_eq!(frame.scope.ground(0), *ground);
+    }
+    let folded: u32 = frames.iter().map(|frame| u32::from(frame.head.folded)).sum();
+    assert!(folded > 50, "{folded}");
+}
+
 #[test]
 fn the_multiplexer_grounds_what_the_plan_says() {
     let grounded = std::rc::Rc::new(std::cell::RefCell::new(Vec::new()));

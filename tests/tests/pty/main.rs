@@ -150,9 +150,9 @@ fn a_board_of_a_newer_protocol_is_refused_by_name() {
     let host = Host::start(board.port());
     board.wait_for(Command::Hello);
     // The example of docs/protocol-examples.md.
-    board.raw(&[0x08, 0x40, 0xC0, 0xDE, 0x4F, 0x7C, 0x4A, 0x25, 0x00]);
+    board.raw(&[0x08, 0x50, 0xC0, 0xDE, 0x3F, 0xDF, 0x6C, 0x39, 0x00]);
     let message = host.ended().unwrap_err().to_string();
-    for part in [board.port().to_str().unwrap(), "version 4", "version 3", "tactomo board flash"] {
+    for part in [board.port().to_str().unwrap(), "version 5", "version 4", "tactomo board flash"] {
         assert!(message.contains(part), "{part} is missing in: {message}");
     }
 }

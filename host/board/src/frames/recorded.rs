@@ -340,12 +340,12 @@ mod tests {
 
     #[test]
     fn a_recording_in_another_version_of_the_protocol_is_refused() {
-        // A packet of version 4: the example of docs/protocol-examples.md.
-        let newer = vec![0x08, 0x40, 0xC0, 0xDE, 0x4F, 0x7C, 0x4A, 0x25, 0x00];
+        // A packet of version 5: the example of docs/protocol-examples.md.
+        let newer = vec![0x08, 0x50, 0xC0, 0xDE, 0x3F, 0xDF, 0x6C, 0x39, 0x00];
         let refusal = recorded("newer", &[b"boot text\0".to_vec(), newer]).err();
-        assert!(matches!(refusal, Some(FramesError::Protocol { other: OtherProtocol { found: 4 }, .. })));
+        assert!(matches!(refusal, Some(FramesError::Protocol { other: OtherProtocol { found: 5 }, .. })));
         let message = refusal.map(|error| error.to_string()).unwrap_or_default();
-        assert!(message.contains("version 4") && message.contains("version 3"), "{message}");
+        assert!(message.contains("version 5") && message.contains("version 4"), "{message}");
         assert!(message.contains("use the program that recorded it"), "{message}");
     }
 

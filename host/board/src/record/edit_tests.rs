@@ -81,11 +81,11 @@ fn a_piece_has_its_frames_its_marks_and_its_time() {
 fn no_piece_is_cut_from_a_recording_in_another_version_of_the_protocol() {
     let [from, to] = ["other-version", "other-version-piece"].map(path);
     let mut writer = RecordWriter::new(File::create(&from).unwrap(), &header("square-60")).unwrap();
-    // A packet of version 4: the example of docs/protocol-examples.md.
-    writer.write(0, &[0x08, 0x40, 0xC0, 0xDE, 0x4F, 0x7C, 0x4A, 0x25, 0x00]).unwrap();
+    // A packet of version 5: the example of docs/protocol-examples.md.
+    writer.write(0, &[0x08, 0x50, 0xC0, 0xDE, 0x3F, 0xDF, 0x6C, 0x39, 0x00]).unwrap();
     writer.write(1_000_000, b"more").unwrap();
     let refused = cut(&from, 0.5..=2.0, &to).unwrap_err();
-    assert!(matches!(refused, EditError::Protocol { other: OtherProtocol { found: 4 }, .. }), "{refused:?}");
+    assert!(matches!(refused, EditError::Protocol { other: OtherProtocol { found: 5 }, .. }), "{refused:?}");
     assert!(!to.exists());
     std::fs::remove_file(from).unwrap();
 }

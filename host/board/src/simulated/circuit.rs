@@ -1,15 +1,15 @@
 //! The circuit around the simulated firmware: the multiplexer's lines and latches, and the clock of the board.
 
 use std::convert::Infallible;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use tactomo_firmware::Chip;
 
-/// What pins, converter and chip share. Only the board's thread touches it.
+/// What pins, converter and chip share. Only the board's thread changes it.
 #[derive(Debug, Default)]
 pub(super) struct Circuit {
     now_ns: AtomicU64,
@@ -23,6 +23,8 @@ pub(super) struct Circuit {
     /// When either half last took one.
     grounded_ns: AtomicU64,
     selected_ns: AtomicU64,
+    /// When the first scan began: the scene begins with it, however long the host took to start the board.
+    scene_began_ns: OnceLock<u64>,
     /// The firmware's own work for a row.
     row_work_ns: u64,
 }
@@ -93,6 +95,16 @@ impl Circuit {
     /// Board time of the last grounding (ns).
     pub(super) fn grounded_ns(&self) -> u64 {
         self.grounded_ns.load(Relaxed)
+    }
+
+    /// Board time of the first grounding under which anything was converted (ns).
+    pub(super) fn scene_began_ns(&self) -> Option<u64> {
+        self.scene_began_ns.get().copied()
+    }
+
+    /// The same; it is the last grounding if nothing was converted before.
+    pub(super) fn scene_begins_ns(&self) -> u64 {
+        *self.scene_began_ns.get_or_init(|| self.grounded_ns())
     }
 
     /// Board time of the last selection (ns).

@@ -17,7 +17,8 @@ pub(super) struct Moment {
     /// The grounded electrode, and how often any has been grounded.
     pub(super) ground: u8,
     pub(super) groundings: u64,
-    /// When it was grounded, and now (ns of board time).
+    /// When the scene began, when it was grounded, and now (ns of board time).
+    pub(super) first_ns: u64,
     pub(super) grounded_ns: u64,
     pub(super) now_ns: u64,
 }
@@ -27,8 +28,6 @@ pub(super) struct Pads {
     physics: Box<dyn Physics>,
     /// Voltage of a grounded electrode's switch (V), above which the physics tell theirs.
     ground_v: f64,
-    /// When the first scan began: the scene begins with it, however long the host took to start the board.
-    first_ns: Option<u64>,
     motion: Motion,
 }
 
@@ -56,17 +55,16 @@ impl Pads {
     /// A scene that stands still for each scan, or one that `moves`, above such a ground (V).
     pub(super) fn new(physics: Box<dyn Physics>, ground_v: f64, moves: bool) -> Self {
         let motion = if moves { Motion::Steps(None) } else { Motion::Scan(None) };
-        Self { physics, ground_v, first_ns: None, motion }
+        Self { physics, ground_v, motion }
     }
 
     /// Voltage of an electrode's pad above the converter's zero (V).
     pub(super) fn at(&mut self, moment: Moment, electrode: u8) -> f64 {
-        let first_ns = *self.first_ns.get_or_insert(moment.grounded_ns);
         let (ground, electrode) = (usize::from(moment.ground), usize::from(electrode));
         let above_ground_v = match &mut self.motion {
-            Motion::Scan(held) => held_at(held, &mut *self.physics, first_ns, moment).at(ground, electrode),
+            Motion::Scan(held) => held_at(held, &mut *self.physics, moment).at(ground, electrode),
             Motion::Steps(step) => {
-                let since_ns = moment.now_ns.saturating_sub(first_ns);
+                let since_ns = moment.now_ns.saturating_sub(moment.first_ns);
                 let [begin, end] = &step_at(step, &mut *self.physics, since_ns / STEP_NS).ends;
                 let share = (since_ns % STEP_NS) as f64 / STEP_NS as f64;
                 let [begin_v, end_v] = [begin, end].map(|readings| readings.at(ground, electrode));
@@ -78,8 +76,8 @@ impl Pads {
 }
 
 /// Asks anew, for the moment of grounding, where a scan begins: where an electrode is grounded that does not follow the one before.
-fn held_at<'a>(held: &'a mut Option<Held>, physics: &mut dyn Physics, first_ns: u64, moment: Moment) -> &'a Readings {
-    let Moment { ground, groundings, grounded_ns, .. } = moment;
+fn held_at<'a>(held: &'a mut Option<Held>, physics: &mut dyn Physics, moment: Moment) -> &'a Readings {
+    let Moment { ground, groundings, first_ns, grounded_ns, .. } = moment;
     let goes_on = held.take().filter(|last| last.groundings == groundings || last.ground < ground);
     let readings = match goes_on {
         Some(last) => last.readings,
@@ -145,8 +143,10 @@ mod tests {
         assert!(missed_v < 1e-3 && largest_v > 0.5, "{missed_v} V of {largest_v} V");
     }
 
+    /// The scene began after 5 ms.
     fn moment(ground: u8, groundings: u64, now_ns: u64) -> Moment {
-        Moment { ground, groundings, grounded_ns: now_ns, now_ns }
+        let now_ns = 5_000_000 + now_ns;
+        Moment { ground, groundings, first_ns: 5_000_000, grounded_ns: now_ns, now_ns }
     }
 
     #[test]
@@ -154,7 +154,7 @@ mod tests {
         let clock = Clock::default();
         let mut pads = Pads::new(Box::new(clock.clone()), 0.0, true);
         for now_us in (0..3000).step_by(100) {
-            let read_s = pads.at(moment(now_us as u8 % 4, now_us, 5_000_000 + 1000 * now_us), 0);
+            let read_s = pads.at(moment(now_us as u8 % 4, now_us, 1000 * now_us), 0);
             assert!((read_s - now_us as f64 * 1e-6).abs() < 1e-12, "time begins with the first scan");
         }
         assert_eq!(*clock.0.lock().unwrap(), [0.0, 2e-3, 4e-3]);

@@ -125,6 +125,7 @@ fn moment(circuit: &Circuit) -> Moment {
     Moment {
         ground: circuit.grounded(),
         groundings: circuit.groundings(),
+        first_ns: circuit.scene_begins_ns(),
         grounded_ns: circuit.grounded_ns(),
         now_ns: circuit.now_ns(),
     }

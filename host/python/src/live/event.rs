@@ -32,7 +32,7 @@ impl TouchEvent {
         self.0.frame.sequence
     }
 
-    /// Board time at the start of the scan (s).
+    /// Board time in the middle of the scan (s).
     #[getter]
     fn time_s(&self) -> f64 {
         self.0.frame.time_s()

@@ -87,7 +87,7 @@ fn sum(file: &Path, survey: &Survey) -> String {
 /// What is lost, and where frames were lost that are missing in a file that is whole.
 fn lost(loss: &RecordingLoss) -> String {
     let before = loss.missing_frames > 0 && !loss.is_damage();
-    format!("{loss}{}", if before { ", dropped by the board or its line; the file is whole" } else { "" })
+    format!("{loss}{}", if before { ", lost on the line; the file is whole" } else { "" })
 }
 
 fn in_words(info: &Info, survey: &Survey) -> String {

@@ -220,6 +220,7 @@ struct SolverStateMessage<'a> {
 struct StatisticsMessage {
     frames: u64,
     frames_per_s: f64,
+    folded: u64,
     dropped: u64,
     skipped: u64,
     solved_per_s: f64,
@@ -239,6 +240,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         statistics: StatisticsMessage {
             frames: counts.frames,
             frames_per_s: counts.frames_per_s,
+            folded: counts.folded,
             dropped: counts.dropped,
             skipped: counts.skipped,
             solved_per_s: counts.solved_per_s,

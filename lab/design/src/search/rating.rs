@@ -19,13 +19,13 @@ const TOGETHER: f64 = 0.02;
 /// What a wish counts that is not met at all, as a logarithm.
 const NOT_AT_ALL: f64 = -20.0;
 
-/// The ESP32's budget, docs/firmware.md: seconds for a conversion, a ground's settling, and the firmware's work for a frame of 256 conversions; bytes of a frame beside
-/// the readings; bytes a second at 921 600 baud.
-const CONVERSION_S: f64 = 10e-6;
+/// The ESP32's budget, docs/firmware.md: seconds for a conversion, of which ten of sixteen are one after the other, a ground's settling, and the firmware's work for a
+/// frame of 256 conversions; bytes of a coded frame beside the readings, and of a reading; bytes a second at 921 600 baud.
+const CONVERSION_S: f64 = 10e-6 * 10.0 / 16.0;
 const SETTLE_S: f64 = 20e-6;
-const WORK_S: f64 = 0.45e-3 / 256.0;
-const FRAME_BYTES: f64 = 16.0;
-const BYTES_PER_READING: f64 = 1.5;
+const WORK_S: f64 = 0.42e-3 / 256.0;
+const FRAME_BYTES: f64 = 18.0;
+const BYTES_PER_READING: f64 = 0.75;
 const BYTES_PER_S: f64 = 92_160.0;
 
 /// What a detector gives of each wish.
@@ -186,7 +186,7 @@ mod tests {
         assert!((rating.largest_n.unwrap() - 2.1).abs() < 0.05, "{rating:?}");
         assert!(rating.smallest_n.unwrap() < 1e-3 && rating.place_m.unwrap() < 1e-3);
         // docs/firmware.md: 230 frames/s over the wire.
-        assert!((rating.frames_per_s - 230.0).abs() < 1.0, "{}", rating.frames_per_s);
+        assert!((rating.frames_per_s - 428.0).abs() < 1.0, "{}", rating.frames_per_s);
         assert!(rating.meets(&wishes(), None));
         assert_eq!(rating.tightest(&wishes()), Wish::Largest);
     }

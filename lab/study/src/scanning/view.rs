@@ -139,8 +139,9 @@ fn method(report: &Report) -> String {
     format!(
         "{} scenes of each number of contacts, on {}, which the solver of contacts knows exactly ({} model); seed {}. All contacts touch at once, and \
          stand or go round together. Readings come from a finer model than the one that is inverted, asked every half millimetre of the way and \
-         interpolated by cubics, at the time of each row, with the converter's noise and steps, less a baseline. A row takes 148 µs, the wire carries \
-         92160 bytes a second, a whole frame has 380 of them; a frame is read while the one before is sent, and the solver's own time does not count, \
+         interpolated by cubics, at the time of each row, with the converter's noise and steps, less a baseline. A row takes 146 µs, the wire carries \
+         92160 bytes a second, a whole frame has 210 of them; a frame is read while the one before is sent, readings of rows that are read again until then \
+         count once, and the solver's own time does not count, \
          but a search is made at most every 4 ms. Adaptive grounds are chosen as in live, at most every 40 ms, for which the board stops for 1.5 ms: all \
          in turn for what stands or has just come, and for what moves those that tell most of it, with every fourth row one of all in turn. Contacts \
          that stand: the last answer within 50 ms of the touch; that move: all answers from 50 to 120 ms. Error: mean distance of contacts found from \
