@@ -67,7 +67,7 @@ fn a_press_is_never_re_zeroed() -> Result<()> {
         stage.browser.until("a contact", |told| told.number("contacts") > 0.0).await?;
         let button = stage.browser.client.find(fantoccini::Locator::Id("rezero")).await?;
         button.click().await?;
-        let notice = "return document.getElementById('notice').textContent";
+        let notice = "return document.getElementById('notice-text').textContent";
         let is_refused = |notice: &Value| notice.as_str().is_some_and(|text| text.starts_with("Not re-zeroed"));
         stage.browser.shows(notice, is_refused).await?;
         stage.browser.until("the contact still", |told| told.number("contacts") == 1.0).await?;
@@ -75,7 +75,7 @@ fn a_press_is_never_re_zeroed() -> Result<()> {
         let rezeros = stage.browser.until("rest", |told| told.number("contacts") == 0.0).await?.number("rezeros");
         button.click().await?;
         stage.browser.until("a re-zero", |told| told.number("rezeros") > rezeros).await?;
-        stage.browser.says("notice", "").await
+        stage.browser.says("notice-text", "").await
     })
 }
 

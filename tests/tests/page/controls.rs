@@ -131,7 +131,7 @@ fn recording_is_asked_for_and_its_file_shown() -> Result<()> {
         stage.browser.click("record").await?;
         asks(stage, Request::Record(true)).await?;
         stage.behind.set(|snapshot| snapshot.recording = Some("/tmp/touch.tactomo".into()));
-        stage.browser.says("notice", "Recording to /tmp/touch.tactomo").await?;
+        stage.browser.says("notice-text", "Recording to /tmp/touch.tactomo").await?;
         stage.browser.client.find(Locator::Css("body")).await?.send_keys("r").await?;
         asks(stage, Request::Record(false)).await
     })
@@ -145,7 +145,7 @@ fn what_is_damaged_in_a_recording_is_said() -> Result<()> {
             [(damage, "This recording is damaged: it is damaged in 1 place (70 bytes left out)"), (Loss::default(), "")]
         {
             stage.behind.set(|snapshot| snapshot.playing = damaged(1.0, false, damage));
-            stage.browser.says("notice", said).await?;
+            stage.browser.says("notice-text", said).await?;
         }
         Ok(())
     })

@@ -8,6 +8,7 @@ mod gallery;
 mod live;
 mod raw;
 mod script;
+mod seen;
 mod server;
 mod stage;
 mod view;

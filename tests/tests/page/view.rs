@@ -128,7 +128,7 @@ fn a_warning_goes_with_its_answer_though_no_other_answer_comes() -> Result<()> {
             ..Solution::default()
         };
         stage.behind.solution(answer(true));
-        stage.browser.says("warnings", "readings do not fit").await?;
+        stage.browser.says("warnings", "does not fit").await?;
         // The last answer has no warning, and then the stream stands still.
         stage.behind.solution(answer(false));
         let is_without = |told: &Told| told.text("flags").is_empty();
@@ -209,7 +209,7 @@ fn the_strip_chart_has_each_contacts_value() -> Result<()> {
 #[test]
 fn a_label_and_its_row_show_the_same_number_at_any_moment() -> Result<()> {
     in_front_of(Script::start, async |stage| {
-        let script = "const row = document.querySelector('#contacts td.value');
+        let script = "const row = document.querySelector('#contacts .value');
             return [JSON.parse(document.documentElement.dataset.labels), row?.textContent]";
         stage.behind.contacts(vec![contact(4, [10.0, 0.0], 3e-4)]);
         settled(stage).await;
@@ -241,19 +241,19 @@ fn pressed(contact: FoundContact, force_n: f64, deviation_n: f64, is_beyond: boo
 #[test]
 fn newtons_are_shown_with_their_error_where_the_detector_has_a_law() -> Result<()> {
     in_front_of(Script::start, async |stage| {
-        let script = "const cells = [...document.querySelectorAll('#contacts td.value')];
+        let script = "const cells = [...document.querySelectorAll('#contacts .value')];
             return [document.getElementById('strength').textContent, ...cells.map((cell) => cell.textContent),
-              ...cells.map((cell) => cell.title), JSON.parse(document.getElementById('strip').dataset.values)[4]]";
+              ...cells.map((cell) => cell.closest('td').title), JSON.parse(document.getElementById('strip').dataset.values)[4]]";
         stage.behind.contacts(vec![contact(4, [10.0, 0.0], 3e-4)]);
-        stage.browser.shows(script, |shown| shown[0] == "conductance" && shown[1] == "300\u{2009}µS").await?;
+        stage.browser.shows(script, |shown| shown[0] == "firmness" && shown[1] == "300\u{2009}µS").await?;
         let light = pressed(contact(4, [10.0, 0.0], 3e-4), 0.734, 0.0612, false);
         stage.behind.contacts(vec![light, pressed(contact(5, [-10.0, 0.0], 5e-3), 7.5, 3.0, true)]);
-        let told = "7.50 ± 3.00\u{2009}N, beyond the largest force that can be told; 5.00\u{2009}mS";
+        let told = "force 7.50 ± 3.00\u{2009}N, beyond the largest that can be told; conductance 5.00\u{2009}mS";
         let forces = |shown: &Value| {
             shown[0] == "force"
                 && shown[1] == "734 ± 61\u{2009}mN"
                 && shown[2] == "\u{2273}\u{2009}7.50\u{2009}N"
-                && shown[3] == "734 ± 61\u{2009}mN; 300\u{2009}µS"
+                && shown[3] == "force 734 ± 61\u{2009}mN; conductance 300\u{2009}µS"
                 && shown[4] == told
                 && shown[5].as_f64().is_some_and(|force_n| (force_n - 0.734).abs() < 1e-6)
         };
@@ -374,13 +374,13 @@ fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
         stage.behind.solution(Solution { contacts, residual: Some(1.04), flags, ..Solution::default() });
         stage.browser.says("choice", "2 contacts").await?;
         stage.browser.says("warnings", "electrode 3 left out").await?;
-        stage.browser.says("notice", sentence).await?;
+        stage.browser.says("notice-text", sentence).await?;
         let residual = "return document.getElementById('residual').textContent";
         let is_told = |shown: &Value| shown.as_str().is_some_and(|s| s.starts_with("residual 1.0 × noise · answer "));
         stage.browser.shows(residual, is_told).await?;
         let another = "my-skin was calibrated on another board.";
         stage.behind.set(|snapshot| (snapshot.baseline, snapshot.calibration) = (None, Some(another.to_owned())));
-        stage.browser.says("notice", another).await?;
+        stage.browser.says("notice-text", another).await?;
         ensure!(stage.browser.run("return document.getElementById('notice').className").await? == "warning");
         Ok(())
     })

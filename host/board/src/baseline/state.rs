@@ -38,8 +38,7 @@ impl BaselineState {
         match self {
             Self::Starting | Self::Held | Self::Renewing => None,
             Self::Pressed(largest_v) => Some(format!(
-                "Something pressed at the start (readings up to {} mV): it is shown as touch, and zero is taken by itself once nothing \
-                 presses. If nothing lies on the detector, re-zero.",
+                "Something pressed at the start (up to {} mV) and is shown as touch. Zero is taken once it lifts; if nothing is there, re-zero.",
                 mv(largest_v)
             )),
             Self::Refused(largest_v) => Some(format!(

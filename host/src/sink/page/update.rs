@@ -65,10 +65,14 @@ const WORDS: [Named<u32>; 7] = [
     }),
 ];
 
-/// Residual of the readings: root mean square, in standard deviations of the noise. Age of the answer when this is sent: since the last byte of
+/// Residual of the readings: root mean square, in standard deviations of the noise. How sure the number of contacts is, and the likeliest other one. Age of the answer when this is sent: since the last byte of
 /// its frame came. The pointer: sum of its motion, 1 while it is pressed, clicks so far; not numbers if no contact is one.
-const NUMBERS: [Named<f32>; 6] = [
+const NUMBERS: [Named<f32>; 8] = [
     named("residual", |shown| known(shown.answer.solution.residual)),
+    named("certainty", |shown| known(shown.answer.solution.certainty)),
+    named("other_contacts", |shown| {
+        known(shown.answer.solution.alternative.map(|alternative| alternative.contacts as f64))
+    }),
     named("age_s", |shown| known(shown.answer.frame.arrived.age(Instant::now()).map(|age| age.as_secs_f64()))),
     named("pointer_x_m", |shown| pointer(shown, |state| state.way_m[0])),
     named("pointer_y_m", |shown| pointer(shown, |state| state.way_m[1])),

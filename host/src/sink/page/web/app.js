@@ -12,19 +12,25 @@ import { Picture } from "./picture.js";
 import { PointerPanel } from "./pointer.js";
 import { listenForPresses } from "./press.js";
 import { Connection } from "./protocol.js";
+import { Notice } from "./notice.js";
 import { ReadingsMap } from "./readings.js";
 import { saveData, savePicture } from "./save.js";
 import { Simulation } from "./simulation.js";
 import { StripChart } from "./strip.js";
 import { listenForTheme, theme } from "./theme.js";
 import { Told } from "./told.js";
+import { Totals } from "./totals.js";
 import { Transport } from "./transport.js";
 import { Verdict } from "./verdict.js";
 import { VibrationPanel } from "./vibration.js";
 
+// A sensor so many times as wide as high has what is said of it above, not beside.
+const WIDE = 1.3;
+
 const { dataset } = document.documentElement;
 const send = (request) => connection.send(request);
 const figures = new Figures();
+const notice = new Notice();
 const verdict = new Verdict();
 const vibration = new VibrationPanel();
 const transport = new Transport(send);
@@ -50,8 +56,10 @@ function start(setup) {
     text, told, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
-    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup),
+    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup), totals: new Totals(history),
   };
+  const [[left, bottom], [right, top]] = setup.bounds_m;
+  document.getElementById("picture").classList.toggle("wide", right - left > WIDE * (top - bottom));
   const plot = document.getElementById("plot");
   plot.classList.toggle("pressable", setup.simulated);
   plot.tabIndex = setup.simulated ? 0 : -1;
@@ -66,18 +74,7 @@ function showStatus(status) {
   for (const part of [figures, vibration, transport, recordButton, rezeroButton, parts.board, parts.simulation, parts.calibrate]) part.show(status);
   if (parts.method.show(status.solver, status.link.state === "streaming")) parts.picture.fitNext();
   document.getElementById("pause").hidden = transport.isThere;
-  showNotice(status);
-}
-
-// One line for what the program has to say: what was refused, what to know of the baseline and the calibration, where the recording is.
-function showNotice({ refused, baseline, calibration, recording, solver, playing }) {
-  const notice = document.getElementById("notice");
-  const method = solver?.refused ? `This solver cannot be used: ${solver.refused}` : null;
-  const damage = playing.damage ? `This recording is damaged: ${playing.damage}` : null;
-  const warning = damage ?? baseline ?? calibration;
-  notice.textContent = refused ?? method ?? warning ?? (recording ? `Recording to ${recording}` : "");
-  notice.className = refused || method ? "bad" : warning ? "warning" : "";
-  notice.hidden = !notice.textContent;
+  notice.show(status);
 }
 
 // Draws the newest update when the browser is about to paint, and only then asks for the next: a page that sleeps asks nothing.
@@ -99,6 +96,7 @@ function show(update, now) {
   parts.readings.show(update, now);
   parts.strip.draw(now);
   parts.pointer.show(update, now);
+  parts.totals.show(update, now);
   vibration.draw(now);
   verdict.show(update, parts.method.explanation, now);
   dataset.sequence = String(update.sequence);
@@ -157,6 +155,7 @@ listenForActions({
   rezero: () => rezeroButton.press(),
   calibrate: () => parts?.calibrate.toggle(),
   full: fullScreen,
+  keys: () => document.getElementById("help").showModal(),
   view: () => look(parts?.picture.looking === "flat" ? "space" : "flat"),
   "view-flat": () => look("flat"),
   "view-space": () => look("space"),

@@ -17,12 +17,15 @@ export function placesOf(shape) {
   return shape.kind === "line" ? [at(shape.from), `to ${at(shape.to)}`] : [at(shape.centre)];
 }
 
+/** The middle of it (m). */
+export const centreOf = (shape) => (shape.kind === "line" ? [0, 1].map((axis) => (shape.from[axis] + shape.to[axis]) / 2) : shape.centre);
+
 /** The largest standard error of a place (m), or null. */
 export const errorOf = ({ errorsM }) => (errorsM.includes(null) ? null : Math.max(...errorsM));
 
 /** A place (m) in the middle of the strip, for its label. */
 export const middleOf = (shape) => (shape.kind === "line"
-  ? [0, 1].map((axis) => (shape.from[axis] + shape.to[axis]) / 2)
+  ? centreOf(shape)
   : [shape.centre[0] + shape.radiusM * Math.SQRT1_2, shape.centre[1] + shape.radiusM * Math.SQRT1_2]);
 
 /** Its outline; `x` and `y` turn places (m) into pixels, of which there are `perM` in a metre. */

@@ -13,8 +13,8 @@ const FIGURES = [
   ["age p50", "Median age of answers when they are ready, since the last byte of their frame came", ({ age_us: age }) => microseconds(age.p50)],
   ["solved/s", "Frames that the solver answered over the last second", ({ solved_per_s: rate }) => [count(rate), ""]],
   ["age p99", "99 of 100 answers are younger than this when they are ready", ({ age_us: age }) => microseconds(age.p99)],
-  ["skipped by the solver", "Frames that came and were not solved by themselves, because newer ones had come", ({ skipped }) => [count(skipped), ""]],
-  ["all frames", "Frames received whole since the start; the mean of several scans each where the line is slower than the scan", ({ frames, folded }) => [count(frames), folded ? `of ${fixed(1 + folded / frames, 1)} scans` : ""]],
+  ["skipped", "Frames that came and were not solved by themselves, because newer ones had come", ({ skipped }) => [count(skipped), ""]],
+  ["all frames", "Frames received whole since the start; the mean of several scans each where the line is slower than the scan", ({ frames, folded }) => [count(frames), folded > 0.05 * frames ? `of ${fixed(1 + folded / frames, 1)} scans` : ""]],
   ["lost on the line", "Frames whose numbers are missing", ({ dropped }) => [count(dropped), ""], ({ dropped }) => dropped > 0],
   ["corrupt", "Stretches of bytes that were no message", ({ corrupt }) => [count(corrupt), ""], ({ corrupt }) => corrupt > 0],
 ];

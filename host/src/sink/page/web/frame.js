@@ -43,7 +43,7 @@ function drawAxes(context, layout, colours) {
   for (const xM of ticks(leftM, rightM, step)) text(context, layout.x(xM), low + 14, fixed(xM * 1e3, decimals));
   for (const yM of ticks(bottomM, topM, step)) text(context, layout.left - 8, layout.y(yM), fixed(yM * 1e3, decimals), "right");
   if (layout.narrow) return;
-  text(context, layout.left + layout.width / 2, low + 31, "x (mm)");
+  text(context, layout.left + layout.width / 2, low + 29, "x (mm)");
   upright(context, layout.left - 42, layout.top + layout.height / 2, "y (mm)", -1);
 }
 

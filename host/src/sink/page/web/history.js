@@ -1,16 +1,16 @@
 // How firmly each contact pressed, over the last minute.
 
+import { valueOf } from "./strength.js";
+
 const KEPT_MS = 61_000;
 // Samples are this far apart at least: more do not fit on a screen.
 const EVERY_MS = 40;
-
-// Of a firm contact the apparent conductance is known far better than the conductance, which goes up and down with the noise.
-const strength = ({ forceN, apparentS, conductanceS }) => forceN ?? apparentS ?? conductanceS;
 
 /** Samples of each contact, by its number; those of an image without contacts under 0. */
 export class History {
   constructor(setup) {
     this.areas = nodeAreas(setup);
+    this.nodes = setup.nodes_m;
     this.clear();
   }
 
@@ -28,7 +28,7 @@ export class History {
     this.last = now;
     this.turn += 1;
     const numbered = contacts.filter(({ id }) => id);
-    for (const contact of numbered) this.#add(contact.id, strength(contact), now);
+    for (const contact of numbered) this.#add(contact.id, valueOf(contact), now);
     if (!numbered.length) this.#addWhole(contacts, image, now);
     for (const [id, line] of this.lines) {
       while (line.length && now - line[0].at > KEPT_MS) line.shift();
@@ -38,9 +38,14 @@ export class History {
 
   // Contacts without numbers cannot be told apart from frame to frame: all of them together, or all of the image.
   #addWhole(contacts, image, now) {
-    const whole = contacts.reduce((sum, contact) => sum + strength(contact), 0)
-      || this.areas.reduce((sum, area, node) => sum + area * Math.max(0, image[node] ?? 0), 0);
+    const whole = contacts.reduce((sum, contact) => sum + valueOf(contact), 0)
+      || this.partsOf(image).reduce((sum, { value }) => sum + value, 0);
     if (whole > 0) this.#add(0, whole, now);
+  }
+
+  /** What an image has at its nodes, and where they are (m). */
+  partsOf(image) {
+    return Array.from(image, (density, node) => ({ value: this.areas[node] * Math.max(0, density), at: this.nodes[node] }));
   }
 
   #add(id, value, at) {

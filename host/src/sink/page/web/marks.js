@@ -1,7 +1,6 @@
 // What is drawn over the heat for each contact: its way, its uncertainty, its size where that is known, and its label.
 
 import { faded } from "./palette.js";
-import { withPrefix } from "./units.js";
 
 // The ellipse holds the true place in 86 of 100 frames: two standard errors. Smaller ones (pixels) would hide in the centre's
 // dot, larger ones say nothing.
@@ -10,10 +9,6 @@ const SMALLEST_ELLIPSE = 4;
 const LARGEST_ELLIPSE = 2000;
 const TRAIL_WIDTH = 5;
 const PILL = { height: 22, badge: 9, font: "600 12.5px system-ui, sans-serif" };
-
-/** What a contact presses with, for people: newtons where they are known, "or more" where they are beyond what the detector can tell. */
-export const strengthOf = ({ forceN = null, beyondMaximum, conductanceS }) => (
-  forceN === null ? (conductanceS === null ? "\u2013" : withPrefix(conductanceS, "S")) : `${beyondMaximum ? "\u2273\u2009" : ""}${withPrefix(forceN, "N")}`);
 
 /** The half axes (m) of one standard error and the direction of the longer (radians, anticlockwise), or null. */
 export function ellipseOf({ xErrorM, yErrorM, correlation }) {

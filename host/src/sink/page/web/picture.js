@@ -2,10 +2,10 @@
 
 import { FlatView } from "./flat.js";
 import { HeatField, densityOf } from "./heat.js";
-import { strengthOf } from "./marks.js";
 import { palette } from "./palette.js";
 import { SteadyScale } from "./scale.js";
 import { SpaceView } from "./space.js";
+import { strengthOf } from "./strength.js";
 import { Trails } from "./trails.js";
 
 // Shares of the sheet conductance. Colours never stretch over less than what a contact of the first shows, spread over the area

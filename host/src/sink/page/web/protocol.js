@@ -109,6 +109,8 @@ export function decodeUpdate(buffer, layout) {
     excluded: bitsOf(words.excluded),
     exchanged: bitsOf(words.exchanged),
     residual: numbers.residual,
+    certainty: numbers.certainty,
+    otherContacts: numbers.other_contacts,
     ageS: numbers.age_s,
     image: arrays.image_s_per_m2,
     readings: arrays.readings_v,

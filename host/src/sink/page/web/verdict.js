@@ -7,10 +7,9 @@ import { fixed } from "./units.js";
 const STAYS_MS = 250;
 
 const WARNINGS = {
-  saturated: ["saturated", "Readings at the end of the converter's range, or contacts that conduct so well that more would change nothing"],
-  misfit: ["readings do not fit", "The readings are not what the model gives for what was found"],
-  calibrate: ["calibrate", "The detector differs from its description: a calibration would tell places better"],
-  unfinished: ["searching", "A better answer is being searched, or a search stopped at its limit of steps"],
+  saturated: ["at its limit", "Readings at the end of the converter's range, or contacts that conduct so well that pressing harder would change nothing"],
+  misfit: ["does not fit", "The readings are not what the model gives for what was found: another sensor, a fault, or something that is no contact"],
+  calibrate: ["differs from its description", "The sensor differs from its description, and places are less sure for it: it is learned from what presses, or calibrated at once (K)"],
 };
 
 function chip(kind, text, title) {
@@ -39,8 +38,24 @@ function headline(update) {
   if (shape) return nameOf(shape);
   // Of a solver that chooses, contacts beside an image are what `contacts` would find; of others, they are its peaks.
   if (image.length && what !== "nothing") return contacts.length ? `Image, ${counted(what === "image" ? "contact" : "peak")}` : "Image";
-  if (contacts.length) return counted("contact");
-  return "Nothing touches";
+  if (!contacts.length) return "Nothing touches";
+  const other = update.otherContacts;
+  if (other === null || other === contacts.length) return counted("contact");
+  return `${Math.min(other, contacts.length)} or ${Math.max(other, contacts.length)} contacts`;
+}
+
+// Shares that a person calls sure, and nearly.
+const SURE = [[0.95, "sure"], [0.8, "nearly sure"], [0, "not sure"]];
+
+// How far it is to be believed, in a few words.
+function sureOf(update) {
+  const { certainty, contacts, flags, image, shape } = update;
+  if (isSearched(update)) return "looking for what it is";
+  if (flags.includes("misfit")) return "not sure: the readings do not fit this";
+  if (flags.includes("unfinished") && !image.length) return "looking for a better answer";
+  if (shape || image.length || !contacts.length || certainty === null) return "";
+  const word = SURE.find(([from]) => certainty >= from)[1];
+  return `${word} of the number (${fixed(100 * certainty, 0)} %)`;
 }
 
 function ageText(ageS) {
@@ -54,6 +69,7 @@ export class Verdict {
 
   constructor() {
     this.what = document.getElementById("choice");
+    this.sure = document.getElementById("sure");
     this.residual = document.getElementById("residual");
     this.why = document.getElementById("why");
     this.chips = document.getElementById("warnings");
@@ -69,14 +85,14 @@ export class Verdict {
     if (words !== this.what.textContent || now - this.shown > STAYS_MS) {
       this.shown = now;
       this.what.textContent = words;
+      this.sure.textContent = sureOf(update) || "\u00a0";
       const left = residual === null ? [] : [`residual ${fixed(residual, 1)} × noise`];
       this.residual.textContent = [...left, ageText(ageS)].filter(Boolean).join(" · ");
       // The residual stands beside it.
       this.why.textContent = choice ? choice.why.replace(/^residual [\d.]+ x noise(; )?/, "") : explanation;
       this.why.title = this.why.textContent;
     }
-    // A warm image is never quite settled, and right all the same.
-    this.#warn(update.image.length ? flags.filter((flag) => flag !== "unfinished") : flags, update, now);
+    this.#warn(flags, update, now);
     // Where no other answer comes, as where it is paused, only what this one says stays.
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.#settle(), STAYS_MS);
@@ -85,7 +101,7 @@ export class Verdict {
 
   /** Says that the last answer is no longer of now. */
   hold() {
-    if (this.what.textContent.trim()) this.residual.textContent = "the last answer";
+    if (this.what.textContent.trim()) this.sure.textContent = "the last answer";
   }
 
   #settle() {
