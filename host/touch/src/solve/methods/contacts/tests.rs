@@ -14,7 +14,8 @@ static PROBLEM: LazyLock<Problem> = LazyLock::new(|| {
     let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector()).unwrap());
     Problem::new(slab)
 });
-static FINE: LazyLock<Slab> = LazyLock::new(|| Slab::with_resolution(&detector(), Resolution::FINE).unwrap());
+pub(super) static FINE: LazyLock<Slab> =
+    LazyLock::new(|| Slab::with_resolution(&detector(), Resolution::FINE).unwrap());
 
 fn detector() -> Detector {
     let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();

@@ -1,6 +1,6 @@
 //! Key frames as they are fitted together: what readings are off by in all of them.
 //!
-//! What is not known of the detector is the same in all frames, and linear near some detector. So is what each reading by itself is off by, but for
+//! What is not known of the detector is the same in all frames, and linear near some detector; so are the errors of pads and converters. So is what each reading by itself is off by, but for
 //! noise: the baseline's error is the same in all frames, and the model's in proportion to what is read. Taken as independent from frame to frame,
 //! both made light contacts beside a firm one that is pressed more and less.
 
@@ -28,7 +28,7 @@ pub(super) struct Frame {
     pub target: Target,
     /// With what the readings may be off by together: for fits of this frame alone.
     pub alone: Target,
-    /// What steps of the detector change, whitened, a row each.
+    /// What steps of the detector, pads and converters change, whitened, a row each.
     transposed: DMatrix<f64>,
     /// What readings change by with steps of the detector, as a share of the largest.
     pub unknown: f64,
@@ -76,12 +76,18 @@ impl<'a> Window<'a> {
             finder.check(&key.mean.readings).ok()?;
             let alone = Target::of_mean(&key.mean.readings, key.mean.frames, &finder.errors, None);
             let model_v = finder.errors.model * key.mean.readings.largest_v();
-            let Some((alone, mut patterns)) = finder.informed_with_patterns(&alone, &key.contacts, near.as_ref())
-            else {
-                let transposed = DMatrix::zeros(0, key.mean.readings.volts().len());
-                return Some(Frame { target: alone.clone(), alone, transposed, unknown: 0.0, model_v });
+            let (alone, mut patterns, steps) = match finder.problem.nuisance() {
+                Some(nuisance) => {
+                    let (alone, patterns) = finder.informed_with_patterns(&alone, &key.contacts, near.as_ref())?;
+                    (alone, patterns, nuisance.directions())
+                }
+                None => {
+                    let mut patterns = finder.errors.patterns_v(&key.mean.readings);
+                    alone.mask(&mut patterns);
+                    (alone, patterns, 0)
+                }
             };
-            let of_steps = patterns.columns(0, finder.problem.nuisance()?.directions());
+            let of_steps = patterns.columns(0, steps);
             let unknown_v = (of_steps.norm_squared() / patterns.nrows() as f64).sqrt();
             let unknown = unknown_v / key.mean.readings.largest_v();
             let of_patterns_v = PATTERN_ERROR * unknown_v;

@@ -1,10 +1,14 @@
 //! Contacts that stay while their strengths change, frame by frame.
 
-use super::super::tests::{contact, frame, solver};
+use super::super::tests::{FINE, contact, frame, solver};
+use super::super::{ContactSettings, Contacts};
 use super::*;
 use crate::solve::answer::{FoundContact, Solution};
+use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Adc, ConverterErrors, Detector};
+use tactomo_physics::forward::{ForwardModel, readings_v};
+use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::{Hand, Scene, SceneName};
 use tactomo_physics::simulate::Noise;
 
@@ -89,6 +93,35 @@ fn one_finger_that_presses_more_and_less_or_moves_is_no_two_that_stay() {
     for seed in [1, 2] {
         let counts = counts(&followed(5.0, contacts_of(SceneName::RollingBall, seed)));
         assert!(counts.iter().all(|count| *count == 1), "a ball, seed {seed}: {counts:?}");
+    }
+}
+
+/// What each converter of a chip is off by is the same in all frames. It is little more than the noise of one, and no contact of all.
+#[test]
+fn what_converters_are_off_by_is_no_second_contact() {
+    let described = Detector::default().taken_as_exact();
+    let mut board = described.clone();
+    board.adc = Adc { bits: 12, full_scale_v: 4.096, noise_lsb: 5.0 };
+    let converter = |floor_v: f64| ConverterErrors { gain_share: 0.01, bow_v: 0.012, range_v: [floor_v, 3.1] };
+    board.converters = [0.142, 0.128].map(converter).into();
+    board.electrodes.iter_mut().skip(6).for_each(|pad| pad.converter = 1);
+    let problem = Problem::of(&described).unwrap().measured_as(&board);
+    for seed in [2, 4, 6] {
+        let mut solver = Contacts::new(&problem, ContactSettings::of(&problem)).unwrap();
+        let (mut noise, scene) = (Noise::new(seed), contacts_of(SceneName::RollingBall, seed));
+        let chip = [0; 4].map(|_| noise.normal());
+        let read = |contacts: &[Contact], noise: &mut Noise| {
+            let true_v = readings_v(&FINE.impedance_ohm(contacts).unwrap(), &board);
+            Readings::from_fn(16, |g, e| {
+                let (volts, index) = (true_v.touch_v(g, e), board.electrodes[e].converter);
+                let [gain_v, bow_v] = board.converters[index].changes_v(volts);
+                volts + chip[2 * index] * gain_v + chip[2 * index + 1] * bow_v + 0.005 * noise.normal()
+            })
+        };
+        let frames = (0..1720).map(|index| read(&scene(f64::from(index) / 430.0), &mut noise)).collect::<Vec<_>>();
+        let counts: Vec<_> = frames.iter().map(|frame| solver.solve(frame).unwrap().contacts.len()).collect();
+        let wrong = counts.iter().filter(|count| **count != 1).count();
+        assert!(wrong == 0, "seed {seed}: {wrong} of {}", counts.len());
     }
 }
 
