@@ -184,7 +184,7 @@ mod tests {
     use super::*;
     use crate::run::{Arrival, Frame};
     use tactomo_physics::readings::Readings;
-    use tactomo_touch::solve::{Choice, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
+    use tactomo_touch::solve::{Alternative, Choice, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
     fn bytes_of(solution: Solution) -> Vec<u8> {
         let readings = Readings::from_fn(2, |g, e| (2 * g + e) as f64);
@@ -232,23 +232,23 @@ mod tests {
             calibrated: None,
             shape: None,
             certainty: Some(0.75),
-            alternative: None,
+            alternative: Some(Alternative { contacts: 3, certainty: 0.125 }),
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
         assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 3, 4, 2, 2]);
-        let head = floats(&bytes[44..104]);
-        assert_eq!(head[0], 1.25);
-        assert!((0.0..5.0).contains(&head[1]), "{} s old", head[1]);
-        assert_eq!(head[2..6], [0.5, -0.25, 1.0, 3.0], "the pointer");
-        assert_eq!(head[6..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
-        assert_eq!(words(&bytes[104..108]), [6]);
+        let head = floats(&bytes[44..112]);
+        assert_eq!(head[..3], [1.25, 0.75, 3.0]);
+        assert!((0.0..5.0).contains(&head[3]), "{} s old", head[3]);
+        assert_eq!(head[4..8], [0.5, -0.25, 1.0, 3.0], "the pointer");
+        assert_eq!(head[8..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
+        assert_eq!(words(&bytes[112..116]), [6]);
         let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.125, 0.25, -0.5];
-        assert_eq!(floats(&bytes[108..172]), known);
-        assert_eq!(words(&bytes[172..176]), [0]);
-        assert_eq!(floats(&bytes[176..192]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[192..232]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[232..240]), [1.0, 2.0]);
-        assert_eq!(&bytes[240..], "2 contacts\nµ".as_bytes());
+        assert_eq!(floats(&bytes[116..180]), known);
+        assert_eq!(words(&bytes[180..184]), [0]);
+        assert_eq!(floats(&bytes[184..200]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[200..240]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[240..248]), [1.0, 2.0]);
+        assert_eq!(&bytes[248..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -261,7 +261,7 @@ mod tests {
             ..Solution::default()
         });
         assert_eq!((words(&bytes[12..16]), words(&bytes[40..44])), (vec![2], vec![1]));
-        let shape = floats(&bytes[68 + 4 * 6 + 68..]);
+        let shape = floats(&bytes[76 + 4 * 6 + 68..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }
@@ -271,7 +271,7 @@ mod tests {
         let bytes = bytes_of(Solution::default());
         assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0, 0, 0, 0, 4, 2, 0]);
         assert!(floats(&bytes[44..48])[0].is_nan());
-        assert_eq!(bytes.len(), 68 + 4 * 6);
+        assert_eq!(bytes.len(), 76 + 4 * 6);
     }
 
     /// Words of the page's script that stand behind one of these.
