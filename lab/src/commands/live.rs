@@ -52,6 +52,9 @@ pub struct Args {
     /// Takes the detector as it is described, learning nothing from what presses
     #[arg(long)]
     no_learning: bool,
+    /// Answers the same bytes once more, frame by frame, however long that takes: then how often that is right stands beside
+    #[arg(long)]
+    offline: bool,
     /// Seed of places and noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -98,6 +101,7 @@ fn cases(args: &Args) -> Vec<Case> {
                     time: Duration::from_secs(args.seconds),
                     busy: args.busy,
                     learns: !args.no_learning,
+                    offline: args.offline,
                 }));
             }
         }
@@ -113,6 +117,7 @@ fn view(runs: &[Found]) -> View {
         .column("board", TEXT, |run| run.board)
         .column("scan", TEXT, |run| run.scan.as_str())
         .column("right", PERCENT.digits(0), |run| run.scored.right)
+        .column("offline", PERCENT.digits(0), |run| run.offline_right)
         .column("or named", PERCENT.digits(0), |run| run.scored.named)
         .column("first right", seconds, |run| run.scored.first_right_s)
         .column("error", MM.digits(2), |run| run.scored.error_m)
@@ -125,7 +130,7 @@ fn view(runs: &[Found]) -> View {
         .column("age p99", US, |run| run.age_p99_us)
         .column("learned", seconds, |run| run.learned_s)
         .note(
-            "right: share of the time with as many contacts as touch, or the right shape. or named: and with an answer that names that number as one it may be. error: of places, median; late: in the last third. \
+            "right: share of the time with as many contacts as touch, or the right shape; offline: where the same bytes are answered frame by frame. or named: and with an answer that names that number as one it may be. error: of places, median; late: in the last third. \
              invented, doubtful: shares of the answers. gap: longest time without an answer. learned: when what presses taught was first used.",
         )
         .data();

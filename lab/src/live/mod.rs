@@ -2,6 +2,7 @@
 
 mod score;
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::thread;
@@ -9,11 +10,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use tactomo::run::calibration::Learning;
-use tactomo::run::options::{Ends, RunOptions, Solving};
+use tactomo::run::options::{Ends, RunOptions, Solving, Summary};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{Listener, Snapshot, TouchEvent};
+use tactomo_board::record::{Header, Recorder};
 use tactomo_board::simulated::{BoardModel, Options, SimulatedBoard};
-use tactomo_board::source::Opened;
+use tactomo_board::source::{Opened, Recording, Source};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::scene::{Hand, Scene, SceneName};
 use tactomo_physics::simulate::{Simulation, try_drawn};
@@ -42,6 +44,8 @@ pub struct Case {
     pub busy: usize,
     /// Whether the detector is learned from what presses.
     pub learns: bool,
+    /// Whether the same bytes are answered once more, as fast as they can be read.
+    pub offline: bool,
 }
 
 /// What came of a run.
@@ -55,6 +59,8 @@ pub struct Found {
     /// Answers against the truth.
     #[serde(flatten)]
     pub scored: Scored,
+    /// Share of the time with the right answer, where the same bytes are answered frame by frame, however long that takes.
+    pub offline_right: Option<f64>,
     /// Age of answers when they are ready: 99 % of them are younger (us).
     pub age_p99_us: f64,
     /// Presses that the detector was learned from, if that was in use at the end.
@@ -86,40 +92,89 @@ pub fn run(case: &Case) -> anyhow::Result<Found> {
     let truth = case.built.map_or_else(|| Ok(detector.clone()), |seed| try_drawn(&detector, seed))?;
     let simulation = Simulation::new(&truth, scene.clone(), &[], case.seed)?;
     let board = SimulatedBoard::simulate(&truth, simulation, Options { seed: case.seed, model })?;
-    let (clock, kept) = (board.scene_clock(), Arc::new(Mutex::new(Vec::new())));
-    let solving = Solving::new(case.method, Problem::of(&detector)?);
-    let learning = Learning::of(&detector, None).filter(|_| case.learns);
-    let options = RunOptions {
-        scan: case.scan.clone(),
-        solving: Some(Solving { learning, ..solving }),
-        listeners: vec![Box::new(Keeper(Arc::clone(&kept)))],
-        seconds: Some(case.time),
-        ..RunOptions::new(detector.clone())
+    let clock = board.scene_clock();
+    let kept = case.offline.then(|| KeptBytes::of(&detector)).transpose()?;
+    let (recorder, file) = kept.map_or((None, None), |(recorder, file)| (Some(recorder), Some(file)));
+    let options = |time| -> anyhow::Result<RunOptions> {
+        let solving = Solving::new(case.method, Problem::of(&detector)?);
+        let learning = Learning::of(&detector, None).filter(|_| case.learns);
+        Ok(RunOptions {
+            scan: case.scan.clone(),
+            solving: Some(Solving { learning, ..solving }),
+            seconds: time,
+            ..RunOptions::new(detector.clone())
+        })
     };
-    let (snapshots, shown) = tokio::sync::watch::channel(Arc::new(Snapshot::default()));
-    let (_requests, requests) = mpsc::sync_channel(1);
-    let (stop, ended) = (Arc::default(), AtomicBool::new(false));
-    let (summary, learned) = thread::scope(|scope| {
-        (0..case.busy).for_each(|_| drop(scope.spawn(|| keep_busy(&ended))));
-        let watching = scope.spawn(|| first_learned(&shown, &ended));
-        let ends = Ends { snapshots, requests, stop };
-        let summary = tactomo::run::run(&mut Opened::new(Box::new(board)), options, ends);
-        ended.store(true, Ordering::Relaxed);
-        (summary, watching.join().ok().flatten())
+    let live = RunOptions { recorder, ..options(Some(case.time))? };
+    let live = answered(&mut Opened::new(Box::new(board)), live, case.busy)?;
+    let began_s = clock.began_s().unwrap_or_default();
+    let scorer = Scorer::new(&detector, scene);
+    let offline_right = file.map(|file| -> anyhow::Result<f64> {
+        let mut played = Recording { path: file.0.clone(), speed: f64::INFINITY, stays_open: false };
+        let mut answers = answered(&mut played, options(None)?, 0)?.answers;
+        // What counts is how long an answer stood by the board's clock.
+        let began = Instant::now();
+        answers.iter_mut().for_each(|answer| answer.came = began + Duration::from_secs_f64(answer.time_s));
+        Ok(scorer.of(&answers, began_s).right)
     });
-    let summary = summary?;
-    let answers = std::mem::take(&mut *kept.lock().ok().context("a thread panicked")?);
+    let Live { summary, answers, learned } = live;
     let began = answers.first().map(|answer| answer.came);
     Ok(Found {
         scene: case.scene.to_string(),
         detector: case.built.map_or_else(|| "as described".to_owned(), |seed| format!("as built {seed}")),
         board: model.name(),
         scan: case.scan.to_string(),
-        scored: Scorer::new(&detector, scene).of(&answers, clock.began_s().unwrap_or_default()),
+        scored: scorer.of(&answers, began_s),
+        offline_right: offline_right.transpose()?,
         age_p99_us: summary.age_us.p99,
         learned_from: summary.learned.as_ref().map(|learned| learned.presses),
         learned_s: learned.zip(began).map(|(learned, began)| learned.duration_since(began).as_secs_f64()),
     })
+}
+
+/// What came of one run.
+struct Live {
+    summary: Summary,
+    answers: Vec<Answer>,
+    /// When something learned was first in use.
+    learned: Option<Instant>,
+}
+
+/// Runs a source to its end, and keeps all answers.
+fn answered(source: &mut dyn Source, options: RunOptions, busy: usize) -> anyhow::Result<Live> {
+    let kept = Arc::new(Mutex::new(Vec::new()));
+    let options = RunOptions { listeners: vec![Box::new(Keeper(Arc::clone(&kept)))], ..options };
+    let (snapshots, shown) = tokio::sync::watch::channel(Arc::new(Snapshot::default()));
+    let (_requests, requests) = mpsc::sync_channel(1);
+    let (stop, ended) = (Arc::default(), AtomicBool::new(false));
+    let (summary, learned) = thread::scope(|scope| {
+        (0..busy).for_each(|_| drop(scope.spawn(|| keep_busy(&ended))));
+        let watching = scope.spawn(|| first_learned(&shown, &ended));
+        let ends = Ends { snapshots, requests, stop };
+        let summary = tactomo::run::run(source, options, ends);
+        ended.store(true, Ordering::Relaxed);
+        (summary, watching.join().ok().flatten())
+    });
+    let answers = std::mem::take(&mut *kept.lock().ok().context("a thread panicked")?);
+    Ok(Live { summary: summary?, answers, learned })
+}
+
+/// A file with a run's bytes, which is gone once this is dropped.
+struct KeptBytes(PathBuf);
+
+impl KeptBytes {
+    fn of(detector: &Detector) -> anyhow::Result<(Recorder, Self)> {
+        let path = std::env::temp_dir().join(format!("tactomo-lab-live-{}.tactomo", std::process::id()));
+        let recorder = Recorder::create(&path, &Header::of(detector, "simulated board".to_owned(), 0))?;
+        Ok((recorder, Self(path)))
+    }
+}
+
+impl Drop for KeptBytes {
+    fn drop(&mut self) {
+        // It may be gone already.
+        let _ = std::fs::remove_file(&self.0);
+    }
 }
 
 /// Keeps a core busy.
