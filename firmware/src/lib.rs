@@ -17,7 +17,7 @@
 //!
 //! Guarantees: no allocation, no floating point, no wait without a bound. Sending overlaps sampling: bytes are pushed between
 //! conversions and during waits, as many as the line takes at that moment, so a slow host never delays the scan. While the line has no
-//! room for a frame its rows are scanned again, and their mean is sent. A [`Board16`] takes about 4 kB of RAM.
+//! room for a frame its rows are scanned again, and their mean is sent. A [`Board16`] takes about 5 kB of RAM.
 #![no_std]
 
 mod adc;
