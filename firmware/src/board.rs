@@ -207,6 +207,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
         if !self.hello.is_streaming {
             self.hello.is_streaming = true;
             self.stuck_reported = false;
+            // Who starts it may be another host than before.
+            self.uplink.forget_keys();
             self.restart_pace();
         }
     }

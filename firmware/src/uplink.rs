@@ -97,6 +97,11 @@ impl<const READINGS: usize, const WIRE: usize> Uplink<READINGS, WIRE> {
         fits
     }
 
+    /// Sends the next frames as they are: the host may have none of the keys.
+    pub fn forget_keys(&mut self) {
+        self.keys.clear();
+    }
+
     /// Whether no frame waits or is being sent.
     pub fn has_room(&self) -> bool {
         !self.frame_waits && self.sending != Sending::Frame
@@ -107,7 +112,7 @@ impl<const READINGS: usize, const WIRE: usize> Uplink<READINGS, WIRE> {
     pub fn frame(&mut self, scanned: &Scanned, scope: &Scope, readings: &[u16]) {
         if self.frame_waits {
             // The host has not got the last frame, nor its key.
-            self.keys.clear();
+            self.forget_keys();
             if self.sending == Sending::Frame {
                 self.sending = Sending::Nothing;
             }

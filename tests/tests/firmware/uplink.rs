@@ -93,6 +93,15 @@ fn a_frame_is_coded_by_a_key_that_was_sent_and_a_key_comes_again() {
     let lost = came.iter().take_while(|packet| **packet == Err(DecodeError::Key)).count();
     assert_eq!((lost, receiver.counters().without_key, receiver.counters().corrupt), (30, 30, 0));
     assert!(came[lost..].iter().all(Result::is_ok));
+    // Another host stops and starts it, and has no key either.
+    outside.send(Command::Stop);
+    step(&mut board, 1);
+    outside.send(Command::Start);
+    scan(&mut board, 2);
+    let sent = std::mem::take(&mut outside.wire.borrow_mut().sent);
+    let (mut receiver, mut input) = (BoardReceiver::default(), &sent[..]);
+    let came: Vec<_> = std::iter::from_fn(|| receiver.receive(&mut input)).map(Result::unwrap).collect();
+    assert_eq!(frames(&came).len(), 2);
 }
 
 #[test]

@@ -23,7 +23,7 @@ const NOT_AT_ALL: f64 = -20.0;
 /// frame of 256 conversions; bytes of a coded frame beside the readings, and of a reading; bytes a second at 921 600 baud.
 const CONVERSION_S: f64 = 10e-6 * 10.0 / 16.0;
 const SETTLE_S: f64 = 20e-6;
-const WORK_S: f64 = 0.42e-3 / 256.0;
+const WORK_S: f64 = 0.415e-3 / 256.0;
 const FRAME_BYTES: f64 = 18.0;
 const BYTES_PER_READING: f64 = 0.75;
 const BYTES_PER_S: f64 = 92_160.0;
