@@ -259,11 +259,14 @@ mod tests {
     use proptest::prelude::*;
     use tactomo_protocol::{FrameHead, MAX_WIRE, Range, encode_board, encode_frame};
 
-    fn hello() -> Vec<u8> {
+    fn said() -> Hello {
         let ranges = [Range::of_codes(4, 10)].into_iter().collect();
-        let hello = Hello { adc_bits: 10, adc_full_scale_mv: 1024, drive_mv: 1500, ranges, ..Hello::example(4) };
+        Hello { adc_bits: 10, adc_full_scale_mv: 1024, drive_mv: 1500, ranges, ..Hello::example(4) }
+    }
+
+    fn hello() -> Vec<u8> {
         let mut wire = [0; MAX_WIRE];
-        let length = encode_board(&BoardMessage::Hello(hello), &mut wire).unwrap();
+        let length = encode_board(&BoardMessage::Hello(said()), &mut wire).unwrap();
         wire[..length].to_vec()
     }
 
@@ -323,8 +326,7 @@ mod tests {
             let path = std::env::temp_dir().join(format!("tactomo-{}-frames-flip", std::process::id()));
             let mut writer = RecordWriter::new(Vec::new(), &Header::default()).unwrap();
             let stream: Vec<Vec<u8>> = (0..80).map(|i| frame(i, 100)).collect();
-            writer.write(0, &hello()).unwrap();
-            writer.write(0, &hello()).unwrap();
+            writer.hello(&said()).unwrap();
             stream.chunks(4).for_each(|frames| writer.write(1, &frames.concat()).unwrap());
             let mut file = writer.get_ref().clone();
             let at = at.index(file.len());
@@ -335,6 +337,22 @@ mod tests {
             prop_assert!(loss.is_any(), "at {}", at);
             // What is missing at the very beginning or end has no frame after it to say so; the file does.
             prop_assert!(loss.missing_frames + times.len() as u64 == 80 || loss.file.is_any());
+        }
+    }
+
+    #[test]
+    fn no_flipped_bit_costs_both_hellos() {
+        let path = std::env::temp_dir().join(format!("tactomo-{}-frames-hello", std::process::id()));
+        let mut writer = RecordWriter::new(Vec::new(), &Header::default()).unwrap();
+        let header_bytes = writer.get_ref().len();
+        writer.hello(&said()).unwrap();
+        let hello_bytes = writer.get_ref().len() - header_bytes;
+        writer.write(1, &frame(1, 100)).unwrap();
+        for bit in 0..8 * hello_bytes {
+            let mut file = writer.get_ref().clone();
+            file[header_bytes + bit / 8] ^= 1 << (bit % 8);
+            std::fs::write(&path, file).unwrap();
+            assert!(FrameFile::open(&path, None).is_ok(), "byte {}, bit {}", bit / 8, bit % 8);
         }
     }
 

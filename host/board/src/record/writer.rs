@@ -76,16 +76,17 @@ impl<W: Write> RecordWriter<W> {
         self.out.write_all(&self.chunk)
     }
 
-    /// Adds what a board says of itself, at the start and twice, so that damage to one does not cost the meaning of all frames.
+    /// Adds what a board says of itself, at the start and twice, so that damage to one does not cost the meaning of all frames. Each begins with a zero:
+    /// without, damage to the first one's last byte would join them.
     ///
     /// # Errors
     /// If `out` takes no bytes.
     pub fn hello(&mut self, hello: &Hello) -> io::Result<()> {
-        let mut wire = [0; MAX_WIRE];
-        let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire)
+        let mut wire = [0; 1 + MAX_WIRE];
+        let length = encode_board(&BoardMessage::Hello(hello.clone()), &mut wire[1..])
             .map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
-        self.write(0, &wire[..length])?;
-        self.write(0, &wire[..length])
+        self.write(0, &wire[..=length])?;
+        self.write(0, &wire[..=length])
     }
 
     /// Hands everything to the system.
