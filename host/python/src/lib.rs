@@ -37,7 +37,7 @@ mod _tactomo {
     #[pymodule_export]
     use super::recording::{Frame, Frames, Recording};
     #[pymodule_export]
-    use super::solution::{Flags, FoundContact, Shape, Solution};
+    use super::solution::{Flags, FoundContact, Shape, Solution, Total};
     #[pymodule_export]
     use super::solver::Solver;
 
@@ -57,6 +57,7 @@ mod _tactomo {
         module.add("CONTACT_FIELDS", PyTuple::new(py, CONTACT_COLUMNS.iter().map(|column| column.name))?)?;
         FoundContact::add_fields(&module.getattr("FoundContact")?)?;
         Shape::add_fields(&module.getattr("Shape")?)?;
+        Total::add_fields(&module.getattr("Total")?)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -6,8 +6,10 @@ use pyo3::PyClass;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyCFunction, PyDict, PyList, PyTuple, PyType};
-use tactomo::schema::{CONTACT_COLUMNS, ContactColumn, FrameReport, Kind, SHAPE_COLUMNS};
-use tactomo::solve::{Alternative, Calibrated, Choice, FoundContact as FoundDisc, FoundShape, Solution as Answer};
+use tactomo::schema::{CONTACT_COLUMNS, ContactColumn, FrameReport, Kind, SHAPE_COLUMNS, TOTAL_COLUMNS, word};
+use tactomo::solve::{
+    Alternative, Calibrated, Choice, FoundContact as FoundDisc, FoundShape, Solution as Answer, Total as Summed,
+};
 
 use crate::error::{raised, refused};
 use crate::pickle::{Restored, restored};
@@ -72,6 +74,12 @@ impl Solution {
     #[getter]
     fn is_contacts(&self) -> bool {
         self.image.is_none() && self.answer.is_contacts()
+    }
+
+    /// What all that touches comes to: force, conductance, area, centre of pressure; `None` if nothing touches or the answer is an image.
+    #[getter]
+    fn total(&self) -> Option<Total> {
+        Summed::of(&self.answer, None).map(Total)
     }
 
     /// How far the readings are from those of what was found: root mean square, in standard deviations of the noise; `None` of a method
@@ -211,6 +219,7 @@ fn field<'py>(column: &ContactColumn, contact: &FoundContact, py: Python<'py>) -
         Kind::Integer => value.map(|value| value as i64).into_bound_py_any(py),
         Kind::Flag => value.map(|value| value != 0.0).into_bound_py_any(py),
         Kind::Number => value.into_bound_py_any(py),
+        Kind::Word(words) => value.map(|value| word(words, value)).into_bound_py_any(py),
     }
 }
 
@@ -235,6 +244,29 @@ impl FoundContact {
 
     fn __repr__(&self) -> PyResult<String> {
         Ok(format!("FoundContact({})", serde_json::to_string(&self.0).map_err(raised)?))
+    }
+}
+
+/// What all that touches comes to. Its attributes are `force_n`, `conductance_s`, `area_m2`, `x_m`, `y_m` and `z_m`; `None` where not known.
+#[pyclass(frozen, module = "tactomo")]
+pub struct Total(Summed);
+
+impl Total {
+    /// Gives the class a property for each field of the schema.
+    pub fn add_fields(class: &Bound<'_, PyAny>) -> PyResult<()> {
+        TOTAL_COLUMNS.iter().try_for_each(|column| {
+            let name = column.name.trim_start_matches("total_");
+            add_property(class, name, "Of all that touches; None where not known.", |total: &Bound<'_, Self>| {
+                Ok(column.value(&total.get().0).into_bound_py_any(total.py())?.unbind())
+            })
+        })
+    }
+}
+
+#[pymethods]
+impl Total {
+    fn __repr__(&self) -> PyResult<String> {
+        Ok(format!("Total({})", serde_json::to_string(&self.0).map_err(raised)?))
     }
 }
 

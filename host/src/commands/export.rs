@@ -9,6 +9,7 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use tactomo::board::frames::FileFrame;
 use tactomo::board::record::{RecordError, RecordReader};
+use tactomo::changes::Changes;
 use tactomo::pointer::Pointer;
 use tactomo::readings::Readings;
 use tactomo::run::{Arrival, Frame, TouchEvent};
@@ -118,6 +119,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let fields = args.fields.unwrap_or_default();
     let mut bar = ProgressBar::new("s recorded", last_us / 1_000_000);
     let (mut lost, mut solved) = (0, 0_u64);
+    let mut changes = Changes::default();
     let mut pointer = args.pointer.then(Pointer::default);
     while let Some(frame) = reader.next_frame()? {
         if stop.load(Ordering::Relaxed) {
@@ -130,7 +132,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         if let Some(pointer) = &mut pointer {
             event.pointer_events = pointer.take(event.frame.time_s(), &event.solution.contacts);
         }
-        out.write(&event.into(), fields, reader.frame() as u64)?;
+        out.write(&Delivery::at_once(event, &mut changes), fields, reader.frame() as u64)?;
         solved += 1;
         bar.tell(arrived_s as u64);
     }

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Context;
+use tactomo::changes::Changes;
 use tactomo::schema::FrameReport;
 use tactomo::solve::{Lambda, Method};
 
@@ -98,14 +99,17 @@ impl Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut reader = Reader::open(&args.input())?;
     let mut writer = Writer::new(args, &reader)?;
-    let mut times_us = Vec::new();
+    let (mut times_us, mut changes) = (Vec::new(), Changes::default());
     while let Some(frame) = reader.next_frame()? {
         let begin = Instant::now();
         let solved = reader.solve(&frame);
         let frame_us = begin.elapsed().as_secs_f64() * 1e6;
         let solution = solved.with_context(|| reader.place())?;
         times_us.push(frame_us);
+        let changed = changes.take(&solution.contacts);
         let report = FrameReport {
+            contacts: &changed.contacts,
+            ended: &changed.ended,
             frame: Some(reader.frame() as u64),
             sequence: frame.sequence,
             time_s: frame.time_s,

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use tactomo_touch::changes::{Changed, Changes};
 use tactomo_touch::pointer::PointerEvent;
 use tokio::sync::{broadcast, watch};
 use tokio::time::timeout;
@@ -51,6 +52,7 @@ pub struct Tail {
     losses: Losses,
     /// Frames lost by the link or the board until the event that was delivered last, if one was.
     lost: Option<u64>,
+    changes: Changes,
 }
 
 /// What a taker has lost, since it was too slow.
@@ -73,13 +75,16 @@ pub struct Delivery {
     pub missed_before: u64,
     /// What the pointer has done since the delivery before.
     pub pointer_events: Vec<PointerEvent>,
+    /// The contacts, with what they have done since the delivery before.
+    pub changed: Changed,
 }
 
-/// An event that nobody had to wait for, and before which nothing was missed.
-impl From<TouchEvent> for Delivery {
-    fn from(event: TouchEvent) -> Self {
+impl Delivery {
+    /// An event that nobody had to wait for, and before which nothing was missed; `changes` remember the one before.
+    pub fn at_once(event: TouchEvent, changes: &mut Changes) -> Self {
         let (lost_before, pointer_events) = (event.lost_before, event.pointer_events.clone());
-        Self { event: Arc::new(event), lost_before, missed_before: 0, pointer_events }
+        let changed = changes.take(&event.solution.contacts);
+        Self { event: Arc::new(event), lost_before, missed_before: 0, pointer_events, changed }
     }
 }
 
@@ -119,7 +124,8 @@ impl Taps {
     pub fn open(&self, name: &str, keeps: Keeps, most_per_s: Option<f64>) -> Option<Tail> {
         let events = self.events.upgrade()?.subscribe();
         let losses = Losses { name: name.to_owned(), before: 0, all: 0 };
-        Some(Tail { events, keeps, decimator: Decimator::new(most_per_s), losses, lost: None })
+        let (decimator, changes) = (Decimator::new(most_per_s), Changes::default());
+        Some(Tail { events, keeps, decimator, losses, lost: None, changes })
     }
 
     /// Waits until there is nothing more to come.
@@ -191,7 +197,9 @@ impl Tail {
         // What was lost before the first is no matter of this taker's.
         let before = self.lost.replace(lost).unwrap_or(lost.saturating_sub(event.lost_before));
         let lost_before = lost.saturating_sub(before);
-        Delivery { event, lost_before, missed_before: std::mem::take(&mut self.losses.before), pointer_events }
+        let changed = self.changes.take(&event.solution.contacts);
+        let missed_before = std::mem::take(&mut self.losses.before);
+        Delivery { event, lost_before, missed_before, pointer_events, changed }
     }
 }
 
@@ -215,7 +223,7 @@ impl Drop for Losses {
 
 #[cfg(test)]
 mod tests {
-    use tactomo_touch::solve::Solution;
+    use tactomo_touch::solve::{Change, FoundContact, Solution};
 
     use super::*;
     use crate::run::Frame;
@@ -253,6 +261,33 @@ mod tests {
             assert_eq!(all.iter().map(|delivery| delivery.lost_before).sum::<u64>(), 9);
             assert_eq!((all[10].lost_before, all[11].lost_before), (1, 0));
         }
+    }
+
+    #[test]
+    fn every_reader_is_told_what_began_and_ended_between_the_answers_that_it_gets() {
+        let with = |sequence, ids: &[u32]| {
+            let contacts = ids.iter().map(|id| FoundContact { id: Some(*id), ..FoundContact::default() }).collect();
+            let event = TouchEvent::of(sequence, Solution { contacts, ..Solution::default() });
+            let frame = Frame { board_time_us: sequence, ..event.frame };
+            Arc::new(TouchEvent { frame, ..event })
+        };
+        let mut feed = Feed::default();
+        let tails = [None, Some(100.0)].map(|most_per_s| feed.taps().open("test", Keeps::All, most_per_s).unwrap());
+        // The last reader gets the first and the last of them.
+        for event in [with(0, &[1, 2]), with(1000, &[1, 3]), with(2000, &[1, 3]), with(10_000, &[1, 4])] {
+            feed.touched(&event);
+        }
+        drop(feed);
+        let [all, some] = tails.map(|tail| {
+            let began = |contact: &FoundContact| contact.change == Some(Change::Start);
+            let told = |delivery: Delivery| {
+                let Changed { contacts, ended } = delivery.changed;
+                (contacts.iter().filter(|contact| began(contact)).filter_map(|contact| contact.id).collect(), ended)
+            };
+            deliveries(tail).into_iter().map(told).collect::<Vec<(Vec<_>, Vec<_>)>>()
+        });
+        assert_eq!(all, [(vec![1, 2], vec![]), (vec![3], vec![2]), (vec![], vec![]), (vec![4], vec![3])]);
+        assert_eq!(some, [(vec![1, 2], vec![]), (vec![4], vec![2])]);
     }
 
     #[test]

@@ -48,6 +48,8 @@ impl Fields {
             lost_before: Some(delivery.lost_before),
             missed_before: Some(delivery.missed_before),
             events: &delivery.pointer_events,
+            contacts: &delivery.changed.contacts,
+            ended: &delivery.changed.ended,
             ..delivery.event.report()
         };
         FrameReport {
@@ -80,9 +82,8 @@ impl Fields {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use serde_json::Value;
+    use tactomo_touch::changes::Changes;
     use tactomo_touch::pointer::PointerEvent;
     use tactomo_touch::solve::{FoundContact, Solution};
 
@@ -96,8 +97,12 @@ mod tests {
             residual: Some(1.25),
             ..Solution::default()
         };
-        let event = Arc::new(TouchEvent::of(7, solution));
-        let delivery = Delivery { event, lost_before: 2, missed_before: 3, pointer_events: vec![PointerEvent::Press] };
+        let delivery = Delivery {
+            lost_before: 2,
+            missed_before: 3,
+            pointer_events: vec![PointerEvent::Press],
+            ..Delivery::at_once(TouchEvent::of(7, solution), &mut Changes::default())
+        };
         let mut line = Vec::new();
         fields.parse::<Fields>().unwrap().line(&delivery, &mut line).unwrap();
         assert_eq!(line.pop(), Some(b'\n'));

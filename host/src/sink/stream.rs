@@ -84,6 +84,7 @@ impl<W: Write + Send + 'static> Sink for Lines<W> {
 mod tests {
     use std::sync::{Arc, Mutex};
 
+    use tactomo_touch::changes::Changes;
     use tactomo_touch::solve::Solution;
 
     use super::*;
@@ -105,8 +106,7 @@ mod tests {
     }
 
     fn delivery(sequence: u64) -> Delivery {
-        let event = Arc::new(TouchEvent::of(sequence, Solution::default()));
-        Delivery { event, lost_before: 0, missed_before: 0, pointer_events: Vec::new() }
+        Delivery::at_once(TouchEvent::of(sequence, Solution::default()), &mut Changes::default())
     }
 
     #[test]

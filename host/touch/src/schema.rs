@@ -1,7 +1,7 @@
 //! What a solved frame is called outside of the program: the one schema behind JSON, CSV, NPZ and the page's socket.
 //!
-//! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of its contacts [`CONTACT_COLUMNS`], those of its shape
-//! [`SHAPE_COLUMNS`]; a column that is added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
+//! A frame is a [`FrameReport`]. Its figures are [`FRAME_COLUMNS`], those of all that touches together [`TOTAL_COLUMNS`], those of its contacts
+//! [`CONTACT_COLUMNS`], those of its shape [`SHAPE_COLUMNS`]; a column that is added here is in every format. Names carry their units: `_m` metres, `_s` siemens for a conductance and seconds for a time, `_n`
 //! newtons, `_v` volts, `_us` microseconds. `sigma_` is a standard error, and `force_deviation_n` that of the force. What is not known is absent in JSON, empty in CSV, and in arrays NaN, -1 of an
 //! integer and false of a flag.
 
@@ -11,13 +11,17 @@ use serde::ser::Serializer;
 use tactomo_physics::readings::Readings;
 
 use crate::pointer::PointerEvent;
-use crate::solve::{Alternative, Choice, Flags, FoundContact, FoundShape, Solution};
+use crate::solve::{Alternative, Choice, Flags, FoundContact, FoundShape, Solution, Total};
 
 mod columns;
 mod events;
+mod total;
 
-pub use columns::{CONTACT_COLUMNS, ContactColumn, Kind, SHAPE_COLUMNS, ShapeColumn, contact_values, shape_values};
+pub use columns::{
+    CONTACT_COLUMNS, ContactColumn, Kind, SHAPE_COLUMNS, ShapeColumn, contact_values, shape_values, word,
+};
 pub use events::{EVENT_COLUMNS, EventColumn};
+pub use total::{TOTAL_COLUMNS, TotalColumn};
 
 /// Version of a frame's JSON: it changes where a field goes or means something else, and stays where one is added.
 pub const SCHEMA: u32 = 1;
@@ -79,6 +83,12 @@ pub struct FrameReport<'a> {
     pub age_us: Option<f64>,
     /// The contacts found: the answer, or beside the shape or image that is.
     pub contacts: &'a [FoundContact],
+    /// Numbers of the contacts that were there in the answer before, and are no more.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub ended: &'a [u32],
+    /// What all that touches comes to: of an image not, whose mesh is not known here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub total: Option<Total>,
     /// The shape found, if that is the answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<&'a FoundShape>,
@@ -136,6 +146,7 @@ impl<'a> FrameReport<'a> {
     pub fn of(solution: &'a Solution) -> Self {
         Self {
             contacts: &solution.contacts,
+            total: Total::of(solution, None),
             shape: solution.shape.as_ref(),
             residual: solution.residual,
             certainty: solution.certainty,
@@ -215,19 +226,23 @@ fn texts(frame: &FrameReport) -> [String; TEXT_COLUMNS.len()] {
     ]
 }
 
-/// Heads of a CSV table with a contact a row: a frame's columns, its shape's, `contact` (from 0), a contact's columns in that order,
+/// Heads of a CSV table with a contact a row: a frame's columns, its total's, its shape's, `contact` (from 0), a contact's columns in that order,
 /// and the texts.
 pub fn csv_heads() -> Vec<&'static str> {
     let frame = FRAME_COLUMNS.iter().map(|column| column.name);
     let shape = SHAPE_COLUMNS.iter().map(|column| column.name);
     let contact = CONTACT_COLUMNS.iter().map(|column| column.name);
-    frame.chain(shape).chain(["contact"]).chain(contact).chain(TEXT_COLUMNS).collect()
+    let total = TOTAL_COLUMNS.iter().map(|column| column.name);
+    frame.chain(total).chain(shape).chain(["contact"]).chain(contact).chain(TEXT_COLUMNS).collect()
 }
 
 /// Rows of that table: one for each contact, or one without a contact.
 pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
     let shape = SHAPE_COLUMNS.iter().map(|column| Kind::Number.text(frame.shape.and_then(|shape| column.value(shape))));
-    let start: Vec<_> = FRAME_COLUMNS.iter().map(|column| column.kind.text(column.value(frame))).chain(shape).collect();
+    let total =
+        TOTAL_COLUMNS.iter().map(|column| Kind::Number.text(frame.total.and_then(|total| column.value(&total))));
+    let own = FRAME_COLUMNS.iter().map(|column| column.kind.text(column.value(frame)));
+    let start: Vec<_> = own.chain(total).chain(shape).collect();
     let end = texts(frame);
     let row = |contact: Option<(usize, &FoundContact)>| {
         let index = contact.map_or_else(String::new, |(index, _)| index.to_string());
@@ -245,7 +260,7 @@ pub fn csv_rows(frame: &FrameReport) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::{ElectrodeFault, FoundLine, FoundRing, LineUncertainty, RingUncertainty, Uncertainty};
+    use crate::solve::{Change, ElectrodeFault, FoundLine, FoundRing, LineUncertainty, RingUncertainty, Uncertainty};
 
     fn contact() -> FoundContact {
         FoundContact {
@@ -257,6 +272,7 @@ mod tests {
             force_deviation_n: Some(0.375),
             force_beyond_maximum: Some(true),
             depth_m: Some(0.0625),
+            change: Some(Change::Move { way_m: [0.5, -0.25, 0.125] }),
             uncertainty: Some(Uncertainty { x_m: 0.125, y_m: 0.75, correlation: -0.5, conductance_s: 4.0 }),
             ..FoundContact::flat(1.0, 2.0, 8.0)
         }
@@ -292,11 +308,15 @@ mod tests {
         for (index, column) in CONTACT_COLUMNS.iter().enumerate() {
             let value = column.value(&contact()).unwrap();
             let flag = json[column.name].as_bool().map(f64::from);
-            assert_eq!(json[column.name].as_f64().or(flag), Some(value), "{}", column.name);
+            let number = json[column.name].as_f64().or(flag);
+            match column.kind {
+                Kind::Word(words) => assert_eq!(json[column.name], words[value as usize]),
+                _ => assert_eq!(number, Some(value), "{}", column.name),
+            }
             let cell = heads.iter().position(|head| *head == column.name).unwrap();
             assert_eq!(rows[0][cell], column.kind.text(Some(value)), "{}", column.name);
             if index > 0 {
-                assert_eq!(f64::from(contact_values(&contact())[index - 1]), value, "{}", column.name);
+                assert_eq!(contact_values(&contact())[index - 1], value as f32, "{}", column.name);
             }
         }
         assert!(json["id"].is_u64() && json["force_beyond_maximum"].is_boolean(), "{json}");
@@ -331,7 +351,8 @@ mod tests {
 
     #[test]
     fn what_its_numbers_say_is_the_whole_of_a_contact_and_of_a_shape() {
-        for contact in [contact(), FoundContact::flat(-1.0, -2.0, 5.0)] {
+        let new = FoundContact { change: Some(Change::Start), ..contact() };
+        for contact in [contact(), new, FoundContact::flat(-1.0, -2.0, 5.0)] {
             let values = CONTACT_COLUMNS.each_ref().map(|column| column.value(&contact));
             assert_eq!(FoundContact::of_values(values), contact);
         }
@@ -381,6 +402,8 @@ mod tests {
         assert_eq!(json["flags"]["faults"], serde_json::json!(names));
         assert_eq!(json["choice"]["what"], "2 contacts");
         assert_eq!(json["contacts"].as_array().map(Vec::len), Some(2));
+        let total = serde_json::json!({"conductance_s": 11.0, "x_m": 1.0 / 11.0, "y_m": 2.0 / 11.0, "z_m": 3.0 / 11.0});
+        assert_eq!(json["total"], total);
         assert!(["image_s_per_m2", "frame", "shape", "events"].iter().all(|name| json.get(name).is_none()));
         let events = [PointerEvent::Press, PointerEvent::Move { dx_m: 0.5, dy_m: -0.25 }];
         let report = FrameReport { events: &events, arrived_unix_s: Some(1.79e9), ..FrameReport::of(&solution) };

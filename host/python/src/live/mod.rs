@@ -16,11 +16,12 @@ use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::RequestedSettings;
 use tactomo::causes::with_causes;
+use tactomo::changes::Changes;
 use tactomo::detector::Detector as Described;
 use tactomo::run::calibration::Learning;
 use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::{LinkState, Request, Snapshot};
+use tactomo::run::{LinkState, Request, Snapshot, TouchEvent as Answered};
 use tactomo::scene::SceneName;
 use tactomo::solve::{Method, Problem};
 use tokio::sync::watch;
@@ -64,6 +65,7 @@ pub struct Live {
     record: Option<PathBuf>,
     learning: Option<Learning>,
     queue: Arc<Queue>,
+    changes: Mutex<Changes>,
     has_begun: AtomicBool,
     running: Mutex<Option<Running>>,
 }
@@ -175,6 +177,7 @@ impl Live {
             record,
             learning,
             queue: Arc::new(Queue::new(queue)),
+            changes: Mutex::default(),
             has_begun: AtomicBool::new(false),
             running: Mutex::new(None),
             source,
@@ -234,7 +237,7 @@ impl Live {
     #[pyo3(signature = (timeout = 1.0))]
     fn newest(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<TouchEvent>> {
         match self.queue.newest() {
-            Some(event) => Ok(Some(TouchEvent(event))),
+            Some(event) => Ok(Some(self.event(event))),
             None => self.next(py, timeout),
         }
     }
@@ -350,11 +353,16 @@ impl Live {
             next => next,
         };
         match next {
-            Next::Event(event) => Ok(Some(Some(TouchEvent(event)))),
+            Next::Event(event) => Ok(Some(Some(self.event(event)))),
             Next::Ended(Ok(_)) => Ok(Some(None)),
             Next::Ended(Err(why)) => Err(refused(why)),
             Next::Nothing => py.check_signals().map(|()| None),
         }
+    }
+
+    fn event(&self, event: Arc<Answered>) -> TouchEvent {
+        let mut changes = self.changes.lock().unwrap_or_else(PoisonError::into_inner);
+        TouchEvent { changed: changes.take(&event.solution.contacts), event }
     }
 
     fn ask(&self, request: Request) -> PyResult<()> {

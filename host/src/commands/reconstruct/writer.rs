@@ -6,7 +6,9 @@ use std::io::{self, BufWriter, Write};
 use anyhow::{Context, bail};
 use tactomo::detector::short;
 use tactomo::forward::ImageMesh;
-use tactomo::schema::{self, CONTACT_COLUMNS, EVENT_COLUMNS, FRAME_COLUMNS, FrameReport, Kind, SHAPE_COLUMNS};
+use tactomo::schema::{
+    self, CONTACT_COLUMNS, EVENT_COLUMNS, FRAME_COLUMNS, FrameReport, Kind, SHAPE_COLUMNS, TOTAL_COLUMNS,
+};
 use tactomo::solve::{FoundContact, FoundShape};
 use tactomo::table::{CsvWriter, NpzWriter, Values};
 
@@ -42,6 +44,7 @@ enum Form {
 struct Arrays {
     frames: [Vec<f64>; FRAME_COLUMNS.len()],
     /// Of each frame, whether it has a shape or not.
+    totals: [Vec<f64>; TOTAL_COLUMNS.len()],
     shapes: [Vec<f64>; SHAPE_COLUMNS.len()],
     /// Number of the frame of each contact, and the contacts' own columns.
     contact_frames: Vec<f64>,
@@ -166,6 +169,9 @@ impl Arrays {
         for (column, values) in FRAME_COLUMNS.iter().zip(&mut self.frames) {
             values.push(column.value(frame).unwrap_or(f64::NAN));
         }
+        for (column, values) in TOTAL_COLUMNS.iter().zip(&mut self.totals) {
+            values.push(frame.total.and_then(|total| column.value(&total)).unwrap_or(f64::NAN));
+        }
         for (column, values) in SHAPE_COLUMNS.iter().zip(&mut self.shapes) {
             values.push(frame.shape.and_then(|shape| column.value(shape)).unwrap_or(f64::NAN));
         }
@@ -197,6 +203,9 @@ impl Arrays {
         let mut writer = NpzWriter::new(out);
         for (frame, values) in FRAME_COLUMNS.iter().zip(&self.frames) {
             column(&mut writer, frame.name, frame.kind, values)?;
+        }
+        for (total, values) in TOTAL_COLUMNS.iter().zip(&self.totals) {
+            column(&mut writer, total.name, Kind::Number, values)?;
         }
         for (shape, values) in SHAPE_COLUMNS.iter().zip(&self.shapes) {
             column(&mut writer, shape.name, Kind::Number, values)?;
@@ -232,7 +241,7 @@ fn column(writer: &mut NpzWriter<BufWriter<File>>, name: &str, kind: Kind, value
     let shape = [values.len()];
     match kind {
         Kind::Number => writer.add(name, &shape, values),
-        Kind::Integer => {
+        Kind::Integer | Kind::Word(_) => {
             let values: Vec<i64> = values.iter().map(|value| if value.is_nan() { -1 } else { *value as i64 }).collect();
             writer.add_values(name, &shape, Values::Integers(&values))
         }

@@ -167,8 +167,8 @@ impl Pose {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
     use std::time::Duration;
+    use tactomo_touch::changes::Changes;
 
     use data_encoding::BASE64;
     use serde_json::Value;
@@ -185,8 +185,10 @@ mod tests {
 
     fn message(channel: Channel, event: TouchEvent) -> Option<Value> {
         let arrived = Arrival::recorded(Duration::from_nanos(1_700_000_000_123_456_789));
-        let event = Arc::new(TouchEvent { frame: Frame { arrived, ..event.frame }, ..event });
-        let delivery = Delivery { event, lost_before: 0, missed_before: 0, pointer_events: Vec::new() };
+        let event = TouchEvent { frame: Frame { arrived, ..event.frame }, ..event };
+        let mut changes = Changes::default();
+        changes.take(&[FoundContact { id: Some(2), ..FoundContact::default() }]);
+        let delivery = Delivery::at_once(event, &mut changes);
         let mut out = Vec::new();
         messages().write(channel, &delivery, &mut out).unwrap().then(|| serde_json::from_slice(&out).unwrap())
     }

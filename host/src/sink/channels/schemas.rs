@@ -2,13 +2,14 @@
 //! used here, and all that it requires.
 
 use serde_json::{Map, Value, json};
-use tactomo_touch::schema::{CONTACT_COLUMNS, Kind, SHAPE_COLUMNS};
+use tactomo_touch::schema::{CONTACT_COLUMNS, Kind, SHAPE_COLUMNS, TOTAL_COLUMNS};
 
 /// An object of such fields, those of which are required whose name does not end in `?`.
-fn object(fields: &[(&str, Value)]) -> Value {
+fn object<N: AsRef<str>>(fields: &[(N, Value)]) -> Value {
+    let named = || fields.iter().map(|(name, schema)| (name.as_ref(), schema));
     let bare = |name: &str| name.trim_end_matches('?').to_owned();
-    let properties: Map<_, _> = fields.iter().map(|(name, schema)| (bare(name), schema.clone())).collect();
-    let required: Vec<_> = fields.iter().filter(|(name, _)| !name.ends_with('?')).map(|(name, _)| name).collect();
+    let properties: Map<_, _> = named().map(|(name, schema)| (bare(name), schema.clone())).collect();
+    let required: Vec<_> = named().map(|(name, _)| name).filter(|name| !name.ends_with('?')).collect();
     json!({ "type": "object", "properties": properties, "required": required })
 }
 
@@ -192,6 +193,8 @@ pub(super) fn touch() -> Value {
             ("rezeroing?", boolean()),
             ("age_us?", number()),
             ("contacts", array(contact())),
+            ("ended?", array(integer())),
+            ("total?", total()),
             ("shape?", shape()),
             ("residual?", number()),
             ("certainty?", number()),
@@ -210,16 +213,23 @@ fn contact() -> Value {
             Kind::Integer => integer(),
             Kind::Flag => boolean(),
             Kind::Number => number(),
+            Kind::Word(_) => text(),
         };
         (format!("{}{}", column.name, if is_always_there(column.name) { "" } else { "?" }), schema)
     });
-    let fields: Vec<_> = fields.collect();
-    object(&fields.iter().map(|(name, schema)| (name.as_str(), schema.clone())).collect::<Vec<_>>())
+    object(&fields.collect::<Vec<_>>())
+}
+
+fn total() -> Value {
+    object(&known_numbers(&TOTAL_COLUMNS.each_ref().map(|column| column.name.trim_start_matches("total_"))))
 }
 
 fn shape() -> Value {
-    let names: Vec<_> =
-        SHAPE_COLUMNS.iter().map(|column| format!("{}?", column.name.trim_start_matches("shape_"))).collect();
-    let fields: Vec<_> = names.iter().map(|name| (name.as_str(), number())).chain([("kind", text())]).collect();
-    object(&fields)
+    let names = SHAPE_COLUMNS.each_ref().map(|column| column.name.trim_start_matches("shape_"));
+    object(&[known_numbers(&names), vec![("kind".to_owned(), text())]].concat())
+}
+
+/// Numbers that are there where they are known.
+fn known_numbers(names: &[&str]) -> Vec<(String, Value)> {
+    names.iter().map(|name| (format!("{name}?"), number())).collect()
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use futures_util::StreamExt;
 use tactomo_board::link::Control;
+use tactomo_touch::changes::Changes;
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
 use tokio_tungstenite::tungstenite::Message;
@@ -50,6 +51,7 @@ struct Page<'a> {
     status_due: Instant,
     /// Points of the course of the readings that it has.
     course_points: u64,
+    changes: Changes,
     /// Whether this page presses on the simulated detector.
     presses: bool,
     pulse: Pulse,
@@ -73,6 +75,7 @@ impl<'a> Page<'a> {
             update_due: now,
             status_due: now,
             course_points: 0,
+            changes: Changes::default(),
             presses: false,
             pulse,
         }
@@ -150,7 +153,14 @@ impl<'a> Page<'a> {
         let (course_v, points) = snapshot.course.points_since(self.course_points);
         self.course_points = points;
         let detector = &self.shared.setup.detector;
-        let shown = Shown { answer, frames: snapshot.statistics.frames, course_v: &course_v, detector };
+        let shown = Shown {
+            answer,
+            contacts: &self.changes.take(&answer.solution.contacts).contacts,
+            frames: snapshot.statistics.frames,
+            course_v: &course_v,
+            detector,
+            mesh: &self.shared.setup.mesh,
+        };
         Some(Message::binary(update::update(&shown)))
     }
 }

@@ -17,20 +17,25 @@ use std::time::Instant;
 
 use serde::Serialize;
 use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::ImageMesh;
 use tactomo_touch::pointer::PointerState;
 use tactomo_touch::schema::{CONTACT_COLUMNS, SHAPE_COLUMNS, contact_values, shape_values};
-use tactomo_touch::solve::{ElectrodeFault, Flags, FoundContact};
+use tactomo_touch::solve::{ElectrodeFault, Flags, FoundContact, Total};
 
 use crate::run::TouchEvent;
 
 /// What an update is made of.
 pub(super) struct Shown<'a> {
     pub answer: &'a TouchEvent,
+    /// Its contacts, with what they have done since the update before.
+    pub contacts: &'a [FoundContact],
     /// Frames received so far.
     pub frames: u64,
     /// Points of the [course](crate::run::course) of the readings (V) since the update before, 4 ms each.
     pub course_v: &'a [f32],
     pub detector: &'a Detector,
+    /// The mesh of images.
+    pub mesh: &'a ImageMesh,
 }
 
 /// What has a name and is read from what is shown.
@@ -66,14 +71,18 @@ const WORDS: [Named<u32>; 7] = [
 ];
 
 /// Residual of the readings: root mean square, in standard deviations of the noise. How sure the number of contacts is, and the likeliest other one. Age of the answer when this is sent: since the last byte of
-/// its frame came. The pointer: sum of its motion, 1 while it is pressed, clicks so far; not numbers if no contact is one.
-const NUMBERS: [Named<f32>; 8] = [
+/// its frame came. What all that touches comes to, and its middle on the map. The pointer: sum of its motion, 1 while it is pressed, clicks so far; not numbers if no contact is one.
+const NUMBERS: [Named<f32>; 12] = [
     named("residual", |shown| known(shown.answer.solution.residual)),
     named("certainty", |shown| known(shown.answer.solution.certainty)),
     named("other_contacts", |shown| {
         known(shown.answer.solution.alternative.map(|alternative| alternative.contacts as f64))
     }),
     named("age_s", |shown| known(shown.answer.frame.arrived.age(Instant::now()).map(|age| age.as_secs_f64()))),
+    named("total_force_n", |shown| known(total(shown).and_then(|total| total.force_n))),
+    named("total_s", |shown| known(total(shown).map(|total| total.conductance_s))),
+    named("centre_x_m", |shown| known(total(shown).map(|total| shown.detector.map_m(total.centre_m)[0]))),
+    named("centre_y_m", |shown| known(total(shown).map(|total| shown.detector.map_m(total.centre_m)[1]))),
     named("pointer_x_m", |shown| pointer(shown, |state| state.way_m[0])),
     named("pointer_y_m", |shown| pointer(shown, |state| state.way_m[1])),
     named("pointer_pressed", |shown| pointer(shown, |state| f64::from(u8::from(state.is_pressed)))),
@@ -144,7 +153,7 @@ pub(super) fn update(shown: &Shown) -> Vec<u8> {
     let numbers = NUMBERS.iter().map(|number| (number.of)(shown));
     let numbers = numbers.chain(arrays.iter().flat_map(|array| array.iter().copied()));
     let mut bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).chain(numbers.flat_map(f32::to_le_bytes)).collect();
-    for found in &solution.contacts {
+    for found in shown.contacts {
         bytes.extend(found.id.unwrap_or(0).to_le_bytes());
         bytes.extend(contact(found, shown.detector).flat_map(f32::to_le_bytes));
     }
@@ -163,6 +172,10 @@ fn contact(found: &FoundContact, detector: &Detector) -> impl Iterator<Item = f3
     let uncertainty = found.uncertainty.filter(|_| detector.surface.is_none());
     let map_m = detector.map_m([found.x_m, found.y_m, found.z_m]).map(|metres| metres as f32);
     contact_values(&FoundContact { uncertainty, ..*found }).into_iter().chain(map_m)
+}
+
+fn total(shown: &Shown) -> Option<Total> {
+    Total::of(&shown.answer.solution, Some(shown.mesh))
 }
 
 fn pointer(shown: &Shown, of: fn(&PointerState) -> f64) -> f32 {
@@ -184,7 +197,7 @@ mod tests {
     use super::*;
     use crate::run::{Arrival, Frame};
     use tactomo_physics::readings::Readings;
-    use tactomo_touch::solve::{Alternative, Choice, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
+    use tactomo_touch::solve::{Alternative, Change, Choice, FoundLine, FoundRing, FoundShape, Solution, Uncertainty};
 
     fn bytes_of(solution: Solution) -> Vec<u8> {
         let readings = Readings::from_fn(2, |g, e| (2 * g + e) as f64);
@@ -193,7 +206,9 @@ mod tests {
         let pointer = Some(PointerState { way_m: [0.5, -0.25], is_pressed: true, clicks: 3 });
         let answer = TouchEvent { pointer, ..TouchEvent::new(frame, readings, solution) };
         let detector = &Detector::preset(Detector::DEFAULT).unwrap();
-        update(&Shown { answer: &answer, frames: 300, course_v: &[0.25, 0.75], detector })
+        let mesh = &ImageMesh::default();
+        let contacts = &answer.solution.contacts;
+        update(&Shown { answer: &answer, contacts, frames: 300, course_v: &[0.25, 0.75], detector, mesh })
     }
 
     fn words(bytes: &[u8]) -> Vec<u32> {
@@ -216,6 +231,7 @@ mod tests {
             force_beyond_maximum: Some(true),
             uncertainty: Some(errors),
             depth_m: Some(0.125),
+            change: Some(Change::Move { way_m: [0.5, 0.25, 0.0] }),
             ..FoundContact::flat(0.25, -0.5, 2.0)
         };
         let bytes = bytes_of(Solution {
@@ -236,19 +252,23 @@ mod tests {
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
         assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 3, 4, 2, 2]);
-        let head = floats(&bytes[44..112]);
+        let head = floats(&bytes[44..128]);
         assert_eq!(head[..3], [1.25, 0.75, 3.0]);
         assert!((0.0..5.0).contains(&head[3]), "{} s old", head[3]);
-        assert_eq!(head[4..8], [0.5, -0.25, 1.0, 3.0], "the pointer");
-        assert_eq!(head[8..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
-        assert_eq!(words(&bytes[112..116]), [6]);
-        let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.125, 0.25, -0.5];
-        assert_eq!(floats(&bytes[116..180]), known);
-        assert_eq!(words(&bytes[180..184]), [0]);
-        assert_eq!(floats(&bytes[184..200]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[200..240]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[240..248]), [1.0, 2.0]);
-        assert_eq!(&bytes[248..], "2 contacts\nµ".as_bytes());
+        assert!(head[4].is_nan(), "not all newtons are known");
+        assert_eq!(head[5], 4.75, "the sum");
+        assert!((head[6] - (1.75 * 0.25 + 3.0) / 4.75).abs() < 1e-6 && (head[7] - 5.125 / 4.75).abs() < 1e-6);
+        assert_eq!(head[8..12], [0.5, -0.25, 1.0, 3.0], "the pointer");
+        assert_eq!(head[12..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
+        assert_eq!(words(&bytes[128..132]), [6]);
+        let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.125];
+        let known = [&known[..], &[7.068_583_5, 1.0, 0.5, 0.25, 0.0, 0.25, -0.5]].concat();
+        assert_eq!(floats(&bytes[132..216]), known);
+        assert_eq!(words(&bytes[216..220]), [0]);
+        assert_eq!(floats(&bytes[220..236]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[236..296]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[296..304]), [1.0, 2.0]);
+        assert_eq!(&bytes[304..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -261,7 +281,7 @@ mod tests {
             ..Solution::default()
         });
         assert_eq!((words(&bytes[12..16]), words(&bytes[40..44])), (vec![2], vec![1]));
-        let shape = floats(&bytes[76 + 4 * 6 + 68..]);
+        let shape = floats(&bytes[92 + 4 * 6 + 88..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }
@@ -271,7 +291,7 @@ mod tests {
         let bytes = bytes_of(Solution::default());
         assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0, 0, 0, 0, 4, 2, 0]);
         assert!(floats(&bytes[44..48])[0].is_nan());
-        assert_eq!(bytes.len(), 76 + 4 * 6);
+        assert_eq!(bytes.len(), 92 + 4 * 6);
     }
 
     /// Words of the page's script that stand behind one of these.

@@ -2,7 +2,9 @@
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use crate::solve::{FoundContact, FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty, Uncertainty};
+use crate::solve::{
+    Change, FoundContact, FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty, Uncertainty,
+};
 
 /// What kind of number a column has. In files of columns each kind is that of the file: 64-bit integers, booleans, double precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +15,8 @@ pub enum Kind {
     Flag,
     /// Any number.
     Number,
+    /// One of these words, by its number in their order.
+    Word(&'static [&'static str]),
 }
 
 impl Kind {
@@ -21,10 +25,19 @@ impl Kind {
         match (self, value) {
             (_, None) => String::new(),
             (Self::Flag, Some(value)) => (value != 0.0).to_string(),
+            (Self::Word(words), Some(value)) => word(words, value).to_owned(),
             (Self::Integer | Self::Number, Some(value)) => value.to_string(),
         }
     }
 }
+
+/// The word of such a number.
+pub fn word(words: &[&'static str], value: f64) -> &'static str {
+    words.get(value as usize).copied().unwrap_or_default()
+}
+
+/// What a contact has done, as [`Change`] has it.
+const STATES: &[&str] = &["start", "move"];
 
 /// A number of a contact, by its name.
 pub struct ContactColumn {
@@ -38,7 +51,7 @@ pub struct ContactColumn {
 }
 
 /// The numbers of a contact, in the order of every format.
-pub const CONTACT_COLUMNS: [ContactColumn; 15] = [
+pub const CONTACT_COLUMNS: [ContactColumn; 20] = [
     ContactColumn {
         name: "id",
         kind: Kind::Integer,
@@ -119,7 +132,39 @@ pub const CONTACT_COLUMNS: [ContactColumn; 15] = [
         what: "Depth (m) that it is pressed in, of a solver that was taught depths.",
         of: |contact| contact.depth_m,
     },
+    ContactColumn {
+        name: "area_m2",
+        kind: Kind::Number,
+        what: "Area (m2), where the readings determine its radius.",
+        of: FoundContact::area_m2,
+    },
+    ContactColumn {
+        name: "state",
+        kind: Kind::Word(STATES),
+        what: "`start` if it was not there in the answer before, else `move`.",
+        of: |contact| contact.change.map(|change| f64::from(u8::from(change != Change::Start))),
+    },
+    ContactColumn {
+        name: "dx_m",
+        kind: Kind::Number,
+        what: "Its way since the answer before, x (m).",
+        of: |contact| way_m(contact, 0),
+    },
+    ContactColumn { name: "dy_m", kind: Kind::Number, what: "The same, y (m).", of: |contact| way_m(contact, 1) },
+    ContactColumn {
+        name: "dz_m",
+        kind: Kind::Number,
+        what: "The same, z (m): on a curved detector; zero on a flat one.",
+        of: |contact| way_m(contact, 2),
+    },
 ];
+
+fn way_m(contact: &FoundContact, axis: usize) -> Option<f64> {
+    match contact.change? {
+        Change::Start => None,
+        Change::Move { way_m } => Some(way_m[axis]),
+    }
+}
 
 fn error(contact: &FoundContact, of: fn(&Uncertainty) -> f64) -> Option<f64> {
     contact.uncertainty.as_ref().map(of)
@@ -142,7 +187,8 @@ impl FoundContact {
     /// The contact with these numbers, in the order of [`CONTACT_COLUMNS`]: the inverse of [`ContactColumn::value`].
     pub fn of_values(values: [Option<f64>; CONTACT_COLUMNS.len()]) -> Self {
         let [id, x_m, y_m, z_m, conductance_s, apparent_conductance_s, radius_m, others @ ..] = values;
-        let [force_n, force_deviation_n, beyond, sigma_x_m, sigma_y_m, correlation, sigma_s, depth_m] = others;
+        let [force_n, force_deviation_n, beyond, sigma_x_m, sigma_y_m, correlation, sigma_s, depth_m, ref change @ ..] =
+            others;
         let uncertainty = || {
             let (correlation, conductance_s) = (correlation?, sigma_s?);
             Some(Uncertainty { x_m: sigma_x_m?, y_m: sigma_y_m?, correlation, conductance_s })
@@ -160,20 +206,28 @@ impl FoundContact {
             force_deviation_n,
             force_beyond_maximum: beyond.map(|flag| flag != 0.0),
             uncertainty: uncertainty(),
+            change: change_of(*change),
         }
     }
 }
 
-/// `{id?, x_m, y_m, z_m?, conductance_s?, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ..., depth_m?}`; z is left out on a flat detector.
+/// The change with the numbers from the area on.
+fn change_of([_area_m2, state, ref way_m @ ..]: [Option<f64>; 5]) -> Option<Change> {
+    let [dx_m, dy_m, dz_m] = way_m.map(Option::unwrap_or_default);
+    state.map(|state| if state == 0.0 { Change::Start } else { Change::Move { way_m: [dx_m, dy_m, dz_m] } })
+}
+
+/// `{id?, x_m, y_m, z_m?, conductance_s?, apparent_conductance_s?, radius_m?, force_n?, force_deviation_n?, force_beyond_maximum?, sigma_x_m?, ..., depth_m?, area_m2?, state?, dx_m?, ...}`; z is left out on a flat detector.
 impl Serialize for FoundContact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
         for column in &CONTACT_COLUMNS {
             match (column.name, column.kind, column.value(self)) {
-                ("z_m", _, Some(0.0)) | (_, _, None) => {}
+                ("z_m" | "dz_m", _, Some(0.0)) | (_, _, None) => {}
                 (name, Kind::Integer, Some(value)) => map.serialize_entry(name, &(value as u64))?,
                 (name, Kind::Flag, Some(value)) => map.serialize_entry(name, &(value != 0.0))?,
                 (name, Kind::Number, Some(value)) => map.serialize_entry(name, &value)?,
+                (name, Kind::Word(words), Some(value)) => map.serialize_entry(name, word(words, value))?,
             }
         }
         map.end()

@@ -31,8 +31,8 @@ mod solver;
 #[cfg(test)]
 pub(crate) use self::after::correct::Corrector;
 pub use self::answer::{
-    Alternative, Calibrated, Choice, ElectrodeFault, Flags, FoundContact, FoundLine, FoundRing, FoundShape,
-    LineUncertainty, RingUncertainty, Solution, SolveError, Uncertainty, check,
+    Alternative, Calibrated, Change, Choice, ElectrodeFault, Flags, FoundContact, FoundLine, FoundRing, FoundShape,
+    LineUncertainty, RingUncertainty, Solution, SolveError, Total, Uncertainty, check,
 };
 pub use self::before::adaptive_mean::AdaptiveMean;
 pub(crate) use self::before::adaptive_mean::rounding_v;

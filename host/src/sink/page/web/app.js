@@ -51,12 +51,12 @@ function start(setup) {
   }
   const told = new Told();
   const picture = new Picture(setup, theme(), told);
-  const history = new History(setup);
+  const history = new History();
   parts = {
     text, told, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
-    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup), totals: new Totals(history),
+    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup), totals: new Totals(),
   };
   const [[left, bottom], [right, top]] = setup.bounds_m;
   document.getElementById("picture").classList.toggle("wide", right - left > WIDE * (top - bottom));

@@ -33,11 +33,12 @@ function strengthCell(contact, text, sheetS) {
   return cell;
 }
 
-function titleOf({ forceN = null, forceErrorN, beyondMaximum, conductanceS, errorS, radiusM = null }) {
+function titleOf({ forceN = null, forceErrorN, beyondMaximum, conductanceS, errorS, radiusM = null, areaM2 = null }) {
   const force = forceN === null ? [] : [`force ${withError(forceN, forceErrorN, "N")}${beyondMaximum ? ", beyond the largest that can be told" : ""}`];
   const error = errorS === null ? "" : ` ± ${withPrefix(errorS, "S", 2)}`;
   const conductance = conductanceS === null ? "conductance not known" : `conductance ${withPrefix(conductanceS, "S")}${error}`;
-  return [...force, conductance, ...(radiusM === null ? [] : [`radius ${millimetres(radiusM, 1)} mm`])].join("; ");
+  const size = radiusM === null || areaM2 === null ? [] : [`radius ${millimetres(radiusM, 1)} mm`, `area ${(1e6 * areaM2).toPrecision(2)} mm²`];
+  return [...force, conductance, ...size].join("; ");
 }
 
 function strengthText(contact) {

@@ -1,16 +1,14 @@
 // How firmly each contact pressed, over the last minute.
 
-import { valueOf } from "./strength.js";
+import { conductanceOf } from "./strength.js";
 
 const KEPT_MS = 61_000;
 // Samples are this far apart at least: more do not fit on a screen.
 const EVERY_MS = 40;
 
-/** Samples of each contact, by its number; those of an image without contacts under 0. */
+/** Samples of each contact, by its number; those of all together, where they have no numbers or are an image, under 0. */
 export class History {
-  constructor(setup) {
-    this.areas = nodeAreas(setup);
-    this.nodes = setup.nodes_m;
+  constructor() {
     this.clear();
   }
 
@@ -22,30 +20,24 @@ export class History {
   }
 
   /** Takes an update. */
-  take({ contacts, image }, now) {
-    this.unit = contacts.some(({ forceN }) => forceN !== null) ? "N" : "S";
+  take({ contacts, total }, now) {
+    const unit = total && total.forceN !== null ? "N" : "S";
+    if (total && unit !== this.unit) {
+      // Newtons and siemens have no axis in common.
+      this.clear();
+      this.unit = unit;
+    }
     if (now - this.last < EVERY_MS) return;
     this.last = now;
     this.turn += 1;
     const numbered = contacts.filter(({ id }) => id);
-    for (const contact of numbered) this.#add(contact.id, valueOf(contact), now);
-    if (!numbered.length) this.#addWhole(contacts, image, now);
+    for (const contact of numbered) this.#add(contact.id, unit === "N" ? contact.forceN : conductanceOf(contact), now);
+    // Without numbers they cannot be told apart from frame to frame.
+    if (!numbered.length && total) this.#add(0, total.forceN ?? total.conductanceS, now);
     for (const [id, line] of this.lines) {
       while (line.length && now - line[0].at > KEPT_MS) line.shift();
       if (!line.length) this.lines.delete(id);
     }
-  }
-
-  // Contacts without numbers cannot be told apart from frame to frame: all of them together, or all of the image.
-  #addWhole(contacts, image, now) {
-    const whole = contacts.reduce((sum, contact) => sum + valueOf(contact), 0)
-      || this.partsOf(image).reduce((sum, { value }) => sum + value, 0);
-    if (whole > 0) this.#add(0, whole, now);
-  }
-
-  /** What an image has at its nodes, and where they are (m). */
-  partsOf(image) {
-    return Array.from(image, (density, node) => ({ value: this.areas[node] * Math.max(0, density), at: this.nodes[node] }));
   }
 
   #add(id, value, at) {
@@ -62,17 +54,4 @@ export class History {
       .filter(([, sample]) => sample && moment - sample.at < 4 * EVERY_MS + 100)
       .map(([id, sample]) => [id, sample.value]);
   }
-}
-
-// A third of each triangle belongs to each of its corners (m2).
-function nodeAreas({ nodes_m: nodes, places_m: places, triangles, torn_triangles: torn }) {
-  const areas = new Float64Array(nodes.length);
-  const at = (node) => places[node] ?? [...nodes[node], 0];
-  for (const triangle of [...triangles, ...torn]) {
-    const [a, b, c] = triangle.map(at);
-    const [u, v] = [b, c].map((p) => p.map((value, k) => value - a[k]));
-    const area = 0.5 * Math.hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]);
-    for (const node of triangle) areas[node] += area / 3;
-  }
-  return areas;
 }

@@ -53,6 +53,7 @@ function contact(taker, names) {
     correlation: values.correlation,
     errorS: values.sigma_conductance_s,
     depthM: values.depth_m,
+    areaM2: values.area_m2,
   };
 }
 
@@ -75,6 +76,12 @@ function shape(taker, names, kind) {
       radiusM: values.shape_radius_m,
       errorsM: [values.shape_sigma_x_m, values.shape_sigma_y_m, values.shape_sigma_radius_m],
     };
+}
+
+// What all that touches comes to, if something does.
+function total(numbers) {
+  const [x, y, conductanceS] = [numbers.centre_x_m, numbers.centre_y_m, numbers.total_s];
+  return conductanceS === null ? null : { forceN: numbers.total_force_n, conductanceS, centreM: [x, y] };
 }
 
 // What the pointer has done, if a contact is one.
@@ -111,6 +118,7 @@ export function decodeUpdate(buffer, layout) {
     residual: numbers.residual,
     certainty: numbers.certainty,
     otherContacts: numbers.other_contacts,
+    total: total(numbers),
     ageS: numbers.age_s,
     image: arrays.image_s_per_m2,
     readings: arrays.readings_v,

@@ -2,11 +2,11 @@
 
 import { withPrefix } from "./units.js";
 
-/**
- * Newtons where they are known, else the apparent conductance: of a firm contact that is known far better than the conductance, which goes up and down with
- * the noise. Null if neither is known.
- */
-export const valueOf = ({ forceN, apparentS, conductanceS }) => forceN ?? apparentS ?? conductanceS ?? null;
+/** The apparent conductance: of a firm contact it is known far better than the conductance, which goes up and down with the noise. Null if neither is known. */
+export const conductanceOf = ({ apparentS, conductanceS }) => apparentS ?? conductanceS ?? null;
+
+/** Newtons where they are known, else that. */
+export const valueOf = (contact) => contact.forceN ?? conductanceOf(contact);
 
 /** The same for people: "or more" where a force is beyond what the detector can tell. */
 export function strengthOf(contact) {

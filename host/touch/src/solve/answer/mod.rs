@@ -1,11 +1,16 @@
 //! What a solver says of a frame, and why it cannot say anything. Knows no other module of this package.
 
+use std::f64::consts::PI;
+
 mod fault;
 mod shape;
+mod total;
 
 pub use self::fault::ElectrodeFault;
 pub use self::shape::{FoundLine, FoundRing, FoundShape, LineUncertainty, RingUncertainty};
+pub use self::total::Total;
 use tactomo_physics::readings::Readings;
+use tactomo_physics::space::Place;
 
 /// What a solver found.
 ///
@@ -128,6 +133,21 @@ pub struct FoundContact {
     pub uncertainty: Option<Uncertainty>,
     /// Number that a contact keeps from frame to frame, of a method that follows contacts.
     pub id: Option<u32>,
+    /// What it has done since the answer that its reader got before: of one that has a number, once [`Changes`](crate::changes::Changes) has
+    /// seen it.
+    pub change: Option<Change>,
+}
+
+/// What a contact has done since the answer before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// It is new.
+    Start,
+    /// It was there.
+    Move {
+        /// Its way (m).
+        way_m: Place,
+    },
 }
 
 /// Standard errors of a contact.
@@ -152,6 +172,11 @@ impl FoundContact {
     /// Its conductance (S), where that is known: nothing that touches has none.
     pub fn known_conductance_s(&self) -> Option<f64> {
         (self.conductance_s != 0.0).then_some(self.conductance_s)
+    }
+
+    /// Its area (m2), where the readings tell its radius.
+    pub fn area_m2(&self) -> Option<f64> {
+        self.radius_m.map(|radius_m| PI * radius_m.powi(2))
     }
 }
 

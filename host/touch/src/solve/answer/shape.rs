@@ -1,5 +1,7 @@
 //! Shapes that were found, as they leave a solver.
 
+use std::f64::consts::TAU;
+
 use tactomo_physics::geometry::{self, Point};
 
 /// A shape that explains a frame with less than an image takes.
@@ -96,6 +98,22 @@ impl FoundShape {
         match self {
             Self::Line(line) => line.conductance_s,
             Self::Ring(ring) => ring.conductance_s,
+        }
+    }
+
+    /// Its middle (m): of a line that between its ends, of a ring its centre.
+    pub fn centre_m(&self) -> Point {
+        match self {
+            Self::Line(line) => std::array::from_fn(|axis| 0.5 * (line.from_m[axis] + line.to_m[axis])),
+            Self::Ring(ring) => ring.centre_m,
+        }
+    }
+
+    /// Its area (m2), with what of it may reach over an edge of the detector.
+    pub fn area_m2(&self) -> f64 {
+        match self {
+            Self::Line(line) => line.length_m() * line.width_m,
+            Self::Ring(ring) => TAU * ring.radius_m * ring.width_m,
         }
     }
 }
