@@ -5,10 +5,14 @@
 mod browser;
 mod check;
 mod figure;
+mod film;
 mod find;
 mod job;
+mod live;
 mod marks;
+mod palette;
 mod picture;
+mod png;
 mod store;
 mod table;
 mod take;
