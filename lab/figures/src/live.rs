@@ -25,7 +25,7 @@ const FILM_STEP: Duration = Duration::from_millis(100);
 /// Less is a row of pictures (1/s).
 const LEAST_FILM_RATE: f64 = 5.0;
 /// Pixels of a film for each of the page's.
-const FILM_SCALE: f64 = 0.8;
+const FILM_SCALE: f64 = 0.75;
 /// Documents shall not grow by more with each film that is taken again.
 const MOST_FILM_BYTES: usize = 1_000_000;
 

@@ -32,7 +32,7 @@ impl Palette {
         cells.sort_unstable_by_key(|cell| cell.colour);
         let mut boxes = vec![Cut::of(cells)];
         while boxes.len() < count.min(256) {
-            let Some(widest) = (0..boxes.len()).filter(|i| boxes[*i].cells.len() > 1).max_by_key(|i| boxes[*i].spread)
+            let Some(widest) = (0..boxes.len()).filter(|i| boxes[*i].spread > 0).max_by_key(|i| boxes[*i].spread)
             else {
                 break;
             };
@@ -85,11 +85,11 @@ impl Cut {
         Self { cells, channel, spread }
     }
 
-    /// Both halves, by how many colours there are.
-    fn halves(mut self) -> (Vec<Cell>, Vec<Cell>) {
-        self.cells.sort_by_key(|cell| cell.colour[self.channel]);
-        let upper = self.cells.split_off(self.cells.len() / 2);
-        (self.cells, upper)
+    /// Both halves of the box. Half the colours each, as Heckbert has it, would give the many greys of small letters most of the palette.
+    fn halves(self) -> (Vec<Cell>, Vec<Cell>) {
+        let values = || self.cells.iter().map(|cell| cell.colour[self.channel]);
+        let middle = u8::midpoint(values().min().unwrap_or_default(), values().max().unwrap_or_default());
+        self.cells.into_iter().partition(|cell| cell.colour[self.channel] <= middle)
     }
 
     fn mean(&self) -> Colour {

@@ -115,7 +115,7 @@ const fn film(
     seconds: f64,
 ) -> Picture {
     let live = Live { args, theme: "light", contacts, headline };
-    Picture { file, how: How::Film(Film { live, seconds }), size: [1000, 600], sources: FILMS }
+    Picture { file, how: How::Film(Film { live, seconds }), size: [1120, 720], sources: FILMS }
 }
 
 /// All pictures.
