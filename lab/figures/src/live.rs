@@ -24,8 +24,6 @@ const SETTLES: Duration = Duration::from_secs(6);
 const FILM_STEP: Duration = Duration::from_millis(100);
 /// Less is a row of pictures (1/s).
 const LEAST_FILM_RATE: f64 = 5.0;
-/// Pixels of a film for each of the page's.
-const FILM_SCALE: f64 = 0.75;
 /// Documents shall not grow by more with each film that is taken again.
 const MOST_FILM_BYTES: usize = 1_000_000;
 
@@ -46,7 +44,7 @@ pub fn picture_of_live(tools: &Tools, live: &Live, size: [u32; 2], picture: &Pat
 /// # Errors
 /// If the page never tells that, there is no browser, or the machine is too busy for a film.
 pub fn film_of_live(tools: &Tools, shown: &Film, size: [u32; 2], file: &Path) -> Result<String> {
-    on_page(tools, &shown.live, (size, FILM_SCALE), async |browser| filmed(browser, shown, file).await)
+    on_page(tools, &shown.live, (size, shown.scale), async |browser| filmed(browser, shown, file).await)
 }
 
 /// Starts the program, opens its page, of that size and scale, in that theme and with something behind it, and looks at it.

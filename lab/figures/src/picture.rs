@@ -20,8 +20,8 @@ pub struct Picture {
     pub how: How,
     /// Width and height (CSS pixels).
     pub size: [u32; 2],
-    /// Files and folders, from the repository's root, whose change makes it old.
-    pub sources: &'static [&'static str],
+    /// Files and folders, from the repository's root, whose change makes it old, in groups.
+    pub sources: &'static [&'static [&'static str]],
 }
 
 /// How a picture is made.
@@ -75,6 +75,8 @@ pub struct Film {
     pub live: Live,
     /// How long it is (s): once round what the scene does, so that it goes on where it ends.
     pub seconds: f64,
+    /// Its pixels for each of the page's.
+    pub scale: f64,
 }
 
 /// What the live page is drawn by.
@@ -84,13 +86,10 @@ const PAGE: &[&str] = &[
     "host/src/sink/page/wire.rs",
     "host/src/sink/page/messages.rs",
 ];
-/// What films of the demonstrations are drawn by: the page, and what presses.
+/// What films of the demonstrations are made by beside the page.
 const FILMS: &[&str] = &[
-    "host/src/sink/page/web",
-    "host/src/sink/page/update.rs",
-    "host/src/sink/page/wire.rs",
-    "host/src/sink/page/messages.rs",
     "host/physics/src/scene/demonstration.rs",
+    "host/physics/src/scene/hand.rs",
     "lab/figures/src/film.rs",
     "lab/figures/src/palette.rs",
 ];
@@ -104,7 +103,7 @@ const fn live(
     contacts: usize,
     headline: &'static str,
 ) -> Picture {
-    Picture { file, how: How::Live(Live { args, theme, contacts, headline }), size: [1400, 860], sources: PAGE }
+    Picture { file, how: How::Live(Live { args, theme, contacts, headline }), size: [1400, 860], sources: &[PAGE] }
 }
 
 const fn film(
@@ -115,7 +114,7 @@ const fn film(
     seconds: f64,
 ) -> Picture {
     let live = Live { args, theme: "light", contacts, headline };
-    Picture { file, how: How::Film(Film { live, seconds }), size: [1120, 720], sources: FILMS }
+    Picture { file, how: How::Film(Film { live, seconds, scale: 0.75 }), size: [1120, 720], sources: &[PAGE, FILMS] }
 }
 
 /// All pictures.
@@ -131,25 +130,25 @@ pub const PICTURES: &[Picture] = &[
         file: "docs/tradeoff.png",
         how: How::Chart { job: "tradeoff", option: "--picture" },
         size: [1320, 470],
-        sources: CHARTS,
+        sources: &[CHARTS],
     },
     Picture {
         file: "docs/scan.png",
         how: How::Chart { job: "scan", option: "--picture" },
         size: [1300, 926],
-        sources: &["lab/study/src/view", "lab/study/src/scanning/view.rs"],
+        sources: &[&["lab/study/src/view", "lab/study/src/scanning/view.rs"]],
     },
     Picture {
         file: "docs/design-materials.png",
         how: How::Chart { job: "materials", option: "--out" },
         size: [1300, 930],
-        sources: &["lab/study/src/view", "lab/design/src/materials/view.rs", "lab/design/src/claim.rs"],
+        sources: &[&["lab/study/src/view", "lab/design/src/materials/view.rs", "lab/design/src/claim.rs"]],
     },
     Picture {
         file: "docs/cost.svg",
         how: How::Drawn { example: "cost" },
         size: [960, 460],
-        sources: &["lab/examples/cost.rs"],
+        sources: &[&["lab/examples/cost.rs"]],
     },
 ];
 
@@ -167,7 +166,7 @@ impl Picture {
     pub fn made_of(&self, root: &Path, store: &Store) -> Result<String> {
         let mut digest = CHECKSUM.digest();
         digest.update(format!("{:?} {:?}", self.how, self.size).as_bytes());
-        for source in self.sources {
+        for source in self.sources.iter().copied().flatten() {
             for file in files(&root.join(source))? {
                 digest.update(&fs::read(&file).with_context(|| file.display().to_string())?);
             }
