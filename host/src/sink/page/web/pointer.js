@@ -23,6 +23,7 @@ export class PointerPanel {
     this.at = [0.5, 0.5];
     this.begun = false;
     this.last = null;
+    this.drawn = null;
     this.trail = [];
     this.clicks = [];
     this.colours = palette();
@@ -37,6 +38,7 @@ export class PointerPanel {
     if (!pointer) return;
     if (!this.begun && contacts.length) this.#begin(contacts[0]);
     this.#go(pointer, now);
+    this.drawn = [pointer, now];
     this.#draw(pointer, now);
     const clicks = `${count(pointer.clicks)} ${pointer.clicks === 1 ? "click" : "clicks"}`;
     this.said.textContent = pointer.pressed ? `${clicks}, pressed` : clicks;
@@ -52,6 +54,8 @@ export class PointerPanel {
     this.width = this.card.clientWidth - 28;
     this.height = Math.round(this.width * SCREEN);
     this.context = sizeCanvas(this.canvas, this.width, this.height);
+    // A canvas of a new size is empty, and a paused page gets no update.
+    if (this.drawn) this.#draw(...this.drawn);
   }
 
   // Begins where the first contact is, or the cursor would soon be held at an edge that the contact is not near.
