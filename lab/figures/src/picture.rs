@@ -1,4 +1,4 @@
-//! Pictures of the documents: charts of reports, and the live page in a browser.
+//! Pictures of the documents: charts of reports, and the live page in a browser, still or as a film.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,8 @@ pub struct Picture {
     pub how: How,
     /// Width and height (CSS pixels).
     pub size: [u32; 2],
-    /// Files and folders, from the repository's root, whose change makes it old.
-    pub sources: &'static [&'static str],
+    /// Files and folders, from the repository's root, whose change makes it old, in groups.
+    pub sources: &'static [&'static [&'static str]],
 }
 
 /// How a picture is made.
@@ -36,6 +36,8 @@ pub enum How {
     },
     /// The live page of a simulated board, once it tells what is wanted.
     Live(Live),
+    /// A film of the live page of a simulated board.
+    Film(Film),
     /// By an example of the package `tactomo`, which writes the file that it is given.
     Drawn {
         /// The example.
@@ -56,12 +58,40 @@ pub struct Live {
     pub headline: &'static str,
 }
 
+impl Live {
+    /// What is wanted, in words.
+    pub fn wanted(&self) -> String {
+        match self.contacts {
+            0 => format!("\"{}\"", self.headline),
+            contacts => format!("\"{}\" and {contacts} in the table", self.headline),
+        }
+    }
+}
+
+/// A film of the live page. It begins when the page tells what is wanted, for what opens it is its first picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Film {
+    /// What it begins with.
+    pub live: Live,
+    /// How long it is (s): once round what the scene does, so that it goes on where it ends.
+    pub seconds: f64,
+    /// Its pixels for each of the page's.
+    pub scale: f64,
+}
+
 /// What the live page is drawn by.
 const PAGE: &[&str] = &[
     "host/src/sink/page/web",
     "host/src/sink/page/update.rs",
     "host/src/sink/page/wire.rs",
     "host/src/sink/page/messages.rs",
+];
+/// What films of the demonstrations are made by beside the page.
+const FILMS: &[&str] = &[
+    "host/physics/src/scene/demonstration.rs",
+    "host/physics/src/scene/hand.rs",
+    "lab/figures/src/film.rs",
+    "lab/figures/src/palette.rs",
 ];
 /// What charts are drawn by.
 const CHARTS: &[&str] = &["lab/study/src/view", "lab/study/src/tradeoff/view.rs"];
@@ -73,41 +103,52 @@ const fn live(
     contacts: usize,
     headline: &'static str,
 ) -> Picture {
-    Picture { file, how: How::Live(Live { args, theme, contacts, headline }), size: [1400, 860], sources: PAGE }
+    Picture { file, how: How::Live(Live { args, theme, contacts, headline }), size: [1400, 860], sources: &[PAGE] }
+}
+
+const fn film(
+    file: &'static str,
+    args: &'static str,
+    contacts: usize,
+    headline: &'static str,
+    seconds: f64,
+) -> Picture {
+    let live = Live { args, theme: "light", contacts, headline };
+    Picture { file, how: How::Film(Film { live, seconds, scale: 0.75 }), size: [1120, 720], sources: &[PAGE, FILMS] }
 }
 
 /// All pictures.
 pub const PICTURES: &[Picture] = &[
     live("docs/live.png", "--scene several", "light", 3, "3 contacts"),
     live("docs/live-dark.png", "--scene several", "dark", 3, "3 contacts"),
-    live("docs/demo-gripper.png", "--scene gripper --board ideal", "light", 0, "Line"),
-    live("docs/demo-display.png", "--scene display --board ideal", "light", 2, "2 contacts"),
-    live("docs/demo-pointer.png", "--scene pointer --board ideal", "light", 1, "1 contact"),
-    live("docs/demo-texture.png", "--scene texture --board ideal", "light", 2, "2 contacts"),
-    live("docs/demo-hand.png", "--scene hand --board ideal", "light", 6, "6 contacts"),
+    film("docs/demo-gripper.png", "--scene gripper", 0, "Line", 6.0),
+    film("docs/demo-display.png", "--scene display", 2, "2 contacts", 8.0),
+    film("docs/demo-pointer.png", "--scene pointer", 1, "1 contact", 7.6),
+    film("docs/demo-texture.png", "--scene texture", 2, "2 contacts", 3.0),
+    film("docs/demo-hand.png", "--scene hand", 6, "6 contacts", 6.0),
     Picture {
         file: "docs/tradeoff.png",
         how: How::Chart { job: "tradeoff", option: "--picture" },
         size: [1320, 470],
-        sources: CHARTS,
+        sources: &[CHARTS],
     },
     Picture {
         file: "docs/scan.png",
         how: How::Chart { job: "scan", option: "--picture" },
         size: [1300, 926],
-        sources: &["lab/study/src/view", "lab/study/src/scanning/view.rs"],
+        sources: &[&["lab/study/src/view", "lab/study/src/scanning/view.rs"]],
     },
     Picture {
         file: "docs/design-materials.png",
         how: How::Chart { job: "materials", option: "--out" },
         size: [1300, 930],
-        sources: &["lab/study/src/view", "lab/design/src/materials/view.rs", "lab/design/src/claim.rs"],
+        sources: &[&["lab/study/src/view", "lab/design/src/materials/view.rs", "lab/design/src/claim.rs"]],
     },
     Picture {
         file: "docs/cost.svg",
         how: How::Drawn { example: "cost" },
         size: [960, 460],
-        sources: &["lab/examples/cost.rs"],
+        sources: &[&["lab/examples/cost.rs"]],
     },
 ];
 
@@ -125,7 +166,7 @@ impl Picture {
     pub fn made_of(&self, root: &Path, store: &Store) -> Result<String> {
         let mut digest = CHECKSUM.digest();
         digest.update(format!("{:?} {:?}", self.how, self.size).as_bytes());
-        for source in self.sources {
+        for source in self.sources.iter().copied().flatten() {
             for file in files(&root.join(source))? {
                 digest.update(&fs::read(&file).with_context(|| file.display().to_string())?);
             }

@@ -10,6 +10,7 @@ use serde_json::Value;
 use crate::browser;
 use crate::figure::Figure;
 use crate::job::{JOBS, Job, Tools};
+use crate::live;
 use crate::marks::marks;
 use crate::picture::{How, PICTURES, Picture};
 use crate::store::{self, Place, Store, Taken};
@@ -158,9 +159,13 @@ fn take_picture(tools: &Tools, store: &mut Store, picture: &Picture) -> Result<(
     let file = tools.root.join(picture.file);
     let shows = match &picture.how {
         How::Chart { .. } => return Ok(()),
-        How::Live(live) => {
-            eprintln!("{}: tactomo live --simulate {}", picture.file, live.args);
-            browser::picture_of_live(tools, live, picture.size, &file).with_context(|| picture.file)?
+        How::Live(state) => {
+            eprintln!("{}: tactomo live --simulate {}", picture.file, state.args);
+            live::picture_of_live(tools, state, picture.size, &file).with_context(|| picture.file)?
+        }
+        How::Film(film) => {
+            eprintln!("{}: {} s of tactomo live --simulate {}", picture.file, film.seconds, film.live.args);
+            live::film_of_live(tools, film, picture.size, &file).with_context(|| picture.file)?
         }
         How::Drawn { example } => {
             eprintln!("{}: example {example}", picture.file);

@@ -14,26 +14,31 @@ const clamped = (value) => Math.min(0.97, Math.max(0.03, value));
 
 /** A panel that is there while a contact is a pointer. */
 export class PointerPanel {
-  constructor({ bounds_m: [[leftM], [rightM]] }) {
+  constructor({ bounds_m: [[leftM, bottomM], [rightM, topM]] }) {
     this.widthM = rightM - leftM;
+    this.middleM = [(leftM + rightM) / 2, (bottomM + topM) / 2];
     this.card = document.getElementById("pointer-card");
     this.said = document.getElementById("pointer-said");
     this.canvas = document.getElementById("pointer");
     this.at = [0.5, 0.5];
+    this.begun = false;
     this.last = null;
+    this.drawn = null;
     this.trail = [];
     this.clicks = [];
     this.colours = palette();
   }
 
   /** Shows an update. */
-  show({ pointer }, now) {
+  show({ pointer, contacts }, now) {
     if (this.card.hidden !== !pointer) {
       this.card.hidden = !pointer;
       if (pointer) this.layOut();
     }
     if (!pointer) return;
+    if (!this.begun && contacts.length) this.#begin(contacts[0]);
     this.#go(pointer, now);
+    this.drawn = [pointer, now];
     this.#draw(pointer, now);
     const clicks = `${count(pointer.clicks)} ${pointer.clicks === 1 ? "click" : "clicks"}`;
     this.said.textContent = pointer.pressed ? `${clicks}, pressed` : clicks;
@@ -49,6 +54,15 @@ export class PointerPanel {
     this.width = this.card.clientWidth - 28;
     this.height = Math.round(this.width * SCREEN);
     this.context = sizeCanvas(this.canvas, this.width, this.height);
+    // A canvas of a new size is empty, and a paused page gets no update.
+    if (this.drawn) this.#draw(...this.drawn);
+  }
+
+  // Begins where the first contact is, or the cursor would soon be held at an edge that the contact is not near.
+  #begin({ xM, yM }) {
+    this.begun = true;
+    const [right, up] = [xM - this.middleM[0], yM - this.middleM[1]].map((way) => way / this.widthM);
+    this.at = [clamped(0.5 + right), clamped(0.5 - up / SCREEN)];
   }
 
   // The width of the detector is that of the screen.
