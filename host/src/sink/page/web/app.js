@@ -5,6 +5,7 @@ import { CalibratePanel } from "./calibrate.js";
 import { ContactTable } from "./contacts.js";
 import { listenForActions, RecordButton, RezeroButton } from "./controls.js";
 import { Figures } from "./figures.js";
+import { GainSelect } from "./gain.js";
 import { History } from "./history.js";
 import { linkOf, showState } from "./link.js";
 import { MethodSelect } from "./method.js";
@@ -14,7 +15,7 @@ import { listenForPresses } from "./press.js";
 import { Connection } from "./protocol.js";
 import { Notice } from "./notice.js";
 import { ReadingsMap } from "./readings.js";
-import { saveData, savePicture } from "./save.js";
+import { saveData, saveHistory, savePicture } from "./save.js";
 import { Simulation } from "./simulation.js";
 import { StripChart } from "./strip.js";
 import { listenForTheme, theme } from "./theme.js";
@@ -52,11 +53,13 @@ function start(setup) {
   const told = new Told();
   const picture = new Picture(setup, theme(), told);
   const history = new History(setup);
+  const totals = new Totals(history);
   parts = {
     text, told, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
-    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup), totals: new Totals(history),
+    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup), totals,
+    gain: new GainSelect(picture.scale.floor, (end) => picture.endAt(end, performance.now())),
   };
   const [[left, bottom], [right, top]] = setup.bounds_m;
   document.getElementById("picture").classList.toggle("wide", right - left > WIDE * (top - bottom));
@@ -90,7 +93,7 @@ function draw(now) {
 
 function show(update, now) {
   shown = update;
-  parts.history.take(update, now);
+  parts.history.take(update, now, () => parts.totals.of(update).total);
   if (parts.told.take(update, now)) parts.table.show(update);
   parts.picture.show(update, now);
   parts.readings.show(update, now);
@@ -146,9 +149,13 @@ listenForActions({
   pause,
   "save-picture": () => parts && savePicture(parts.picture.layers(), parts.picture.colours.card),
   "save-data": () => shown && saveData(shown),
+  "save-history": () => parts && saveHistory(parts.history),
+  "more-gain": () => parts?.gain.step(1, parts.picture.scale.max),
+  "less-gain": () => parts?.gain.step(-1, parts.picture.scale.max),
   record: () => recordButton.toggle(),
   mark: () => recordButton.mark(),
   rescale: () => {
+    parts?.gain.release();
     parts?.picture.fit(performance.now());
     parts?.readings.fit(performance.now());
   },

@@ -1,4 +1,4 @@
-// How firmly each contact pressed, over the last minute.
+// How firmly each contact pressed, and all together, over the last minute.
 
 import { valueOf } from "./strength.js";
 
@@ -6,7 +6,7 @@ const KEPT_MS = 61_000;
 // Samples are this far apart at least: more do not fit on a screen.
 const EVERY_MS = 40;
 
-/** Samples of each contact, by its number; those of an image without contacts under 0. */
+/** Samples of each contact, by its number; those of a shape, or of an image without contacts, under 0. */
 export class History {
   constructor(setup) {
     this.areas = nodeAreas(setup);
@@ -16,31 +16,35 @@ export class History {
 
   clear() {
     this.lines = new Map();
+    /** Of each sample: when it was by the page's clock (ms) and by the board's (s), and what all pressed with together. */
+    this.turns = [];
     this.turn = 0;
     this.last = -Infinity;
     this.unit = "S";
   }
 
-  /** Takes an update. */
-  take({ contacts, image }, now) {
-    this.unit = contacts.some(({ forceN }) => forceN !== null) ? "N" : "S";
+  /** Takes an update; `total` says what all of it presses with. */
+  take({ contacts, timeS }, now, total) {
+    const unit = contacts.some(({ forceN }) => forceN !== null) ? "N" : "S";
+    if (contacts.length && unit !== this.unit) {
+      // Siemens and newtons have no axis in common.
+      this.clear();
+      this.unit = unit;
+    }
     if (now - this.last < EVERY_MS) return;
     this.last = now;
     this.turn += 1;
     const numbered = contacts.filter(({ id }) => id);
     for (const contact of numbered) this.#add(contact.id, valueOf(contact), now);
-    if (!numbered.length) this.#addWhole(contacts, image, now);
+    const all = total();
+    // What has no number cannot be told apart from frame to frame: all of it together.
+    if (!numbered.length && all > 0) this.#add(0, all, now);
+    this.turns.push({ turn: this.turn, at: now, timeS, total: all });
+    while (now - this.turns[0].at > KEPT_MS) this.turns.shift();
     for (const [id, line] of this.lines) {
       while (line.length && now - line[0].at > KEPT_MS) line.shift();
       if (!line.length) this.lines.delete(id);
     }
-  }
-
-  // Contacts without numbers cannot be told apart from frame to frame: all of them together, or all of the image.
-  #addWhole(contacts, image, now) {
-    const whole = contacts.reduce((sum, contact) => sum + valueOf(contact), 0)
-      || this.partsOf(image).reduce((sum, { value }) => sum + value, 0);
-    if (whole > 0) this.#add(0, whole, now);
   }
 
   /** What an image has at its nodes, and where they are (m). */
