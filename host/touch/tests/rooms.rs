@@ -54,6 +54,7 @@ const PLAN: [(&str, &[&str]); 25] = [
             "solve::methods::contacts",
             "solve::methods::shapes",
             "solve::methods::image",
+            "solve::methods::linear",
         ],
     ),
     (

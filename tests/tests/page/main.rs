@@ -6,6 +6,7 @@ mod chromium;
 mod controls;
 mod gallery;
 mod live;
+mod picture;
 mod raw;
 mod script;
 mod seen;

@@ -128,6 +128,7 @@ fn publish(
             if let Some(answer) = &mut snapshot.answer {
                 let frame = &mut Arc::make_mut(answer).frame;
                 (frame.sequence, frame.arrived) = (number, Arrival::at(Instant::now()));
+                frame.board_time_us = number * PUBLISH_EVERY.as_micros() as u64;
             }
             snapshots.send_replace(Arc::new(snapshot));
             std::thread::sleep(PUBLISH_EVERY);

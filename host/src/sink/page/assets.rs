@@ -28,6 +28,7 @@ const ASSETS: &[Asset] = &[
     ("/figures.js", SCRIPT, include_str!("web/figures.js")),
     ("/flat.js", SCRIPT, include_str!("web/flat.js")),
     ("/frame.js", SCRIPT, include_str!("web/frame.js")),
+    ("/gain.js", SCRIPT, include_str!("web/gain.js")),
     ("/heat.js", SCRIPT, include_str!("web/heat.js")),
     ("/history.js", SCRIPT, include_str!("web/history.js")),
     ("/layout.js", SCRIPT, include_str!("web/layout.js")),

@@ -48,11 +48,12 @@ const fn named<T>(name: &'static str, of: fn(&Shown) -> T) -> Named<T> {
     Named { name, of }
 }
 
-/// Whole numbers; counts are modulo 2^32. The shape is 0 for none, or the number of its [name](SHAPES) from 1 on; flags are bits, the first of
+/// Whole numbers; counts, and the board's time in the middle of the frame's scan, are modulo 2^32. The shape is 0 for none, or the number of its [name](SHAPES) from 1 on; flags are bits, the first of
 /// [`FLAGS`] the lowest; electrodes are bits too: bit `e` is electrode `e`.
-const WORDS: [Named<u32>; 7] = [
+const WORDS: [Named<u32>; 8] = [
     named("sequence", |shown| shown.answer.frame.sequence as u32),
     named("frames", |shown| shown.frames as u32),
+    named("time_ms", |shown| (1e3 * shown.answer.frame.time_s()).round() as u64 as u32),
     named("electrodes", |shown| shown.answer.frame.measured.electrodes() as u32),
     named("shape", |shown| {
         let name = shown.answer.solution.shape.as_ref().map(|shape| shape.name());
@@ -202,7 +203,7 @@ mod tests {
     fn bytes_of(solution: Solution) -> Vec<u8> {
         let readings = Readings::from_fn(2, |g, e| (2 * g + e) as f64);
         let first = Frame::first(readings.clone(), readings.clone(), Arrival::at(Instant::now()));
-        let frame = Frame { sequence: (7 << 32) + 9, ..first };
+        let frame = Frame { sequence: (7 << 32) + 9, board_time_us: 2_500_400, ..first };
         let pointer = Some(PointerState { way_m: [0.5, -0.25], is_pressed: true, clicks: 3 });
         let answer = TouchEvent { pointer, ..TouchEvent::new(frame, readings, solution) };
         let detector = &Detector::preset(Detector::DEFAULT).unwrap();
@@ -251,8 +252,8 @@ mod tests {
             alternative: Some(Alternative { contacts: 3, certainty: 0.125 }),
             choice: Some(Choice { what: "2 contacts".to_owned(), why: "µ".to_owned() }),
         });
-        assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 3, 4, 2, 2]);
-        let head = floats(&bytes[44..128]);
+        assert_eq!(words(&bytes[..48]), [9, 300, 2500, 2, 0, 0b101, 1 << 31 | 1 << 3, 1 << 31, 3, 4, 2, 2]);
+        let head = floats(&bytes[48..132]);
         assert_eq!(head[..3], [1.25, 0.75, 3.0]);
         assert!((0.0..5.0).contains(&head[3]), "{} s old", head[3]);
         assert!(head[4].is_nan(), "not all newtons are known");
@@ -260,15 +261,15 @@ mod tests {
         assert!((head[6] - (1.75 * 0.25 + 3.0) / 4.75).abs() < 1e-6 && (head[7] - 5.125 / 4.75).abs() < 1e-6);
         assert_eq!(head[8..12], [0.5, -0.25, 1.0, 3.0], "the pointer");
         assert_eq!(head[12..], [2.0, 4.0, -8.0, 0.0, 1.0, 2.0, 3.0, 0.25, 0.75]);
-        assert_eq!(words(&bytes[128..132]), [6]);
+        assert_eq!(words(&bytes[132..136]), [6]);
         let known = [0.25, -0.5, 0.0, 2.0, 1.75, 1.5, 3.0, 0.75, 1.0, 0.5, 0.25, -0.5, 4.0, 0.125];
         let known = [&known[..], &[7.068_583_5, 1.0, 0.5, 0.25, 0.0, 0.25, -0.5]].concat();
-        assert_eq!(floats(&bytes[132..216]), known);
-        assert_eq!(words(&bytes[216..220]), [0]);
-        assert_eq!(floats(&bytes[220..236]), [1.0, 2.0, 0.0, 3.0]);
-        assert!(floats(&bytes[236..296]).iter().all(|value| value.is_nan()), "what is not known");
-        assert_eq!(floats(&bytes[296..304]), [1.0, 2.0]);
-        assert_eq!(&bytes[304..], "2 contacts\nµ".as_bytes());
+        assert_eq!(floats(&bytes[136..220]), known);
+        assert_eq!(words(&bytes[220..224]), [0]);
+        assert_eq!(floats(&bytes[224..240]), [1.0, 2.0, 0.0, 3.0]);
+        assert!(floats(&bytes[240..300]).iter().all(|value| value.is_nan()), "what is not known");
+        assert_eq!(floats(&bytes[300..308]), [1.0, 2.0]);
+        assert_eq!(&bytes[308..], "2 contacts\nµ".as_bytes());
     }
 
     #[test]
@@ -280,8 +281,8 @@ mod tests {
             shape: Some(FoundShape::Ring(ring)),
             ..Solution::default()
         });
-        assert_eq!((words(&bytes[12..16]), words(&bytes[40..44])), (vec![2], vec![1]));
-        let shape = floats(&bytes[92 + 4 * 6 + 88..]);
+        assert_eq!((words(&bytes[16..20]), words(&bytes[44..48])), (vec![2], vec![1]));
+        let shape = floats(&bytes[96 + 4 * 6 + 88..]);
         assert_eq!((shape.len(), shape[4..9].to_vec()), (18, vec![0.25, -0.5, 2.0, 0.5, 3.0]));
         assert!(shape[..4].iter().chain(&shape[9..]).all(|value| value.is_nan()), "{shape:?}");
     }
@@ -289,9 +290,9 @@ mod tests {
     #[test]
     fn nothing_found_is_head_and_readings_alone() {
         let bytes = bytes_of(Solution::default());
-        assert_eq!(words(&bytes[..44]), [9, 300, 2, 0, 0, 0, 0, 0, 4, 2, 0]);
-        assert!(floats(&bytes[44..48])[0].is_nan());
-        assert_eq!(bytes.len(), 92 + 4 * 6);
+        assert_eq!(words(&bytes[..48]), [9, 300, 2500, 2, 0, 0, 0, 0, 0, 4, 2, 0]);
+        assert!(floats(&bytes[48..52])[0].is_nan());
+        assert_eq!(bytes.len(), 96 + 4 * 6);
     }
 
     /// Words of the page's script that stand behind one of these.

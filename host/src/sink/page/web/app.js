@@ -5,6 +5,7 @@ import { CalibratePanel } from "./calibrate.js";
 import { ContactTable } from "./contacts.js";
 import { listenForActions, RecordButton, RezeroButton } from "./controls.js";
 import { Figures } from "./figures.js";
+import { GainSelect } from "./gain.js";
 import { History } from "./history.js";
 import { linkOf, showState } from "./link.js";
 import { MethodSelect } from "./method.js";
@@ -14,7 +15,7 @@ import { listenForPresses } from "./press.js";
 import { Connection } from "./protocol.js";
 import { Notice } from "./notice.js";
 import { ReadingsMap } from "./readings.js";
-import { saveData, savePicture } from "./save.js";
+import { saveData, saveHistory, savePicture } from "./save.js";
 import { Simulation } from "./simulation.js";
 import { StripChart } from "./strip.js";
 import { listenForTheme, theme } from "./theme.js";
@@ -57,6 +58,7 @@ function start(setup) {
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
     calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup), totals: new Totals(),
+    gain: new GainSelect(picture.scale.floor, (end) => picture.endAt(end, performance.now())),
   };
   const [[left, bottom], [right, top]] = setup.bounds_m;
   document.getElementById("picture").classList.toggle("wide", right - left > WIDE * (top - bottom));
@@ -146,9 +148,13 @@ listenForActions({
   pause,
   "save-picture": () => parts && savePicture(parts.picture.layers(), parts.picture.colours.card),
   "save-data": () => shown && saveData(shown),
+  "save-history": () => parts && saveHistory(parts.history),
+  "more-gain": () => parts?.gain.step(1, parts.picture.scale.max),
+  "less-gain": () => parts?.gain.step(-1, parts.picture.scale.max),
   record: () => recordButton.toggle(),
   mark: () => recordButton.mark(),
   rescale: () => {
+    parts?.gain.release();
     parts?.picture.fit(performance.now());
     parts?.readings.fit(performance.now());
   },

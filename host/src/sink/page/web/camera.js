@@ -10,9 +10,9 @@ const OVER_THE_SHOULDER = [0.5, 0.55, 0.67];
 
 /** Turns places (m) into pixels. */
 export class Camera {
-  constructor(curved) {
-    this.turn = -0.6;
-    this.tilt = curved ? 0.6 : 0.7;
+  constructor({ turn }) {
+    this.turn = turn;
+    this.tilt = 0.7;
     this.zoom = 1;
   }
 
@@ -65,18 +65,33 @@ export class Camera {
     return [-left * cosTurn + away * sinTurn, left * sinTurn + away * cosTurn, up * cosTilt + near * sinTilt];
   }
 
-  /** Projects `points` (m), x, y, z one after the other, to `x`, `y` on `width` x `height` pixels and the depth `z` (m). */
-  project({ centre, sizeM, fill }, points, { x, y, z }, width, height) {
+  /** The direction halfway between the light and the eye: what faces it shines. */
+  shine() {
+    const [cosTilt, sinTilt] = [Math.cos(this.tilt), Math.sin(this.tilt)];
+    const eye = [-Math.sin(this.turn) * cosTilt, -Math.cos(this.turn) * cosTilt, sinTilt];
+    const sum = this.light().map((v, k) => v + eye[k]);
+    const length = Math.hypot(...sum);
+    return sum.map((v) => v / length);
+  }
+
+  /**
+   * Projects `points` (m), x, y, z one after the other, to `x`, `y` on `width` x `height` pixels and the depth `z` (m). However it is turned, all of the
+   * shape fits into the picture.
+   */
+  project({ centre, sizeM, radiusM, halfHeightM }, points, { x, y, z }, width, height) {
     const [cosTurn, sinTurn, cosTilt, sinTilt] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)];
-    const scale = (fill * this.zoom * Math.min(width, 1.35 * height)) / sizeM;
     const eye = DISTANCE * sizeM;
+    // What is near is larger: but what is nearest is in the middle, and what is at the sides as far as the centre.
+    const across = 2.1 * radiusM;
+    const down = 2.1 * (radiusM * Math.abs(sinTilt) + halfHeightM * cosTilt);
+    const scale = this.zoom * Math.min(width / across, height / down);
     for (let i = 0, k = 0; k < points.length; i += 1, k += 3) {
       const [dx, dy, dz] = [points[k] - centre[0], points[k + 1] - centre[1], points[k + 2] - centre[2]];
       const away = dx * sinTurn + dy * cosTurn;
       z[i] = away * cosTilt - dz * sinTilt;
       const near = (scale * eye) / (eye + z[i]);
       x[i] = width / 2 + (dx * cosTurn - dy * sinTurn) * near;
-      y[i] = 0.47 * height - (away * sinTilt + dz * cosTilt) * near;
+      y[i] = height / 2 - (away * sinTilt + dz * cosTilt) * near;
     }
   }
 

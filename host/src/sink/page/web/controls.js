@@ -6,7 +6,8 @@ const REZERO_SHOWN_MS = 1500;
 export function listenForActions(actions) {
   const KEYS = {
     p: actions.pause, s: actions["save-picture"], c: actions["save-data"], r: actions.record, m: actions.mark, a: actions.rescale, z: actions.rezero,
-    k: actions.calibrate, f: actions.full, 3: actions.view, "?": actions.keys, t: () => document.getElementById("theme").click(),
+    k: actions.calibrate, f: actions.full, 3: actions.view, "?": actions.keys, h: actions["save-history"],
+    "+": actions["more-gain"], "=": actions["more-gain"], "-": actions["less-gain"], t: () => document.getElementById("theme").click(),
   };
   for (const [name, act] of Object.entries(actions)) {
     const button = document.getElementById(name);

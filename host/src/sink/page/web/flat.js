@@ -2,7 +2,7 @@
 
 import { drawOutline, middleOf } from "./bars.js";
 import { colourMaps } from "./colours.js";
-import { drawFrame, outlinePath } from "./frame.js";
+import { drawFrame } from "./frame.js";
 import { Layout, sizeCanvas } from "./layout.js";
 import { drawLabels, drawMark, drawTrail } from "./marks.js";
 
@@ -12,8 +12,9 @@ export class FlatView {
     this.view = view;
     this.canvas = document.getElementById("image");
     this.marks = document.getElementById("marks");
-    this.small = document.createElement("canvas");
-    [this.small.width, this.small.height] = [view.field.width, view.field.height];
+    // A pixel of the field is one of the canvas: the browser makes it as large as the picture, smoothly, and with the graphics processor where there is one.
+    [this.canvas.width, this.canvas.height] = [view.field.width, view.field.height];
+    this.heat = this.canvas.getContext("2d");
     this.image = new ImageData(view.field.width, view.field.height);
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
@@ -23,10 +24,9 @@ export class FlatView {
     const { setup } = this.view;
     this.layout = new Layout(setup.bounds_m, width, height);
     const { left, top } = this.layout;
-    [this.canvas.style.left, this.canvas.style.top] = [`${left}px`, `${top}px`];
-    this.heat = sizeCanvas(this.canvas, this.layout.width, this.layout.height);
-    this.heat.imageSmoothingQuality = "high";
-    this.heat.clip(outlinePath(setup.outline_m, (xM) => this.layout.x(xM) - left, (yM) => this.layout.y(yM) - top), "evenodd");
+    const { style } = this.canvas;
+    [style.left, style.top] = [`${left}px`, `${top}px`];
+    [style.width, style.height] = [`${this.layout.width}px`, `${this.layout.height}px`];
     this.over = sizeCanvas(this.marks, width, height);
   }
 
@@ -59,11 +59,11 @@ export class FlatView {
     const colours = colourMaps(theme).image;
     const [last, factor] = [colours.length - 1, 1 / scale.max];
     for (let i = 0; i < this.pixels.length; i += 1) {
+      if (!field.isOn(i)) continue; // stays transparent
       const share = field.values[i] * factor;
       this.pixels[i] = colours[share <= 0 ? 0 : share >= 1 ? last : Math.round(last * Math.sqrt(share))];
     }
-    this.small.getContext("2d").putImageData(this.image, 0, 0);
-    this.heat.drawImage(this.small, 0, 0, this.layout.width, this.layout.height);
+    this.heat.putImageData(this.image, 0, 0);
   }
 
   // Where the person presses, and the cursor of the keyboard.

@@ -23,8 +23,8 @@ function upright(context, x, y, words, direction) {
   context.restore();
 }
 
-/** The outline as a path in pixels. */
-export function outlinePath(loops, x, y) {
+// The outline as a path in pixels.
+function outlinePath(loops, x, y) {
   const path = new Path2D();
   for (const loop of loops) {
     loop.forEach(([xM, yM], i) => (i ? path.lineTo(x(xM), y(yM)) : path.moveTo(x(xM), y(yM))));

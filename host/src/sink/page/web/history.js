@@ -1,4 +1,4 @@
-// How firmly each contact pressed, over the last minute.
+// How firmly each contact pressed, and all together, over the last minute.
 
 import { conductanceOf } from "./strength.js";
 
@@ -6,7 +6,7 @@ const KEPT_MS = 61_000;
 // Samples are this far apart at least: more do not fit on a screen.
 const EVERY_MS = 40;
 
-/** Samples of each contact, by its number; those of all together, where they have no numbers or are an image, under 0. */
+/** Samples of each contact, by its number; those of a shape, or of an image without contacts, under 0. */
 export class History {
   constructor() {
     this.clear();
@@ -14,13 +14,15 @@ export class History {
 
   clear() {
     this.lines = new Map();
+    /** Of each sample: when it was by the page's clock (ms) and by the board's (s), and what all pressed with together. */
+    this.turns = [];
     this.turn = 0;
     this.last = -Infinity;
     this.unit = "S";
   }
 
   /** Takes an update. */
-  take({ contacts, total }, now) {
+  take({ contacts, total, timeS }, now) {
     const unit = total && total.forceN !== null ? "N" : "S";
     if (total && unit !== this.unit) {
       // Newtons and siemens have no axis in common.
@@ -32,8 +34,11 @@ export class History {
     this.turn += 1;
     const numbered = contacts.filter(({ id }) => id);
     for (const contact of numbered) this.#add(contact.id, unit === "N" ? contact.forceN : conductanceOf(contact), now);
-    // Without numbers they cannot be told apart from frame to frame.
-    if (!numbered.length && total) this.#add(0, total.forceN ?? total.conductanceS, now);
+    // What has no number cannot be told apart from frame to frame: all of it together.
+    const all = total ? total.forceN ?? total.conductanceS : 0;
+    if (!numbered.length && all > 0) this.#add(0, all, now);
+    this.turns.push({ turn: this.turn, at: now, timeS, total: all });
+    while (now - this.turns[0].at > KEPT_MS) this.turns.shift();
     for (const [id, line] of this.lines) {
       while (line.length && now - line[0].at > KEPT_MS) line.shift();
       if (!line.length) this.lines.delete(id);

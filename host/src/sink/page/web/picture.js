@@ -28,6 +28,7 @@ export class Picture {
     const firm = densityOf({ conductanceS: FIRM_SHARE * setup.sheet_conductance_s }, setup.usual_radius_m);
     this.scale = new SteadyScale((FLOOR_SHARE * setup.sheet_conductance_s) / areaM2, firm);
     this.excluded = [];
+    this.empty = null;
     this.marked = null;
     this.fingers = [];
     this.views = { flat: new FlatView(this), space: new SpaceView(this) };
@@ -43,14 +44,31 @@ export class Picture {
     if (this.unfitted) this.scale.fit(this.field.peak, now);
     else this.scale.take(this.field.peak, now);
     this.unfitted = false;
-    this.draw(now);
+    if (!this.#isStill()) this.draw(now);
     this.#tell();
+  }
+
+  // Whether nothing touches, as in the picture that is there.
+  #isStill() {
+    const { field, trails } = this;
+    const isEmpty = !field.contacts.length && !field.shape && !field.image && !trails.ways.size;
+    const before = this.empty;
+    this.empty = isEmpty ? `${this.scale.max} ${this.excluded}` : null;
+    return isEmpty && this.empty === before;
   }
 
   /** Fits the colours to what is there now. */
   fit(now) {
     this.scale.fit(this.field.peak, now);
     this.draw(now);
+  }
+
+  /** Ends the colours at `max` (S/m2); if that is null, they follow again what is there. */
+  endAt(max, now) {
+    const follows = this.scale.isFixed && max === null;
+    this.scale.fix(max);
+    if (follows) this.fit(now);
+    else this.draw(now);
   }
 
   /** Fits the colours to the next update: another solver's values can be far from these. */
@@ -124,7 +142,7 @@ export class Picture {
     const places = contacts.map(({ xM, yM }) => [xM, yM].map((m) => Number((m * 1e3).toFixed(3))));
     Object.assign(document.documentElement.dataset, {
       contacts: String(contacts.length), placesMm: JSON.stringify(places), labels: JSON.stringify(labels), image: String(Boolean(this.field.image)), shape: shape?.kind ?? "",
-      scaleMaxSPerM2: String(this.scale.max), excluded: this.excluded.join(" "),
+      scaleMaxSPerM2: String(this.scale.max), scaleFixed: String(this.scale.isFixed), excluded: this.excluded.join(" "),
     });
   }
 }

@@ -111,6 +111,7 @@ export function decodeUpdate(buffer, layout) {
   return {
     sequence: words.sequence,
     frames: words.frames,
+    timeS: words.time_ms / 1e3,
     electrodes: words.electrodes,
     flags: bitsOf(words.flags).map((bit) => layout.flags[bit]),
     excluded: bitsOf(words.excluded),

@@ -1,15 +1,16 @@
 // From values at the nodes of a mesh to values at the pixels of a grid. Which triangle a pixel lies in, and its weights there,
 // never change: they are found once.
 
-const LONG_SIDE = 420;
+// Fine enough for the smallest contact: the screen smooths what is between.
+const LONG_SIDE = 200;
 
 /** A grid of pixels over the bounds of a mesh, upper row first. */
 export class Raster {
   /** `nodesM`: positions (m); `triangles`: three nodes each; `bounds`: [[smallest x, y], [largest x, y]] (m). */
   constructor(nodesM, triangles, [[left, bottom], [right, top]]) {
     this.pixelM = Math.max(right - left, top - bottom) / LONG_SIDE;
-    this.width = Math.max(1, Math.round((right - left) / this.pixelM));
-    this.height = Math.max(1, Math.round((top - bottom) / this.pixelM));
+    this.width = Math.max(2, Math.round((right - left) / this.pixelM));
+    this.height = Math.max(2, Math.round((top - bottom) / this.pixelM));
     this.corners = new Int32Array(3 * this.width * this.height).fill(-1);
     this.weights = new Float32Array(3 * this.width * this.height);
     const pixels = nodesM.map(([x, y]) => [(x - left) / this.pixelM - 0.5, (top - y) / this.pixelM - 0.5]);

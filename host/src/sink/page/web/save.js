@@ -1,4 +1,4 @@
-// Files for the person: the picture as PNG, the readings and contacts as CSV.
+// Files for the person: the picture as PNG, the readings and contacts as CSV, the history as CSV.
 
 const FIELDS = ["id", "x_m", "y_m", "z_m", "conductance_s", "conductance_error_s", "apparent_conductance_s", "radius_m",
   "force_n", "force_error_n", "force_beyond_maximum", "x_error_m", "y_error_m", "correlation"];
@@ -43,4 +43,19 @@ export function csvOf({ contacts, beside = [], readings, electrodes }) {
 /** Saves an update as CSV. */
 export function saveData(update) {
   download(new Blob([csvOf(update)], { type: "text/csv" }), `tactomo-${stamp()}.csv`);
+}
+
+/** A history as CSV: a row for each sample, with the board's time, what all pressed with, and what each contact did; nothing where it was not there. */
+export function historyCsv({ lines, turns, unit }) {
+  const numbered = [...lines].filter(([id]) => id).sort(([a], [b]) => a - b);
+  const columns = numbered.map(([, line]) => new Map(line.map(({ turn, value }) => [turn, value])));
+  const suffix = unit.toLowerCase();
+  const heads = ["time_s", `total_${suffix}`, ...numbered.map(([id]) => `contact_${id}_${suffix}`)];
+  const rows = turns.map(({ turn, timeS, total }) => [timeS, total, ...columns.map((column) => column.get(turn) ?? "")]);
+  return `${[heads, ...rows].map((row) => row.join(",")).join("\n")}\n`;
+}
+
+/** Saves a history as CSV. */
+export function saveHistory(history) {
+  download(new Blob([historyCsv(history)], { type: "text/csv" }), `tactomo-history-${stamp()}.csv`);
 }

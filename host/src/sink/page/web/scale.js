@@ -25,6 +25,13 @@ export class SteadyScale {
     this.peaks = [];
     this.since = 0;
     this.last = null;
+    this.isFixed = false;
+  }
+
+  /** Ends at `max` whatever comes; at null it follows again what comes. */
+  fix(max) {
+    this.isFixed = max !== null;
+    if (this.isFixed) this.max = max;
   }
 
   /** Takes the largest value of a frame at time `now` (ms); says whether `max` changed. */
@@ -35,7 +42,7 @@ export class SteadyScale {
     while (this.peaks.length > PEAKS || (this.peaks.length > 3 && now - this.peaks[0][0] > PEAK_AGE_MS)) this.peaks.shift();
     const peak = median(this.peaks.map(([, v]) => v));
     const before = this.max;
-    if (this.peaks.length >= 3 && peak > this.floor) this.#follow(peak, now, elapsed);
+    if (!this.isFixed && this.peaks.length >= 3 && peak > this.floor) this.#follow(peak, now, elapsed);
     return this.max !== before;
   }
 
@@ -43,7 +50,7 @@ export class SteadyScale {
   fit(value, now) {
     this.peaks = [];
     this.since = now;
-    this.max = Math.max(this.floor, HEADROOM * value);
+    if (!this.isFixed) this.max = Math.max(this.floor, HEADROOM * value);
   }
 
   /** Share of the colours, 0 to 1, that shows a value: its square root, so that light touches show beside firm ones. */

@@ -1,14 +1,23 @@
-// The detector in space: a flat one as a grid that rises with the heat, a curved one as it is, swelling a little.
+// The detector in space: a flat one as a sheet of foam that rises with the heat, a curved one as it is, swelling a little.
 
 import { densityOf } from "./heat.js";
 
 // Points along the longer side of a flat detector.
 const GRID = 96;
-// Height of the hottest place, as a share of the detector's longer side.
+// Height of what has the colour of the scale's end, and thickness of the sheet, as shares of the detector's longer side.
 const RISE = 0.26;
+const THICKNESS = 0.05;
 const SWELL = 0.1;
-// Share of the picture that the size takes: a plate lies, a curved detector may stand.
-const FILL = { plate: 0.64, curved: 0.5 };
+// From this share of the scale on heights grow less, and never beyond the other: what is above the end of the scale is higher still, and not cut flat.
+const [KNEE, HIGHEST] = [0.85, 1.2];
+// Shares of the scale's end below which nothing rises: it would not be seen.
+const SEEN = 3e-5;
+
+/** Height of a value, as a share of that of the scale's end. */
+function heightOf(value, scale) {
+  const root = Math.sqrt(Math.max(0, value) / scale.max);
+  return root < KNEE ? root : HIGHEST - (HIGHEST - KNEE) * Math.exp((KNEE - root) / (HIGHEST - KNEE));
+}
 
 /**
  * Whether a point is within an outline with holes: even-odd rule.
@@ -42,7 +51,7 @@ export function normalsOf(points, triangles, normals) {
     }
   }
   for (let i = 0; i < normals.length; i += 3) {
-    const length = Math.hypot(normals[i], normals[i + 1], normals[i + 2]) || 1;
+    const length = Math.sqrt(normals[i] ** 2 + normals[i + 1] ** 2 + normals[i + 2] ** 2) || 1;
     normals[i] /= length;
     normals[i + 1] /= length;
     normals[i + 2] /= length;
@@ -55,8 +64,12 @@ class Plate {
 
   constructor({ bounds_m: [[left, bottom], [right, top]], outline_m: loops }) {
     this.sizeM = Math.max(right - left, top - bottom);
-    this.fill = FILL.plate;
-    this.centre = [(left + right) / 2, (bottom + top) / 2, 0.06 * this.sizeM];
+    const ends = [-THICKNESS, RISE].map((share) => share * this.sizeM);
+    this.centre = [(left + right) / 2, (bottom + top) / 2, (ends[0] + ends[1]) / 2];
+    this.radiusM = Math.hypot(right - left, top - bottom) / 2;
+    this.halfHeightM = (ends[1] - ends[0]) / 2;
+    // The longer side lies across the picture.
+    this.turn = top - bottom > 1.5 * (right - left) ? 1.2 : right - left > 1.5 * (top - bottom) ? -0.35 : -0.6;
     const cellM = this.sizeM / GRID;
     const [columns, rows] = [right - left, top - bottom].map((side) => Math.max(2, Math.round(side / cellM)));
     const at = (i, k) => k * (columns + 1) + i;
@@ -72,24 +85,67 @@ class Plate {
         triangles.push(at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k), at(i + 1, k + 1), at(i, k + 1));
       }
     }
+    const low = new Set();
+    for (const loop of loops) this.#addWall(loop, cellM, low, triangles);
     this.triangles = Uint32Array.from(triangles);
-    this.points = Float32Array.from(this.places.flatMap((place) => [...place, 0]));
+    this.points = Float32Array.from(this.places.flatMap((place, i) => [...place, low.has(i) ? ends[0] : 0]));
+    this.isLow = Uint8Array.from(this.places, (_, i) => (low.has(i) ? 1 : 0));
     this.shares = new Float32Array(this.places.length);
+    this.space = new Uint32Array(this.triangles.length);
+    /** The triangles that rise, all others being as at rest. */
+    this.raised = this.space.subarray(0, 0);
     this.rimsM = loops.map((loop) => loop.map(([x, y]) => [x, y, 0]));
+  }
+
+  // The edge of the sheet along a loop of its outline: points of its own, so that the light on it is not that from above.
+  #addWall(loop, cellM, low, triangles) {
+    const along = loop.flatMap(([ax, ay], i) => {
+      const [bx, by] = loop[(i + 1) % loop.length];
+      const pieces = Math.max(1, Math.round(Math.hypot(bx - ax, by - ay) / cellM));
+      return Array.from({ length: pieces }, (_, k) => [[ax, ay, bx, by], k / pieces, (k + 1) / pieces]);
+    });
+    for (const [[ax, ay, bx, by], from, to] of along) {
+      const first = this.places.length;
+      for (const share of [from, to]) {
+        const place = [ax + (bx - ax) * share, ay + (by - ay) * share];
+        this.places.push(place, place);
+        low.add(this.places.length - 1);
+      }
+      triangles.push(first, first + 1, first + 3, first, first + 3, first + 2);
+    }
+  }
+
+  /** Moves the points to where they are when nothing presses. */
+  settle() {
+    this.shares.fill(0);
+    for (let i = 0; i < this.shares.length; i += 1) if (!this.isLow[i]) this.points[3 * i + 2] = 0;
   }
 
   /** Moves the points to the heat of now. */
   update(field, scale) {
-    this.pixels ??= Uint32Array.from(this.places, ([x, y]) => field.pixelAt(x, y));
-    for (let i = 0; i < this.shares.length; i += 1) {
-      this.shares[i] = scale.share(field.values[this.pixels[i]]);
-      this.points[3 * i + 2] = RISE * this.sizeM * this.shares[i];
+    const { triangles, shares } = this;
+    for (let i = 0; i < shares.length; i += 1) {
+      if (this.isLow[i]) continue;
+      const value = field.at(this.places[i][0], this.places[i][1]);
+      const rises = value > SEEN * scale.max;
+      shares[i] = rises ? scale.share(value) : 0;
+      this.points[3 * i + 2] = rises ? RISE * this.sizeM * heightOf(value, scale) : 0;
     }
+    let count = 0;
+    for (let t = 0; t < triangles.length; t += 3) {
+      const [a, b, c] = [triangles[t], triangles[t + 1], triangles[t + 2]];
+      if (!(shares[a] > 0 || shares[b] > 0 || shares[c] > 0)) continue;
+      this.space[count] = a;
+      this.space[count + 1] = b;
+      this.space[count + 2] = c;
+      count += 3;
+    }
+    this.raised = this.space.subarray(0, count);
   }
 
   /** The top of the heat at a contact. */
   topOf({ xM, yM }, field, scale) {
-    return [xM, yM, RISE * this.sizeM * scale.share(field.values[field.pixelAt(xM, yM)])];
+    return [xM, yM, RISE * this.sizeM * heightOf(field.at(xM, yM), scale)];
   }
 }
 
@@ -98,9 +154,13 @@ class Curved {
   constructor({ places_m: places, triangles, torn_triangles: torn }) {
     const ends = [0, 1, 2].map((k) => [Math.min(...places.map((p) => p[k])), Math.max(...places.map((p) => p[k]))]);
     this.centre = ends.map(([low, high]) => (low + high) / 2);
-    this.fill = FILL.curved;
     this.sizeM = Math.max(...ends.map(([low, high]) => high - low));
+    const halves = ends.map(([low, high]) => (high - low) / 2);
+    this.radiusM = Math.hypot(halves[0], halves[1]) + SWELL * this.sizeM;
+    this.halfHeightM = halves[2] + SWELL * this.sizeM;
+    this.turn = -0.6;
     this.triangles = Uint32Array.from([...triangles, ...torn].flat());
+    this.raised = this.triangles;
     this.rest = Float32Array.from(places.flat());
     this.points = this.rest.slice();
     this.out = new Float32Array(this.rest.length);
@@ -108,6 +168,9 @@ class Curved {
     this.shares = new Float32Array(places.length);
     this.rimsM = [];
   }
+
+  /** All of it is drawn anew: a swelling changes the light around it. */
+  settle() {}
 
   /** Moves the points to the heat of now. */
   update(field, scale) {
@@ -133,5 +196,5 @@ class Curved {
   topOf({ place }) { return place; }
 }
 
-/** The shape of a detector: `points`, `triangles`, `shares` of the colours, and `update(field, scale)`. */
+/** The shape of a detector: `points`, `triangles`, those of them that are `raised`, `shares` of the colours, and `update(field, scale)`. */
 export const shapeOf = (setup) => (setup.places_m.length ? new Curved(setup) : new Plate(setup));

@@ -8,13 +8,15 @@ import { sizeCanvas } from "./layout.js";
 import { drawLabels, drawTrail } from "./marks.js";
 import { faded } from "./palette.js";
 import { normalsOf, shapeOf } from "./shapes.js";
-import { DepthImage, shadesOf } from "./triangles.js";
+import { DepthImage, MATT, shadesOf } from "./triangles.js";
 
 // More pixels than this are not drawn one by one.
 const MOST_PIXELS = 420_000;
 // An edge is drawn in so many pieces, each of which may be hidden.
 const EDGE_PIECES = 48;
-const SHADES = { light: { darkest: 0.6, lift: 0 }, dark: { darkest: 0.4, lift: 34 } };
+const SHADES = { light: { darkest: 0.5, lift: -14 }, dark: { darkest: 0.4, lift: 34 } };
+// Pixels at the right that belong to the colour bar.
+const BAR = { width: 96, narrow: 58, narrowBelow: 520 };
 
 /** Draws `view.field` in space. */
 export class SpaceView {
@@ -25,7 +27,7 @@ export class SpaceView {
     this.canvas = document.getElementById("space");
     this.marks = document.getElementById("marks");
     this.shape = shapeOf(view.setup);
-    this.camera = new Camera(view.setup.places_m.length > 0);
+    this.camera = new Camera(this.shape);
     const count = this.shape.shares.length;
     this.normals = new Float32Array(3 * count);
     /** @type {any} */
@@ -35,47 +37,69 @@ export class SpaceView {
 
   /** Fits into a box of pixels. */
   layOut(width, height) {
+    this.narrow = width < BAR.narrowBelow;
+    this.bar = this.narrow ? BAR.narrow : BAR.width;
+    width -= this.bar;
     [this.width, this.height] = [width, height];
     const ratio = Math.min(1.5, window.devicePixelRatio || 1, Math.sqrt(MOST_PIXELS / (width * height)));
     this.depth = new DepthImage(Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio)));
     [this.canvas.width, this.canvas.height] = [this.depth.width, this.depth.height];
     [this.canvas.style.width, this.canvas.style.height] = [`${width}px`, `${height}px`];
-    this.over = sizeCanvas(this.marks, width, height);
+    this.over = sizeCanvas(this.marks, width + this.bar, height);
   }
 
   /** Draws all of it. */
   draw(now) {
-    const { view: { field, scale, theme }, shape, depth } = this;
+    const { view: { field, scale }, shape, depth } = this;
+    this.#drawRest();
     shape.update(field, scale);
-    this.#project();
-    depth.clear();
-    if (this.theme !== theme) this.shades = shadesOf(colourMaps(theme).image, SHADES[this.theme = theme]);
-    depth.draw(shape.triangles, this.screen, this.shades);
+    this.#project(shape.raised);
+    depth.restore();
+    depth.draw(shape.raised, this.screen, this.shades);
     this.canvas.getContext("2d").putImageData(depth.image, 0, 0);
     this.#drawOver(now);
   }
 
-  #project() {
-    const { shape: { points, triangles }, normals, screen, depth } = this;
+  // The detector on which nothing presses: drawn once for each look at it. What rises is drawn over it.
+  #drawRest() {
+    const { view: { theme }, shape, depth, camera } = this;
+    const look = [theme, depth.width, depth.height, camera.turn, camera.tilt, camera.zoom].join();
+    if (look === this.look) return;
+    this.look = look;
+    this.shades = shadesOf(colourMaps(theme).image, SHADES[theme]);
+    shape.settle();
+    depth.clear();
+    if (shape.raised !== shape.triangles) {
+      this.#project(shape.triangles);
+      depth.draw(shape.triangles, this.screen, this.shades);
+    }
+    depth.keep();
+  }
+
+  #project(triangles) {
+    const { shape: { points }, normals, screen, depth } = this;
     normalsOf(points, triangles, normals);
     this.camera.project(this.shape, points, screen, depth.width, depth.height);
     const [x, y, z] = this.camera.light();
+    const [hx, hy, hz] = this.camera.shine();
     for (let i = 0, k = 0; i < screen.x.length; i += 1, k += 3) {
-      const facing = normals[k] * x + normals[k + 1] * y + normals[k + 2] * z;
-      screen.light[i] = 0.5 + 0.5 * facing;
+      const [nx, ny, nz] = [normals[k], normals[k + 1], normals[k + 2]];
+      const facing = nx * x + ny * y + nz * z;
+      const shining = Math.max(0, nx * hx + ny * hy + nz * hz) ** 24;
+      screen.light[i] = MATT * (0.5 + 0.5 * facing) + (1 - MATT) * shining;
     }
   }
 
   #drawOver(now) {
     const { over, view, shape, width, height } = this;
     const at = this.camera.projection(shape, width, height);
-    over.clearRect(0, 0, width, height);
+    over.clearRect(0, 0, width + this.bar, height);
     this.#drawRims(at);
     this.#drawPads(at);
     for (const [id, way] of view.trails.all(now)) {
       const points = way.map(({ place, ...rest }) => {
-        const [x, y] = at(...place);
-        return { ...rest, x, y };
+        const [x, y, z] = at(...place);
+        return { ...rest, x, y, begins: rest.begins || !this.#shows(x, y, z) };
       });
       drawTrail(over, id, points, view.colours);
     }
@@ -89,8 +113,7 @@ export class SpaceView {
       spots.push({ contact: view.field.shape, text: view.labelOf(view.field.shape), x, y, radius: 8 });
     }
     drawLabels(over, spots, view.colours, { width, height });
-    const narrow = width < 520;
-    drawBar(over, { left: 0, width: width - (narrow ? 58 : 96), top: 14, height: Math.min(360, height - 44), narrow }, view);
+    drawBar(over, { left: 0, width, top: 14, height: Math.min(360, height - 44), narrow: this.narrow }, view);
   }
 
   #drawRims(at) {

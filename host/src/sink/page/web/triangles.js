@@ -1,7 +1,10 @@
 // Draws triangles with a depth buffer into the pixels of an image. No library, no graphics processor: it looks the same and
 // works everywhere.
 
-const LIGHTS = 32;
+const LIGHTS = 64;
+/** Share of brightness up to which it is that of the colour; above, colours turn white: they shine. */
+export const MATT = 0.8;
+const MOST_WHITE = 0.35;
 
 /** An image with depth. */
 export class DepthImage {
@@ -17,6 +20,15 @@ export class DepthImage {
   clear() {
     this.pixels.fill(0);
     this.depth.fill(Infinity);
+  }
+
+  /** Keeps what is drawn now, for `restore`. */
+  keep() { this.kept = { pixels: this.pixels.slice(), depth: this.depth.slice() }; }
+
+  /** Draws what was kept, and nothing else. */
+  restore() {
+    this.pixels.set(this.kept.pixels);
+    this.depth.set(this.kept.depth);
   }
 
   /**
@@ -75,10 +87,12 @@ export function shadesOf(colours, { darkest, lift }) {
   const bytes = new Uint8Array(shades.buffer);
   const source = new Uint8Array(colours.buffer);
   for (let light = 0; light < LIGHTS; light += 1) {
-    const factor = darkest + (1 - darkest) * (light / (LIGHTS - 1));
+    const share = light / (LIGHTS - 1);
+    const factor = darkest + (1 - darkest) * Math.min(1, share / MATT);
+    const white = MOST_WHITE * Math.max(0, (share - MATT) / (1 - MATT));
     for (let i = 0; i < source.length; i += 1) {
       const added = lift * Math.max(0, 1 - i / source.length / LIFTED);
-      bytes[light * source.length + i] = i % 4 === 3 ? 255 : Math.min(255, (source[i] + added) * factor);
+      bytes[light * source.length + i] = i % 4 === 3 ? 255 : Math.min(255, (source[i] + added) * factor * (1 - white) + 255 * white);
     }
   }
   return shades;

@@ -2,8 +2,9 @@
 //!
 //! Nothing, one contact, two, up to six, a line, a ring, an image: what explains the readings at the lowest price ([`Evidence`]) is the
 //! answer, and the solution says which and why. What is known is followed from frame to frame, which costs least, and searched anew
-//! only when it no longer explains the readings, or now and then.
+//! only when it no longer explains the readings, or now and then. A touch of which nothing is found yet is shown by its linear image.
 
+mod first_look;
 mod search;
 #[cfg(test)]
 mod tests;
@@ -12,6 +13,7 @@ mod words;
 
 use std::sync::Arc;
 
+use self::first_look::FirstLook;
 use self::search::AutoSearch;
 use self::tracker::AutoTracker;
 use crate::solve::answer::{Solution, SolveError};
@@ -72,6 +74,7 @@ impl Auto {
             contacts.clone().map(ContactTracker::new),
             shapes.clone().map(ShapeTracker::new),
             image.clone(),
+            FirstLook::new(problem),
         );
         let search = AutoSearch::new(contacts, shapes, image);
         Ok(Self { tracker, search })

@@ -91,6 +91,31 @@ fn it_takes_no_more_than_the_scene_needs() {
 }
 
 #[test]
+fn a_touch_is_seen_in_its_first_frame_where_it_is_and_nothing_is_seen_without_one() {
+    let mut trial = AutoTrial::new();
+    let Parts { mut tracker, .. } = Box::new(Auto::new(&trial.problem()).unwrap()).split();
+    let nothing = tracker.follow(&Readings::from_fn(16, |_, _| 0.0)).unwrap();
+    assert_eq!((what(&nothing.solution), nothing.solution.image_s_per_m2.is_none()), ("nothing", true));
+    let [x_m, y_m] = [0.01, 0.004];
+    let touched = trial.measured(&[Contact::flat(x_m, y_m, 0.0025, 3e-4)]);
+    let mesh = trial.problem().jacobian.image_mesh.clone();
+    let peak_m = |solution: &Solution| {
+        let image = solution.image_s_per_m2.as_deref().unwrap();
+        assert!(image.iter().all(|density| *density >= 0.0));
+        let highest = image.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).unwrap().0;
+        mesh.nodes_m[highest]
+    };
+    // Before a search, and after one that has led to nothing.
+    let followed = tracker.follow(&touched).unwrap();
+    let adopted = tracker.adopt(Hypothesis::default(), &touched).unwrap();
+    for followed in [followed, adopted] {
+        assert_eq!((what(&followed.solution), followed.search), ("searching", true), "{followed:?}");
+        let [x, y] = peak_m(&followed.solution);
+        assert!((x - x_m).hypot(y - y_m) < 0.004, "{x} {y}");
+    }
+}
+
+#[test]
 fn a_follower_goes_on_from_what_was_searched_some_frames_ago() {
     let mut trial = AutoTrial::new();
     let Parts { mut tracker, search } = Box::new(Auto::new(&trial.problem()).unwrap()).split();

@@ -1,5 +1,6 @@
 //! The fast half: follows whichever model was chosen last, and contacts beside it.
 
+use super::first_look::FirstLook;
 use super::words::{as_contacts, as_whole, nothing};
 use super::{
     ContactHypothesis, ContactTracker, Evidence, FrameHypothesis, Nonlinear, ShapeTracker, Solution, SolveError,
@@ -22,6 +23,7 @@ pub(super) struct AutoTracker {
     contacts: Option<ContactTracker>,
     shapes: Option<ShapeTracker>,
     image: Nonlinear,
+    first_look: FirstLook,
     answer: Answer,
     /// Frames for which nothing is searched while an image is the answer, and how many it will be next time.
     skip: u32,
@@ -52,6 +54,7 @@ impl AutoTracker {
         contacts: Option<ContactTracker>,
         shapes: Option<ShapeTracker>,
         image: Nonlinear,
+        first_look: FirstLook,
     ) -> Self {
         let (electrodes, average) = (detector.electrodes.len(), AdaptiveMean::new(detector.adc.deviation_v()));
         Self {
@@ -60,6 +63,7 @@ impl AutoTracker {
             contacts,
             shapes,
             image,
+            first_look,
             answer: Answer::Contacts,
             skip: 0,
             patience: policy::image_patience()[0],
@@ -186,7 +190,7 @@ impl AutoTracker {
             Some(whole) => Solution { contacts: contacts.contacts, ..whole },
             None => as_contacts(contacts, search),
         };
-        Ok(Followed { solution, search })
+        self.first_look.of(Followed { solution, search }, readings)
     }
 
     /// Goes on from an image where the model has no contacts.
@@ -217,7 +221,7 @@ impl AutoTracker {
                 let is_gone = !matches!(self.answer, Answer::Contacts);
                 self.take(Answer::Contacts);
                 let followed = self.follow_contacts(readings, target.as_ref());
-                Ok(Followed { search: followed.search || is_gone, ..followed })
+                self.first_look.of(Followed { search: followed.search || is_gone, ..followed }, readings)
             }
         }
     }
@@ -240,7 +244,7 @@ impl Tracker for AutoTracker {
             (Answer::Contacts, Some(contacts)) => {
                 self.average.reset();
                 let Followed { solution, search } = contacts.follow_rows(rows, elapsed_s)?;
-                Ok(Followed { solution: as_contacts(solution, search), search })
+                self.first_look.of(Followed { solution: as_contacts(solution, search), search }, latest)
             }
             _ => self.follow(latest),
         }
