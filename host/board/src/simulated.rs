@@ -152,7 +152,7 @@ impl SimulatedBoard {
         options: Options,
     ) -> Result<Self, SimulatedBoardError> {
         let circuit = Arc::new(Circuit::new(options.model.figures().row_work_ns));
-        let line = Arc::new(Line::default());
+        let line = Arc::new(Line::new(options.model.figures()));
         let step = firmware(detector, physics, options, &circuit, &line)?;
         let thread = {
             let (line, circuit) = (Arc::clone(&line), Arc::clone(&circuit));
@@ -160,6 +160,11 @@ impl SimulatedBoard {
         };
         let thread = Some(thread.map_err(SimulatedBoardError::Thread)?);
         Ok(Self { line, circuit, model: options.model, controls: None, thread })
+    }
+
+    /// Puts a USB bridge in the line that keeps rates up to this one (bits a second), and garbles bytes above it.
+    pub fn set_bridge_baud(&self, most: u32) {
+        self.line.set_bridge_baud(most);
     }
 
     /// A clock that tells when the scene began.
@@ -190,6 +195,14 @@ impl Link for SimulatedBoard {
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.line.down.put_all_within(bytes, WRITE_WAIT)
+    }
+
+    fn baud(&self) -> Option<u32> {
+        self.line.host_baud()
+    }
+
+    fn set_baud(&mut self, baud: u32) -> io::Result<()> {
+        self.line.set_host_baud(baud)
     }
 
     fn control(&mut self, control: &Control) -> Result<(), ControlError> {
