@@ -1,6 +1,6 @@
 //! The talk with a board: who are you, here are your settings and your scan plan, start.
 //!
-//! No input or output happens here: a [`Session`] is given what came and asked what to send.
+//! A [`Session`] is given what came and tells what to send. Input and output are in [`Session::transmit`] alone, which also sets the line's rate.
 
 mod damage;
 mod greet;

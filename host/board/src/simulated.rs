@@ -36,6 +36,8 @@ const AHEAD: Duration = Duration::from_millis(5);
 const BEHIND: Duration = Duration::from_millis(20);
 /// Longest sleep of a board with nothing to do.
 const IDLE: Duration = Duration::from_millis(5);
+/// Longest sleep of a board with nothing to do but to send: a third of what its FIFO takes to empty.
+const FULL: Duration = Duration::from_micros(400);
 /// Longest wait for bytes of one read.
 const READ_WAIT: Duration = Duration::from_millis(50);
 /// Longest wait for room of one write.
@@ -333,6 +335,7 @@ fn run(mut step: Step, circuit: &Circuit, line: &Line) {
         match step() {
             Activity::Row => clocks.wait_if_ahead_by(AHEAD),
             Activity::Frame => clocks.wait_if_ahead_by(Duration::ZERO),
+            Activity::Idle if line.is_full() => clocks.idle(line, FULL),
             Activity::Idle => clocks.idle(line, IDLE),
             Activity::Waiting { until_us } => {
                 clocks.idle(line, Duration::from_micros(until_us).saturating_sub(clocks.wall()).min(IDLE));

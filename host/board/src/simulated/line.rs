@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -31,6 +31,8 @@ pub(super) struct Line {
     board_baud: AtomicU32,
     /// The highest rate that the bridge between them keeps.
     bridge_baud: AtomicU32,
+    /// Whether the board has more to send than its FIFO took last.
+    is_full: AtomicBool,
 }
 
 impl Line {
@@ -43,6 +45,7 @@ impl Line {
             host_baud: AtomicU32::new(baud),
             board_baud: AtomicU32::new(baud),
             bridge_baud: AtomicU32::new(u32::MAX),
+            is_full: AtomicBool::new(false),
         }
     }
 
@@ -60,6 +63,11 @@ impl Line {
     /// Sets the highest rate that the bridge keeps.
     pub(super) fn set_bridge_baud(&self, baud: u32) {
         self.bridge_baud.store(baud, Relaxed);
+    }
+
+    /// Whether the board waits for room in its FIFO.
+    pub(super) fn is_full(&self) -> bool {
+        self.is_full.load(Relaxed)
     }
 
     /// Makes other bytes of those that pass the line now, where its ends differ in their rates or the bridge does not keep them.
@@ -212,6 +220,7 @@ impl Serial for BoardEnd {
         let mut sent = bytes[..bytes.len().min(room)].to_vec();
         self.line.garble(&mut sent);
         let count = self.line.up.put(&sent);
+        self.line.is_full.store(count < bytes.len(), Relaxed);
         if let Some(fifo) = &mut self.fifo {
             fifo.held += count as f64;
         }
