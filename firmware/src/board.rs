@@ -8,6 +8,7 @@ use tactomo_protocol::{
 
 use crate::inbox::Inbox;
 use crate::pace::Pace;
+use crate::rate::Rate;
 use crate::row::Attended;
 use crate::scan::{FrontEnd, Scan, Scanned};
 use crate::uplink::Uplink;
@@ -84,6 +85,7 @@ pub struct Board<M, S, L, C, const READINGS: usize, const WIRE: usize> {
     scan: Scan<READINGS>,
     uplink: Uplink<READINGS, WIRE>,
     pace: Pace,
+    rate: Rate,
     /// Whether the host knows that the converter is stuck.
     stuck_reported: bool,
     /// What went wrong before the reset, until a host has surely heard of it.
@@ -124,6 +126,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             scan,
             uplink,
             pace: Pace::default(),
+            rate: Rate::default(),
             stuck_reported: false,
             boot_fault: None,
         })
@@ -151,6 +154,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
     /// If a pin of the multiplexer cannot be driven.
     pub fn step(&mut self) -> Result<Activity, M::Error> {
         self.parts.chip.feed_watchdog();
+        self.rate.turn(&mut self.parts.serial, &mut self.parts.chip, &mut self.uplink);
         self.receive();
         let activity = self.scan_if_due();
         self.uplink.poll(&mut self.parts.serial, &mut self.parts.chip);
@@ -186,6 +190,7 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             Err(refusal) => self.fault(refusal),
         }
         self.boot_fault.take().into_iter().for_each(|fault| self.fault(fault));
+        self.rate.heard(&mut self.parts.chip, &mut self.uplink);
     }
 
     /// # Errors
@@ -199,6 +204,8 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
             Command::Configure(_) => return Err(Fault::BadSettings { answers }),
             Command::Scan(plan) if plan == *self.scan.plan() => {}
             Command::Scan(plan) => self.follow(plan, answers)?,
+            Command::Rate { baud } if self.rate.ask(baud, &self.parts.serial) => {}
+            Command::Rate { .. } => return Err(Fault::BadRate { answers }),
         }
         Ok(())
     }

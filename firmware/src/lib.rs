@@ -30,6 +30,7 @@ mod log_queue;
 pub mod mux;
 mod pace;
 mod parts;
+mod rate;
 mod row;
 mod scan;
 mod side_by_side;

@@ -80,6 +80,15 @@ pub trait Sampler {
 
 /// The line to the host. Neither direction ever waits.
 pub trait Serial {
+    /// Rates that the line can be set to (bits a second), of which it has the first after a reset; none on a line whose rate is not the board's to
+    /// choose, such as a USB port.
+    fn rates(&self) -> &'static [u32] {
+        &[]
+    }
+
+    /// Sets the line to one of its [rates](Self::rates), when what was pushed has left the transmitter: that alone is waited for, a FIFO's time.
+    fn set_baud(&mut self, _baud: u32) {}
+
     /// Takes as many of `bytes`, from the front, as the transmitter has room for at once; returns how many. A UART takes no
     /// more than its FIFO has free.
     fn push(&mut self, bytes: &[u8]) -> usize;

@@ -51,7 +51,7 @@ pub(crate) trait Attended<C> {
     fn transfer(&mut self, chip: &mut C);
 }
 
-/// Longest stretch of a wait in which nobody looks at the line (us): at 921600 baud, 23 bytes of the 128 of a UART's FIFO.
+/// Longest stretch of a wait in which nobody looks at the line (us): at 3 million baud, 75 bytes of the 128 of a UART's FIFO.
 const WAIT_US: u32 = 250;
 
 /// Waits, at least for `us`, and keeps line and watchdog alive.

@@ -39,6 +39,8 @@ enum Sending {
     Control,
     Frame,
     Log,
+    /// Nothing, until the line may be used again.
+    Held,
 }
 
 /// Packets on their way to the host; a frame has `READINGS` readings and takes `WIRE` bytes at most.
@@ -61,6 +63,8 @@ pub struct Uplink<const READINGS: usize, const WIRE: usize> {
     gone: usize,
     /// Whether the last packet was a frame, so that the log has its turn.
     after_frame: bool,
+    /// Whether nothing is to be begun but answers.
+    holds: bool,
 }
 
 impl<const READINGS: usize, const WIRE: usize> Default for Uplink<READINGS, WIRE> {
@@ -80,6 +84,7 @@ impl<const READINGS: usize, const WIRE: usize> Default for Uplink<READINGS, WIRE
             sending: Sending::Nothing,
             gone: 0,
             after_frame: false,
+            holds: false,
         }
     }
 }
@@ -100,6 +105,31 @@ impl<const READINGS: usize, const WIRE: usize> Uplink<READINGS, WIRE> {
     /// Sends the next frames as they are: the host may have none of the keys.
     pub fn forget_keys(&mut self) {
         self.keys.clear();
+    }
+
+    /// Sends what is being sent and the answers that wait, then nothing until it is [released](Self::release).
+    pub fn hold(&mut self) {
+        self.holds = true;
+        self.hold_if_done();
+    }
+
+    fn hold_if_done(&mut self) {
+        if self.holds && self.sending == Sending::Nothing && self.control.is_empty() {
+            self.sending = Sending::Held;
+        }
+    }
+
+    /// Whether all that was to be sent has gone to the line.
+    pub fn is_held(&self) -> bool {
+        self.sending == Sending::Held
+    }
+
+    /// Goes on after a [hold](Self::hold).
+    pub fn release(&mut self) {
+        self.holds = false;
+        if self.is_held() {
+            self.sending = Sending::Nothing;
+        }
     }
 
     /// Whether no frame waits or is being sent.
@@ -164,6 +194,7 @@ impl<const READINGS: usize, const WIRE: usize> Uplink<READINGS, WIRE> {
     fn push(&mut self, serial: &mut impl Serial) -> bool {
         let done = match self.sending {
             Sending::Nothing => true,
+            Sending::Held => false,
             Sending::Control => self.push_control(serial),
             Sending::Frame => push_from(&self.frame, &mut self.gone, serial),
             Sending::Log => push_from(&self.log, &mut self.gone, serial),
@@ -171,6 +202,7 @@ impl<const READINGS: usize, const WIRE: usize> Uplink<READINGS, WIRE> {
         self.frame_waits &= self.sending != Sending::Frame || self.gone == 0;
         if done {
             self.sending = Sending::Nothing;
+            self.hold_if_done();
         }
         done
     }

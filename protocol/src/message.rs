@@ -231,6 +231,11 @@ pub enum Fault {
         /// Tag of the command.
         answers: u8,
     },
+    /// A command with a rate that the board's line cannot be set to; the old one stays.
+    BadRate {
+        /// Tag of the command.
+        answers: u8,
+    },
 }
 
 /// Host to board: a command, and a tag by which the answer names it.
@@ -242,8 +247,8 @@ pub struct Request {
     pub command: Command,
 }
 
-/// What a board is to do. It answers each with [`Hello`], which names the tag, or with [`Fault::BadSettings`] or [`Fault::BadPlan`]; so a host
-/// can repeat a command until it is answered, and the repetition changes nothing.
+/// What a board is to do. It answers each with [`Hello`], which names the tag, or with [`Fault::BadSettings`], [`Fault::BadPlan`] or
+/// [`Fault::BadRate`]; so a host can repeat a command until it is answered, and the repetition changes nothing.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Command {
     /// Asks for [`Hello`].
@@ -256,4 +261,9 @@ pub enum Command {
     Configure(Settings),
     /// Changes the rows that are scanned, and abandons the frame under way.
     Scan(Plan),
+    /// Sets the line to another rate on trial, or confirms the one that is on trial, as `docs/protocol.md` has it.
+    Rate {
+        /// Bits a second on the line.
+        baud: u32,
+    },
 }

@@ -28,6 +28,20 @@ pub trait Link: Send {
     /// If the link is gone or does not take bytes in time.
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()>;
 
+    /// Bits a second that the line was opened at, or was [set](Self::set_baud) to; `None` if it has no rate.
+    fn baud(&self) -> Option<u32> {
+        None
+    }
+
+    /// Sets the line to another rate (bits a second). What was written and is not sent yet may be lost.
+    ///
+    /// # Errors
+    /// If the line has no rate, or not this one, or is gone ([`io::ErrorKind::BrokenPipe`]).
+    fn set_baud(&mut self, baud: u32) -> io::Result<()> {
+        let _ = baud;
+        Err(io::ErrorKind::Unsupported.into())
+    }
+
     /// Does what a person asks of a simulated detector or a recording; a real board has nothing to be asked.
     ///
     /// # Errors

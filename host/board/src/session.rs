@@ -1,10 +1,13 @@
 //! The talk with a board: who are you, here are your settings and your scan plan, start.
 //!
-//! No input or output happens here: a [`Session`] is given what came and asked what to send.
+//! A [`Session`] is given what came and tells what to send. Input and output are in [`Session::transmit`] alone, which also sets the line's rate.
 
+mod damage;
 mod greet;
+mod line;
 mod pace;
 mod plan;
+mod rate;
 mod requested;
 
 use std::time::{Duration, Instant};
@@ -13,9 +16,12 @@ use tactomo_protocol::{Command, Fault, Hello, Plan, Request, Settings};
 
 use self::pace::Paces;
 use self::plan::PlanWish;
+use self::rate::{KEEP_ALIVE, Rates};
 
-pub use greet::{GreetError, explain, greet, send};
+pub use greet::{GreetError, explain, greet};
+pub use line::send;
 pub use plan::PlanState;
+pub use rate::RATES;
 pub use requested::{Refusal, RequestedSettings};
 
 /// Time between two askings for Hello.
@@ -75,6 +81,8 @@ pub struct Session {
     /// Whether settings were sent of which nobody knows if they arrived.
     settings_in_doubt: bool,
     plan: PlanWish,
+    /// The rate of the line; `None` where it has none, or before it is open.
+    rates: Option<Rates>,
     /// Whether Start is to be sent.
     start_due: bool,
     /// What the board said of itself last, in answer to what it was asked last.
@@ -102,6 +110,7 @@ impl Session {
             settings_due: false,
             settings_in_doubt: false,
             plan: PlanWish::default(),
+            rates: None,
             start_due: false,
             hello: None,
             pending: None,
@@ -166,15 +175,34 @@ impl Session {
 
     /// The command to send now, if any.
     pub fn command(&mut self, now: Instant) -> Option<Request> {
-        let request = self.next_request(now)?;
+        let request = match &self.rates {
+            Some(rates) if rates.is_changing() => self.question()?,
+            _ => self.next_request(now)?,
+        };
         self.heard = Some(now);
+        self.rates.iter_mut().for_each(|rates| rates.sent(now));
         Some(request)
     }
 
+    /// What the trial of a rate asks next.
+    fn question(&mut self) -> Option<Request> {
+        let command = self.rates.as_ref()?.question()?;
+        let tag = self.next_tag();
+        self.rates.iter_mut().for_each(|rates| rates.asked(tag));
+        Some(Request { tag, command })
+    }
+
+    fn next_tag(&mut self) -> u8 {
+        self.tag = self.tag.checked_add(1).unwrap_or(1);
+        self.tag
+    }
+
     fn next_request(&mut self, now: Instant) -> Option<Request> {
+        let is_raised = self.is_raised();
         if let Some(pending) = &mut self.pending {
             let is_question = pending.request.command == Command::Hello;
             let patience = match is_question {
+                true if is_raised => KEEP_ALIVE,
                 true if self.started => SILENCE,
                 true => ASK_EVERY,
                 false => REPEAT_EVERY,
@@ -195,12 +223,14 @@ impl Session {
 
     /// What is to be sent to the board next.
     fn due(&mut self, now: Instant) -> Option<Command> {
-        let silence = self.is_silent(now).then_some(Command::Hello);
+        let keep_alive = self.rates.as_ref().is_some_and(|rates| rates.is_keep_alive_due(now));
+        let silence = (keep_alive || self.is_silent(now)).then_some(Command::Hello);
         let Some(hello) = &self.hello else { return silence };
         let wanted = self.requested.over(hello.settings);
         let is_other = wanted != hello.settings || self.settings_in_doubt;
         self.settings_due &= is_other;
         let due = [
+            self.rates.as_ref().and_then(Rates::due).map(|baud| Command::Rate { baud }),
             self.settings_due.then_some(Command::Configure(wanted)),
             self.plan.due().cloned().map(Command::Scan),
             self.start_due.then_some(Command::Start),
@@ -211,14 +241,14 @@ impl Session {
 
     /// Gives a command a tag, and waits for its answer.
     fn ask(&mut self, command: Command, now: Instant) -> Request {
-        self.tag = self.tag.checked_add(1).unwrap_or(1);
+        let tag = self.next_tag();
         self.settings_in_doubt |= matches!(command, Command::Configure(_));
         self.paces.sent(&command, now);
         if command == Command::Start {
             self.started = true;
             self.waiting_since.get_or_insert(now);
         }
-        let request = Request { tag: self.tag, command };
+        let request = Request { tag, command };
         self.pending = Some(Pending { request: request.clone(), tries: 1, sent: now });
         request
     }
@@ -230,8 +260,13 @@ impl Session {
 
     /// Takes a Hello: an answer, an old one, or that of a board that has started anew and has to be sent everything again.
     pub fn hello(&mut self, hello: &Hello, now: Instant) {
+        self.whole(now);
         if hello.answers == 0 {
+            self.rates.iter_mut().for_each(Rates::board_has_started);
             return self.board_has_started(hello, now);
+        }
+        if self.rates.as_mut().is_some_and(|rates| rates.answered(hello.answers)) {
+            return;
         }
         let is_answer = |pending: &mut Pending| pending.request.tag == hello.answers;
         let Some(answered) = self.pending.take_if(is_answer) else {
@@ -239,6 +274,9 @@ impl Session {
             return;
         };
         self.heard = Some(now);
+        if let (Command::Rate { baud }, Some(rates)) = (&answered.request.command, &mut self.rates) {
+            rates.taken(*baud);
+        }
         let is_first = self.hello.replace(hello.clone()).is_none();
         if !is_first && !self.start_due && !hello.is_streaming {
             // It was started, and does not stream: it has started anew, and its Hello was lost.
@@ -253,7 +291,7 @@ impl Session {
         let is_followed = match &command {
             Command::Start | Command::Stop => hello.is_streaming,
             Command::Configure(wanted) => *wanted == hello.settings,
-            Command::Hello | Command::Scan(_) => true,
+            Command::Hello | Command::Scan(_) | Command::Rate { .. } => true,
         };
         if is_followed {
             self.paces.restart(&command);
@@ -265,6 +303,7 @@ impl Session {
             Command::Configure(_) if is_followed => self.settings_in_doubt = false,
             Command::Configure(wanted) => self.refused(wanted, true),
             Command::Scan(plan) => self.plan.confirmed(plan),
+            Command::Rate { .. } => {}
         }
     }
 
@@ -291,12 +330,13 @@ impl Session {
     pub fn fault(&mut self, fault: &Fault) -> bool {
         match *fault {
             Fault::BadSettings { answers } if self.is_answer(answers) => {}
-            Fault::BadPlan { answers } if self.is_answer(answers) => {}
+            Fault::BadPlan { answers } | Fault::BadRate { answers } if self.is_answer(answers) => {}
             _ => return false,
         }
         match self.pending.take().map(|pending| pending.request.command) {
             Some(Command::Configure(wanted)) => self.refused(wanted, true),
             Some(Command::Scan(_)) => self.plan_refused("does not take"),
+            Some(Command::Rate { .. }) => self.rates.iter_mut().for_each(Rates::refused),
             _ => return false,
         }
         true
@@ -314,6 +354,7 @@ impl Session {
             // Whole frames nobody has asked for; the frames themselves say what they are.
             Some(Command::Scan(plan)) if plan.is_whole() => self.plan.confirmed(plan),
             Some(Command::Scan(_)) => self.plan_refused("did not confirm"),
+            Some(Command::Rate { .. }) => self.rates.iter_mut().for_each(Rates::refused),
             _ => self.start_due = false,
         }
     }
@@ -336,6 +377,7 @@ impl Session {
 
     /// Takes note of a frame.
     pub fn frame(&mut self, now: Instant) {
+        self.whole(now);
         if self.started {
             self.heard = Some(now);
             self.waiting_since = None;

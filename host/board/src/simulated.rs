@@ -36,6 +36,8 @@ const AHEAD: Duration = Duration::from_millis(5);
 const BEHIND: Duration = Duration::from_millis(20);
 /// Longest sleep of a board with nothing to do.
 const IDLE: Duration = Duration::from_millis(5);
+/// Longest sleep of a board with nothing to do but to send: a third of what its FIFO takes to empty.
+const FULL: Duration = Duration::from_micros(400);
 /// Longest wait for bytes of one read.
 const READ_WAIT: Duration = Duration::from_millis(50);
 /// Longest wait for room of one write.
@@ -152,7 +154,7 @@ impl SimulatedBoard {
         options: Options,
     ) -> Result<Self, SimulatedBoardError> {
         let circuit = Arc::new(Circuit::new(options.model.figures().row_work_ns));
-        let line = Arc::new(Line::default());
+        let line = Arc::new(Line::new(options.model.figures()));
         let step = firmware(detector, physics, options, &circuit, &line)?;
         let thread = {
             let (line, circuit) = (Arc::clone(&line), Arc::clone(&circuit));
@@ -160,6 +162,11 @@ impl SimulatedBoard {
         };
         let thread = Some(thread.map_err(SimulatedBoardError::Thread)?);
         Ok(Self { line, circuit, model: options.model, controls: None, thread })
+    }
+
+    /// Puts a USB bridge in the line that keeps rates up to this one (bits a second), and garbles bytes above it.
+    pub fn set_bridge_baud(&self, most: u32) {
+        self.line.set_bridge_baud(most);
     }
 
     /// A clock that tells when the scene began.
@@ -190,6 +197,14 @@ impl Link for SimulatedBoard {
 
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.line.down.put_all_within(bytes, WRITE_WAIT)
+    }
+
+    fn baud(&self) -> Option<u32> {
+        self.line.host_baud()
+    }
+
+    fn set_baud(&mut self, baud: u32) -> io::Result<()> {
+        self.line.set_host_baud(baud)
     }
 
     fn control(&mut self, control: &Control) -> Result<(), ControlError> {
@@ -320,6 +335,7 @@ fn run(mut step: Step, circuit: &Circuit, line: &Line) {
         match step() {
             Activity::Row => clocks.wait_if_ahead_by(AHEAD),
             Activity::Frame => clocks.wait_if_ahead_by(Duration::ZERO),
+            Activity::Idle if line.is_full() => clocks.idle(line, FULL),
             Activity::Idle => clocks.idle(line, IDLE),
             Activity::Waiting { until_us } => {
                 clocks.idle(line, Duration::from_micros(until_us).saturating_sub(clocks.wall()).min(IDLE));

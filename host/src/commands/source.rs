@@ -35,7 +35,7 @@ pub struct BoardArgs {
     /// Which board is simulated [default: esp32; of more than 16 electrodes ideal]
     #[arg(long, value_name = "BOARD", requires = "simulate", value_parser = board_model())]
     board: Option<BoardModel>,
-    /// Baud rate of the serial port
+    /// Baud rate of the serial port, from which board and program agree on a higher one
     #[arg(long, default_value_t = DEFAULT_BAUD, value_parser = clap::value_parser!(u32).range(300..=12_000_000))]
     pub baud: u32,
     #[command(flatten)]

@@ -48,9 +48,7 @@ impl Connection {
 
     /// Sends what is due and reads what has come; returns the number of bytes.
     pub fn exchange(&mut self, link: &mut dyn Link, buffer: &mut [u8]) -> io::Result<usize> {
-        if let Some(command) = self.session.command(Instant::now()) {
-            session::send(link, &command)?;
-        }
+        self.session.transmit(link, self.receiver.counters().corrupt)?;
         link.read(buffer)
     }
 
@@ -80,15 +78,11 @@ impl Connection {
     /// Corrupt stretches since the last time this was asked; boot text before Hello is none.
     pub fn newly_corrupt(&mut self) -> u64 {
         let Some(junk) = self.junk else { return 0 };
-        if self.landing {
-            // The rest of a packet that a jump has landed in is none.
-            self.counted = self.receiver.counters().corrupt;
-            return 0;
-        }
         let corrupt = self.receiver.counters().corrupt - junk;
         let newly = corrupt - self.counted;
         self.counted = corrupt;
-        newly
+        // The rest of a packet that a jump has landed in is none, and neither is what comes at a rate that the line does not keep.
+        if self.landing || self.session.is_changing_rate() { 0 } else { newly }
     }
 }
 

@@ -33,7 +33,7 @@ use super::{LinkState, Request};
 
 /// Time between two tries to open a link that was lost.
 const REOPEN_EVERY: Duration = Duration::from_millis(500);
-/// Bytes of one read: 40 ms at 921600 baud.
+/// Bytes of one read: 40 ms at 921600 baud, 14 ms at 3 million.
 const READ_BYTES: usize = 4096;
 
 /// Runs until the time is over, the recording ends, or it is told to stop. A board that is lost is waited for.
@@ -218,6 +218,7 @@ impl Reader {
             }
             self.show_link(link, &mut connection);
         }
+        connection.session.leave(link);
         let frames = self.notice.count(|meter| meter.statistics(Instant::now()).frames);
         if comes_back && frames == 0 && self.is_timed_out() {
             return Err(LiveError::Mute { link: link.name() });

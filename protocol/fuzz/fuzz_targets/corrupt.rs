@@ -67,6 +67,7 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Log(Log([0xFF, 0, 1, 0, 0].into_iter().collect())),
         BoardMessage::Fault(Fault::AdcStuck),
         BoardMessage::Fault(Fault::BadPlan { answers: 9 }),
+        BoardMessage::Fault(Fault::BadRate { answers: 6 }),
         BoardMessage::Fault(Fault::Reset("watchdog".try_into().expect("short"))),
     ]
 }
@@ -89,7 +90,14 @@ fn coded() -> (Sent, Vec<u8>) {
 fn requests() -> Vec<Request> {
     let grounds = [0, 5, 10, 15].into_iter().collect();
     let plan = Plan { grounds, reads: 0xFFFF, rows_a_frame: 2, average_log2: 1 };
-    let commands = [Command::Hello, Command::Start, Command::Stop, Command::Configure(SETTINGS), Command::Scan(plan)];
+    let commands = [
+        Command::Hello,
+        Command::Start,
+        Command::Stop,
+        Command::Configure(SETTINGS),
+        Command::Scan(plan),
+        Command::Rate { baud: 3_000_000 },
+    ];
     (1..).zip(commands).map(|(tag, command)| Request { tag, command }).collect()
 }
 

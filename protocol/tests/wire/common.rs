@@ -121,6 +121,7 @@ fn fault() -> impl Strategy<Value = BoardMessage> {
         Just(Fault::AdcStuck),
         any::<u8>().prop_map(|answers| Fault::BadSettings { answers }),
         any::<u8>().prop_map(|answers| Fault::BadPlan { answers }),
+        any::<u8>().prop_map(|answers| Fault::BadRate { answers }),
         any::<u8>().prop_map(Fault::UnknownVersion),
     ]
     .prop_map(BoardMessage::Fault)
@@ -149,6 +150,7 @@ pub fn request() -> impl Strategy<Value = Request> {
         Just(Command::Stop),
         settings().prop_map(Command::Configure),
         plan().prop_map(Command::Scan),
+        any::<u32>().prop_map(|baud| Command::Rate { baud }),
     ];
     (1u8.., command).prop_map(|(tag, command)| Request { tag, command })
 }

@@ -58,6 +58,7 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Fault(Fault::BadSettings { answers: 8 }),
         BoardMessage::Fault(Fault::UnknownVersion(3)),
         BoardMessage::Fault(Fault::BadPlan { answers: 9 }),
+        BoardMessage::Fault(Fault::BadRate { answers: 13 }),
     ]
 }
 
@@ -72,6 +73,7 @@ fn requests() -> Vec<Request> {
         Command::Configure(settings),
         Command::Scan(plan),
         Command::Scan(Plan::default()),
+        Command::Rate { baud: 3_000_000 },
     ];
     (7..).zip(commands).map(|(tag, command)| Request { tag, command }).collect()
 }

@@ -6,6 +6,7 @@ mod commands;
 mod failures;
 mod parts;
 mod plans;
+mod rate;
 mod samplers;
 mod scan;
 mod switches;

@@ -41,11 +41,24 @@ pub struct Wire {
     pub pulls: usize,
     /// Comes when the board has looked for bytes twice more.
     pub soon: Vec<u8>,
+    /// Rates that it can be set to, the one that it has, and how many bytes were sent before each change.
+    pub rates: &'static [u32],
+    pub baud: u32,
+    pub changes: Vec<usize>,
 }
 
 impl Default for Wire {
     fn default() -> Self {
-        Self { sent: Vec::new(), to_board: VecDeque::new(), room: usize::MAX, pulls: 0, soon: Vec::new() }
+        Self {
+            sent: Vec::new(),
+            to_board: VecDeque::new(),
+            room: usize::MAX,
+            pulls: 0,
+            soon: Vec::new(),
+            rates: &[],
+            baud: 0,
+            changes: Vec::new(),
+        }
     }
 }
 
@@ -60,6 +73,17 @@ pub struct Watchdog {
 pub struct TestSerial(Outside);
 
 impl Serial for TestSerial {
+    fn rates(&self) -> &'static [u32] {
+        self.0.wire.borrow().rates
+    }
+
+    fn set_baud(&mut self, baud: u32) {
+        let mut wire = self.0.wire.borrow_mut();
+        wire.baud = baud;
+        let sent = wire.sent.len();
+        wire.changes.push(sent);
+    }
+
     fn push(&mut self, bytes: &[u8]) -> usize {
         let mut wire = self.0.wire.borrow_mut();
         let count = bytes.len().min(wire.room);

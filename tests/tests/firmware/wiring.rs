@@ -97,7 +97,7 @@ fn the_multiplexer_is_wired_as_the_page_says() {
 
 #[test]
 fn the_line_has_the_pins_and_the_baud_rate_that_the_page_says() {
-    let baud = between(ESP32_LINE, "const BAUD: u32 = ", ";").replace('_', "");
+    let baud = between(ESP32_LINE, "RATES: [u32; 4] = [", ",").replace('_', "");
     assert!(row("esp32")[4].contains(&format!("{baud} baud")), "{baud}");
     assert_eq!(baud, tactomo::board::link::serial::DEFAULT_BAUD.to_string(), "the host's is the same");
     let pins = numbers(between(ESP32_MAIN, "UartLine::new(chip.UART0, ", ")"));

@@ -105,7 +105,7 @@ impl Listening {
         let (opened, mut unframed) = (Instant::now(), UnframedBytes::default());
         let mut buffer = [0; READ_BYTES];
         while opened.elapsed() < PATIENCE {
-            let count = transfer(&mut *link, &mut session, &mut buffer)?;
+            let count = transfer(&mut *link, &mut session, &receiver, &mut buffer)?;
             unframed.add(&buffer[..count]);
             let mut input = &buffer[..count];
             while let Some(message) = receiver.receive(&mut input) {
@@ -182,7 +182,7 @@ impl Listening {
             return Ok(Some(frame));
         }
         let mut buffer = [0; READ_BYTES];
-        let count = transfer(&mut *self.link, &mut self.session, &mut buffer)?;
+        let count = transfer(&mut *self.link, &mut self.session, &self.receiver, &mut buffer)?;
         self.receive(&buffer[..count])?;
         if self.session.is_mute(Instant::now()) {
             return Err(ListenError::Mute { link: self.link.name() });
@@ -219,9 +219,19 @@ impl Listening {
     }
 }
 
-fn transfer(link: &mut dyn Link, session: &mut Session, buffer: &mut [u8]) -> Result<usize, ListenError> {
-    let due = session.command(Instant::now());
-    let sent = due.map_or(Ok(()), |command| session::send(link, &command));
+impl Drop for Listening {
+    fn drop(&mut self) {
+        self.session.leave(&mut *self.link);
+    }
+}
+
+fn transfer(
+    link: &mut dyn Link,
+    session: &mut Session,
+    receiver: &BoardReceiver,
+    buffer: &mut [u8],
+) -> Result<usize, ListenError> {
+    let sent = session.transmit(link, receiver.counters().corrupt);
     sent.and_then(|()| link.read(buffer)).map_err(|source| ListenError::Link { link: link.name(), source })
 }
 

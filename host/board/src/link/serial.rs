@@ -110,6 +110,14 @@ impl Link for SerialLink {
     fn write_all(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.port.write_all(bytes)
     }
+
+    fn baud(&self) -> Option<u32> {
+        self.port.baud_rate().ok()
+    }
+
+    fn set_baud(&mut self, baud: u32) -> io::Result<()> {
+        self.port.set_baud_rate(baud).map_err(io::Error::from)
+    }
 }
 
 /// What a refusal means and what to do about it.

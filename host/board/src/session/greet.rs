@@ -1,10 +1,8 @@
-//! Commands on their way to a board, and the first word of one.
+//! The first word of a board, and what its faults mean.
 
 use std::time::Instant;
 
-use tactomo_protocol::{
-    BoardMessage, BoardReceiver, DecodeError, Fault, Hello, MAX_COMMAND, Request, VERSION, encode_request,
-};
+use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Fault, Hello, VERSION};
 
 use super::{RequestedSettings, Session};
 use crate::link::Link;
@@ -56,10 +54,9 @@ pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError
     let mut session = Session::new(RequestedSettings::default());
     let mut buffer = [0; 512];
     while Instant::now() < deadline {
-        if let Some(request) = session.command(Instant::now()) {
-            send(link, &request).map_err(|error| GreetError::Link(error.to_string()))?;
-        }
-        let count = link.read(&mut buffer).map_err(|error| GreetError::Link(error.to_string()))?;
+        let sent = session.transmit(link, receiver.counters().corrupt);
+        let read = sent.and_then(|()| link.read(&mut buffer));
+        let count = read.map_err(|error| GreetError::Link(error.to_string()))?;
         let mut input = &buffer[..count];
         while let Some(message) = receiver.receive(&mut input) {
             match message {
@@ -74,18 +71,6 @@ pub fn greet(link: &mut dyn Link, deadline: Instant) -> Result<Hello, GreetError
     Err(GreetError::Silent { seconds, junk_bytes: receiver.counters().dropped_bytes })
 }
 
-/// Sends a command.
-///
-/// # Errors
-/// If the link does not take it.
-pub fn send(link: &mut dyn Link, request: &Request) -> std::io::Result<()> {
-    let mut wire = [0; MAX_COMMAND];
-    let length = encode_request(request, &mut wire).map_err(std::io::Error::other)?;
-    // A zero ends whatever noise the board may have got before.
-    link.write_all(&[0])?;
-    link.write_all(&wire[..length])
-}
-
 /// What a fault means, for people.
 pub fn explain(fault: &Fault) -> String {
     match fault {
@@ -94,6 +79,9 @@ pub fn explain(fault: &Fault) -> String {
         Fault::AdcStuck => "no conversion of its ADC finishes in time".to_owned(),
         Fault::BadSettings { .. } => "it refuses the settings, and keeps the old ones".to_owned(),
         Fault::BadPlan { .. } => "it refuses the scan plan, and keeps the old one".to_owned(),
+        Fault::BadRate { .. } => {
+            "its line cannot be set to the rate that was asked for, and keeps the old one".to_owned()
+        }
         Fault::UnknownVersion(version) => format!("it got a command in version {version} of the protocol"),
     }
 }

@@ -52,7 +52,7 @@ impl Paces {
             Command::Configure(_) => Some(&mut self.settings),
             Command::Scan(_) => Some(&mut self.plan),
             Command::Start | Command::Stop => Some(&mut self.start),
-            Command::Hello => None,
+            Command::Hello | Command::Rate { .. } => None,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What boards say, and what the session says to that.
 
 mod any_order;
+mod rates;
 
 use super::*;
 

@@ -1,7 +1,9 @@
-//! The line between the simulated board and the host: two bounded queues of bytes.
+//! The line between the simulated board and the host: two bounded queues of bytes, and the rates of both ends, by which bytes arrive as they
+//! were sent or do not.
 
 use std::collections::VecDeque;
 use std::io;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -14,6 +16,8 @@ use super::model::{Figures, LineFigures};
 const UP_BYTES: usize = 64 * 1024;
 /// Bytes that wait for the board.
 const DOWN_BYTES: usize = 4 * 1024;
+/// Start, eight data bits, stop.
+const BITS_A_BYTE: f64 = 10.0;
 
 /// Both directions.
 #[derive(Debug)]
@@ -22,15 +26,58 @@ pub(super) struct Line {
     pub(super) up: Queue,
     /// Host to board.
     pub(super) down: Queue,
-}
-
-impl Default for Line {
-    fn default() -> Self {
-        Self { up: Queue::new(UP_BYTES), down: Queue::new(DOWN_BYTES) }
-    }
+    /// Rates of the ends (bits a second); 0 on a line that has none.
+    host_baud: AtomicU32,
+    board_baud: AtomicU32,
+    /// The highest rate that the bridge between them keeps.
+    bridge_baud: AtomicU32,
+    /// Whether the board has more to send than its FIFO took last.
+    is_full: AtomicBool,
 }
 
 impl Line {
+    /// The line of a board with these figures.
+    pub(super) fn new(figures: &Figures) -> Self {
+        let baud = figures.line.and_then(|line| line.rates.first().copied()).unwrap_or(0);
+        Self {
+            up: Queue::new(UP_BYTES),
+            down: Queue::new(DOWN_BYTES),
+            host_baud: AtomicU32::new(baud),
+            board_baud: AtomicU32::new(baud),
+            bridge_baud: AtomicU32::new(u32::MAX),
+            is_full: AtomicBool::new(false),
+        }
+    }
+
+    /// The rate of the host's end, where the line has one.
+    pub(super) fn host_baud(&self) -> Option<u32> {
+        Some(self.host_baud.load(Relaxed)).filter(|baud| *baud > 0)
+    }
+
+    pub(super) fn set_host_baud(&self, baud: u32) -> io::Result<()> {
+        self.host_baud().ok_or(io::ErrorKind::Unsupported)?;
+        self.host_baud.store(baud, Relaxed);
+        Ok(())
+    }
+
+    /// Sets the highest rate that the bridge keeps.
+    pub(super) fn set_bridge_baud(&self, baud: u32) {
+        self.bridge_baud.store(baud, Relaxed);
+    }
+
+    /// Whether the board waits for room in its FIFO.
+    pub(super) fn is_full(&self) -> bool {
+        self.is_full.load(Relaxed)
+    }
+
+    /// Makes other bytes of those that pass the line now, where its ends differ in their rates or the bridge does not keep them.
+    fn garble(&self, bytes: &mut [u8]) {
+        let baud = self.board_baud.load(Relaxed);
+        if baud != self.host_baud.load(Relaxed) || baud > self.bridge_baud.load(Relaxed) {
+            bytes.iter_mut().for_each(|byte| *byte = byte.wrapping_mul(0x6D) ^ 0xA7);
+        }
+    }
+
     pub(super) fn is_open(&self) -> bool {
         self.down.lock().open
     }
@@ -170,7 +217,10 @@ impl BoardEnd {
 impl Serial for BoardEnd {
     fn push(&mut self, bytes: &[u8]) -> usize {
         let room = self.fifo.as_mut().map_or(bytes.len(), |fifo| fifo.room(self.circuit.now()));
-        let count = self.line.up.put(&bytes[..bytes.len().min(room)]);
+        let mut sent = bytes[..bytes.len().min(room)].to_vec();
+        self.line.garble(&mut sent);
+        let count = self.line.up.put(&sent);
+        self.line.is_full.store(count < bytes.len(), Relaxed);
         if let Some(fifo) = &mut self.fifo {
             fifo.held += count as f64;
         }
@@ -178,7 +228,22 @@ impl Serial for BoardEnd {
     }
 
     fn pull(&mut self, buffer: &mut [u8]) -> usize {
-        self.line.down.take(buffer)
+        let count = self.line.down.take(buffer);
+        // The board's thread may have slept since they came, where a board would have looked.
+        self.line.garble(&mut buffer[..count]);
+        count
+    }
+
+    fn rates(&self) -> &'static [u32] {
+        self.fifo.as_ref().map_or(&[], |fifo| fifo.figures.rates)
+    }
+
+    fn set_baud(&mut self, baud: u32) {
+        if let Some(fifo) = &mut self.fifo {
+            self.circuit.advance(fifo.empty(self.circuit.now()).as_nanos() as u64);
+            fifo.figures.bytes_per_s = f64::from(baud) / BITS_A_BYTE;
+            self.line.board_baud.store(baud, Relaxed);
+        }
     }
 }
 
@@ -191,6 +256,14 @@ struct Fifo {
 }
 
 impl Fifo {
+    /// Time from now until it is empty.
+    fn empty(&mut self, now: Duration) -> Duration {
+        self.room(now);
+        let left = std::mem::take(&mut self.held) / self.figures.bytes_per_s;
+        self.at = now + Duration::from_secs_f64(left);
+        self.at - now
+    }
+
     /// Bytes that it has room for at this board time.
     fn room(&mut self, now: Duration) -> usize {
         let sent = (now - self.at).as_secs_f64() * self.figures.bytes_per_s;

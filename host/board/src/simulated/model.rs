@@ -17,7 +17,7 @@ pub enum BoardModel {
     /// The detector's own converter behind a fast multiplexer, a line without end, and a scene that stands still for a scan.
     #[default]
     Ideal,
-    /// An ESP-WROOM-32: two ADCs with a floor, 16 inputs of which four are behind strapping resistors, UART at 921600 baud.
+    /// An ESP-WROOM-32: two ADCs with a floor, 16 inputs of which four are behind strapping resistors, UART at 921600 to 3 million baud.
     Esp32,
     /// An ESP32-C3: one ADC behind the multiplexer's second half, USB.
     Esp32c3,
@@ -68,6 +68,8 @@ pub(super) struct Figures {
 pub(super) struct LineFigures {
     pub(super) bytes_per_s: f64,
     pub(super) fifo_bytes: f64,
+    /// Rates of a UART (bits a second), the first of which it begins with: ten bits a byte.
+    pub(super) rates: &'static [u32],
 }
 
 /// The analogue side of a board.
@@ -106,7 +108,7 @@ const FULL_SCALE_MV: u16 = 1 << BITS;
 const NOISE_MV: f64 = 5.0;
 /// The firmware's instructions outside conversions and waits, for a frame of 16 electrodes: measured on the emulated board by the test
 /// `a_frame_costs_the_same_in_every_run` of `tests/tests/emulated_board`, which holds this figure too.
-pub const FRAME_INSTRUCTIONS: u64 = 66_331;
+pub const FRAME_INSTRUCTIONS: u64 = 66_867;
 /// Cycles of a row of 16 of them, at one and a half for an instruction.
 const ROW_CYCLES: u64 = FRAME_INSTRUCTIONS * 3 / 2 / 16;
 
@@ -140,8 +142,12 @@ static ESP32: Figures = Figures {
     conversion_ns: 10_000,
     // At 240 MHz.
     row_work_ns: ROW_CYCLES * 1000 / 240,
-    // 921600 baud, ten bits a byte; FIFO of 128 bytes.
-    line: Some(LineFigures { bytes_per_s: 92_160.0, fifo_bytes: 128.0 }),
+    // The rates of `firmware/boards/esp32/src/line.rs`; FIFO of 128 bytes.
+    line: Some(LineFigures {
+        bytes_per_s: 92_160.0,
+        fifo_bytes: 128.0,
+        rates: &[921_600, 1_500_000, 2_000_000, 3_000_000],
+    }),
     analog: Some(Analog {
         // The floors are what code 0 of either ADC reads after calibration.
         converters: &[ESP32_ADC1, ConverterFigures { electrodes: 10, floor_mv: 128.0, ..ESP32_ADC1 }],
@@ -160,7 +166,7 @@ static ESP32C3: Figures = Figures {
     // At 160 MHz.
     row_work_ns: ROW_CYCLES * 1000 / 160,
     // Nineteen packets of 64 bytes a millisecond (USB 2.0, 5.8.4: bulk transfers at full speed).
-    line: Some(LineFigures { bytes_per_s: 1_216_000.0, fifo_bytes: 64.0 }),
+    line: Some(LineFigures { bytes_per_s: 1_216_000.0, fifo_bytes: 64.0, rates: &[] }),
     analog: Some(Analog {
         // 35 mV of total error from 0 to 2500 mV by the data sheet, after a curve that takes most of the bow away.
         converters: &[ConverterFigures {
@@ -215,7 +221,7 @@ impl BoardModel {
     pub fn explanation(self) -> &'static str {
         match self {
             Self::Ideal => "The converter of the detector's description, at 2 us a conversion, on a line without end",
-            Self::Esp32 => "ESP-WROOM-32: two ADCs with a floor at 0.14 V, 921600 baud",
+            Self::Esp32 => "ESP-WROOM-32: two ADCs with a floor at 0.14 V, UART of up to 3 million baud",
             Self::Esp32c3 => "ESP32-C3: one ADC behind the multiplexer's second half, USB",
         }
     }

@@ -33,7 +33,7 @@ impl Board {
 
     fn obey(&mut self, request: Request, at: u64) {
         match request.command {
-            Command::Hello => {}
+            Command::Hello | Command::Rate { .. } => {}
             Command::Configure(settings) => self.settings = settings,
             Command::Scan(plan) => self.plan = plan,
             Command::Start => self.streaming = true,
