@@ -113,8 +113,20 @@ impl AutoSearch {
         }
         let image = self.image(from, readings)?;
         let evidence = image_evidence(&self.image, readings, target)?;
-        let is_better = evidence.is_some_and(|evidence| evidence.score() < best.score());
-        Ok(if is_better { image } else { shape })
+        let Some(by_image) = evidence.map(|evidence| evidence.score()).filter(|score| *score < best.score()) else {
+            return Ok(shape);
+        };
+        let shape = self.shape_of_image(readings, target, by_image)?;
+        Ok(shape.map(|fit| Whole::Shape(Box::new(fit))).or(image))
+    }
+
+    /// The line or ring that an image stands for, if it explains the frame better: contacts that explain nothing do not lead to it.
+    fn shape_of_image(&self, readings: &Readings, target: &Target, score: f64) -> Result<Option<StripFit>, SolveError> {
+        let (Some(shapes), Some(image)) = (&self.shapes, self.image.solution(readings)?.image_s_per_m2) else {
+            return Ok(None);
+        };
+        let shape = shapes.search(&shapes.contacts_of(&image), None, target, score);
+        Ok(shape.filter(|shape| shape.evidence().score() < score))
     }
 }
 

@@ -30,7 +30,7 @@ use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
-use tactomo_physics::geometry;
+use tactomo_physics::geometry::{self, Point};
 
 /// Steps from each start, steps from the best one of a kind, and steps from the frame before.
 const FIRST_STEPS: usize = 5;
@@ -129,6 +129,16 @@ impl ShapeFinder {
         kinds.retain(|other| other.evidence().score() < policy::shape_rivals() * best);
         let fits = kinds.iter().filter_map(|fit| self.catch_up(fit, target));
         fits.filter(|fit| self.is_clear(fit.strip(), 1.0)).min_by(lowest)
+    }
+
+    /// An image as contacts, one for what each node has of it.
+    pub fn contacts_of(&self, image_s_per_m2: &[f32]) -> Vec<FoundContact> {
+        let nodes = self.image_ground.nodes().zip(image_s_per_m2);
+        let contact = |(([x_m, y_m], area_m2), density): ((Point, f64), &f32)| FoundContact {
+            radius_m: Some(0.0),
+            ..FoundContact::flat(x_m, y_m, area_m2 * f64::from(*density))
+        };
+        nodes.filter(|(_, density)| **density > 0.0).map(contact).collect()
     }
 
     /// Whether what was chosen is still more than a disc to the readings.

@@ -147,6 +147,11 @@ impl Ground {
         }
     }
 
+    /// Each node's place (m) and area (m2).
+    pub fn nodes(&self) -> impl Iterator<Item = (Point, f64)> {
+        self.nodes_m.iter().copied().zip(self.areas_m2.iter().copied())
+    }
+
     /// Conductance that a strip gives each node (S).
     pub fn conductances_s(&self, strip: &Strip) -> Vec<f64> {
         (0..self.nodes_m.len()).map(|node| self.conductance_s(strip, node)).collect()
