@@ -56,7 +56,7 @@ function start(setup) {
     text, told, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
-    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup), totals: new Totals(history),
+    calibrate: new CalibratePanel(setup, send, picture), pointer: new PointerPanel(setup), totals: new Totals(history),
   };
   const [[left, bottom], [right, top]] = setup.bounds_m;
   document.getElementById("picture").classList.toggle("wide", right - left > WIDE * (top - bottom));
@@ -153,7 +153,11 @@ listenForActions({
     parts?.readings.fit(performance.now());
   },
   rezero: () => rezeroButton.press(),
-  calibrate: () => parts?.calibrate.toggle(),
+  calibrate: () => {
+    // The target is on the flat picture.
+    look("flat");
+    parts?.calibrate.toggle();
+  },
   full: fullScreen,
   keys: () => document.getElementById("help").showModal(),
   view: () => look(parts?.picture.looking === "flat" ? "space" : "flat"),
