@@ -1,8 +1,10 @@
 //! The live page: its server, spoken to byte by byte, and the page in a browser.
 
+mod access;
 mod browser;
 mod calibrate;
 mod chromium;
+mod colours;
 mod controls;
 mod gallery;
 mod live;
@@ -11,4 +13,5 @@ mod script;
 mod seen;
 mod server;
 mod stage;
+mod states;
 mod view;
