@@ -1,4 +1,4 @@
-//! Calibrating from the page: a simulated board that is not the one described, rubbed until the page says that it is done.
+//! Calibrating from the page: a simulated board that is not the one described, and a finger that follows the page until that says that it is done.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -10,42 +10,29 @@ use crate::chromium::Told;
 use crate::live::Live;
 use crate::stage::{Stage, in_front_of};
 
-/// Longest that a person would rub; on two idle cores it takes half a minute.
+/// Longest that a person would follow; on two idle cores it takes a minute.
 const PATIENCE: Duration = Duration::from_secs(180);
-/// Time at a place, and distance to the next (mm): a finger that rubs at 10 cm/s.
-const AT_A_PLACE: Duration = Duration::from_millis(25);
-const STEP_MM: f64 = 2.5;
-/// How far the finger goes from the middle (mm): to where its disc is just on the sensor.
-const REACH_MM: f64 = 26.0;
-/// Light and firm.
+/// Time that the finger stays before it looks at the page again.
+const AT_A_PLACE: Duration = Duration::from_millis(150);
+/// Lightly and firmly.
 const FIRMNESSES: [f64; 2] = [0.05, 0.8];
 
-/// Places to and fro over the whole sensor (mm), along x and then along y, 5 mm apart.
-fn way_mm() -> Vec<[f64; 2]> {
-    let steps = (2.0 * REACH_MM / STEP_MM) as i32;
-    let along = |i: i32| -REACH_MM + STEP_MM * f64::from(i);
-    let rows = (0..=steps).step_by(2).enumerate().flat_map(|(turn, row)| {
-        (0..=steps).map(move |i| [along(if turn % 2 == 0 { i } else { steps - i }), along(row)])
-    });
-    let rows: Vec<_> = rows.collect();
-    rows.iter().copied().chain(rows.iter().map(|[x, y]| [*y, *x])).collect()
-}
-
-/// Rubs until the page tells what is wanted.
-async fn rub_until(stage: &Stage<Live>, wanted: impl Fn(&Told) -> bool) -> Result<Told> {
+/// A finger that presses where the page says, as hard as it says, until the page tells what is wanted.
+async fn follow_until(stage: &Stage<Live>, wanted: impl Fn(&Told) -> bool) -> Result<Told> {
     let begin = Instant::now();
-    let way_mm = way_mm();
-    for (step, at_mm) in way_mm.iter().cycle().enumerate() {
+    loop {
         let told = stage.browser.told().await?;
         if wanted(&told) {
             stage.behind.mouse.press(Vec::new());
             return Ok(told);
         }
-        ensure!(begin.elapsed() < PATIENCE, "rubbing does not end; the page tells {told:?}");
-        stage.behind.press_with(*at_mm, FIRMNESSES[step / 30 % 2])?;
+        ensure!(begin.elapsed() < PATIENCE, "the guide does not end; the page tells {told:?}");
+        // While all is fitted there is no target.
+        if let Ok(at_mm) = serde_json::from_str::<[f64; 2]>(told.text("targetMm")) {
+            stage.behind.press_with(at_mm, FIRMNESSES[usize::from(told.text("targetFirm") == "true")])?;
+        }
         tokio::time::sleep(AT_A_PLACE).await;
     }
-    unreachable!("a way without end")
 }
 
 /// Distance from a press of where the page shows its contact (mm), in the mean over a few places.
@@ -67,14 +54,17 @@ async fn calibrates(stage: &Stage<Live>, folder: &Path) -> Result<()> {
     let before_mm = off_mm(stage).await?;
     stage.browser.click("calibrate").await?;
     stage.browser.until("rubbing", |told| told.text("calibrating") == "rubbing").await?;
-    let first_mm = rub_until(stage, |told| told.number("fits") >= 1.0).await?.number("errorMm");
+    let first_mm = follow_until(stage, |told| told.number("fits") >= 1.0).await?.number("errorMm");
     let pictures = std::env::var_os("TACTOMO_SCREENSHOT").map(std::path::PathBuf::from);
     pictured(stage, pictures.as_deref(), "rubbing").await?;
     let begin = Instant::now();
-    let done = rub_until(stage, |told| told.text("calibrating") == "done").await?;
+    let done = follow_until(stage, |told| told.text("calibrating") == "done").await?;
     let last_mm = done.number("errorMm");
     eprintln!("expected {first_mm:.2} mm, after {:.0} s more {last_mm:.2} mm", begin.elapsed().as_secs_f64());
-    ensure!(last_mm < first_mm && done.number("rubbed") > 0.8, "from {first_mm} mm: {done:?}");
+    ensure!(
+        last_mm < first_mm && done.number("rubbed") > 0.8 && done.text("recommended") == "true",
+        "from {first_mm} mm: {done:?}"
+    );
     pictured(stage, pictures.as_deref(), "done").await?;
     stage.browser.click("calibrate-save").await?;
     let saved = stage.browser.until("the file", |told| !told.text("calibrated").is_empty()).await?;
@@ -108,7 +98,7 @@ async fn pictured(stage: &Stage<Live>, folder: Option<&Path>, name: &str) -> Res
 }
 
 #[test]
-fn a_rub_finds_the_detector_that_was_built() -> Result<()> {
+fn who_follows_the_guide_finds_the_detector_that_was_built() -> Result<()> {
     let folder = std::env::temp_dir().join(format!("tactomo-calibrate-{}", std::process::id()));
     std::fs::create_dir_all(&folder)?;
     let outcome = in_front_of(|| Live::as_built(3, &folder), async |stage| calibrates(stage, &folder).await);

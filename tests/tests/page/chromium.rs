@@ -255,7 +255,7 @@ async fn connect(port: u16, profile: &std::path::Path) -> Result<Client> {
     .to_vec();
     arguments.push(format!("--user-data-dir={}", profile.display()));
     // Pictures are as sharp as a good screen; a fourth of the pixels is enough to test by, and there is no graphics card to draw them.
-    let pictures = ["TACTOMO_SCREENSHOT", "TACTOMO_GALLERY"].iter().any(|name| std::env::var_os(name).is_some());
+    let pictures = std::env::var_os("TACTOMO_SCREENSHOT").is_some();
     arguments.push(format!("--force-device-scale-factor={}", if pictures { 2 } else { 1 }));
     let capabilities = json!({ "goog:chromeOptions": { "args": arguments } });
     let capabilities = capabilities.as_object().cloned().context("an object")?;

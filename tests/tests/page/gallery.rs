@@ -1,125 +1,93 @@
-//! Pictures of the page in many states, for whoever changes how it looks:
-//! `TACTOMO_GALLERY=/tmp/gallery cargo test --release -p tactomo-tests --test page gallery`.
+//! Pictures of the page in every state, a sheet of five windows each, and the document that shows them:
+//! `TACTOMO_GALLERY=$PWD/docs cargo test -p tactomo-tests --test page gallery`.
 
+use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
 
-use anyhow::{Context, Result};
-use tactomo::board::link::Playing;
-use tactomo::board::record::Loss;
-use tactomo::run::{LinkState, Snapshot};
-use tactomo::scene::SceneName;
-use tactomo::solve::{Choice, Flags, FoundContact, Method, Solution, Uncertainty};
+use anyhow::{Context, Result, ensure};
+use serde_json::json;
 
-use crate::live::Live;
+use crate::chromium::Page;
 use crate::script::Script;
-use crate::stage::{Stage, in_front_of};
+use crate::stage::in_front_of;
+use crate::states::STATES;
 
-fn contact(id: u32, [x_mm, y_mm]: [f64; 2], conductance_s: f64) -> FoundContact {
-    FoundContact { id: Some(id), ..FoundContact::flat(x_mm * 1e-3, y_mm * 1e-3, conductance_s) }
-}
-
-/// Five fingertips of a hand.
-fn hand() -> Solution {
-    let tips = [[-18.0, -12.0], [-12.0, 10.0], [-1.0, 16.0], [9.0, 13.0], [18.0, 3.0]];
-    let firmness = [8e-4, 3e-4, 6e-4, 1.2e-4, 3e-5];
-    let errors = Uncertainty { x_m: 0.0015, y_m: 0.0008, correlation: 0.4, conductance_s: 4e-6 };
-    let mut contacts: Vec<_> = (1..).zip(tips).zip(firmness).map(|((id, tip), s)| contact(id, tip, s)).collect();
-    contacts[4].uncertainty = Some(errors);
-    contacts[0].radius_m = Some(0.005);
-    let choice = Choice { what: "5 contacts".to_owned(), why: "residual 1.0 x noise".to_owned() };
-    Solution { contacts, residual: Some(1.0), choice: Some(choice), ..Solution::default() }
-}
+/// Windows: two small laptops, a large screen, a phone upright and lying (CSS pixels), and where each is on the sheet (left, top, width).
+const WINDOWS: [([u32; 2], [u32; 3]); 5] = [
+    ([1920, 1080], [0, 0, 800]),
+    ([1366, 768], [808, 0, 560]),
+    ([390, 844], [1376, 0, 208]),
+    ([1280, 580], [0, 458, 560]),
+    ([844, 390], [568, 458, 440]),
+];
+/// Width and height of a sheet (pixels).
+const SHEET: [u32; 2] = [1584, 712];
 
 #[test]
 fn gallery() -> Result<()> {
     let Some(folder) = std::env::var_os("TACTOMO_GALLERY") else { return Ok(()) };
     let folder = Path::new(&folder);
-    std::fs::create_dir_all(folder)?;
-    scripted(folder)?;
-    solved(folder, SceneName::Ring, Method::Nonlinear, "ring-image")?;
-    solved(folder, SceneName::Ring, Method::Auto, "ring")?;
-    solved(folder, SceneName::Line, Method::Auto, "line")?;
-    solved(folder, SceneName::FiveFingers, Method::Auto, "five-fingers")
-}
-
-fn scripted(folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder.join("page"))?;
     in_front_of(Script::start, async |stage| {
-        let simulated = Playing::Simulated { scene: SceneName::FiveFingers, faults: Vec::new() };
-        stage.behind.set(|snapshot| snapshot.playing = simulated);
-        shot(stage, folder, "rest").await?;
-        stage.behind.solution(hand());
-        shot(stage, folder, "hand").await?;
-        for (size, name) in
-            [((1280, 760), "low"), ((390, 844), "phone"), ((820, 1100), "tablet"), ((1920, 1080), "wide")]
-        {
-            stage.browser.resize(size.0, size.1).await?;
-            shot(stage, folder, name).await?;
+        for state in &STATES {
+            state.enter(&stage.behind, &stage.browser).await?;
+            let mut pictures = Vec::new();
+            for ([width, height], place) in WINDOWS {
+                stage.browser.resize(width, height).await?;
+                tokio::time::sleep(Duration::from_millis(700)).await;
+                pictures.push((picture(&stage.browser).await?, place));
+            }
+            stage.browser.resize(1280, 800).await?;
+            state.leave(&stage.browser).await?;
+            let file = folder.join("page").join(format!("{}.webp", state.name));
+            std::fs::write(&file, sheet(&stage.browser, &pictures).await?)
+                .with_context(|| file.display().to_string())?;
         }
-        stage.browser.resize(1280, 800).await?;
-        stage.browser.click("view-space").await?;
-        shot(stage, folder, "space").await?;
-        stage.browser.theme("dark").await?;
-        shot(stage, folder, "space-dark").await?;
-        stage.browser.click("view-flat").await?;
-        shot(stage, folder, "hand-dark").await?;
-        stage.browser.theme("light").await?;
-        states(stage, folder).await
-    })
+        Ok(())
+    })?;
+    let mut text = "# Every state of the page\n\nEach sheet shows the same state in windows of 1920 x 1080, 1366 x 768, 390 x 844, 1280 x 580 and 844 x 390. \
+         What the page is told is made up, so that every state is there; the page is the real one.\n\
+         `TACTOMO_GALLERY=$PWD/docs cargo test -p tactomo-tests --test page gallery` takes them again and writes this document.\n"
+        .to_owned();
+    for state in &STATES {
+        write!(text, "\n## {}\n{}\n\n![{}](page/{}.webp)\n", state.name, state.says, state.says, state.name)?;
+    }
+    Ok(std::fs::write(folder.join("page-states.md"), text)?)
 }
 
-async fn states(stage: &Stage<Script>, folder: &Path) -> Result<()> {
-    let flags = Flags { excluded: vec![3], misfit: true, ..Flags::default() };
-    stage.behind.solution(Solution { flags, ..hand() });
-    stage.behind.set(|snapshot| {
-        snapshot.baseline = Some("Something pressed at the start: it is shown as the contact that it is.".to_owned());
-    });
-    shot(stage, folder, "excluded").await?;
-    let playing = Playing::Recording {
-        position_s: 7.4,
-        length_s: 20.0,
-        speed: 0.5,
-        paused: false,
-        looped: true,
-        ended: false,
-        damage: Loss::default(),
+/// The window as base64 of a PNG.
+async fn picture(page: &Page) -> Result<String> {
+    let png = page.client.screenshot().await?;
+    // The page makes the sheet, for a browser can decode, scale and encode pictures.
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let group = |bytes: &[u8]| {
+        let word = bytes.iter().enumerate().fold(0_u32, |word, (i, byte)| word | u32::from(*byte) << (16 - 8 * i));
+        (0..4)
+            .map(|i| if i <= bytes.len() { DIGITS[(word >> (18 - 6 * i)) as usize & 63] as char } else { '=' })
+            .collect::<String>()
     };
-    stage.behind.set(|snapshot| (snapshot.playing, snapshot.baseline) = (playing, None));
-    shot(stage, folder, "recording").await?;
-    let playing = Playing::Recording {
-        position_s: 20.0,
-        length_s: 20.0,
-        speed: 0.5,
-        paused: false,
-        looped: false,
-        ended: true,
-        damage: Loss::default(),
-    };
-    let link = LinkState::Ended("the recording is over".to_owned());
-    stage.behind.set(|snapshot| (snapshot.playing, snapshot.link) = (playing, link));
-    shot(stage, folder, "ended").await?;
-    let link = LinkState::Silent("no frame for 2 s".to_owned());
-    stage.behind.set(|snapshot| *snapshot = Snapshot { link, ..Snapshot::default() });
-    shot(stage, folder, "silent").await
+    Ok(png.chunks(3).map(group).collect())
 }
 
-fn solved(folder: &Path, scene: SceneName, method: Method, name: &str) -> Result<()> {
-    in_front_of(
-        || Live::start(scene, &[]),
-        async |stage| {
-            stage.browser.choose(method).await?;
-            tokio::time::sleep(Duration::from_secs(9)).await;
-            shot(stage, folder, name).await?;
-            stage.browser.click("view-space").await?;
-            shot(stage, folder, &format!("{name}-space")).await?;
-            eprintln!("{name}: drawn in {} ms", stage.browser.told().await?.text("drawMs"));
-            Ok(())
-        },
-    )
-}
-
-async fn shot<T>(stage: &Stage<T>, folder: &Path, name: &str) -> Result<()> {
-    tokio::time::sleep(Duration::from_millis(1200)).await;
-    let picture = stage.browser.client.screenshot().await?;
-    std::fs::write(folder.join(format!("{name}.png")), picture).context("the gallery's folder")
+/// The pictures on one sheet, as WebP.
+async fn sheet(page: &Page, pictures: &[(String, [u32; 3])]) -> Result<Vec<u8>> {
+    let script = "const [pictures, [width, height], done] = arguments;
+        const sheet = Object.assign(document.createElement('canvas'), { width, height });
+        const context = sheet.getContext('2d');
+        [context.fillStyle, context.imageSmoothingQuality] = ['#8a8a8a', 'high'];
+        context.fillRect(0, 0, width, height);
+        (async () => {
+          for (const [data, [left, top, across]] of pictures) {
+            const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
+            const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+            context.drawImage(image, left, top, across, Math.round(across * image.height / image.width));
+          }
+          const blob = await new Promise((made) => sheet.toBlob(made, 'image/webp', 0.6));
+          done(Array.from(new Uint8Array(await blob.arrayBuffer())));
+        })().catch((error) => done(String(error)));";
+    let made = page.client.execute_async(script, vec![json!(pictures), json!(SHEET)]).await?;
+    let bytes = made.as_array().with_context(|| made.to_string())?;
+    ensure!(bytes.len() > 1000, "a sheet of {} bytes", bytes.len());
+    bytes.iter().map(|byte| byte.as_u64().and_then(|byte| u8::try_from(byte).ok()).context("a byte")).collect()
 }

@@ -1,8 +1,10 @@
 //! The live page: its server, spoken to byte by byte, and the page in a browser.
 
+mod access;
 mod browser;
 mod calibrate;
 mod chromium;
+mod colours;
 mod controls;
 mod gallery;
 mod live;
@@ -12,4 +14,5 @@ mod script;
 mod seen;
 mod server;
 mod stage;
+mod states;
 mod view;

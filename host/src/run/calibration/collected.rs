@@ -15,6 +15,9 @@ const COVERS: f64 = 1.0;
 const FIRM: f64 = 0.3;
 /// Frames that are kept of each cell and firmness, the newest: 3456 at most on a square detector, 7 MB of 16 electrodes.
 const KEPT: usize = 12;
+/// What is felt in a cell: a light press, a firm one, or both.
+pub(super) const FELT_LIGHT: u8 = 1;
+pub(super) const FELT_FIRM: u8 = 2;
 
 /// Cells of the detector, and which have been rubbed.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +41,7 @@ pub(super) struct Collected {
 }
 
 impl Coverage {
-    fn new(detector: &Detector) -> Self {
+    pub(super) fn new(detector: &Detector) -> Self {
         let bounds_m = detector.outline.bounds();
         let [low, high] = bounds_m;
         let size_m = [high[0] - low[0], high[1] - low[1]];
@@ -56,11 +59,52 @@ impl Coverage {
         on.clone().filter(|felt| **felt > 0).count() as f64 / on.count().max(1) as f64
     }
 
-    fn side_m(&self, axis: usize) -> f64 {
+    /// The middle of the detector (m).
+    pub(super) fn centre_m(&self) -> [f64; 2] {
+        [0, 1].map(|axis| (self.bounds_m[0][axis] + self.bounds_m[1][axis]) / 2.0)
+    }
+
+    /// Whether the detector ends beside the cell along x, and along y.
+    fn ends_beside(&self, cell: usize) -> [bool; 2] {
+        let [columns, rows] = self.cells;
+        let is_on = |along: usize, step: isize, cells: usize, stride: isize| {
+            let is_inside = along.checked_add_signed(step).is_some_and(|next| next < cells);
+            is_inside && self.felt[cell.wrapping_add_signed(step * stride)].is_some()
+        };
+        let across = [-1, 1].into_iter().all(|step| is_on(cell % columns, step, columns, 1));
+        let down = [-1, 1].into_iter().all(|step| is_on(cell / columns, step, rows, columns as isize));
+        [!across, !down]
+    }
+
+    /// Whether it is a corner, where contacts are found millimetres off.
+    pub(super) fn is_corner(&self, cell: usize) -> bool {
+        self.ends_beside(cell) == [true; 2]
+    }
+
+    /// Where to press for this cell (m): its middle, or half a cell further in where the detector ends, for a fingertip does not reach it there.
+    pub(super) fn pressed_at_m(&self, cell: usize) -> [f64; 2] {
+        let (middle_m, centre_m, ends) = (self.middle_m(cell), self.centre_m(), self.ends_beside(cell));
+        [0, 1].map(|axis| {
+            let inwards_m = (centre_m[axis] - middle_m[axis]).clamp(-0.5 * self.side_m(axis), 0.5 * self.side_m(axis));
+            middle_m[axis] + if ends[axis] { inwards_m } else { 0.0 }
+        })
+    }
+
+    /// Cells that a contact here covers, beside the detector too.
+    pub(super) fn covered(&self, at_m: [f64; 2]) -> impl Iterator<Item = usize> {
+        let reach_m = COVERS * self.side_m(0).max(self.side_m(1));
+        (0..self.felt.len()).filter(move |cell| {
+            let middle_m = self.middle_m(*cell);
+            // The next cell's middle is within reach, however it is rounded.
+            (middle_m[0] - at_m[0]).hypot(middle_m[1] - at_m[1]) <= reach_m * (1.0 + 1e-9)
+        })
+    }
+
+    pub(super) fn side_m(&self, axis: usize) -> f64 {
         (self.bounds_m[1][axis] - self.bounds_m[0][axis]) / self.cells[axis] as f64
     }
 
-    fn middle_m(&self, cell: usize) -> [f64; 2] {
+    pub(super) fn middle_m(&self, cell: usize) -> [f64; 2] {
         let index = [cell % self.cells[0], cell / self.cells[0]];
         [0, 1].map(|axis| self.bounds_m[0][axis] + (index[axis] as f64 + 0.5) * self.side_m(axis))
     }
@@ -73,13 +117,10 @@ impl Coverage {
         index(1) * self.cells[0] + index(0)
     }
 
-    fn cover(&mut self, at_m: [f64; 2], felt: u8) {
-        let reach_m = COVERS * self.side_m(0).max(self.side_m(1));
-        for cell in 0..self.felt.len() {
-            let middle_m = self.middle_m(cell);
-            if (middle_m[0] - at_m[0]).hypot(middle_m[1] - at_m[1]) <= reach_m {
-                self.felt[cell] = self.felt[cell].map(|before| before | felt);
-            }
+    pub(super) fn cover(&mut self, at_m: [f64; 2], felt: u8) {
+        let covered: Vec<usize> = self.covered(at_m).collect();
+        for cell in covered {
+            self.felt[cell] = self.felt[cell].map(|before| before | felt);
         }
     }
 }
@@ -101,7 +142,7 @@ impl Collected {
             return;
         }
         let is_firm = contact.conductance_s >= self.firm_s;
-        self.coverage.cover(at_m, if is_firm { 2 } else { 1 });
+        self.coverage.cover(at_m, if is_firm { FELT_FIRM } else { FELT_LIGHT });
         let bin = &mut self.bins[2 * self.coverage.cell_at(at_m) + usize::from(is_firm)];
         if bin.len() == KEPT {
             bin.pop_front();

@@ -4,10 +4,12 @@
 
 mod collected;
 mod fit;
+mod guide;
 mod learning;
 pub(super) mod messages;
 mod save;
 mod session;
+mod worth;
 
 use std::fmt;
 use std::path::PathBuf;
@@ -20,10 +22,12 @@ use tactomo_touch::calibrate::Rub;
 use tactomo_touch::solve::FoundContact;
 
 pub use self::collected::Coverage;
+pub use self::guide::Target;
 pub use self::learning::Learning;
 pub use self::messages::Calibrate;
 pub(super) use self::messages::Outcome;
 use self::session::RubSession;
+pub use self::worth::Compared;
 use super::detector::DetectorState;
 use super::inbox::{Inbox, Taken};
 use super::notice::NoticeBoard;
@@ -37,7 +41,7 @@ pub enum Stage {
     Rubbing,
     /// All of them are fitted.
     Finishing,
-    /// There is a detector to save and to use.
+    /// There is a detector to save and to use, or a reason to keep the present one.
     Done,
 }
 
@@ -48,6 +52,8 @@ pub struct Calibrating {
     pub stage: Stage,
     /// Where has been rubbed.
     pub coverage: Coverage,
+    /// Where to press next.
+    pub target: Option<Target>,
     /// Frames that something touched in.
     pub touched: u64,
     /// Whether a fit is under way.
@@ -56,6 +62,10 @@ pub struct Calibrating {
     pub errors_m: Vec<f64>,
     /// The newest fit.
     pub fit: Option<Arc<Rub>>,
+    /// What that is worth, on presses that were not used.
+    pub compared: Option<Compared>,
+    /// Why the present detector is to be kept, once all is fitted, as a sentence for a person; none if what was found is better.
+    pub keep: Option<String>,
     /// Why there is none, or no newer one, as a sentence for a person.
     pub trouble: Option<String>,
     /// The file that was written.

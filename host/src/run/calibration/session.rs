@@ -14,7 +14,9 @@ use tactomo_touch::solve::FoundContact;
 
 use super::collected::Collected;
 use super::fit::{self, Task};
+use super::guide::Guide;
 use super::messages::{Calibrate, Fitted, Outcome};
+use super::worth::{Compared, OTHER, WORTH, why_keep};
 use super::{Calibrating, Stage, save};
 use crate::run::inbox::{Event, Inbox};
 use crate::run::notice::NoticeBoard;
@@ -32,15 +34,8 @@ const FIRST_LEARNED: usize = 5;
 const PAUSE: Duration = Duration::from_secs(2);
 /// Share of the detector that has to be rubbed before it is done: fingertips hardly reach the corners.
 const WHOLE: f64 = 0.8;
-/// Share of the expected error before by which a fit has to better it for more to be worth it.
-const WORTH: f64 = 0.05;
-/// The sensor is another one than the detector in use was learned from where that leaves, of presses that were not fitted, so many times the
-/// residual that the detector found leaves: of the same sensor 0.99 to 1.07 times, of others 1.33 to 2.6 times (six pairs as built, 3 to 11 presses).
-const OTHER: f64 = 1.2;
 /// Frames of rows without a whole one between them from which on the board's plan has none: an adaptive plan of 32 electrodes has one in every 64.
 const NEVER_WHOLE: u64 = 500;
-/// Most that is said to be missing at a time.
-const TOLD: usize = 3;
 /// Time between two pictures of how it is: a person sees that at once.
 const SHOWN_EVERY: Duration = Duration::from_millis(80);
 
@@ -59,12 +54,15 @@ pub(super) struct RubSession {
     /// Whether a fit has said that presses of this session fit the detector in use.
     is_same: bool,
     collected: Collected,
+    guide: Guide,
     rounds: Rounds,
     shown: Calibrating,
     cancelled: Arc<AtomicBool>,
     next_fit: Instant,
     fitted_frames: u64,
     showed: Option<Instant>,
+    /// Whether a person wants the end now, whatever comes of it.
+    is_asked_to_finish: bool,
 }
 
 impl Drop for RubSession {
@@ -86,10 +84,13 @@ impl RubSession {
         let shown = Calibrating {
             stage: Stage::Learning,
             coverage: collected.coverage.clone(),
+            target: None,
             touched: 0,
             fitting: false,
             errors_m: Vec::new(),
             fit: None,
+            compared: None,
+            keep: None,
             trouble: None,
             saved: None,
             used: false,
@@ -104,12 +105,14 @@ impl RubSession {
             used: None,
             is_same: false,
             collected,
+            guide: Guide::default(),
             rounds: Rounds::default(),
             shown,
             cancelled: Arc::default(),
             next_fit: Instant::now(),
             fitted_frames: 0,
             showed: None,
+            is_asked_to_finish: false,
         }
     }
 
@@ -119,17 +122,21 @@ impl RubSession {
         match (ask, self.shown.stage) {
             (Calibrate::End, _) => self.shown.stage = Stage::Learning,
             (Calibrate::Begin, Stage::Learning | Stage::Done) => {
-                (self.shown.stage, self.shown.trouble) = (Stage::Rubbing, None)
+                (self.shown.stage, self.shown.trouble, self.shown.keep) = (Stage::Rubbing, None, None);
             }
-            (Calibrate::Finish, Stage::Rubbing) => self.finish(),
-            (Calibrate::Save, Stage::Done) => self.save(),
+            (Calibrate::Finish, Stage::Rubbing) => {
+                self.is_asked_to_finish = true;
+                self.finish();
+            }
+            (Calibrate::Save, Stage::Done) if self.shown.keep.is_none() => self.save(),
             _ => {}
         }
     }
 
-    /// What a person has found, to go on with, if there is something.
+    /// What a person has found, to go on with, if there is something and it is better than what is in use.
     pub fn use_found(&mut self) -> Option<Arc<Rub>> {
-        let fit = self.shown.fit.as_ref().filter(|_| self.shown.stage == Stage::Done)?;
+        let is_better = self.shown.stage == Stage::Done && self.shown.keep.is_none();
+        let fit = self.shown.fit.as_ref().filter(|_| is_better)?;
         (self.shown.used, self.showed) = (true, None);
         Some(Arc::clone(fit))
     }
@@ -212,6 +219,9 @@ impl RubSession {
         }
         self.showed = Some(Instant::now());
         self.shown.coverage.clone_from(&self.collected.coverage);
+        let is_rubbing = self.shown.stage == Stage::Rubbing;
+        self.shown.target =
+            if is_rubbing { self.guide.target(&self.collected.coverage, self.collected.touched) } else { None };
         self.shown.touched = self.collected.touched;
         Some(self.shown.clone())
     }
@@ -250,7 +260,7 @@ impl RubSession {
     fn fail(&mut self, trouble: String) {
         self.shown.trouble = Some(trouble);
         if self.shown.stage == Stage::Finishing {
-            self.shown.stage = Stage::Rubbing;
+            (self.shown.stage, self.is_asked_to_finish) = (Stage::Rubbing, false);
         }
     }
 
@@ -268,14 +278,14 @@ impl RubSession {
                 let settled = |before_m: &f64| (error_m / before_m - 1.0).abs() < WORTH;
                 let is_settled = self.shown.errors_m.last().is_some_and(settled) && fit.helped();
                 let least_m = self.shown.errors_m.iter().copied().fold(f64::INFINITY, f64::min);
-                let unfinished = is_last.then(|| unfinished(&fit, least_m)).flatten();
+                let compared = Compared::of(&fit, self.used.as_deref());
+                let keep = is_last.then(|| why_keep(&fit, compared, least_m)).flatten();
                 self.shown.errors_m.push(error_m);
-                self.shown.fit = Some(Arc::new(fit));
-                (self.shown.trouble, self.shown.saved, self.shown.used) = (unfinished, None, false);
+                (self.shown.fit, self.shown.compared) = (Some(Arc::new(fit)), compared);
+                (self.shown.trouble, self.shown.saved, self.shown.used) = (None, None, false);
                 let is_covered = self.collected.coverage.share() >= WHOLE;
                 match self.shown.stage {
-                    Stage::Finishing if is_last && self.shown.trouble.is_none() => self.shown.stage = Stage::Done,
-                    Stage::Finishing if is_last => self.shown.stage = Stage::Rubbing,
+                    Stage::Finishing if is_last => self.finished(keep),
                     Stage::Rubbing if is_settled && is_covered => self.finish(),
                     _ => {}
                 }
@@ -283,6 +293,16 @@ impl RubSession {
         }
         if is_asked {
             self.fit(true);
+        }
+    }
+
+    /// All is fitted. Where nobody has asked for the end, and what was found is not better, the guide goes on for what is missing.
+    fn finished(&mut self, keep: Option<String>) {
+        let is_asked = std::mem::take(&mut self.is_asked_to_finish);
+        if keep.is_none() || is_asked {
+            (self.shown.stage, self.shown.keep) = (Stage::Done, keep);
+        } else {
+            (self.shown.stage, self.shown.trouble) = (Stage::Rubbing, keep);
         }
     }
 
@@ -298,31 +318,6 @@ impl RubSession {
             self.shown.trouble = Some(format!("cannot start a thread: {error}"));
         }
     }
-}
-
-/// Why a detector that was found is not to be used, and what to do, as a sentence for a person; `None` if presses that it was not fitted to
-/// say that it has helped. An expected error that has risen from the least one before (m) is none to end with, while anything is missing.
-fn unfinished(found: &Rub, least_m: f64) -> Option<String> {
-    let error_m = found.place_error_m();
-    let has_risen = error_m > (1.0 + WORTH) * least_m && !found.missing.is_empty();
-    if found.helped() && !has_risen {
-        return None;
-    }
-    let why = match &found.held_out {
-        _ if found.helped() => {
-            format!("The expected error has risen from {:.2} to {:.2} mm", 1e3 * least_m, 1e3 * error_m)
-        }
-        None => "It is too little to tell whether it helps".to_owned(),
-        Some(HeldOut { residuals: [before, after], place_errors_m: [before_m, after_m], .. }) => format!(
-            "It has not helped: presses that were not used leave {before:.1} × noise before and {after:.1} after, and places are known to \
-             {:.2} mm before and {:.2} after",
-            1e3 * before_m,
-            1e3 * after_m
-        ),
-    };
-    let missing: Vec<_> = found.missing.iter().take(TOLD).map(ToString::to_string).collect();
-    let what = if missing.is_empty() { "rub on, with one fingertip alone".to_owned() } else { missing.join("; ") };
-    Some(format!("{why}. What is missing: {what}."))
 }
 
 #[cfg(test)]
@@ -416,14 +411,19 @@ mod tests {
     }
 
     #[test]
-    fn what_rose_is_not_done_and_says_what_is_missing() {
-        assert_eq!(unfinished(&found([0.9e-3, 0.2e-3], [3.0, 1.0], &[]), 0.25e-3), None);
-        let risen = unfinished(&found([0.9e-3, 0.75e-3], [3.0, 1.0], &[Missing::Firm]), 0.68e-3).unwrap_or_default();
-        assert!(risen.contains("risen from 0.68 to 0.75 mm") && risen.contains("press harder"), "{risen}");
-        let worse = found([0.68e-3, 0.75e-3], [3.0, 1.0], &[Missing::Place([-0.02, 0.02])]);
-        let worse = unfinished(&worse, 0.75e-3).unwrap_or_default();
-        assert!(worse.contains("0.68 mm before and 0.75 after") && worse.contains("(-20, 20) mm"), "{worse}");
-        let none = Rub { held_out: None, ..found([0.9e-3, 0.2e-3], [3.0, 1.0], &[]) };
-        assert!(unfinished(&none, 0.3e-3).unwrap_or_default().contains("too little to tell"));
+    fn only_what_is_better_can_be_used_and_a_person_who_asks_for_the_end_is_told_why() {
+        let ends_with = |residuals, is_asked: bool| {
+            let mut session = session(false);
+            session.ask(Calibrate::Begin);
+            (session.shown.stage, session.is_asked_to_finish) = (Stage::Finishing, is_asked);
+            let fit = Ok(found([0.9e-3, 0.2e-3], residuals, &[]));
+            session.receive(Outcome::Fitted(Box::new(Fitted { is_last: true, fit, took: Duration::ZERO })));
+            let is_usable = session.use_found().is_some();
+            (session.shown.stage, session.shown.keep.is_some(), session.shown.trouble.is_some(), is_usable)
+        };
+        assert_eq!(ends_with([3.0, 1.0], true), (Stage::Done, false, false, true));
+        assert_eq!(ends_with([3.0, 1.0], false), (Stage::Done, false, false, true));
+        assert_eq!(ends_with([1.0, 1.5], true), (Stage::Done, true, false, false), "worse, and says to keep the other");
+        assert_eq!(ends_with([1.0, 1.5], false), (Stage::Rubbing, false, true, false), "it goes on");
     }
 }

@@ -51,6 +51,7 @@ const ASSETS: &[Asset] = &[
     ("/strength.js", SCRIPT, include_str!("web/strength.js")),
     ("/strip.js", SCRIPT, include_str!("web/strip.js")),
     ("/svg.js", SCRIPT, include_str!("web/svg.js")),
+    ("/target.js", SCRIPT, include_str!("web/target.js")),
     ("/theme.js", SCRIPT, include_str!("web/theme.js")),
     ("/told.js", SCRIPT, include_str!("web/told.js")),
     ("/totals.js", SCRIPT, include_str!("web/totals.js")),

@@ -18,8 +18,6 @@ const MOST: usize = 24;
 const ENOUGH: usize = 12;
 /// Share of the expected error of places before that has to be gone.
 const BETTER: f64 = 0.05;
-/// Share by which the residual of so few presses may be larger by chance: of 24 presses of 240 readings it scatters by a hundredth.
-const CHANCE: f64 = 0.03;
 
 /// Sheet conductances from which a press is firm.
 const FIRM: f64 = 0.3;
@@ -44,11 +42,14 @@ pub struct HeldOut {
 }
 
 impl HeldOut {
+    /// Share by which the residual of so few presses may be larger by chance: of 24 presses of 240 readings it scatters by a hundredth.
+    pub const CHANCE: f64 = 0.03;
+
     /// Whether the detector that was found is better: presses that it does not know fit no worse, and places are known better.
     pub fn helped(&self) -> bool {
         let [before, after] = self.residuals;
         let [before_m, after_m] = self.place_errors_m;
-        after <= (1.0 + CHANCE) * before && after_m < (1.0 - BETTER) * before_m
+        after <= (1.0 + Self::CHANCE) * before && after_m < (1.0 - BETTER) * before_m
     }
 }
 

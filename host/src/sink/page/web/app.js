@@ -57,7 +57,7 @@ function start(setup) {
     text, told, picture, history, strip: new StripChart(history), table: new ContactTable(setup), board: new Board(setup, send),
     readings: new ReadingsMap(setup, theme(), (g, e) => picture.highlight(g, e)),
     method: new MethodSelect(setup.solvers, send), simulation: new Simulation(setup, send),
-    calibrate: new CalibratePanel(setup, send), pointer: new PointerPanel(setup), totals: new Totals(),
+    calibrate: new CalibratePanel(setup, send, picture), pointer: new PointerPanel(setup), totals: new Totals(),
     gain: new GainSelect(picture.scale.floor, (end) => picture.endAt(end, performance.now())),
   };
   const [[left, bottom], [right, top]] = setup.bounds_m;
@@ -159,7 +159,11 @@ listenForActions({
     parts?.readings.fit(performance.now());
   },
   rezero: () => rezeroButton.press(),
-  calibrate: () => parts?.calibrate.toggle(),
+  calibrate: () => {
+    // The target is on the flat picture.
+    look("flat");
+    parts?.calibrate.toggle();
+  },
   full: fullScreen,
   keys: () => document.getElementById("help").showModal(),
   view: () => look(parts?.picture.looking === "flat" ? "space" : "flat"),

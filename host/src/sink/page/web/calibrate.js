@@ -5,50 +5,28 @@ import { label, line, svg } from "./svg.js";
 import { theme } from "./theme.js";
 import { count, fixed, millimetres } from "./units.js";
 
-// From this share of the detector on, a person is told which part is left.
-const MOST_RUBBED = 0.35;
-// Share from which it is done, as in `run/calibration`.
-const WHOLE = 0.8;
-// Cells felt both lightly and firmly, as a share of those felt, below which a person is told to change.
-const BOTH = 0.4;
-
 const element = (id) => document.getElementById(id);
 const errorText = (errorM) => (errorM < 0.1 ? millimetres(errorM, errorM < 1e-3 ? 2 : 1) : "> 100");
 
-// The third of the detector that has been rubbed least, in words.
-function leastRubbed({ cells: [columns, rows], felt }) {
-  const ROWS = ["lower", "", "upper"];
-  const COLUMNS = ["left", "", "right"];
-  const parts = Array.from({ length: 9 }, () => ({ all: 0, done: 0 }));
-  felt.forEach((kind, cell) => {
-    if (kind === null) return;
-    const [x, y] = [Math.floor((3 * (cell % columns)) / columns), Math.floor((3 * Math.floor(cell / columns)) / rows)];
-    parts[3 * y + x].all += 1;
-    parts[3 * y + x].done += kind > 0 ? 1 : 0;
-  });
-  const shares = parts.map(({ all, done }) => (all ? done / all : 1));
-  const part = shares.indexOf(Math.min(...shares));
-  const words = [ROWS[Math.floor(part / 3)], COLUMNS[part % 3]].filter(Boolean).join(" ");
-  return words ? `at the ${words}` : "in the middle";
+// Where a target is, in words, for those who do not see the picture.
+function partOf([x, y], { left, bottom, right, top }) {
+  const third = (value, low, high) => Math.min(2, Math.max(0, Math.floor((3 * (value - low)) / (high - low))));
+  const names = [["at the lower left", "at the bottom", "at the lower right"], ["at the left", "in the middle", "at the right"], ["at the upper left", "at the top", "at the upper right"]];
+  return names[third(y, bottom, top)][third(x, left, right)];
 }
 
 // What to do now, in a sentence.
-function advice(state) {
-  const { stage, share, touched, felt, fit, saved, used } = state;
-  if (stage === "finishing") return "Hold on: everything is fitted once more, and compared with before.";
+function advice(state, bounds) {
+  const { stage, touched, target, keep, saved, used } = state;
+  if (stage === "finishing") return "Lift your finger: all presses are being fitted, and the result is tested.";
   if (stage === "done") {
-    if (saved && used) return "Done. The picture uses the calibrated detector.";
-    return saved ? "Saved. Use it here, or start with it next time." : "Done: more rubbing would bring next to nothing. Save it, and use it.";
+    if (keep) return "Keep the present calibration.";
+    if (used) return saved ? "Done. The picture uses the new calibration." : "The picture uses the new calibration. Save it to have it next time.";
+    return "The new calibration is better. Use it.";
   }
-  if (!touched) return "Rub one fingertip over the whole sensor, now light and now firm.";
-  const rubbed = felt.filter((kind) => kind > 0);
-  const bothShare = rubbed.filter((kind) => kind === 3).length / Math.max(1, rubbed.length);
-  if (share > MOST_RUBBED && bothShare < BOTH) {
-    const light = rubbed.filter((kind) => kind === 1).length;
-    return `Go over it again, ${light > rubbed.length / 2 ? "more firmly" : "more lightly"}.`;
-  }
-  if (share > MOST_RUBBED && share < WHOLE) return `Now rub ${leastRubbed(state)}, where the map is empty.`;
-  return share < WHOLE || !fit ? "Go on: one fingertip, everywhere, now light and now firm." : "Nearly there: go on while the error falls.";
+  if (!target) return "Every part has been pressed. Go on while the error falls, or finish.";
+  const how = target.firm ? "firmly" : "lightly";
+  return `Press ${how} with one fingertip at the ${target.firm ? "thick" : "thin"} ring, ${partOf(target.at_m, bounds)}${touched ? "." : ": anything else stays off the sensor."}`;
 }
 
 // Expected error after each fit, falling.
@@ -80,7 +58,8 @@ function row(what, before, after) {
 export class CalibratePanel {
   state;
 
-  constructor(setup, send) {
+  constructor(setup, send, picture) {
+    this.picture = picture;
     this.send = (what) => send({ calibrate: what });
     this.card = element("calibrate-card");
     this.button = element("calibrate");
@@ -101,6 +80,7 @@ export class CalibratePanel {
 
   /** Shows a status message. */
   show({ calibrating, learned, link }) {
+    this.picture.aim(calibrating?.target ?? null);
     element("learned").textContent = learned ? `${learned[0].toUpperCase()}${learned.slice(1)}` : "";
     this.button.disabled = !calibrating && link.state !== "streaming";
     this.button.setAttribute("aria-pressed", String(Boolean(calibrating)));
@@ -118,51 +98,55 @@ export class CalibratePanel {
     const { dataset } = document.documentElement;
     dataset.calibrating = state?.stage ?? "";
     if (!state) return;
-    const { stage, share, touched, fitting, errors_m: errorsM, fit, trouble, saved, used } = state;
+    const { stage, share, touched, fitting, errors_m: errorsM, fit, compared, keep, target, saved, used } = state;
     const errorM = errorsM.at(-1);
-    Object.assign(dataset, { calibrated: saved ?? "", fits: String(errorsM.length), rubbed: String(share), errorMm: String(1e3 * (errorM ?? NaN)) });
-    element("calibrate-now").textContent = advice(state);
-    element("calibrate-share").textContent = `${fixed(100 * share, 0)} % rubbed`;
-    element("calibrate-touched").textContent = `${count(touched)} frames${fitting ? ", fitting…" : ""}`;
+    Object.assign(dataset, { calibrated: saved ?? "", fits: String(errorsM.length), rubbed: String(share), errorMm: String(1e3 * (errorM ?? NaN)),
+      targetMm: JSON.stringify(target?.at_m.map((m) => 1e3 * m) ?? null), targetFirm: String(target?.firm ?? ""), recommended: String(stage === "done" && !keep) });
+    element("calibrate-now").textContent = advice(state, this.rubbed);
+    element("calibrate-share").textContent = `${fixed(100 * share, 0)} % pressed`;
+    element("calibrate-touched").textContent = `${count(touched)} frames${fitting ? ", being fitted" : ""}`;
     this.rubbed.draw(state, theme());
     this.errors.draw(fit, theme());
     element("calibrate-legend").style.background = ErrorMap.legend(theme());
     element("calibrate-error").textContent = errorM === undefined ? "not known yet" : `± ${errorText(errorM)}\u2009mm`;
     element("calibrate-history").replaceChildren(history(errorsM));
-    this.#compare(stage, fit);
-    this.#note(trouble, fit, saved, stage);
+    this.#compare(stage, compared);
+    this.#note(state);
     const done = stage === "done";
     element("calibrate-finish").hidden = stage !== "rubbing";
     element("calibrate-finish").disabled = errorsM.length === 0;
     element("calibrate-more").hidden = !done;
-    element("calibrate-save").hidden = !done;
+    element("calibrate-save").hidden = !done || Boolean(keep);
     element("calibrate-save").disabled = Boolean(saved);
-    element("calibrate-use").hidden = !done;
+    element("calibrate-use").hidden = !done || Boolean(keep);
     element("calibrate-use").disabled = used;
     element("calibrate-use").textContent = used ? "In use" : "Use it";
   }
 
-  #compare(stage, fit) {
+  // The present calibration and the new one, by the same measures.
+  #compare(stage, compared) {
     const table = element("calibrate-compared");
-    table.hidden = stage !== "done" || !fit;
+    table.hidden = stage !== "done" || !compared;
     if (table.hidden) return;
-    const rows = [];
-    if (fit.residuals) rows.push(row("residual", ...fit.residuals.map((value) => `${fixed(value, 1)} × noise`)));
-    if (fit.place_errors_m) rows.push(row("places", ...fit.place_errors_m.map((metres) => `± ${errorText(metres)}\u2009mm`)));
-    element("calibrate-rows").replaceChildren(...rows);
+    const { presses, residuals, place_errors_m: errorsM } = compared;
+    element("calibrate-unused").textContent = `${presses} presses not used`;
+    element("calibrate-rows").replaceChildren(
+      row("unexplained / noise", ...residuals.map((value) => fixed(value, 1))),
+      row("error of places", ...errorsM.map((metres) => `± ${errorText(metres)}\u2009mm`)),
+    );
   }
 
-  #note(trouble, fit, saved, stage) {
+  #note({ trouble, keep, fit, saved, stage }) {
     const note = element("calibrate-note");
     const wires = fit?.wires?.map((electrode, channel) => (electrode === channel ? null : `${channel} is at electrode ${electrode}`)).filter(Boolean);
     const told = [
-      trouble,
-      stage === "done" && saved ? `Written to ${saved}: start with --detector ${saved}` : null,
+      trouble ?? keep,
+      stage === "done" && saved ? `Saved as ${saved}. To begin with it next time: tactomo live --detector ${saved}` : null,
       wires?.length ? `Wires are exchanged, and taken as they are: channel ${wires.join(", ")}.` : null,
       fit?.left_out.length ? `Electrodes ${fit.left_out.join(", ")} are broken or contradict the others, and were left out.` : null,
     ].filter(Boolean);
     note.textContent = told.join(" ");
-    note.className = trouble ? "bad" : "muted";
+    note.className = trouble ? "bad" : keep ? "" : "muted";
     note.hidden = !told.length;
   }
 }

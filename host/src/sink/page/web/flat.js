@@ -5,6 +5,7 @@ import { colourMaps } from "./colours.js";
 import { drawFrame } from "./frame.js";
 import { Layout, sizeCanvas } from "./layout.js";
 import { drawLabels, drawMark, drawTrail } from "./marks.js";
+import { drawTarget } from "./target.js";
 
 /** Draws the heat of `view.field` on the scale `view.scale` in the colours of `view.theme`. */
 export class FlatView {
@@ -51,6 +52,7 @@ export class FlatView {
     }
     for (const { contact, x, y } of spots.filter((spot) => !spot.contact.kind)) drawMark(over, contact, [x, y], layout.perM, view.colours);
     drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight });
+    if (view.target) drawTarget(over, view.target, [layout.x(view.target.at_m[0]), layout.y(view.target.at_m[1])], view.colours);
     this.#drawFingers();
   }
 

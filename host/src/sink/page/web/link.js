@@ -1,11 +1,11 @@
 // How the link to the board fares, in the page's first line.
 
 const LINK_TEXT = {
-  searching: "Looking for a board",
-  waiting: "The link is open; waiting for the board to say hello",
+  searching: "Looking for a board: connect it by USB",
+  waiting: "A board is connected and has not answered yet",
   streaming: "Live",
-  silent: "The board answers but sends no frames",
-  lost: "The board is lost; trying again",
+  silent: "The board answers and sends no readings",
+  lost: "The board is gone; looking for it again",
   ended: "The link has ended",
   finished: "The recording has ended",
   paused: "The recording is paused",

@@ -31,6 +31,7 @@ export class Picture {
     this.empty = null;
     this.marked = null;
     this.fingers = [];
+    this.target = null;
     this.views = { flat: new FlatView(this), space: new SpaceView(this) };
     this.#listen();
     this.look("flat");
@@ -114,6 +115,12 @@ export class Picture {
   /** Shows where the person presses: fingers with a `place` (m), `down` or about to be. */
   showFingers(fingers) {
     this.fingers = fingers;
+    this.draw(performance.now());
+  }
+
+  /** Shows where to press next, or nothing. */
+  aim(target) {
+    this.target = target;
     this.draw(performance.now());
   }
 

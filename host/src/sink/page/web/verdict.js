@@ -6,6 +6,9 @@ import { fixed } from "./units.js";
 // Words and warnings stay this long: what flickers cannot be read.
 const STAYS_MS = 250;
 
+// A screen reader is told what has stayed this long: it takes a second to say it, and nobody can follow every frame.
+const ANNOUNCED_MS = 1000;
+
 const WARNINGS = {
   saturated: ["at its limit", "Readings at the end of the converter's range, or contacts that conduct so well that pressing harder would change nothing"],
   misfit: ["does not fit", "The readings are not what the model gives for what was found: another sensor, a fault, or something that is no contact"],
@@ -65,7 +68,7 @@ function ageText(ageS) {
 
 /** What the solver says of its answer. */
 export class Verdict {
-  flags; wires;
+  flags; wires; announcing; announcer;
 
   constructor() {
     this.what = document.getElementById("choice");
@@ -82,6 +85,7 @@ export class Verdict {
   show(update, explanation, now) {
     const { choice, flags, residual, ageS } = update;
     const words = headline(update);
+    this.#announce(words);
     if (words !== this.what.textContent || now - this.shown > STAYS_MS) {
       this.shown = now;
       this.what.textContent = words;
@@ -102,6 +106,16 @@ export class Verdict {
   /** Says that the last answer is no longer of now. */
   hold() {
     if (this.what.textContent.trim()) this.sure.textContent = "the last answer";
+  }
+
+  #announce(words) {
+    if (words === this.announcing) return;
+    this.announcing = words;
+    clearTimeout(this.announcer);
+    this.announcer = setTimeout(() => {
+      const line = document.getElementById("announced");
+      if (line.textContent !== words) line.textContent = words;
+    }, ANNOUNCED_MS);
   }
 
   #settle() {
