@@ -16,7 +16,7 @@ use tactomo_physics::readings::Readings;
 
 /// Chooses the model.
 pub(super) struct AutoSearch {
-    finder: Option<Arc<ContactFinder>>,
+    pub(super) finder: Option<Arc<ContactFinder>>,
     shapes: Option<Arc<ShapeFinder>>,
     image: Nonlinear,
 }
@@ -91,7 +91,7 @@ impl AutoSearch {
     }
 
     /// What explains the frame as a whole better than contacts do, if anything.
-    fn whole(
+    pub(super) fn whole(
         &mut self,
         (contacts, solution): (Evidence, &Solution),
         from: Option<(Whole, String)>,

@@ -20,7 +20,11 @@ struct AutoTrial {
 
 impl AutoTrial {
     fn new() -> Self {
-        let mut detector = Detector::preset(Detector::DEFAULT).unwrap().taken_as_exact();
+        Self::on(Detector::DEFAULT)
+    }
+
+    fn on(preset: &str) -> Self {
+        let mut detector = Detector::preset(preset).unwrap().taken_as_exact();
         detector.adc.noise_lsb = 1.5;
         let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector).unwrap());
         let auto = Auto::new(&Problem::new(slab)).unwrap();
@@ -113,6 +117,22 @@ fn a_touch_is_seen_in_its_first_frame_where_it_is_and_nothing_is_seen_without_on
         let [x, y] = peak_m(&followed.solution);
         assert!((x - x_m).hypot(y - y_m) < 0.004, "{x} {y}");
     }
+}
+
+#[test]
+fn what_an_image_explains_is_a_line_if_it_is_one_where_contacts_lead_nowhere() {
+    let mut trial = AutoTrial::on("strip-13x60");
+    let rod = Shape::Line { length_m: 0.036, width_m: 0.0018, angle_rad: 1.6 };
+    let readings = trial.shaped(&[([0.0004, 0.003], rod, 20.0)]);
+    let target = trial.auto.search.finder.as_ref().unwrap().target_of(&Mean::of_frame(&readings), None).unwrap();
+    // Two of the rod's ends, of which one is where there is nothing: as a search that got lost leaves them.
+    let lost = Solution {
+        contacts: vec![FoundContact::flat(-0.005, 0.027, 1e-5), FoundContact::flat(0.006, -0.028, 3e-6)],
+        ..Solution::default()
+    };
+    let whole = trial.auto.search.whole((Evidence::of(2e4, 8), &lost), None, &target, &readings).unwrap();
+    let Some(Whole::Shape(line)) = whole else { panic!("an image, or nothing") };
+    assert!(line.strip().is_line() && (line.strip().course.length_m() - 0.036).abs() < 0.002, "{:?}", line.strip());
 }
 
 #[test]
