@@ -70,7 +70,7 @@ fn a_simulated_board_takes_scenes_faults_and_settings() -> Result<()> {
         }
         let said = "return document.querySelector('#scene option[value=gripper]').textContent";
         let said = stage.browser.run(said).await?;
-        ensure!(said == "gripper, scaled", "{said}: it was made for another detector than this one");
+        ensure!(said == "gripper (other sensor)", "{said}: it was made for another detector than this one");
         stage.browser.select("fault", "open:3").await?;
         asks(stage, Request::Control(Control::Faults(vec![Fault::Open { electrode: 3 }]))).await?;
         stage.browser.run("document.getElementById('details-card').open = true").await?;

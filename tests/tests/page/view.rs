@@ -128,7 +128,7 @@ fn a_warning_goes_with_its_answer_though_no_other_answer_comes() -> Result<()> {
             ..Solution::default()
         };
         stage.behind.solution(answer(true));
-        stage.browser.says("warnings", "does not fit").await?;
+        stage.browser.says("warnings", "readings do not fit").await?;
         // The last answer has no warning, and then the stream stands still.
         stage.behind.solution(answer(false));
         let is_without = |told: &Told| told.text("flags").is_empty();

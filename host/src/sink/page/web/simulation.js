@@ -14,7 +14,7 @@ const WISH_STAYS_MS = 500;
 function sceneOption(name, madeFor) {
   const option = new Option(name.replaceAll("-", " "), name);
   if (madeFor) {
-    option.text += ", scaled";
+    option.text += " (other sensor)";
     option.title = `Made for ${madeFor}, and scaled to this detector: to see it on its own, tactomo live --simulate --scene ${name}`;
   }
   return option;
