@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each room with those that it may use, all of which stand above it: so there are no cycles.
-const PLAN: [(&str, &[&str]); 25] = [
+const PLAN: [(&str, &[&str]); 26] = [
     ("gaussian", &[]),
     ("scanning", &[]),
     ("student", &[]),
@@ -78,6 +78,7 @@ const PLAN: [(&str, &[&str]); 25] = [
     ),
     // `solve` by itself is what it shows to others.
     ("pointer", &["solve"]),
+    ("changes", &["solve"]),
     ("metrics", &["solve"]),
     ("schema", &["pointer", "solve"]),
     ("calibrate", &["gaussian", "student", "solve::fit", "solve"]),

@@ -61,7 +61,7 @@ impl Session {
         let Some(baud) = first else { return };
         let request = Request { tag: self.next_tag(), command: Command::Rate { baud } };
         if let Err(error) = send(link, &request) {
-            tracing::debug!("{}: {error}", link.name());
+            tracing::debug!("{}: {}", link.name(), with_causes(&error));
         }
     }
 }
