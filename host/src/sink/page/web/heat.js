@@ -2,6 +2,7 @@
 // for all, so that all have the same colours on the same scale.
 
 import { Raster } from "./raster.js";
+import { conductanceOf } from "./strength.js";
 
 // A contact is drawn as C / (pi r2) exp(-(d / r)2), which adds up to its conductance C; beyond so many radii that is nothing.
 const REACH = 3.5;
@@ -11,8 +12,8 @@ const REACH = 3.5;
 const [ACROSS, ABOUT] = [1.8128, 2.7842];
 const SHAPE_REACH = 1.9;
 
-/** Density (S/m2) in the middle of a contact of this conductance and radius. */
-export const densityOf = ({ conductanceS }, radiusM) => Math.max(0, conductanceS ?? 0) / (Math.PI * radiusM * radiusM);
+/** Density (S/m2) in the middle of a contact of this radius. */
+export const densityOf = (contact, radiusM) => Math.max(0, conductanceOf(contact) ?? 0) / (Math.PI * radiusM * radiusM);
 
 // A line from end to end, whose ends are as round as it is wide.
 function lineOf({ from: [ax, ay], to: [bx, by] }, h) {

@@ -25,7 +25,7 @@ export class Picture {
     this.trails = new Trails();
     const [[left, bottom], [right, top]] = setup.bounds_m;
     const areaM2 = ((right - left) * (top - bottom)) / setup.electrodes.length;
-    const firm = densityOf({ conductanceS: FIRM_SHARE * setup.sheet_conductance_s }, setup.usual_radius_m);
+    const firm = densityOf({ apparentS: null, conductanceS: FIRM_SHARE * setup.sheet_conductance_s }, setup.usual_radius_m);
     this.scale = new SteadyScale((FLOOR_SHARE * setup.sheet_conductance_s) / areaM2, firm);
     this.excluded = [];
     this.empty = null;
