@@ -15,6 +15,7 @@ use super::KeyFrame;
 use super::together::Together;
 use crate::solve::fit::approximation::Linearised;
 use crate::solve::fit::target::Target;
+use tactomo_physics::forward::Nuisance;
 
 /// Frames that a baseline is the mean of at first (`host/board/src/baseline`).
 const BASELINE_FRAMES: f64 = 32.0;
@@ -41,6 +42,8 @@ pub(super) struct Window<'a> {
     pub finder: &'a ContactFinder,
     pub fitter: DiscFitter<'a>,
     pub frames: Vec<Frame>,
+    /// What is not known of the detector. It may be [made](crate::solve::problem::Problem::nuisance) meanwhile: for one window it is what it was at its begin.
+    nuisance: Option<&'a Nuisance>,
     /// The detector near which readings are taken as linear, if not the described one.
     pub near: Option<Arc<Linearised>>,
     /// Information of all frames about steps of the detector, with what is known of these before.
@@ -72,11 +75,12 @@ impl ContactFinder {
 impl<'a> Window<'a> {
     /// Of key frames whose readings are linear near a detector, or else the described one.
     pub fn new(finder: &'a ContactFinder, keys: &[KeyFrame], near: Option<Arc<Linearised>>) -> Option<Self> {
+        let nuisance = finder.problem.nuisance();
         let frame = |key: &KeyFrame| {
             finder.check(&key.mean.readings).ok()?;
             let alone = Target::of_mean(&key.mean.readings, key.mean.frames, &finder.errors, None);
             let model_v = finder.errors.model * key.mean.readings.largest_v();
-            let (alone, mut patterns, steps) = match finder.problem.nuisance() {
+            let (alone, mut patterns, steps) = match nuisance {
                 Some(nuisance) => {
                     let (alone, patterns) = finder.informed_with_patterns(&alone, &key.contacts, near.as_ref())?;
                     (alone, patterns, nuisance.directions())
@@ -104,12 +108,22 @@ impl<'a> Window<'a> {
         let information = |sum: DMatrix<f64>, (frame, all): (&Frame, &DMatrix<f64>)| sum + &frame.transposed * all;
         let of_detector = frames.iter().zip(&patterns).fold(DMatrix::identity(unknowns, unknowns), information);
         let factor = Cholesky::new(of_detector.clone())?;
-        Some(Self { fitter: finder.disc_fitter(), of_detector, factor, finder, near, between, patterns, frames })
+        Some(Self {
+            fitter: finder.disc_fitter(),
+            of_detector,
+            factor,
+            finder,
+            nuisance,
+            near,
+            between,
+            patterns,
+            frames,
+        })
     }
 
     /// The detector that an explanation makes likeliest, if it is far from where readings are linear.
     pub fn nearer(&self, found: &Together) -> Option<Arc<Linearised>> {
-        let nuisance = self.finder.problem.nuisance()?;
+        let nuisance = self.nuisance?;
         let steps = self.factor.solve(&self.pull(&self.residuals(&found.at.fits).0)?);
         let steps = steps.as_slice()[..nuisance.directions()].to_vec();
         let is_far =

@@ -4,6 +4,7 @@ use super::super::tests::{FINE, contact, frame, solver};
 use super::super::{ContactSettings, Contacts};
 use super::*;
 use crate::solve::answer::{FoundContact, Solution};
+use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::problem::Problem;
 use crate::solve::solver::Solver;
 use tactomo_physics::detector::{Adc, ConverterErrors, Detector};
@@ -152,4 +153,27 @@ fn what_several_frames_say_holds_contacts_where_one_frame_says_little() {
     assert!(held_m < 0.7e-3 && free_m > 1.5 * held_m, "{held_m} {free_m}");
     let deviation = |fit: &crate::solve::methods::contacts::discs::DiscFit| fit.covariance().unwrap()[(0, 0)].sqrt();
     assert!(deviation(&held) < deviation(&free));
+}
+
+#[test]
+fn a_window_begun_before_it_was_known_what_is_unknown_of_the_detector_ends_as_it_began() {
+    let detector = Detector::preset(Detector::DEFAULT).unwrap();
+    let model: Box<dyn ForwardModel> = Box::new(tactomo_physics::forward::Slab::new(&detector).unwrap());
+    let problem = Problem::new(model);
+    let finder = ContactFinder::new(&problem, ContactSettings::of(&problem)).unwrap();
+    let mut noise = Noise::new(3);
+    let key = |sheets| {
+        let contacts = vec![contact(0.004, -0.002, sheets)];
+        KeyFrame { mean: Mean::of_frame(&frame(&contacts, &mut noise)), contacts }
+    };
+    let keys: Vec<_> = [0.1, 0.2, 0.3, 0.4].map(key).into();
+    // As live does: a thread makes it, and takes about a second.
+    problem.make_nuisance_beside();
+    let window = Window::new(&finder, &keys, None).unwrap();
+    let followed: Vec<_> = keys.iter().map(|key| key.contacts.clone()).collect();
+    let growing = window.explained(followed, Motion::Growing(1e-3)).unwrap();
+    while problem.nuisance().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    assert!(window.nearer(&growing).is_none(), "readings were taken as of a detector that is known");
 }
