@@ -322,25 +322,9 @@ impl RubSession {
 
 #[cfg(test)]
 mod tests {
+    use super::super::worth::tests::found;
     use super::*;
     use tactomo_physics::detector::Calibration;
-    use tactomo_touch::calibrate::Missing;
-
-    fn found(place_errors_m: [f64; 2], residuals: [f64; 2], missing: &[Missing]) -> Rub {
-        Rub {
-            detector: Detector::default(),
-            wires: None,
-            left_out: Vec::new(),
-            touched: 200,
-            single: 200,
-            presses: 160,
-            known: 0,
-            held_out: Some(HeldOut { presses: 24, residuals, place_errors_m, rival: None }),
-            missing: missing.to_vec(),
-            chi_square: [9.0, 1.0],
-            place_errors_m: vec![([0.0; 2], place_errors_m[1])],
-        }
-    }
 
     fn session(learns: bool) -> RubSession {
         let (snapshots, _) = tokio::sync::watch::channel(Arc::default());
@@ -381,7 +365,7 @@ mod tests {
         let mut learning = session(true);
         assert!(learning.learned().is_none(), "nothing is fitted");
         let mut fitted = |place_errors_m, residuals, used| {
-            learning.shown.fit = Some(Arc::new(found(place_errors_m, residuals, &[])));
+            learning.shown.fit = Some(Arc::new(found(place_errors_m, residuals, None, &[])));
             learning.set_used(used);
             learning.learned().is_some()
         };
@@ -401,7 +385,7 @@ mod tests {
         let mut is_taken = |rival| {
             let held_out =
                 HeldOut { presses: 4, residuals: [9.0, 1.0], place_errors_m: [0.9e-3, 0.2e-3], rival: Some(rival) };
-            let found = found([0.9e-3, 0.2e-3], [9.0, 1.0], &[]);
+            let found = found([0.9e-3, 0.2e-3], [9.0, 1.0], None, &[]);
             learning.shown.fit = Some(Arc::new(Rub { held_out: Some(held_out), ..found }));
             learning.learned().is_some()
         };
@@ -416,7 +400,7 @@ mod tests {
             let mut session = session(false);
             session.ask(Calibrate::Begin);
             (session.shown.stage, session.is_asked_to_finish) = (Stage::Finishing, is_asked);
-            let fit = Ok(found([0.9e-3, 0.2e-3], residuals, &[]));
+            let fit = Ok(found([0.9e-3, 0.2e-3], residuals, None, &[]));
             session.receive(Outcome::Fitted(Box::new(Fitted { is_last: true, fit, took: Duration::ZERO })));
             let is_usable = session.use_found().is_some();
             (session.shown.stage, session.shown.keep.is_some(), session.shown.trouble.is_some(), is_usable)

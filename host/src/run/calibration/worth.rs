@@ -39,8 +39,8 @@ impl Compared {
     /// Whether the one that was found is better: it fits them no worse and tells places better, or the sensor is another one by now.
     fn is_better(&self) -> bool {
         let [before, after] = self.residuals;
-        let [before_m, after_m] = self.place_errors_m;
-        before > OTHER * after || (after <= (1.0 + HeldOut::CHANCE) * before && after_m < (1.0 - WORTH) * before_m)
+        let Self { presses, residuals, place_errors_m } = *self;
+        before > OTHER * after || HeldOut { presses, residuals, place_errors_m, rival: None }.helped()
     }
 }
 
@@ -75,13 +75,14 @@ pub(super) fn why_keep(found: &Rub, compared: Option<Compared>, least_m: f64) ->
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use tactomo_physics::detector::Calibration;
     use tactomo_touch::calibrate::Missing;
 
     use super::*;
 
-    fn found(place_errors_m: [f64; 2], residuals: [f64; 2], rival: Option<f64>, missing: &[Missing]) -> Rub {
+    /// What a fit found, with what it and the description, or else a rival, say of presses that were not fitted.
+    pub fn found(place_errors_m: [f64; 2], residuals: [f64; 2], rival: Option<f64>, missing: &[Missing]) -> Rub {
         Rub {
             detector: Detector::default(),
             wires: None,
