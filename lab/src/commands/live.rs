@@ -12,11 +12,12 @@ use tactomo_study::view::{Format, MM, PERCENT, PLAIN, TEXT, Table, US, View};
 use tactomo_touch::solve::Method;
 
 use super::shown::Shown;
-use crate::live::{self, Case, Found};
+use crate::live::{Case, Found};
 
 /// Runs scenes live behind a simulated board, and holds every answer against what truly touches.
 ///
-/// Scenes press from the first frame on. Each runs in real time; let nothing else run meanwhile.
+/// Scenes press from the first frame on. Each runs in real time; let nothing else run meanwhile. What comes of a run is told when it ends, and a run
+/// that fails does not end the others.
 ///
 /// Examples:
 ///   tactomo-lab live
@@ -71,13 +72,26 @@ struct Report {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let files = args.shown.files()?;
     let cases = cases(args);
-    let mut runs = Vec::with_capacity(cases.len());
+    let (mut runs, mut failed) = (Vec::with_capacity(cases.len()), 0);
     for (index, case) in cases.iter().enumerate() {
-        message!("{} of {}: {} for {} s", index + 1, cases.len(), case.scene, args.seconds);
-        runs.push(live::run(case)?);
+        let what = match case.run() {
+            Ok(found) => {
+                let right = format!("right {:.0} %", 100.0 * found.scored.right);
+                runs.push(found);
+                right
+            }
+            // An hour of runs is not lost by one of them.
+            Err(error) => {
+                failed += 1;
+                format!("failed: {error:#}")
+            }
+        };
+        message!("{} of {}: {case}: {what}", index + 1, cases.len());
     }
     let view = view(&runs);
-    args.shown.put_out(files, &Report { runs }, &[view])
+    args.shown.put_out(files, &Report { runs }, &[view])?;
+    anyhow::ensure!(failed == 0, "{failed} of {} runs failed; what they ended with is said above", cases.len());
+    Ok(())
 }
 
 fn cases(args: &Args) -> Vec<Case> {

@@ -2,6 +2,7 @@
 
 mod score;
 
+use std::fmt;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
@@ -83,8 +84,27 @@ impl Listener for Keeper {
     }
 }
 
+impl Case {
+    /// Runs it. A thread of it that panics is an error like others: whatever ran before stays of use.
+    pub fn run(&self) -> anyhow::Result<Found> {
+        std::panic::catch_unwind(|| run(self)).unwrap_or_else(|_| anyhow::bail!("the solver panicked"))
+    }
+
+    /// What is known of its detector.
+    fn detector(&self) -> String {
+        self.built.map_or_else(|| "as described".to_owned(), |seed| format!("as built {seed}"))
+    }
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let board = self.board.map_or("the usual board", BoardModel::name);
+        write!(f, "{}, {}, {board}, {}", self.scene, self.detector(), self.scan)
+    }
+}
+
 /// Runs one case.
-pub fn run(case: &Case) -> anyhow::Result<Found> {
+fn run(case: &Case) -> anyhow::Result<Found> {
     let detector = case.scene.detector().and_then(Detector::preset).unwrap_or_default();
     let model = case.board.unwrap_or_else(|| BoardModel::usual(&detector));
     let detector = model.described(detector, case.built.is_some());
@@ -121,7 +141,7 @@ pub fn run(case: &Case) -> anyhow::Result<Found> {
     let began = answers.first().map(|answer| answer.came);
     Ok(Found {
         scene: case.scene.to_string(),
-        detector: case.built.map_or_else(|| "as described".to_owned(), |seed| format!("as built {seed}")),
+        detector: case.detector(),
         board: model.name(),
         scan: case.scan.to_string(),
         scored: scorer.of(&answers, began_s),
