@@ -82,7 +82,7 @@ pub const JOBS: &[Job] = &[
     of_machine("live-esp32c3", "tactomo live --simulate --board esp32c3 --scene single --seconds 5 --no-open"),
     of_machine(
         "live-adaptive",
-        "tactomo live --simulate --board esp32 --scan adaptive --scene single --seconds 5 --no-open",
+        "tactomo live --simulate --board esp32 --scan adaptive --scene moving --seconds 5 --no-open",
     ),
 ];
 

@@ -1,7 +1,7 @@
 //! Which rows the board is asked to scan: whole frames, some grounds, or what the scene needs at the moment.
 //!
 //! A wire carries so many rows a second, whatever they are; the board scans each again until it has room. While nothing touches two grounds see a touch come, wherever it is. What
-//! stands is read under all grounds in turn; of what moves those grounds that tell most of it are scanned most, and all others in turn, for what is
+//! stands is read in whole frames, which are averaged; of what moves those grounds that tell most of it are scanned most, and all others in turn, for what is
 //! new. Where the answer is a line, a ring or an image, or rows do not fit, whole frames are scanned.
 
 mod choice;
@@ -90,8 +90,11 @@ fn listed(grounds: &[usize], electrodes: usize) -> Plan {
     plan(grounds.iter().copied(), rows_a_frame, electrodes)
 }
 
-/// A plan of these grounds, and all others in turn.
+/// A plan of these grounds, and all others in turn; whole frames where these are all.
 fn adaptive(focus: &[usize], electrodes: usize) -> Plan {
+    if focus.len() >= electrodes {
+        return Plan::default();
+    }
     let rows = with_others(focus, electrodes, MAX_PLAN_ROWS);
     let rows_a_frame = if rows.len().is_multiple_of(ROWS) { ROWS } else { 1 };
     plan(rows.into_iter(), rows_a_frame, electrodes)
@@ -137,6 +140,7 @@ mod tests {
             }
             assert!(listed(&[0, 3, 1], electrodes).is_valid(electrodes as u8));
         }
+        assert!(adaptive(&(0..16).collect::<Vec<_>>(), 16).is_whole(), "all grounds are a whole frame");
         let of_16 = adaptive(&[5, 10], 16);
         assert_eq!((&of_16.grounds[..8], of_16.rows_a_frame), (&[5, 10, 5, 0, 10, 5, 10, 1][..], 2));
     }

@@ -21,6 +21,11 @@ impl Doubt {
         self.0 = if fits { 0.0 } else { policy::unfit_s() };
     }
 
+    /// A search has found fewer or more contacts than were followed: that did not show in rows, or not soon.
+    pub fn recounted(&mut self) {
+        self.whole(false);
+    }
+
     /// Whether whole frames are needed.
     pub fn needs_whole(self) -> bool {
         self.0 >= policy::unfit_s()
@@ -43,5 +48,7 @@ mod tests {
         assert!(doubt.needs_whole());
         doubt.whole(true);
         assert!(!doubt.needs_whole());
+        doubt.recounted();
+        assert!(doubt.needs_whole(), "a number that changes is not left to rows");
     }
 }

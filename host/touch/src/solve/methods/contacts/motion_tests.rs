@@ -172,3 +172,42 @@ fn a_contact_that_lifts_below_the_converters_range_is_gone_in_rows_too() {
         "{counts:?}"
     );
 }
+
+#[test]
+fn noise_in_a_few_rows_is_no_contact() {
+    // On 32 electrodes most readings of a frame of two rows are completed.
+    let detector = Detector::preset("display-140x70").unwrap().taken_as_exact();
+    let n = detector.electrodes.len();
+    let problem = Problem::of(&detector).unwrap();
+    let mut solver = Contacts::new(&problem, ContactSettings::of(&problem)).unwrap();
+    let (rest, mut noise) = (Readings::from_fn(n, |_, _| 0.0), Noise::new(7));
+    let seen = (0..2000).filter(|frame| {
+        let frame_v = measured(&rest, &detector.adc, &mut noise);
+        let rows = frame_v.hiding(|ground, _| ground / 2 != frame % (n / 2));
+        !solver.solve_rows(&rows, &rows, 2e-4).unwrap().contacts.is_empty()
+    });
+    assert_eq!(seen.count(), 0);
+}
+
+#[test]
+fn grounds_are_chosen_for_what_moves() {
+    let mut trial = MotionTrial::new();
+    let Parts { mut tracker, search } = Box::new(MotionTrial::new().solver).split();
+    let mut searcher = search.unwrap();
+    let mut answered = |contacts: &[Contact]| {
+        trial.touch(contacts);
+        let frame = trial.frame();
+        let Followed { search, .. } = tracker.follow(&frame).unwrap();
+        if search {
+            let hypothesis = searcher.search(tracker.hypothesis(), &frame, &mut |_| ()).unwrap();
+            tracker.adopt(hypothesis, &frame).unwrap();
+        }
+        tracker.telling_grounds(3).map(|grounds| grounds.len())
+    };
+    let standing: Vec<_> = (0..40).map(|_| answered(&[contact(0.0, 0.0, 0.3)])).collect();
+    assert_eq!(standing[39], Some(16), "{standing:?}");
+    let moving: Vec<_> = (0..40).map(|frame| answered(&[contact(2e-4 * f64::from(frame), 0.0, 0.3)])).collect();
+    assert_eq!((moving[0], moving[39]), (Some(16), Some(3)), "{moving:?}");
+    let again: Vec<_> = (0..40).map(|_| answered(&[contact(8e-3, 0.0, 0.3)])).collect();
+    assert_eq!(again[39], Some(16), "{again:?}");
+}

@@ -96,8 +96,8 @@ impl MultipleModels {
     }
 
     /// Whether the contacts are believed to move, after two memories in which that could be seen.
-    pub fn moves(&self) -> bool {
-        self.best > 0 && self.age_s > 2.0 * MEMORY_S
+    pub fn moves(&self) -> Option<bool> {
+        (self.age_s > 2.0 * MEMORY_S).then_some(self.best > 0)
     }
 
     /// Tells what is known from other contacts, so far away in the parameters.

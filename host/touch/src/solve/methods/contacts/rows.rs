@@ -66,8 +66,8 @@ impl RowState {
         self.unfit == 0
     }
 
-    /// Whether what is followed is believed to move.
-    pub fn moves(&self) -> bool {
+    /// Whether what is followed is believed to move; `None` as long as too few rows have come to tell.
+    pub fn moves(&self) -> Option<bool> {
         self.filters.moves()
     }
 
@@ -113,9 +113,11 @@ impl ContactFinder {
         Step::Followed(Box::new(ContactHypothesis { fit, ..last }), Box::new(state), search)
     }
 
-    /// A first, rough contact in rows where something stands out.
+    /// A first, rough contact in rows where something stands out: of completed readings, and of those that were read, where noise is not taken for a
+    /// pattern.
     pub(super) fn glimpsed(&self, target: &Target) -> Option<ContactHypothesis> {
-        self.roughly_from(self.begun(target)?, target)
+        let found = self.roughly_from(self.begun(target)?, target)?;
+        (target.cost_of_nothing() - found.fit.cost >= policy::first_gain()).then_some(found)
     }
 
     /// What these contacts are in another frame, roughly.

@@ -54,6 +54,8 @@ pub(crate) struct ContactTracker {
     /// Time since a search changed the number of contacts (s), until one does not: rows from before were given for other contacts' motion.
     recounted_s: Option<f64>,
     doubt: Doubt,
+    /// Whole frames in a row that differed from those before.
+    restless: usize,
     /// Time for which no row has said more than that its readings are below the converter's range (s).
     silent_s: f64,
     /// What is followed over a longer time.
@@ -147,6 +149,7 @@ impl ContactTracker {
             is_glimpsed: false,
             recounted_s: None,
             doubt: Doubt::default(),
+            restless: 0,
             silent_s: 0.0,
             keys: KeyFrames::default(),
             is_of_key_frames: false,
@@ -195,6 +198,7 @@ impl ContactTracker {
     fn step_frame(&mut self, target: &Target) -> bool {
         self.before = self.association.clone();
         (self.rows, self.latest) = (None, None);
+        self.restless = if target.frames > 1 { 0 } else { self.restless + 1 };
         self.is_of_key_frames = false;
         let Some(last) = self.last.take() else {
             let search = self.finder.stands_out(target);
@@ -250,6 +254,9 @@ impl ContactTracker {
             (self.last, self.is_stale) = (caught_up, false);
         }
         self.recounted_s = (count(&self.last) != before).then_some(0.0);
+        if before > 0 && self.last.is_some() && self.recounted_s.is_some() {
+            self.doubt.recounted();
+        }
         self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(last, target)));
         if let Some(mut latest) = self.latest.take() {
             latest.change_model(expected_v.as_deref(), self.expected_v());
@@ -304,7 +311,7 @@ impl ContactTracker {
     /// Follows nothing for a time, and keeps the numbers of contacts.
     pub fn let_go(&mut self) {
         (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
-        self.doubt = Doubt::default();
+        (self.doubt, self.restless) = (Doubt::default(), 0);
         (self.keys, self.is_of_key_frames) = (KeyFrames::default(), false);
         (self.rows, self.recounted_s) = (None, None);
     }

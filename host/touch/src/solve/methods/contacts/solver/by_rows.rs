@@ -10,6 +10,8 @@ use crate::solve::methods::contacts::rows::{RowState, Step};
 use crate::solve::solver::Followed;
 use tactomo_physics::readings::Readings;
 
+/// Frames in a row that differ from those before, of what moves: what stands still is averaged after ten.
+const RESTLESS: usize = 16;
 /// Rows older than this say nothing to a search (s): all grounds of 32 electrodes are read within.
 const OLDEST_S: f64 = 0.06;
 
@@ -38,6 +40,9 @@ impl ContactTracker {
             latest.forget();
         }
         latest.add(rows, elapsed_s, self.expected_v());
+        if self.rows.as_ref().and_then(|rows| rows.moves()) == Some(false) {
+            self.restless = 0;
+        }
         let is_outdated = self.last.is_some() && self.is_provisional && self.finder.knows_unknowns();
         self.recounted_s = self.recounted_s.map(|time_s| time_s + elapsed_s);
         let is_renewed = self.recounted_s.is_some_and(|time_s| latest.is_whole(time_s));
@@ -56,16 +61,20 @@ impl ContactTracker {
     }
 
     /// The grounds whose rows tell most of what moves, so many of them; of what stands or has just come, all: no number of rows takes away what the
-    /// model of a reading is off by, and a new contact is seen by all. Of nothing, those that see a contact come. None where rows do not tell it.
+    /// model of a reading is off by, and a new contact is seen by all. Of nothing, those that see a contact come. None where rows do not tell it, as
+    /// where contacts are too many to be followed by few rows.
     pub fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
         match &self.last {
             _ if self.doubt.needs_whole() => None,
-            Some(last) if self.rows.as_ref().is_some_and(|rows| rows.moves()) => {
-                Some(self.finder.telling_grounds(&last.fit, count))
-            }
+            Some(last) if self.moves() => Some(self.finder.telling_grounds(&last.fit, count)),
             Some(_) => Some(self.finder.all_grounds()),
             None => Some(self.finder.watching_grounds()),
         }
+    }
+
+    /// Whether what is followed moves, as rows tell it once they have come for a while, and whole frames before.
+    fn moves(&self) -> bool {
+        self.rows.as_ref().and_then(|rows| rows.moves()).unwrap_or(self.restless >= RESTLESS)
     }
 
     /// The latest readings, as they would be for the contacts now; none while whole frames come.
@@ -86,10 +95,10 @@ impl ContactTracker {
         };
         let Some(last) = self.last.take() else {
             self.rows = None;
-            let search = self.finder.stands_out(&target);
             // A rough contact is better than none for the time of a search.
-            let begun = search.then(|| self.taken_over(&target).or_else(|| self.finder.glimpsed(&target)));
-            if let Some(begun) = begun.flatten() {
+            let glimpsed = self.finder.glimpsed(&target);
+            let search = glimpsed.is_some();
+            if let Some(begun) = glimpsed.map(|glimpsed| self.taken_over(&target).unwrap_or(glimpsed)) {
                 self.rows = Some(Box::new(RowState::new(&begun, &target)));
                 self.is_provisional = target.is_provisional();
                 (self.last, self.is_stale, self.is_glimpsed) = (Some(begun), true, true);
