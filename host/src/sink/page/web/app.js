@@ -93,16 +93,23 @@ function draw(now) {
 function show(update, now) {
   shown = update;
   parts.history.take(update, now);
-  if (parts.told.take(update, now)) parts.table.show(update);
+  const isTold = parts.told.take(update, now);
   parts.picture.show(update, now);
   parts.readings.show(update, now);
   parts.strip.draw(now);
   parts.pointer.show(update, now);
-  parts.totals.show(update, now);
+  if (isTold) tell(update);
   vibration.draw(now);
   verdict.show(update, parts.method.explanation, now);
   dataset.sequence = String(update.sequence);
   dataset.updates = String(Number(dataset.updates ?? 0) + 1);
+}
+
+// What is written of it.
+function tell(update) {
+  parts.table.show(update);
+  parts.totals.show(update);
+  parts.readings.tell();
 }
 
 function update(message) {

@@ -21,6 +21,8 @@ function scanned({ choice, grounds, others }, electrodes, rate) {
 
 /** Shows the board and asks it for other settings through `send`. */
 export class Board {
+  listed;
+
   constructor(setup, send) {
     this.setup = setup;
     this.form = document.getElementById("settings");
@@ -70,8 +72,15 @@ export class Board {
       ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes`],
       ["Images", `${count(setup.nodes_m.length)} nodes`],
     ];
-    document.getElementById("details").replaceChildren(...rows.flatMap(rowOf));
+    this.#list(rows);
     if (hello) this.#showSettings(hello);
+  }
+
+  #list(rows) {
+    const text = JSON.stringify(rows);
+    if (text === this.listed) return;
+    this.listed = text;
+    document.getElementById("details").replaceChildren(...rows.flatMap(rowOf));
   }
 
   // Only when the board changed them: what a person is typing stays.

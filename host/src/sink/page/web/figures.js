@@ -1,6 +1,7 @@
 // The figures beside the picture, each by its name.
 
 import { count, fixed } from "./units.js";
+import { write } from "./words.js";
 
 const microseconds = (us) => (us < 1000 ? [fixed(us, us < 100 ? 1 : 0), "µs"] : [fixed(us / 1000, us < 1e5 ? 1 : 0), "ms"]);
 
@@ -41,7 +42,7 @@ export class Figures {
   /** Shows the statistics of a status message. */
   show({ statistics }) {
     for (const { cell, value, unit, read, warns } of this.cells) {
-      [value.textContent, unit.textContent] = read(statistics);
+      read(statistics).forEach((words, i) => write(i ? unit : value, words));
       cell.classList.toggle("warning", Boolean(warns?.(statistics)));
     }
     const { frames, frames_per_s: rate, dropped, corrupt, skipped, age_us: age } = statistics;

@@ -2,7 +2,7 @@
 
 import { drawOutline, middleOf } from "./bars.js";
 import { colourMaps } from "./colours.js";
-import { drawFrame } from "./frame.js";
+import { drawFrame, FrameCanvas } from "./frame.js";
 import { Layout, sizeCanvas } from "./layout.js";
 import { drawLabels, drawMark, drawTrail } from "./marks.js";
 import { drawTarget } from "./target.js";
@@ -12,6 +12,7 @@ export class FlatView {
   constructor(view) {
     this.view = view;
     this.canvas = document.getElementById("image");
+    this.frame = new FrameCanvas();
     this.marks = document.getElementById("marks");
     // A pixel of the field is one of the canvas: the browser makes it as large as the picture, smoothly, and with the graphics processor where there is one.
     [this.canvas.width, this.canvas.height] = [view.field.width, view.field.height];
@@ -28,6 +29,7 @@ export class FlatView {
     const { style } = this.canvas;
     [style.left, style.top] = [`${left}px`, `${top}px`];
     [style.width, style.height] = [`${this.layout.width}px`, `${this.layout.height}px`];
+    this.frame.layOut(width, height);
     this.over = sizeCanvas(this.marks, width, height);
   }
 
@@ -35,8 +37,9 @@ export class FlatView {
   draw(now) {
     this.#drawHeat();
     const { view, over, layout } = this;
+    const { theme, scale, marked, excluded } = view;
+    this.frame.draw([theme, scale.max, marked, excluded], (context) => drawFrame(context, view.setup, layout, view));
     over.clearRect(0, 0, layout.boxWidth, layout.boxHeight);
-    drawFrame(over, view.setup, layout, view);
     for (const [id, way] of view.trails.all(now)) {
       const points = way.map(({ xM, yM, ...rest }) => ({ ...rest, x: layout.x(xM), y: layout.y(yM) }));
       drawTrail(over, id, points, view.colours);

@@ -96,6 +96,19 @@ function placeFor(width, { x, y, radius }, taken, box) {
   return best;
 }
 
+// Widths of texts in the font of labels (pixels): each is drawn many times.
+const MOST_WIDTHS = 1000;
+const widths = new Map();
+
+function widthOf(context, text) {
+  const known = widths.get(text);
+  if (known !== undefined) return known;
+  if (widths.size >= MOST_WIDTHS) widths.clear();
+  const { width } = context.measureText(text);
+  widths.set(text, width);
+  return width;
+}
+
 /** Labels of contacts: `spots` with the contact, the `text` of its label, its pixels `x`, `y` and its `radius` there; `box` that they stay in. */
 export function drawLabels(context, spots, colours, box) {
   context.font = PILL.font;
@@ -103,8 +116,8 @@ export function drawLabels(context, spots, colours, box) {
   const taken = spots.map(({ x, y, radius }) => ({ x: x - radius, y: y - radius, width: 2 * radius, height: 2 * radius }));
   for (const spot of spots) {
     const { contact, text } = spot;
-    const badge = contact.id ? Math.max(2 * PILL.badge, context.measureText(String(contact.id)).width + 9) : 0;
-    const pill = placeFor(badge + context.measureText(text).width + 16, spot, taken, box);
+    const badge = contact.id ? Math.max(2 * PILL.badge, widthOf(context, String(contact.id)) + 9) : 0;
+    const pill = placeFor(badge + widthOf(context, text) + 16, spot, taken, box);
     taken.push(pill);
     drawPill(context, pill, contact, text, badge, colours);
   }
