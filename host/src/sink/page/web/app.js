@@ -144,6 +144,9 @@ function look(name) {
   document.getElementById("view-space").setAttribute("aria-pressed", String(name === "space"));
 }
 
+// A phone may have none.
+document.getElementById("full").hidden = !document.fullscreenEnabled;
+
 function fullScreen() {
   if (document.fullscreenElement) document.exitFullscreen();
   else document.getElementById("picture").requestFullscreen?.().catch(() => {});
@@ -172,6 +175,7 @@ listenForActions({
     parts?.calibrate.toggle();
   },
   full: fullScreen,
+  leave: fullScreen,
   keys: () => document.getElementById("help").showModal(),
   view: () => look(parts?.picture.looking === "flat" ? "space" : "flat"),
   "view-flat": () => look("flat"),

@@ -5,7 +5,7 @@ import { colourMaps } from "./colours.js";
 import { drawFrame, FrameCanvas } from "./frame.js";
 import { Layout, sizeCanvas } from "./layout.js";
 import { drawLabels, drawMark, drawTrail } from "./marks.js";
-import { drawTarget } from "./target.js";
+import { TARGET_RADIUS, drawTarget } from "./target.js";
 
 /** Draws the heat of `view.field` on the scale `view.scale` in the colours of `view.theme`. */
 export class FlatView {
@@ -54,8 +54,9 @@ export class FlatView {
       spots.push({ contact: shape, text: view.labelOf(shape), x: layout.x(xM), y: layout.y(yM), radius: (shape.widthM * layout.perM) / 2 });
     }
     for (const { contact, x, y } of spots.filter((spot) => !spot.contact.kind)) drawMark(over, contact, [x, y], layout.perM, view.colours);
-    drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight });
-    if (view.target) drawTarget(over, view.target, [layout.x(view.target.at_m[0]), layout.y(view.target.at_m[1])], view.colours);
+    const target = view.target && { x: layout.x(view.target.at_m[0]), y: layout.y(view.target.at_m[1]), radius: TARGET_RADIUS };
+    drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight }, target ? [target] : []);
+    if (target) drawTarget(over, view.target, [target.x, target.y], view.colours);
     this.#drawFingers();
   }
 

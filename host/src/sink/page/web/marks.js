@@ -109,11 +109,11 @@ function widthOf(context, text) {
   return width;
 }
 
-/** Labels of contacts: `spots` with the contact, the `text` of its label, its pixels `x`, `y` and its `radius` there; `box` that they stay in. */
-export function drawLabels(context, spots, colours, box) {
+/** Labels of contacts: `spots` with the contact, the `text` of its label, its pixels `x`, `y` and its `radius` there; `box` that they stay in; `others` are circles `{x, y, radius}` that they leave free. */
+export function drawLabels(context, spots, colours, box, others = []) {
   context.font = PILL.font;
   context.textBaseline = "middle";
-  const taken = spots.map(({ x, y, radius }) => ({ x: x - radius, y: y - radius, width: 2 * radius, height: 2 * radius }));
+  const taken = [...spots, ...others].map(({ x, y, radius }) => ({ x: x - radius, y: y - radius, width: 2 * radius, height: 2 * radius }));
   for (const spot of spots) {
     const { contact, text } = spot;
     const badge = contact.id ? Math.max(2 * PILL.badge, widthOf(context, String(contact.id)) + 9) : 0;
