@@ -99,7 +99,8 @@ pub const STATES: [State; 18] = [
     state("notice", "What the program has to say stands in one line on top.", |script| {
         script.solution(sure(vec![contact(1, [9.0, -6.0], 2.4e-4)]));
         script.set(|snapshot| {
-            snapshot.refused = Some("Not re-zeroed: something presses. Let go of the sensor, and try again.".to_owned())
+            snapshot.refused.control =
+                Some("Not re-zeroed: something presses. Let go of the sensor, and try again.".to_owned())
         });
     }),
     state("lost", "The link is lost: the last answer is pale, and the page says that it tries again.", |script| {

@@ -120,6 +120,7 @@ function update(message) {
 function lost(reason) {
   waiting = null;
   rezeroButton.lost();
+  notice.lost();
   showState("unreachable", reason || "The program does not answer; trying again");
   verdict.hold();
 }

@@ -17,7 +17,7 @@ export class Notice {
 
   /** Shows that of a status message. */
   show({ refused, baseline, calibration, recording, solver, playing }) {
-    const method = solver?.refused ? `This solver cannot be used: ${solver.refused}` : null;
+    const method = solver?.refused ? `This method cannot be used: ${solver.refused}` : null;
     const damage = playing.damage ? `This recording is damaged: ${playing.damage}` : null;
     const warning = damage ?? baseline ?? calibration;
     const told = refused ?? method ?? warning ?? (recording ? `Recording to ${recording}` : "");
@@ -27,4 +27,7 @@ export class Notice {
     if (told !== this.read) this.read = "";
     this.box.hidden = !told || told === this.read;
   }
+
+  /** The program is gone: what it had to say may be so no more. */
+  lost() { this.box.hidden = true; }
 }
