@@ -70,7 +70,7 @@ export class Board {
       ["Converter", hello ? `${hello.adc_bits} bits of ${fixed(hello.full_scale_v, 2)} V; drive ${fixed(hello.drive_v, 2)} V` : ""],
       ["Scan", hello ? scanned(scan, setup.electrodes.length, statistics.frames_per_s) : ""],
       ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes`],
-      ["Images", `${count(setup.nodes_m.length)} nodes`],
+      ["Images", `${count(setup.nodes_m.length)} points`],
     ];
     this.#list(rows);
     if (hello) this.#showSettings(hello);

@@ -29,8 +29,8 @@ const isSearched = ({ choice }) => choice?.what === "searching";
 
 /** What stands in place of contacts where there are none. */
 export function inPlaceOfContacts(update) {
-  if (isSearched(update)) return "What touches is being searched.";
-  return update.image.length ? "The image has no single contacts." : "Nothing touches.";
+  if (isSearched(update)) return "Looking for what touches.";
+  return update.image.length ? "The image shows no single contacts." : "Nothing touches.";
 }
 
 // What a passer-by calls it.
@@ -91,9 +91,9 @@ export class Verdict {
       this.shown = now;
       write(this.what, words);
       write(this.sure, sureOf(update) || "\u00a0");
-      const left = residual === null ? [] : [`residual ${fixed(residual, 1)} × noise`];
+      const left = residual === null ? [] : [`unexplained ${fixed(residual, 1)} × noise`];
       write(this.residual, [...left, ageText(ageS)].filter(Boolean).join(" · "));
-      // The residual stands beside it.
+      // What it leaves unexplained stands beside it.
       const why = choice ? choice.why.replace(/^residual [\d.]+ x noise(; )?/, "") : explanation;
       write(this.why, why);
       this.why.title = why;
