@@ -40,7 +40,7 @@ const fn state(name: &'static str, says: &'static str, set: fn(&Script)) -> Stat
 pub const STATES: [State; 18] = [
     state("waiting", "No board yet. The page says what it waits for, and what to check.", |script| {
         script.set(|snapshot| {
-            (snapshot.link, snapshot.answer, snapshot.hello) = (LinkState::Searching, None, None);
+            *snapshot = Snapshot { link: LinkState::Searching, playing: Playing::Board, ..Snapshot::default() };
         });
     }),
     state("nothing", "Frames come, and nothing touches.", |script| script.solution(Solution::default())),
