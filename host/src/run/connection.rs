@@ -26,8 +26,6 @@ pub(super) struct Connection {
     counted: u64,
     /// Whether no frame has come since a jump.
     pub landing: bool,
-    /// What the board has refused, as it is shown.
-    pub refusal: Option<session::Refusal>,
 }
 
 impl Connection {
@@ -42,7 +40,6 @@ impl Connection {
             junk: None,
             counted: 0,
             landing: false,
-            refusal: None,
         }
     }
 

@@ -29,6 +29,7 @@ pub mod options;
 mod order;
 mod reader;
 mod recordings;
+mod refusals;
 mod scanned;
 pub mod scanning;
 mod searcher;
@@ -41,6 +42,7 @@ pub use self::frame::{Arrival, Frame, NewestReadings};
 pub use self::maker::SolverState;
 pub use self::order::Order;
 pub use self::reader::run;
+pub use self::refusals::Refusals;
 pub use self::scanned::Scan;
 
 use std::path::PathBuf;
@@ -82,8 +84,8 @@ pub struct Snapshot {
     pub calibrated: Option<Arc<Detector>>,
     /// What was learned of the detector while it was used, if that is in use.
     pub learned: Option<LearnedInUse>,
-    /// What was asked for last and cannot be, for the person who asked.
-    pub refused: Option<String>,
+    /// What was asked for and cannot be, for the person who asked.
+    pub refused: Refusals,
     /// What to know of the baseline, as one sentence for a person; none if all is well.
     pub baseline: Option<String>,
     /// What to know of the detector's calibration, as one sentence for a person; none if all is well or there is none.

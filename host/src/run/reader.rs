@@ -293,7 +293,8 @@ impl Reader {
             }
             self.inbox.put(Event::Conversions(hello.settings.conversions()));
             let noise_v = measured.adc.deviation_v();
-            let other_board = identity::other_board(&measured, &hello);
+            let calibrated = self.notice.calibrated();
+            let other_board = identity::other_board(calibrated.as_deref().unwrap_or(&measured), &hello);
             // Settings change its Hello, and not what it is.
             let is_new = known.is_none_or(|board| identity::identity(&board.hello) != identity::identity(&hello));
             if let Some(notice) = other_board.as_ref().filter(|_| is_new) {
@@ -375,7 +376,7 @@ impl Reader {
                     if let (None, Control::Scene(scene)) = (&refused, control) {
                         self.inbox.put(Event::Pointer(self.options.pointer || scene == SceneName::Pointer));
                     }
-                    self.notice.change(|snapshot| snapshot.refused = refused.map(|error| with_causes(&error)));
+                    self.notice.change(|snapshot| snapshot.refused.control = refused.map(|error| with_causes(&error)));
                 }
             }
         }
@@ -388,13 +389,12 @@ impl Reader {
         } else if connection.junk.is_some() {
             self.enter(LinkState::Streaming);
         }
-        let refusal = connection.session.refusal();
-        if refusal != connection.refusal {
-            self.notice.change(|snapshot| snapshot.refused = refusal.map(|refusal| refusal.to_string()));
-            connection.refusal = refusal;
-        }
+        // Of this link: what another refused is past.
+        let refusal = connection.session.refusal().map(|refusal| refusal.to_string());
         let (playing, scan) = (link.playing(), self.scanned.scan());
-        self.notice.change(|snapshot| (snapshot.playing, snapshot.scan) = (playing, scan));
+        self.notice.change(|snapshot| {
+            (snapshot.playing, snapshot.scan, snapshot.refused.settings) = (playing, scan, refusal);
+        });
         self.recordings.found(self.notice.calibrated());
         if !self.follows {
             self.notice.keep_fresh();

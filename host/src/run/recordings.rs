@@ -66,7 +66,7 @@ impl Recordings {
         let line = with_causes(&error);
         tracing::error!("{line}");
         let refused = Some(line);
-        self.notice.change(|snapshot| snapshot.refused = refused);
+        self.notice.change(|snapshot| snapshot.refused.recording = refused);
         self.show();
         self.lost.get_or_insert(error);
     }
@@ -81,14 +81,14 @@ impl Recordings {
     /// Sets a mark.
     pub fn mark(&mut self, text: String) {
         let refused = match &mut self.recorder {
-            None => Some("a mark is set in a recording: begin one first (key R)".to_owned()),
+            None => Some("A mark is set in a recording: begin one first (key R).".to_owned()),
             Some(recorder) => {
                 self.marks += 1;
                 recorder.note(Note::Mark { text }, Instant::now()).err().map(|error| with_causes(&error))
             }
         };
         let marks = self.marks;
-        self.notice.change(|snapshot| (snapshot.refused, snapshot.marks) = (refused, marks));
+        self.notice.change(|snapshot| (snapshot.refused.recording, snapshot.marks) = (refused, marks));
     }
 
     /// Sets down what a calibration has found, in this recording and those to come.
@@ -109,7 +109,7 @@ impl Recordings {
         let (None, Some(begin)) = (&self.recorder, &mut self.begin) else { return };
         let begun = begin(hello, self.found.as_deref());
         let refused = begun.as_ref().err().map(|error| with_causes(error));
-        self.notice.change(|snapshot| snapshot.refused = refused);
+        self.notice.change(|snapshot| snapshot.refused.recording = refused);
         (self.recorder, self.marks) = (begun.ok(), 0);
         self.show();
     }
@@ -118,7 +118,7 @@ impl Recordings {
     pub fn end(&mut self) {
         let Some(recorder) = self.recorder.take() else { return };
         self.closing.push(recorder.close());
-        self.notice.change(|snapshot| snapshot.refused = None);
+        self.notice.change(|snapshot| snapshot.refused.recording = None);
         self.show();
     }
 
@@ -138,5 +138,42 @@ impl Recordings {
         let path: Option<PathBuf> = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
         let marks = self.marks;
         self.notice.change(|snapshot| (snapshot.recording, snapshot.marks) = (path, marks));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tactomo_board::record::Header;
+    use tokio::sync::watch;
+
+    use super::super::Snapshot;
+    use super::*;
+
+    #[test]
+    fn a_recording_that_cannot_begin_is_told_until_one_begins_whatever_else_is_granted() {
+        let folder = std::env::temp_dir().join(format!("tactomo-recordings-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder for temporary files");
+        let mut names = ["missing/touch", "touch"].into_iter();
+        let path = folder.clone();
+        let begin = move |hello: &Hello, _: Option<&Detector>| {
+            let name = path.join(names.next().unwrap_or_default()).with_extension("tactomo");
+            Recorder::create_with_hello(&name, &Header::default(), hello)
+        };
+        let mut options = RunOptions { begin_recording: Some(Box::new(begin)), ..RunOptions::new(Detector::default()) };
+        let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
+        let notice = Arc::new(NoticeBoard::new(snapshots));
+        let mut recordings = Recordings::of(&mut options, Arc::clone(&notice));
+        let refused = |change: fn(&mut Snapshot)| {
+            notice.publish(change);
+            shown.borrow().refused.recording.clone()
+        };
+        recordings.begin(&Hello::example(16));
+        assert!(refused(|_| ()).is_some_and(|words| words.contains("missing")));
+        // What is asked of the simulated board, as a press, is granted: that is another matter.
+        assert!(refused(|snapshot| snapshot.refused.control = None).is_some());
+        recordings.begin(&Hello::example(16));
+        assert_eq!(refused(|_| ()), None);
+        recordings.finish().expect("a folder that can be written to");
+        std::fs::remove_dir_all(&folder).expect("its own folder");
     }
 }

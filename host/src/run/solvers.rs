@@ -63,7 +63,8 @@ impl Solvers {
         // Wires that it knows to be exchanged are none any more.
         detector.watch = ElectrodeWatch::new(&found);
         detector.detector = Arc::clone(&found);
-        self.notice.change(|snapshot| snapshot.calibrated = Some(Arc::clone(&found)));
+        // It was found on this board: whatever was to be known of the calibration before is past.
+        self.notice.change(|snapshot| (snapshot.calibrated, snapshot.calibration) = (Some(Arc::clone(&found)), None));
         self.calibrated = Some(found);
         self.order_again();
     }
@@ -233,5 +234,17 @@ mod tests {
         solvers.begin_with(Arc::new(Detector { drive_v: 1.0, ..Detector::default() }));
         let detector = &solvers.detector().unwrap().detector;
         assert_eq!((&*detector.name, detector.drive_v), ("found", 1.0), "as the board measures it");
+    }
+
+    #[test]
+    fn what_is_to_be_known_of_a_calibration_goes_when_another_is_found_on_this_board() {
+        let (mut solvers, _inbox, shown) = solvers();
+        solvers.begin_with(Arc::default());
+        let warn = |snapshot: &mut Snapshot| snapshot.calibration = Some("Calibrated on another board.".to_owned());
+        solvers.notice.publish(warn);
+        assert!(shown.borrow().calibration.is_some());
+        solvers.use_calibrated(Arc::default());
+        let Snapshot { calibration, calibrated, .. } = &**shown.borrow();
+        assert_eq!((calibration, calibrated.is_some()), (&None, true));
     }
 }

@@ -193,12 +193,20 @@ impl Page {
 
     /// Makes the page this large (CSS pixels).
     pub async fn resize(&self, width: u32, height: u32) -> Result<()> {
-        // The window has a border that the page does not; asked once, it is known.
-        self.client.set_window_size(width, height).await?;
-        let inner = self.client.execute("return [innerWidth, innerHeight]", Vec::new()).await?;
-        let border = |axis: usize, wanted: u32| Some(wanted.saturating_sub(u32::try_from(inner[axis].as_u64()?).ok()?));
-        let [across, down] = [border(0, width), border(1, height)].map(Option::unwrap_or_default);
-        Ok(self.client.set_window_size(width + across, height + down).await?)
+        // The window has a border that the page does not, and the page hears of a new size a moment later.
+        let script = "return [innerWidth, innerHeight, outerWidth - innerWidth, outerHeight - innerHeight]";
+        let begin = Instant::now();
+        loop {
+            let size = self.run(script).await?;
+            let [inner_width, inner_height, across, down] = [0, 1, 2, 3]
+                .map(|i| size[i].as_u64().and_then(|pixels| u32::try_from(pixels).ok()).unwrap_or_default());
+            if [inner_width, inner_height] == [width, height] {
+                return Ok(());
+            }
+            ensure!(begin.elapsed() < PATIENCE, "the page never is {width} x {height}, but {size}");
+            self.client.set_window_size(width + across, height + down).await?;
+            tokio::time::sleep(LOOK_EVERY).await;
+        }
     }
 }
 

@@ -8,6 +8,7 @@ mod colours;
 mod controls;
 mod gallery;
 mod live;
+mod notices;
 mod picture;
 mod raw;
 mod script;

@@ -6,6 +6,7 @@ use tactomo::solve::{Alternative, FoundContact, Solution};
 
 use crate::script::Script;
 use crate::stage::{Stage, in_front_of};
+use crate::states::STATES;
 
 fn contact(id: u32, [x_mm, y_mm]: [f64; 2], apparent_s: f64) -> FoundContact {
     let flat = FoundContact::flat(x_mm * 1e-3, y_mm * 1e-3, 3.0 * apparent_s);
@@ -86,6 +87,66 @@ fn a_notice_that_was_read_comes_again_only_with_other_words() -> Result<()> {
         ensure!(stage.browser.run(hidden).await? == Value::Bool(true));
         tell("Touched for long.");
         stage.browser.shows(hidden, |hidden| *hidden == Value::Bool(false)).await?;
+        Ok(())
+    })
+}
+
+/// Waits until these elements are within the window and within the box of the element around each that cuts it off.
+async fn in_sight(stage: &Stage<Script>, ids: &[&str]) -> Result<()> {
+    let script = format!(
+        "return {ids:?}.filter((id) => {{
+            const at = document.getElementById(id);
+            const {{ left, top, right, bottom, width }} = at.getBoundingClientRect();
+            const card = at.closest('.card').getBoundingClientRect();
+            return !(width > 0 && left >= card.left && right <= card.right && top >= card.top && bottom <= Math.min(card.bottom, innerHeight) && right <= innerWidth);
+        }})"
+    );
+    stage.browser.shows(&script, |hidden| hidden.as_array().is_some_and(Vec::is_empty)).await.map(drop)
+}
+
+#[test]
+fn on_a_phone_that_lies_chart_and_calibration_need_no_scrolling() -> Result<()> {
+    in_front_of(Script::start, async |stage| {
+        stage.browser.resize(844, 390).await?;
+        for (name, ids) in [
+            ("several", &["strip", "strip-60", "save-history", "rescale"][..]),
+            ("calibrating", &["calibrate-now", "calibrate-error", "calibrate-finish"]),
+            (
+                "calibrated",
+                &["calibrate-now", "calibrate-compared", "calibrate-more", "calibrate-save", "calibrate-use"],
+            ),
+            ("kept", &["calibrate-now", "calibrate-compared", "calibrate-note", "calibrate-more"]),
+        ] {
+            let state = STATES.iter().find(|state| state.name == name).context("the state")?;
+            state.enter(&stage.behind, &stage.browser).await?;
+            in_sight(stage, ids).await.context(name)?;
+        }
+        Ok(())
+    })
+}
+
+#[test]
+fn no_label_lies_over_the_ring_to_press_at() -> Result<()> {
+    // Between the ring and its dot nothing is drawn: how much is there, and whether there is a ring.
+    let script = "const target = JSON.parse(document.documentElement.dataset.targetMm ?? 'null');
+        if (!target) return [-1, 0];
+        const [canvas, image] = ['marks', 'image'].map((id) => document.getElementById(id));
+        const ratio = canvas.width / canvas.clientWidth;
+        const at = [image.offsetLeft + (target[0] / 60 + 0.5) * image.clientWidth, image.offsetTop + (0.5 - target[1] / 60) * image.clientHeight];
+        const most = (radius) => Math.max(...Array.from({ length: 32 }, (_, i) => canvas.getContext('2d').getImageData(
+          ratio * (at[0] + radius * Math.cos(i * Math.PI / 16)), ratio * (at[1] + radius * Math.sin(i * Math.PI / 16)), 1, 1).data[3]));
+        return [most(8), most(17)]";
+    in_front_of(Script::start, async |stage| {
+        let state = STATES.iter().find(|state| state.name == "calibrating").context("the state")?;
+        state.enter(&stage.behind, &stage.browser).await?;
+        for [width, height] in [[844, 390], [390, 844], [1280, 800]] {
+            stage.browser.resize(width, height).await?;
+            stage
+                .browser
+                .shows(script, |shown| shown[0] == 0 && shown[1] == 255)
+                .await
+                .with_context(|| format!("{width} x {height}"))?;
+        }
         Ok(())
     })
 }

@@ -40,7 +40,7 @@ const fn state(name: &'static str, says: &'static str, set: fn(&Script)) -> Stat
 pub const STATES: [State; 18] = [
     state("waiting", "No board yet. The page says what it waits for, and what to check.", |script| {
         script.set(|snapshot| {
-            (snapshot.link, snapshot.answer, snapshot.hello) = (LinkState::Searching, None, None);
+            *snapshot = Snapshot { link: LinkState::Searching, playing: Playing::Board, ..Snapshot::default() };
         });
     }),
     state("nothing", "Frames come, and nothing touches.", |script| script.solution(Solution::default())),
@@ -99,7 +99,8 @@ pub const STATES: [State; 18] = [
     state("notice", "What the program has to say stands in one line on top.", |script| {
         script.solution(sure(vec![contact(1, [9.0, -6.0], 2.4e-4)]));
         script.set(|snapshot| {
-            snapshot.refused = Some("Not re-zeroed: something presses. Let go of the sensor, and try again.".to_owned())
+            snapshot.refused.control =
+                Some("Not re-zeroed: something presses. Let go of the sensor, and try again.".to_owned())
         });
     }),
     state("lost", "The link is lost: the last answer is pale, and the page says that it tries again.", |script| {
@@ -118,12 +119,12 @@ pub const STATES: [State; 18] = [
             script.set(|snapshot| snapshot.calibrating = Some(Arc::new(calibrating())));
         },
     ),
-    state("calibrated", "Calibrated: better on presses that were not used, so it is recommended.", |script| {
+    state("calibrated", "Calibrated: better on presses that were set aside, so it is recommended.", |script| {
         script.set(|snapshot| snapshot.calibrating = Some(Arc::new(calibrated())));
     }),
     state(
         "kept",
-        "Not better on presses that were not used: the page says to keep the present one, and why.",
+        "Not better on presses that were set aside: the page says to keep the present one, and why.",
         |script| {
             script.set(|snapshot| snapshot.calibrating = Some(Arc::new(kept())));
         },
@@ -237,7 +238,7 @@ fn calibrated() -> Calibrating {
 }
 
 fn kept() -> Calibrating {
-    let why = "Presses that were not used fit what was found worse than what is in use. To do better: press harder now and then: \
+    let why = "The new calibration explains presses that were set aside worse than the one in use. To do better: press harder now and then: \
                hardly a press was firm.";
     let compared = Compared { presses: 24, residuals: [1.0, 1.4], place_errors_m: [0.21e-3, 0.26e-3] };
     let errors_m = vec![0.92e-3, 0.61e-3, 0.38e-3, 0.28e-3, 0.26e-3];

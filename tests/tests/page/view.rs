@@ -105,7 +105,7 @@ fn a_shape_is_named_outlined_and_listed_without_the_contacts_beside_it() -> Resu
 fn while_a_touch_is_searched_nothing_says_that_nothing_touches() -> Result<()> {
     in_front_of(Script::start, async |stage| {
         for (what, headline, table) in [
-            ("searching", "Something touches", "What touches is being searched."),
+            ("searching", "Something touches", "Looking for what touches."),
             ("nothing", "Nothing touches", "Nothing touches."),
         ] {
             let choice = Some(Choice { what: what.to_owned(), why: "residual 9.0 x noise".to_owned() });
@@ -376,7 +376,8 @@ fn what_the_program_says_is_shown_in_plain_words() -> Result<()> {
         stage.browser.says("warnings", "electrode 3 left out").await?;
         stage.browser.says("notice-text", sentence).await?;
         let residual = "return document.getElementById('residual').textContent";
-        let is_told = |shown: &Value| shown.as_str().is_some_and(|s| s.starts_with("residual 1.0 × noise · answer "));
+        let is_told =
+            |shown: &Value| shown.as_str().is_some_and(|s| s.starts_with("unexplained 1.0 × noise · answer "));
         stage.browser.shows(residual, is_told).await?;
         let another = "my-skin was calibrated on another board.";
         stage.behind.set(|snapshot| (snapshot.baseline, snapshot.calibration) = (None, Some(another.to_owned())));

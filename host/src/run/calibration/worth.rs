@@ -54,19 +54,19 @@ pub(super) fn why_keep(found: &Rub, compared: Option<Compared>, least_m: f64) ->
         return None;
     }
     let why = match compared {
-        None => "There are too few presses to test what was found on some that it was not made from".to_owned(),
+        None => "There are too few presses to set some aside for a test".to_owned(),
         Some(_) if is_better => format!(
             "The expected error of places has risen from {:.2} to {:.2} mm while you pressed",
             1e3 * least_m,
             1e3 * error_m
         ),
         Some(Compared { residuals: [before, after], .. }) if after > (1.0 + HeldOut::CHANCE) * before => {
-            "Presses that were not used fit what was found worse than what is in use".to_owned()
+            "The new calibration explains presses that were set aside worse than the one in use".to_owned()
         }
         Some(Compared { place_errors_m: [before_m, after_m], .. }) => format!(
-            "What was found tells places no better: {:.2} mm now, {:.2} mm with it",
-            1e3 * before_m,
-            1e3 * after_m
+            "The new calibration tells places no better: to {:.2} mm, the one in use to {:.2} mm",
+            1e3 * after_m,
+            1e3 * before_m
         ),
     };
     let missing: Vec<_> = found.missing.iter().take(TOLD).map(ToString::to_string).collect();
@@ -110,11 +110,11 @@ pub(super) mod tests {
         let no_better = found([0.68e-3, 0.75e-3], [3.0, 2.9], None, &[Missing::Place([-0.02, 0.02])]);
         let no_better = why(&no_better, None, 0.75e-3);
         assert!(
-            no_better.contains("0.68 mm now, 0.75 mm with it") && no_better.contains("(-20, 20) mm"),
+            no_better.contains("to 0.75 mm, the one in use to 0.68 mm") && no_better.contains("(-20, 20) mm"),
             "{no_better}"
         );
         let worse = why(&found([0.9e-3, 0.2e-3], [1.0, 1.2], None, &[]), None, 0.25e-3);
-        assert!(worse.contains("worse than what is in use"), "{worse}");
+        assert!(worse.contains("worse than the one in use"), "{worse}");
         let none = Rub { held_out: None, ..found([0.9e-3, 0.2e-3], [3.0, 1.0], None, &[]) };
         assert!(why(&none, None, 0.3e-3).contains("too few presses"));
     }

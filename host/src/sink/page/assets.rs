@@ -61,6 +61,7 @@ const ASSETS: &[Asset] = &[
     ("/units.js", SCRIPT, include_str!("web/units.js")),
     ("/verdict.js", SCRIPT, include_str!("web/verdict.js")),
     ("/vibration.js", SCRIPT, include_str!("web/vibration.js")),
+    ("/words.js", SCRIPT, include_str!("web/words.js")),
 ];
 
 /// Answer to a request for `path`.

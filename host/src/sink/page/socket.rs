@@ -8,6 +8,7 @@ use std::time::Duration;
 use futures_util::StreamExt;
 use tactomo_board::link::Control;
 use tactomo_touch::changes::Changes;
+use tactomo_touch::solve::Total;
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
 use tokio_tungstenite::tungstenite::Message;
@@ -16,7 +17,7 @@ use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 
 use super::messages::PageMessage;
 use super::update::{self, Shown};
-use super::{Shared, wire};
+use super::{PageSetup, Shared, wire};
 use crate::run::{Request, Snapshot};
 use crate::sink::web::{Beat, Pulse, WebSocket};
 
@@ -152,14 +153,14 @@ impl<'a> Page<'a> {
         let answer = snapshot.answer.as_deref()?;
         let (course_v, points) = snapshot.course.points_since(self.course_points);
         self.course_points = points;
-        let detector = &self.shared.setup.detector;
+        let PageSetup { detector, mesh, .. } = &self.shared.setup;
         let shown = Shown {
             answer,
             contacts: &self.changes.take(&answer.solution.contacts).contacts,
             frames: snapshot.statistics.frames,
             course_v: &course_v,
             detector,
-            mesh: &self.shared.setup.mesh,
+            total: Total::of(&answer.solution, Some(mesh)),
         };
         Some(Message::binary(update::update(&shown)))
     }

@@ -17,7 +17,6 @@ use std::time::Instant;
 
 use serde::Serialize;
 use tactomo_physics::detector::Detector;
-use tactomo_physics::forward::ImageMesh;
 use tactomo_touch::pointer::PointerState;
 use tactomo_touch::schema::{CONTACT_COLUMNS, SHAPE_COLUMNS, contact_values, shape_values};
 use tactomo_touch::solve::{ElectrodeFault, Flags, FoundContact, Total};
@@ -34,8 +33,8 @@ pub(super) struct Shown<'a> {
     /// Points of the [course](crate::run::course) of the readings (V) since the update before, 4 ms each.
     pub course_v: &'a [f32],
     pub detector: &'a Detector,
-    /// The mesh of images.
-    pub mesh: &'a ImageMesh,
+    /// What all that touches comes to, if anything does.
+    pub total: Option<Total>,
 }
 
 /// What has a name and is read from what is shown.
@@ -80,10 +79,10 @@ const NUMBERS: [Named<f32>; 12] = [
         known(shown.answer.solution.alternative.map(|alternative| alternative.contacts as f64))
     }),
     named("age_s", |shown| known(shown.answer.frame.arrived.age(Instant::now()).map(|age| age.as_secs_f64()))),
-    named("total_force_n", |shown| known(total(shown).and_then(|total| total.force_n))),
-    named("total_s", |shown| known(total(shown).map(|total| total.conductance_s))),
-    named("centre_x_m", |shown| known(total(shown).map(|total| shown.detector.map_m(total.centre_m)[0]))),
-    named("centre_y_m", |shown| known(total(shown).map(|total| shown.detector.map_m(total.centre_m)[1]))),
+    named("total_force_n", |shown| known(shown.total.and_then(|total| total.force_n))),
+    named("total_s", |shown| known(shown.total.map(|total| total.conductance_s))),
+    named("centre_x_m", |shown| known(shown.total.map(|total| shown.detector.map_m(total.centre_m)[0]))),
+    named("centre_y_m", |shown| known(shown.total.map(|total| shown.detector.map_m(total.centre_m)[1]))),
     named("pointer_x_m", |shown| pointer(shown, |state| state.way_m[0])),
     named("pointer_y_m", |shown| pointer(shown, |state| state.way_m[1])),
     named("pointer_pressed", |shown| pointer(shown, |state| f64::from(u8::from(state.is_pressed)))),
@@ -175,10 +174,6 @@ fn contact(found: &FoundContact, detector: &Detector) -> impl Iterator<Item = f3
     contact_values(&FoundContact { uncertainty, ..*found }).into_iter().chain(map_m)
 }
 
-fn total(shown: &Shown) -> Option<Total> {
-    Total::of(&shown.answer.solution, Some(shown.mesh))
-}
-
 fn pointer(shown: &Shown, of: fn(&PointerState) -> f64) -> f32 {
     known(shown.answer.pointer.as_ref().map(of))
 }
@@ -207,9 +202,9 @@ mod tests {
         let pointer = Some(PointerState { way_m: [0.5, -0.25], is_pressed: true, clicks: 3 });
         let answer = TouchEvent { pointer, ..TouchEvent::new(frame, readings, solution) };
         let detector = &Detector::preset(Detector::DEFAULT).unwrap();
-        let mesh = &ImageMesh::default();
         let contacts = &answer.solution.contacts;
-        update(&Shown { answer: &answer, contacts, frames: 300, course_v: &[0.25, 0.75], detector, mesh })
+        let total = Total::of(&answer.solution, None);
+        update(&Shown { answer: &answer, contacts, frames: 300, course_v: &[0.25, 0.75], detector, total })
     }
 
     fn words(bytes: &[u8]) -> Vec<u32> {

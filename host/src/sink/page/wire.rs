@@ -257,7 +257,7 @@ pub(super) fn status(snapshot: &Snapshot, rezeros: u64) -> serde_json::Result<St
         playing: playing(&snapshot.playing),
         recording: snapshot.recording.as_ref().map(|path| path.display().to_string()),
         marks: snapshot.marks,
-        refused: snapshot.refused.as_deref(),
+        refused: snapshot.refused.first(),
         baseline: snapshot.baseline.as_deref(),
         calibration: snapshot.calibration.as_deref(),
         learned: snapshot.learned.map(|learned| learned.to_string()),

@@ -93,16 +93,23 @@ function draw(now) {
 function show(update, now) {
   shown = update;
   parts.history.take(update, now);
-  if (parts.told.take(update, now)) parts.table.show(update);
+  const isTold = parts.told.take(update, now);
   parts.picture.show(update, now);
   parts.readings.show(update, now);
   parts.strip.draw(now);
   parts.pointer.show(update, now);
-  parts.totals.show(update, now);
+  if (isTold) tell(update);
   vibration.draw(now);
   verdict.show(update, parts.method.explanation, now);
   dataset.sequence = String(update.sequence);
   dataset.updates = String(Number(dataset.updates ?? 0) + 1);
+}
+
+// What is written of it.
+function tell(update) {
+  parts.table.show(update);
+  parts.totals.show(update);
+  parts.readings.tell();
 }
 
 function update(message) {
@@ -113,6 +120,7 @@ function update(message) {
 function lost(reason) {
   waiting = null;
   rezeroButton.lost();
+  notice.lost();
   showState("unreachable", reason || "The program does not answer; trying again");
   verdict.hold();
 }
@@ -136,6 +144,9 @@ function look(name) {
   document.getElementById("view-flat").setAttribute("aria-pressed", String(name === "flat"));
   document.getElementById("view-space").setAttribute("aria-pressed", String(name === "space"));
 }
+
+// A phone may have none.
+document.getElementById("full").hidden = !document.fullscreenEnabled;
 
 function fullScreen() {
   if (document.fullscreenElement) document.exitFullscreen();
@@ -165,6 +176,7 @@ listenForActions({
     parts?.calibrate.toggle();
   },
   full: fullScreen,
+  leave: fullScreen,
   keys: () => document.getElementById("help").showModal(),
   view: () => look(parts?.picture.looking === "flat" ? "space" : "flat"),
   "view-flat": () => look("flat"),

@@ -21,6 +21,8 @@ function scanned({ choice, grounds, others }, electrodes, rate) {
 
 /** Shows the board and asks it for other settings through `send`. */
 export class Board {
+  listed;
+
   constructor(setup, send) {
     this.setup = setup;
     this.form = document.getElementById("settings");
@@ -68,10 +70,17 @@ export class Board {
       ["Converter", hello ? `${hello.adc_bits} bits of ${fixed(hello.full_scale_v, 2)} V; drive ${fixed(hello.drive_v, 2)} V` : ""],
       ["Scan", hello ? scanned(scan, setup.electrodes.length, statistics.frames_per_s) : ""],
       ["Detector", `${setup.detector}, ${width} × ${height} mm, ${setup.electrodes.length} electrodes`],
-      ["Images", `${count(setup.nodes_m.length)} nodes`],
+      ["Images", `${count(setup.nodes_m.length)} points`],
     ];
-    document.getElementById("details").replaceChildren(...rows.flatMap(rowOf));
+    this.#list(rows);
     if (hello) this.#showSettings(hello);
+  }
+
+  #list(rows) {
+    const text = JSON.stringify(rows);
+    if (text === this.listed) return;
+    this.listed = text;
+    document.getElementById("details").replaceChildren(...rows.flatMap(rowOf));
   }
 
   // Only when the board changed them: what a person is typing stays.

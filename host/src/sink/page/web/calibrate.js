@@ -129,9 +129,9 @@ export class CalibratePanel {
     table.hidden = stage !== "done" || !compared;
     if (table.hidden) return;
     const { presses, residuals, place_errors_m: errorsM } = compared;
-    element("calibrate-unused").textContent = `${presses} presses not used`;
+    element("calibrate-unused").textContent = `${presses} presses set aside`;
     element("calibrate-rows").replaceChildren(
-      row("unexplained / noise", ...residuals.map((value) => fixed(value, 1))),
+      row("unexplained, × noise", ...residuals.map((value) => fixed(value, 1))),
       row("error of places", ...errorsM.map((metres) => `± ${errorText(metres)}\u2009mm`)),
     );
   }

@@ -1,22 +1,26 @@
 // The figures beside the picture, each by its name.
 
 import { count, fixed } from "./units.js";
+import { write } from "./words.js";
 
 const microseconds = (us) => (us < 1000 ? [fixed(us, us < 100 ? 1 : 0), "µs"] : [fixed(us / 1000, us < 1e5 ? 1 : 0), "ms"]);
 
+// A count of what should not be stands out this long after it has grown.
+const WARNED_MS = 5000;
+
 /**
- * In rows of two.
+ * In rows of two; the last is a count of what should not be.
  * @type {[string, string, Function, Function?][]}
  */
 const FIGURES = [
   ["frames/s", "Frames that came over the last second", ({ frames_per_s: rate }) => [count(rate), ""]],
-  ["age p50", "Median age of answers when they are ready, since the last byte of their frame came", ({ age_us: age }) => microseconds(age.p50)],
-  ["solved/s", "Frames that the solver answered over the last second", ({ solved_per_s: rate }) => [count(rate), ""]],
-  ["age p99", "99 of 100 answers are younger than this when they are ready", ({ age_us: age }) => microseconds(age.p99)],
-  ["skipped", "Frames that came and were not solved by themselves, because newer ones had come", ({ skipped }) => [count(skipped), ""]],
+  ["median age", "Half of the answers are younger than this when they are ready, since the last byte of their frame came", ({ age_us: age }) => microseconds(age.p50)],
+  ["answers/s", "Answers over the last second", ({ solved_per_s: rate }) => [count(rate), ""]],
+  ["99 % age", "99 of 100 answers are younger than this when they are ready", ({ age_us: age }) => microseconds(age.p99)],
+  ["skipped", "Frames that have no answer of their own, because newer ones had come: they count in its mean", ({ skipped }) => [count(skipped), ""]],
   ["all frames", "Frames received whole since the start; the mean of several scans each where the line is slower than the scan", ({ frames, folded }) => [count(frames), folded > 0.05 * frames ? `of ${fixed(1 + folded / frames, 1)} scans` : ""]],
-  ["lost on the line", "Frames whose numbers are missing", ({ dropped }) => [count(dropped), ""], ({ dropped }) => dropped > 0],
-  ["corrupt", "Stretches of bytes that were no message", ({ corrupt }) => [count(corrupt), ""], ({ corrupt }) => corrupt > 0],
+  ["lost on the line", "Frames that the board sent and that did not come, since the start", ({ dropped }) => [count(dropped), ""], ({ dropped }) => dropped],
+  ["corrupt", "Pieces of what the board sent that could not be read, since the start", ({ corrupt }) => [count(corrupt), ""], ({ corrupt }) => corrupt],
 ];
 
 function element(name, kind, ...children) {
@@ -29,25 +33,34 @@ function element(name, kind, ...children) {
 /** Figures: rates, ages, counts. */
 export class Figures {
   constructor() {
-    this.cells = FIGURES.map(([name, meaning, read, warns]) => {
+    this.cells = FIGURES.map(([name, meaning, read, countOf]) => {
       const [value, unit] = [element("span", "value", "\u2013"), element("span", "unit")];
       const cell = element("div", "figure", element("dt", "", name), element("dd", "", value, " ", unit));
       cell.title = meaning;
-      return { cell, value, unit, read, warns };
+      return { cell, value, unit, read, countOf, count: Infinity, grewAt: -Infinity };
     });
     document.getElementById("figures").replaceChildren(...this.cells.map(({ cell }) => cell));
   }
 
   /** Shows the statistics of a status message. */
   show({ statistics }) {
-    for (const { cell, value, unit, read, warns } of this.cells) {
-      [value.textContent, unit.textContent] = read(statistics);
-      cell.classList.toggle("warning", Boolean(warns?.(statistics)));
+    for (const figure of this.cells) {
+      const { cell, value, unit, read, countOf } = figure;
+      read(statistics).forEach((words, i) => write(i ? unit : value, words));
+      if (countOf) cell.classList.toggle("warning", this.#grows(figure, countOf(statistics)));
     }
     const { frames, frames_per_s: rate, dropped, corrupt, skipped, age_us: age } = statistics;
     Object.assign(document.documentElement.dataset, {
       frames: String(frames), framesPerS: rate.toFixed(1), dropped: String(dropped), corrupt: String(corrupt),
       skipped: String(skipped), ageP99Us: String(age.p99),
     });
+  }
+
+  // Whether a count has grown a moment ago.
+  #grows(figure, count) {
+    const now = performance.now();
+    if (count > figure.count) figure.grewAt = now;
+    figure.count = count;
+    return now - figure.grewAt < WARNED_MS;
   }
 }

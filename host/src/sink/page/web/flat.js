@@ -2,16 +2,17 @@
 
 import { drawOutline, middleOf } from "./bars.js";
 import { colourMaps } from "./colours.js";
-import { drawFrame } from "./frame.js";
+import { drawFrame, FrameCanvas } from "./frame.js";
 import { Layout, sizeCanvas } from "./layout.js";
 import { drawLabels, drawMark, drawTrail } from "./marks.js";
-import { drawTarget } from "./target.js";
+import { TARGET_RADIUS, drawTarget } from "./target.js";
 
 /** Draws the heat of `view.field` on the scale `view.scale` in the colours of `view.theme`. */
 export class FlatView {
   constructor(view) {
     this.view = view;
     this.canvas = document.getElementById("image");
+    this.frame = new FrameCanvas();
     this.marks = document.getElementById("marks");
     // A pixel of the field is one of the canvas: the browser makes it as large as the picture, smoothly, and with the graphics processor where there is one.
     [this.canvas.width, this.canvas.height] = [view.field.width, view.field.height];
@@ -28,6 +29,7 @@ export class FlatView {
     const { style } = this.canvas;
     [style.left, style.top] = [`${left}px`, `${top}px`];
     [style.width, style.height] = [`${this.layout.width}px`, `${this.layout.height}px`];
+    this.frame.layOut(width, height);
     this.over = sizeCanvas(this.marks, width, height);
   }
 
@@ -35,8 +37,9 @@ export class FlatView {
   draw(now) {
     this.#drawHeat();
     const { view, over, layout } = this;
+    const { theme, scale, marked, excluded } = view;
+    this.frame.draw([theme, scale.max, marked, excluded], (context) => drawFrame(context, view.setup, layout, view));
     over.clearRect(0, 0, layout.boxWidth, layout.boxHeight);
-    drawFrame(over, view.setup, layout, view);
     for (const [id, way] of view.trails.all(now)) {
       const points = way.map(({ xM, yM, ...rest }) => ({ ...rest, x: layout.x(xM), y: layout.y(yM) }));
       drawTrail(over, id, points, view.colours);
@@ -51,8 +54,9 @@ export class FlatView {
       spots.push({ contact: shape, text: view.labelOf(shape), x: layout.x(xM), y: layout.y(yM), radius: (shape.widthM * layout.perM) / 2 });
     }
     for (const { contact, x, y } of spots.filter((spot) => !spot.contact.kind)) drawMark(over, contact, [x, y], layout.perM, view.colours);
-    drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight });
-    if (view.target) drawTarget(over, view.target, [layout.x(view.target.at_m[0]), layout.y(view.target.at_m[1])], view.colours);
+    const target = view.target && { x: layout.x(view.target.at_m[0]), y: layout.y(view.target.at_m[1]), radius: TARGET_RADIUS };
+    drawLabels(over, spots, view.colours, { width: layout.left + layout.width + 4, height: layout.boxHeight }, target ? [target] : []);
+    if (target) drawTarget(over, view.target, [target.x, target.y], view.colours);
     this.#drawFingers();
   }
 

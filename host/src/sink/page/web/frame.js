@@ -1,6 +1,7 @@
-// What stays on the flat picture: outline, electrodes, axes and the colour bar.
+// What stays on the picture: outline, electrodes, axes and the colour bar.
 
 import { colourMaps, css } from "./colours.js";
+import { sizeCanvas } from "./layout.js";
 import { faded } from "./palette.js";
 import { decimalsOf, fixed, niceStep, prefixOf, ticks } from "./units.js";
 
@@ -21,6 +22,28 @@ function upright(context, x, y, words, direction) {
   context.rotate(direction * Math.PI / 2);
   text(context, 0, 0, words);
   context.restore();
+}
+
+/** A canvas over the heat and under the marks, drawn anew only when what is on it has changed: frames are many, and it hardly ever changes. */
+export class FrameCanvas {
+  context; width; height; drawn;
+
+  constructor() { this.canvas = document.getElementById("frame"); }
+
+  /** Makes it so many pixels large. */
+  layOut(width, height) {
+    Object.assign(this, { width, height, drawn: null });
+    this.context = sizeCanvas(this.canvas, width, height);
+  }
+
+  /** Calls `paint(context)` unless what `of` says of it is as it was. */
+  draw(of, paint) {
+    const key = JSON.stringify(of);
+    if (key === this.drawn) return;
+    this.drawn = key;
+    this.context.clearRect(0, 0, this.width, this.height);
+    paint(this.context);
+  }
 }
 
 // The outline as a path in pixels.

@@ -1,7 +1,7 @@
 // Where the flat picture lies on the screen.
 
 const WIDE = { left: 50, right: 92, top: 10, bottom: 36 };
-const NARROW = { left: 28, right: 46, top: 6, bottom: 24 };
+const NARROW = { left: 29, right: 50, top: 6, bottom: 24 };
 const NARROW_BELOW = 520;
 
 /** Fits bounds (m) into a box of pixels; `x`, `y` turn places (m) into pixels, `placeOf` pixels into places. */

@@ -1,5 +1,7 @@
 // How the link to the board fares, in the page's first line.
 
+import { write } from "./words.js";
+
 const LINK_TEXT = {
   searching: "Looking for a board: connect it by USB",
   waiting: "A board is connected and has not answered yet",
@@ -38,7 +40,7 @@ export function showState(state, text) {
   const line = document.getElementById("state");
   line.dataset.state = state;
   line.title = text;
-  document.getElementById("state-text").textContent = text;
+  write(document.getElementById("state-text"), text);
   const stale = !FRESH.includes(state);
   document.body.classList.toggle("stale", stale);
   document.documentElement.dataset.state = state;

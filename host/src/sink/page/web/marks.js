@@ -96,15 +96,28 @@ function placeFor(width, { x, y, radius }, taken, box) {
   return best;
 }
 
-/** Labels of contacts: `spots` with the contact, the `text` of its label, its pixels `x`, `y` and its `radius` there; `box` that they stay in. */
-export function drawLabels(context, spots, colours, box) {
+// Widths of texts in the font of labels (pixels): each is drawn many times.
+const MOST_WIDTHS = 1000;
+const widths = new Map();
+
+function widthOf(context, text) {
+  const known = widths.get(text);
+  if (known !== undefined) return known;
+  if (widths.size >= MOST_WIDTHS) widths.clear();
+  const { width } = context.measureText(text);
+  widths.set(text, width);
+  return width;
+}
+
+/** Labels of contacts: `spots` with the contact, the `text` of its label, its pixels `x`, `y` and its `radius` there; `box` that they stay in; `others` are circles `{x, y, radius}` that they leave free. */
+export function drawLabels(context, spots, colours, box, others = []) {
   context.font = PILL.font;
   context.textBaseline = "middle";
-  const taken = spots.map(({ x, y, radius }) => ({ x: x - radius, y: y - radius, width: 2 * radius, height: 2 * radius }));
+  const taken = [...spots, ...others].map(({ x, y, radius }) => ({ x: x - radius, y: y - radius, width: 2 * radius, height: 2 * radius }));
   for (const spot of spots) {
     const { contact, text } = spot;
-    const badge = contact.id ? Math.max(2 * PILL.badge, context.measureText(String(contact.id)).width + 9) : 0;
-    const pill = placeFor(badge + context.measureText(text).width + 16, spot, taken, box);
+    const badge = contact.id ? Math.max(2 * PILL.badge, widthOf(context, String(contact.id)) + 9) : 0;
+    const pill = placeFor(badge + widthOf(context, text) + 16, spot, taken, box);
     taken.push(pill);
     drawPill(context, pill, contact, text, badge, colours);
   }

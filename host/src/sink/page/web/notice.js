@@ -1,6 +1,8 @@
 // One line for what the program has to say: what was refused, what to know of the baseline and the calibration, where the recording is. It goes when its
 // cause goes, or when it was read.
 
+import { write } from "./words.js";
+
 /** The line. */
 export class Notice {
   constructor() {
@@ -15,14 +17,17 @@ export class Notice {
 
   /** Shows that of a status message. */
   show({ refused, baseline, calibration, recording, solver, playing }) {
-    const method = solver?.refused ? `This solver cannot be used: ${solver.refused}` : null;
+    const method = solver?.refused ? `This method cannot be used: ${solver.refused}` : null;
     const damage = playing.damage ? `This recording is damaged: ${playing.damage}` : null;
     const warning = damage ?? baseline ?? calibration;
     const told = refused ?? method ?? warning ?? (recording ? `Recording to ${recording}` : "");
-    this.text.textContent = told;
+    write(this.text, told);
     this.text.title = told;
     this.box.className = refused || method ? "bad" : warning ? "warning" : "";
     if (told !== this.read) this.read = "";
     this.box.hidden = !told || told === this.read;
   }
+
+  /** The program is gone: what it had to say may be so no more. */
+  lost() { this.box.hidden = true; }
 }

@@ -120,6 +120,8 @@ export class Picture {
 
   /** Shows where to press next, or nothing. */
   aim(target) {
+    // Every status says it, and it changes once in a few seconds.
+    if (JSON.stringify(target) === JSON.stringify(this.target)) return;
     this.target = target;
     this.draw(performance.now());
   }
@@ -136,7 +138,7 @@ export class Picture {
 
   /** The canvases of the view, lowest first. */
   layers() {
-    return [document.getElementById(this.looking === "flat" ? "image" : "space"), document.getElementById("marks")];
+    return [this.looking === "flat" ? "image" : "space", "frame", "marks"].map((id) => document.getElementById(id));
   }
 
   #listen() {

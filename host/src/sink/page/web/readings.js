@@ -4,6 +4,7 @@ import { colourMaps, css } from "./colours.js";
 import { SteadyScale } from "./scale.js";
 import { gradient, label, line, svg } from "./svg.js";
 import { decimalsOf, fixed, niceStep, prefixOf, ticks } from "./units.js";
+import { write } from "./words.js";
 
 const MARGIN = { left: 40, right: 6, top: 4, bottom: 66 };
 // Axes are drawn anew no more often than this while the scale moves.
@@ -42,7 +43,6 @@ export class ReadingsMap {
     this.moved ||= this.scale.take(this.#largest(), now);
     if (this.moved && now - this.drawn > AXES_EVERY_MS) this.#drawAxes();
     this.#paint();
-    this.#tell();
   }
 
   /** Fits the colours to the readings of now. */
@@ -143,7 +143,7 @@ export class ReadingsMap {
     this.chosen = cell;
     this.onChoose(...(cell ?? []));
     this.#frameChosen();
-    this.#tell();
+    this.tell();
   }
 
   #frameChosen() {
@@ -154,10 +154,11 @@ export class ReadingsMap {
     this.frame.setAttribute("y", MARGIN.top + g * this.cell);
   }
 
-  #tell() {
+  /** Tells the reading that is pointed at, or the largest. */
+  tell() {
     const [g, e] = this.chosen ?? [];
-    this.text.textContent = this.chosen
+    write(this.text, this.chosen
       ? `ground ${g}, read ${e}: ${fixed(this.values[g * this.count + e], 4)} V`
-      : `largest ${fixed(this.#largest(), 3)} V`;
+      : `largest ${fixed(this.#largest(), 3)} V`);
   }
 }

@@ -47,10 +47,11 @@ export class Simulation {
   show({ playing }) {
     this.box.hidden = playing.kind !== "simulated";
     if (this.box.hidden || performance.now() - this.asked < WISH_STAYS_MS) return;
-    this.scene.value = playing.scene;
+    if (this.scene.value !== playing.scene) this.scene.value = playing.scene;
     this.scene.title = this.scene.selectedOptions[0]?.title ?? "";
     // Faults of the command line may be none of the list.
     const text = playing.faults.join(" ");
+    if (this.fault.value === text) return;
     if (![...this.fault.options].some(({ value }) => value === text)) this.fault.add(new Option(text, text));
     this.fault.value = text;
   }

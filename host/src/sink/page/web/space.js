@@ -3,7 +3,7 @@
 import { middleOf } from "./bars.js";
 import { Camera } from "./camera.js";
 import { colourMaps } from "./colours.js";
-import { drawBar } from "./frame.js";
+import { drawBar, FrameCanvas } from "./frame.js";
 import { sizeCanvas } from "./layout.js";
 import { drawLabels, drawTrail } from "./marks.js";
 import { faded } from "./palette.js";
@@ -25,6 +25,7 @@ export class SpaceView {
   constructor(view) {
     this.view = view;
     this.canvas = document.getElementById("space");
+    this.frame = new FrameCanvas();
     this.marks = document.getElementById("marks");
     this.shape = shapeOf(view.setup);
     this.camera = new Camera(this.shape);
@@ -45,6 +46,7 @@ export class SpaceView {
     this.depth = new DepthImage(Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio)));
     [this.canvas.width, this.canvas.height] = [this.depth.width, this.depth.height];
     [this.canvas.style.width, this.canvas.style.height] = [`${width}px`, `${height}px`];
+    this.frame.layOut(width + this.bar, height);
     this.over = sizeCanvas(this.marks, width + this.bar, height);
   }
 
@@ -92,6 +94,8 @@ export class SpaceView {
 
   #drawOver(now) {
     const { over, view, shape, width, height } = this;
+    const bar = { left: 0, width, top: 14, height: Math.min(360, height - 44), narrow: this.narrow };
+    this.frame.draw([view.theme, view.scale.max], (context) => drawBar(context, bar, view));
     const at = this.camera.projection(shape, width, height);
     over.clearRect(0, 0, width + this.bar, height);
     this.#drawRims(at);
@@ -113,7 +117,6 @@ export class SpaceView {
       spots.push({ contact: view.field.shape, text: view.labelOf(view.field.shape), x, y, radius: 8 });
     }
     drawLabels(over, spots, view.colours, { width, height });
-    drawBar(over, { left: 0, width, top: 14, height: Math.min(360, height - 44), narrow: this.narrow }, view);
   }
 
   #drawRims(at) {

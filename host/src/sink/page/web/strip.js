@@ -3,8 +3,10 @@
 import { sizeCanvas } from "./layout.js";
 import { faded, palette } from "./palette.js";
 import { decimalsOf, fixed, niceStep, prefixOf, ticks, withPrefix } from "./units.js";
+import { write } from "./words.js";
 
 const MARGIN = { left: 34, right: 8, top: 8, bottom: 18 };
+// Samples are no closer, and less than a pixel's time changes nothing that can be seen.
 const DRAWN_EVERY_MS = 40;
 const FONT = "11px system-ui, sans-serif";
 
@@ -32,7 +34,7 @@ export class StripChart {
 
   /** Draws what the history has, ending now; held while the picture is. */
   draw(now) {
-    if (now - this.shown < DRAWN_EVERY_MS) return;
+    if (now - this.shown < Math.max(DRAWN_EVERY_MS, this.spanMs / this.width)) return;
     this.shown = now;
     this.end = now;
     this.#redraw();
@@ -145,6 +147,6 @@ export class StripChart {
       }
     }
     const words = values.map(([id, value]) => `${id || "all"}: ${withPrefix(value, history.unit)}`);
-    this.text.textContent = inside ? `${fixed((moment - end) / 1e3, 1)} s  ${words.join("  ") || "nothing"}` : "";
+    write(this.text, inside ? `${fixed((moment - end) / 1e3, 1)} s  ${words.join("  ") || "nothing"}` : "");
   }
 }

@@ -2,6 +2,9 @@
 
 const RING = { radius: 17, firmWidth: 6, lightWidth: 2.5 };
 
+/** Radius of all of it (pixels). */
+export const TARGET_RADIUS = RING.radius + RING.firmWidth / 2 + 2;
+
 /** Draws a target at `[x, y]` pixels: a thick ring to press firmly, a thin one to press lightly. */
 export function drawTarget(context, { firm }, [x, y], colours) {
   for (const [width, colour] of [[(firm ? RING.firmWidth : RING.lightWidth) + 4, colours.card], [firm ? RING.firmWidth : RING.lightWidth, colours.accent]]) {

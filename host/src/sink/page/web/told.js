@@ -1,4 +1,4 @@
-// The numbers that are told of what touches: those of one update for a while, in labels and in the table alike.
+// The numbers that are told of what touches: those of one update for a while, wherever they stand.
 
 // Numbers that change faster cannot be read.
 const STAYS_MS = 120;

@@ -2,6 +2,7 @@
 
 import { nameOf } from "./bars.js";
 import { fixed } from "./units.js";
+import { write } from "./words.js";
 
 // Words and warnings stay this long: what flickers cannot be read.
 const STAYS_MS = 250;
@@ -28,8 +29,8 @@ const isSearched = ({ choice }) => choice?.what === "searching";
 
 /** What stands in place of contacts where there are none. */
 export function inPlaceOfContacts(update) {
-  if (isSearched(update)) return "What touches is being searched.";
-  return update.image.length ? "The image has no single contacts." : "Nothing touches.";
+  if (isSearched(update)) return "Looking for what touches.";
+  return update.image.length ? "The image shows no single contacts." : "Nothing touches.";
 }
 
 // What a passer-by calls it.
@@ -88,13 +89,14 @@ export class Verdict {
     this.#announce(words);
     if (words !== this.what.textContent || now - this.shown > STAYS_MS) {
       this.shown = now;
-      this.what.textContent = words;
-      this.sure.textContent = sureOf(update) || "\u00a0";
-      const left = residual === null ? [] : [`residual ${fixed(residual, 1)} × noise`];
-      this.residual.textContent = [...left, ageText(ageS)].filter(Boolean).join(" · ");
-      // The residual stands beside it.
-      this.why.textContent = choice ? choice.why.replace(/^residual [\d.]+ x noise(; )?/, "") : explanation;
-      this.why.title = this.why.textContent;
+      write(this.what, words);
+      write(this.sure, sureOf(update) || "\u00a0");
+      const left = residual === null ? [] : [`unexplained ${fixed(residual, 1)} × noise`];
+      write(this.residual, [...left, ageText(ageS)].filter(Boolean).join(" · "));
+      // What it leaves unexplained stands beside it.
+      const why = choice ? choice.why.replace(/^residual [\d.]+ x noise(; )?/, "") : explanation;
+      write(this.why, why);
+      this.why.title = why;
     }
     this.#warn(flags, update, now);
     // Where no other answer comes, as where it is paused, only what this one says stays.
@@ -114,7 +116,7 @@ export class Verdict {
     clearTimeout(this.announcer);
     this.announcer = setTimeout(() => {
       const line = document.getElementById("announced");
-      if (line.textContent !== words) line.textContent = words;
+      write(line, words);
     }, ANNOUNCED_MS);
   }
 

@@ -3,6 +3,7 @@
 import { sizeCanvas } from "./layout.js";
 import { faded, palette } from "./palette.js";
 import { decimalsOf, fixed, niceStep, prefixOf, ticks, withPrefix } from "./units.js";
+import { write } from "./words.js";
 
 const MARGIN = { left: 38, right: 8, top: 10, bottom: 18 };
 const HEIGHT = 104;
@@ -56,7 +57,7 @@ export class VibrationPanel {
     }
     this.spectrum = vibration;
     const peak = vibration?.peak;
-    this.said.textContent = peak ? `${fixed(peak.frequency_hz, 1)} Hz, ${withPrefix(peak.amplitude_v, "V", 2)}` : "no clear frequency";
+    write(this.said, peak ? `${fixed(peak.frequency_hz, 1)} Hz, ${withPrefix(peak.amplitude_v, "V", 2)}` : "no clear frequency");
     this.card.dataset.peakHz = peak ? String(peak.frequency_hz) : "";
     if (this.card.open) this.#drawSpectrum();
   }
