@@ -213,12 +213,7 @@ impl ContactFinder {
         mut starts: Vec<Vec<Contact>>,
         target: &Target,
     ) -> Result<DiscFit, f64> {
-        let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
-        let at = target.at(&fit.volts);
-        let slopes = at.whitened_columns(fit.slopes_v());
-        let left = target.residuals(&fit.volts).into();
-        let fitted = Fitted { spots: &spots, slopes, normal: &fit.normal, left };
-        let looks = self.scan.beside(&self.spot_model, &*self.fields, &fitted, &at);
+        let looks = self.looks_beside(fit, target);
         let ones = looks.as_ref().map_or_else(Vec::new, |looks| self.scan.ones(looks, STARTS, self.apart_m()));
         let is_worth_a_try = ones.first().is_some_and(|best| best.gain > policy::parameter_price())
             || self.may_hide_more(fit.contacts.len());
@@ -242,6 +237,16 @@ impl ContactFinder {
         begun.retain(|start| start.cost <= most);
         begun.truncate(if gain > 0.0 { FINALISTS } else { 1 });
         self.best_of(begun, target).ok_or(f64::NEG_INFINITY)
+    }
+
+    /// A look for more contacts beside those of a fit.
+    pub(super) fn looks_beside(&self, fit: &DiscFit, target: &Target) -> Option<Looks<'_>> {
+        let spots: Vec<_> = fit.contacts.iter().map(|contact| self.spot_of(contact)).collect();
+        let at = target.at(&fit.volts);
+        let slopes = at.whitened_columns(fit.slopes_v());
+        let left = target.residuals(&fit.volts).into();
+        let fitted = Fitted { spots: &spots, slopes, normal: &fit.normal, left };
+        self.scan.beside(&self.spot_model, &*self.fields, &fitted, &at)
     }
 
     /// Whether beside so many contacts another may be where the linear theory cannot tell it. What light contacts do to balanced readings has as

@@ -20,7 +20,7 @@ use self::frames::Window;
 pub(super) use self::key_frames::{KeyFrame, KeyFrames};
 use self::together::{Motion, Together};
 use super::discs::{Effort, STAYING, Still, place_m};
-use super::search::COLD;
+use super::search::{COLD, FINALISTS};
 use super::{Certainty, ContactFinder, ContactHypothesis};
 use crate::solve::fit::approximation::Linearised;
 use crate::solve::fit::evidence::misfit_limit;
@@ -48,9 +48,8 @@ impl ContactFinder {
         target: &Target,
     ) -> Option<ContactHypothesis> {
         let followed: Vec<_> = keys.iter().map(|key| key.contacts.clone()).collect();
-        // What a detector differs by, even what is left of that once it is learned, can make one contact seem two that stay.
-        let is_known = self.problem.nuisance().is_none();
-        (is_known || followed[0].len() > 1).then_some(())?;
+        // What a detector or a chip differs by, even what is left of that once it is learned, can make one contact seem two that stay.
+        (followed[0].len() > 1).then_some(())?;
         let (middle, spread_m) = middle(&followed);
         let near = from.error.as_ref().and_then(|error| error.linearised.clone());
         let (window, growing) = self.window_of(keys, near, &followed, spread_m)?;
@@ -161,8 +160,34 @@ impl Window<'_> {
         are_apart && lightest - firmest > unknown.ln()
     }
 
-    /// One contact more that stays, from where it would explain most of the frame that is explained worst.
+    /// One contact more that stays: the likeliest from where it would explain most of all frames, and of the one that is explained worst. No single frame
+    /// tells well where it is, and what all tell is linear.
     fn one_more(&self, found: &Together) -> Option<Together> {
+        let of_all = self.starts_in_all(found).unwrap_or_default().into_iter();
+        let starts = of_all.chain(self.start_in_worst(found));
+        let all = starts.filter_map(|start| self.explained(start, Motion::Still));
+        all.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
+    }
+
+    /// Contacts in each frame, with one more where it would explain most of all.
+    fn starts_in_all(&self, found: &Together) -> Option<Vec<Vec<Vec<Contact>>>> {
+        let finder = self.finder;
+        let looks = found.at.fits.iter().zip(&self.frames).map(|(fit, frame)| {
+            let fit = self.fitter.go_on(fit, &frame.alone, AS_IT_IS)?;
+            finder.looks_beside(&fit, &frame.alone)
+        });
+        let looks: Vec<_> = looks.collect::<Option<_>>()?;
+        let places = finder.scan.staying(&looks, FINALISTS, finder.apart_m());
+        let start = |place| {
+            let more = finder.discs_of(&finder.scan.start(&looks[0], place));
+            let with_more = |contacts: Vec<Contact>| contacts.into_iter().chain(more.iter().copied()).collect();
+            found.at.contacts().into_iter().map(with_more).collect()
+        };
+        Some(places.iter().map(start).collect())
+    }
+
+    /// Contacts in each frame, with one more as the frame that is explained worst has it by itself.
+    fn start_in_worst(&self, found: &Together) -> Option<Vec<Vec<Contact>>> {
         let left = |index: &usize| self.frames[*index].alone.cost(&found.at.fits[*index].volts);
         let worst = (0..self.frames.len()).max_by(|a, b| left(a).total_cmp(&left(b)))?;
         let alone = &self.frames[worst].alone;
@@ -175,7 +200,7 @@ impl Window<'_> {
             let pairs = more.contacts.iter().zip(ratios.chain(std::iter::repeat(1.0)));
             pairs.map(|(one, ratio)| Contact { conductance_s: ratio * one.conductance_s, ..*one }).collect()
         });
-        self.explained(start.collect(), Motion::Still)
+        Some(start.collect())
     }
 
     /// Readings that count.

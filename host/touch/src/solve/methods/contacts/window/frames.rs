@@ -1,8 +1,8 @@
 //! Key frames as they are fitted together: what readings are off by in all of them.
 //!
 //! What is not known of the detector is the same in all frames, and linear near some detector; so are the errors of pads and converters. So is what each reading by itself is off by, but for
-//! noise: the baseline's error is the same in all frames, and the model's in proportion to what is read. Taken as independent from frame to frame,
-//! both made light contacts beside a firm one that is pressed more and less.
+//! noise: the baseline's error is the same in all frames, the model's in proportion to what is read, and that of steps of the detector in proportion
+//! to what these change. Taken as independent from frame to frame, they made light contacts beside a firm one that is pressed more and less.
 
 use std::sync::Arc;
 
@@ -14,13 +14,15 @@ use super::super::discs::{DiscFit, DiscFitter};
 use super::KeyFrame;
 use super::together::Together;
 use crate::solve::fit::approximation::Linearised;
+use crate::solve::fit::dot::dot;
 use crate::solve::fit::target::Target;
 use tactomo_physics::forward::Nuisance;
 
 /// Frames that a baseline is the mean of at first (`host/board/src/baseline`).
 const BASELINE_FRAMES: f64 = 32.0;
 /// Share by which what steps of a detector change in the readings is wrong, as it is found with coarse models and taken as linear: without it, fits to
-/// detectors as built leave 1.1 times the squares of noise and contacts are invented; with a hundredth a third, and with 0.03 five fingers are not told.
+/// detectors as built leave 1.1 times the squares of noise and contacts are invented; with a hundredth they leave those of noise, 0.86 to 1.0 times, and
+/// with 0.03 five fingers are not told.
 const PATTERN_ERROR: f64 = 0.01;
 
 /// A key frame as it is fitted.
@@ -33,7 +35,7 @@ pub(super) struct Frame {
     transposed: DMatrix<f64>,
     /// What readings change by with steps of the detector, as a share of the largest.
     pub unknown: f64,
-    /// What the model is wrong by in each of them (V).
+    /// What the model is wrong by in each of them (V), but for steps of the detector.
     model_v: f64,
 }
 
@@ -58,16 +60,19 @@ pub(super) struct Window<'a> {
 
 impl ContactFinder {
     /// Inverse of the covariance between frames of what each reading by itself is off by, in its deviations of each frame: noise is each frame's own, the
-    /// baseline's error the same in all, and the model's in proportion to what is read.
-    fn between(&self, frames: &[Frame]) -> Option<DMatrix<f64>> {
+    /// baseline's error the same in all, the model's in proportion to what is read, and that of the first patterns, which are steps of the detector, to
+    /// what these change.
+    fn between(&self, frames: &[Frame], steps: usize) -> Option<DMatrix<f64>> {
         let baseline_v = self.errors.noise_v / BASELINE_FRAMES.sqrt();
-        let fixed = |frame: &Frame| {
-            let deviation_v = frame.target.deviation_v();
-            [baseline_v / deviation_v, frame.model_v / deviation_v]
+        let covariance = |i: usize, j: usize| {
+            let (one, other) = (&frames[i], &frames[j]);
+            let noise_v2 = if i == j { one.target.noise_v.powi(2) } else { 0.0 };
+            let model_v2 = one.model_v * other.model_v * likeness(&one.target.volts, &other.target.volts);
+            let of_each = (noise_v2 + baseline_v * baseline_v + model_v2)
+                / (one.target.deviation_v() * other.target.deviation_v());
+            let of_steps = one.transposed.rows(0, steps).dot(&other.transposed.rows(0, steps));
+            of_each + PATTERN_ERROR * PATTERN_ERROR * of_steps / one.transposed.ncols() as f64
         };
-        let all: Vec<_> = frames.iter().map(fixed).collect();
-        let covariance =
-            |i: usize, j: usize| f64::from(u8::from(i == j)) + all[i][0] * all[j][0] + all[i][1] * all[j][1];
         Some(Cholesky::new(DMatrix::from_fn(frames.len(), frames.len(), covariance))?.inverse())
     }
 }
@@ -94,15 +99,15 @@ impl<'a> Window<'a> {
             let of_steps = patterns.columns(0, steps);
             let unknown_v = (of_steps.norm_squared() / patterns.nrows() as f64).sqrt();
             let unknown = unknown_v / key.mean.readings.largest_v();
-            let of_patterns_v = PATTERN_ERROR * unknown_v;
-            let (alone, model_v) = (alone.with_model_error(of_patterns_v), model_v.hypot(of_patterns_v));
+            let alone = alone.with_model_error(PATTERN_ERROR * unknown_v);
             let target = alone.without_unknowns();
             target.whiten_columns(&mut patterns);
             Some(Frame { target, alone, transposed: patterns.transpose(), unknown, model_v })
         };
         let frames: Vec<_> = keys.iter().map(frame).collect::<Option<_>>()?;
         let unknowns = frames.first()?.transposed.nrows();
-        let between = finder.between(&frames)?;
+        let steps = nuisance.map_or(0, Nuisance::directions);
+        let between = finder.between(&frames, steps)?;
         let patterns: Vec<_> = frames.iter().map(|frame| frame.transposed.transpose()).collect();
         let patterns = across(&between, &patterns);
         let information = |sum: DMatrix<f64>, (frame, all): (&Frame, &DMatrix<f64>)| sum + &frame.transposed * all;
@@ -147,6 +152,11 @@ impl<'a> Window<'a> {
         let pulls = self.frames.iter().zip(residuals).map(|(frame, left)| &frame.transposed * left);
         pulls.reduce(|sum, pull| sum + pull)
     }
+}
+
+/// How alike readings are in their proportions: 1 if they are, and 0 if what is read in one is not in the other.
+fn likeness(one: &[f64], other: &[f64]) -> f64 {
+    dot(one, other) / (dot(one, one) * dot(other, other)).sqrt().max(f64::MIN_POSITIVE)
 }
 
 /// A matrix between frames times what each frame has.
