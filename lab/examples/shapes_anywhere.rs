@@ -24,6 +24,9 @@ const SIZES: [f64; 2] = [0.3, 0.9];
 const WIDTHS: [f64; 2] = [0.02, 0.15];
 const SHEETS: [f64; 2] = [1.0, 10.0];
 
+/// Draws a touch, and places on its rim (m).
+type Draw = fn(&Detector, &mut fastrand::Rng) -> (Touch, Vec<Point>);
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let seed: u64 = words.next().map_or(Ok(1), |word| word.parse())?;
@@ -35,9 +38,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("|---|---|---|---|---|");
     for name in names {
         let detector = detector(name)?;
-        for (what, make) in [("line", line as fn(&Detector, &mut fastrand::Rng) -> Touch), ("ring", ring)] {
+        for (what, draw) in [("line", line as Draw), ("ring", ring)] {
             let mut random = fastrand::Rng::with_seed(seed);
-            let row = row(&detector, built, what, || make(&detector, &mut random), (seed, scenes))?;
+            let row = row(&detector, built, what, || drawn_within(&detector, &mut random, draw), (seed, scenes))?;
             println!("| {name} | {what} | {row} |");
         }
     }
@@ -78,54 +81,57 @@ fn shorter_side_m(detector: &Detector) -> f64 {
     detector.outline.size_m().into_iter().fold(f64::INFINITY, f64::min)
 }
 
-/// Whether all of these places are on the detector.
-fn are_on(detector: &Detector, places_m: &[Point]) -> bool {
-    places_m.iter().all(|at_m| geometry::is_inside(*at_m, &detector.outline.outer))
+fn is_on(detector: &Detector, at_m: Point) -> bool {
+    geometry::is_inside(at_m, &detector.outline.outer)
 }
 
 fn anywhere(detector: &Detector, random: &mut fastrand::Rng) -> Point {
     detector.outline.size_m().map(|side_m| side_m * (random.f64() - 0.5))
 }
 
-fn line(detector: &Detector, random: &mut fastrand::Rng) -> Touch {
+/// A touch that is all on the detector. A long line along a diagonal has no place on it if it is wide: so all is drawn anew, not its place only.
+fn drawn_within(detector: &Detector, random: &mut fastrand::Rng, draw: Draw) -> Touch {
+    loop {
+        let (touch, rim_m) = draw(detector, random);
+        if rim_m.iter().all(|at_m| is_on(detector, *at_m)) {
+            return touch;
+        }
+    }
+}
+
+/// A line and its corners.
+fn line(detector: &Detector, random: &mut fastrand::Rng) -> (Touch, Vec<Point>) {
     let angle_rad = PI * random.f64();
     let (sin, cos) = angle_rad.sin_cos();
     let mut half_m = 0.0;
-    while are_on(detector, &[[half_m * cos, half_m * sin]]) {
+    while is_on(detector, [half_m * cos, half_m * sin]) {
         half_m += 1e-5;
     }
     let length_m = 2.0 * half_m * between(random, SIZES);
     let width_m = shorter_side_m(detector) * between(random, WIDTHS);
     let conductance_s = detector.sheet_conductance_s() * log_between(random, SHEETS);
-    loop {
-        let centre_m = anywhere(detector, random);
-        let corner = |[along, across]: [f64; 2]| {
-            let [along_m, across_m] = [0.5 * along * length_m, 0.5 * across * width_m];
-            [centre_m[0] + along_m * cos - across_m * sin, centre_m[1] + along_m * sin + across_m * cos]
-        };
-        let corners_m = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner);
-        if are_on(detector, &corners_m) {
-            return Touch::flat(centre_m, Shape::Line { length_m, width_m, angle_rad }, conductance_s);
-        }
-    }
+    let centre_m = anywhere(detector, random);
+    let corner = |[along, across]: [f64; 2]| {
+        let [along_m, across_m] = [0.5 * along * length_m, 0.5 * across * width_m];
+        [centre_m[0] + along_m * cos - across_m * sin, centre_m[1] + along_m * sin + across_m * cos]
+    };
+    let corners_m = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner);
+    (Touch::flat(centre_m, Shape::Line { length_m, width_m, angle_rad }, conductance_s), corners_m.to_vec())
 }
 
-fn ring(detector: &Detector, random: &mut fastrand::Rng) -> Touch {
+/// A ring and places on its outer rim.
+fn ring(detector: &Detector, random: &mut fastrand::Rng) -> (Touch, Vec<Point>) {
     let shorter_m = shorter_side_m(detector);
     let width_m = shorter_m * between(random, WIDTHS);
     let radius_m = 0.5 * (shorter_m - width_m) * between(random, SIZES);
     let conductance_s = detector.sheet_conductance_s() * log_between(random, SHEETS);
-    loop {
-        let centre_m = anywhere(detector, random);
-        let on = |turn: u32| {
-            let (sin, cos) = (TAU * f64::from(turn) / 32.0).sin_cos();
-            let outer_m = radius_m + 0.5 * width_m;
-            [centre_m[0] + outer_m * cos, centre_m[1] + outer_m * sin]
-        };
-        if are_on(detector, &(0..32).map(on).collect::<Vec<_>>()) {
-            return Touch::flat(centre_m, Shape::Ring { radius_m, width_m }, conductance_s);
-        }
-    }
+    let centre_m = anywhere(detector, random);
+    let on = |turn: u32| {
+        let (sin, cos) = (TAU * f64::from(turn) / 32.0).sin_cos();
+        let outer_m = radius_m + 0.5 * width_m;
+        [centre_m[0] + outer_m * cos, centre_m[1] + outer_m * sin]
+    };
+    (Touch::flat(centre_m, Shape::Ring { radius_m, width_m }, conductance_s), (0..32).map(on).collect())
 }
 
 /// What becomes of scenes of one kind.

@@ -46,8 +46,6 @@ const DIFFERENCE: f64 = 1e-4;
 const WIDTH: f64 = 0.25;
 /// Standard deviation of the logarithm of the width before anything is read, as of the radius of discs: it is usual to a factor of two.
 const WIDTH_DEVIATION: f64 = 0.7;
-/// A contact of more sheet conductances counts as one of so many where a fit starts.
-const MOST_WEIGHT: f64 = 2.0;
 
 /// What finds lines and rings: the same for all frames, and shared by the threads that follow and search.
 pub(crate) struct ShapeFinder {
@@ -111,7 +109,7 @@ impl ShapeFinder {
         rival: f64,
     ) -> Option<StripFit> {
         let coarse = self.fitter(&self.coarse);
-        let starts = start::starts(contacts, self.usual.width_m, MOST_WEIGHT * self.usual.conductance_s);
+        let starts = start::starts(contacts, self.usual.width_m);
         let starts = starts.into_iter().chain(from.map(|fit| *fit.strip()));
         let most = policy::shape_rivals() * rival;
         let begun = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, FIRST_STEPS)));
