@@ -32,8 +32,7 @@ use crate::solve::problem::Problem;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::geometry::{self, Point};
 
-/// Steps from each start, steps from the best one of a kind, and steps from the frame before.
-const FIRST_STEPS: usize = 5;
+/// Steps from each start on either mesh, and steps from the frame before.
 const COLD_STEPS: usize = 20;
 const WARM_STEPS: usize = 2;
 /// Nodes of the mesh that shapes are searched on, as a share of the model's.
@@ -112,16 +111,11 @@ impl ShapeFinder {
         let starts = start::starts(contacts, self.usual.width_m);
         let starts = starts.into_iter().chain(from.map(|fit| *fit.strip()));
         let most = policy::shape_rivals() * rival;
-        let begun = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, FIRST_STEPS)));
-        let (lines, rings): (Vec<_>, Vec<_>) = begun.partition(|fit| fit.strip().is_line());
-        let mut kinds: Vec<_> = [lines, rings]
-            .into_iter()
-            .filter_map(|begun| begun.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost)))
-            .filter(|best| best.cost < most)
-            .map(|best| coarse.fit(best.laid, target, COLD_STEPS))
-            .filter(|best| best.evidence().score() < policy::shape_rivals() * rival)
-            .collect();
+        let fits = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, COLD_STEPS)));
+        let (lines, rings): (Vec<_>, Vec<_>) =
+            fits.filter(|fit| fit.evidence().score() < most).partition(|fit| fit.strip().is_line());
         let lowest = |a: &StripFit, b: &StripFit| a.evidence().score().total_cmp(&b.evidence().score());
+        let mut kinds: Vec<_> = [lines, rings].into_iter().filter_map(|fits| fits.into_iter().min_by(lowest)).collect();
         kinds.sort_unstable_by(lowest);
         let best = kinds.first()?.evidence().score();
         kinds.retain(|other| other.evidence().score() < policy::shape_rivals() * best);
