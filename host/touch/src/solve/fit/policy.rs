@@ -134,7 +134,7 @@ thresholds! {
     /// By how much the score of a shape has to be lower than that of contacts (squared deviations) on a detector that is not known exactly. Two
     /// contacts on one of those were a line by 2; lines and rings, on three others, were so by 23 or more.
     shape_gain: f64 = 10.0;
-    /// A shape of so many times the rival's score is given up, after the first steps on the coarse mesh and after all.
+    /// A shape of so many times the rival's score on the coarse mesh is given up.
     shape_rivals: f64 = 4.0;
     /// Shortest line, in mean distances of electrodes.
     shortest_line: f64 = 0.7;

@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::*;
-use crate::solve::answer::{FoundContact, Solution};
+use crate::solve::answer::{FoundContact, FoundShape, Solution};
 use crate::solve::solver::Hypothesis;
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v, touched_impedance_ohm};
@@ -133,6 +133,19 @@ fn what_an_image_explains_is_a_line_if_it_is_one_where_contacts_lead_nowhere() {
     let whole = trial.auto.search.whole((Evidence::of(2e4, 8), &lost), None, &target, &readings).unwrap();
     let Some(Whole::Shape(line)) = whole else { panic!("an image, or nothing") };
     assert!(line.strip().is_line() && (line.strip().course.length_m() - 0.036).abs() < 0.002, "{:?}", line.strip());
+}
+
+#[test]
+fn a_firm_rod_between_two_columns_of_electrodes_is_a_line_at_its_first_frame() {
+    let mut trial = AutoTrial::on("strip-13x60");
+    let rod = Shape::Line { length_m: 0.036, width_m: 0.0018, angle_rad: FRAC_PI_2 };
+    for y_m in [0.0, 0.001, -0.002, 0.003, 0.005, -0.004] {
+        let readings = trial.shaped(&[([0.0001, y_m], rod.clone(), 4.0)]);
+        trial.auto.reset();
+        let solution = trial.auto.solve(&readings).unwrap();
+        let Some(FoundShape::Line(line)) = solution.shape else { panic!("at {y_m}: {:?}", solution.choice) };
+        assert!((line.length_m() - 0.036).abs() < 5e-4, "{line:?}");
+    }
 }
 
 #[test]

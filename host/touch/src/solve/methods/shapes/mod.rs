@@ -32,8 +32,7 @@ use crate::solve::problem::Problem;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::geometry::{self, Point};
 
-/// Steps from each start, steps from the best one of a kind, and steps from the frame before.
-const FIRST_STEPS: usize = 5;
+/// Steps from each start on either mesh, and steps from the frame before.
 const COLD_STEPS: usize = 20;
 const WARM_STEPS: usize = 2;
 /// Nodes of the mesh that shapes are searched on, as a share of the model's.
@@ -46,8 +45,6 @@ const DIFFERENCE: f64 = 1e-4;
 const WIDTH: f64 = 0.25;
 /// Standard deviation of the logarithm of the width before anything is read, as of the radius of discs: it is usual to a factor of two.
 const WIDTH_DEVIATION: f64 = 0.7;
-/// A contact of more sheet conductances counts as one of so many where a fit starts.
-const MOST_WEIGHT: f64 = 2.0;
 
 /// What finds lines and rings: the same for all frames, and shared by the threads that follow and search.
 pub(crate) struct ShapeFinder {
@@ -111,19 +108,14 @@ impl ShapeFinder {
         rival: f64,
     ) -> Option<StripFit> {
         let coarse = self.fitter(&self.coarse);
-        let starts = start::starts(contacts, self.usual.width_m, MOST_WEIGHT * self.usual.conductance_s);
+        let starts = start::starts(contacts, self.usual.width_m);
         let starts = starts.into_iter().chain(from.map(|fit| *fit.strip()));
         let most = policy::shape_rivals() * rival;
-        let begun = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, FIRST_STEPS)));
-        let (lines, rings): (Vec<_>, Vec<_>) = begun.partition(|fit| fit.strip().is_line());
-        let mut kinds: Vec<_> = [lines, rings]
-            .into_iter()
-            .filter_map(|begun| begun.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost)))
-            .filter(|best| best.cost < most)
-            .map(|best| coarse.fit(best.laid, target, COLD_STEPS))
-            .filter(|best| best.evidence().score() < policy::shape_rivals() * rival)
-            .collect();
+        let fits = starts.filter_map(|start| Some(coarse.fit_below(most, coarse.lay(start)?, target, COLD_STEPS)));
+        let (lines, rings): (Vec<_>, Vec<_>) =
+            fits.filter(|fit| fit.evidence().score() < most).partition(|fit| fit.strip().is_line());
         let lowest = |a: &StripFit, b: &StripFit| a.evidence().score().total_cmp(&b.evidence().score());
+        let mut kinds: Vec<_> = [lines, rings].into_iter().filter_map(|fits| fits.into_iter().min_by(lowest)).collect();
         kinds.sort_unstable_by(lowest);
         let best = kinds.first()?.evidence().score();
         kinds.retain(|other| other.evidence().score() < policy::shape_rivals() * best);

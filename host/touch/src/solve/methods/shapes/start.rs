@@ -21,9 +21,10 @@ struct Cloud {
 }
 
 impl Cloud {
-    /// Contacts above `most_s` (S) conduct no better: they would outweigh all others.
-    fn of(contacts: &[FoundContact], usual_radius_m: f64, most_s: f64) -> Option<Self> {
-        let weight = |contact: &FoundContact| contact.conductance_s.clamp(0.0, most_s);
+    /// A contact weighs what it conducts with its spreading resistance. Its own conductance, where it is firm, the readings hardly tell: it would
+    /// outweigh all others, and a fit that starts at twice the conductance is led astray.
+    fn of(contacts: &[FoundContact], usual_radius_m: f64) -> Option<Self> {
+        let weight = |contact: &FoundContact| contact.apparent_conductance_s.unwrap_or(contact.conductance_s).max(0.0);
         let conductance_s: f64 = contacts.iter().map(weight).sum();
         if !(conductance_s > 0.0 && conductance_s.is_finite()) {
             return None;
@@ -74,8 +75,8 @@ impl Cloud {
 }
 
 /// Strips of a usual width that contacts may stand for: two of them for a line, one for a ring, more for both.
-pub(super) fn starts(contacts: &[FoundContact], usual_width_m: f64, most_s: f64) -> Vec<Strip> {
-    let Some(cloud) = Cloud::of(contacts, 0.5 * usual_width_m, most_s) else { return Vec::new() };
+pub(super) fn starts(contacts: &[FoundContact], usual_width_m: f64) -> Vec<Strip> {
+    let Some(cloud) = Cloud::of(contacts, 0.5 * usual_width_m) else { return Vec::new() };
     let mut courses = match contacts.len() {
         1 => vec![cloud.ring()],
         2 => vec![cloud.line()],
@@ -110,7 +111,7 @@ mod tests {
         let [from, to] = [[-0.012, 0.003], [0.015, -0.008]];
         let at = |i: u32| [0, 1].map(|axis| from[axis] + (f64::from(i) + 0.5) / 20.0 * (to[axis] - from[axis]));
         let contacts: Vec<_> = (0..20).map(at).map(|[x, y]| FoundContact::flat(x, y, 1e-4)).collect();
-        let starts = starts(&contacts, 0.001, 1.0);
+        let starts = starts(&contacts, 0.001);
         let Course::Line(mut ends) = starts[0].course else { panic!("{starts:?}") };
         ends.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
         assert!(geometry::distance(ends[0], from) < 1e-4 && geometry::distance(ends[1], to) < 1e-4, "{ends:?}");
@@ -124,7 +125,7 @@ mod tests {
         for (share, which) in [(1.0, 1), (0.4, 2)] {
             let places = (0..10).map(|i| on(share * f64::from(i) / 10.0));
             let contacts: Vec<_> = places.map(|[x, y]| FoundContact::flat(x, y, 1e-4)).collect();
-            let starts = starts(&contacts, 0.001, 1.0);
+            let starts = starts(&contacts, 0.001);
             assert_eq!(starts.len(), which + 1);
             let Course::Ring { centre_m, radius_m: found_m } = starts[which].course else { panic!("{starts:?}") };
             assert!(geometry::distance(centre_m, centre) < 1e-4 && (found_m - radius_m).abs() < 1e-4, "{starts:?}");
@@ -133,10 +134,14 @@ mod tests {
 
     #[test]
     fn nothing_starts_from_nothing_and_a_perfect_contact_does_not_outweigh_the_rest() {
-        assert!(starts(&[], 0.003, 1e-3).is_empty());
-        let contacts = [FoundContact::flat(-0.01, 0.0, 1e-3), FoundContact::flat(0.01, 0.0, 0.3)];
-        let starts = starts(&contacts, 0.003, 1e-3);
+        assert!(starts(&[], 0.003).is_empty());
+        let contact = |x_m: f64, conductance_s: f64| FoundContact {
+            apparent_conductance_s: Some(4e-4),
+            ..FoundContact::flat(x_m, 0.0, conductance_s)
+        };
+        let starts = starts(&[contact(-0.01, 1e-3), contact(0.01, 0.3)], 0.003);
         let Course::Line([a, b]) = starts[0].course else { panic!("{starts:?}") };
         assert!((a[0] + b[0]).abs() < 1e-9, "{a:?} {b:?}");
+        assert!((starts[0].conductance_s - 8e-4).abs() < 1e-12, "{starts:?}");
     }
 }
