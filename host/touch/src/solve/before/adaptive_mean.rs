@@ -11,12 +11,12 @@
 //! readings, which finds a contact that comes or goes, and along the derivatives of the readings by the place and by the strength of
 //! each contact that is known, which finds much less. Where they differ, the frames before are forgotten.
 
+mod moves;
+
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
-
-use crate::solve::fit::dot::dot;
+use self::moves::Moves;
 use crate::solve::fit::policy;
 use tactomo_physics::detector::Adc;
 use tactomo_physics::readings::{Readings, Says};
@@ -29,8 +29,6 @@ const AVERAGED: usize = 5;
 const FIRST_FRAMES: usize = 16;
 /// Terms of the series of the error by rounding: they leave out less than 1 %.
 const TERMS: u32 = 50;
-/// Parameters of a contact that are tested together: the place, and the strength with the size.
-const TOGETHER: usize = 2;
 
 /// The mean of the newest frames of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,15 +60,6 @@ struct Difference {
     overall: f64,
     /// Largest square of the Mahalanobis length of what two parameters of a contact have changed by.
     of_contacts: f64,
-}
-
-/// What contacts that are known would change when they move.
-struct Moves<'a> {
-    /// Derivatives of the readings by their parameters (V).
-    slopes_v: &'a [Vec<f64>],
-    /// Covariance of the parameters by a reading's noise.
-    covariance: DMatrix<f64>,
-    variance_v2: f64,
 }
 
 impl Mean {
@@ -250,40 +239,6 @@ fn windows(frames: usize) -> impl Iterator<Item = usize> {
     powers.chain(std::iter::once(half))
 }
 
-impl<'a> Moves<'a> {
-    /// Of contacts by whose parameters readings have the derivatives `slopes_v` (V); `None` if there are none. No parameter is expected
-    /// to change by more than about one, which is a radius, or a factor of e.
-    fn new(slopes_v: &'a [Vec<f64>], noise_v: f64) -> Option<Self> {
-        let size = slopes_v.len();
-        let variance_v2 = noise_v * noise_v;
-        let mut normal = DMatrix::identity(size, size);
-        for i in 0..size {
-            for j in 0..=i {
-                let product = dot(&slopes_v[i], &slopes_v[j]) / variance_v2;
-                normal[(i, j)] += product;
-                normal[(j, i)] = normal[(i, j)];
-            }
-        }
-        let covariance = Cholesky::new(normal).filter(|_| size > 0)?.inverse();
-        Some(Self { slopes_v, covariance, variance_v2 })
-    }
-
-    /// Largest square of the Mahalanobis length of what parameters that belong together have changed by, if the readings have by `change_v`.
-    fn largest(&self, change_v: &[f64]) -> f64 {
-        let along = self.slopes_v.iter().map(|slope| dot(slope, change_v) / self.variance_v2);
-        let change = &self.covariance * DVector::from_iterator(self.slopes_v.len(), along);
-        let pairs = (0..self.slopes_v.len() / TOGETHER).map(|pair| TOGETHER * pair);
-        pairs.map(|start| self.square_length(&change, start)).fold(0.0, f64::max)
-    }
-
-    fn square_length(&self, change: &DVector<f64>, start: usize) -> f64 {
-        let of = |i: usize, j: usize| self.covariance[(start + i, start + j)];
-        let (a, b) = (change[start], change[start + 1]);
-        let determinant = of(0, 0) * of(1, 1) - of(0, 1) * of(1, 0);
-        (a * a * of(1, 1) - 2.0 * a * b * of(0, 1) + b * b * of(0, 0)) / determinant.max(f64::MIN_POSITIVE)
-    }
-}
-
 /// Standard deviation of what rounding to codes leaves in the mean of any number of readings (V): noise of half a code takes nearly all
 /// of it away, none leaves the root of 1/12 (Widrow and Kollar, Quantization noise, 2008: a Fourier series of the mean error, damped by the
 /// characteristic function of the noise).
@@ -298,6 +253,7 @@ pub(crate) fn rounding_v(adc: &Adc) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solve::fit::dot::dot;
 
     const NOISE_V: f64 = 1e-3;
     const READINGS: usize = 256;

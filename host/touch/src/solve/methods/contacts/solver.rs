@@ -1,10 +1,12 @@
 //! Contacts from frame to frame: followed, and searched where following does not explain the readings.
 
 mod by_rows;
+mod frame_tracker;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use self::frame_tracker::FrameTracker;
 use super::discs::DiscFit;
 use super::doubt::Doubt;
 use super::keep::needed;
@@ -13,16 +15,14 @@ use super::window::KeyFrames;
 use super::{ContactFinder, ContactHypothesis, ContactSettings};
 use crate::solve::after::association::Association;
 use crate::solve::answer::{Calibrated, FoundContact, Solution, SolveError};
-use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
+use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::before::latest::Latest;
 use crate::solve::fit::approximation::ApproximationError;
 use crate::solve::fit::evidence::Evidence;
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use crate::solve::problem::Problem;
-use crate::solve::solver::{
-    Followed, Hypothesis, Parts, Search, Solver, Tracker, follow_and_search, follow_rows_and_search,
-};
+use crate::solve::solver::{Hypothesis, Parts, Search, Solver, Tracker, follow_and_search, follow_rows_and_search};
 use tactomo_physics::forward::ForwardError;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
@@ -30,12 +30,6 @@ use tactomo_physics::scene::Contact;
 /// Fits contacts.
 pub struct Contacts {
     tracker: FrameTracker,
-}
-
-/// Follows contacts in the mean of the frames that stand still.
-struct FrameTracker {
-    average: AdaptiveMean,
-    contacts: ContactTracker,
 }
 
 /// Follows contacts from frame to frame.
@@ -322,64 +316,6 @@ impl ContactTracker {
         self.latest = None;
         self.association.reset();
         self.before = self.association.clone();
-    }
-}
-
-impl FrameTracker {
-    fn target(&self, readings: &Readings) -> Result<Target, SolveError> {
-        self.contacts.finder.target_of(&self.average.mean_or(readings), self.contacts.error())
-    }
-}
-
-impl Tracker for FrameTracker {
-    fn follow(&mut self, readings: &Readings) -> Result<Followed, SolveError> {
-        self.contacts.finder.check(readings)?;
-        self.average.add_beside(readings, self.contacts.slopes_v());
-        let target = self.target(readings)?;
-        let search = self.contacts.follow(&target);
-        Ok(Followed { solution: self.contacts.solution(&target), search })
-    }
-
-    fn follow_rows(&mut self, rows: &Readings, _latest: &Readings, elapsed_s: f64) -> Result<Followed, SolveError> {
-        self.average.reset();
-        self.contacts.follow_rows(rows, elapsed_s)
-    }
-
-    fn adopt(&mut self, hypothesis: Hypothesis, readings: &Readings) -> Result<Followed, SolveError> {
-        let hypothesis: FrameHypothesis = hypothesis.known();
-        self.contacts.finder.check(readings)?;
-        match self.contacts.latest() {
-            Some(latest) => self.average.add(&latest.readings),
-            None => self.average.add_beside(readings, self.contacts.slopes_v()),
-        }
-        self.contacts.searched_in(hypothesis.mean.as_ref());
-        let error = hypothesis.contacts.as_ref().and_then(|found| found.error()).or(self.contacts.error());
-        let target = self.contacts.finder.target_of(&self.average.mean_or(readings), error)?;
-        let frames = hypothesis.mean.as_ref().map_or(1, |mean| mean.frames);
-        let search = self.contacts.adopt(hypothesis.contacts.map(|found| *found), frames, &target);
-        Ok(Followed { solution: self.contacts.solution(&target), search })
-    }
-
-    fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
-        self.contacts.telling_grounds(count)
-    }
-
-    fn has_news(&self) -> bool {
-        self.contacts.has_news()
-    }
-
-    fn hypothesis(&self) -> Hypothesis {
-        let mean = self.contacts.latest().or_else(|| self.average.mean());
-        Hypothesis::of(FrameHypothesis::new(self.contacts.found(), mean))
-    }
-
-    fn inherit(&mut self, before: &[FoundContact]) {
-        self.contacts.inherit(before);
-    }
-
-    fn reset(&mut self) {
-        self.average.reset();
-        self.contacts.reset();
     }
 }
 

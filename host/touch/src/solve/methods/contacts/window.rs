@@ -19,7 +19,7 @@ use std::sync::Arc;
 use self::frames::Window;
 pub(super) use self::key_frames::{KeyFrame, KeyFrames};
 use self::together::{Motion, Together};
-use super::discs::{Effort, STAYING, Still, place_m};
+use super::discs::{DiscFit, Effort, STAYING, Still, place_m};
 use super::search::{COLD, FINALISTS};
 use super::{Certainty, ContactFinder, ContactHypothesis};
 use crate::solve::fit::approximation::Linearised;
@@ -163,39 +163,36 @@ impl Window<'_> {
     /// One contact more that stays: the likeliest from where it would explain most of all frames, and of the one that is explained worst. No single frame
     /// tells well where it is, and what all tell is linear.
     fn one_more(&self, found: &Together) -> Option<Together> {
-        let of_all = self.starts_in_all(found).unwrap_or_default().into_iter();
-        let starts = of_all.chain(self.start_in_worst(found));
+        let alone = found.at.fits.iter().zip(&self.frames);
+        let alone =
+            alone.map(|(fit, frame)| self.fitter.go_on(fit, &frame.alone, AS_IT_IS)).collect::<Option<Vec<_>>>()?;
+        let of_all = self.starts_in_all(&alone).unwrap_or_default().into_iter();
+        let starts = of_all.chain(self.start_in_worst(&alone));
         let all = starts.filter_map(|start| self.explained(start, Motion::Still));
         all.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
     }
 
     /// Contacts in each frame, with one more where it would explain most of all.
-    fn starts_in_all(&self, found: &Together) -> Option<Vec<Vec<Vec<Contact>>>> {
+    fn starts_in_all(&self, alone: &[DiscFit]) -> Option<Vec<Vec<Vec<Contact>>>> {
         let finder = self.finder;
-        let looks = found.at.fits.iter().zip(&self.frames).map(|(fit, frame)| {
-            let fit = self.fitter.go_on(fit, &frame.alone, AS_IT_IS)?;
-            finder.looks_beside(&fit, &frame.alone)
-        });
+        let looks = alone.iter().zip(&self.frames).map(|(fit, frame)| finder.looks_beside(fit, &frame.alone));
         let looks: Vec<_> = looks.collect::<Option<_>>()?;
         let places = finder.scan.staying(&looks, FINALISTS, finder.apart_m());
         let start = |place| {
             let more = finder.discs_of(&finder.scan.start(&looks[0], place));
-            let with_more = |contacts: Vec<Contact>| contacts.into_iter().chain(more.iter().copied()).collect();
-            found.at.contacts().into_iter().map(with_more).collect()
+            alone.iter().map(|fit| fit.contacts.iter().chain(&more).copied().collect()).collect()
         };
         Some(places.iter().map(start).collect())
     }
 
     /// Contacts in each frame, with one more as the frame that is explained worst has it by itself.
-    fn start_in_worst(&self, found: &Together) -> Option<Vec<Vec<Contact>>> {
-        let left = |index: &usize| self.frames[*index].alone.cost(&found.at.fits[*index].volts);
-        let worst = (0..self.frames.len()).max_by(|a, b| left(a).total_cmp(&left(b)))?;
-        let alone = &self.frames[worst].alone;
-        let fit = self.fitter.go_on(&found.at.fits[worst], alone, AS_IT_IS)?;
-        let more = self.finder.one_more(&fit, Vec::new(), alone).ok()?;
+    fn start_in_worst(&self, alone: &[DiscFit]) -> Option<Vec<Vec<Contact>>> {
+        let (worst, frame) =
+            alone.iter().zip(&self.frames).max_by(|(one, _), (other, _)| one.cost.total_cmp(&other.cost))?;
+        let more = self.finder.one_more(worst, Vec::new(), &frame.alone).ok()?;
         // What changes is where they are; how much firmer each is in other frames stays as it was.
-        let start = found.at.fits.iter().map(|fit| {
-            let ratios = fit.contacts.iter().zip(&found.at.fits[worst].contacts);
+        let start = alone.iter().map(|fit| {
+            let ratios = fit.contacts.iter().zip(&worst.contacts);
             let ratios = ratios.map(|(here, there)| here.conductance_s / there.conductance_s);
             let pairs = more.contacts.iter().zip(ratios.chain(std::iter::repeat(1.0)));
             pairs.map(|(one, ratio)| Contact { conductance_s: ratio * one.conductance_s, ..*one }).collect()
