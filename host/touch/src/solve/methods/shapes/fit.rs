@@ -22,10 +22,10 @@ const LONGEST_LOG: f64 = 0.5;
 const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-6, tries: 5 };
 /// Share of the sum that a step gains below which it is the last.
 const LEAST_GAIN: f64 = 2e-3;
-/// A descent that is so many times above its bound may hope for a factor that is this power of what its last step brought. A step that was cut
-/// short brings too little to tell: lines that would have fitted were given up after their first.
+/// A descent that is so many times above its bound may hope for a factor that is this power of what its last step brought, and where that was cut short,
+/// of what a whole one would have: without regard to that, lines that would have fitted were given up after their first step.
 const FAR: f64 = 100.0;
-const HOPE: i32 = 12;
+const HOPE: f64 = 12.0;
 /// Narrowest strip, in usual widths: below, the readings no longer tell.
 const NARROWEST: f64 = 0.02;
 /// Widest strip, in mean distances of electrodes: what is wider is a disc's or an image's business.
@@ -108,8 +108,8 @@ struct Descent<'a> {
     target: &'a Target,
     /// It is given up where it will hardly come below this sum.
     most: f64,
-    /// Whether the step tried last was longer than a step may be.
-    was_cut: bool,
+    /// What was taken of the step that was tried last.
+    share: f64,
 }
 
 impl LeastSquares for Descent<'_> {
@@ -124,9 +124,8 @@ impl LeastSquares for Descent<'_> {
     }
 
     fn moved(&mut self, from: &Look, step: &DVector<f64>) -> Option<Look> {
-        let share = self.fitter.share_of(&from.laid.strip, step.as_slice());
-        self.was_cut = share < 1.0;
-        let laid = self.fitter.lay(from.laid.strip.moved((step * share).as_slice()))?;
+        self.share = self.fitter.share_of(&from.laid.strip, step.as_slice());
+        let laid = self.fitter.lay(from.laid.strip.moved((step * self.share).as_slice()))?;
         Some(self.fitter.look(laid, self.target))
     }
 
@@ -136,7 +135,8 @@ impl LeastSquares for Descent<'_> {
 
     fn goes_on(&self, before: &Look, after: &Look, _equations: &NormalEquations) -> bool {
         let (before, after) = (self.sum(before), self.sum(after));
-        let may_come_below = self.was_cut || after < FAR * self.most || after * (after / before).powi(HOPE) < self.most;
+        let hoped = after * (after / before).powf(HOPE / self.share);
+        let may_come_below = after < FAR * self.most || hoped < self.most;
         before - after >= LEAST_GAIN * before && may_come_below
     }
 }
@@ -159,7 +159,7 @@ impl StripFitter<'_> {
     /// The same, given up where it will hardly come below a sum of squares.
     pub fn fit_below(&self, most: f64, start: Laid, target: &Target, steps: usize) -> StripFit {
         let start = self.look(start, target);
-        let found = minimise(&mut Descent { fitter: self, target, most, was_cut: false }, start, steps, SCHEDULE);
+        let found = minimise(&mut Descent { fitter: self, target, most, share: 1.0 }, start, steps, SCHEDULE);
         let Minimum { at: look, matrix, settled } = found;
         let cost = look.residuals.rows(0, look.laid.volts.len()).norm_squared();
         StripFit { laid: look.laid, cost, covariance: matrix.as_ref().and_then(covariance), settled }
