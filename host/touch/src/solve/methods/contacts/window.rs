@@ -52,8 +52,8 @@ impl ContactFinder {
         (followed[0].len() > 1).then_some(())?;
         let (middle, spread_m) = middle(&followed);
         let near = from.error.as_ref().and_then(|error| error.linearised.clone());
-        let (window, growing) = self.window_of(keys, near, &followed, spread_m)?;
-        let (best, by_count) = window.grown(&middle, &growing, spread_m)?;
+        let (window, still, growing) = self.window_of(keys, near, &followed, (&middle, spread_m))?;
+        let (best, by_count) = window.grown(&middle, (still, growing), spread_m)?;
         (best.count() > followed[0].len() && window.fits(&best)).then_some(())?;
         let last = best.at.fits.last()?;
         let contacts = last.contacts.clone();
@@ -66,20 +66,25 @@ impl ContactFinder {
         (!self.is_misfit(&found.fit, &target)).then_some(found)
     }
 
-    /// Key frames that the contacts that are followed explain if they move, as they explain each by itself. Where they do not explain all,
-    /// readings are linear near another detector, or no verdict is possible.
+    /// Key frames that the contacts that are followed explain if they move, as they explain each by itself, with how they explain
+    /// them as they stay and as they move; `None` if they explain them as well as they stay. Where they do not even if they move, readings are linear near
+    /// another detector, or no verdict is possible.
     fn window_of(
         &self,
         keys: &[KeyFrame],
         mut near: Option<Arc<Linearised>>,
         followed: &[Vec<Contact>],
-        spread_m: f64,
-    ) -> Option<(Window<'_>, Together)> {
+        (middle, spread_m): (&[Contact], f64),
+    ) -> Option<(Window<'_>, Together, Together)> {
         for _ in 0..RENEWALS {
             let window = Window::new(self, keys, near)?;
+            let still = window.explained(vec![middle.to_vec(); keys.len()], Motion::Still)?;
+            if !window.may_be_more(&still, spread_m) {
+                return None;
+            }
             let growing = window.explained(followed.to_vec(), Motion::Growing(spread_m))?;
             if window.fits(&growing) {
-                return Some((window, growing));
+                return Some((window, still, growing));
             }
             near = Some(window.nearer(&growing)?);
         }
@@ -117,22 +122,25 @@ fn middle(frames: &[Vec<Contact>]) -> (Vec<Contact>, f64) {
 impl Window<'_> {
     /// The likeliest number of contacts that stay, from as many as are followed; their rival is that those move, grow or not. Gives the logarithm of the
     /// evidence for each count too.
-    fn grown(&self, from: &[Contact], growing: &Together, spread_m: f64) -> Option<(Together, Vec<f64>)> {
-        let still = self.explained(vec![from.to_vec(); self.frames.len()], Motion::Still)?;
-        // What has gone far is not explained by contacts that stay. And frame by frame one more is hardly told from contacts that move and grow, so that it
-        // explains about as much as those.
+    fn grown(
+        &self,
+        from: &[Contact],
+        (still, growing): (Together, Together),
+        spread_m: f64,
+    ) -> Option<(Together, Vec<f64>)> {
+        // What has gone far is not explained by contacts that stay.
         let is_near = still.at.cost < policy::wrong_mean_square() * self.count();
         let may_gain = still.at.cost - growing.at.cost > 2.0 * policy::gone_nats();
         (is_near && may_gain).then_some(())?;
         let moving = self.explained(of_radii(growing.at.contacts(), from), Motion::Moving(spread_m));
-        let rivals = [Some(growing), moving.as_ref(), Some(&still)].into_iter().flatten();
+        let rivals = [Some(&growing), moving.as_ref(), Some(&still)].into_iter().flatten();
         let rival = rivals.map(|rival| rival.ln_evidence).fold(f64::NEG_INFINITY, f64::max);
         let mut by_count = vec![f64::NEG_INFINITY; self.finder.settings.most + 1];
         by_count[still.count()] = rival;
         let needed = |found: &Together| rival + policy::gone_nats() * (found.count() - from.len()) as f64;
         let (mut best, mut last) = (None, still);
         while last.count() < self.finder.settings.most {
-            let Some(more) = self.one_more(&last).filter(|more| self.may_be(more)) else { break };
+            let Some(more) = self.one_more(&last, spread_m).filter(|more| self.may_be(more)) else { break };
             by_count[more.count()] = more.ln_evidence;
             let is_worse = more.ln_evidence < last.ln_evidence;
             last = more;
@@ -140,7 +148,7 @@ impl Window<'_> {
             if gain > best.as_ref().map_or(0.0, |best: &Together| best.ln_evidence - needed(best)) {
                 best = Some(last.clone());
             }
-            if is_worse {
+            if is_worse || !self.may_be_more(&last, spread_m) {
                 break;
             }
         }
@@ -160,15 +168,19 @@ impl Window<'_> {
         are_apart && lightest - firmest > unknown.ln()
     }
 
-    /// One contact more that stays: the likeliest from where it would explain most of all frames, and of the one that is explained worst. No single frame
-    /// tells well where it is, and what all tell is linear.
-    fn one_more(&self, found: &Together) -> Option<Together> {
+    /// One contact more that stays: as the frame that is explained worst has it by itself if that explains all frames, else the likeliest of that and of where
+    /// it would explain most of all. No single frame tells well where it is, and what all tell is linear.
+    fn one_more(&self, found: &Together, spread_m: f64) -> Option<Together> {
         let alone = found.at.fits.iter().zip(&self.frames);
         let alone =
             alone.map(|(fit, frame)| self.fitter.go_on(fit, &frame.alone, AS_IT_IS)).collect::<Option<Vec<_>>>()?;
-        let of_all = self.starts_in_all(&alone).unwrap_or_default().into_iter();
-        let starts = of_all.chain(self.start_in_worst(&alone));
-        let all = starts.filter_map(|start| self.explained(start, Motion::Still));
+        let explained = |start| self.explained(start, Motion::Still);
+        let of_worst = self.start_in_worst(&alone).and_then(explained);
+        if of_worst.as_ref().is_some_and(|found| !self.may_be_more(found, spread_m)) {
+            return of_worst;
+        }
+        let of_all = self.starts_in_all(&alone).unwrap_or_default();
+        let all = of_all.into_iter().filter_map(explained).chain(of_worst);
         all.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
     }
 
@@ -198,6 +210,13 @@ impl Window<'_> {
             pairs.map(|(one, ratio)| Contact { conductance_s: ratio * one.conductance_s, ..*one }).collect()
         });
         Some(start.collect())
+    }
+
+    /// Whether there may be more contacts than some that stay: frame by frame one more is hardly told from that those move and grow, and explains about as
+    /// much.
+    fn may_be_more(&self, still: &Together, spread_m: f64) -> bool {
+        let gain = || self.gain_by_motion(still, Motion::Growing(spread_m));
+        !self.fits(still) || gain().is_some_and(|gain| gain > 2.0 * policy::gone_nats())
     }
 
     /// Readings that count.

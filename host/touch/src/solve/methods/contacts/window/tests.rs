@@ -177,3 +177,32 @@ fn a_window_begun_before_it_was_known_what_is_unknown_of_the_detector_ends_as_it
     }
     assert!(window.nearer(&growing).is_none(), "readings were taken as of a detector that is known");
 }
+
+/// What motion is expected to gain is what it gains, and nothing where contacts stay: a little less than noise, which stands for the model's error too.
+#[test]
+fn motion_gains_what_its_score_says_and_nothing_where_contacts_stay() {
+    let solver = solver();
+    let finder = solver.finder();
+    let growing = Motion::Growing(3e-4);
+    let score = |seed: u64, moved_m: f64| {
+        let mut noise = Noise::new(seed);
+        let key = |(index, sheets): (usize, f64)| {
+            let away_m = moved_m * (index % 2) as f64;
+            let first = contact(-0.012 + away_m, -0.002, sheets);
+            let contacts = vec![first, contact(0.01, 0.005, 0.5 - sheets)];
+            KeyFrame { mean: Mean::of_frame(&frame(&contacts, &mut noise)), contacts }
+        };
+        let keys: Vec<_> = [0.1, 0.2, 0.3, 0.4].into_iter().enumerate().map(key).collect();
+        let window = Window::new(finder, &keys, None).unwrap();
+        let followed: Vec<_> = keys.iter().map(|key| key.contacts.clone()).collect();
+        let still = window.explained(vec![middle(&followed).0; keys.len()], Motion::Still).unwrap();
+        let moving = window.explained(followed, growing).unwrap();
+        (window.gain_by_motion(&still, growing).unwrap(), still.at.squares() - moving.at.squares())
+    };
+    let still: Vec<f64> = (0..40).map(|seed| score(seed, 0.0).0).collect();
+    let mean = still.iter().sum::<f64>() / 40.0;
+    let largest = still.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    assert!((-6.0..1.0).contains(&mean) && largest < 2.0 * policy::gone_nats(), "{mean} {largest}");
+    let (expected, gained) = score(1, 5e-4);
+    assert!(expected > 2.0 * policy::gone_nats() && (expected / gained - 1.0).abs() < 0.3, "{expected} of {gained}");
+}

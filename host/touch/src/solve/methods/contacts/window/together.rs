@@ -20,6 +20,8 @@ use tactomo_physics::space;
 /// finger that has moved ends 6 mm off.
 const STEPS: usize = 80;
 const WORTH: f64 = 0.1;
+/// What of frames' own steps is tried after a try that led nowhere.
+const SHORTER: f64 = 0.3;
 const SCHEDULE: Schedule = Schedule { first: 1e-3, least: 1e-7, tries: 6 };
 
 /// How contacts may differ from frame to frame besides in strength.
@@ -59,8 +61,22 @@ struct Equations {
     own: DVector<f64>,
     /// How much less that is by a step of what they have in common.
     own_by_common: DMatrix<f64>,
-    /// Logarithm of the determinant of what is each frame's own.
-    ln_determinant: f64,
+    /// What is each frame's own.
+    inner: Cholesky<f64, Dyn>,
+}
+
+impl Equations {
+    /// By how much whole steps of what frames have in common, and of what is each frame's own, lower the sum of squares if readings are linear.
+    fn gains(&self) -> Option<[f64; 2]> {
+        let own = self.inner.l().tr_mul(&self.own).norm_squared();
+        Some([self.common.step(0.0)?.dot(&self.common.gradient), own])
+    }
+
+    /// Whether steps are worth nothing more: of frames' own parameters, a square each, which noise makes of them.
+    fn are_settled(&self) -> Option<bool> {
+        let [common, own] = self.gains()?;
+        Some(common < WORTH && own < self.own.nrows() as f64)
+    }
 }
 
 /// An explanation of all frames.
@@ -74,7 +90,7 @@ pub(super) struct Together {
 
 impl Point {
     /// What a descent lowers.
-    fn squares(&self) -> f64 {
+    pub fn squares(&self) -> f64 {
         self.cost + self.known
     }
 
@@ -109,12 +125,15 @@ impl Window<'_> {
         let mut damping = Damping::new(SCHEDULE);
         let mut is_renewed = true;
         for _ in 0..STEPS {
-            if equations.common.step(0.0)?.dot(&equations.common.gradient) < WORTH {
+            if equations.are_settled()? {
                 break;
             }
-            let next = damping.step(&equations.common, |step| match self.moved(&at, &equations, step, motion) {
-                Some(next) if next.squares() < at.squares() => Trial::Accepted(next),
-                _ => Trial::Rejected,
+            // What is each frame's own is not damped: each try takes less of that.
+            let mut of_own = 1.0;
+            let next = damping.step(&equations.common, |step| {
+                let next = self.moved(&at, &equations, (step, of_own), motion);
+                of_own *= SHORTER;
+                next.filter(|next| next.squares() < at.squares()).map_or(Trial::Rejected, Trial::Accepted)
             });
             let gained = next.as_ref().map_or(0.0, |next| at.squares() - next.squares());
             at = next.unwrap_or(at);
@@ -243,8 +262,7 @@ impl Window<'_> {
             (0..discs).for_each(|column| matrix[(row, column)] = matrix[(column, row)]);
         }
         self.add_known(at, &mut matrix, &mut gradient);
-        let ln_determinant = factor.ln_determinant();
-        Some(Equations { common: NormalEquations { matrix, gradient }, own, own_by_common, ln_determinant })
+        Some(Equations { common: NormalEquations { matrix, gradient }, own, own_by_common, inner: factor })
     }
 
     /// Information of all frames about what is each frame's own, one frame after the other.
@@ -280,9 +298,15 @@ impl Window<'_> {
         }
     }
 
-    /// All frames' contacts after a step of what they have in common, and of each frame's own that follows.
-    fn moved(&self, at: &Point, equations: &Equations, step: &DVector<f64>, motion: Motion) -> Option<Point> {
-        let own = &equations.own - &equations.own_by_common * step;
+    /// All frames' contacts after a step of what they have in common, and of each frame's own that follows, with so much of what that would take besides.
+    fn moved(
+        &self,
+        at: &Point,
+        equations: &Equations,
+        (step, of_own): (&DVector<f64>, f64),
+        motion: Motion,
+    ) -> Option<Point> {
+        let own = &equations.own * of_own - &equations.own_by_common * step;
         let of_frame = |(index, fit): (usize, &DiscFit)| {
             let mut all = step.rows(0, PARAMETERS * fit.contacts.len()).into_owned();
             let (parameters, _) = self.own_parameters(fit, motion);
@@ -298,6 +322,22 @@ impl Window<'_> {
         };
         let fits = at.fits.iter().zip(&steps).zip(&self.frames).map(moved).collect::<Option<_>>()?;
         self.at(fits, motion)
+    }
+
+    /// By how much more than noise alone makes of it the sum of squares would be lowered if what stays moved: Rao's score, less what is expected of it.
+    pub fn gain_by_motion(&self, still: &Together, motion: Motion) -> Option<f64> {
+        let of = |motion| {
+            let equations = self.equations(&still.at, motion)?;
+            Some(equations.gains()?.iter().sum::<f64>() - self.determined(&still.at, &equations, motion))
+        };
+        Some(of(motion)? - of(Motion::Still)?)
+    }
+
+    /// How many of frames' own parameters the readings determine, which explain as many squares of noise: what is known of them before does the rest.
+    fn determined(&self, at: &Point, equations: &Equations, motion: Motion) -> f64 {
+        let before = at.fits.iter().flat_map(|fit| self.own_parameters(fit, motion).1);
+        let after = equations.inner.inverse().diagonal();
+        before.zip(after.iter()).map(|(before, after)| 1.0 - after / (before * before)).sum()
     }
 
     /// An explanation with the logarithm of its evidence.
@@ -321,7 +361,7 @@ impl Window<'_> {
             + peaks_of_own
             + orders
             + 0.5 * parameters as f64 * TAU.ln()
-            - 0.5 * (equations.ln_determinant + common.ln_determinant());
+            - 0.5 * (equations.inner.ln_determinant() + common.ln_determinant());
         Some(Together { ln_evidence, common, at })
     }
 }
