@@ -52,7 +52,7 @@ impl ContactFinder {
         (followed[0].len() > 1).then_some(())?;
         let (middle, spread_m) = middle(&followed);
         let near = from.error.as_ref().and_then(|error| error.linearised.clone());
-        let (window, still, growing) = self.window_of(keys, near, &followed, (&middle, spread_m))?;
+        let (window, still, growing) = self.window_of(keys, near, &middle, spread_m)?;
         let (best, by_count) = window.grown(&middle, (still, growing), spread_m)?;
         (best.count() > followed[0].len() && window.fits(&best)).then_some(())?;
         let last = best.at.fits.last()?;
@@ -73,8 +73,8 @@ impl ContactFinder {
         &self,
         keys: &[KeyFrame],
         mut near: Option<Arc<Linearised>>,
-        followed: &[Vec<Contact>],
-        (middle, spread_m): (&[Contact], f64),
+        middle: &[Contact],
+        spread_m: f64,
     ) -> Option<(Window<'_>, Together, Together)> {
         for _ in 0..RENEWALS {
             let window = Window::new(self, keys, near)?;
@@ -82,7 +82,7 @@ impl ContactFinder {
             if !window.may_be_more(&still, spread_m) {
                 return None;
             }
-            let growing = window.explained(followed.to_vec(), Motion::Growing(spread_m))?;
+            let growing = window.explained(still.at.contacts(), Motion::Growing(spread_m))?;
             if window.fits(&growing) {
                 return Some((window, still, growing));
             }
