@@ -66,9 +66,8 @@ impl ContactFinder {
         (!self.is_misfit(&found.fit, &target)).then_some(found)
     }
 
-    /// Key frames that the contacts that are followed explain if they move, as they explain each by itself, with how they explain
-    /// them as they stay and as they move; `None` if they explain them as well as they stay. Where they do not even if they move, readings are linear near
-    /// another detector, or no verdict is possible.
+    /// Key frames with how the contacts that are followed explain them if these stay and if they move; `None` if staying explains them as well. Where not even
+    /// moving explains them, readings are linear near another detector, or no verdict is possible.
     fn window_of(
         &self,
         keys: &[KeyFrame],
@@ -129,9 +128,7 @@ impl Window<'_> {
         spread_m: f64,
     ) -> Option<(Together, Vec<f64>)> {
         // What has gone far is not explained by contacts that stay.
-        let is_near = still.at.cost < policy::wrong_mean_square() * self.count();
-        let may_gain = still.at.cost - growing.at.cost > 2.0 * policy::gone_nats();
-        (is_near && may_gain).then_some(())?;
+        (still.at.cost < policy::wrong_mean_square() * self.count()).then_some(())?;
         let moving = self.explained(of_radii(growing.at.contacts(), from), Motion::Moving(spread_m));
         let rivals = [Some(&growing), moving.as_ref(), Some(&still)].into_iter().flatten();
         let rival = rivals.map(|rival| rival.ln_evidence).fold(f64::NEG_INFINITY, f64::max);
@@ -140,7 +137,8 @@ impl Window<'_> {
         let needed = |found: &Together| rival + policy::gone_nats() * (found.count() - from.len()) as f64;
         let (mut best, mut last) = (None, still);
         while last.count() < self.finder.settings.most {
-            let Some(more) = self.one_more(&last, spread_m).filter(|more| self.may_be(more)) else { break };
+            let more = self.one_more(&last, spread_m).filter(|(more, _)| self.may_be(more));
+            let Some((more, may_be_more)) = more else { break };
             by_count[more.count()] = more.ln_evidence;
             let is_worse = more.ln_evidence < last.ln_evidence;
             last = more;
@@ -148,7 +146,7 @@ impl Window<'_> {
             if gain > best.as_ref().map_or(0.0, |best: &Together| best.ln_evidence - needed(best)) {
                 best = Some(last.clone());
             }
-            if is_worse || !self.may_be_more(&last, spread_m) {
+            if is_worse || !may_be_more {
                 break;
             }
         }
@@ -168,20 +166,24 @@ impl Window<'_> {
         are_apart && lightest - firmest > unknown.ln()
     }
 
-    /// One contact more that stays: as the frame that is explained worst has it by itself if that explains all frames, else the likeliest of that and of where
-    /// it would explain most of all. No single frame tells well where it is, and what all tell is linear.
-    fn one_more(&self, found: &Together, spread_m: f64) -> Option<Together> {
+    /// One contact more that stays, and whether there may be more of them: as the frame that is explained worst has it by itself if that leaves nothing to explain,
+    /// else the likeliest of that and of where it would explain most of all. No single frame tells well where it is, and what all tell is linear.
+    fn one_more(&self, found: &Together, spread_m: f64) -> Option<(Together, bool)> {
         let alone = found.at.fits.iter().zip(&self.frames);
         let alone =
             alone.map(|(fit, frame)| self.fitter.go_on(fit, &frame.alone, AS_IT_IS)).collect::<Option<Vec<_>>>()?;
-        let explained = |start| self.explained(start, Motion::Still);
+        let explained = |start| {
+            let found = self.explained(start, Motion::Still)?;
+            let may_be_more = self.may_be_more(&found, spread_m);
+            Some((found, may_be_more))
+        };
         let of_worst = self.start_in_worst(&alone).and_then(explained);
-        if of_worst.as_ref().is_some_and(|found| !self.may_be_more(found, spread_m)) {
+        if let Some((_, false)) = of_worst {
             return of_worst;
         }
         let of_all = self.starts_in_all(&alone).unwrap_or_default();
         let all = of_all.into_iter().filter_map(explained).chain(of_worst);
-        all.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
+        all.max_by(|(a, _), (b, _)| a.ln_evidence.total_cmp(&b.ln_evidence))
     }
 
     /// Contacts in each frame, with one more where it would explain most of all.
@@ -212,7 +214,7 @@ impl Window<'_> {
         Some(start.collect())
     }
 
-    /// Whether there may be more contacts than some that stay: frame by frame one more is hardly told from that those move and grow, and explains about as
+    /// Whether there may be more contacts than some that stay: frame by frame one more is hardly told from these moving and growing, which explains about as
     /// much.
     fn may_be_more(&self, still: &Together, spread_m: f64) -> bool {
         let gain = || self.gain_by_motion(still, Motion::Growing(spread_m));
