@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, ensure};
 use tactomo::detector::{Detector, Stack};
-use tactomo::hertz::{Hertz, POISSON, SURFACE_DEPTH_M, Skin};
+use tactomo::hertz::{Hertz, POISSON, Skin, Surface};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
@@ -35,9 +35,10 @@ pub struct SceneArgs {
     /// Poisson's ratio of the detector, for forces
     #[arg(long, value_name = "RATIO", default_value_t = POISSON)]
     poisson: f64,
-    /// Depth of the surface layer that a contact's current crosses, for forces (mm)
-    #[arg(long, value_name = "MM", default_value_t = SURFACE_DEPTH_M * 1e3, value_parser = positive)]
-    surface_depth: f64,
+    /// What the surface conducts under pressure, for forces: measured, as in the paper's table II, or ideal, all that touches alike down to 0.5 mm or to the
+    /// depth in ideal:MM [default: measured; demonstrations without --force press an ideal one, as the paper gives none of their forces]
+    #[arg(long, value_name = "LAW", value_parser = law)]
+    surface: Option<Law>,
     /// A fault: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2,
     /// clip:0.14,1.8 (V); of the driving layer: driving-sheet:100 (ohm/sq), connected at one corner, driving-sheet:100:2 at two, leak:0.01 (sheet
     /// conductances in all); of the foam in time: creep:0.2:3 (share, time constant in s), hysteresis:0.1 (share), drift:0.2:86400
@@ -54,7 +55,7 @@ pub struct SceneArgs {
 impl SceneArgs {
     /// Names of the arguments.
     pub const NAMES: [&str; 9] =
-        ["scene", "force", "tip", "elasticity", "poisson", "surface_depth", "fault", AsBuiltArgs::NAME, "seed"];
+        ["scene", "force", "tip", "elasticity", "poisson", "surface", "fault", AsBuiltArgs::NAME, "seed"];
 
     /// The seed.
     pub fn seed(&self) -> u64 {
@@ -85,7 +86,11 @@ impl SceneArgs {
         let Some(force_n) = self.force else {
             let hand = Hand::relative(detector);
             let is_known = self.elasticity.is_some() || foams.is_some();
-            return Ok(if is_known { hand.on(self.hertz(foams, detector)?) } else { hand });
+            return Ok(if is_known {
+                hand.on(self.hertz_on(Law::Ideal(Surface::IDEAL), foams, detector)?)
+            } else {
+                hand
+            });
         };
         let radius_m = self.tip.map_or_else(|| Fingertip::fitting_m(detector), |tip_mm| tip_mm * 1e-3);
         let hand = Hand::in_newtons(detector, Fingertip { hertz: self.hertz(foams, detector)?, force_n, radius_m });
@@ -97,12 +102,41 @@ impl SceneArgs {
 
     /// Mechanics of a detector of such foams, if they are known.
     pub fn hertz(&self, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hertz> {
+        self.hertz_on(Law::Measured, foams, detector)
+    }
+
+    fn hertz_on(&self, otherwise: Law, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hertz> {
         let skin = self.elasticity.map(|mpa| Skin::of(mpa * 1e6)).or_else(|| foams.as_ref().map(Skin::from));
         let skin = skin.with_context(|| {
             format!("forces need to know how soft {} is: give --elasticity or --material", detector.name)
         })?;
-        let surface_depth_m = self.surface_depth * 1e-3;
-        Ok(Hertz::new(detector, Skin { poisson: self.poisson, surface_depth_m, ..skin })?)
+        let skin = Skin { poisson: self.poisson, ..skin };
+        Ok(Hertz::new(
+            detector,
+            match self.surface.unwrap_or(otherwise) {
+                Law::Measured => skin,
+                Law::Ideal(surface) => skin.with(surface),
+            },
+        )?)
+    }
+}
+
+/// The law of a surface that is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// That of the foam on top.
+    Measured,
+    /// An ideal one.
+    Ideal(Surface),
+}
+
+/// A law from `measured`, `ideal` or `ideal:MM`.
+pub fn law(text: &str) -> Result<Law, String> {
+    match text.split_once(':') {
+        None if text == "measured" => Ok(Law::Measured),
+        None if text == "ideal" => Ok(Law::Ideal(Surface::IDEAL)),
+        Some(("ideal", mm)) => positive(mm).map(|mm| Law::Ideal(Surface::Ideal { depth_m: mm * 1e-3 })),
+        _ => Err("measured, ideal, or ideal:MM with a depth in mm is needed".to_owned()),
     }
 }
 
@@ -163,6 +197,15 @@ mod tests {
         let press = press("3,-4,2.5,1.5").unwrap_or_else(|error| panic!("{error}"));
         assert!((press.radius_m - 0.0025).abs() < 1e-15 && press.force_n == 1.5, "{press:?}");
         assert!((press.place_m[1] + 0.004).abs() < 1e-15, "{press:?}");
+    }
+
+    #[test]
+    fn laws_of_surfaces_are_measured_or_ideal_to_a_depth() {
+        assert_eq!((law("measured"), law("ideal")), (Ok(Law::Measured), Ok(Law::Ideal(Surface::IDEAL))));
+        assert_eq!(law("ideal:0.2"), Ok(Law::Ideal(Surface::Ideal { depth_m: 0.2e-3 })));
+        for wrong in ["hertz", "ideal:", "ideal:-1", "measured:1"] {
+            assert!(law(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

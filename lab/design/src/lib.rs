@@ -8,6 +8,7 @@ pub mod claim;
 pub mod curve;
 pub mod electrodes;
 mod error;
+pub mod explain;
 mod imaging;
 mod layout;
 mod limit;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::geometry::Point;
-use tactomo_physics::hertz::{Hertz, SURFACE_DEPTH_M, Skin, SkinError};
+use tactomo_physics::hertz::{Hertz, Imprint, SURFACE_DEPTH_M, Skin, SkinError, Surface};
 use tactomo_physics::scene::Contact;
 
 /// Diameter of the paper's simulated contact (m), section III.A.
@@ -37,18 +37,30 @@ pub enum Press {
         /// The layer.
         hertz: Hertz,
     },
+    /// A flat punch on a layer of foam.
+    Flat {
+        /// Of the punch (m).
+        radius_m: f64,
+        /// The layer.
+        hertz: Hertz,
+    },
 }
 
 impl Press {
     /// The paper's simulated contact.
     pub const PAPER: Self = Self::Conductivity { radius_m: CONTACT_DIAMETER_M / 2.0 };
 
-    /// The paper's indenter on a detector of such a skin.
+    /// The paper's indenter on a detector of such a skin: flat, which fits its table II. Under a flat one an ideal surface tells no force, so on that it is a ball, as in
+    /// the paper's eq. (1).
     ///
     /// # Errors
     /// [`SkinError`] if that is no elastic layer.
     pub fn indenter(detector: &Detector, skin: Skin) -> Result<Self, SkinError> {
-        Self::ball(detector, skin, INDENTER_DIAMETER_M / 2.0)
+        let (radius_m, hertz) = (INDENTER_DIAMETER_M / 2.0, Hertz::new(detector, skin)?);
+        Ok(match skin.surface {
+            Surface::Ideal { .. } => Self::Ball { radius_m, hertz },
+            Surface::Film { .. } => Self::Flat { radius_m, hertz },
+        })
     }
 
     /// A ball of a radius (m) on a detector of such a skin.
@@ -61,14 +73,13 @@ impl Press {
 
     /// The contact of a strength at a place (m).
     pub fn at(&self, [x_m, y_m]: Point, strength: f64) -> Contact {
+        let imprinted = |imprint: Imprint| Contact::flat(x_m, y_m, imprint.half_width_m, imprint.conductance_s);
         match self {
             Self::Conductivity { radius_m } => {
                 Contact::flat(x_m, y_m, *radius_m, strength * PI * radius_m * radius_m / SURFACE_DEPTH_M)
             }
-            Self::Ball { radius_m, hertz } => {
-                let imprint = hertz.ball(*radius_m, strength);
-                Contact::flat(x_m, y_m, imprint.half_width_m, imprint.conductance_s)
-            }
+            Self::Ball { radius_m, hertz } => imprinted(hertz.ball(*radius_m, strength)),
+            Self::Flat { radius_m, hertz } => imprinted(hertz.flat(*radius_m, strength)),
         }
     }
 }
@@ -100,12 +111,12 @@ mod tests {
         let contact = Press::PAPER.at([0.01, 0.0], 1.0);
         assert!((contact.conductance_s - 0.025_133).abs() < 1e-6 && contact.radius_m == 0.002);
         let detector = Detector::default();
-        let skin = Foam::of('A').unwrap().into();
-        let ball = Press::indenter(&detector, skin).unwrap();
-        assert_eq!(
-            ball.at(MIDDLE, 1.0).conductance_s,
-            Hertz::new(&detector, skin).unwrap().ball(0.0025, 1.0).conductance_s
-        );
+        let skin: Skin = Foam::of('A').unwrap().into();
+        let hertz = Hertz::new(&detector, skin).unwrap();
+        let flat = Press::indenter(&detector, skin).unwrap().at(MIDDLE, 1.0);
+        assert_eq!((flat.conductance_s, flat.radius_m), (hertz.flat(0.0025, 1.0).conductance_s, 0.0025));
+        let ball = Press::indenter(&detector, skin.with(Surface::IDEAL)).unwrap().at(MIDDLE, 1.0);
+        assert_eq!(ball.conductance_s, hertz.with(Surface::IDEAL).ball(0.0025, 1.0).conductance_s);
     }
 
     #[test]

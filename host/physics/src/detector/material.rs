@@ -60,6 +60,11 @@ impl Stack {
     pub fn foams(&self) -> &[Foam] {
         &self.foams
     }
+
+    /// The foam that is touched.
+    pub fn top(&self) -> Foam {
+        self.foams[self.foams.len() - 1]
+    }
 }
 
 /// Why a text is no [`Stack`].

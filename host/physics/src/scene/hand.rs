@@ -5,7 +5,7 @@ use super::SceneName;
 use super::{Shape, Touch};
 use crate::detector::Detector;
 use crate::geometry::Point;
-use crate::hertz::{Beyond, Hertz, Imprint};
+use crate::hertz::{Beyond, Hertz, Imprint, Surface};
 
 /// Fingertips of a hand laid down: from the middle finger's root, in shares of the shorter side, thumb first.
 pub(super) const FINGERTIPS: [Point; 5] = [[-0.30, -0.12], [-0.20, 0.20], [-0.02, 0.28], [0.14, 0.22], [0.29, 0.05]];
@@ -56,7 +56,7 @@ impl Hand {
         Self {
             shorter_m: shorter_m(detector),
             sheet_conductance_s: detector.sheet_conductance_s(),
-            hertz: Hertz::of_sample_a(detector),
+            hertz: Hertz::of_sample_a(detector).with(Surface::IDEAL),
             fingertip: None,
         }
     }
@@ -71,7 +71,7 @@ impl Hand {
         Self { hertz: fingertip.hertz, fingertip: Some(fingertip), ..Self::relative(detector) }
     }
 
-    /// Mechanics of the detector: of sample A unless given.
+    /// Mechanics of the detector: of an ideal sample A unless given.
     pub(super) fn hertz(&self) -> Hertz {
         self.hertz
     }

@@ -21,7 +21,7 @@ use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Fault, Foam, Noise, measured as through_converter};
 
 pub use self::choices::{Choice, Choices};
-pub use self::measured::Measured;
+pub use self::measured::{Measured, all as measured};
 pub use self::view::view;
 use super::curve::{Fit, fit};
 use super::imaging::{Images, Imaging, accuracy_of_the_middle};
@@ -32,7 +32,7 @@ use super::{Claim, Course, DesignError, Limit, PaperSolver, Press, Progress, Rea
 /// Forces on the way up, and as many on the way down: every 0.125 N.
 const STEPS: usize = 40;
 /// Force at which places and images are compared (N), table II.
-const COMPARED_N: f64 = 2.25;
+pub(crate) const COMPARED_N: f64 = 2.25;
 /// Hysteresis of the foam, as a share of the conductance: the paper gives none; its curves of loading and unloading are apart by about so much.
 const HYSTERESIS: f64 = 0.1;
 /// Places along a line profile.
@@ -92,7 +92,7 @@ pub struct Report {
 pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
     let start = Instant::now();
     let solver = PaperSolver::new(&Detector::default())?;
-    let tasks: Vec<(u64, Measured)> = (plan.seed..).zip(measured::all()).collect();
+    let tasks: Vec<(u64, Measured)> = (plan.seed..).zip(measured()).collect();
     let computed = progress.map("samples", &tasks, |(seed, measured)| sample(*measured, &solver, *seed));
     let is_stopped = computed.iter().any(Option::is_none);
     let samples: Vec<Sample> = computed.into_iter().flatten().collect::<Result<_, _>>()?;
@@ -104,11 +104,21 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
 
 /// The detector that a sample was, and the paper's indenter on it.
 fn pressed(name: &str) -> Result<(Detector, Press), DesignError> {
-    let wrong = |what: &dyn Display| ForwardError::Detector { detector: name.to_owned(), what: what.to_string() };
-    let stack: Stack = name.parse().map_err(|error| wrong(&error))?;
-    let detector = Detector::default().in_material(&stack).map_err(|error| wrong(&error))?.taken_as_exact();
+    let (stack, detector) = stacked(name)?;
+    let detector = detector.taken_as_exact();
     let press = Press::indenter(&detector, Skin::from(&stack))?;
     Ok((detector, press))
+}
+
+/// The stack of a name, and the detector that it was.
+///
+/// # Errors
+/// [`DesignError`] if there is no such stack.
+pub fn stacked(name: &str) -> Result<(Stack, Detector), DesignError> {
+    let wrong = |what: &dyn Display| ForwardError::Detector { detector: name.to_owned(), what: what.to_string() };
+    let stack: Stack = name.parse().map_err(|error| wrong(&error))?;
+    let detector = Detector::default().in_material(&stack).map_err(|error| wrong(&error))?;
+    Ok((stack, detector))
 }
 
 fn sample(measured: Measured, solver: &PaperSolver, seed: u64) -> Result<Sample, DesignError> {

@@ -4,7 +4,9 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use tactomo_design::{DesignError, Progress, Step, bonding, electrodes, materials, overview, samples, thickness};
+use tactomo_design::{
+    DesignError, Progress, Step, bonding, electrodes, explain, materials, overview, samples, thickness,
+};
 use tactomo_study::view::View;
 use tactomo_touch::solve::Method;
 
@@ -68,6 +70,18 @@ pub enum Study {
     ///   tactomo-lab study samples --json
     #[command(verbatim_doc_comment)]
     Samples(Seeded),
+    /// Explains why the paper's table II differs from ideal foams: laws of contact, and causes one at a time.
+    ///
+    /// Laws of how a contact conducts under force are fitted to the four single foams, and have to
+    /// predict the seven stacks. Then what each cause explains of sensitivity, maximum force, spatial
+    /// resolution and position accuracy: the law, eq. (8) as printed, tolerances, noise, the
+    /// converter's floor, the image.
+    ///
+    /// Examples:
+    ///   tactomo-lab study explain --out explain.html
+    ///   tactomo-lab study explain --json
+    #[command(verbatim_doc_comment)]
+    Explain(Seeded),
     /// Joins two layers of sample B by 5 x 5 and 7 x 7 dots of conductive glue, from 1 mm to dots that touch: figure 7.
     ///
     /// Errors of places with the paper's solver and the limit of the sensor itself over the dots'
@@ -113,6 +127,7 @@ struct All {
     materials: materials::Report,
     thickness: thickness::Report,
     samples: samples::Report,
+    explain: explain::Report,
     bonding: bonding::Report,
     electrodes: electrodes::Report,
 }
@@ -123,6 +138,7 @@ impl All {
             materials: materials::run(&materials::Plan { side: SIDE, reached: false, seed }, progress)?,
             thickness: thickness::run(&thickness::Plan { methods: thickness::methods(), seed }, progress)?,
             samples: samples::run(&samples::Plan { seed }, progress)?,
+            explain: explain::run(&explain::Plan { seed }, progress)?,
             bonding: bonding::run(progress)?,
             electrodes: electrodes::run(&electrodes::Plan { seed }, progress)?,
         })
@@ -133,6 +149,7 @@ impl All {
             materials::view(&self.materials),
             thickness::view(&self.thickness),
             samples::view(&self.samples),
+            explain::view(&self.explain),
             bonding::view(&self.bonding),
             electrodes::view(&self.electrodes),
         ];
@@ -156,6 +173,10 @@ pub fn run(study: &Study) -> anyhow::Result<()> {
         Study::Samples(Seeded { seed, shown }) => {
             let plan = samples::Plan { seed: *seed };
             found(shown, |progress| samples::run(&plan, progress), |report| vec![samples::view(report)])
+        }
+        Study::Explain(Seeded { seed, shown }) => {
+            let plan = explain::Plan { seed: *seed };
+            found(shown, |progress| explain::run(&plan, progress), |report| vec![explain::view(report)])
         }
         Study::Bonding(shown) => found(shown, bonding::run, |report| vec![bonding::view(report)]),
         Study::Electrodes(Seeded { seed, shown }) => {

@@ -1,23 +1,25 @@
 //! Contact mechanics: from a force to the disc or strip of contact that it makes, and back.
 //!
-//! A rigid tip is pressed on an elastic layer. Its area of contact is Hertz's; the conductance of that area is the paper's
-//! eq. (3), `sigma S / l`, with the conductivity `sigma` of the layer's top and the depth `l` of surface that the current
-//! has to cross. The paper's eq. (1) is Hertz's *radius* of contact under the name of an area; here the area is `pi a^2`, so
-//! the exponent of eq. (2) is 2/3 for a ball and 1/2 for a cylinder. Its eq. (5) hides `sigma / l` in the factor `a`.
+//! A rigid tip is pressed on an elastic layer. Its area of contact and the pressure over it are Hertz's; what that conducts is the
+//! [surface](Surface)'s. The paper's eq. (1) is Hertz's *radius* of contact under the name of an area; here the area is `pi a^2`. Where
+//! all of it conducts alike, the exponent of eq. (2) is 2/3 for a ball and 1/2 for a cylinder; on a film that conducts as the cube of the
+//! pressure it is 5/3 and 2. The paper's eq. (5) hides `sigma / l` in the factor `a`.
+//!
+//! A contact that conducts unevenly is given as the even disc or strip of its conductance and its second moment, which is all that readings
+//! tell of it.
 //!
 //! Sources: K. L. Johnson, *Contact Mechanics* (1985), eqs. (4.22) and (4.43); I. N. Sneddon, Int. J. Eng. Sci. 3 (1965), and
 //! E. K. Dimitriadis et al., Biophys. J. 82 (2002), for the limits.
 
+mod surface;
+
 use std::f64::consts::PI;
 
+pub use self::surface::{SURFACE_DEPTH_M, Surface};
 use crate::detector::{Detector, FOAMS, Foam, Stack};
 
 /// Poisson's ratio where none is given: open-cell foams are near 1/3. The paper gives none.
 pub const POISSON: f64 = 0.3;
-
-/// Depth of surface that a contact's current crosses where none is given (m). The paper gives none either; with
-/// this one the contact on its sample A is at nine tenths of the drive at 2.1 N under its tip of 5 mm, where its table II has 2.8 N.
-pub const SURFACE_DEPTH_M: f64 = 0.5e-3;
 
 /// Contacts are within Hertz's theory up to this share of the tip's radius, and of the layer's thickness.
 ///
@@ -32,8 +34,8 @@ pub struct Skin {
     pub young_pa: f64,
     /// Poisson's ratio, -1 to 0.5.
     pub poisson: f64,
-    /// Depth of surface that a contact's current crosses (m): `l` of the paper's eq. (3).
-    pub surface_depth_m: f64,
+    /// What its surface conducts.
+    pub surface: Surface,
 }
 
 /// Contact mechanics of a detector.
@@ -52,13 +54,14 @@ pub struct Skin {
 pub struct Hertz {
     plane_modulus_pa: f64,
     thickness_m: f64,
-    conductance_s_per_m2: f64,
+    top_s_per_m: f64,
+    surface: Surface,
 }
 
 /// Where a tip touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imprint {
-    /// Radius of a disc, half the width of a strip (m).
+    /// Radius of a disc, half the width of a strip (m): of the even one that conducts as much and is as wide in the mean of the squares.
     pub half_width_m: f64,
     /// Conductance of all of it (S).
     pub conductance_s: f64,
@@ -89,16 +92,23 @@ pub struct SkinError {
 impl Skin {
     /// A skin of one Young's modulus (Pa).
     pub fn of(young_pa: f64) -> Self {
-        Self { young_pa, poisson: POISSON, surface_depth_m: SURFACE_DEPTH_M }
+        Self { young_pa, poisson: POISSON, surface: Surface::measured(young_pa) }
     }
 
-    /// A skin of layers of such thicknesses (any unit) and Young's moduli (Pa): they give way one after the other, so that their compliances add up.
+    /// A skin of layers of such thicknesses (any unit) and Young's moduli (Pa), bottom first: they give way one after the other, so that their
+    /// compliances add up. The surface is the top's.
     pub fn of_layers(layers: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let add = |[thickness, compliance]: [f64; 2], (own, young_pa): (f64, f64)| {
-            [thickness + own, compliance + own / young_pa]
+        let add = |[thickness, compliance, _]: [f64; 3], (own, young_pa): (f64, f64)| {
+            [thickness + own, compliance + own / young_pa, young_pa]
         };
-        let [thickness, compliance] = layers.into_iter().fold([0.0; 2], add);
-        Self::of(thickness / compliance)
+        let [thickness, compliance, top_pa] = layers.into_iter().fold([0.0; 3], add);
+        Self { surface: Surface::measured(top_pa), ..Self::of(thickness / compliance) }
+    }
+
+    /// The same skin with another surface.
+    #[must_use]
+    pub fn with(self, surface: Surface) -> Self {
+        Self { surface, ..self }
     }
 
     fn check(&self) -> Result<(), SkinError> {
@@ -109,8 +119,12 @@ impl Skin {
         if !(self.poisson > -1.0 && self.poisson <= 0.5) {
             return wrong("Poisson's ratio", self.poisson, "above -1 and at most 0.5");
         }
-        if !(self.surface_depth_m > 0.0 && self.surface_depth_m.is_finite()) {
-            return wrong("depth of surface (m)", self.surface_depth_m, "above zero");
+        let (what, value) = match self.surface {
+            Surface::Ideal { depth_m } => ("depth of surface (m)", depth_m),
+            Surface::Film { unit_pa } => ("pressure of 1 S/m2 (Pa)", unit_pa),
+        };
+        if !(value > 0.0 && value.is_finite()) {
+            return wrong(what, value, "above zero");
         }
         Ok(())
     }
@@ -144,42 +158,87 @@ impl Hertz {
         Self::under(detector, FOAMS[0].into())
     }
 
+    /// The same mechanics on another surface.
+    #[must_use]
+    pub fn with(self, surface: Surface) -> Self {
+        Self { surface, ..self }
+    }
+
     fn under(detector: &Detector, skin: Skin) -> Self {
-        let top_s_per_m = detector.layers.last().map_or(0.0, |layer| layer.top_s_per_m);
         Self {
             plane_modulus_pa: skin.young_pa / (1.0 - skin.poisson * skin.poisson),
             thickness_m: detector.thickness_m(),
-            conductance_s_per_m2: top_s_per_m / skin.surface_depth_m,
+            top_s_per_m: detector.layers.last().map_or(0.0, |layer| layer.top_s_per_m),
+            surface: skin.surface,
         }
     }
 
     /// The disc under a ball: `a^3 = 3 F R / (4 E*)` with `E* = E / (1 - nu^2)`. It is never wider than the ball.
+    ///
+    /// The pressure is `p sqrt(1 - r^2 / a^2)` with `p = 3 F / (2 pi a^2)`. Its cube over the disc is `2 pi a^2 p^3 / 5`, of which the mean of `r^2` is `2 a^2 / 7`.
     pub fn ball(&self, radius_m: f64, force_n: f64) -> Imprint {
         let hertz_m = (0.75 * force_n * radius_m / self.plane_modulus_pa).cbrt();
         let half_width_m = hertz_m.min(radius_m);
-        self.imprint(half_width_m, PI * half_width_m * half_width_m, radius_m)
+        let area_m2 = PI * half_width_m * half_width_m;
+        let beyond = self.beyond(half_width_m, radius_m);
+        self.imprint(half_width_m, area_m2, 1.5 * force_n / area_m2, [(4.0_f64 / 7.0).sqrt(), 0.4], beyond)
     }
 
     /// The strip under a cylinder that lies on its side: `b^2 = 4 F R / (pi E* L)`. It is never wider than the cylinder.
+    ///
+    /// The pressure is `p sqrt(1 - x^2 / b^2)` with `p = 2 F / (pi b L)`. Its cube over the strip is `3 pi b L p^3 / 8`, of which the mean of `x^2` is `b^2 / 6`.
     pub fn cylinder(&self, radius_m: f64, length_m: f64, force_n: f64) -> Imprint {
         let hertz_m = (4.0 * force_n * radius_m / (PI * self.plane_modulus_pa * length_m)).sqrt();
         let half_width_m = hertz_m.min(radius_m);
-        self.imprint(half_width_m, 2.0 * half_width_m * length_m, radius_m)
+        let area_m2 = 2.0 * half_width_m * length_m;
+        let beyond = self.beyond(half_width_m, radius_m);
+        self.imprint(half_width_m, area_m2, 4.0 / PI * force_n / area_m2, [0.5_f64.sqrt(), 3.0 * PI / 16.0], beyond)
+    }
+
+    /// The disc under a flat punch, at one pressure all over: that of a foam, which gives way at the edge, where a hard layer's pressure would be without bounds.
+    pub fn flat(&self, radius_m: f64, force_n: f64) -> Imprint {
+        let area_m2 = PI * radius_m * radius_m;
+        self.imprint(radius_m, area_m2, force_n / area_m2, [1.0; 2], None)
     }
 
     /// Force under a ball whose contact has that conductance (N): [`ball`](Self::ball) backwards, within the theory's limits.
     pub fn ball_force_n(&self, radius_m: f64, conductance_s: f64) -> f64 {
-        let half_width_m = (conductance_s / self.conductance_s_per_m2 / PI).sqrt();
-        self.plane_modulus_pa * half_width_m.powi(3) / (0.75 * radius_m)
+        let area_exponent = 2.0 / 3.0;
+        let exponent = match self.surface {
+            Surface::Ideal { .. } => area_exponent,
+            // Of an area of F^(2/3) under a pressure of F^(1/3).
+            Surface::Film { .. } => area_exponent + 1.0,
+        };
+        // So light a press that it is within all limits.
+        let light_n = 1e-9 * self.plane_modulus_pa * radius_m * radius_m;
+        light_n * (conductance_s / self.ball(radius_m, light_n).conductance_s).powf(1.0 / exponent)
     }
 
-    fn imprint(&self, half_width_m: f64, area_m2: f64, tip_m: f64) -> Imprint {
-        let beyond = if half_width_m > LARGEST_SHARE * tip_m {
+    /// What a contact of such a half width, area and largest pressure is on this surface; `of_film` are the shares of the half width and of the conductance under
+    /// that pressure all over that are left where the cube of the pressure conducts.
+    fn imprint(
+        &self,
+        half_width_m: f64,
+        area_m2: f64,
+        pressure_pa: f64,
+        of_film: [f64; 2],
+        beyond: Option<Beyond>,
+    ) -> Imprint {
+        let [width_share, share] = match self.surface {
+            Surface::Ideal { .. } => [1.0; 2],
+            Surface::Film { .. } => of_film,
+        };
+        let conductance_s = self.surface.s_per_m2(pressure_pa, self.top_s_per_m) * area_m2 * share;
+        Imprint { half_width_m: half_width_m * width_share, conductance_s, beyond }
+    }
+
+    /// The limit of Hertz's theory that a contact is beyond.
+    fn beyond(&self, half_width_m: f64, tip_m: f64) -> Option<Beyond> {
+        if half_width_m > LARGEST_SHARE * tip_m {
             Some(Beyond::Tip)
         } else {
             (half_width_m > LARGEST_SHARE * self.thickness_m).then_some(Beyond::Thickness)
-        };
-        Imprint { half_width_m, conductance_s: self.conductance_s_per_m2 * area_m2, beyond }
+        }
     }
 }
 
@@ -189,9 +248,57 @@ mod tests {
     use crate::forward::{ForwardModel, Slab};
     use crate::scene::Contact;
 
-    fn sample_a() -> Hertz {
+    fn measured_a() -> Hertz {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
         Hertz::new(&detector, Foam::of('A').unwrap().into()).unwrap()
+    }
+
+    fn sample_a() -> Hertz {
+        measured_a().with(Surface::IDEAL)
+    }
+
+    /// What pieces of a contact conduct, and their mean square from the middle: by the midpoint rule over the pressure, piece by piece.
+    fn summed(hertz: &Hertz, half_m: f64, pressure_pa: f64, area_m2: impl Fn(f64) -> f64) -> [f64; 2] {
+        let steps = 20_000;
+        let mut sums = [0.0; 2];
+        for step in 0..steps {
+            let share = (f64::from(step) + 0.5) / f64::from(steps);
+            let here_pa = pressure_pa * (1.0 - share * share).sqrt();
+            let own_s = hertz.surface.s_per_m2(here_pa, 0.2273) * area_m2(share) * half_m / f64::from(steps);
+            sums[0] += own_s;
+            sums[1] += own_s * (share * half_m).powi(2);
+        }
+        [sums[0], sums[1] / sums[0]]
+    }
+
+    #[test]
+    fn on_a_film_a_ball_and_a_rod_conduct_what_their_pieces_do() {
+        let hertz = measured_a();
+        let ball = hertz.ball(0.008, 1.0);
+        let a_m: f64 = 2.498_67e-3;
+        let [sum_s, square_m2] = summed(&hertz, a_m, 1.5 / (PI * a_m * a_m), |share| 2.0 * PI * share * a_m);
+        assert!((ball.conductance_s / sum_s - 1.0).abs() < 1e-4, "{ball:?} {sum_s}");
+        // An even disc's mean square is half of its radius squared.
+        assert!((ball.half_width_m.powi(2) / 2.0 / square_m2 - 1.0).abs() < 1e-4, "{ball:?}");
+        let rod = hertz.cylinder(0.003, 0.04, 2.0);
+        let b_m = 7.0467e-4;
+        let [sum_s, square_m2] = summed(&hertz, b_m, 4.0 / (PI * b_m * 0.04), |_| 2.0 * 0.04);
+        assert!((rod.conductance_s / sum_s - 1.0).abs() < 1e-4, "{rod:?} {sum_s}");
+        // And an even strip's a third of its half width squared.
+        assert!((rod.half_width_m.powi(2) / 3.0 / square_m2 - 1.0).abs() < 1e-4, "{rod:?}");
+    }
+
+    #[test]
+    fn a_flat_punch_on_a_film_conducts_as_the_cube_of_its_force_whatever_the_foam_does() {
+        let hertz = measured_a();
+        let [light, firm] = [1.0, 2.0].map(|force_n| hertz.flat(0.0025, force_n));
+        assert!((firm.conductance_s / light.conductance_s - 8.0).abs() < 1e-9 && firm.half_width_m == 0.0025);
+        let better = Hertz { top_s_per_m: 100.0, ..hertz };
+        assert_eq!(better.flat(0.0025, 1.0), light);
+        // 2 N on 19.635 mm2 are 101.86 kPa; 80.90 kPa conduct 1 S/m2 on 0.35 MPa: sqrt(18.7 kJ/m3 x 0.35 MPa).
+        assert!((firm.conductance_s - 1.9960 * 19.635e-6).abs() < 1e-8, "{firm:?}");
+        // Where all conducts alike, the force under a flat punch tells nothing.
+        assert_eq!(sample_a().flat(0.0025, 1.0), sample_a().flat(0.0025, 2.0));
     }
 
     #[test]
@@ -213,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn sample_a_saturates_near_the_force_of_the_paper() {
+    fn an_ideal_sample_a_saturates_at_2_1_n_under_a_ball() {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
         let imprint = sample_a().ball(0.0025, 2.1);
         let contact = Contact::flat(0.0, 0.0, imprint.half_width_m, imprint.conductance_s);
@@ -254,8 +361,9 @@ mod tests {
 
     #[test]
     fn the_force_comes_back_from_the_conductance() {
-        let hertz = sample_a();
-        for force_n in [1e-6, 0.02, 0.9] {
+        for (hertz, force_n) in
+            [sample_a(), measured_a()].into_iter().flat_map(|one| [1e-6, 0.02, 0.9].map(|n| (one, n)))
+        {
             let back_n = hertz.ball_force_n(0.006, hertz.ball(0.006, force_n).conductance_s);
             assert!((back_n / force_n - 1.0).abs() < 1e-12, "{force_n} {back_n}");
         }
@@ -265,7 +373,8 @@ mod tests {
     fn stacks_are_as_soft_as_springs_one_after_the_other() {
         let stack: Stack = "AB".parse().unwrap();
         assert!((Skin::from(&stack).young_pa - 2.0 / (1.0 / 0.35e6 + 1.0 / 0.96e6)).abs() < 1e-6);
-        assert_eq!(Skin::from(&"A".parse::<Stack>().unwrap()).young_pa, 0.35e6);
+        assert_eq!(Skin::from(&stack).surface, Surface::measured(0.35e6), "of the foam on top");
+        assert_eq!(Skin::from(&"A".parse::<Stack>().unwrap()), Skin::of(0.35e6));
     }
 
     #[test]
@@ -275,7 +384,8 @@ mod tests {
             (Skin::of(0.0), "Young's modulus"),
             (Skin::of(f64::NAN), "Young's modulus"),
             (Skin { poisson: 0.51, ..Skin::of(1e5) }, "at most 0.5"),
-            (Skin { surface_depth_m: -1.0, ..Skin::of(1e5) }, "depth of surface"),
+            (Skin::of(1e5).with(Surface::Ideal { depth_m: -1.0 }), "depth of surface"),
+            (Skin::of(1e5).with(Surface::Film { unit_pa: 0.0 }), "pressure of 1 S/m2"),
         ] {
             let error = Hertz::new(&detector, skin).unwrap_err().to_string();
             assert!(error.contains(named), "{error}");
