@@ -264,6 +264,7 @@ mod tests {
     use super::*;
     use tactomo_physics::detector::{Adc, Foam};
     use tactomo_physics::forward::Slab;
+    use tactomo_physics::hertz::{Skin, Surface};
 
     fn limit(detector: &Detector, strength: f64) -> Limit {
         Limit::of(&Slab::new(detector).unwrap(), &Press::PAPER, strength, [1e-3, 10.0]).unwrap()
@@ -293,8 +294,9 @@ mod tests {
         let bound = cramer_rao(&slab, &[press.at(MIDDLE, seen)], detector.adc.deviation_v()).unwrap().unwrap()[0];
         assert!((3.0 * bound.conductance - 1.0).abs() < 0.01, "{bound:?}");
         assert!((of_drive(&slab, &press.at(MIDDLE, saturated)).unwrap() - 0.9).abs() < 0.001);
-        // The indenter on sample A saturates where `tactomo_physics::hertz` says that it does.
-        let ball = Press::indenter(&detector, Foam::of('A').unwrap().into()).unwrap();
+        // A ball on an ideal sample A saturates where `tactomo_physics::hertz` says that it does.
+        let skin: Skin = Foam::of('A').unwrap().into();
+        let ball = Press::indenter(&detector, skin.with(Surface::IDEAL)).unwrap();
         let newtons = Limit::of(&slab, &ball, 1.0, [0.01, 5.0]).unwrap().range[1].unwrap();
         assert!((newtons - 2.1).abs() < 0.05, "{newtons}");
     }

@@ -279,7 +279,7 @@ mod tests {
 
     #[test]
     fn modest_wishes_are_met_and_the_file_is_a_detector() {
-        let answer = answered(Wishes { two_points_m: 15e-3, electrodes: 9, ..wishes() });
+        let answer = answered(Wishes { two_points_m: 18e-3, electrodes: 9, ..wishes() });
         assert!(answer.meeting > 0 && answer.impossible.is_empty() && answer.relax.is_empty(), "{answer:?}");
         let best = &answer.choices[0];
         assert!(best.meets_all && best.reason.contains("meets the wishes best"), "{}", best.reason);

@@ -154,8 +154,8 @@ pub(super) mod tests {
     pub fn wishes() -> Wishes {
         Wishes {
             size_m: [0.06, 0.06],
-            smallest_n: 0.05,
-            largest_n: 2.0,
+            smallest_n: 0.2,
+            largest_n: 5.0,
             place_m: 1e-3,
             two_points_m: 8e-3,
             frames_per_s: 100.0,
@@ -170,7 +170,7 @@ pub(super) mod tests {
         for (wrong, field, named) in [
             (Wishes { size_m: [0.0, 0.06], ..wishes() }, "--size", "above zero"),
             (Wishes { place_m: -1.0, ..wishes() }, "--place", "above zero"),
-            (Wishes { smallest_n: 3.0, ..wishes() }, "--smallest", "not below --largest"),
+            (Wishes { smallest_n: 6.0, ..wishes() }, "--smallest", "not below --largest"),
             (Wishes { two_points_m: 0.07, ..wishes() }, "--two-points", "shorter side"),
             (Wishes { electrodes: 3, ..wishes() }, "--electrodes", "4 to 32"),
             (Wishes { frames_per_s: 1e6, ..wishes() }, "--frames", "are possible"),

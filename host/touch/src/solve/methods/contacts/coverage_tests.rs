@@ -9,7 +9,7 @@ use crate::solve::before::latest::Latest;
 use crate::solve::solver::{Parts, Solver, follow_rows_and_search};
 use tactomo_physics::detector::{Adc, ConverterErrors, Detector, Electrode};
 use tactomo_physics::forward::{Resolution, Slab, readings_v};
-use tactomo_physics::hertz::Hertz;
+use tactomo_physics::hertz::{Hertz, Surface};
 use tactomo_physics::readings::Range;
 use tactomo_physics::scene::{Contact, Fingertip, Hand};
 use tactomo_physics::simulate::{Noise, drawn};
@@ -127,7 +127,7 @@ impl Course {
     fn new(press: Press, described: &Detector, model: &Slab) -> Self {
         let mut random = fastrand::Rng::with_seed(press.seed);
         let [x_m, y_m] = [0, 1].map(|_| 0.044 * (random.f64() - 0.5));
-        let hertz = Hertz::of_sample_a(described);
+        let hertz = Hertz::of_sample_a(described).with(Surface::IDEAL);
         let tip = Fingertip { hertz, force_n: press.force_n, radius_m: Fingertip::fitting_m(described) };
         let from = Hand::in_newtons(described, tip).tip([x_m, y_m], 1.0, 1.0).disc().unwrap();
         let (sin, cos) = (std::f64::consts::TAU * random.f64()).sin_cos();

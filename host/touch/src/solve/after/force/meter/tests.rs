@@ -4,7 +4,7 @@ use super::*;
 use crate::solve::answer::Uncertainty;
 use tactomo_physics::detector::{Detector, Foam};
 use tactomo_physics::forward::{ForwardModel, readings_v};
-use tactomo_physics::hertz::Hertz;
+use tactomo_physics::hertz::{Hertz, Skin, Surface};
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::{Noise, finer_model, measured};
 
@@ -22,7 +22,7 @@ impl MeterTrial {
         Self {
             meter: Meter::new(&Problem::of(&detector).unwrap()).unwrap(),
             finer: finer_model(&detector, &[], 0).unwrap(),
-            hertz: Hertz::new(&detector, Foam::of('A').unwrap().into()).unwrap(),
+            hertz: Hertz::new(&detector, Skin::from(Foam::of('A').unwrap()).with(Surface::IDEAL)).unwrap(),
             noise: Noise::new(3),
             detector,
         }
