@@ -4,16 +4,17 @@ use std::error::Error;
 
 use tactomo::detector::{Detector, Stack};
 use tactomo::forward::{readings_v, touched_impedance_ohm};
-use tactomo::hertz::Hertz;
+use tactomo::hertz::{Hertz, Skin};
 use tactomo::scene::{Fingertip, Hand};
 use tactomo::simulate::finer_model;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let force_n = std::env::args().nth(1).map_or(Ok(0.5), |text| text.parse())?;
+    let force_n = std::env::args().nth(1).map_or(Ok(5.0), |text| text.parse())?;
     for foam in ["A", "B", "C", "D", "BC"] {
         let stack: Stack = foam.parse()?;
         let detector = Detector::default().in_material(&stack)?;
-        let fingertip = Fingertip { hertz: Hertz::of_sample_a(&detector), force_n, radius_m: 0.008 };
+        let hertz = Hertz::new(&detector, Skin::from(&stack))?;
+        let fingertip = Fingertip { hertz, force_n, radius_m: 0.008 };
         let press = Hand::in_newtons(&detector, fingertip).tip([0.01, 0.005], 1.0, 1.0);
         let model = finer_model(&detector, &[], 1)?;
         let readings = readings_v(&touched_impedance_ohm(&*model, &[press])?, &detector);

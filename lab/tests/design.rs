@@ -28,13 +28,22 @@ fn materials_give_json_csv_and_a_page() {
 }
 
 #[test]
+fn what_is_compared_has_to_be_of_the_size_that_is_wished() {
+    let message = refused(&["design", "--size", "30x30", "--compare", "square-50"]);
+    assert!(
+        message.contains("--compare square-50: it is 50x50 mm, and 30x30 mm is wished: give --size 50x50"),
+        "{message}"
+    );
+}
+
+#[test]
 fn a_design_is_a_detector_that_live_takes() {
     let folder = Folder::new("design");
     let path = folder.path("chosen.toml");
     let asked = [
         "design",
         "--size",
-        "30x30",
+        "50x50",
         "--foam",
         "A",
         "--foam",
@@ -42,7 +51,7 @@ fn a_design_is_a_detector_that_live_takes() {
         "--electrodes",
         "6",
         "--two-points",
-        "12",
+        "20",
         "--try",
         "40",
         "--compare",

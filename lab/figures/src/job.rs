@@ -70,6 +70,7 @@ pub const JOBS: &[Job] = &[
         "tactomo-lab study contacts --solver auto --scenes 60 --seed 40 --detector square-60 --as-built 20 --rub 20",
     ),
     job("materials", "tactomo-lab study materials --seed 1"),
+    job("explain", "tactomo-lab study explain --seed 1"),
     job("samples", "tactomo-lab study samples --seed 1"),
     job("bonding", "tactomo-lab study bonding"),
     job("electrodes", "tactomo-lab study electrodes --seed 1"),

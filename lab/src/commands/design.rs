@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use tactomo_board::inputs::{self, Settling};
 use tactomo_design::search::{self, Material, Plan, Wishes};
 use tactomo_physics::detector::{Chosen, Detector, Stack};
@@ -85,6 +85,9 @@ pub struct Args {
     json: bool,
 }
 
+/// Sides that differ by less than this share are the same.
+const SAME_SIZE: f64 = 0.01;
+
 /// Width and height (m).
 #[derive(Clone, Copy, Debug)]
 struct Size([f64; 2]);
@@ -99,6 +102,23 @@ impl FromStr for Size {
             _ => Err("width and height in millimetres are needed, as in 60x60".to_owned()),
         }
     }
+}
+
+/// A detector of another size meets other wishes.
+fn check_size(detector: &Detector, size_m: [f64; 2]) -> anyhow::Result<()> {
+    let own_m = detector.outline.size_m();
+    let is_same = own_m.iter().zip(size_m).all(|(own, wished)| (own / wished - 1.0).abs() < SAME_SIZE);
+    let [own, wished] = [own_m, size_m].map(|size| size.map(|metres| format!("{:.4}", metres * 1e3)));
+    let text = |size: &[String; 2]| size.each_ref().map(|mm| mm.trim_end_matches('0').trim_end_matches('.')).join("x");
+    ensure!(
+        is_same,
+        "--compare {}: it is {} mm, and {} mm is wished: give --size {}, or compare a detector of that size",
+        detector.name,
+        text(&own),
+        text(&wished),
+        text(&own)
+    );
+    Ok(())
 }
 
 /// Searches and answers.
@@ -164,7 +184,11 @@ impl Args {
         };
         wishes.check()?;
         let compared = match &self.compare {
-            Some(chosen) => Some((chosen.get()?.in_material(&self.material)?, Skin::from(&self.material))),
+            Some(chosen) => {
+                let detector = chosen.get()?;
+                check_size(&detector, size_m)?;
+                Some((detector.in_material(&self.material)?, Skin::from(&self.material)))
+            }
             None => None,
         };
         Ok(Plan { wishes, foams: self.foams()?, most: self.most as usize, compared, seed: self.seed })

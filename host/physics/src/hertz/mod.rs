@@ -70,7 +70,8 @@ pub struct Imprint {
 }
 
 /// A limit of Hertz's theory. Beyond it contacts are narrower than it says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
 pub enum Beyond {
     /// The contact is wider than half the tip.
     #[error("the contact is wider than half the tip")]

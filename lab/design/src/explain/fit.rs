@@ -26,7 +26,7 @@ pub struct Judged {
     pub unit_mv: f64,
     /// Errors of SENS and of FMAX, for each sample; `None` where it conducts nothing.
     pub errors: Vec<Option<[f64; 2]>>,
-    /// Root mean square over the samples that it was not fitted to: of SENS and FMAX.
+    /// Factors that SENS and FMAX are off by, root mean square of the logarithm over the samples that it was not fitted to.
     pub left: [Option<f64>; 2],
     /// Over all of them.
     pub all: [Option<f64>; 2],
@@ -116,14 +116,14 @@ pub fn counted(error: f64) -> f64 {
     error.abs().min(MOST)
 }
 
-/// Root mean square of errors over some samples, of SENS and of FMAX where that was measured; a sample that conducts nothing is off by the most that counts.
+/// Factors that SENS, and FMAX where that was measured, are off by over some samples; one that conducts nothing is off by the most that counts.
 fn left(benches: &[Bench], errors: &[Option<[f64; 2]>], of: impl Fn(usize) -> bool) -> [Option<f64>; 2] {
     [0, 1].map(|figure| {
         let counts = |at: usize| of(at) && (figure == 0 || benches[at].measured.maximum_n.is_some());
         let counted = errors.iter().enumerate().filter(|(at, _)| counts(*at));
         let squares: Vec<f64> =
             counted.map(|(_, one)| one.map_or(MOST, |errors| self::counted(errors[figure])).powi(2)).collect();
-        mean(&squares).map(f64::sqrt)
+        mean(&squares).map(|square| square.sqrt().exp())
     })
 }
 

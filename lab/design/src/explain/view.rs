@@ -24,10 +24,6 @@ pub fn view(report: &Report) -> View {
     (0..FIGURES.len()).fold(view, |view, figure| view.figures(heading(figure), [heat(report, figure)]))
 }
 
-fn factor(error: Option<f64>) -> Option<f64> {
-    error.map(f64::exp)
-}
-
 /// A rank correlation and its chance.
 fn order(of: Option<[f64; 2]>) -> String {
     of.map_or_else(|| "-".to_owned(), |[correlation, chance]| format!("{correlation:+.2} (p {chance:.3})"))
@@ -42,8 +38,8 @@ fn laws(report: &Report) -> Table {
         .column("law", TEXT, |one| one.name)
         .column("", TEXT, |one| one.formula)
         .column("eq. (8)", TEXT, move |one| eighth(one))
-        .column("SENS of the stacks off by", FACTOR, |one| factor(one.fitted.left[0]))
-        .column("FMAX", FACTOR, |one| factor(one.fitted.left[1]))
+        .column("SENS of the stacks off by", FACTOR, |one| one.fitted.left[0])
+        .column("FMAX", FACTOR, |one| one.fitted.left[1])
         .column("order of SENS", TEXT, |one| order(one.fitted.order[0]))
         .column("order of FMAX", TEXT, |one| order(one.fitted.order[1]))
         .detail("from", TEXT, |one| one.source)
@@ -88,8 +84,8 @@ fn predicted(report: &Report) -> Table {
 fn left(report: &Report) -> Table {
     Table::of("What each cause leaves", &report.causes)
         .column("with", TEXT, |cause| cause.name)
-        .column("SENS off by", FACTOR, |cause| factor(cause.left[0]))
-        .column("FMAX off by", FACTOR, |cause| factor(cause.left[1]))
+        .column("SENS off by", FACTOR, |cause| cause.left[0])
+        .column("FMAX off by", FACTOR, |cause| cause.left[1])
         .column("SR off by", PLAIN.digits(2), |cause| cause.left[2])
         .column("of images", PLAIN.digits(0), |cause| count(cause, 2))
         .column("PA off by", PLAIN.digits(2), |cause| cause.left[3])

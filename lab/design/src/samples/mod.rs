@@ -1,7 +1,7 @@
 //! The paper's samples, its tables I and II and figure 6: foams A to D and stacks of them under an indenter, simulated as they were
 //! measured, and the measured figures beside.
 //!
-//! 60 x 60 mm, each layer 5 mm; nine places; a ball of 5 mm pressed from 0 to 5 N and let go, on foam with hysteresis. The output is the value of the
+//! 60 x 60 mm, each layer 5 mm; nine places; a flat punch of 5 mm pressed from 0 to 5 N and let go, on foam with hysteresis. The output is the value of the
 //! paper's image at its centroid, over a sheet of 1 S.
 
 mod choices;

@@ -200,12 +200,10 @@ fn reason(found: &Found, best_in: &[&str], wishes: &Wishes) -> String {
         Some(largest_n) => format!("saturates at {}", Wish::Largest.text(largest_n)),
         None => "no force saturates it".to_owned(),
     };
-    let thin = if rating.is_beyond_hertz {
-        "; at the largest force the contact is wider than Hertz's theory allows for its thickness, so it takes more"
-    } else {
-        ""
-    };
-    format!("{}; {saturates}; {tight}{thin}", best_in.join(", "))
+    let limit = rating.beyond_hertz.map_or_else(String::new, |beyond| {
+        format!("; at the largest force {beyond}, beyond Hertz's theory, so forces there are rough")
+    });
+    format!("{}; {saturates}; {tight}{limit}", best_in.join(", "))
 }
 
 fn wish_text(wish: Wish, given: f64) -> String {

@@ -47,8 +47,8 @@ pub struct Rating {
     pub electrodes: usize,
     /// Of all layers (m).
     pub thickness_m: f64,
-    /// Whether the largest force is beyond Hertz's theory: then contacts are narrower, and it takes more.
-    pub is_beyond_hertz: bool,
+    /// The limit of Hertz's theory that the largest force wished for is beyond, if any: then contacts are narrower than it says.
+    pub beyond_hertz: Option<Beyond>,
 }
 
 impl Rating {
@@ -94,7 +94,6 @@ impl Rating {
         let press = Press::ball(detector, skin, wishes.tip_m)?;
         let middle_n = (wishes.smallest_n * wishes.largest_n).sqrt();
         let [smallest_n, largest_n] = range(slab, &press, [wishes.smallest_n, wishes.largest_n], noise_v)?;
-        let beyond = Hertz::new(detector, skin)?.ball(wishes.tip_m, wishes.largest_n).beyond;
         Ok(Self {
             smallest_n,
             largest_n,
@@ -104,7 +103,7 @@ impl Rating {
             drive_v,
             electrodes: detector.electrodes.len(),
             thickness_m: detector.thickness_m(),
-            is_beyond_hertz: beyond == Some(Beyond::Thickness),
+            beyond_hertz: Hertz::new(detector, skin)?.ball(wishes.tip_m, wishes.largest_n).beyond,
         })
     }
 

@@ -118,8 +118,19 @@ const CHOICES: [(&str, [&str; 2], Option<&str>); 7] = [
     ("nearest", ["ideal", "each ground less its mean"], None),
 ];
 
+/// Laws of contact: what ids call them, how the report does, and the form of eq. (8).
+const LAWS: [(&str, &str, &str); 7] = [
+    ("ideal", "ideal", "printed"),
+    ("ideal-derived", "ideal", "derived"),
+    ("rough-foam", "rough, on the foam", "printed"),
+    ("rough-film", "rough, on a film", "printed"),
+    ("mesh", "mesh, on a film", "printed"),
+    ("cube-foam", "cube, on the foam", "printed"),
+    ("film", "cube, on a film", "printed"),
+];
+
 pub(super) fn figures() -> Vec<Figure> {
-    [claims(), choices(), thickness(), electrodes()].concat()
+    [claims(), choices(), laws(), thickness(), electrodes()].concat()
 }
 
 fn claims() -> Vec<Figure> {
@@ -157,6 +168,24 @@ fn choices() -> Vec<Figure> {
     }
     let own = "force at which the contact of sample A is at nine tenths of the drive";
     all.push(figure("samples", "sample-A.maximum", own, "samples/0/limit/range/1").unit("N", 1.0).share(0.01));
+    all
+}
+
+fn laws() -> Vec<Figure> {
+    let energy = "energy per volume at which the film of the law of contact conducts 1 S/m2";
+    let mut all =
+        vec![figure("explain", "law.energy", energy, "chosen/unit_energy_j_per_m3").unit("kJ/m3", 1e-3).by(0.2)];
+    for (id, name, eighth) in LAWS {
+        let of = |field: &str, says: &str, path: &str| {
+            let says = format!("{says}: law of contact {name}, eq. (8) as {eighth}");
+            let path = format!("laws/name={name}&eighth={eighth}/fitted/{path}");
+            figure("explain", format!("law.{id}.{field}"), says, path)
+        };
+        all.push(of("sensitivity", "factor that SENS of the stacks is off by", "left/0").share(0.05));
+        all.push(of("maximum", "factor that FMAX of the stacks is off by", "left/1").share(0.05));
+        all.push(of("order", "rank correlation of SENS with what was measured", "order/0/0").by(0.05));
+        all.push(of("order-maximum", "rank correlation of FMAX with what was measured", "order/1/0").by(0.05));
+    }
     all
 }
 
