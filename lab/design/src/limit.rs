@@ -238,7 +238,11 @@ pub(crate) fn at_share_of_drive(
 /// Potential of a contact that is alone as a share of the drive, mean over the grounds: eq. (4). All current passes the contact.
 pub(crate) fn of_drive(model: &dyn ForwardModel, contact: &Contact) -> Result<f64, ForwardError> {
     let Detector { on_resistance_ohm, electrodes, .. } = model.detector();
-    let impedance_ohm = model.impedance_ohm(std::slice::from_ref(contact))?;
+    let impedance_ohm = match model.impedance_ohm(std::slice::from_ref(contact)) {
+        // So light that it conducts nothing in numbers of this size.
+        Err(ForwardError::NoContact) => return Ok(0.0),
+        impedance_ohm => impedance_ohm?,
+    };
     let lost = |g: usize| 1.0 / (contact.conductance_s * (impedance_ohm[(g, g)] + on_resistance_ohm));
     Ok(1.0 - (0..electrodes.len()).map(lost).sum::<f64>() / electrodes.len() as f64)
 }

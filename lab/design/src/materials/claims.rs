@@ -11,8 +11,8 @@ const SUITED_S_PER_M: f64 = 0.2;
 const PEAK_S_PER_M: f64 = 1.0;
 /// A condition is among the best in a figure if it is in the best tenth.
 const BEST_SHARE: f64 = 0.1;
-/// Touch of several newtons (N): a light press, and a firm one below what the paper measured as the maximum of its sample A, 2.8 N.
-const TOUCH_N: [f64; 2] = [0.05, 2.5];
+/// Touch of several newtons (N): from a keystroke, the least that ISO 9241-410 prefers, to the largest force that the paper applied.
+const TOUCH_N: [f64; 2] = [0.5, 5.0];
 
 /// A figure of a condition: larger is better. Images that have collapsed have none.
 type Figure = fn(&Condition) -> Option<f64>;
