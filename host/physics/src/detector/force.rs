@@ -22,8 +22,8 @@
 //! power law of eq. (5), `G = a F^gamma`.
 //!
 //! The constriction is no constant: by Hertz a ball's radius of contact grows as `F^(1/3)`, so of `1 / G` one part falls as `F^(-2/3)`, the
-//! contact's own, and one as `F^(-1/3)`, the constriction. Exponents that are found are therefore between the two; over two decades of
-//! force eq. (6) follows that sum to 1 %.
+//! contact's own on an ideal surface, or as `F^(-5/3)` on a [film](crate::hertz::Surface), and one as `F^(-1/3)`, the constriction. Exponents that
+//! are found are therefore between the two; over two decades of force eq. (6) follows the sum of `-2/3` and `-1/3` to 1 %.
 
 use std::fmt::{self, Write as _};
 use std::ops::RangeInclusive;
@@ -38,7 +38,8 @@ const SATURATED_SHARE: f64 = 0.9;
 pub const FARTHEST: f64 = 2.0;
 
 const CONDUCTANCE_S: RangeInclusive<f64> = 1e-12..=1e6;
-/// Of Hertz's theory are 1/2 (a cylinder) and 2/3 (a ball); foams that stiffen or yield, and rough tips, are around that.
+/// Of Hertz's theory are 1/2 (a cylinder) and 2/3 (a ball) on an ideal surface, 2 and 5/3 on a film that the pressure makes conduct; foams that stiffen or yield, and
+/// rough tips, are around that.
 const EXPONENT: RangeInclusive<f64> = 1e-2..=10.0;
 const SERIES_OHM: RangeInclusive<f64> = 1e-9..=1e9;
 const FORCE_N: RangeInclusive<f64> = 1e-6..=1e6;

@@ -13,9 +13,10 @@ const FACTOR: Format = Format::new("", "").digits(1);
 
 /// Laws, predictions, and causes.
 pub fn view(report: &Report) -> View {
-    let lead = "Why the paper's foams are less sensitive, by their own order, than ideal ones: laws of contact fitted to its four single foams, \
+    let lead = "Why the paper's foams are less sensitive than ideal ones, and in another order: laws of contact fitted to its four single foams, \
                 which then have to predict the seven stacks; and what else explains its table II.";
-    let view = report.course.view("From the ideal foam to the measured one", lead).with(laws(report));
+    let view = report.course.view("From the ideal foam to the measured one", lead);
+    let view = view.with(laws(report)).folded("Where each law is from", [sources(report)]);
     let view = match &report.chosen {
         Some(chosen) => view.text(sentence(chosen)).with(predicted(report)),
         None => view,
@@ -42,12 +43,21 @@ fn laws(report: &Report) -> Table {
         .column("FMAX", FACTOR, |one| one.fitted.left[1])
         .column("order of SENS", TEXT, |one| order(one.fitted.order[0]))
         .column("order of FMAX", TEXT, |one| order(one.fitted.order[1]))
-        .detail("from", TEXT, |one| one.source)
         .note(
             "Off by a factor: root mean square of the logarithm, each counted as 20 at most, over the stacks, of which nothing was fitted but the unit of SENS (a median). Order: rank correlation over \
              all samples, and how likely one so strong is by chance. Eq. (8) as it is printed does not follow from (6), but it may be what was computed.",
         )
         .data()
+        .into()
+}
+
+/// Each law once.
+fn sources(report: &Report) -> Table {
+    let once = report.laws.iter().filter(|one| one.eighth == Eighth::Printed);
+    Table::of("", once.collect::<Vec<_>>())
+        .column("law", TEXT, |one| one.name)
+        .column("from", TEXT, |one| one.source)
+        .style(Style::Prose)
         .into()
 }
 
@@ -87,9 +97,9 @@ fn left(report: &Report) -> Table {
         .column("SENS off by", FACTOR, |cause| cause.left[0])
         .column("FMAX off by", FACTOR, |cause| cause.left[1])
         .column("SR off by", PLAIN.digits(2), |cause| cause.left[2])
-        .column("of images", PLAIN.digits(0), |cause| count(cause, 2))
+        .column("samples with it", PLAIN.digits(0), |cause| count(cause, 2))
         .column("PA off by", PLAIN.digits(2), |cause| cause.left[3])
-        .column("of images.", PLAIN.digits(0), |cause| count(cause, 3))
+        .column("with it", PLAIN.digits(0), |cause| count(cause, 3))
         .note(
             "Factors (each counted as 20 at most) and differences, root mean square over the samples that have a figure; images that have collapsed have none. The first three rows add up; each later one adds to \
              the third.",
@@ -103,7 +113,7 @@ fn count(cause: &Cause, figure: usize) -> f64 {
 
 fn heading(figure: usize) -> String {
     let what = if figure < 2 { "simulated over measured" } else { "simulated less measured" };
-    format!("{}, {what}, sample by sample: from the ideal foam at the top to what explains most.", FIGURES[figure])
+    format!("{}, {what}: a column for each sample, a row for each cause.", FIGURES[figure])
 }
 
 /// A row for each cause, a column for each sample.
