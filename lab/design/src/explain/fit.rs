@@ -37,7 +37,7 @@ pub struct Judged {
 /// Fits a law to some of the samples, and judges it by all.
 pub fn fitted(law: &Law, benches: &[Bench], fit_to: impl Fn(usize) -> bool + Copy, eighth: Eighth) -> Judged {
     let cost = |parameters: &[f64]| cost(law, benches, parameters, fit_to, eighth);
-    let found = law.starts.iter().map(|start| descend(&cost, start.to_vec())).min_by(|a, b| a.1.total_cmp(&b.1));
+    let found = law.starts.iter().map(|start| descend(cost, start.to_vec())).min_by(|a, b| a.1.total_cmp(&b.1));
     let parameters = found.map(|(parameters, _)| parameters).unwrap_or_default();
     judged(law, benches, parameters, fit_to, eighth)
 }
