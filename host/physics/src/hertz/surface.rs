@@ -3,10 +3,9 @@
 //! **Ideal.** All that touches conducts alike, `sigma / l`: the paper's eq. (3), with the conductivity `sigma` of the layer's top and the depth `l` of
 //! surface that the current has to cross.
 //!
-//! **Measured.** The paper's table II does not bear that out: under its indenter of 5 mm foam A is at nine tenths of the drive at 0.24 N by it, and at
-//! 2.8 N as measured; and foams that differ in conductivity a hundredfold would be equally sensitive but for their softness. What the table says
-//! is a film between foam and driving layer, which conducts whatever the foam does, and the more so the more energy the press stores in
-//! the foam below it:
+//! **Measured.** The paper's table II does not bear that out. By it foams whose conductivity differs a hundredfold would be equally sensitive but for
+//! their softness, and the table has them the other way round. What it says is a film between foam and driving layer, which conducts whatever the
+//! foam does, and the more so the more energy the press stores in the foam below it:
 //!
 //! ```text
 //! c(p) = 1 S/m2 (p / u)^3,   u = sqrt(w E),   w = 18.7 kJ/m3
