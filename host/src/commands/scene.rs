@@ -85,7 +85,7 @@ impl SceneArgs {
     fn hand(&self, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hand> {
         let Some(force_n) = self.force else {
             let hand = Hand::relative(detector);
-            let is_known = self.elasticity.is_some() || foams.is_some();
+            let is_known = self.elasticity.is_some() || foams.is_some() || self.surface.is_some();
             return Ok(if is_known {
                 hand.on(self.hertz_on(Law::Ideal(Surface::IDEAL), foams, detector)?)
             } else {

@@ -17,6 +17,8 @@ pub const COMPARED_S_PER_M: f64 = 1.0;
 pub const INDENTER_DIAMETER_M: f64 = 0.005;
 /// Forces there (N), from the lightest that its force sensor of 50 N resolves.
 pub const FORCES_N: [f64; 2] = [0.01, 5.0];
+/// Steps of force from nothing to the largest: every 0.125 N.
+pub const STEPS: usize = 40;
 /// The paper's nine places: so far from the middle (m) on its detector of 60 mm, and in proportion on others.
 const APART_M: f64 = 0.020;
 const OF_WIDTH_M: f64 = 0.060;
@@ -82,6 +84,11 @@ impl Press {
             Self::Flat { radius_m, hertz } => imprinted(hertz.flat(*radius_m, strength)),
         }
     }
+}
+
+/// Force of a step (N).
+pub fn force_n(step: usize) -> f64 {
+    step as f64 * FORCES_N[1] / STEPS as f64
 }
 
 /// The paper's nine places, in proportion to the detector's sides (m): rows from the lowest, the middle one is the fifth.

@@ -63,6 +63,13 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
+/// Median of some values, between the two in the middle where they are even in number; `None` of none.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some((values[last / 2] + values[last.div_ceil(2)]) / 2.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,5 +109,12 @@ mod tests {
     fn nothing_to_rank_is_no_number() {
         assert_eq!(spearman(&[[1.0, 2.0], [2.0, 3.0]]), None);
         assert_eq!(spearman(&[[1.0, 2.0], [2.0, 2.0], [3.0, 2.0]]), None);
+    }
+
+    #[test]
+    fn a_median_is_the_middle_or_between_the_two_in_it() {
+        assert_eq!(median(vec![5.0, 1.0, 3.0]), Some(3.0));
+        assert_eq!(median(vec![9.0, 1.0, 2.0, 4.0]), Some(3.0));
+        assert_eq!(median(Vec::new()), None);
     }
 }

@@ -2,21 +2,20 @@
 
 use tactomo_physics::detector::Foam;
 use tactomo_physics::forward::{Auto, ForwardModel};
+use tactomo_physics::hertz::Skin;
 use tactomo_physics::scene::Contact;
 
 use super::super::DesignError;
 use super::super::curve::{OutputCurve, fit};
 use super::super::limit::of_drive;
-use super::super::press::{FORCES_N, INDENTER_DIAMETER_M, MIDDLE};
+use super::super::press::{FORCES_N, INDENTER_DIAMETER_M, MIDDLE, STEPS, force_n};
 use super::super::samples::{Measured, stacked};
 use super::Eighth;
 
 /// Radii of contacts that resistances are computed at (m); the last is the indenter's.
 const RADII_M: [f64; 5] = [0.3e-3, 0.6e-3, 1.2e-3, 1.8e-3, INDENTER_DIAMETER_M / 2.0];
-/// Forces of a curve: every 0.125 N, as in `study samples`.
-const STEPS: usize = 40;
 /// Force at which SENS is taken: half of the largest that was applied (N).
-const HALF_N: f64 = 2.5;
+const HALF_N: f64 = FORCES_N[1] / 2.0;
 
 /// A sample, and the resistance from a contact in its middle to a ground.
 pub struct Bench {
@@ -52,7 +51,7 @@ impl Bench {
         for (resistance_ohm, radius_m) in resistances_ohm.iter_mut().zip(RADII_M) {
             *resistance_ohm = resistance(&*model, radius_m, top.conductivity_s_per_m)?;
         }
-        let young_pa = tactomo_physics::hertz::Skin::from(&stack).young_pa;
+        let young_pa = Skin::from(&stack).young_pa;
         Ok(Self { measured, top, young_pa, resistances_ohm })
     }
 
@@ -68,7 +67,7 @@ impl Bench {
             let [conductance_s, radius_m] = law(force_n);
             [force_n, self.share(conductance_s, radius_m)]
         };
-        Curve::of(&forces_n().map(point).collect::<Vec<_>>(), eighth)
+        Curve::of(&(1..=STEPS).map(|step| point(force_n(step))).collect::<Vec<_>>(), eighth)
     }
 
     /// Between the radii a spreading resistance goes with one over the radius.
@@ -95,11 +94,6 @@ impl Curve {
     }
 }
 
-/// Forces of a curve (N).
-pub fn forces_n() -> impl Iterator<Item = f64> {
-    (1..=STEPS).map(|step| step as f64 * FORCES_N[1] / STEPS as f64)
-}
-
 /// From the middle to a ground (ohm), of a contact near half of the drive, where its current is as even as it gets.
 fn resistance(model: &dyn ForwardModel, radius_m: f64, top_s_per_m: f64) -> Result<f64, DesignError> {
     let conductance_s = 4.0 * radius_m * top_s_per_m;
@@ -110,7 +104,7 @@ fn resistance(model: &dyn ForwardModel, radius_m: f64, top_s_per_m: f64) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tactomo_physics::hertz::{Skin, Surface};
+    use tactomo_physics::hertz::Surface;
 
     #[test]
     fn it_gives_the_potential_that_the_model_gives_for_any_radius_and_conductance() {

@@ -1,6 +1,6 @@
 //! From the ideal foam to the measured one, a cause at a time: what each explains of SENS, FMAX, SR and PA.
 
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Adc, Detector};
 use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, readings_v};
 use tactomo_physics::hertz::{Skin, Surface};
 use tactomo_physics::readings::Readings;
@@ -9,12 +9,12 @@ use tactomo_physics::simulate::{Noise, drawn, measured as through_converter};
 
 use super::super::imaging::Images;
 use super::super::limit::of_drive;
-use super::super::press::{MIDDLE, nine_places};
+use super::super::press::{MIDDLE, STEPS, force_n, nine_places};
 use super::super::rank::mean;
 use super::super::samples::{COMPARED_N, Measured, stacked};
 use super::super::{DesignError, PaperSolver, Press};
 use super::Eighth;
-use super::bench::{Curve, forces_n};
+use super::bench::Curve;
 
 /// The floor of an ESP32's first converter (V): below, it tells nothing.
 const FLOOR_V: f64 = 0.142;
@@ -97,7 +97,7 @@ fn of(detector: &Detector, skin: Skin, setup: &Setup, solver: &PaperSolver, seed
     let press = Press::indenter(detector, skin)?;
     let mut bench = Reader { model: &*model, setup, noise: Noise::new(seed) };
     let mut points = Vec::new();
-    for force_n in forces_n() {
+    for force_n in (1..=STEPS).map(force_n) {
         let contact = press.at(MIDDLE, force_n);
         let output = match setup.has_image {
             false => Some(of_drive(&*model, &contact)?),
@@ -132,7 +132,7 @@ impl Reader<'_> {
         let detector = self.model.detector();
         let mut readings = readings_v(&self.model.impedance_ohm(std::slice::from_ref(contact))?, detector);
         if self.setup.has_noise {
-            let adc = tactomo_physics::detector::Adc { noise_lsb: NOISE_V / detector.adc.lsb_v(), ..detector.adc };
+            let adc = Adc { noise_lsb: NOISE_V / detector.adc.lsb_v(), ..detector.adc };
             readings = through_converter(&readings, &adc, &mut self.noise);
         }
         if self.setup.has_floor {

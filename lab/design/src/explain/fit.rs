@@ -3,13 +3,12 @@
 //! Errors are logarithms of factors. The unit of SENS is unknown ("reconstructed value"), so one factor for all samples is taken off: the median of the
 //! samples that a law is fitted to. A maximum force that the paper's own fit did not find (D and DA) counts as right from [`FAILED_N`] on.
 
-use super::super::rank::{chance, mean, spearman};
+use super::super::rank::{chance, mean, median, spearman};
+use super::super::samples::FAILED_N;
 use super::Eighth;
 use super::bench::{Bench, Curve};
 use super::laws::Law;
 
-/// From this force on a maximum is a failed fit there (N): four times what was applied.
-const FAILED_N: f64 = 20.0;
 /// An error counts as this at most: 3 is a factor of 20.
 const MOST: f64 = 3.0;
 /// What a sample counts that conducts nothing.
@@ -28,8 +27,6 @@ pub struct Judged {
     pub errors: Vec<Option<[f64; 2]>>,
     /// Factors that SENS and FMAX are off by, root mean square of the logarithm over the samples that it was not fitted to.
     pub left: [Option<f64>; 2],
-    /// Over all of them.
-    pub all: [Option<f64>; 2],
     /// Rank correlation over all samples of what it says with what was measured, and how likely one so strong is by chance: of SENS and FMAX.
     pub order: [Option<[f64; 2]>; 2],
 }
@@ -42,11 +39,6 @@ pub fn fitted(law: &Law, benches: &[Bench], fit_to: impl Fn(usize) -> bool + Cop
     judged(law, benches, parameters, fit_to, eighth)
 }
 
-fn curves(law: &Law, benches: &[Bench], parameters: &[f64], eighth: Eighth) -> Vec<Option<Curve>> {
-    let of = |bench: &Bench| bench.curve(|force_n| (law.contact)(bench, parameters, force_n), eighth);
-    benches.iter().map(of).collect()
-}
-
 /// The factor that SENS is off by, and FMAX.
 fn errors(bench: &Bench, curve: &Curve) -> [f64; 2] {
     let sensitivity = (curve.sensitivity / bench.measured.sensitivity_mv_per_n).ln();
@@ -57,13 +49,25 @@ fn errors(bench: &Bench, curve: &Curve) -> [f64; 2] {
     [sensitivity, maximum]
 }
 
-/// The median of the errors of SENS over some samples: the logarithm of its unit.
-fn unit(errors: &[Option<[f64; 2]>], of: impl Fn(usize) -> bool) -> f64 {
-    let mut logs: Vec<f64> =
-        errors.iter().enumerate().filter(|(at, _)| of(*at)).filter_map(|(_, one)| Some((*one)?[0])).collect();
-    logs.sort_by(f64::total_cmp);
-    let (low, high) = (logs.get(logs.len().saturating_sub(1) / 2), logs.get(logs.len() / 2));
-    low.zip(high).map_or(0.0, |(low, high)| (low + high) / 2.0)
+/// The curves of some samples and their errors, the unit of SENS still in them; `None` of others, and where one conducts nothing.
+fn told(
+    law: &Law,
+    benches: &[Bench],
+    parameters: &[f64],
+    of: impl Fn(usize) -> bool,
+    eighth: Eighth,
+) -> Vec<Option<(Curve, [f64; 2])>> {
+    let one = |(at, bench): (usize, &Bench)| {
+        let curve = of(at).then(|| bench.curve(|force_n| (law.contact)(bench, parameters, force_n), eighth));
+        curve.flatten().map(|curve| (curve, errors(bench, &curve)))
+    };
+    benches.iter().enumerate().map(one).collect()
+}
+
+/// The logarithm of the unit of SENS: the median of the errors of some samples.
+fn unit(told: &[Option<(Curve, [f64; 2])>], of: impl Fn(usize) -> bool) -> f64 {
+    let counted = told.iter().enumerate().filter(|(at, _)| of(*at));
+    median(counted.filter_map(|(_, one)| one.map(|(_, errors)| errors[0])).collect()).unwrap_or(0.0)
 }
 
 fn cost(
@@ -73,20 +77,13 @@ fn cost(
     fit_to: impl Fn(usize) -> bool + Copy,
     eighth: Eighth,
 ) -> f64 {
-    let errors: Vec<_> = benches
-        .iter()
-        .enumerate()
-        .map(|(at, bench)| {
-            let curve = fit_to(at).then(|| bench.curve(|force_n| (law.contact)(bench, parameters, force_n), eighth));
-            curve.flatten().map(|curve| self::errors(bench, &curve))
-        })
-        .collect();
-    let unit = unit(&errors, fit_to);
+    let told = told(law, benches, parameters, fit_to, eighth);
+    let unit = unit(&told, fit_to);
     let square = |error: f64| counted(error).powi(2);
-    let of = |one: &Option<[f64; 2]>| {
-        one.map_or(NOTHING * NOTHING, |[sensitivity, maximum]| square(sensitivity - unit) + square(maximum))
+    let of = |one: &Option<(Curve, [f64; 2])>| {
+        one.map_or(NOTHING * NOTHING, |(_, [sensitivity, maximum])| square(sensitivity - unit) + square(maximum))
     };
-    errors.iter().enumerate().filter(|(at, _)| fit_to(*at)).map(|(_, one)| of(one)).sum()
+    told.iter().enumerate().filter(|(at, _)| fit_to(*at)).map(|(_, one)| of(one)).sum()
 }
 
 fn judged(
@@ -96,15 +93,14 @@ fn judged(
     fit_to: impl Fn(usize) -> bool + Copy,
     eighth: Eighth,
 ) -> Judged {
-    let curves = curves(law, benches, &parameters, eighth);
-    let errors = benches.iter().zip(&curves).map(|(bench, curve)| curve.as_ref().map(|curve| errors(bench, curve)));
-    let mut errors: Vec<Option<[f64; 2]>> = errors.collect();
-    let unit = unit(&errors, fit_to);
-    errors.iter_mut().flatten().for_each(|[sensitivity, _]| *sensitivity -= unit);
+    let told = told(law, benches, &parameters, |_| true, eighth);
+    let unit = unit(&told, fit_to);
+    let errors = told.iter().map(|one| one.map(|(_, [sensitivity, maximum])| [sensitivity - unit, maximum]));
+    let errors: Vec<Option<[f64; 2]>> = errors.collect();
+    let curves: Vec<Option<Curve>> = told.iter().map(|one| one.map(|(curve, _)| curve)).collect();
     Judged {
         unit_mv: (-unit).exp(),
         left: left(benches, &errors, |at| !fit_to(at)),
-        all: left(benches, &errors, |_| true),
         order: order(benches, &curves),
         errors,
         parameters,

@@ -19,6 +19,7 @@ use self::causes::SETUPS;
 pub use self::fit::Judged;
 use self::laws::{CHOSEN, LAWS};
 pub use self::view::view;
+use super::rank::{mean, median};
 use super::samples::Measured;
 use super::{Course, DesignError, PaperSolver, Progress, samples};
 
@@ -160,13 +161,11 @@ fn cause(name: &'static str, samples: &[Measured], figures: Vec<Figures>) -> Cau
             ]
         })
         .collect();
-    let mut units: Vec<f64> = errors.iter().filter_map(|one| one[0]).collect();
-    units.sort_by(f64::total_cmp);
-    let unit = units.get(units.len() / 2).copied().unwrap_or(0.0);
+    let unit = median(errors.iter().filter_map(|one| one[0]).collect()).unwrap_or(0.0);
     errors.iter_mut().filter_map(|one| one[0].as_mut()).for_each(|error| *error -= unit);
     let left = std::array::from_fn(|figure| {
         let squares: Vec<f64> = errors.iter().filter_map(|one| Some(fit::counted(one[figure]?).powi(2))).collect();
-        let left = super::rank::mean(&squares).map(f64::sqrt);
+        let left = mean(&squares).map(f64::sqrt);
         if figure < 2 { left.map(f64::exp) } else { left }
     });
     Cause { name, figures, errors, left }

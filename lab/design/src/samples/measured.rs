@@ -17,8 +17,8 @@ pub struct Measured {
     pub position_accuracy: f64,
 }
 
-/// The largest force that was applied was 5 N; an FMAX of more than this many times that is a failed fit (13.7 N of AB is 2.7 times).
-const BELIEVED_TIMES: f64 = 4.0;
+/// An FMAX from here on is a failed fit (N): four times what was applied (13.7 N of AB is 2.7 times).
+pub const FAILED_N: f64 = 4.0 * super::super::press::FORCES_N[1];
 
 /// Table II, as printed.
 const TABLE: [(&str, [f64; 4]); 11] = [
@@ -50,7 +50,7 @@ pub fn all() -> impl Iterator<Item = Measured> {
     TABLE.into_iter().map(|(name, [sensitivity_mv_per_n, maximum_n, spatial_resolution, position_accuracy])| Measured {
         name,
         sensitivity_mv_per_n,
-        maximum_n: (maximum_n < BELIEVED_TIMES * super::super::press::FORCES_N[1]).then_some(maximum_n),
+        maximum_n: (maximum_n < FAILED_N).then_some(maximum_n),
         printed_maximum_n: maximum_n,
         spatial_resolution,
         position_accuracy,

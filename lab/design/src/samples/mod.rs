@@ -21,16 +21,14 @@ use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Fault, Foam, Noise, measured as through_converter};
 
 pub use self::choices::{Choice, Choices};
-pub use self::measured::{Measured, all as measured};
+pub use self::measured::{FAILED_N, Measured, all as measured};
 pub use self::view::view;
 use super::curve::{Fit, fit};
 use super::imaging::{Images, Imaging, accuracy_of_the_middle};
-use super::press::{FORCES_N, MIDDLE, nine_places};
+use super::press::{FORCES_N, MIDDLE, STEPS, force_n, nine_places};
 use super::reached::by_auto;
 use super::{Claim, Course, DesignError, Limit, PaperSolver, Press, Progress, Reached};
 
-/// Forces on the way up, and as many on the way down: every 0.125 N.
-const STEPS: usize = 40;
 /// Force at which places and images are compared (N), table II.
 pub(crate) const COMPARED_N: f64 = 2.25;
 /// Hysteresis of the foam, as a share of the conductance: the paper gives none; its curves of loading and unloading are apart by about so much.
@@ -163,12 +161,11 @@ impl Bench<'_> {
     /// Force and output in the middle, up and down.
     fn load_and_unload(&mut self, press: &Press, solver: &PaperSolver) -> Result<[Vec<[f64; 2]>; 2], ForwardError> {
         let mut foam = Foam::new(&[Fault::Hysteresis { share: HYSTERESIS }]);
-        let step_n = FORCES_N[1] / STEPS as f64;
         let mut ways = [Vec::new(), Vec::new()];
         let up = (1..=STEPS).map(|step| (0, step));
         let down = (1..STEPS).rev().map(|step| (1, step));
         for (time_s, (way, step)) in up.chain(down).enumerate() {
-            let force_n = step as f64 * step_n;
+            let force_n = force_n(step);
             let contact = press.at(MIDDLE, force_n);
             let pressed = foam.press(vec![Touch::from(contact)], time_s as f64);
             let conductance_s = pressed.touches.first().map_or(contact.conductance_s, |touch| touch.conductance_s);
