@@ -64,7 +64,7 @@ fn sources(report: &Report) -> Table {
 fn sentence(chosen: &Chosen) -> String {
     let [low, high] = chosen.without_one_j_per_m3.map(|energy| energy / 1e3);
     format!(
-        "**{}** is used everywhere. Fitted to all samples its film conducts 1 S/m2 at an energy of {:.1} kJ/m3 (without any one of the samples {low:.1} to {high:.1}); a \
+        "**{}** is used everywhere. Its form was found with all samples in view. Fitted to all samples its film conducts 1 S/m2 at an energy of {:.1} kJ/m3 (without any one of the samples {low:.1} to {high:.1}); a \
          share of 1 of the drive is {:.2} mV of the paper's reconstructed value, an image's value whose scale its lambda sets.",
         chosen.name,
         chosen.unit_energy_j_per_m3 / 1e3,
