@@ -67,7 +67,7 @@ impl AutoSearch {
         }
         let solution = search.solution(contacts, mean).ok()?;
         let shape = self.shape((&solution, evidence), from, &target)?;
-        (!shape.evidence().is_misfit(target.count())).then_some(shape)
+        (!shape.evidence().may_be_better(1.0, target.count())).then_some(shape)
     }
 
     /// The image that explains a frame, from the one that was followed if it was one.

@@ -37,6 +37,11 @@ impl Informed {
     }
 }
 
+/// Tells of a better explanation; it breaks if that ends the search.
+fn told(found: &Informed, better: &mut Better<'_>) -> ControlFlow<Informed> {
+    better(&found.hypothesis).map_break(|()| found.clone())
+}
+
 impl ContactFinder {
     /// What explains a frame, from what explains it so far if that leads there, else from nothing. Each better explanation on the way
     /// goes to `better`, which may end the search.
@@ -52,65 +57,63 @@ impl ContactFinder {
         if self.problem.nuisance().is_none() {
             return self.search_exact(from, target, better);
         }
-        match from {
+        let found = match from {
             Some(from) => self.search_from(from, target, better),
             None => self.search_from_nothing(target, better),
-        }
+        };
+        let (ControlFlow::Break(found) | ControlFlow::Continue(found)) = found.map_break(Some);
+        Some(found?.hypothesis)
     }
 
-    /// What explains a frame: first a few contacts, roughly, which a single one that fits makes the answer; else contact by contact.
-    fn search_from_nothing(&self, target: &Target, better: &mut Better<'_>) -> Option<ContactHypothesis> {
+    /// What explains a frame: first a few contacts, roughly, which a single one that fits makes the answer; else contact by contact. What
+    /// ended the search breaks.
+    fn search_from_nothing(&self, target: &Target, better: &mut Better<'_>) -> ControlFlow<Informed, Option<Informed>> {
         let begun = self.begun_roughly(target);
         if let Some(begun) = &begun {
-            if better(&begun.hypothesis).is_break() {
-                return Some(begun.hypothesis.clone());
-            }
-            if begun.count() == 1 {
-                let one = self.caught_up(&begun.hypothesis, target).map(|one| self.grown(one, better));
-                if let Some(one) = one.filter(|one| !self.is_misfit(&one.hypothesis.fit, &one.target)) {
-                    return Some(one.hypothesis);
+            told(begun, better)?;
+            if begun.count() == 1
+                && let Some(one) = self.caught_up(&begun.hypothesis, target)
+            {
+                let one = self.grown(one, better)?;
+                if !self.is_misfit(&one.hypothesis.fit, &one.target) {
+                    return ControlFlow::Continue(Some(one));
                 }
             }
         }
-        let mut is_ended = false;
-        let anew = self.anew(target, &mut |found| {
-            let flow = better(found);
-            is_ended |= flow.is_break();
-            flow
-        });
+        let anew = self.anew(target, better)?;
         // What was begun with needs no more if as many are found from one contact on.
-        let other = begun.filter(|begun| !is_ended && anew.as_ref().is_none_or(|anew| anew.count() != begun.count()));
+        let other = begun.filter(|begun| anew.as_ref().is_none_or(|anew| anew.count() != begun.count()));
         let other = other.map(|begun| self.settled(begun));
-        Some(self.more_likely(other, anew)?.hypothesis)
+        ControlFlow::Continue(self.more_likely(other, anew))
     }
 
-    /// What explains a frame, from what explains it so far if that leads there, else from nothing.
+    /// What explains a frame, from what explains it so far if that leads there, else from nothing. What ended the search breaks.
     fn search_from(
         &self,
         from: &ContactHypothesis,
         target: &Target,
         better: &mut Better<'_>,
-    ) -> Option<ContactHypothesis> {
-        // What was found before anything was known of the readings' errors is given with them first: to bring it to them takes a while.
-        let provisional = if from.error.is_none() { self.informed_as_is(from, target) } else { None };
-        if let Some(judged) = provisional.filter(|judged| better(&judged.hypothesis).is_break()) {
-            return Some(judged.hypothesis);
+    ) -> ControlFlow<Informed, Option<Informed>> {
+        // What was found before anything was known of the readings' errors is given with them first: to bring it to them takes a while. Else
+        // a contact that comes is shown as soon as it is found beside the others; whether it is one, and not what the detector differs by,
+        // takes longer.
+        let soon = if from.error.is_none() { self.informed_as_is(from, target) } else { self.joined(from, target) };
+        if let Some(soon) = soon {
+            told(&soon, better)?;
         }
-        // A contact that comes is shown as soon as it is found beside the others. Whether it is one, and not what the detector differs by, takes longer.
-        if let Some(joined) = self.joined(from, target).filter(|joined| better(joined).is_break()) {
-            return Some(joined);
+        let followed = match self.caught_up(from, target) {
+            Some(followed) => Some(self.grown(followed, better)?),
+            None => None,
+        };
+        if followed.as_ref().is_some_and(|grown| !self.is_misfit(&grown.hypothesis.fit, &grown.target)) {
+            return ControlFlow::Continue(followed);
         }
-        let followed = self.caught_up(from, target);
-        let followed = followed.map(|followed| self.grown(followed, better));
-        if let Some(grown) = followed.as_ref().filter(|grown| !self.is_misfit(&grown.hypothesis.fit, &grown.target)) {
-            return Some(grown.hypothesis.clone());
-        }
-        let anew = self.anew(target, better);
-        Some(self.more_likely(followed, anew)?.hypothesis)
+        let anew = self.anew(target, better)?;
+        ControlFlow::Continue(self.more_likely(followed, anew))
     }
 
     /// What explains a frame so far with one contact more, if it does not fit without; linear about the detector as it was found so far.
-    fn joined(&self, from: &ContactHypothesis, target: &Target) -> Option<ContactHypothesis> {
+    fn joined(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
         let error = from.error.as_ref()?;
         let as_before = Target::of_mean(&target.readings(), target.frames, &self.errors, Some(error));
         let fit = self.disc_fitter().go_on(&from.fit, &as_before, COLD)?;
@@ -121,7 +124,9 @@ impl ContactFinder {
         let fit = self.disc_fitter().go_on(&fit, &target, COLD)?;
         let more = self.is_misfit(&fit, &target).then(|| self.one_more(&fit, Vec::new(), &target))?.ok()?;
         let is_likelier = self.evidence(&more) > self.evidence(&fit);
-        is_likelier.then(|| ContactHypothesis { is_begun: true, ..ContactHypothesis::of(more, &target) })
+        let hypothesis =
+            is_likelier.then(|| ContactHypothesis { is_begun: true, ..ContactHypothesis::of(more, &target) })?;
+        Some(Informed { hypothesis, target })
     }
 
     /// A few contacts, found as if nothing were known of the readings' errors but their size, which is soonest. More may stand for something
@@ -136,12 +141,9 @@ impl ContactFinder {
     }
 
     /// What explains a frame, from nothing: contact by contact.
-    fn anew(&self, target: &Target, better: &mut Better<'_>) -> Option<Informed> {
-        let one = self.alone(target)?;
-        Some(match better(&one.hypothesis) {
-            ControlFlow::Break(()) => one,
-            ControlFlow::Continue(()) => self.grown(one, better),
-        })
+    fn anew(&self, target: &Target, better: &mut Better<'_>) -> ControlFlow<Informed, Option<Informed>> {
+        let Some(one) = self.alone(target) else { return ControlFlow::Continue(None) };
+        self.grown(one, better).map_continue(Some)
     }
 
     /// The best single contact, if anything stands out.
@@ -175,7 +177,8 @@ impl ContactFinder {
         for renewal in 0..RENEWALS {
             let Informed { hypothesis, target } = &found;
             // What contacts are missing for says nothing of the detector.
-            let is_hopeless = hypothesis.fit.cost > policy::wrong_mean_square() * target.count() as f64;
+            let is_hopeless = hypothesis.fit.cost > policy::wrong_mean_square() * target.count() as f64
+                || self.is_misfit(&hypothesis.fit, target) && self.is_widest(&hypothesis.fit);
             if is_hopeless && renewal > 0 {
                 break;
             }
@@ -200,9 +203,9 @@ impl ContactFinder {
     }
 
     /// More contacts as long as the evidence for them grows, then whatever other set of them is more likely.
-    fn grown(&self, first: Informed, better: &mut Better<'_>) -> Informed {
-        let (mut best, more) = self.one_by_one(first, better);
-        for _ in 0..if more.is_break() { 0 } else { GROWTHS } {
+    fn grown(&self, first: Informed, better: &mut Better<'_>) -> ControlFlow<Informed, Informed> {
+        let mut best = self.one_by_one(first, better)?;
+        for _ in 0..GROWTHS {
             let fit = &best.hypothesis.fit;
             let starts = self.pairs(fit, &best.target);
             let grown = self.grow(fit.clone(), starts, &best.target, &mut |_| ControlFlow::Continue(()));
@@ -211,9 +214,7 @@ impl ContactFinder {
             let is_better = self.whole_evidence(&grown) > self.whole_evidence(&best);
             if is_better {
                 best = grown;
-                if better(&best.hypothesis).is_break() {
-                    break;
-                }
+                told(&best, better)?;
             } else if !is_other {
                 // The same contacts, with what is known of their count.
                 best.hypothesis.certainty = grown.hypothesis.certainty;
@@ -222,23 +223,24 @@ impl ContactFinder {
                 break;
             }
         }
-        best
+        ControlFlow::Continue(best)
     }
 
     /// As many contacts as their spots ask for, then one more at a time, each with what its readings may be off by, while there are too few.
-    fn one_by_one(&self, first: Informed, better: &mut Better<'_>) -> (Informed, ControlFlow<()>) {
+    fn one_by_one(&self, first: Informed, better: &mut Better<'_>) -> ControlFlow<Informed, Informed> {
+        told(&first, better)?;
         let crowd = self.crowd(&first.hypothesis.fit, &first.target).map(|crowd| {
             let (hypothesis, target) = (ContactHypothesis::of(crowd, &first.target), first.target.clone());
             self.settled(Informed { hypothesis, target })
         });
         let is_likelier = |crowd: &Informed| self.whole_evidence(crowd) > self.whole_evidence(&first);
-        let crowd = crowd.filter(is_likelier);
-        if let Some(crowd) = &crowd
-            && better(&crowd.hypothesis).is_break()
-        {
-            return (crowd.clone(), ControlFlow::Break(()));
-        }
-        let mut best = crowd.unwrap_or(first);
+        let mut best = match crowd.filter(is_likelier) {
+            Some(crowd) => {
+                told(&crowd, better)?;
+                crowd
+            }
+            None => first,
+        };
         let mut last = best.clone();
         while self.is_misfit(&best.hypothesis.fit, &best.target) {
             let Informed { hypothesis: ContactHypothesis { fit, .. }, target } = last;
@@ -250,14 +252,12 @@ impl ContactFinder {
             last = self.settled(Informed { hypothesis: ContactHypothesis::of(more, &target), target });
             if self.whole_evidence(&last) > self.whole_evidence(&best) {
                 best = last.clone();
-                if better(&best.hypothesis).is_break() {
-                    return (best, ControlFlow::Break(()));
-                }
+                told(&best, better)?;
             } else if last.hypothesis.fit.contacts.len() > best.hypothesis.fit.contacts.len() + 1 {
                 break;
             }
         }
-        (best, ControlFlow::Continue(()))
+        ControlFlow::Continue(best)
     }
 
     fn more_likely(&self, one: Option<Informed>, other: Option<Informed>) -> Option<Informed> {
