@@ -9,10 +9,14 @@ use super::{
     SolveError, Target, Whole, image_evidence,
 };
 use crate::solve::before::adaptive_mean::Mean;
+use crate::solve::fit::approximation::ApproximationError;
 use crate::solve::fit::policy;
 use crate::solve::methods::shapes::StripFit;
 use crate::solve::solver::{Hypothesis, Search};
 use tactomo_physics::readings::Readings;
+
+/// Contacts that stand for a line or a ring: as many as are searched.
+const STANDING: usize = 6;
 
 /// Chooses the model.
 pub(super) struct AutoSearch {
@@ -61,13 +65,38 @@ impl AutoSearch {
     ) -> Option<StripFit> {
         let finder = self.finder.as_ref().filter(|_| !contacts.is_begun())?;
         let target = finder.target_of(mean, Some(contacts.error()?)).ok()?;
-        let evidence = finder.evidence_of_found(contacts);
-        if !evidence.is_misfit(target.count()) || is_partial(&target) {
-            return None;
-        }
-        let solution = search.solution(contacts, mean).ok()?;
-        let shape = self.shape((&solution, evidence), from, &target)?;
+        let is_misfit = finder.evidence_of_found(contacts).is_misfit(target.count());
+        if is_misfit { self.surely(search, contacts, from, mean) } else { None }
+    }
+
+    /// The line or ring that explains a frame better than contacts, and so well that nothing could do much better.
+    fn surely(
+        &self,
+        search: &ContactSearch,
+        contacts: &ContactHypothesis,
+        from: Option<&(Whole, String)>,
+        mean: &Mean,
+    ) -> Option<StripFit> {
+        let finder = self.finder.as_ref()?;
+        let target = finder.target_of(mean, contacts.error()).ok()?;
+        let solution = search.solution(contacts, mean).ok().filter(|_| !is_partial(&target))?;
+        let shape = self.shape((&solution, finder.evidence_of_found(contacts)), from, &target)?;
         (!shape.evidence().may_be_better(1.0, target.count())).then_some(shape)
+    }
+
+    /// The line or ring that was followed, if it still explains a frame with what readings may be off by together where it is now; and contacts
+    /// that stand for it. `error` is what they were off by so far.
+    fn renewed(
+        &self,
+        search: &ContactSearch,
+        from: Option<&(Whole, String)>,
+        error: Option<&Arc<ApproximationError>>,
+        mean: &Mean,
+    ) -> Option<(ContactHypothesis, (Whole, String))> {
+        let Some((Whole::Shape(fit), why)) = from else { return None };
+        let contacts = self.finder.as_ref()?.standing(fit.strip().discs(STANDING), error, mean)?;
+        let shape = self.surely(search, &contacts, from, mean)?;
+        Some((contacts, (Whole::Shape(Box::new(shape)), why.clone())))
     }
 
     /// The image that explains a frame, from the one that was followed if it was one.
@@ -147,8 +176,13 @@ impl Search for AutoSearch {
         let readings = &mean.readings;
         let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings).map(Hypothesis::of) };
         let FrameHypothesis { contacts, whole: from, .. } = from;
-        let contacts = contacts.filter(|_| from.is_none());
         let search = ContactSearch::new(Arc::clone(&finder));
+        let error = contacts.as_ref().and_then(|contacts| contacts.error());
+        if let Some((contacts, whole)) = self.renewed(&search, from.as_ref(), error, &mean) {
+            let contacts = Some(Box::new(contacts));
+            return Ok(Hypothesis::of(FrameHypothesis { contacts, whole: Some(whole), mean: Some(mean) }));
+        }
+        let contacts = contacts.filter(|_| from.is_none());
         let is_of_key_frames = contacts.as_ref().is_some_and(|contacts| contacts.is_of_key_frames());
         let mut early = None;
         let mut better = |better: ContactHypothesis| {

@@ -11,8 +11,9 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::discs::DiscFit;
-use super::search::COLD;
+use super::search::{COLD, FIRST};
 use super::{Better, ContactFinder, ContactHypothesis};
+use crate::solve::before::adaptive_mean::Mean;
 use crate::solve::fit::approximation::{ApproximationError, Linearised};
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
@@ -110,6 +111,20 @@ impl ContactFinder {
         }
         let anew = self.anew(target, better)?;
         ControlFlow::Continue(self.more_likely(followed, anew))
+    }
+
+    /// Contacts that stand for something else, with what the readings of that may be off by together, beginning with the detector that `error`
+    /// is about; `None` of a detector that is known exactly.
+    pub(crate) fn standing(
+        &self,
+        contacts: Vec<Contact>,
+        error: Option<&Arc<ApproximationError>>,
+        mean: &Mean,
+    ) -> Option<ContactHypothesis> {
+        let near = error.and_then(|error| error.linearised.as_ref());
+        let target = self.informed(&self.target_to_search(mean).ok()?, &contacts, near)?;
+        let hypothesis = ContactHypothesis::of(self.disc_fitter().fit(contacts, &target, FIRST)?, &target);
+        Some(self.settled(Informed { hypothesis, target }).hypothesis)
     }
 
     /// What explains a frame so far with one contact more, if it does not fit without; linear about the detector as it was found so far.

@@ -10,6 +10,7 @@ use std::f64::consts::{PI, TAU};
 
 use tactomo_physics::forward::ImageMesh;
 use tactomo_physics::geometry::{self, Point};
+use tactomo_physics::scene::Contact;
 
 /// What a strip goes along.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +87,21 @@ impl Course {
 }
 
 impl Strip {
+    /// So many discs in a row along it, which conduct as much together.
+    pub fn discs(&self, count: usize) -> Vec<Contact> {
+        let share = |k: usize| (k as f64 + 0.5) / count as f64;
+        let at = |k: usize| match self.course {
+            Course::Line([from, to]) => [0, 1].map(|axis| from[axis] + share(k) * (to[axis] - from[axis])),
+            Course::Ring { centre_m: [x_m, y_m], radius_m } => {
+                let (sin, cos) = (TAU * share(k)).sin_cos();
+                [x_m + radius_m * cos, y_m + radius_m * sin]
+            }
+        };
+        let conductance_s = self.conductance_s / count as f64;
+        let disc = |[x_m, y_m]: Point| Contact::flat(x_m, y_m, 0.5 * self.width_m, conductance_s);
+        (0..count).map(at).map(disc).collect()
+    }
+
     /// Whether it goes along a line.
     pub fn is_line(&self) -> bool {
         matches!(self.course, Course::Line(_))
