@@ -35,17 +35,8 @@ impl AutoSearch {
     }
 
     /// The line or ring that explains a frame better than contacts, if there may be one.
-    fn shape(
-        &self,
-        contacts: (&Solution, Evidence),
-        from: Option<&(Whole, String)>,
-        target: &Target,
-    ) -> Option<StripFit> {
+    fn shape(&self, contacts: (&Solution, Evidence), from: Option<&StripFit>, target: &Target) -> Option<StripFit> {
         let (solution, evidence) = contacts;
-        let from = match from {
-            Some((Whole::Shape(fit), _)) => Some(&**fit),
-            _ => None,
-        };
         let shapes = self.shapes.as_ref()?;
         let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
         let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
@@ -60,13 +51,17 @@ impl AutoSearch {
         &self,
         search: &ContactSearch,
         contacts: &ContactHypothesis,
-        from: Option<&(Whole, String)>,
+        from: Option<&StripFit>,
         mean: &Mean,
     ) -> Option<StripFit> {
         let finder = self.finder.as_ref().filter(|_| !contacts.is_begun())?;
         let target = finder.target_of(mean, Some(contacts.error()?)).ok()?;
-        let is_misfit = finder.evidence_of_found(contacts).is_misfit(target.count());
-        if is_misfit { self.surely(search, contacts, from, mean) } else { None }
+        // A single contact stands for a line or a ring if it is as wide as may be; else a second one is nearer.
+        let may_be = contacts.count() > 1 || finder.is_widest(contacts);
+        if !may_be || !finder.evidence_of_found(contacts).is_misfit(target.count()) {
+            return None;
+        }
+        self.surely(search, contacts, from, mean)
     }
 
     /// The line or ring that explains a frame better than contacts, and so well that nothing could do much better.
@@ -74,7 +69,7 @@ impl AutoSearch {
         &self,
         search: &ContactSearch,
         contacts: &ContactHypothesis,
-        from: Option<&(Whole, String)>,
+        from: Option<&StripFit>,
         mean: &Mean,
     ) -> Option<StripFit> {
         let finder = self.finder.as_ref()?;
@@ -89,14 +84,13 @@ impl AutoSearch {
     fn renewed(
         &self,
         search: &ContactSearch,
-        from: Option<&(Whole, String)>,
+        from: &StripFit,
         error: Option<&Arc<ApproximationError>>,
         mean: &Mean,
-    ) -> Option<(ContactHypothesis, (Whole, String))> {
-        let Some((Whole::Shape(fit), why)) = from else { return None };
-        let contacts = self.finder.as_ref()?.standing(fit.strip().discs(STANDING), error, mean)?;
-        let shape = self.surely(search, &contacts, from, mean)?;
-        Some((contacts, (Whole::Shape(Box::new(shape)), why.clone())))
+    ) -> Option<(ContactHypothesis, StripFit)> {
+        let contacts = self.finder.as_ref()?.standing(from.strip().discs(STANDING), error, mean)?;
+        let shape = self.surely(search, &contacts, Some(from), mean)?;
+        Some((contacts, shape))
     }
 
     /// The image that explains a frame, from the one that was followed if it was one.
@@ -130,7 +124,7 @@ impl AutoSearch {
         if self.image.is_rest(readings) || is_partial(target) {
             return Ok(None);
         }
-        let shape = self.shape((solution, contacts), from.as_ref(), target);
+        let shape = self.shape((solution, contacts), shape_of(from.as_ref()), target);
         let best = shape.as_ref().map_or(contacts, StripFit::evidence);
         let shape = shape.map(|fit| Whole::Shape(Box::new(fit)));
         // Of a provisional target nothing is claimed that another model could do better than.
@@ -159,6 +153,14 @@ impl AutoSearch {
     }
 }
 
+/// The line or ring that was followed.
+fn shape_of(from: Option<&(Whole, String)>) -> Option<&StripFit> {
+    match from {
+        Some((Whole::Shape(fit), _)) => Some(fit),
+        _ => None,
+    }
+}
+
 /// Whether so few rows were read that any shape explains them.
 fn is_partial(target: &Target) -> bool {
     2 * target.known() < target.readings().volts().len()
@@ -177,16 +179,18 @@ impl Search for AutoSearch {
         let Some(finder) = self.finder.clone() else { return self.image_alone(from, readings).map(Hypothesis::of) };
         let FrameHypothesis { contacts, whole: from, .. } = from;
         let search = ContactSearch::new(Arc::clone(&finder));
-        let error = contacts.as_ref().and_then(|contacts| contacts.error());
-        if let Some((contacts, whole)) = self.renewed(&search, from.as_ref(), error, &mean) {
-            let contacts = Some(Box::new(contacts));
-            return Ok(Hypothesis::of(FrameHypothesis { contacts, whole: Some(whole), mean: Some(mean) }));
+        if let Some((Whole::Shape(fit), why)) = &from {
+            let error = contacts.as_ref().and_then(|contacts| contacts.error());
+            if let Some((contacts, shape)) = self.renewed(&search, fit, error, &mean) {
+                let (contacts, whole) = (Some(Box::new(contacts)), Some((Whole::Shape(Box::new(shape)), why.clone())));
+                return Ok(Hypothesis::of(FrameHypothesis { contacts, whole, mean: Some(mean) }));
+            }
         }
         let contacts = contacts.filter(|_| from.is_none());
         let is_of_key_frames = contacts.as_ref().is_some_and(|contacts| contacts.is_of_key_frames());
         let mut early = None;
         let mut better = |better: ContactHypothesis| {
-            early = self.early(&search, &better, from.as_ref(), &mean);
+            early = self.early(&search, &better, shape_of(from.as_ref()), &mean);
             // A picture does not change to contacts that may not explain it.
             if early.is_none() && from.is_none() {
                 found(Hypothesis::of(FrameHypothesis {

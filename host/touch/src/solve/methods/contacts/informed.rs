@@ -34,7 +34,7 @@ pub(super) struct Informed {
 
 impl Informed {
     fn count(&self) -> usize {
-        self.hypothesis.fit.contacts.len()
+        self.hypothesis.count()
     }
 }
 
@@ -193,7 +193,7 @@ impl ContactFinder {
             let Informed { hypothesis, target } = &found;
             // What contacts are missing for says nothing of the detector.
             let is_hopeless = hypothesis.fit.cost > policy::wrong_mean_square() * target.count() as f64
-                || self.is_misfit(&hypothesis.fit, target) && self.is_widest(&hypothesis.fit);
+                || self.is_misfit(&hypothesis.fit, target) && self.is_widest(hypothesis);
             if is_hopeless && renewal > 0 {
                 break;
             }

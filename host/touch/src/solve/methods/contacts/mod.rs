@@ -156,6 +156,11 @@ impl ContactHypothesis {
         self.error.as_ref()
     }
 
+    /// How many contacts it has.
+    pub fn count(&self) -> usize {
+        self.fit.contacts.len()
+    }
+
     /// Whether it and what the readings may be off by together were not brought to agree yet: that it does not fit tells nothing then.
     pub fn is_begun(&self) -> bool {
         self.is_begun
@@ -284,6 +289,11 @@ impl ContactFinder {
     fn is_misfit(&self, fit: &DiscFit, target: &Target) -> bool {
         let freedom = self.freedom(fit, target);
         fit.cost > freedom * misfit_limit(freedom)
+    }
+
+    /// Whether a contact is as wide as a fit lets it be: then it stands for others that are missing, or for what is no disc.
+    pub fn is_widest(&self, found: &ContactHypothesis) -> bool {
+        found.fit.contacts.iter().any(|contact| contact.radius_m > 0.99 * self.widest_m)
     }
 
     /// What contacts leave of the frames, and what they take for that.

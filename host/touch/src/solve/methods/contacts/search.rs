@@ -255,11 +255,6 @@ impl ContactFinder {
         PARAMETERS * (count + 1) >= self.spot_model.electrodes()
     }
 
-    /// Whether a contact is as wide as a fit lets it be: then it stands for others that are missing, or for what is no disc.
-    pub(super) fn is_widest(&self, fit: &DiscFit) -> bool {
-        fit.contacts.iter().any(|contact| contact.radius_m > 0.99 * self.widest_m)
-    }
-
     /// Whether a fit leaves a little more than noise should, or needs a contact as wide as may be.
     pub(super) fn is_doubtful(&self, fit: &DiscFit, target: &Target) -> bool {
         let freedom = self.freedom(fit, target);
