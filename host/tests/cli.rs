@@ -78,7 +78,10 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
             "its driving layer has a sheet resistance, which only the slab can have",
         ),
         (&["forward", "--fault", "leak:0.01", "--save-jacobian", "no.jacobian"], "leave out --fault leak"),
-        (&["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"], "skin.poisson is 0.6, but has to be from -0.99 to 0.5"),
+        (
+            &["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"],
+            "skin.poisson is 0.6, but has to be from -0.99 to 0.5",
+        ),
         (&["live", "--port", "/dev/null", "--elf", text, "--json"], elf),
         (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
         (&["detector", "show", "--svg", text], "exists already: give another name, or --overwrite"),
