@@ -91,7 +91,7 @@ mod tests {
         let layers = |second: &str| {
             let layers = format!("material = \"B\"\n[[layers]]\nthickness_m = 0.002\n{second}");
             let text = FILE.replace("conductivity_s_per_m = 0.2", &layers);
-            Detector::from_toml(&text, "").unwrap().skin
+            Detector::from_toml(&text, "foams").unwrap().skin
         };
         assert_eq!(layers("material = \"A\""), Some(Skin::of_layers([(0.005, 0.96e6), (0.002, 0.35e6)])));
         assert_eq!(layers("conductivity_s_per_m = 0.2"), None, "one of them is not known");
