@@ -1,4 +1,4 @@
-//! `tactomo calibrate force` as a user calls it: presses of known force in, a detector with newtons out.
+//! `tactomo calibrate force` and `tactomo material fit` as a user calls them: presses of known force in, a detector with newtons or with its skin out.
 
 #![allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where")]
 
@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use serde_json::Value;
 use tactomo::detector::{Detector, Foam};
 use tactomo::forward::{ForwardModel, readings_v};
-use tactomo::hertz::Hertz;
+use tactomo::hertz::{Hertz, Skin, Surface};
 use tactomo::readings::Readings;
 use tactomo::scene::Contact;
 use tactomo::simulate::{Noise, finer_model, measured};
@@ -228,7 +228,7 @@ fn a_file_is_never_replaced_and_bad_presses_write_none() {
     let two = folder.with("two.csv", csv(&two));
     let light = folder.with("light.csv", csv(&light));
     let nothing = folder.with("nothing.csv", csv(&(0..10).map(|_| bench.row(&[])).collect::<Vec<_>>()));
-    let few = folder.with("few.csv", csv(&rows[..4]));
+    let few = folder.with("few.csv", csv(&rows[..3]));
     let sensor = folder.with("sensor.csv", "time_s,force_n\n0,1\n1,2\n");
     let no_force = folder.with("no-force.csv", "newtons\n1\n2\n");
     for (file, known, told) in [
@@ -242,7 +242,7 @@ fn a_file_is_never_replaced_and_bad_presses_write_none() {
         (&two, ["--newtons", &list(&TEN_N)], "row 4 has 2 contacts: press with one tip"),
         (&light, ["--newtons", &list(&TEN_N)], "press 1 (0.7 N) is too light to be found"),
         (&nothing, ["--newtons", &list(&TEN_N)], "no press in any of its 10 rows"),
-        (&few, ["--newtons", &list(&TEN_N[..4])], "4 presses, but 5 at least are needed"),
+        (&few, ["--newtons", &list(&TEN_N[..3])], "3 presses, but 4 at least are needed"),
         (&good, ["--newtons", "1,1.1,1.2,1.3,1.4,1.5,1.6,1.7,1.8,1.9"], "the forces go from 1 N to 1.9 N only"),
         (&good, ["--forces", &sensor], "a table of readings has no times"),
         (&good, ["--forces", &no_force], "a column named force_n is needed"),
@@ -360,4 +360,76 @@ fn a_wanted_law_that_is_open_is_not_determined() {
     assert_eq!(report["parameters"][2]["name"], "series_ohm");
     assert!(report["parameters"][2]["value"].is_null() && report["maximum_force_n"].is_null(), "{report}");
     assert!(report["maximum_force_as_printed_n"].is_null());
+}
+
+#[test]
+fn presses_tell_the_film_of_a_foam() {
+    let folder = Folder::new("material-fit");
+    let (mut within, mut follows, mut all) = (0, 0, 0);
+    for seed in 100..108 {
+        let mut bench = Bench::new(seed);
+        // Another film than the paper's foams have.
+        bench.hertz = bench.hertz.with(Surface::Film { unit_pa: 6e4 });
+        let file = folder.with(&format!("presses-{seed}.csv"), csv(&bench.rows(&TEN_N, 0.05)));
+        let out = folder.path(&format!("foam-{seed}.toml"));
+        let fit = ["material", "fit", &file, "--newtons", &list(&TEN_N), "--tip", "5", "--out", &out, "--json"];
+        let report = TACTOMO.json(&fit);
+        let number = |name: &str| report[name].as_f64().unwrap_or_else(|| panic!("no {name}: {report}"));
+        let (unit_pa, deviation_pa) = (number("film_unit_pa"), number("film_unit_deviation_pa"));
+        assert!((unit_pa / 6e4 - 1.0).abs() < 0.05, "{seed}: {unit_pa} {deviation_pa}");
+        within += usize::from((unit_pa - 6e4).abs() < BAND * deviation_pa);
+        all += 1;
+        assert!((number("exponent") - 5.0 / 3.0).abs() < 1e-12);
+        follows += usize::from(report["follows_law"] == true);
+        let skin = Skin::from(Foam::of('A').unwrap()).with(Surface::Film { unit_pa });
+        assert_eq!(Detector::read(Path::new(&out)).unwrap(), Detector { skin: Some(skin), ..Detector::default() });
+
+        // What was measured, as a table: the same film.
+        let rows = report["presses"].as_array().unwrap().iter().map(|press| {
+            let [force_n, conductance_s, deviation_s] =
+                ["force_n", "conductance_with_constriction_s", "sigma_conductance_with_constriction_s"]
+                    .map(|name| press[name].to_string());
+            format!("{force_n},{conductance_s},{deviation_s}\n")
+        });
+        let table = format!("force_n,conductance_s,conductance_deviation_s\n{}", rows.collect::<String>());
+        let table = folder.with("forces.csv", table);
+        let again = TACTOMO.json(&["material", "fit", &table, "--tip", "5", "--json"]);
+        assert_eq!(again["film_unit_pa"], report["film_unit_pa"]);
+    }
+    assert!(within >= all - 2 && follows >= all - 1, "{within} of {all} in bands of 90 %, {follows} follow the law");
+}
+
+#[test]
+fn presses_that_tell_no_film_say_what_to_do() {
+    let folder = Folder::new("material-bad");
+    let mut bench = Bench::new(3);
+    let good = folder.with("good.csv", csv(&bench.rows(&TEN_N, 0.0)));
+    let table = "force_n,conductance_s\n0.5,2e-6\n1,6e-6\n2,2e-5\n4,6e-5\n8,2e-4\n";
+    let forces = folder.with("forces.csv", table);
+    let few = folder.with("few.csv", "force_n,conductance_s\n0.5,2e-6\n1,6e-6\n");
+    let narrow = folder.with("narrow.csv", "force_n,conductance_s\n1,2e-6\n1.1,3e-6\n1.2,4e-6\n1.3,5e-6\n1.4,6e-6\n");
+    let silent: String = Detector::default().to_toml().split("\n[skin]").next().unwrap().to_owned();
+    let silent = folder.with("silent.toml", silent);
+    fn fit<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+        [&["material", "fit", "--tip", "5"][..], arguments].concat()
+    }
+    for (arguments, told) in [
+        (
+            fit(&[&good]),
+            "there are 256 without names; of a recording, or a table of readings, give --newtons or --forces",
+        ),
+        (fit(&[&few]), "2 presses, but 4 at least are needed"),
+        (fit(&[&narrow]), "press with forces that differ 2 times at least"),
+        (fit(&[&forces, "--detector", &silent]), "give --elasticity"),
+        (fit(&[&good, "--newtons", "1,2,3"]), "10 rows of readings, but 3 forces are given"),
+    ] {
+        let message = TACTOMO.refused(&arguments);
+        assert!(message.contains(told), "{arguments:?}: {message}");
+    }
+    let shown = TACTOMO.succeeds(&fit(&[&forces, "--detector", &silent, "--elasticity", "0.2"]));
+    let shown = String::from_utf8(shown).unwrap();
+    assert!(shown.starts_with("[skin]\nyoung_pa = 200000.0\npoisson = 0.3\nfilm_unit_pa = "), "{shown}");
+    let warned = TACTOMO.run(&fit(&[&forces, "--flat"]));
+    let warned = String::from_utf8_lossy(&warned.stderr).into_owned();
+    assert!(warned.contains("warning: the presses do not follow the law of a film"), "{warned}");
 }

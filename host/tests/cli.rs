@@ -78,7 +78,10 @@ fn what_fails_exits_with_1_and_says_what_to_do() {
             "its driving layer has a sheet resistance, which only the slab can have",
         ),
         (&["forward", "--fault", "leak:0.01", "--save-jacobian", "no.jacobian"], "leave out --fault leak"),
-        (&["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"], "Poisson's ratio is 0.6"),
+        (
+            &["forward", "--scene", "single", "--force", "1", "--poisson", "0.6"],
+            "skin.poisson is 0.6, but has to be from -0.99 to 0.5",
+        ),
         (&["live", "--port", "/dev/null", "--elf", text, "--json"], elf),
         (&["live", "--port", "/dev/null", "--record", text, "--json"], "File exists"),
         (&["detector", "show", "--svg", text], "exists already: give another name, or --overwrite"),
@@ -146,6 +149,37 @@ fn a_detector_goes_through_its_file_into_the_model() {
     };
     assert_eq!(read(&[&file]), read(&["fingertip-10", "--material", "BC"]));
     assert_eq!(TACTOMO.succeeds(&["detector", "show", &file, "--toml"]), shown);
+}
+
+#[test]
+fn a_file_says_how_soft_it_is_and_arguments_win() {
+    let folder = Folder::new("skin");
+    let bare = "[outline]\nsize_m = [0.06, 0.06]\n[[layers]]\nthickness_m = 0.005\nconductivity_s_per_m = 0.2273\n\
+        [electrodes]\ngrid = [4, 4]\ndiameter_m = 0.004\n";
+    let silent = folder.with("silent.toml", bare);
+    let film = folder.with("film.toml", format!("{bare}[skin]\nyoung_pa = 0.35e6\nfilm_unit_pa = 40e3\n"));
+    let ideal = folder.with("ideal.toml", format!("{bare}[skin]\nyoung_pa = 0.35e6\nideal_depth_m = 0.2e-3\n"));
+    let conductance_s = |file: &str, arguments: &[&str]| {
+        let press = ["forward", "--nodes", "500", "--press", "2,3,8,1", "--json", "--detector", file];
+        TACTOMO.json(&[&press[..], arguments].concat())["touches"][0]["conductance_s"].as_f64().unwrap()
+    };
+    // Of the ball of 1 N on foam A: 6.6273 uS on its film of 80.90 kPa, 8.9165 mS on an ideal surface of 0.5 mm (by hand, tests of the contact mechanics).
+    let near =
+        |found_s: f64, by_hand_s: f64| assert!((found_s / by_hand_s - 1.0).abs() < 2e-4, "{found_s} {by_hand_s}");
+    near(conductance_s(&film, &[]), 6.6273e-6 * (80.901f64 / 40.0).powi(3));
+    near(conductance_s(&ideal, &[]), 8.9165e-3 * 2.5);
+    near(conductance_s(&film, &["--surface", "measured"]), 6.6273e-6 * (80.901f64 / 40.0).powi(3));
+    for wins in [&["--surface", "measured"][..], &["--elasticity", "0.35"], &["--material", "A"]] {
+        near(conductance_s(&ideal, wins), 6.6273e-6);
+    }
+    near(conductance_s(&film, &["--surface", "ideal"]), 8.9165e-3);
+    near(conductance_s(&silent, &["--material", "A"]), 6.6273e-6);
+    for command in [&["forward", "--press", "2,3,8,1"][..], &["live", "--simulate", "--force", "1", "--seconds", "1"]] {
+        let message = TACTOMO.refused(&[command, &["--detector", &silent]].concat());
+        assert!(message.contains("how soft silent is") && message.contains("[skin]"), "{message}");
+    }
+    let live = TACTOMO.json(&["live", "--simulate", "--detector", &film, "--force", "3", "--seconds", "0.5", "--json"]);
+    assert!(live["frames"].as_u64().is_some_and(|frames| frames > 0), "{live}");
 }
 
 #[test]

@@ -69,7 +69,8 @@ fn a_design_is_a_detector_that_live_takes() {
     let boards: Vec<_> = settling[0].as_array().unwrap().iter().map(|one| one["board"].as_str().unwrap()).collect();
     assert_eq!(boards, ["esp32", "esp32c3", "esp32c6", "stm32f405"]);
     assert!(settling[0][0]["pad_ohm"].as_f64().is_some_and(|ohm| ohm > 100.0));
-    let live = TACTOMO.json(&["live", "--simulate", "--detector", &path, "--seconds", "0.5", "--json"]);
+    // The file says how soft it is: forces need no --material.
+    let live = TACTOMO.json(&["live", "--simulate", "--detector", &path, "--force", "2", "--seconds", "0.5", "--json"]);
     assert!(live["frames"].as_u64().is_some_and(|frames| frames > 0), "{live}");
 }
 

@@ -79,14 +79,6 @@ pub fn method() -> impl TypedValueParser<Value = Method> {
 }
 
 impl DetectorArgs {
-    /// What the detector is made of, if that is known: presets are of sample A, a file does not say how soft its layers are.
-    pub fn foams(&self) -> Option<Stack> {
-        match &self.detector {
-            None | Some(Chosen::Preset(_)) => self.material.clone().or_else(|| "A".parse().ok()),
-            Some(Chosen::File(_)) => self.material.clone(),
-        }
-    }
-
     /// The detector, or the default one, in the material that is asked for.
     pub fn get(&self) -> anyhow::Result<Detector> {
         self.get_or(Detector::DEFAULT)

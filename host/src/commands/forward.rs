@@ -125,16 +125,16 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 /// The detector, and all that touches it.
 fn pressed(args: &Args) -> anyhow::Result<(Detector, Pressed)> {
-    let (detector, foams) = (args.detector.get_or(args.scene.preset())?, args.detector.foams());
+    let detector = args.detector.get_or(args.scene.preset())?;
     let mut held: Vec<Touch> = args.contact.iter().copied().map(Touch::from).collect();
     if !args.press.is_empty() {
-        let hertz = args.scene.hertz(foams.clone(), &detector)?;
+        let hertz = args.scene.hertz(&detector)?;
         held.extend(args.press.iter().map(|press| press.touch(&hertz)));
     }
     if let Some(path) = &args.touches {
         held.extend(scene::read_touches(path)?);
     }
-    let scene = args.scene.scene(SceneName::Rest, foams, &detector)?;
+    let scene = args.scene.scene(SceneName::Rest, &detector)?;
     let pressed =
         Foam::after(&args.scene.fault, args.time, |time_s| held.iter().cloned().chain(scene.at(time_s)).collect());
     Ok((detector, pressed))

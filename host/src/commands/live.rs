@@ -161,7 +161,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     let detector = kept(learning.as_ref()).unwrap_or(detector);
     let (source, finger) = match args.replay {
         Some(file) => (source::recording(file, args.speed, !args.picture.json && args.seconds.is_none()), None),
-        None => source::board(&args.board, &args.picture.detector, &detector)?,
+        None => source::board(&args.board, &detector)?,
     };
     let settings = args.board.settings.requested();
     let is_pointer = args.board.scene.scene == Some(SceneName::Pointer);

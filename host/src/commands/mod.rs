@@ -9,6 +9,7 @@ mod export;
 mod forward;
 mod keep;
 mod live;
+mod material;
 mod ports;
 mod reconstruct;
 mod record;
@@ -43,6 +44,7 @@ enum Command {
     Forward(Box<forward::Args>),
     Reconstruct(reconstruct::Args),
     Calibrate(calibrate::Args),
+    Material(Box<material::Args>),
 }
 
 /// Commands by what they are for, as `--help` lists them.
@@ -50,7 +52,7 @@ const TASKS: [(&str, &[&str]); 5] = [
     ("See", &["live", "replay"]),
     ("Connect", &["ports", "board"]),
     ("Record", &["record", "recording", "export"]),
-    ("Calibrate", &["calibrate"]),
+    ("Calibrate", &["calibrate", "material"]),
     ("Compute", &["reconstruct", "forward", "detector"]),
 ];
 
@@ -95,6 +97,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Forward(args) => forward::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Material(args) => material::run(&args),
     }
 }
 

@@ -103,7 +103,7 @@ fn recorded(
     notes: String,
 ) -> anyhow::Result<()> {
     let detector = source::described(board, detector_args.get_or(board.scene.preset())?);
-    let (mut source, _) = source::board(board, detector_args, &detector)?;
+    let (mut source, _) = source::board(board, &detector)?;
     let header = Header { notes, ..Header::now(&detector, source.name()) };
     let options = RunOptions {
         settings: board.settings.requested(),
@@ -136,7 +136,7 @@ fn in_ring(
     ring: impl FnOnce(Header) -> Ring,
 ) -> anyhow::Result<()> {
     let detector = source::described(board, detector_args.get_or(board.scene.preset())?);
-    let (mut source, _) = source::board(board, detector_args, &detector)?;
+    let (mut source, _) = source::board(board, &detector)?;
     let ring = ring(Header::now(&detector, source.name()));
     let mut options = RunOptions { settings: board.settings.requested(), seconds, ..RunOptions::new(detector) };
     if save_on.contains(&SaveOn::Enter) {

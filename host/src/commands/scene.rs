@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use tactomo::detector::{Detector, Stack};
-use tactomo::hertz::{Hertz, POISSON, Skin, Surface};
+use tactomo::detector::Detector;
+use tactomo::hertz::{Hertz, Skin, Surface};
 use tactomo::scene::{Fingertip, Hand, Scene, SceneName, Shape, Touch};
 use tactomo::simulate::Fault;
 
@@ -29,14 +29,15 @@ pub struct SceneArgs {
     /// Radius of fingertips and bars in the scene (mm) [default: 8, or a seventh of a smaller detector's side]
     #[arg(long, value_name = "MM", value_parser = positive, requires = "force")]
     tip: Option<f64>,
-    /// Young's modulus of the detector, for forces (MPa) [default: that of its foams]
+    /// Young's modulus of the detector, for forces, with the measured surface of such a foam (MPa) [default: that of its foams or of its file]
     #[arg(long, value_name = "MPA", value_parser = positive)]
     elasticity: Option<f64>,
-    /// Poisson's ratio of the detector, for forces
-    #[arg(long, value_name = "RATIO", default_value_t = POISSON)]
-    poisson: f64,
-    /// What the surface conducts under pressure, for forces: measured, as in the paper's table II, or ideal, all that touches alike down to 0.5 mm or to the
-    /// depth in ideal:MM [default: measured; demonstrations without --force press an ideal one, as the paper gives none of their forces]
+    /// Poisson's ratio of the detector, for forces [default: that of its file, or 0.3]
+    #[arg(long, value_name = "RATIO")]
+    poisson: Option<f64>,
+    /// What the surface conducts under pressure, for forces: measured, a film as the detector's file has it or as in the paper's table II, or ideal, all that touches
+    /// alike down to 0.5 mm or to the depth in ideal:MM [default: the file's law, or measured; demonstrations without --force press an ideal one, as the paper gives
+    /// none of their forces]
     #[arg(long, value_name = "LAW", value_parser = law)]
     surface: Option<Law>,
     /// A fault: open:3, short:2,7, short:2,7:50 (ohm), swap:1,5, gain:4:0.8, invert:4, contact-spread:0.2, conductivity:2, uneven:0.2,
@@ -67,9 +68,9 @@ impl SceneArgs {
         self.scene.and_then(SceneName::detector).unwrap_or(Detector::DEFAULT)
     }
 
-    /// The scene, or `otherwise`, on a detector of such foams if they are known.
-    pub fn scene(&self, otherwise: SceneName, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Scene> {
-        let hand = self.hand(foams, detector)?;
+    /// The scene, or `otherwise`, on a detector.
+    pub fn scene(&self, otherwise: SceneName, detector: &Detector) -> anyhow::Result<Scene> {
+        let hand = self.hand(detector)?;
         let name = self.scene.unwrap_or(otherwise);
         ensure!(
             detector.surface.is_none() || name.is_of_discs(),
@@ -82,49 +83,52 @@ impl SceneArgs {
         Ok(Scene::new(name, detector, hand, self.seed()))
     }
 
-    fn hand(&self, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hand> {
+    fn hand(&self, detector: &Detector) -> anyhow::Result<Hand> {
         let Some(force_n) = self.force else {
             let hand = Hand::relative(detector);
-            let is_known = self.elasticity.is_some() || foams.is_some() || self.surface.is_some();
+            let is_known = self.elasticity.is_some() || detector.skin.is_some() || self.surface.is_some();
             return Ok(if is_known {
-                hand.on(self.hertz_on(Law::Ideal(Surface::IDEAL), foams, detector)?)
+                hand.on(self.hertz_on(Some(Law::Ideal(Surface::IDEAL)), detector)?)
             } else {
                 hand
             });
         };
         let radius_m = self.tip.map_or_else(|| Fingertip::fitting_m(detector), |tip_mm| tip_mm * 1e-3);
-        let hand = Hand::in_newtons(detector, Fingertip { hertz: self.hertz(foams, detector)?, force_n, radius_m });
+        let hand = Hand::in_newtons(detector, Fingertip { hertz: self.hertz(detector)?, force_n, radius_m });
         if let Some(beyond) = hand.beyond(1.0, 1.0) {
             message!("warning: {force_n} N is beyond Hertz's theory: {beyond}");
         }
         Ok(hand)
     }
 
-    /// Mechanics of a detector of such foams, if they are known.
-    pub fn hertz(&self, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hertz> {
-        self.hertz_on(Law::Measured, foams, detector)
+    /// Mechanics of a detector, by its own skin or by what is said of it.
+    pub fn hertz(&self, detector: &Detector) -> anyhow::Result<Hertz> {
+        self.hertz_on(None, detector)
     }
 
-    fn hertz_on(&self, otherwise: Law, foams: Option<Stack>, detector: &Detector) -> anyhow::Result<Hertz> {
-        let skin = self.elasticity.map(|mpa| Skin::of(mpa * 1e6)).or_else(|| foams.as_ref().map(Skin::from));
+    /// The same, on such a surface unless another one is asked for.
+    fn hertz_on(&self, otherwise: Option<Law>, detector: &Detector) -> anyhow::Result<Hertz> {
+        let skin = self.elasticity.map(|mpa| Skin::of(mpa * 1e6)).or(detector.skin);
         let skin = skin.with_context(|| {
-            format!("forces need to know how soft {} is: give --elasticity or --material", detector.name)
+            format!(
+                "forces need to know how soft {} is: give --elasticity or --material, or write young_pa in a table [skin] of its file",
+                detector.name
+            )
         })?;
-        let skin = Skin { poisson: self.poisson, ..skin };
-        Ok(Hertz::new(
-            detector,
-            match self.surface.unwrap_or(otherwise) {
-                Law::Measured => skin,
-                Law::Ideal(surface) => skin.with(surface),
-            },
-        )?)
+        let skin = Skin { poisson: self.poisson.unwrap_or(skin.poisson), ..skin };
+        let skin = match (self.surface.or(otherwise), skin.surface) {
+            (None, _) | (Some(Law::Measured), Surface::Film { .. }) => skin,
+            (Some(Law::Measured), Surface::Ideal { .. }) => skin.with(Surface::measured(skin.young_pa)),
+            (Some(Law::Ideal(surface)), _) => skin.with(surface),
+        };
+        Ok(Hertz::new(detector, skin)?)
     }
 }
 
 /// The law of a surface that is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
-    /// That of the foam on top.
+    /// A film: the detector's own, or that of the paper's foams.
     Measured,
     /// An ideal one.
     Ideal(Surface),

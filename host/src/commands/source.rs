@@ -106,15 +106,11 @@ pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
 }
 
 /// The board that is chosen, and what the mouse presses with on a simulated one.
-pub fn board(
-    args: &BoardArgs,
-    chosen: &DetectorArgs,
-    detector: &Detector,
-) -> anyhow::Result<(Box<dyn Source>, Option<Finger>)> {
+pub fn board(args: &BoardArgs, detector: &Detector) -> anyhow::Result<(Box<dyn Source>, Option<Finger>)> {
     if !args.simulate {
         return Ok((args.serial(), None));
     }
-    let scene = args.scene.scene(SceneName::Wandering, chosen.foams(), detector)?;
+    let scene = args.scene.scene(SceneName::Wandering, detector)?;
     let finger = scene.hand().tip([0.0; 2], MOUSE_FIRMNESS, 1.0).disc().map(Finger::from);
     let seed = args.scene.seed();
     let built = args.scene.as_built.of(detector)?;

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Detector, Problem};
 use tactomo_physics::geometry::Point;
-use tactomo_physics::hertz::{Hertz, Imprint, SURFACE_DEPTH_M, Skin, SkinError, Surface};
+use tactomo_physics::hertz::{Hertz, Imprint, SURFACE_DEPTH_M, Skin, Surface};
 use tactomo_physics::scene::Contact;
 
 /// Diameter of the paper's simulated contact (m), section III.A.
@@ -56,21 +56,13 @@ impl Press {
     /// the paper's eq. (1).
     ///
     /// # Errors
-    /// [`SkinError`] if that is no elastic layer.
-    pub fn indenter(detector: &Detector, skin: Skin) -> Result<Self, SkinError> {
+    /// [`Problem`] if that is no elastic layer.
+    pub fn indenter(detector: &Detector, skin: Skin) -> Result<Self, Problem> {
         let (radius_m, hertz) = (INDENTER_DIAMETER_M / 2.0, Hertz::new(detector, skin)?);
         Ok(match skin.surface {
             Surface::Ideal { .. } => Self::Ball { radius_m, hertz },
             Surface::Film { .. } => Self::Flat { radius_m, hertz },
         })
-    }
-
-    /// A ball of a radius (m) on a detector of such a skin.
-    ///
-    /// # Errors
-    /// [`SkinError`] if that is no elastic layer.
-    pub fn ball(detector: &Detector, skin: Skin, radius_m: f64) -> Result<Self, SkinError> {
-        Ok(Self::Ball { radius_m, hertz: Hertz::new(detector, skin)? })
     }
 
     /// The contact of a strength at a place (m).

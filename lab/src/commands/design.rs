@@ -7,7 +7,6 @@ use anyhow::{Context, ensure};
 use tactomo_board::inputs::{self, Settling};
 use tactomo_design::search::{self, Material, Plan, Wishes};
 use tactomo_physics::detector::{Chosen, Detector, Stack};
-use tactomo_physics::hertz::Skin;
 use tactomo_study::view::{self, View};
 
 use super::study::watched;
@@ -59,9 +58,9 @@ pub struct Args {
     /// A detector to compare with what is found: a preset, or a TOML file
     #[arg(long, value_name = "NAME|FILE")]
     compare: Option<Chosen>,
-    /// What that is made of: foam, or stack with the upper one first
-    #[arg(long, value_name = "A..D|STACK", default_value = "A", requires = "compare")]
-    material: Stack,
+    /// Foam, or stack with the upper one first, that is compared in place of what that is made of
+    #[arg(long, value_name = "A..D|STACK", requires = "compare")]
+    material: Option<Stack>,
     /// Candidates that are tried at most
     #[arg(long = "try", value_name = "COUNT", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(1..))]
     most: u32,
@@ -187,7 +186,10 @@ impl Args {
             Some(chosen) => {
                 let detector = chosen.get()?;
                 check_size(&detector, size_m)?;
-                Some((detector.in_material(&self.material)?, Skin::from(&self.material)))
+                Some(match &self.material {
+                    Some(stack) => detector.in_material(stack)?,
+                    None => detector,
+                })
             }
             None => None,
         };

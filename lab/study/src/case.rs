@@ -186,6 +186,7 @@ impl File {
                 converters: Vec::new(),
                 calibration: None,
                 force: None,
+                skin: None,
                 correction: None,
             },
             contacts: self.contacts,

@@ -84,10 +84,11 @@ impl Header {
         detector.map(Some).map_err(|source| RecordError::Detector { path: path.to_owned(), source })
     }
 
-    /// Whether `detector` is the one of the recording, whatever is known of its forces and corrected in its answers.
+    /// Whether `detector` is the one of the recording, whatever is known of its forces and its softness, and corrected in its answers.
     pub fn is_of(&self, detector: &Detector) -> bool {
         let bare = |detector: &Detector| {
-            let header = Self::of(&Detector { force: None, correction: None, ..detector.clone() }, String::new(), 0);
+            let header =
+                Self::of(&Detector { force: None, skin: None, correction: None, ..detector.clone() }, String::new(), 0);
             (header.detector_toml, header.surface_obj)
         };
         let recorded = self.detector(Path::new("")).ok().flatten();

@@ -6,6 +6,7 @@ use super::{
     Adc, CalibratedParameter, Correction, Detector, Electrode, ForceLaw, Layer, Outline, Parameter, Tolerances,
 };
 use crate::geometry::{Point, area, cross, distance, edges, is_inside, segment_distance};
+use crate::hertz::Skin;
 use crate::space::{self, Place};
 
 /// How many electrodes a detector may have.
@@ -76,6 +77,7 @@ impl Detector {
         self.check_calibration()?;
         self.adc.check()?;
         self.force.as_ref().map_or(Ok(()), ForceLaw::check)?;
+        self.skin.as_ref().map_or(Ok(()), Skin::check)?;
         self.check_correction()
     }
 
@@ -348,7 +350,7 @@ fn check_name(name: &str) -> Result<(), Problem> {
 }
 
 /// Checks that a number is in a range.
-pub(super) fn within(field: &str, value: f64, range: RangeInclusive<f64>) -> Result<(), Problem> {
+pub(crate) fn within(field: &str, value: f64, range: RangeInclusive<f64>) -> Result<(), Problem> {
     if range.contains(&value) {
         return Ok(());
     }

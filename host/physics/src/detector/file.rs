@@ -3,6 +3,7 @@
 mod calibration;
 mod electrodes;
 mod layers;
+mod skin;
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -15,6 +16,7 @@ use toml::de::{DeTable, DeValue};
 use self::calibration::CalibrationTable;
 use self::electrodes::ElectrodeTable;
 use self::layers::LayerTable;
+use self::skin::SkinTable;
 use super::check::{LENGTH_M, Problem, within};
 use super::pad::CONTACT_IMPEDANCE_OHM_M2;
 use super::preset::{DRIVE_V, ON_RESISTANCE_OHM};
@@ -86,6 +88,7 @@ struct Document {
     tolerances: Tolerances,
     calibration: Option<CalibrationTable>,
     force: Option<ForceLaw>,
+    skin: Option<SkinTable>,
     correction: Option<Correction>,
 }
 
@@ -211,6 +214,9 @@ impl Detector {
         if let Some(law) = &self.force {
             law.write_toml(text)?;
         }
+        if let Some(skin) = &self.skin {
+            skin.write_toml(text)?;
+        }
         if let Some(correction) = &self.correction {
             correction.write_toml(text)?;
         }
@@ -294,9 +300,11 @@ impl Document {
             }
         };
         let layer = |(index, layer): (usize, LayerTable)| layer.into_layer(&format!("layers[{index}]"));
+        let layers: Vec<_> = self.layers.into_iter().enumerate().map(layer).collect::<Result<_, _>>()?;
         Ok(Detector {
+            skin: self.skin.map(SkinTable::into_skin).transpose()?.or_else(|| skin::of_foams(&layers)),
             name: self.name.unwrap_or_else(|| name.to_owned()),
-            layers: self.layers.into_iter().enumerate().map(layer).collect::<Result<_, _>>()?,
+            layers: layers.into_iter().map(|(layer, _)| layer).collect(),
             electrodes: self.electrodes.into_list(&outline, surface.as_ref(), shift_m)?,
             outline,
             surface,

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use super::bond::DOT_DIAMETER_M;
 use super::check::Problem;
 use super::{Bond, Detector, Layer};
+use crate::hertz::Skin;
 
 /// Letters that a stack may have.
 const MAX_LETTERS: usize = 8;
@@ -134,7 +135,7 @@ fn bond(dots: &str, foams: usize) -> Result<Bond, StackError> {
 }
 
 impl Detector {
-    /// This detector in another material, with no law of force and no correction: those were another material's. A stack of as many foams as there are layers keeps each layer's thickness; on a
+    /// This detector in another material, with that one's skin and with no law of force and no correction: those were another material's. A stack of as many foams as there are layers keeps each layer's thickness; on a
     /// single layer, each foam has that layer's thickness, as the paper's stacks do. Layers that are joined by dots stay so, unless the stack has
     /// dots of its own.
     ///
@@ -153,6 +154,8 @@ impl Detector {
         };
         self.layers = stack.foams.iter().enumerate().map(layer).collect();
         let (name, detector) = (&stack.name, &self.name);
+        let soft = self.layers.iter().zip(&stack.foams).map(|(layer, foam)| (layer.thickness_m, foam.elasticity_pa));
+        self.skin = Some(Skin::of_layers(soft));
         let named = |problem| MaterialError::Bond { stack: name.clone(), detector: detector.clone(), problem };
         self.check_bond().map_err(named)?;
         self.name = format!("{} in {}", self.name, stack.name);

@@ -18,6 +18,7 @@ mod uneven;
 
 pub use self::bond::Bond;
 pub use self::calibration::{CalibratedParameter, Calibration, SHORTEST_WAVE, Unknowns};
+pub(crate) use self::check::within;
 pub use self::check::{ELECTRODES, Problem};
 pub use self::chosen::{Chosen, UnknownDetector};
 pub use self::correction::{ConductanceErrors, Correction, PlaceErrors};
@@ -33,6 +34,7 @@ pub use self::tolerances::Tolerances;
 pub use self::uneven::Unevenness;
 pub(crate) use self::uneven::cosines;
 use crate::geometry;
+use crate::hertz::Skin;
 
 /// A detection layer with its electrodes and the circuit that measures it.
 ///
@@ -87,6 +89,9 @@ pub struct Detector {
     pub calibration: Option<Calibration>,
     /// Newtons from conductances, once that is calibrated.
     pub force: Option<ForceLaw>,
+    /// How soft it is and what its surface conducts, if that is known: newtons of simulated presses need it.
+    #[serde(default)]
+    pub skin: Option<Skin>,
     /// What is taken off contacts that are found with this description, where known presses have shown errors.
     #[serde(skip)]
     pub correction: Option<Correction>,
@@ -234,6 +239,7 @@ impl Detector {
             tolerances,
             calibration,
             force,
+            skin,
             correction,
         } = self.clone();
         Self {
@@ -252,6 +258,7 @@ impl Detector {
             converters,
             tolerances,
             force,
+            skin,
             correction,
         }
     }

@@ -60,6 +60,7 @@ impl Detector {
             converters: Vec::new(),
             calibration: None,
             force: None,
+            skin: Some(FOAMS[0].into()),
             correction: None,
         }
     }

@@ -3,6 +3,7 @@
 use std::fmt::{self, Write as _};
 
 use super::{Correction, Detector, Layer};
+use crate::hertz::Skin;
 
 /// Largest size of the view from above (px).
 const PLAN_PX: [f64; 2] = [460.0, 420.0];
@@ -279,6 +280,9 @@ impl Detector {
             ("ADC", format!("{} bits to {} V", self.adc.bits, short(self.adc.full_scale_v))),
             ("noise", format!("{} LSB", short(self.adc.noise_lsb))),
         ];
+        let elasticity = |skin: Skin| ("elasticity", format!("{} MPa", short(skin.young_pa * 1e-6)));
+        facts.extend(self.skin.map(elasticity));
+        facts.extend(self.skin.map(|skin| ("surface touched", skin.surface.summary())));
         facts.extend(self.bond().map(|(_, bond)| ("layers joined by", bond.summary())));
         facts.extend(self.force.as_ref().map(|law| ("forces", format!("up to {} N", short(law.limit_n())))));
         let presses = |correction: &Correction| ("corrected", format!("by {} known presses", correction.presses()));

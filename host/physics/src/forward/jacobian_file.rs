@@ -16,7 +16,7 @@ use super::jacobian::Jacobian;
 use crate::detector::{Detector, Surface};
 
 const MAGIC: &[u8; 8] = b"TACTOJAC";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const CHECKSUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a Jacobian cannot be saved or loaded.
@@ -246,7 +246,7 @@ mod tests {
         assert!(message(&whole[..9]).contains("cut short"));
         assert!(message(&changed(whole.len() / 2)).contains("checksum"));
         assert!(message(&changed(0)).contains("TACTOJAC"));
-        assert!(message(&changed(9)).contains("format 259"));
+        assert!(message(&changed(9)).contains("format 260"));
         Ok(())
     }
 }

@@ -14,9 +14,10 @@
 mod surface;
 
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 
 pub use self::surface::{SURFACE_DEPTH_M, Surface};
-use crate::detector::{Detector, FOAMS, Foam, Stack};
+use crate::detector::{Detector, FOAMS, Foam, Problem, Stack, within};
 
 /// Poisson's ratio where none is given: open-cell foams are near 1/3. The paper gives none.
 pub const POISSON: f64 = 0.3;
@@ -27,12 +28,18 @@ pub const POISSON: f64 = 0.3;
 /// hard ground it is about a fifth narrower (Dimitriadis et al., for an incompressible layer; foam is nearer to Hertz).
 const LARGEST_SHARE: f64 = 0.5;
 
-/// What a detector's layer is to the touch.
-#[derive(Clone, Copy, Debug, PartialEq)]
+const YOUNG_PA: RangeInclusive<f64> = 1e2..=1e12;
+/// Of stable solids above -1.
+const RATIO: RangeInclusive<f64> = -0.99..=0.5;
+const UNIT_PA: RangeInclusive<f64> = 1.0..=1e12;
+const DEPTH_M: RangeInclusive<f64> = 1e-9..=1.0;
+
+/// What a detector's layers are to the touch: all of them together, and the surface that is touched.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Skin {
-    /// Young's modulus (Pa).
+    /// Young's modulus of all layers together (Pa).
     pub young_pa: f64,
-    /// Poisson's ratio, -1 to 0.5.
+    /// Poisson's ratio, above -1 to 0.5.
     pub poisson: f64,
     /// What its surface conducts.
     pub surface: Surface,
@@ -48,7 +55,7 @@ pub struct Skin {
 /// let [light, firm] = [0.5, 2.0].map(|force_n| hertz.ball(0.01, force_n).half_width_m);
 /// // Radii go with the cube root of the force.
 /// assert!((firm / light - 4f64.cbrt()).abs() < 1e-9);
-/// # Ok::<(), tactomo_physics::hertz::SkinError>(())
+/// # Ok::<(), tactomo_physics::detector::Problem>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hertz {
@@ -56,6 +63,21 @@ pub struct Hertz {
     thickness_m: f64,
     top_s_per_m: f64,
     surface: Surface,
+}
+
+/// What presses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tip {
+    /// A ball, or a tip that is as round where it touches.
+    Ball {
+        /// Its radius (m).
+        radius_m: f64,
+    },
+    /// A flat punch.
+    Flat {
+        /// Its radius (m).
+        radius_m: f64,
+    },
 }
 
 /// Where a tip touches.
@@ -81,15 +103,6 @@ pub enum Beyond {
     Thickness,
 }
 
-/// Elastic constants that no layer has.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("{what} is {value}; it has to be {allowed}")]
-pub struct SkinError {
-    what: &'static str,
-    value: f64,
-    allowed: &'static str,
-}
-
 impl Skin {
     /// A skin of one Young's modulus (Pa).
     pub fn of(young_pa: f64) -> Self {
@@ -112,22 +125,17 @@ impl Skin {
         Self { surface, ..self }
     }
 
-    fn check(&self) -> Result<(), SkinError> {
-        let wrong = |what, value, allowed| Err(SkinError { what, value, allowed });
-        if !(self.young_pa > 0.0 && self.young_pa.is_finite()) {
-            return wrong("Young's modulus (Pa)", self.young_pa, "above zero");
+    /// Checks its numbers, by the names that they have in a detector's file.
+    ///
+    /// # Errors
+    /// The first [`Problem`] found, with its field.
+    pub fn check(&self) -> Result<(), Problem> {
+        within("skin.young_pa", self.young_pa, YOUNG_PA)?;
+        within("skin.poisson", self.poisson, RATIO)?;
+        match self.surface {
+            Surface::Ideal { depth_m } => within("skin.ideal_depth_m", depth_m, DEPTH_M),
+            Surface::Film { unit_pa } => within("skin.film_unit_pa", unit_pa, UNIT_PA),
         }
-        if !(self.poisson > -1.0 && self.poisson <= 0.5) {
-            return wrong("Poisson's ratio", self.poisson, "above -1 and at most 0.5");
-        }
-        let (what, value) = match self.surface {
-            Surface::Ideal { depth_m } => ("depth of surface (m)", depth_m),
-            Surface::Film { unit_pa } => ("pressure of 1 S/m2 (Pa)", unit_pa),
-        };
-        if !(value > 0.0 && value.is_finite()) {
-            return wrong(what, value, "above zero");
-        }
-        Ok(())
     }
 }
 
@@ -144,12 +152,27 @@ impl From<&Stack> for Skin {
     }
 }
 
+impl Tip {
+    /// The power of the force that the conductance of its contact is in proportion to.
+    pub fn exponent(self, surface: Surface) -> f64 {
+        // The area goes with F^(2/3) or stays, the pressure is the force over it.
+        let area = match self {
+            Self::Ball { .. } => 2.0 / 3.0,
+            Self::Flat { .. } => 0.0,
+        };
+        match surface {
+            Surface::Ideal { .. } => area,
+            Surface::Film { .. } => area + 3.0 * (1.0 - area),
+        }
+    }
+}
+
 impl Hertz {
     /// The mechanics of `detector` with such a skin.
     ///
     /// # Errors
-    /// [`SkinError`] if a constant is not one of an elastic layer.
-    pub fn new(detector: &Detector, skin: Skin) -> Result<Self, SkinError> {
+    /// [`Problem`] if a constant is not one of an elastic layer.
+    pub fn new(detector: &Detector, skin: Skin) -> Result<Self, Problem> {
         skin.check()?;
         Ok(Self::under(detector, skin))
     }
@@ -202,17 +225,32 @@ impl Hertz {
         self.imprint(radius_m, area_m2, force_n / area_m2, [1.0; 2], None)
     }
 
+    /// The contact under a tip.
+    pub fn tip(&self, tip: Tip, force_n: f64) -> Imprint {
+        match tip {
+            Tip::Ball { radius_m } => self.ball(radius_m, force_n),
+            Tip::Flat { radius_m } => self.flat(radius_m, force_n),
+        }
+    }
+
     /// Force under a ball whose contact has that conductance (N): [`ball`](Self::ball) backwards, within the theory's limits.
     pub fn ball_force_n(&self, radius_m: f64, conductance_s: f64) -> f64 {
-        let area_exponent = 2.0 / 3.0;
-        let exponent = match self.surface {
-            Surface::Ideal { .. } => area_exponent,
-            // Of an area of F^(2/3) under a pressure of F^(1/3).
-            Surface::Film { .. } => area_exponent + 1.0,
-        };
+        let tip = Tip::Ball { radius_m };
+        (conductance_s / self.conductance_at_1_n_s(tip)).powf(1.0 / tip.exponent(self.surface))
+    }
+
+    /// Pressure at which a film conducts 1 S/m2 (Pa), if contacts under such a tip conduct `conductance_at_1_n_s` times the force to the power of
+    /// [`Tip::exponent`].
+    pub fn film_unit_pa(&self, tip: Tip, conductance_at_1_n_s: f64) -> f64 {
+        (self.with(Surface::Film { unit_pa: 1.0 }).conductance_at_1_n_s(tip) / conductance_at_1_n_s).cbrt()
+    }
+
+    /// The factor of the power of the force (S) that the conductance is within the theory's limits.
+    fn conductance_at_1_n_s(&self, tip: Tip) -> f64 {
+        let (Tip::Ball { radius_m } | Tip::Flat { radius_m }) = tip;
         // So light a press that it is within all limits.
         let light_n = 1e-9 * self.plane_modulus_pa * radius_m * radius_m;
-        light_n * (conductance_s / self.ball(radius_m, light_n).conductance_s).powf(1.0 / exponent)
+        self.tip(tip, light_n).conductance_s / light_n.powf(tip.exponent(self.surface))
     }
 
     /// What a contact of such a half width, area and largest pressure is on this surface; `of_film` are the shares of the half width and of the conductance under
@@ -371,6 +409,19 @@ mod tests {
     }
 
     #[test]
+    fn a_film_is_known_by_what_it_conducts_at_1_n() {
+        // 1 N on 19.635 mm2 are 50.93 kPa, of a film of 80.90 kPa 0.24949 S/m2.
+        let flat = Tip::Flat { radius_m: 0.0025 };
+        let found_pa = measured_a().film_unit_pa(flat, 0.24949 * 19.635e-6);
+        assert!((found_pa / 80.901e3 - 1.0).abs() < 1e-4, "{found_pa}");
+        // The ball of 8 mm of the tests of commands: 6.6273 uS at 1 N.
+        let found_pa = sample_a().film_unit_pa(Tip::Ball { radius_m: 0.008 }, 6.6273e-6);
+        assert!((found_pa / 80.901e3 - 1.0).abs() < 1e-4, "{found_pa}");
+        let ideal = |tip: Tip| tip.exponent(Surface::IDEAL);
+        assert_eq!((ideal(flat), ideal(Tip::Ball { radius_m: 0.008 })), (0.0, 2.0 / 3.0));
+    }
+
+    #[test]
     fn stacks_are_as_soft_as_springs_one_after_the_other() {
         let stack: Stack = "AB".parse().unwrap();
         assert!((Skin::from(&stack).young_pa - 2.0 / (1.0 / 0.35e6 + 1.0 / 0.96e6)).abs() < 1e-6);
@@ -382,11 +433,11 @@ mod tests {
     fn constants_of_no_layer_are_refused() {
         let detector = Detector::preset(Detector::DEFAULT).unwrap();
         for (skin, named) in [
-            (Skin::of(0.0), "Young's modulus"),
-            (Skin::of(f64::NAN), "Young's modulus"),
-            (Skin { poisson: 0.51, ..Skin::of(1e5) }, "at most 0.5"),
-            (Skin::of(1e5).with(Surface::Ideal { depth_m: -1.0 }), "depth of surface"),
-            (Skin::of(1e5).with(Surface::Film { unit_pa: 0.0 }), "pressure of 1 S/m2"),
+            (Skin::of(0.0), "skin.young_pa is 0.0"),
+            (Skin::of(f64::NAN), "skin.young_pa is NaN"),
+            (Skin { poisson: 0.51, ..Skin::of(1e5) }, "skin.poisson is 0.51"),
+            (Skin::of(1e5).with(Surface::Ideal { depth_m: -1.0 }), "skin.ideal_depth_m is -1.0"),
+            (Skin::of(1e5).with(Surface::Film { unit_pa: 0.0 }), "skin.film_unit_pa is 0.0"),
         ] {
             let error = Hertz::new(&detector, skin).unwrap_err().to_string();
             assert!(error.contains(named), "{error}");

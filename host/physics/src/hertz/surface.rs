@@ -19,6 +19,8 @@
 //! **Limits.** It is an empirical law, of one rubber sheet on four foams and of 0 to 5 N on 20 mm2: 0 to 250 kPa. Single samples are off by a factor of up to 3.
 //! Another driving layer is another film: known presses tell (`tactomo calibrate force`).
 
+use crate::detector::short;
+
 /// Depth of surface that a contact's current crosses on an ideal surface, where none is given (m). The paper gives none. It was chosen for one sample: with
 /// it the contact on sample A is at nine tenths of the drive at 2.1 N under a ball of 5 mm.
 pub const SURFACE_DEPTH_M: f64 = 0.5e-3;
@@ -28,7 +30,8 @@ pub const SURFACE_DEPTH_M: f64 = 0.5e-3;
 const UNIT_ENERGY_J_PER_M3: f64 = 18.7e3;
 
 /// A law of contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Surface {
     /// All that touches conducts alike, down to a depth.
     Ideal {
@@ -49,6 +52,14 @@ impl Surface {
     /// The film on a foam of such a Young's modulus (Pa), as the paper's table II has it.
     pub fn measured(young_pa: f64) -> Self {
         Self::Film { unit_pa: (UNIT_ENERGY_J_PER_M3 * young_pa).sqrt() }
+    }
+
+    /// What it conducts, in a few words.
+    pub fn summary(&self) -> String {
+        match self {
+            Self::Ideal { depth_m } => format!("ideal, down to {} mm", short(depth_m * 1e3)),
+            Self::Film { unit_pa } => format!("1 S/m\u{b2} at {} kPa", short(unit_pa * 1e-3)),
+        }
     }
 
     /// Conductance per area (S/m2) under a pressure (Pa), on a layer of such a conductivity at its top (S/m).

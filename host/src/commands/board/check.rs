@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut board = args.board.clone();
     board.scene.scene = Some(SceneName::Rest);
     let described = source::described(&board, args.detector.get()?);
-    let (mut source, finger) = source::board(&board, &args.detector, &described)?;
+    let (mut source, finger) = source::board(&board, &described)?;
     let mut listening = Listening::open(&mut *source, board.settings.requested())?;
     greet(&listening);
     let detector = measured::as_measured(&described, listening.hello())?;

@@ -1,8 +1,8 @@
 //! `tactomo calibrate force`: newtons from presses of known force.
 
-mod gather;
-mod known;
-mod report;
+pub mod gather;
+pub mod known;
+pub mod report;
 
 use std::path::PathBuf;
 
@@ -32,23 +32,11 @@ use tactomo_cli::output::{self, NewFile, message};
 #[command(verbatim_doc_comment)]
 #[command(group(clap::ArgGroup::new("known").args(["newtons", "forces"]).required(true)))]
 pub struct Args {
-    /// A recording, or a table of readings with a press a row (see `reconstruct`)
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
     #[command(flatten)]
-    detector: DetectorArgs,
-    /// Force of each press (N): of each row of a table, of each press of a recording
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = newtons)]
-    newtons: Vec<f64>,
-    /// The same from a table with a column `force_n`, and `unloading` if that is known: 1 where the force was falling, else 0; or a force
-    /// sensor's: columns `time_s`, since the recording's first frame, and `force_n`
-    #[arg(long, value_name = "FILE")]
-    forces: Option<PathBuf>,
+    presses: PressArgs,
     /// Law of force: `power`, or `saturating`, the paper's eq. (6) [default: the one that the presses need]
     #[arg(long, value_name = "power|saturating", value_parser = law)]
     law: Option<Law>,
-    #[command(flatten)]
-    reading: Reading,
     /// The detector file to write; a file that exists is not replaced
     #[arg(long, value_name = "CAL.toml")]
     out: PathBuf,
@@ -57,13 +45,40 @@ pub struct Args {
     json: bool,
 }
 
+/// Presses of known force.
+#[derive(Debug, clap::Args)]
+pub struct PressArgs {
+    /// A recording, or a table of readings with a press a row (see `reconstruct`)
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub detector: DetectorArgs,
+    /// Force of each press (N): of each row of a table, of each press of a recording
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = newtons)]
+    newtons: Vec<f64>,
+    /// The same from a table with a column `force_n`, and `unloading` if that is known: 1 where the force was falling, else 0; or a force
+    /// sensor's: columns `time_s`, since the recording's first frame, and `force_n`
+    #[arg(long, value_name = "FILE", conflicts_with = "newtons")]
+    forces: Option<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+impl PressArgs {
+    /// The forces that are given, if any are.
+    pub fn known(&self) -> anyhow::Result<Option<Known>> {
+        let is_given = !self.newtons.is_empty() || self.forces.is_some();
+        is_given.then(|| Known::of(&self.newtons, self.forces.as_deref())).transpose()
+    }
+}
+
 /// Fits a law and writes the detector with it.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let out = NewFile::never_replacing(&args.out)?;
-    let known = Known::of(&args.newtons, args.forces.as_deref())?;
-    let gathered = gather(args, &known)?;
+    let known = args.presses.known()?.context("give --newtons or --forces: which forces were the presses?")?;
+    let gathered = gather(&args.presses, &known)?;
     let presses: Vec<_> = gathered.presses.iter().map(|press| press.press).collect();
-    let fit = fit_force(&presses, args.law).with_context(|| args.file.display().to_string())?;
+    let fit = fit_force(&presses, args.law).with_context(|| args.presses.file.display().to_string())?;
     let calibrated = Detector { force: Some(fit.law.clone()), ..gathered.detector };
     super::write(&calibrated, &args.out, out)?;
     let report = Report::of(&calibrated.name, &args.out, &gathered.presses, &fit);

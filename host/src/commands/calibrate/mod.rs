@@ -1,6 +1,6 @@
 //! `tactomo calibrate`: makes a detector on paper the one that was built.
 
-mod force;
+pub mod force;
 mod known;
 mod presses;
 mod rub;
@@ -84,7 +84,7 @@ impl Source {
 
 /// How the readings of a file are to be read.
 #[derive(Debug, clap::Args)]
-struct Reading {
+pub struct Reading {
     /// Frames at the start whose mean is the baseline, and which are no presses [default: as `reconstruct`]
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(0..=100_000))]
     rest: Option<u32>,
@@ -94,7 +94,7 @@ struct Reading {
 }
 
 /// Writes a detector, and beside it the surface of a curved one.
-fn write(detector: &Detector, path: &Path, out: NewFile) -> anyhow::Result<()> {
+pub fn write(detector: &Detector, path: &Path, out: NewFile) -> anyhow::Result<()> {
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let (text, surface) = detector.to_files(&stem);
     if let Some((name, obj)) = surface {

@@ -36,8 +36,8 @@ impl Learning {
         if kept.calibration.is_none() || !kept.may_be_of(&self.description) {
             return Err(format!("{} is not of {} as it is described now", path.display(), self.description.name));
         }
-        // Newtons are not learned.
-        Ok(Some(Detector { force: self.description.force.clone(), ..kept }))
+        // Newtons and what they need are not learned.
+        Ok(Some(Detector { force: self.description.force.clone(), skin: self.description.skin, ..kept }))
     }
 }
 

@@ -5,21 +5,30 @@
 //! loading and unloading where presses tell it, by Levenberg's and Marquardt's steps with a share of outliers (`fit`). The law with the
 //! lowest Bayesian information criterion is taken: no more law than the presses need. Presses that contradict each other are refused with what to
 //! look at (`order`).
+//!
+//! **No prior for the exponent.** The law of contact says 5/3 under a ball, and even four presses over a decade of force tell it better than that is known of an
+//! unknown tip. It was tried on 300 simulated sets each of 3 to 12 presses from 0.5 to 8 N. With 5/3 give or take 0.35 or more nothing changes: half of the
+//! forces told by four presses are off by less than 1.9 % with it and without, at a scatter of 5 %. Give or take 0.1, that is 1.8 %, and at a scatter of 15 % 4.8 in place of 5.1 %
+//! (of twelve presses 3.0 in place of 3.7 %). But then an ideal surface is told off by 25 to 40 % in place of 2 to 12, and a flat tip by 44 to 50 % in place of 1 to 7.
+//!
+//! Where the tip and the foam's elasticity are known, the same fit tells the film on the foam (`skin`): the exponent is that of the law of contact then.
 
 mod fit;
 mod order;
 mod plateaus;
+mod skin;
 #[cfg(test)]
 mod tests;
 
-use tactomo_physics::detector::{FARTHEST, ForceLaw};
+use tactomo_physics::detector::{FARTHEST, ForceLaw, Problem};
 
-use self::fit::{Fitted, Form, Point};
+use self::fit::{Fitted, Form, Known, Point};
 pub use self::order::Mistyped;
 pub use self::plateaus::{Moment, Plateau, pairs, plateaus};
+pub use self::skin::{SkinFit, fit_skin};
 
-/// Fewest presses: two or three parameters and a scatter, of which something is left.
-pub const FEWEST: usize = 5;
+/// Fewest presses: two or three parameters and a scatter, of which something is left. Of three, fits are refused in up to six cases of ten.
+pub const FEWEST: usize = 4;
 /// Largest force over the smallest, at least: with a scatter of 10 %, ten presses then tell the exponent to a tenth or two.
 const SPREAD: f64 = 2.0;
 /// Largest share of presses that may be left out as outliers.
@@ -169,6 +178,9 @@ pub enum ForceError {
         /// Its standard error.
         deviation: f64,
     },
+    /// No elastic layer.
+    #[error(transparent)]
+    Skin(#[from] Problem),
     /// The law that is wanted, or any, is open.
     #[error("the presses do not determine a law: press more often, with forces that differ more")]
     Open,
@@ -184,19 +196,38 @@ fn numbers(presses: &[usize]) -> String {
 /// # Errors
 /// [`ForceError`] if they tell none; nothing is guessed.
 pub fn fit_force(presses: &[ForcePress], wanted: Option<Law>) -> Result<ForceFit, ForceError> {
-    check(presses)?;
-    order::check(presses)?;
-    let points: Vec<Point> = presses.iter().map(Point::of).collect();
-    let mut tried: Vec<Fitted> = forms(presses).filter_map(|form| fit::fit(&points, form)).collect();
-    tried.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+    let tried = rising(presses)?;
     let candidates = tried.iter().map(Fitted::candidate).collect();
-    check_rise(&tried)?;
     // Of itself no law is taken whose exponent is open: it has more parameters than the presses tell.
     let is_taken = |fit: &&Fitted| match wanted {
         Some(law) => fit.form().law == law,
         None => is_determined(fit.exponent(), fit.freedom()),
     };
     let best = tried.iter().find(is_taken).ok_or(ForceError::Open)?;
+    let left_out = left_out(presses, best)?;
+    let (law, maximum) = law_of(best, presses, &left_out);
+    Ok(ForceFit { law, parameters: parameters(best), maximum, left_out, candidates })
+}
+
+/// Fits all forms, whatever the exponent, to presses whose conductance rises with the force; the likeliest first.
+fn rising(presses: &[ForcePress]) -> Result<Vec<Fitted>, ForceError> {
+    check(presses)?;
+    order::check(presses)?;
+    let tried = tried(presses, None);
+    check_rise(&tried)?;
+    Ok(tried)
+}
+
+/// All forms fitted to presses, with what is known; the likeliest first.
+fn tried(presses: &[ForcePress], known: Option<Known>) -> Vec<Fitted> {
+    let points: Vec<Point> = presses.iter().map(Point::of).collect();
+    let mut tried: Vec<Fitted> = forms(presses, known).filter_map(|form| fit::fit(&points, form)).collect();
+    tried.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+    tried
+}
+
+/// Presses that do not agree with the others, if they are not too many.
+fn left_out(presses: &[ForcePress], best: &Fitted) -> Result<Vec<usize>, ForceError> {
     let left_out = best.outliers();
     if left_out.len() > 1 {
         order::check_exchange(presses, &left_out, best)?;
@@ -204,8 +235,7 @@ pub fn fit_force(presses: &[ForcePress], wanted: Option<Law>) -> Result<ForceFit
     if left_out.len() as f64 > LEFT_OUT * presses.len() as f64 {
         return Err(ForceError::Disagree { presses: left_out, count: presses.len() });
     }
-    let (law, maximum) = law_of(best, presses, &left_out);
-    Ok(ForceFit { law, parameters: parameters(best), maximum, left_out, candidates })
+    Ok(left_out)
 }
 
 /// Whether a value differs from nothing, with its standard error and so many degrees of freedom.
@@ -259,13 +289,13 @@ fn range_n<'a>(presses: impl Iterator<Item = &'a ForcePress>) -> [f64; 2] {
     presses.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], press| [low.min(press.force_n), high.max(press.force_n)])
 }
 
-/// What to try: two curves only where both were pressed twice.
-fn forms(presses: &[ForcePress]) -> impl Iterator<Item = Form> {
+/// What to try: two curves only where both were pressed twice, and a constriction always where it is known.
+fn forms(presses: &[ForcePress], known: Option<Known>) -> impl Iterator<Item = Form> {
     let count = |of: Direction| presses.iter().filter(|press| press.direction == Some(of)).count();
     let both = count(Direction::Loading).min(count(Direction::Unloading)) > 1;
     let laws = [Law::Power, Law::Saturating].into_iter();
-    laws.flat_map(|law| [false, true].map(|hysteresis| Form { law, hysteresis }))
-        .filter(move |form| both || !form.hysteresis)
+    laws.flat_map(move |law| [false, true].map(|hysteresis| Form { law, hysteresis, known }))
+        .filter(move |form| (both || !form.hysteresis) && (known.is_none() || form.law == Law::Saturating))
 }
 
 /// Student's allowance: so much wider are bands of 90 % by a scatter that is known with so many degrees of freedom.

@@ -4,12 +4,12 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
-use tactomo_physics::hertz::Skin;
 use tactomo_physics::scene::Contact;
 
 use super::super::reached::{as_built, by_auto};
 use super::super::{DesignError, Press, Progress, Reached};
 use super::find::{Found, find, front};
+use super::rating::hertz;
 use super::{Material, Rating, Space, Wish, Wishes};
 
 /// Detectors that are drawn from the tolerances of each choice.
@@ -26,8 +26,8 @@ pub struct Plan {
     pub foams: Vec<Material>,
     /// How many candidates are tried at most.
     pub most: usize,
-    /// A detector that is compared with what is found: its own foams' softness, too.
-    pub compared: Option<(Detector, Skin)>,
+    /// A detector that is compared with what is found; it has to say how soft it is.
+    pub compared: Option<Detector>,
     /// Of the sample, and of noise.
     pub seed: u64,
 }
@@ -128,8 +128,7 @@ pub fn answer(plan: &Plan, progress: Progress) -> Result<Answer, DesignError> {
     let never = AtomicBool::new(false);
     let choices = Progress::new(&never, progress.say)
         .map("choices as built", &picked, |(found, reason)| choice(found, reason, plan));
-    let compared =
-        plan.compared.as_ref().map(|(detector, skin)| compared(detector, *skin, &found, wishes)).transpose()?;
+    let compared = plan.compared.as_ref().map(|detector| compared(detector, &found, wishes)).transpose()?;
     let meeting = found.iter().filter(|found| found.rating.meets(wishes, None)).count();
     let is_met = in_full.iter().any(|found| found.rating.meets(wishes, None));
     Ok(Answer {
@@ -212,7 +211,7 @@ fn wish_text(wish: Wish, given: f64) -> String {
 
 fn choice(found: &Found, reason: &str, plan: &Plan) -> Result<Choice, DesignError> {
     let wishes = &plan.wishes;
-    let press = Press::ball(&found.detector, found.skin, wishes.tip_m)?;
+    let press = Press::Ball { radius_m: wishes.tip_m, hertz: hertz(&found.detector)? };
     let middle_n = (wishes.smallest_n * wishes.largest_n).sqrt();
     let contacts: Vec<Contact> =
         TRIED.iter().map(|shares| press.at([0, 1].map(|axis| shares[axis] * wishes.size_m[axis]), middle_n)).collect();
@@ -239,8 +238,8 @@ fn unmet(found: &[Found], wishes: &Wishes, counts: impl Fn(&Rating, Wish) -> boo
     Wish::ALL.into_iter().filter_map(of).collect()
 }
 
-fn compared(detector: &Detector, skin: Skin, found: &[Found], wishes: &Wishes) -> Result<Compared, DesignError> {
-    let rating = Rating::as_driven(detector, skin, wishes)?;
+fn compared(detector: &Detector, found: &[Found], wishes: &Wishes) -> Result<Compared, DesignError> {
+    let rating = Rating::as_driven(detector, wishes)?;
     let score = rating.score(wishes);
     Ok(Compared {
         name: detector.name.clone(),
@@ -270,7 +269,7 @@ mod tests {
             .map(|foam| Material { thicknesses_m: vec![5e-3, 10e-3], ..foam })
             .collect();
         let stop = AtomicBool::new(false);
-        let compared = Some((Detector::default(), Skin::of(0.35e6)));
+        let compared = Some(Detector::default());
         let plan = Plan { wishes, foams, most: 60, compared, seed: 1 };
         answer(&plan, Progress::new(&stop, &|_| {})).unwrap()
     }
@@ -282,7 +281,9 @@ mod tests {
         let best = &answer.choices[0];
         assert!(best.meets_all && best.reason.contains("meets the wishes best"), "{}", best.reason);
         let file = Detector::from_toml(&answer.toml(0).unwrap(), "chosen").unwrap();
-        assert_eq!((file.layers, file.electrodes.len()), (best.detector.layers.clone(), best.rating.electrodes));
+        assert_eq!(file.electrodes.len(), best.rating.electrodes);
+        assert_eq!((file.skin, &file.layers), (best.detector.skin, &best.detector.layers));
+        assert!(file.skin.is_some());
         assert!(answer.compared.is_some_and(|compared| compared.rating.electrodes == 16));
         assert!(!answer.front.is_empty() && answer.front.len() <= answer.tried);
     }

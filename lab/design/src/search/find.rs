@@ -8,7 +8,6 @@ use std::collections::HashMap;
 use std::sync::atomic::AtomicBool;
 
 use tactomo_physics::detector::Detector;
-use tactomo_physics::hertz::Skin;
 
 use super::super::{DesignError, Progress};
 use super::{Candidate, Rating, Space, Wishes};
@@ -28,8 +27,6 @@ pub struct Found {
     pub candidate: Candidate,
     /// The detector, with the drive that suits it best.
     pub detector: Detector,
-    /// How soft it is.
-    pub skin: Skin,
     /// What it gives.
     pub rating: Rating,
     /// Whether that was found on a standard model, with all drives.
@@ -84,16 +81,13 @@ impl Tried {
             }
         }
         let built: Vec<_> = new.iter().filter_map(|candidate| Some((*candidate, space.detector(candidate)?))).collect();
-        let rated = progress.part(self.seen.len() - new.len(), most).map(
-            "detectors",
-            &built,
-            |(candidate, (detector, skin))| {
+        let rated =
+            progress.part(self.seen.len() - new.len(), most).map("detectors", &built, |(candidate, detector)| {
                 // What has no model, such as electrodes that touch, is no candidate.
-                let rating = Rating::roughly(detector, *skin, wishes).ok()?;
+                let rating = Rating::roughly(detector, wishes).ok()?;
                 let detector = Detector { drive_v: rating.drive_v, ..detector.clone() };
-                Some(Found { candidate: *candidate, detector, skin: *skin, rating, is_in_full: false })
-            },
-        );
+                Some(Found { candidate: *candidate, detector, rating, is_in_full: false })
+            });
         self.found.extend(rated.into_iter().flatten().flatten());
     }
 
@@ -124,7 +118,7 @@ impl Tried {
             best.chain(unbeaten).map(|found| (found.candidate, found.clone())).collect();
         let chosen: Vec<Found> = self.found.iter().filter_map(|found| chosen.get(&found.candidate).cloned()).collect();
         let rated = progress.map("best detectors in full", &chosen, |found| {
-            let rating = Rating::of(&found.detector, found.skin, wishes)?;
+            let rating = Rating::of(&found.detector, wishes)?;
             let detector = Detector { drive_v: rating.drive_v, ..found.detector.clone() };
             Ok((found.candidate, Found { detector, rating, is_in_full: true, ..found.clone() }))
         });

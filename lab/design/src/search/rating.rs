@@ -2,7 +2,7 @@
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab};
-use tactomo_physics::hertz::{Beyond, Hertz, Skin};
+use tactomo_physics::hertz::{Beyond, Hertz};
 
 use super::super::limit::{places_everywhere, range, two_points_m};
 use super::super::{DesignError, Press};
@@ -52,25 +52,25 @@ pub struct Rating {
 }
 
 impl Rating {
-    /// Of a detector of such a softness, at the highest drive, on a coarse model: for a search. Against the standard one, forces and two points are right to
+    /// Of a detector, at the highest drive, on a coarse model: for a search. Against the standard one, forces and two points are right to
     /// 5 %, and so are places but for thin layers on wide electrodes, right above which the coarse model tells places two or three times too well.
     ///
     /// # Errors
     /// [`DesignError`] if there is no model of it.
-    pub fn roughly(detector: &Detector, skin: Skin, wishes: &Wishes) -> Result<Self, DesignError> {
+    pub fn roughly(detector: &Detector, wishes: &Wishes) -> Result<Self, DesignError> {
         let slab = Slab::with_resolution(&detector.taken_as_exact(), Resolution::COARSE)?;
-        Self::at(&slab, skin, wishes, DRIVES_V[DRIVES_V.len() - 1])
+        Self::at(&slab, wishes, DRIVES_V[DRIVES_V.len() - 1])
     }
 
-    /// Of a detector of such a softness, with the drive that meets the wishes best: of equals, the lowest.
+    /// Of a detector, with the drive that meets the wishes best: of equals, the lowest.
     ///
     /// # Errors
     /// [`DesignError`] if there is no model of it.
-    pub fn of(detector: &Detector, skin: Skin, wishes: &Wishes) -> Result<Self, DesignError> {
+    pub fn of(detector: &Detector, wishes: &Wishes) -> Result<Self, DesignError> {
         let slab = Slab::new(&detector.taken_as_exact())?;
-        let mut best = Self::at(&slab, skin, wishes, DRIVES_V[0])?;
+        let mut best = Self::at(&slab, wishes, DRIVES_V[0])?;
         for drive_v in &DRIVES_V[1..] {
-            let other = Self::at(&slab, skin, wishes, *drive_v)?;
+            let other = Self::at(&slab, wishes, *drive_v)?;
             if other.score(wishes) > best.score(wishes) {
                 best = other;
             }
@@ -82,16 +82,17 @@ impl Rating {
     ///
     /// # Errors
     /// [`DesignError`] if there is no model of it.
-    pub fn as_driven(detector: &Detector, skin: Skin, wishes: &Wishes) -> Result<Self, DesignError> {
+    pub fn as_driven(detector: &Detector, wishes: &Wishes) -> Result<Self, DesignError> {
         let slab = Slab::new(&detector.taken_as_exact())?;
-        Self::at(&slab, skin, wishes, detector.drive_v)
+        Self::at(&slab, wishes, detector.drive_v)
     }
 
-    fn at(slab: &Slab, skin: Skin, wishes: &Wishes, drive_v: f64) -> Result<Self, DesignError> {
+    fn at(slab: &Slab, wishes: &Wishes, drive_v: f64) -> Result<Self, DesignError> {
         let detector = slab.detector();
         // All readings are in proportion to the drive.
         let noise_v = detector.adc.deviation_v() * detector.drive_v / drive_v;
-        let press = Press::ball(detector, skin, wishes.tip_m)?;
+        let hertz = hertz(detector)?;
+        let press = Press::Ball { radius_m: wishes.tip_m, hertz };
         let middle_n = (wishes.smallest_n * wishes.largest_n).sqrt();
         let [smallest_n, largest_n] = range(slab, &press, [wishes.smallest_n, wishes.largest_n], noise_v)?;
         Ok(Self {
@@ -103,7 +104,7 @@ impl Rating {
             drive_v,
             electrodes: detector.electrodes.len(),
             thickness_m: detector.thickness_m(),
-            beyond_hertz: Hertz::new(detector, skin)?.ball(wishes.tip_m, wishes.largest_n).beyond,
+            beyond_hertz: hertz.ball(wishes.tip_m, wishes.largest_n).beyond,
         })
     }
 
@@ -160,6 +161,15 @@ impl Rating {
     }
 }
 
+/// Mechanics of a detector that says how soft it is.
+///
+/// # Errors
+/// [`DesignError::Softness`] if it does not, or [`DesignError::Skin`].
+pub(super) fn hertz(detector: &Detector) -> Result<Hertz, DesignError> {
+    let skin = detector.skin.ok_or_else(|| DesignError::Softness { detector: detector.name.clone() })?;
+    Ok(Hertz::new(detector, skin)?)
+}
+
 /// Frames a second of so many electrodes on an ESP32: what the wire or the converter allows, whichever is less (docs/firmware.md).
 pub fn frames_per_s(electrodes: usize) -> f64 {
     let conversions = electrodes.pow(2) as f64;
@@ -172,11 +182,9 @@ pub fn frames_per_s(electrodes: usize) -> f64 {
 mod tests {
     use super::super::wishes::tests::wishes;
     use super::*;
-    use tactomo_physics::detector::Foam;
 
     fn rating() -> Rating {
-        let skin = Foam::of('A').unwrap().into();
-        Rating::as_driven(&Detector::default(), skin, &wishes()).unwrap()
+        Rating::as_driven(&Detector::default(), &wishes()).unwrap()
     }
 
     #[test]
@@ -192,13 +200,12 @@ mod tests {
 
     #[test]
     fn more_drive_is_better_as_the_square_root_of_nothing_but_noise() {
-        let skin = Foam::of('A').unwrap().into();
         let of = |drive_v: f64| {
             let detector = Detector { drive_v, ..Detector::default() };
-            Rating::as_driven(&detector, skin, &wishes()).unwrap()
+            Rating::as_driven(&detector, &wishes()).unwrap()
         };
         let slab = Slab::new(&Detector::default()).unwrap();
-        let [scaled, direct] = [Rating::at(&slab, skin, &wishes(), 1.0).unwrap(), of(1.0)];
+        let [scaled, direct] = [Rating::at(&slab, &wishes(), 1.0).unwrap(), of(1.0)];
         assert!((scaled.place_m.unwrap() / direct.place_m.unwrap() - 1.0).abs() < 1e-6);
         assert!(of(2.0).place_m < direct.place_m && of(2.0).largest_n == direct.largest_n);
     }

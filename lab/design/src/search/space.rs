@@ -170,8 +170,8 @@ impl Space {
         [other, nearest.unwrap_or(0)]
     }
 
-    /// The detector that a candidate is, and how soft it is; `None` if it cannot be built.
-    pub fn detector(&self, candidate: &Candidate) -> Option<(Detector, Skin)> {
+    /// The detector that a candidate is; `None` if it cannot be built.
+    pub fn detector(&self, candidate: &Candidate) -> Option<Detector> {
         let layers: Vec<(f64, &Material)> = candidate
             .layers
             .iter()
@@ -196,10 +196,11 @@ impl Space {
                 .collect(),
             electrodes: layout.electrodes(self.wishes.size_m, diameter_m / 2.0),
             adc: Adc::default(),
+            skin: Some(Skin::of_layers(layers.iter().map(|(thickness_m, foam)| (*thickness_m, foam.elasticity_pa)))),
             ..Detector::default()
         };
         detector.check().ok()?;
-        Some((detector, Skin::of_layers(layers.iter().map(|(thickness_m, foam)| (*thickness_m, foam.elasticity_pa)))))
+        Some(detector)
     }
 
     /// Room that an electrode has along the shorter pitch (m).
@@ -266,10 +267,11 @@ mod tests {
         let detectors: Vec<_> =
             space.all().iter().step_by(997).filter_map(|candidate| space.detector(candidate)).collect();
         assert!(detectors.len() > 20);
-        for (detector, skin) in &detectors {
+        for detector in &detectors {
             assert_eq!(detector.outline.size_m(), [0.06, 0.06]);
-            assert!(detector.electrodes.len() <= 16 && skin.young_pa > 1e5);
-            assert!(Detector::from_toml(&detector.to_toml(), "").is_ok(), "{}", detector.name);
+            let read = Detector::from_toml(&detector.to_toml(), "");
+            assert_eq!(read.map_err(|error| error.to_string()), Ok(detector.clone()));
+            assert!(detector.electrodes.len() <= 16 && detector.skin.is_some_and(|skin| skin.young_pa > 1e5));
         }
     }
 }

@@ -50,17 +50,18 @@ impl Bond {
 }
 
 impl LayerTable {
-    pub(super) fn into_layer(self, field: &str) -> Result<Layer, Problem> {
+    /// The layer, and the foam that it is of, if that is said.
+    pub(super) fn into_layer(self, field: &str) -> Result<(Layer, Option<Foam>), Problem> {
         let Self { thickness_m, material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m, bond } = self;
-        let layer = match (material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m) {
+        let (layer, foam) = match (material, conductivity_s_per_m, bottom_s_per_m, top_s_per_m) {
             (Some(material), None, None, None) => {
                 let foam = single(&material).and_then(Foam::of);
                 let what = || format!("is {}, but has to be \"A\", \"B\", \"C\" or \"D\"", quoted(&material));
                 let foam = foam.ok_or_else(|| Problem::new(format!("{field}.material"), what()))?;
-                Layer::uniform(thickness_m, foam.conductivity_s_per_m)
+                (Layer::uniform(thickness_m, foam.conductivity_s_per_m), Some(foam))
             }
-            (None, Some(conductivity), None, None) => Layer::uniform(thickness_m, conductivity),
-            (None, None, Some(bottom), Some(top)) => Layer::graded(thickness_m, [bottom, top]),
+            (None, Some(conductivity), None, None) => (Layer::uniform(thickness_m, conductivity), None),
+            (None, None, Some(bottom), Some(top)) => (Layer::graded(thickness_m, [bottom, top]), None),
             _ => {
                 return Err(Problem::new(
                     field,
@@ -68,7 +69,7 @@ impl LayerTable {
                 ));
             }
         };
-        Ok(Layer { bond: bond.map(BondTable::into_bond), ..layer })
+        Ok((Layer { bond: bond.map(BondTable::into_bond), ..layer }, foam))
     }
 }
 

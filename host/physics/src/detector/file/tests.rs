@@ -3,6 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::detector::Electrode;
 use crate::detector::Layer;
+use crate::hertz::{self, Skin};
 use crate::space;
 
 const DOCUMENTATION: &str = include_str!("../../../../../docs/detector.md");
@@ -43,7 +44,8 @@ fn the_documented_examples_are_detectors() {
 #[test]
 fn a_short_file_is_the_preset() {
     let preset = Detector::preset("square-60").unwrap();
-    assert_eq!(Detector::from_toml(SQUARE, "square-60").unwrap(), preset);
+    let unknown = Detector { skin: None, ..preset.clone() };
+    assert_eq!(Detector::from_toml(SQUARE, "square-60").unwrap(), unknown, "nothing says how soft it is");
     let material = SQUARE.replace("conductivity_s_per_m = 0.2273", "material = \"A\"");
     assert_eq!(Detector::from_toml(&material, "square-60").unwrap(), preset);
 }
@@ -147,15 +149,25 @@ fn laws() -> impl Strategy<Value = ForceLaw> {
         })
 }
 
+/// Skins of odd numbers.
+fn skins() -> impl Strategy<Value = Skin> {
+    let film = (1.0..1e9f64).prop_map(|unit_pa| hertz::Surface::Film { unit_pa });
+    let ideal = (1e-9..1.0f64).prop_map(|depth_m| hertz::Surface::Ideal { depth_m });
+    (1e3..1e9f64, -0.9..0.5f64, prop_oneof![film, ideal]).prop_map(|(young_pa, poisson, surface)| Skin {
+        young_pa,
+        poisson,
+        surface,
+    })
+}
+
 /// Detectors of odd numbers: a star about the origin, with a hole or without, and electrodes on a ring.
 fn detectors() -> impl Strategy<Value = Detector> {
     let star = prop::collection::vec(0.04..0.08f64, 3..40);
     let layers = prop::collection::vec((1e-4..0.01f64, 1e-3..100.0f64, 1e-3..100.0f64), 1..5);
     let rest = (1e-6..1e-3f64, 0.1..10.0f64, 0.0..100.0f64, 1..=24u8, any::<bool>());
-    (star, layers, 4..=32usize, "[^\\p{Cc}]{1,30}", rest, prop::option::of(laws())).prop_filter_map(
-        "not buildable",
-        |parts| {
-            let (star, layers, count, name, (impedance, drive_v, on_resistance_ohm, bits, hole), force) = parts;
+    (star, layers, 4..=32usize, "[^\\p{Cc}]{1,30}", rest, (prop::option::of(laws()), prop::option::of(skins())))
+        .prop_filter_map("not buildable", |parts| {
+            let (star, layers, count, name, (impedance, drive_v, on_resistance_ohm, bits, hole), (force, skin)) = parts;
             let ring = |count: usize, index: usize| (std::f64::consts::TAU * index as f64 / count as f64).sin_cos();
             let outer = star.iter().enumerate().map(|(i, radius)| {
                 let (sin, cos) = ring(star.len(), i);
@@ -188,11 +200,11 @@ fn detectors() -> impl Strategy<Value = Detector> {
                 on_resistance_ohm,
                 adc: Adc { bits, ..Adc::default() },
                 force,
+                skin,
                 correction: None,
             };
             detector.check().is_ok().then_some(detector)
-        },
-    )
+        })
 }
 
 #[test]

@@ -39,6 +39,7 @@ fn flat(outline: Outline, electrodes: Vec<Electrode>) -> Detector {
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
         force: None,
+        skin: None,
         correction: None,
     }
 }

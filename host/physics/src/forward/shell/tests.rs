@@ -38,6 +38,7 @@ fn detector(outline: Outline, pads_m: &[[f64; 3]]) -> Detector {
         on_resistance_ohm: 4.0,
         adc: Adc::default(),
         force: None,
+        skin: None,
         correction: None,
     }
 }

@@ -1,11 +1,11 @@
 //! Presses of a file with their forces: what the solver `contacts` finds in it.
 
 use anyhow::{Context, bail, ensure};
-use tactomo::calibrate::force::{ForcePress, Moment, Plateau, pairs, plateaus};
+use tactomo::calibrate::force::{Moment, Plateau, pairs, plateaus};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::solve::{Method, Solution};
 
-use super::Args;
+use super::PressArgs;
 use super::known::{Known, KnownForce};
 use super::report::ReportedPress;
 use crate::commands::reconstruct::reader::{Input, Reader};
@@ -25,7 +25,7 @@ pub struct Gathered {
 }
 
 /// Reads a file and gives its presses their forces.
-pub fn gather(args: &Args, known: &Known) -> anyhow::Result<Gathered> {
+pub fn gather(args: &PressArgs, known: &Known) -> anyhow::Result<Gathered> {
     let mut reader = Reader::open(&Input {
         file: &args.file,
         detector: &args.detector,
@@ -173,10 +173,4 @@ fn of_rows(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec<Rep
         );
     }
     Ok(presses)
-}
-
-impl KnownForce {
-    fn press(self, conductance_s: f64, deviation_s: f64) -> ForcePress {
-        ForcePress { force_n: self.force_n, conductance_s, deviation_s, direction: self.direction }
-    }
 }

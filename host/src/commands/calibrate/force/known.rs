@@ -3,8 +3,11 @@
 use std::path::Path;
 
 use anyhow::{anyhow, ensure};
-use tactomo::calibrate::force::Direction;
+use tactomo::calibrate::force::{Direction, ForcePress};
 use tactomo::table::{Array, Table};
+
+/// So many columns are named in errors.
+const NAMED: usize = 8;
 
 /// Forces, and where they belong.
 pub enum Known {
@@ -23,6 +26,13 @@ pub struct KnownForce {
     pub direction: Option<Direction>,
 }
 
+impl KnownForce {
+    /// A press of this force that conducts so much (S).
+    pub fn press(self, conductance_s: f64, deviation_s: f64) -> ForcePress {
+        ForcePress { force_n: self.force_n, conductance_s, deviation_s, direction: self.direction }
+    }
+}
+
 impl Known {
     /// Forces that were typed, or those of a file.
     pub fn of(newtons: &[f64], file: Option<&Path>) -> anyhow::Result<Self> {
@@ -34,20 +44,72 @@ impl Known {
     }
 
     fn of_table(table: Table) -> anyhow::Result<Self> {
-        let columns = columns(table);
-        let column = |name: &str| columns.iter().find(|(known, _)| known == name).map(|(_, values)| &values[..]);
-        let names = || columns.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-        let forces_n = column("force_n").or_else(|| match &columns[..] {
+        let columns = Columns::of(table);
+        let forces_n = columns.named("force_n").or_else(|| match &columns.0[..] {
             [(name, lone)] if name.is_empty() => Some(lone),
             _ => None,
         });
         let forces_n = forces_n.ok_or_else(|| {
-            anyhow!("a column named force_n is needed, and time_s for a force sensor; there are {}", names())
+            anyhow!("a column named force_n is needed, and time_s for a force sensor; there are {}", columns.names())
         })?;
-        if let Some(times_s) = column("time_s") {
+        if let Some(times_s) = columns.named("time_s") {
             return sensor(times_s, forces_n);
         }
-        let direction = |row: usize| column("unloading").map(|unloading| direction(unloading[row])).transpose();
+        columns.check_length(forces_n.len())?;
+        Ok(Self::Presses(columns.forces(forces_n)?))
+    }
+}
+
+/// Presses from a table of what they conduct: columns `force_n`, `conductance_s`, and if they are known `conductance_deviation_s` and `unloading`.
+pub fn measured(path: &Path) -> anyhow::Result<Vec<ForcePress>> {
+    of_measured(Table::read(path)?).map_err(|what| anyhow!("{}: {what}", path.display()))
+}
+
+fn of_measured(table: Table) -> anyhow::Result<Vec<ForcePress>> {
+    let columns = Columns::of(table);
+    let (Some(forces_n), Some(conductances_s)) = (columns.named("force_n"), columns.named("conductance_s")) else {
+        return Err(anyhow!(
+            "columns named force_n and conductance_s are needed, but there are {}; of a recording, or a table of readings, give --newtons or --forces",
+            columns.names()
+        ));
+    };
+    let deviations_s = columns.named("conductance_deviation_s");
+    let press = |(row, known): (usize, &KnownForce)| {
+        known.press(conductances_s[row], deviations_s.map_or(0.0, |deviations_s| deviations_s[row]))
+    };
+    columns.check_length(forces_n.len())?;
+    Ok(columns.forces(forces_n)?.iter().enumerate().map(press).collect())
+}
+
+/// Columns with their names; without a name of a table that has none.
+struct Columns(Vec<(String, Vec<f64>)>);
+
+impl Columns {
+    fn named(&self, name: &str) -> Option<&[f64]> {
+        self.0.iter().find(|(known, _)| known == name).map(|(_, values)| &values[..])
+    }
+
+    /// Checks that all columns have so many rows, which arrays of a file need not.
+    fn check_length(&self, rows: usize) -> anyhow::Result<()> {
+        match self.0.iter().find(|(_, values)| values.len() != rows) {
+            Some((name, values)) => Err(anyhow!("{name} has {} rows, but force_n has {rows}", values.len())),
+            None => Ok(()),
+        }
+    }
+
+    /// Their names, the first of them if there are many.
+    fn names(&self) -> String {
+        let named: Vec<_> = self.0.iter().map(|(name, _)| name.as_str()).filter(|name| !name.is_empty()).collect();
+        match named.len() {
+            0 => format!("{} without names", self.0.len()),
+            many if many > NAMED => format!("{} and {} others", named[..NAMED].join(", "), many - NAMED),
+            _ => named.join(", "),
+        }
+    }
+
+    /// The forces of a column, with their direction if there is a column for that.
+    fn forces(&self, forces_n: &[f64]) -> anyhow::Result<Vec<KnownForce>> {
+        let direction = |row: usize| self.named("unloading").map(|unloading| direction(unloading[row])).transpose();
         let known = |(row, force_n): (usize, &f64)| {
             ensure!(
                 *force_n > 0.0 && force_n.is_finite(),
@@ -57,7 +119,19 @@ impl Known {
             let direction = direction(row).map_err(|what| anyhow!("row {}: {what}", row + 1))?;
             Ok(KnownForce { force_n: *force_n, direction })
         };
-        forces_n.iter().enumerate().map(known).collect::<Result<_, _>>().map(Self::Presses)
+        forces_n.iter().enumerate().map(known).collect()
+    }
+
+    fn of(table: Table) -> Self {
+        let of_rows = |names: Vec<String>, rows: Array| {
+            let count = rows.columns().max(1);
+            let column = |index: usize| rows.values.iter().skip(index).step_by(count).copied().collect();
+            (0..count).map(|index| (names.get(index).cloned().unwrap_or_default(), column(index))).collect()
+        };
+        Self(match table {
+            Table::Columns { names, rows } => of_rows(names, rows),
+            Table::Arrays(arrays) => arrays.into_iter().map(|(name, array)| (name, array.values)).collect(),
+        })
     }
 }
 
@@ -77,19 +151,6 @@ fn direction(unloading: f64) -> Result<Direction, String> {
         0.0 => Ok(Direction::Loading),
         1.0 => Ok(Direction::Unloading),
         other => Err(format!("unloading is {other}, but has to be 1 where the force was falling, else 0")),
-    }
-}
-
-/// Columns with their names; without a name of a table that has none.
-fn columns(table: Table) -> Vec<(String, Vec<f64>)> {
-    let of_rows = |names: Vec<String>, rows: Array| {
-        let count = rows.columns().max(1);
-        let column = |index: usize| rows.values.iter().skip(index).step_by(count).copied().collect();
-        (0..count).map(|index| (names.get(index).cloned().unwrap_or_default(), column(index))).collect()
-    };
-    match table {
-        Table::Columns { names, rows } => of_rows(names, rows),
-        Table::Arrays(arrays) => arrays.into_iter().map(|(name, array)| (name, array.values)).collect(),
     }
 }
 
@@ -113,6 +174,27 @@ mod tests {
         }
         let Ok(Known::Sensor(forces)) = read("time_s,force_n\n0,-0.01\n0.5,2\n") else { panic!("no sensor") };
         assert_eq!(forces, [[0.0, -0.01], [0.5, 2.0]]);
+    }
+
+    #[test]
+    fn presses_that_were_measured_are_read_by_their_columns() {
+        let read = |text: &str| {
+            Table::parse(text.as_bytes()).and_then(|table| of_measured(table).map_err(|error| error.to_string()))
+        };
+        let [light, firm] = read("force_n,conductance_s,unloading\n1,1e-5,0\n2,3e-5,1\n").unwrap()[..] else {
+            panic!()
+        };
+        assert_eq!((light.force_n, light.conductance_s, light.deviation_s), (1.0, 1e-5, 0.0));
+        assert_eq!((firm.conductance_s, firm.direction), (3e-5, Some(Direction::Unloading)));
+        let known = read("conductance_deviation_s,force_n,conductance_s\n1e-6,1,1e-5\n").unwrap();
+        assert_eq!((known[0].deviation_s, known[0].direction), (1e-6, None));
+        let error = read("force_n,ohm\n1,2\n").unwrap_err();
+        assert!(
+            error.contains("force_n and conductance_s are needed, but there are force_n, ohm; of a recording"),
+            "{error}"
+        );
+        let error = read(&format!("{}\n", vec!["1"; 256].join(","))).unwrap_err();
+        assert!(error.contains("there are 256 without names"), "{error}");
     }
 
     #[test]

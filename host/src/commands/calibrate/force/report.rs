@@ -85,10 +85,7 @@ impl<'a> Report<'a> {
         let rows = self.presses.iter().enumerate().map(|(index, row)| {
             let odd =
                 if self.left_out.contains(&(index + 1)) { "  left out: does not agree with the others" } else { "" };
-            let conductance = format!(
-                "{:.3e} \u{b1} {:.0e}",
-                row.conductance_with_constriction_s, row.sigma_conductance_with_constriction_s
-            );
+            let conductance = siemens(row.conductance_with_constriction_s, row.sigma_conductance_with_constriction_s);
             let fitted = format!("{} \u{b1} {}", three(row.fitted_force_n), three(row.fitted_force_deviation_n));
             let [number, force] = [(index + 1).to_string(), short(row.force_n)];
             format!("{number:>5}  {:<16} {force:>9}  {conductance:>21}  {fitted:>17}{odd}", row.place)
@@ -170,8 +167,13 @@ fn parameter_line(parameter: &FittedParameter) -> String {
     format!("  {what:<21} {value}")
 }
 
+/// A conductance with its standard error (S).
+pub fn siemens(conductance_s: f64, deviation_s: f64) -> String {
+    format!("{conductance_s:.3e} \u{b1} {deviation_s:.0e}")
+}
+
 /// A number with three digits.
-fn three(value: f64) -> String {
+pub fn three(value: f64) -> String {
     let decade = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
     match (-3.0..4.0).contains(&decade) {
         true => format!("{value:.*}", (2.0 - decade).max(0.0) as usize),

@@ -37,10 +37,43 @@ const SMALL: f64 = 1e-9;
 const PAIRED: usize = 200;
 
 /// A law, with or without curves of their own for loading and unloading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Form {
     pub law: Law,
     pub hysteresis: bool,
+    /// What is known of it, if the tip is.
+    pub known: Option<Known>,
+}
+
+/// What is known of a law where tip and foam are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Known {
+    /// The exponent, unless it is fitted.
+    pub exponent: Option<f64>,
+    /// The constriction at 1 N, as much of it as changes with the width of the contact (ohm). The resistance in series is fitted as a factor of that and of `around_ohm`.
+    pub under_ohm: f64,
+    /// The rest of it (ohm).
+    pub around_ohm: f64,
+    /// Exponent by which the width of the contact grows with the force.
+    pub width_exponent: f64,
+}
+
+impl Form {
+    /// Smallest product of the resistance in series and the unit of conductance that is followed.
+    fn least(&self, ln_unit_s: f64) -> f64 {
+        if self.known.is_some() { LEAST * ln_unit_s.exp() } else { LEAST }
+    }
+
+    /// The exponent, where that is known.
+    fn exponent(&self) -> Option<f64> {
+        self.known.and_then(|known| known.exponent)
+    }
+
+    /// What the resistance in series is a factor of, under such a press (ohm): all alike where nothing is known.
+    fn series_ohm(&self, point: &Point) -> f64 {
+        let ohm = |known: Known| known.around_ohm + known.under_ohm * (-known.width_exponent * point.ln_force).exp();
+        self.known.map_or(1.0, ohm)
+    }
 }
 
 /// A press, in logarithms.
@@ -106,11 +139,16 @@ impl Parameters {
         2 + usize::from(self.form.law == Law::Saturating) + usize::from(self.form.hysteresis)
     }
 
+    /// How many of them are fitted.
+    fn fitted(&self) -> usize {
+        self.count() - usize::from(self.form.exponent().is_some())
+    }
+
     /// `R e^x`.
     fn load(&self, point: &Point) -> f64 {
         match self.form.law {
             Law::Power => 0.0,
-            Law::Saturating => (self.ln_series + self.own(point) - self.ln_unit_s).exp(),
+            Law::Saturating => self.form.series_ohm(point) * (self.ln_series + self.own(point) - self.ln_unit_s).exp(),
         }
     }
 
@@ -129,7 +167,8 @@ impl Parameters {
     fn slopes(&self, point: &Point) -> Vec<f64> {
         let load = self.load(point);
         let own = 1.0 / (1.0 + load);
-        let mut slopes = vec![own, own * point.ln_force];
+        let by_exponent = if self.form.exponent().is_some() { 0.0 } else { own * point.ln_force };
+        let mut slopes = vec![own, by_exponent];
         if self.form.law == Law::Saturating {
             slopes.push(-load * own);
         }
@@ -144,7 +183,7 @@ impl Parameters {
         moved.ln_a += step[0];
         moved.exponent += step[1];
         if self.form.law == Law::Saturating {
-            moved.ln_series = (self.ln_series + step[2].clamp(-2.0, 2.0)).max(LEAST.ln());
+            moved.ln_series = (self.ln_series + step[2].clamp(-2.0, 2.0)).max(self.form.least(self.ln_unit_s).ln());
         }
         if self.form.hysteresis {
             moved.hysteresis += step[step.len() - 1];
@@ -157,13 +196,16 @@ impl Parameters {
 fn starts(points: &[Point], form: Form) -> Vec<Parameters> {
     let ln_unit_s = points.iter().map(|point| point.ln_conductance).fold(f64::NEG_INFINITY, f64::max);
     let start = |share: f64| {
+        // Of the constriction that is known, or of all.
+        let share = if form.known.is_some() { share * ln_unit_s.exp() } else { share };
         // 1 / S less what is in series, as a power of the force.
         let own = |point: &Point| {
-            let own = (-(point.ln_conductance - ln_unit_s)).exp() - share;
-            (own > 0.01 * share).then(|| [point.ln_force, ln_unit_s - own.ln()])
+            let series = share * form.series_ohm(point);
+            let own = (-(point.ln_conductance - ln_unit_s)).exp() - series;
+            (own > 0.01 * series).then(|| [point.ln_force, ln_unit_s - own.ln()])
         };
-        let [ln_a, exponent] = line(&points.iter().filter_map(own).collect::<Vec<_>>())?;
-        let ln_series = share.max(LEAST).ln();
+        let [ln_a, exponent] = line(&points.iter().filter_map(own).collect::<Vec<_>>(), form.exponent())?;
+        let ln_series = share.max(form.least(ln_unit_s)).ln();
         Some(Parameters { form, ln_unit_s, ln_a, exponent, ln_series, hysteresis: 0.0 })
     };
     match form.law {
@@ -172,12 +214,13 @@ fn starts(points: &[Point], form: Form) -> Vec<Parameters> {
     }
 }
 
-/// The line through points with the median of all slopes (Theil, Sen), which a few odd points do not turn; `None` of fewer than two.
-fn line(points: &[[f64; 2]]) -> Option<[f64; 2]> {
+/// The line through points with that slope or with the median of all slopes (Theil, Sen), which a few odd points do not turn; `None` of fewer than two.
+fn line(points: &[[f64; 2]], slope: Option<f64>) -> Option<[f64; 2]> {
     let step = points.len().div_ceil(PAIRED).max(1);
     let some: Vec<_> = points.iter().step_by(step).collect();
     let pairs = some.iter().enumerate().flat_map(|(i, a)| some[..i].iter().map(move |b| (*a, *b)));
-    let slope = median(pairs.filter(|(a, b)| (a[0] - b[0]).abs() > 1e-9).map(|(a, b)| (a[1] - b[1]) / (a[0] - b[0])))?;
+    let slopes = pairs.filter(|(a, b)| (a[0] - b[0]).abs() > 1e-9).map(|(a, b)| (a[1] - b[1]) / (a[0] - b[0]));
+    let slope = slope.or_else(|| median(slopes))?;
     let height = median(points.iter().map(|point| point[1] - slope * point[0]))?;
     Some([height, slope])
 }
@@ -259,14 +302,22 @@ impl Mixture<'_> {
 
     fn finish(mut self) -> Option<Fitted> {
         let likelihood = self.expect();
-        let (count, size) = (self.points.len() as f64, self.parameters.count());
+        let (count, size) = (self.points.len() as f64, self.parameters.fitted());
         let kept: f64 = self.agree.iter().sum();
         if !likelihood.is_finite() || kept <= size as f64 {
             return None;
         }
         // Parameters take up scatter: the rest is from so many fewer presses.
         let allowance = kept / (kept - size as f64);
-        let covariance = covariance(&self.normal(&self.parameters).matrix)? * allowance;
+        let mut matrix = self.normal(&self.parameters).matrix;
+        if self.parameters.form.exponent().is_some() {
+            // Beside nothing: any number does.
+            matrix[(1, 1)] = 1.0;
+        }
+        let mut covariance = covariance(&matrix)? * allowance;
+        if self.parameters.form.exponent().is_some() {
+            covariance[(1, 1)] = 0.0;
+        }
         Some(Fitted {
             bic: likelihood + (size + 1) as f64 * count.ln(),
             form: self.parameters.form,
@@ -315,7 +366,7 @@ impl Fitted {
 
     /// Presses that agree, less the parameters that were fitted to them.
     pub fn freedom(&self) -> f64 {
-        self.agree.iter().sum::<f64>() - self.parameters.count() as f64
+        self.agree.iter().sum::<f64>() - self.parameters.fitted() as f64
     }
 
     /// How far a press is from the law, in standard deviations.
@@ -339,10 +390,16 @@ impl Fitted {
         [self.parameters.exponent, self.covariance[(1, 1)].sqrt()]
     }
 
-    /// Resistance in series (ohm), and its standard error.
+    /// Resistance in series (ohm), or the factor of what is known of it, and its standard error.
     pub fn series(&self) -> Option<[f64; 2]> {
         let ohm = (self.parameters.ln_series - self.parameters.ln_unit_s).exp();
         (self.form.law == Law::Saturating).then(|| [ohm, ohm * self.covariance[(2, 2)].sqrt()])
+    }
+
+    /// What a press of such a force should conduct (S), in the middle between loading and unloading.
+    pub fn conductance_s(&self, press: &ForcePress) -> f64 {
+        let point = Point { direction: 0.0, ..Point::of(press) };
+        press.conductance_s * (-self.parameters.residual(&point)).exp()
     }
 
     pub fn scatter(&self) -> f64 {

@@ -59,11 +59,16 @@ struct Judged {
 
 /// Fits of ten presses each, against eleven others within `range_n`.
 fn judged(trial: impl Fn(u64) -> ForceLawTrial, range_n: [f64; 2]) -> Judged {
+    judged_by(&TEN_N, trial, range_n)
+}
+
+/// The same by presses of such forces.
+fn judged_by(forces_n: &[f64], trial: impl Fn(u64) -> ForceLawTrial, range_n: [f64; 2]) -> Judged {
     let mut judged = Judged::default();
     let mut presses = 0.0;
     for seed in 0..400 {
         let mut trial = trial(seed);
-        let Ok(fit) = fit_force(&trial.presses(&TEN_N), None) else {
+        let Ok(fit) = fit_force(&trial.presses(forces_n), None) else {
             judged.refused += 1;
             continue;
         };
@@ -104,6 +109,22 @@ fn bands_hold_nine_of_ten_presses() {
             judged.within
         );
         assert!(judged.refused < 8, "{} refused", judged.refused);
+    }
+}
+
+#[test]
+fn four_presses_are_few_and_say_so() {
+    // A ball on a film with its constriction, and one on an ideal surface.
+    for (truth, scatter) in [((1.24e-5, 5.0 / 3.0, 550.0), 0.05), (BALL, 0.05), (BALL, 0.1)] {
+        let judged =
+            judged_by(&[0.5, 1.25, 3.2, 8.0], |seed| ForceLawTrial::new(truth, 0.0, scatter, seed), [0.5, 8.0]);
+        assert!((0.86..0.95).contains(&judged.within[1]), "{truth:?} {scatter}: {:?}", judged.within);
+        assert!(
+            judged.middle_95() < 2.0 * scatter / truth.1 && judged.refused < 8,
+            "{} {}",
+            judged.middle_95(),
+            judged.refused
+        );
     }
 }
 
@@ -263,7 +284,7 @@ fn two_exchanged_forces_are_named() {
 fn what_tells_no_law_is_refused_with_a_reason() {
     let presses = ForceLawTrial::new(BALL, 0.0, 0.03, 1).presses(&TEN_N);
     let refusal = |presses: &[ForcePress]| refused(presses).to_string();
-    assert!(refusal(&presses[..4]).starts_with("4 presses, but 5 at least"));
+    assert!(refusal(&presses[..3]).starts_with("3 presses, but 4 at least"));
     assert!(refusal(&[&presses[6..9], &presses[6..8]].concat()).starts_with("the forces go from 2.6 N to 4.2 N only"));
     let mut wrong = presses.clone();
     wrong[3].force_n = 0.0;
