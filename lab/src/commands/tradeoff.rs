@@ -7,6 +7,7 @@ use tactomo_study::scanning::{self, Settings};
 use tactomo_study::tradeoff::{self, Plan};
 use tactomo_study::view::picture as picture_of;
 
+use super::shown::{watched, whole};
 use super::study::StudyArgs;
 use crate::heap::HEAP;
 use tactomo_cli::choice;
@@ -70,10 +71,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         drawn: if study.quick { DRAWN[0] } else { DRAWN[1] },
         calibrate: study.calibrate(),
     };
-    let report = tradeoff::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
+    let report = watched(|progress| tradeoff::run(&plan, &output::command_line(), progress))?;
     let view = tradeoff::view(&report);
     picture.map(|picture| picture.write(picture_of(&view))).transpose()?;
-    study.shown.put_out(files, &report, &[view])
+    study.shown.put_out(files, &report, &[view])?;
+    whole(&report.missing)
 }
 
 /// Runs the study of rows.

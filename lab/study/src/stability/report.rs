@@ -27,6 +27,8 @@ pub struct Report {
     pub sweeps: Vec<SweepReport>,
     /// What noise allows, beside what solvers reach.
     pub bounds: BoundReport,
+    /// Sweeps and charts that were not done when the study was stopped.
+    pub missing: Vec<String>,
 }
 
 impl Report {

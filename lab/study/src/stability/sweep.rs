@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use super::tolerances::Calibrations;
 use crate::calibrate::Calibrate;
 use crate::experiment::{Experiment, Frame, StudyError};
 use crate::scenes::SceneKind;
@@ -33,9 +34,25 @@ pub struct Plan {
     pub calibrate: Option<Calibrate>,
 }
 
+/// How a sweep is made, when its turn comes.
+pub(super) struct Maker {
+    /// What is varied.
+    pub title: &'static str,
+    /// How much work that is, in points that are tried without a calibration.
+    pub work: usize,
+    /// Makes it.
+    pub make: Box<dyn Fn(&Bench) -> Result<Sweep, StudyError>>,
+}
+
+impl Maker {
+    /// Of a sweep of so many points.
+    pub fn new(title: &'static str, work: usize, make: impl Fn(&Bench) -> Result<Sweep, StudyError> + 'static) -> Self {
+        Self { title, work, make: Box::new(make) }
+    }
+}
+
 /// Something that is varied.
 pub(super) struct Sweep {
-    pub title: &'static str,
     pub note: String,
     pub points: Vec<Point>,
 }
@@ -60,18 +77,16 @@ pub(super) struct Bench<'a> {
     pub plan: &'a Plan,
     /// The sound detector: as it is described, or as it was built where that is asked for.
     pub sound: Experiment,
-    progress: RefCell<&'a mut dyn FnMut(&str)>,
+    /// The same, of which solvers know the tolerances.
+    pub tolerant: Experiment,
+    /// Detectors as built that were calibrated.
+    pub calibrations: RefCell<Calibrations>,
 }
 
 impl<'a> Bench<'a> {
     /// Of a plan and its sound detector.
-    pub fn new(plan: &'a Plan, sound: Experiment, progress: &'a mut dyn FnMut(&str)) -> Self {
-        Self { plan, sound, progress: RefCell::new(progress) }
-    }
-
-    /// Tells what is tried next.
-    pub fn tell(&self, step: &str) {
-        (self.progress.borrow_mut())(step);
+    pub fn new(plan: &'a Plan, sound: Experiment) -> Self {
+        Self { plan, tolerant: sound.tolerant(), sound, calibrations: RefCell::default() }
     }
 
     /// Another detector, as it is described or as it was built where that is asked for.

@@ -1,10 +1,10 @@
 //! Sweeps of the tolerances: how far the detector that was built may be from the one described.
 
-use super::sweep::{Bench, Point, Sweep};
+use super::sweep::{Bench, Maker, Plan, Point, Sweep};
 use crate::calibrate::{Calibrate, Calibrated};
 use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
-use tactomo_physics::detector::{Detector, Tolerances};
+use tactomo_physics::detector::Tolerances;
 
 /// Times a hobbyist's bench: from nothing to hopeless.
 const TIMES: [f64; 6] = [0.0, 0.1, 0.3, 1.0, 2.0, 4.0];
@@ -36,71 +36,83 @@ const KINDS: [Kind; 11] = [
 ];
 const ALL: &str = "All tolerances";
 
-/// All of them: with what solvers know from the description, and after a calibration if there is one.
-pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
-    let mut calibrated = CalibratedBench { bench, done: Vec::new() };
-    KINDS.into_iter().map(|kind| sweep(&mut calibrated, kind)).collect()
+/// How much longer a point takes that is tried after a calibration too.
+const CALIBRATED_WORK: usize = 4;
+
+/// All of them: with what solvers know from the description, and after a calibration if there is one. A quick study calibrates for all
+/// tolerances at once alone.
+pub fn sweeps(plan: &Plan) -> Vec<Maker> {
+    let maker = |(title, only): Kind| {
+        let calibrate = plan.calibrate.filter(|_| !plan.quick || title == ALL);
+        let times = if title == ALL { &ALL_TIMES } else { &TIMES };
+        let work = times.len() * if calibrate.is_some() { CALIBRATED_WORK } else { 1 };
+        Maker::new(title, work, move |bench| sweep(bench, times, only, calibrate))
+    };
+    KINDS.into_iter().map(maker).collect()
 }
 
-fn sweep(calibrated: &mut CalibratedBench, (title, only): Kind) -> Result<Sweep, StudyError> {
-    let bench = calibrated.bench;
+fn sweep(
+    bench: &Bench,
+    times: &[f64],
+    only: fn(Tolerances) -> Tolerances,
+    calibrate: Option<Calibrate>,
+) -> Result<Sweep, StudyError> {
     let mut note = "At so many times that of a hobbyist's bench, docs/detector.md. A firm contact, each place on another detector as built.".to_owned();
     let (mut points, mut refused) = (Vec::new(), 0);
-    for (index, times) in bench.some(if title == ALL { &ALL_TIMES } else { &TIMES }).enumerate() {
+    for (index, times) in bench.some(times).enumerate() {
         let (label, severity) = (format!("x {times}"), index as f64);
         let tolerances = only(Tolerances::default().times(*times));
         let built = as_built(bench, tolerances)?;
         let mut point = point(bench, label.clone(), severity, &built)?;
-        if let Some(calibrate) = bench.plan.calibrate {
-            bench.tell(&format!("{title}, {label}: calibrating {} detectors", built.len()));
-            let (known, more) = calibrated.known(calibrate, tolerances, &built)?;
+        if let Some(calibrate) = calibrate {
+            let (known, more) = bench.calibrations.borrow_mut().known(bench, calibrate, tolerances, &built)?;
             refused += more;
             point.calibrated = Some(Box::new(self::point(bench, label, severity, &known)?));
         }
         points.push(point);
     }
-    if let Some(calibrate) = bench.plan.calibrate {
+    if let Some(calibrate) = calibrate {
         note += &format!(" Below each solver: {}.", calibrate.name());
     }
     if refused > 0 {
         note += &format!(" {refused} calibrations were refused; solvers know the description there.");
     }
-    Ok(Sweep { title, note, points })
+    Ok(Sweep { note, points })
 }
 
 /// The detector as it was built at each place, within tolerances of which solvers know nothing.
 fn as_built(bench: &Bench, tolerances: Tolerances) -> Result<Vec<Experiment>, StudyError> {
-    bench.seeds().into_iter().map(|seed| bench.sound.as_built_within(tolerances, seed)).collect()
+    bench.seeds().into_iter().map(|seed| bench.tolerant.as_built_within(tolerances, seed)).collect()
 }
 
-/// Calibrations of the detectors as built within some tolerances, each done once: no tolerances are the same ones in every sweep.
-struct CalibratedBench<'a, 'plan> {
-    bench: &'a Bench<'plan>,
-    done: Vec<(Tolerances, Vec<Detector>, usize)>,
-}
+/// Detectors as built within some tolerances as solvers know them after a calibration, and how many were refused. Each is done once: no
+/// tolerances are the same ones in every sweep.
+#[derive(Default)]
+pub(super) struct Calibrations(Vec<(Tolerances, Vec<Experiment>, usize)>);
 
-impl CalibratedBench<'_, '_> {
-    /// The same detectors as solvers know them after a calibration, and how many of those were refused.
+impl Calibrations {
+    /// Those of each place's detector.
     fn known(
         &mut self,
+        bench: &Bench,
         calibrate: Calibrate,
         tolerances: Tolerances,
         built: &[Experiment],
     ) -> Result<(Vec<Experiment>, usize), StudyError> {
-        let index = match self.done.iter().position(|(done, ..)| *done == tolerances) {
+        let index = match self.0.iter().position(|(done, ..)| *done == tolerances) {
             Some(index) => index,
             None => {
-                let places = built.iter().zip(self.bench.seeds());
-                let found = places.map(|(place, seed)| calibrate.find(place, seed)).collect::<Result<Vec<_>, _>>()?;
+                let places = built.iter().zip(bench.seeds());
+                let found = places.clone().map(|(place, seed)| calibrate.find(place, seed));
+                let found = found.collect::<Result<Vec<Calibrated>, _>>()?;
                 let refused = found.iter().filter(|found| found.refused.is_some()).count();
-                let detectors = found.into_iter().map(|Calibrated { detector, .. }| detector).collect();
-                self.done.push((tolerances, detectors, refused));
-                self.done.len() - 1
+                let known = places.zip(&found).map(|((place, _), found)| place.known_as(&found.detector));
+                self.0.push((tolerances, known.collect::<Result<_, _>>()?, refused));
+                self.0.len() - 1
             }
         };
-        let (_, detectors, refused) = &self.done[index];
-        let known = built.iter().zip(detectors).map(|(place, detector)| place.known_as(detector));
-        Ok((known.collect::<Result<_, _>>()?, *refused))
+        let (_, known, refused) = &self.0[index];
+        Ok((known.iter().map(|place| place.with_faults(&[], 0)).collect::<Result<_, _>>()?, *refused))
     }
 }
 

@@ -34,7 +34,7 @@ pub fn view(report: &Report) -> View {
         .heading("Every point")
         .figures(every, report.sweeps.iter().map(heat))
         .with(breaks(report));
-    View { method: method(report), ..view }
+    View { method: method(report), ..view }.without(&report.missing)
 }
 
 /// All rows of a sweep, those after a calibration behind those before; and what follows the name of the latter.

@@ -103,6 +103,16 @@ impl View {
         self.with(Part::Folded(summary.into(), parts.into_iter().map(Into::into).collect()))
     }
 
+    /// With what is missing because it was stopped, if anything is: before all other parts.
+    #[must_use]
+    pub fn without(mut self, missing: &[String]) -> Self {
+        if !missing.is_empty() {
+            let text = format!("**Partial: it was stopped before it was done.** Missing: {}.", missing.join("; "));
+            self.parts.insert(0, Part::Text(text));
+        }
+        self
+    }
+
     /// All tables, those that are folded away too.
     fn tables(&self) -> Vec<&Table> {
         fn of(part: &Part) -> Vec<&Table> {
