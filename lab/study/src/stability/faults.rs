@@ -51,7 +51,7 @@ fn sweep(bench: &Bench, (_, note, fault): Kind) -> Result<Sweep, StudyError> {
         points.push(point(format!("no. {electrode}"), 1.0, &[fault(electrode, (electrode + 1) % count)])?);
     }
     let note = format!("{note} On a firm contact, each electrode in turn, counted from 0.");
-    Ok(Sweep { note, points })
+    Ok(Sweep::new(note, points))
 }
 
 /// The same sweep, solved without the electrodes that the guard finds wrong.
@@ -61,7 +61,7 @@ fn left_out(sweep: Sweep, method: Method) -> Result<Sweep, StudyError> {
         sweep.note
     );
     let points = sweep.points.into_iter().map(|point| without_wrong(point, method)).collect::<Result<_, _>>()?;
-    Ok(Sweep { note, points })
+    Ok(Sweep::new(note, points))
 }
 
 fn without_wrong(mut point: Point, method: Method) -> Result<Point, StudyError> {

@@ -1,7 +1,7 @@
 //! All sweeps, run one after the other.
 
 use super::bounds::{BoundReport, Charted};
-use super::breakdown::{CellReport, breaks};
+use super::breakdown::{CellReport, Wrong, breaks, margin};
 use super::report::{ErrorRange, PointReport, Report, SolverRow, SweepReport};
 use super::sweep::{Bench, Maker, Plan, Point, Sweep};
 use super::trials::Trials;
@@ -10,7 +10,6 @@ use crate::experiment::{Experiment, StudyError};
 use crate::machine::Machine;
 use crate::progress::Progress;
 use crate::scenes::SceneKind;
-use crate::score::Summary;
 use tactomo_touch::solve::{Method, ParameterKind};
 
 /// Lambda's sweep, in shares of the largest singular value.
@@ -27,13 +26,13 @@ pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, Stu
     let progress = progress.part(0, all);
     let mut trials = Trials::new(&bench);
     let (mut sweeps, mut charts, mut missing, mut done) = (Vec::new(), Vec::new(), Vec::new(), 0);
-    for Maker { title, work, make } in makers {
-        progress.tell(title, done);
-        match try_sweep(&bench, (title, &*make), &mut trials, progress)? {
+    for maker in makers {
+        progress.tell(maker.title, done);
+        match try_sweep(&bench, &maker, &mut trials, progress)? {
             Some(sweep) => sweeps.push(sweep),
-            None => missing.push(title.to_owned()),
+            None => missing.push(maker.title.to_owned()),
         }
-        done += work;
+        done += maker.work;
     }
     for chart in &bounds::CHARTS {
         progress.tell(chart.title, done);
@@ -80,20 +79,20 @@ fn lambda(bench: &Bench) -> Result<Sweep, StudyError> {
         })
         .collect::<Result<_, StudyError>>()?;
     let note = "Of a firm contact; in shares of the largest singular value. Only of solvers that have one.";
-    Ok(Sweep { note: note.to_owned(), points })
+    Ok(Sweep::new(note, points))
 }
 
 /// Lets all solvers try a sweep; `None` if it was stopped before they had.
 fn try_sweep(
     bench: &Bench,
-    (title, make): (&str, &dyn Fn(&Bench) -> Result<Sweep, StudyError>),
+    maker: &Maker,
     trials: &mut Trials,
     progress: Progress,
 ) -> Result<Option<SweepReport>, StudyError> {
     if progress.is_stopped() {
         return Ok(None);
     }
-    let Sweep { note, points } = make(bench)?;
+    let Sweep { note, unit, points } = (maker.make)(bench)?;
     let sweeps_lambda = points.iter().any(|point| point.lambda.is_some());
     let methods =
         bench.plan.methods.iter().filter(|method| !sweeps_lambda || method.parameter() == Some(ParameterKind::Lambda));
@@ -110,9 +109,16 @@ fn try_sweep(
             }
         }
     }
-    let point = |point: Point| PointReport { label: point.label, severity: point.severity };
+    let point = |point: Point| PointReport { label: point.label, severity: point.severity, amount: point.amount };
     let points = points.into_iter().map(point).collect();
-    Ok(Some(SweepReport { title: title.to_owned(), note, points, solvers, calibrated }))
+    Ok(Some(SweepReport {
+        title: maker.title.to_owned(),
+        note,
+        unit: unit.map(str::to_owned),
+        points,
+        solvers,
+        calibrated,
+    }))
 }
 
 /// What a solver makes of points; `None` if it was stopped before.
@@ -128,13 +134,16 @@ fn row(
             return Ok(None);
         }
         let scores = trials.scores(method, point)?;
-        cells.push(scores.map(|scores| CellReport::of(&Summary::of(&scores), point.experiment.reach_m())));
+        cells.push(scores.map(|scores| CellReport::of(&scores, point.experiment.reach_m())));
     }
     let severities: Vec<f64> = points.iter().map(|point| point.severity).collect();
     let labels: Vec<&str> = points.iter().map(|point| point.label.as_str()).collect();
     let breaks = breaks(&labels, &severities, &mut cells);
     let errors = ErrorRange::of(&severities, &cells);
-    Ok(Some(SolverRow { solver: method.name().to_owned(), cells, errors, breaks }))
+    let amounts: Vec<Option<f64>> = points.iter().map(|point| point.amount).collect();
+    let margin = margin(&severities, &amounts, &cells);
+    let wrong = Wrong::mean(cells.iter().flatten().map(|cell| cell.wrong));
+    Ok(Some(SolverRow { solver: method.name().to_owned(), cells, errors, breaks, wrong, margin }))
 }
 
 #[cfg(test)]

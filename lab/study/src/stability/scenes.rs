@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::sweep::{Bench, Maker, Sweep};
+use super::sweep::{Bench, Maker, NOISE, Sweep};
 use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
 use tactomo_physics::detector::{Adc, Detector};
@@ -18,6 +18,10 @@ const BITS: [u8; 5] = [16, 14, 12, 10, 8];
 const CONDUCTANCES: [f64; 10] = [0.003, 0.01, 0.03, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0];
 /// Distances (mean distances of electrodes).
 pub(super) const APART: [f64; 9] = [1.6, 1.2, 0.9, 0.7, 0.55, 0.4, 0.27, 0.2, 0.13];
+/// Distance to which two contacts part, each of which is shown alike when they begin on one spot (m).
+const PARTED_M: [f64; 6] = [0.024, 0.015, 0.01, 0.007, 0.005, 0.003];
+/// Frames in which they part: a tenth of a second at 100 frames a second.
+const PARTING: usize = 10;
 const FROM_EDGE: [f64; 6] = [0.5, 0.3, 0.2, 0.15, 0.12, 0.1];
 const FROM_PAD: [f64; 6] = [0.5, 0.3, 0.2, 0.13, 0.07, 0.0];
 /// Radius of a wide contact (mean distances of electrodes).
@@ -35,6 +39,7 @@ pub fn sweeps() -> Vec<Maker> {
         Maker::new("Force, from nothing to saturation", CONDUCTANCES.len(), conductance),
         Maker::new("Distance of two firm contacts", APART.len(), apart_firm),
         Maker::new("Distance of two light contacts", APART.len(), apart_light),
+        Maker::new("Two contacts that part while they are followed", PARTED_M.len(), parting),
         Maker::new("Distance to the edge", FROM_EDGE.len(), edge),
         Maker::new("Distance to an electrode's middle", FROM_PAD.len(), pad),
         Maker::new("Radius of a wide contact", RADII.len(), width),
@@ -65,7 +70,9 @@ fn noise_of(bench: &Bench, kind: SceneKind, note: &str) -> Result<Sweep, StudyEr
             bench.point(format!("{snr_db} dB"), -snr_db, experiment, kind)
         })
         .collect::<Result<_, _>>()?;
-    Ok(Sweep { note: note.to_owned(), points })
+    let described_v = bench.sound.detector.adc.deviation_v();
+    let noise_v = |snr_db: &f64| signal_v * 10f64.powf(-snr_db / 20.0);
+    Ok(Sweep::new(note, points).in_units(NOISE, bench.some(&SNR_DB).map(|snr_db| noise_v(snr_db) / described_v)))
 }
 
 fn noise(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -93,7 +100,7 @@ fn bits(bench: &Bench) -> Result<Sweep, StudyError> {
         "On a light contact (0.03 sheet conductances), with {} LSB of noise.",
         bench.sound.detector.adc.noise_lsb
     );
-    Ok(Sweep { note, points })
+    Ok(Sweep::new(note, points))
 }
 
 /// The sound experiment once more.
@@ -114,7 +121,7 @@ fn touched<T: Copy>(
         .enumerate()
         .map(|(index, value)| bench.touched(label(*value), index as f64, sound(bench)?, |seed| touches(*value, seed)))
         .collect::<Result<_, _>>()?;
-    Ok(Sweep { note: note.to_owned(), points })
+    Ok(Sweep::new(note, points))
 }
 
 fn conductance(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -167,6 +174,22 @@ fn apart_firm(bench: &Bench) -> Result<Sweep, StudyError> {
 
 fn apart_light(bench: &Bench) -> Result<Sweep, StudyError> {
     apart(bench, SceneKind::Light, "0.03 sheet conductances each.")
+}
+
+/// Two that begin on one spot and part, which solvers follow from one contact to two.
+fn parting(bench: &Bench) -> Result<Sweep, StudyError> {
+    let point = |(index, parted_m): (usize, &f64)| {
+        let touches = |seed, share: f64| {
+            let apart = share * parted_m / bench.sound.reach_m();
+            pair(bench, SceneKind::Firm, apart, seed).map(Touch::from).to_vec()
+        };
+        bench.followed(format!("{:.0} mm", parted_m * 1e3), index as f64, sound(bench)?, PARTING, touches)
+    };
+    let points = bench.some(&PARTED_M).enumerate().map(point).collect::<Result<_, _>>()?;
+    let note = format!(
+        "Two firm contacts of 0.3 sheet conductances that begin on one spot and part to this distance in {PARTING} frames. What counts is what is found there."
+    );
+    Ok(Sweep::new(note, points))
 }
 
 fn edge(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -226,7 +249,7 @@ fn lowered(bench: &Bench) -> Result<Sweep, StudyError> {
         .collect::<Result<_, StudyError>>()?;
     let note = "A second press of the same conductance, at places that raise the signal or lower it: root mean square of both presses' \
                 readings over that of the first alone, at the first place.";
-    Ok(Sweep { note: note.to_owned(), points })
+    Ok(Sweep::new(note, points))
 }
 
 /// Pairs of presses, the first always the same, with their signal over that of the first alone: the lowest first.

@@ -1,6 +1,6 @@
 //! Sweeps of the tolerances: how far the detector that was built may be from the one described.
 
-use super::sweep::{Bench, Maker, Plan, Point, Sweep};
+use super::sweep::{BENCH, Bench, Maker, Plan, Point, Sweep};
 use crate::calibrate::{Calibrate, Calibrated};
 use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
@@ -53,19 +53,20 @@ pub fn sweeps(plan: &Plan) -> Vec<Maker> {
 
 fn sweep(
     bench: &Bench,
-    times: &[f64],
+    all_times: &[f64],
     only: fn(Tolerances) -> Tolerances,
     calibrate: Option<Calibrate>,
 ) -> Result<Sweep, StudyError> {
     let mut note = "At so many times that of a hobbyist's bench, docs/detector.md. A firm contact, each place on another detector as built.".to_owned();
     let (mut points, mut refused) = (Vec::new(), 0);
-    for (index, times) in bench.some(times).enumerate() {
+    for (index, times) in bench.some(all_times).enumerate() {
         let (label, severity) = (format!("x {times}"), index as f64);
         let tolerances = only(Tolerances::default().times(*times));
         let built = as_built(bench, tolerances)?;
         let mut point = point(bench, label.clone(), severity, &built)?;
         if let Some(calibrate) = calibrate {
-            let (known, more) = bench.calibrations.borrow_mut().known(bench, calibrate, tolerances, &built)?;
+            let find = if tolerances.is_exact() { known_of_exact } else { known };
+            let (known, more) = find(bench, calibrate, &built)?;
             refused += more;
             point.calibrated = Some(Box::new(self::point(bench, label, severity, &known)?));
         }
@@ -77,7 +78,7 @@ fn sweep(
     if refused > 0 {
         note += &format!(" {refused} calibrations were refused; solvers know the description there.");
     }
-    Ok(Sweep { note, points })
+    Ok(Sweep::new(note, points).in_units(BENCH, bench.some(all_times).copied()))
 }
 
 /// The detector as it was built at each place, within tolerances of which solvers know nothing.
@@ -85,35 +86,26 @@ fn as_built(bench: &Bench, tolerances: Tolerances) -> Result<Vec<Experiment>, St
     bench.seeds().into_iter().map(|seed| bench.tolerant.as_built_within(tolerances, seed)).collect()
 }
 
-/// Detectors as built within some tolerances as solvers know them after a calibration, and how many were refused. Each is done once: no
-/// tolerances are the same ones in every sweep.
-#[derive(Default)]
-pub(super) struct Calibrations(Vec<(Tolerances, Vec<Experiment>, usize)>);
+/// The detector as it was built at each place as solvers know it after a calibration, and how many of those were refused.
+pub(super) type Known = (Vec<Experiment>, usize);
 
-impl Calibrations {
-    /// Those of each place's detector.
-    fn known(
-        &mut self,
-        bench: &Bench,
-        calibrate: Calibrate,
-        tolerances: Tolerances,
-        built: &[Experiment],
-    ) -> Result<(Vec<Experiment>, usize), StudyError> {
-        let index = match self.0.iter().position(|(done, ..)| *done == tolerances) {
-            Some(index) => index,
-            None => {
-                let places = built.iter().zip(bench.seeds());
-                let found = places.clone().map(|(place, seed)| calibrate.find(place, seed));
-                let found = found.collect::<Result<Vec<Calibrated>, _>>()?;
-                let refused = found.iter().filter(|found| found.refused.is_some()).count();
-                let known = places.zip(&found).map(|((place, _), found)| place.known_as(&found.detector));
-                self.0.push((tolerances, known.collect::<Result<_, _>>()?, refused));
-                self.0.len() - 1
-            }
-        };
-        let (_, known, refused) = &self.0[index];
-        Ok((known.iter().map(|place| place.with_faults(&[], 0)).collect::<Result<_, _>>()?, *refused))
-    }
+fn known(bench: &Bench, calibrate: Calibrate, built: &[Experiment]) -> Result<Known, StudyError> {
+    let places = built.iter().zip(bench.seeds());
+    let found = places.clone().map(|(place, seed)| calibrate.find(place, seed));
+    let found = found.collect::<Result<Vec<Calibrated>, _>>()?;
+    let refused = found.iter().filter(|found| found.refused.is_some()).count();
+    let known = places.zip(&found).map(|((place, _), found)| place.known_as(&found.detector));
+    Ok((known.collect::<Result<_, _>>()?, refused))
+}
+
+/// The same without any tolerances, which are the same detectors in every sweep: they are calibrated once.
+fn known_of_exact(bench: &Bench, calibrate: Calibrate, built: &[Experiment]) -> Result<Known, StudyError> {
+    let mut kept = bench.exact.borrow_mut();
+    let (places, refused) = match &*kept {
+        Some(known) => known,
+        None => kept.insert(known(bench, calibrate, built)?),
+    };
+    Ok((places.iter().map(|place| place.with_faults(&[], 0)).collect::<Result<_, _>>()?, *refused))
 }
 
 /// A point at which each place has a detector of its own.
@@ -125,8 +117,10 @@ fn point(bench: &Bench, label: String, severity: f64, places: &[Experiment]) -> 
     Ok(Point {
         label,
         severity,
+        amount: None,
         experiment: bench.sound.with_faults(&[], 0)?,
         places: places.iter().zip(bench.seeds()).map(frames).collect::<Result<_, _>>()?,
+        lead: 0,
         known: places.iter().map(|place| place.with_faults(&[], 0)).collect::<Result<_, _>>()?,
         lambda: None,
         calibrated: None,

@@ -57,7 +57,7 @@ impl Trials {
         for (place, frames) in point.places.iter().enumerate() {
             let experiment = point.known.get(place).unwrap_or(&point.experiment);
             match self.of_place(variation, experiment, frames)? {
-                Some(more) => scores.extend(more),
+                Some(more) => scores.extend(more.into_iter().skip(point.lead)),
                 None => return Ok(None),
             }
         }

@@ -1,9 +1,10 @@
 //! Sweeps of what is wrong in the model or in the description of the detector.
 
-use super::sweep::{Bench, Maker, Sweep};
+use super::sweep::{BENCH, Bench, Maker, NOISE, Sweep};
 use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
-use tactomo_physics::detector::{Adc, Detector, Layer};
+use tactomo_physics::detector::{Adc, Detector, Layer, Tolerances};
+use tactomo_physics::forward::ConnectingPoints;
 use tactomo_physics::forward::shell::Shell;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::Fault;
@@ -27,6 +28,11 @@ const NOISES: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
 /// Voltage at which the converter saturates, as a share of the drive.
 const CLIPS: [f64; 6] = [1.0, 0.5, 0.3, 0.2, 0.1, 0.05];
 
+/// Sheet resistance of the driving layer (ohm per square), which no model has.
+const SHEETS_OHM: [f64; 7] = [0.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
+/// Conductance of layers that touch lightly everywhere (sheet conductances).
+const LEAKS: [f64; 6] = [0.0, 0.003, 0.01, 0.03, 0.1, 0.3];
+
 /// All of them.
 pub fn sweeps() -> Vec<Maker> {
     vec![
@@ -35,6 +41,8 @@ pub fn sweeps() -> Vec<Maker> {
         Maker::new("Contact impedances that differ", SPREADS.len(), spread),
         Maker::new("A baseline taken under load", BASELINES.len(), baseline),
         Maker::new("More noise than expected", NOISES.len(), noise),
+        Maker::new("A driving sheet that resists", SHEETS_OHM.len(), driving_sheet),
+        Maker::new("A detector that leaks", LEAKS.len(), leak),
         Maker::new("Readings that saturate", CLIPS.len(), clip),
         Maker::new("A thick detector read with the thin-shell model", SHELL_THICKNESSES.len(), shell),
         Maker::new("A finer or coarser image", NODES.len(), nodes),
@@ -54,7 +62,7 @@ fn firm<T: Copy>(
         .some(values)
         .map(|value| bench.point(label(*value), severity(*value), experiment(*value)?, SceneKind::Firm))
         .collect::<Result<_, _>>()?;
-    Ok(Sweep { note: note.to_owned(), points })
+    Ok(Sweep::new(note, points))
 }
 
 /// A detector whose layers are thicker by a factor, of the same conductivity.
@@ -75,13 +83,26 @@ fn pad_radius_m(detector: &Detector) -> f64 {
 fn thickness(bench: &Bench) -> Result<Sweep, StudyError> {
     let note = "True thickness over the one in the model, at the same conductivity.";
     let of = |factor| bench.sound.with_truth(&thicker(bench.sound.truth(), factor));
-    firm(bench, note, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
+    let sweep =
+        firm(bench, note, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)?;
+    let deviation = Tolerances::default().thickness_share;
+    let factors: Vec<f64> = bench.some(&THICKNESSES).copied().collect();
+    Ok(sweep.in_units(BENCH, deviations(&factors, deviation)))
 }
 
 fn conductivity(bench: &Bench) -> Result<Sweep, StudyError> {
     let note = "True conductivity over the one in the model.";
     let of = |factor| bench.sound.with_faults(&[Fault::Conductivity { factor }], 1);
-    firm(bench, note, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
+    let sweep =
+        firm(bench, note, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)?;
+    let deviation = Tolerances::default().conductivity_share;
+    let factors: Vec<f64> = bench.some(&CONDUCTIVITIES).copied().collect();
+    Ok(sweep.in_units(BENCH, deviations(&factors, deviation)))
+}
+
+/// Deviations of a factor's logarithm.
+fn deviations(factors: &[f64], deviation: f64) -> impl Iterator<Item = f64> {
+    factors.iter().map(move |factor| factor.ln().abs() / deviation)
 }
 
 fn percent(share: f64) -> String {
@@ -93,7 +114,9 @@ fn spread(bench: &Bench) -> Result<Sweep, StudyError> {
     let felt = Detector { contact_impedance_ohm_m2: FELT_OHM_M2, ..bench.sound.detector.clone() };
     let felt = bench.experiment(&felt)?;
     let of = |deviation| felt.with_faults(&[Fault::ContactSpread { deviation }], bench.plan.seed);
-    firm(bench, note, &SPREADS, percent, |deviation| deviation, of)
+    let sweep = firm(bench, note, &SPREADS, percent, |deviation| deviation, of)?;
+    let bench_spread = Tolerances::default().contact_impedance_spread;
+    Ok(sweep.in_units(BENCH, bench.some(&SPREADS).map(|deviation| deviation / bench_spread)))
 }
 
 fn baseline(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -114,7 +137,28 @@ fn noise(bench: &Bench) -> Result<Sweep, StudyError> {
         let noisy = Adc { noise_lsb: factor * adc.noise_lsb, ..adc };
         bench.sound.with_truth(&Detector { adc: noisy, ..bench.sound.truth().clone() })
     };
-    firm(bench, note, &NOISES, |factor| format!("x {factor}"), |factor| factor, of)
+    let sweep = firm(bench, note, &NOISES, |factor| format!("x {factor}"), |factor| factor, of)?;
+    Ok(sweep.in_units(NOISE, bench.some(&NOISES).copied()))
+}
+
+fn driving_sheet(bench: &Bench) -> Result<Sweep, StudyError> {
+    let note = "Sheet resistance of the driving layer in ohm per square, connected at a corner; the model has none.";
+    let of = |ohm| match ohm > 0.0 {
+        true => bench.sound.with_faults(&[Fault::DrivingSheet { ohm, points: ConnectingPoints::One }], 1),
+        false => bench.sound.with_faults(&[], 0),
+    };
+    let sweep = firm(bench, note, &SHEETS_OHM, |ohm| format!("{ohm}"), |ohm| ohm, of)?;
+    let bench_ohm = Tolerances::default().driving_sheet_ohm;
+    Ok(sweep.in_units(BENCH, bench.some(&SHEETS_OHM).map(|ohm| ohm / bench_ohm)))
+}
+
+fn leak(bench: &Bench) -> Result<Sweep, StudyError> {
+    let note = "Conductance of layers that touch lightly everywhere, in sheet conductances. The baseline is taken off, and the leakage in it.";
+    let of = |sheets| match sheets > 0.0 {
+        true => bench.sound.with_faults(&[Fault::Leak { sheets }], 1),
+        false => bench.sound.with_faults(&[], 0),
+    };
+    firm(bench, note, &LEAKS, |sheets| format!("{sheets}"), |sheets| sheets, of)
 }
 
 fn clip(bench: &Bench) -> Result<Sweep, StudyError> {

@@ -11,7 +11,9 @@ mod text;
 pub use self::figure::{Axis, Chart, Map, Mark, Series, Unit, same_axis};
 pub use self::html::{page, picture};
 pub use self::svg::standalone;
-pub use self::table::{Cell, Column, Format, MM, PERCENT, PLAIN, Rows, S_PER_M, Style, TEXT, Table, US, Value};
+pub use self::table::{
+    Cell, Column, Format, MM, Outcome, PERCENT, PLAIN, Rows, S_PER_M, Style, TEXT, Table, US, Value,
+};
 pub use self::text::text;
 
 /// What a study shows.
