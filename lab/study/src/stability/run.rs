@@ -268,5 +268,10 @@ mod tests {
         let fits = page.find("heat whole").is_some_and(|at| at < page.find("Against what noise allows").unwrap());
         assert!(fits, "the overview takes the width of the page, whatever its columns");
         assert!(page.contains("tactomo &lt;stability&gt;") && page.contains("noise limit"));
+        let opened: usize = report.sweeps.iter().map(|sweep| sweep.solvers.len() + sweep.calibrated.len()).sum();
+        assert_eq!((page.matches("popovertarget=").count(), page.matches("<div popover ").count()), (opened, opened));
+        let row = |title: &str| &report.sweeps.iter().find(|sweep| sweep.title == title).unwrap().solvers[0];
+        assert!(row("Noise").wrong.silent > 0.1, "a linear image has no flags for noise");
+        assert!(row("A driving sheet that resists").margin.is_some() && row("A detector that leaks").margin.is_none());
     }
 }

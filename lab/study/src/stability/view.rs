@@ -72,6 +72,7 @@ fn borne(margin: Margin) -> String {
         format!("{amount:.digits$}")
     };
     match (margin.holds.filter(|amount| *amount > 0.0), margin.breaks) {
+        (Some(holds), Some(breaks)) if times(holds) == times(breaks) => format!("{} x", times(holds)),
         (Some(holds), Some(breaks)) => format!("{}–{} x", times(holds), times(breaks)),
         (None, Some(breaks)) => format!("< {} x", times(breaks)),
         (Some(holds), None) => format!("> {} x", times(holds)),
@@ -120,6 +121,7 @@ fn overview(report: &Report) -> Table {
         let first = row.breaks.as_ref();
         let detail = match (row.margin, first) {
             (Some(margin), _) => borne(margin),
+            (None, Some(Break { how: Breakdown::Never, .. })) => Breakdown::Never.name().to_owned(),
             (None, Some(found)) => found.at.clone(),
             (None, None) => "holds".to_owned(),
         };
@@ -168,10 +170,8 @@ fn curve(sweep: &SweepReport, row: &SolverRow) -> Chart {
     let tried = severities.zip(&row.cells).filter_map(|(severity, cell)| Some((severity, cell.as_ref()?)));
     let harmless = tried.min_by(|(a, _), (b, _)| a.total_cmp(b));
     let level = harmless.map(|(_, cell)| (cell.limit_m(), "wrong above".to_owned()));
-    let margin = row.margin.map_or_else(String::new, |margin| {
-        format!("; margin {} {}", borne(margin), sweep.unit.as_deref().unwrap_or_default())
-    });
-    let subtitle = format!("wrong, silent / flagged: {} % of frames{margin}", shares(row.wrong));
+    let margin = row.margin.map_or_else(String::new, |margin| format!("; margin to failure {}", borne(margin)));
+    let subtitle = format!("wrong answers, silent / flagged: {} % of frames{margin}", shares(row.wrong));
     let title = format!("{}: error of {}", sweep.title, row.solver);
     Chart { level, ..Chart::new(title, subtitle, axes, series).sized([520.0, 320.0]) }
 }

@@ -158,7 +158,7 @@ impl Outcome {
             Self::Right => None,
             Self::Flagged => Some(("⚑", "flagged")),
             Self::SometimesSilent => Some(("✕", "silent at times")),
-            Self::Silent => Some(("✕✕", "silent")),
+            Self::Silent => Some(("✕", "silent")),
         }
     }
 }
