@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::{Group, GroupReport, Heap, Plan, SceneReport, SolverReport, milliseconds};
+use super::{Group, GroupReport, Heap, Memory, Plan, SceneReport, SolverReport, milliseconds};
 use crate::experiment::{Experiment, Frame, StudyError};
 use crate::scenes::SceneKind;
 use crate::score::{Score, Scorer, Summary};
@@ -48,9 +48,7 @@ pub(super) fn try_variation(
     trials: &mut [Trial],
     variation: Variation,
 ) -> Result<SolverReport, StudyError> {
-    // Memory is counted until the solver has read the first place of each kind, at which it still is there.
-    let (mut set_up, mut counts, mut memory) = (Duration::ZERO, heap, None);
-    counts.iter().for_each(|heap| (heap.start)());
+    let mut set_up = Duration::ZERO;
     let mut scores: Vec<(SceneKind, Vec<Score>)> = Vec::new();
     let mut last: Option<(Arc<Jacobian>, Box<dyn Solver>)> = None;
     for Trial { experiment, scorer, places } in trials.iter_mut() {
@@ -60,21 +58,18 @@ pub(super) fn try_variation(
             Some(same) => last.insert(same),
             None => {
                 let start = Instant::now();
-                let solver = variation.build(&experiment.problem).inspect_err(|_| {
-                    counts.iter().for_each(|heap| _ = (heap.stop)());
-                })?;
+                let solver = variation.build(&experiment.problem)?;
                 set_up = start.elapsed();
                 last.insert((Arc::clone(jacobian), solver))
             }
         };
         for place in places {
             scores.push((place.kind, scorer.run(&mut **solver, &place.frames)?));
-            if scores.len() == SceneKind::ALL.len() {
-                memory = counts.take().map(|heap| (heap.stop)());
-            }
         }
     }
     drop(last);
+    let counted = heap.zip(trials.first());
+    let memory = counted.map(|(heap, trial)| memory(heap, &trial.experiment, &trial.places, variation)).transpose()?;
     let over = |is: &dyn Fn(SceneKind) -> bool| {
         Summary::of(scores.iter().filter(|(kind, _)| is(*kind)).flat_map(|(_, scores)| scores))
     };
@@ -94,4 +89,20 @@ pub(super) fn try_variation(
             .map(|scene| SceneReport { scene, summary: over(&|kind| kind == scene) })
             .collect(),
     })
+}
+
+/// Makes the solver again and lets it solve the first place of each kind, with nothing else allocated meanwhile.
+fn memory(heap: Heap, experiment: &Experiment, scenes: &[Place], variation: Variation) -> Result<Memory, StudyError> {
+    (heap.start)();
+    let built = variation.build(&experiment.problem).map(|mut solver| {
+        for frame in scenes.iter().take(SceneKind::ALL.len()).flat_map(|place| &place.frames) {
+            // Readings that it refuses need no memory.
+            drop(solver.solve(&frame.readings));
+        }
+        solver
+    });
+    // The solver is still there, so what it keeps is counted.
+    let memory = (heap.stop)();
+    built?;
+    Ok(memory)
 }
