@@ -129,6 +129,8 @@ impl NewFile {
         unfinished.push(".unfinished");
         let file = Self { path, unfinished: unfinished.into() };
         file.create()?;
+        // Whoever is ended before there is anything to write leaves no empty file.
+        drop(std::fs::remove_file(&file.unfinished));
         Ok(file)
     }
 

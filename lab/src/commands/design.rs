@@ -9,7 +9,7 @@ use tactomo_design::search::{self, Material, Plan, Wishes};
 use tactomo_physics::detector::{Chosen, Detector, Stack};
 use tactomo_study::view::{self, View};
 
-use super::study::watched;
+use super::shown::watched;
 use tactomo_cli::output::{self, NewFile, message};
 
 /// Finds the detector that meets what you want: foams, thicknesses, electrodes and drive.

@@ -7,6 +7,7 @@ use tactomo_study::scanning::{self, Settings};
 use tactomo_study::tradeoff::{self, Plan};
 use tactomo_study::view::picture as picture_of;
 
+use super::shown::{watched, whole};
 use super::study::StudyArgs;
 use crate::heap::HEAP;
 use tactomo_cli::choice;
@@ -16,7 +17,7 @@ use tactomo_cli::output::{self, NewFile, message};
 const DETECTORS: [&str; 4] = ["square-60", "strip-13x60", "display-140x70", "fingertip-10"];
 
 /// Detectors drawn from the tolerances of each: in a quick look, and else.
-const DRAWN: [usize; 2] = [2, 4];
+const DRAWN: [usize; 2] = [1, 4];
 
 /// Scenes of each number of contacts of --scan: in a quick look, and else.
 const SCENES: [usize; 2] = [1, 6];
@@ -27,7 +28,7 @@ const CONTACTS: [usize; 3] = [1, 2, 3];
 ///
 /// Readings are simulated on a finer model than the ones inverted, with the converter's noise
 /// and steps; then once more on detectors that are not quite the ones described, before and after a calibration. Takes some minutes, with
-/// --quick about half a minute. Let nothing else run meanwhile.
+/// --quick about half a minute. Ctrl-C keeps what is done. Let nothing else run meanwhile.
 ///
 /// Examples:
 ///   tactomo-lab tradeoff --quick --out tradeoff.html
@@ -70,10 +71,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         drawn: if study.quick { DRAWN[0] } else { DRAWN[1] },
         calibrate: study.calibrate(),
     };
-    let report = tradeoff::run(&plan, &output::command_line(), &mut |step| message!("{step}"))?;
+    let report = watched(|progress| tradeoff::run(&plan, &output::command_line(), progress))?;
     let view = tradeoff::view(&report);
     picture.map(|picture| picture.write(picture_of(&view))).transpose()?;
-    study.shown.put_out(files, &report, &[view])
+    study.shown.put_out(files, &report, &[view])?;
+    whole(&report.missing)
 }
 
 /// Runs the study of rows.

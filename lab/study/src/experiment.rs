@@ -61,7 +61,7 @@ pub enum StudyError {
 }
 
 /// What was there and what was read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// What touched.
     pub touches: Vec<Touch>,
@@ -162,7 +162,15 @@ impl Experiment {
         let built = drawn(&Detector { tolerances, ..self.detector.clone() }, seed);
         let name = || self.detector.name.clone();
         built.check().map_err(|wrong| StudyError::AsBuilt { detector: name(), seed, wrong })?;
-        Ok(Self { problem: self.problem.measured_as(&self.detector), ..self.with_truth(&built)? })
+        Ok(Self { problem: self.tolerant().problem, ..self.with_truth(&built)? })
+    }
+
+    /// The same, whose solvers know the tolerances of its description: what they make of those is made once for all copies.
+    pub fn tolerant(&self) -> Self {
+        match self.problem.detector() == &self.detector {
+            true => self.again(),
+            false => Self { problem: self.problem.measured_as(&self.detector), ..self.again() },
+        }
     }
 
     /// The same, in truth another detector than the one described: thicker, or noisier.

@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use super::experiment::{Experiment, Frame};
 use super::stopwatch::timed;
-use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_touch::metrics::{Comparison, Greit, ImageMetrics, Matching, PaperFigures, found_s_per_m2, truth_s_per_m2};
@@ -48,11 +47,16 @@ pub struct Score {
 
 /// Scores solutions on one detector.
 pub struct Scorer {
-    detector: Detector,
+    reach_m: f64,
+    images: Option<Images>,
+}
+
+/// What images are scored with.
+struct Images {
+    width_m: f64,
     mesh: ImageMesh,
     comparison: Comparison,
     smoothing_m: f64,
-    reach_m: f64,
     /// The touches before, and their image.
     last: Option<(Vec<Touch>, Vec<f32>)>,
 }
@@ -60,12 +64,12 @@ pub struct Scorer {
 impl Scorer {
     /// For solutions of an experiment's problem.
     pub fn new(experiment: &Experiment) -> Self {
-        let detector = experiment.detector.clone();
-        let mesh = experiment.problem.jacobian.image_mesh.clone();
-        let [width_m, height_m] = detector.outline.size_m();
-        let smoothing_m = SMOOTHING_SHARE * width_m.min(height_m);
-        let comparison = Comparison::new(&mesh, smoothing_m);
-        Self { detector, mesh, comparison, smoothing_m, reach_m: experiment.reach_m(), last: None }
+        Self { images: Some(Images::new(experiment)), ..Self::of_contacts(experiment.reach_m()) }
+    }
+
+    /// For contacts alone: images are not looked at. What is further from the truth than `reach_m` counts as missed and invented.
+    pub fn of_contacts(reach_m: f64) -> Self {
+        Self { reach_m, images: None }
     }
 
     /// Lets a solver read frames one after the other, and scores what it found.
@@ -100,8 +104,8 @@ impl Scorer {
         if let Some(truth) = &frame.contacts {
             self.score_contacts(truth, &solution.contacts, &mut score);
         }
-        if !frame.touches.is_empty() {
-            self.score_image(frame, solution, &mut score)?;
+        if let Some(images) = self.images.as_mut().filter(|_| !frame.touches.is_empty()) {
+            images.score(frame, solution, &mut score)?;
         }
         Ok(score)
     }
@@ -114,16 +118,26 @@ impl Scorer {
         score.conductance_error = matching.conductance_error(truth, found);
         score.position_error_m = Matching::within(f64::INFINITY, truth, found).position_error_m();
     }
+}
 
-    fn score_image(&mut self, frame: &Frame, solution: &Solution, score: &mut Score) -> Result<(), ForwardError> {
+impl Images {
+    /// Of an experiment's problem.
+    fn new(experiment: &Experiment) -> Self {
+        let mesh = experiment.problem.jacobian.image_mesh.clone();
+        let [width_m, height_m] = experiment.detector.outline.size_m();
+        let smoothing_m = SMOOTHING_SHARE * width_m.min(height_m);
+        let comparison = Comparison::new(&mesh, smoothing_m);
+        Self { width_m, mesh, comparison, smoothing_m, last: None }
+    }
+
+    fn score(&mut self, frame: &Frame, solution: &Solution, score: &mut Score) -> Result<(), ForwardError> {
         let image = found_s_per_m2(&self.mesh, solution, self.smoothing_m);
         self.see(&frame.touches)?;
         if let Some((_, truth)) = &self.last {
             score.image = self.comparison.of(truth, &image);
         }
         if let Some([contact]) = frame.contacts.as_deref() {
-            let [width_m, _] = self.detector.outline.size_m();
-            score.paper = PaperFigures::of(&self.mesh, &image, contact, width_m);
+            score.paper = PaperFigures::of(&self.mesh, &image, contact, self.width_m);
             score.greit = Greit::of(&self.mesh, &image, contact);
         }
         Ok(())
@@ -279,6 +293,7 @@ pub fn quantiles<const N: usize>(values: impl Iterator<Item = f64>, shares: [f64
 mod tests {
     use super::*;
     use crate::SceneKind;
+    use tactomo_physics::detector::Detector;
 
     fn experiment() -> Experiment {
         Experiment::new(&Detector::preset(Detector::DEFAULT).unwrap()).unwrap()

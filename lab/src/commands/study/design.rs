@@ -1,21 +1,13 @@
 //! `tactomo-lab study materials` and the other studies of detectors.
 
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
-
 use serde::Serialize;
-use tactomo_design::{
-    DesignError, Progress, Step, bonding, electrodes, explain, materials, overview, samples, thickness,
-};
+use tactomo_design::{DesignError, Progress, bonding, electrodes, explain, materials, overview, samples, thickness};
 use tactomo_study::view::View;
 use tactomo_touch::solve::Method;
 
-use super::super::shown::Shown;
-use tactomo_cli::output::message;
-use tactomo_cli::{choice, interrupt};
+use super::super::shown::{Shown, watched};
+use tactomo_cli::choice;
 
-/// Steps are told so often at most.
-const TOLD_EVERY: Duration = Duration::from_secs(1);
 /// Conductivities on a side of the paper's map.
 const SIDE: usize = 11;
 
@@ -196,24 +188,4 @@ fn found<R: Serialize>(
     let files = shown.files()?;
     let found = watched(run)?;
     shown.put_out(files, &found, &views(&found))
-}
-
-/// Runs something that tells how far it is, until Ctrl-C.
-pub fn watched<R>(run: impl FnOnce(Progress) -> Result<R, DesignError>) -> anyhow::Result<R> {
-    let stop = interrupt::flag()?;
-    let last = Mutex::new(Instant::now());
-    let say = |step: &Step| {
-        let Ok(mut last) = last.try_lock() else { return };
-        if last.elapsed() >= TOLD_EVERY && step.done < step.all {
-            *last = Instant::now();
-            let left_s = step.left.as_secs_f64().ceil();
-            message!(
-                "{}: {} of {}, about {left_s:.0} s left; Ctrl-C keeps what is done",
-                step.what,
-                step.done,
-                step.all
-            );
-        }
-    };
-    Ok(run(Progress::new(&stop, &say))?)
 }

@@ -6,7 +6,6 @@ mod contacts;
 mod design;
 
 pub use self::args::StudyArgs;
-pub use self::design::watched;
 
 /// Studies of detectors, and of how well touch is found.
 ///

@@ -6,7 +6,9 @@ use super::trials::Trials;
 use crate::bound::cramer_rao;
 use crate::experiment::StudyError;
 use crate::scenes::SceneKind;
+use crate::score::Summary;
 use tactomo_physics::scene::{Contact, Touch};
+use tactomo_touch::solve::Method;
 
 /// Conductances of one contact (sheet conductances).
 const CONDUCTANCES: [f64; 7] = [0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
@@ -38,51 +40,66 @@ pub struct BoundCurve {
     pub points: Vec<[f64; 2]>,
 }
 
-/// Both.
-pub(super) fn report(bench: &Bench, trials: &mut Trials) -> Result<BoundReport, StudyError> {
-    let sheet_s = bench.sound.detector.sheet_conductance_s();
-    let one = |sheets: f64, seed: u64| {
-        vec![Contact { conductance_s: sheets * sheet_s, ..bench.contact(SceneKind::Firm, seed) }]
-    };
-    let distances_m = APART.map(|share| share * bench.sound.reach_m());
-    let two = |kind: SceneKind| {
-        move |apart_m: f64, seed: u64| pair(bench, kind, apart_m / bench.sound.reach_m(), seed).to_vec()
-    };
-    let charts = vec![
-        chart(bench, trials, ("One contact, against its conductance", false), &CONDUCTANCES, one)?,
-        chart(
-            bench,
-            trials,
-            ("Two light contacts, against their distance", true),
-            &distances_m,
-            two(SceneKind::Light),
-        )?,
-        chart(bench, trials, ("Two firm contacts, against their distance", true), &distances_m, two(SceneKind::Firm))?,
-    ];
-    Ok(BoundReport { charts })
+/// What a chart has: its title, what is to the right, at which values, and the contacts at a value and a seed.
+pub(super) struct Charted {
+    pub title: &'static str,
+    is_distance: bool,
+    values: &'static [f64],
+    contacts: fn(&Bench, f64, u64) -> Vec<Contact>,
 }
 
-fn chart(
-    bench: &Bench,
-    trials: &mut Trials,
-    (title, is_distance): (&str, bool),
-    values: &[f64],
-    contacts: impl Fn(f64, u64) -> Vec<Contact>,
-) -> Result<BoundChart, StudyError> {
-    let methods = &bench.plan.methods;
-    let mut curves = vec![BoundCurve { solver: None, points: Vec::new() }];
-    curves
-        .extend(methods.iter().map(|method| BoundCurve { solver: Some(method.name().to_owned()), points: Vec::new() }));
-    for value in bench.some(values) {
-        curves[0].points.extend(bound(bench, |seed| contacts(*value, seed))?.map(|bound_m| [*value, bound_m]));
-        let touches = |seed| contacts(*value, seed).into_iter().map(Touch::from).collect();
-        let point = bench.touched(String::new(), 0.0, bench.sound.with_faults(&[], 0)?, touches)?;
-        for (method, curve) in methods.iter().zip(&mut curves[1..]) {
-            let error_m = trials.summary(*method, &point)?.and_then(|summary| summary.error_m);
-            curve.points.extend(error_m.map(|error_m| [*value, error_m]));
-        }
+/// All charts. Distances are in mean distances of electrodes.
+pub(super) const CHARTS: [Charted; 3] = [
+    Charted {
+        title: "One contact, against its conductance",
+        is_distance: false,
+        values: &CONDUCTANCES,
+        contacts: |bench, sheets, seed| {
+            let conductance_s = sheets * bench.sound.detector.sheet_conductance_s();
+            vec![Contact { conductance_s, ..bench.contact(SceneKind::Firm, seed) }]
+        },
+    },
+    Charted {
+        title: "Two light contacts, against their distance",
+        is_distance: true,
+        values: &APART,
+        contacts: |bench, apart, seed| pair(bench, SceneKind::Light, apart, seed).to_vec(),
+    },
+    Charted {
+        title: "Two firm contacts, against their distance",
+        is_distance: true,
+        values: &APART,
+        contacts: |bench, apart, seed| pair(bench, SceneKind::Firm, apart, seed).to_vec(),
+    },
+];
+
+impl Charted {
+    /// How much work it is, in points.
+    pub fn work(&self) -> usize {
+        self.values.len()
     }
-    Ok(BoundChart { title: title.to_owned(), is_distance, curves })
+
+    /// The bound and the solvers along it.
+    pub fn of(&self, bench: &Bench, trials: &mut Trials) -> Result<BoundChart, StudyError> {
+        let methods = &bench.plan.methods;
+        let curve = |solver: Option<&Method>| BoundCurve {
+            solver: solver.map(|method| method.name().to_owned()),
+            points: Vec::new(),
+        };
+        let mut curves: Vec<_> = std::iter::once(None).chain(methods.iter().map(Some)).map(curve).collect();
+        for value in bench.some(self.values) {
+            let x = value * if self.is_distance { bench.sound.reach_m() } else { 1.0 };
+            let contacts = |seed| (self.contacts)(bench, *value, seed);
+            curves[0].points.extend(bound(bench, contacts)?.map(|bound_m| [x, bound_m]));
+            let touches = |seed| contacts(seed).into_iter().map(Touch::from).collect();
+            let point = bench.touched(String::new(), 0.0, bench.sound.with_faults(&[], 0)?, touches)?;
+            for (method, curve) in methods.iter().zip(&mut curves[1..]) {
+                let error_m = trials.scores(*method, &point)?.and_then(|scores| Summary::of(&scores).error_m);
+                curve.points.extend(error_m.map(|error_m| [x, error_m]));
+            }
+        }
+        Ok(BoundChart { title: self.title.to_owned(), is_distance: self.is_distance, curves })
+    }
 }
 
 /// Mean of the bound over contacts and places (m); `None` where they cannot be separated.

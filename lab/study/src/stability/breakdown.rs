@@ -1,6 +1,6 @@
 //! What counts as broken.
 
-use crate::score::Summary;
+use crate::score::{Score, Summary};
 
 /// Error from which a method is broken, in mean distances of electrodes, and in errors at the harmless point.
 const BROKEN_SHARE: f64 = 0.15;
@@ -67,6 +67,58 @@ pub struct Break {
     pub survives: f64,
 }
 
+/// In which share of frames a solver is wrong: further off than the limit that breaks it, with a contact missed or invented, refused, or not
+/// finite.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Wrong {
+    /// And says nothing of it: whoever uses the answer is misled.
+    pub silent: f64,
+    /// And says so, by a flag or by refusing.
+    pub flagged: f64,
+}
+
+impl Wrong {
+    /// Means of some, none of none.
+    pub fn mean(all: impl IntoIterator<Item = Self>) -> Self {
+        let (mut sum, mut count) = (Self::default(), 0.0_f64);
+        for Self { silent, flagged } in all {
+            (sum.silent, sum.flagged, count) = (sum.silent + silent, sum.flagged + flagged, count + 1.0);
+        }
+        Self { silent: sum.silent / count.max(1.0), flagged: sum.flagged / count.max(1.0) }
+    }
+}
+
+/// How much of what a good build has a solver bears.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Margin {
+    /// The most that it bears, of what was tried below its first break.
+    pub holds: Option<f64>,
+    /// The least that breaks it, if anything does.
+    pub breaks: Option<f64>,
+}
+
+/// What of a frame tells whether it is wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Answer {
+    error_m: Option<f64>,
+    /// Whatever its error is.
+    is_wrong: bool,
+    is_flagged: bool,
+}
+
+impl Answer {
+    fn of(score: &Score) -> Self {
+        let miscounted = score.missed.unwrap_or(0) + score.invented.unwrap_or(0) > 0;
+        let flags = &score.flags;
+        let is_flagged = flags.misfit || flags.saturated || flags.unfinished || !flags.excluded.is_empty();
+        Self {
+            error_m: score.error_m,
+            is_wrong: score.failed || score.not_finite || miscounted,
+            is_flagged: is_flagged || score.failed,
+        }
+    }
+}
+
 /// What a solver made of a point.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct CellReport {
@@ -94,13 +146,21 @@ pub struct CellReport {
     pub level: u8,
     /// How it is broken, if it is.
     pub broken: Option<Breakdown>,
+    /// In which share of frames it is wrong.
+    pub wrong: Wrong,
+    #[serde(skip)]
+    pub(super) answers: Vec<Answer>,
     /// The mean distance of electrodes (m).
     pub reach_m: f64,
 }
 
 impl CellReport {
-    /// Of a summary; not yet judged against the harmless point.
-    pub fn of(summary: &Summary, reach_m: f64) -> Self {
+    /// Of some frames; not yet judged against the harmless point.
+    pub fn of(scores: &[Score], reach_m: f64) -> Self {
+        Self { answers: scores.iter().map(Answer::of).collect(), ..Self::summed(&Summary::of(scores), reach_m) }
+    }
+
+    fn summed(summary: &Summary, reach_m: f64) -> Self {
         let flags = [summary.misfit, summary.saturated, summary.unfinished, summary.excluded];
         let share = summary.error_m.map_or(f64::INFINITY, |error_m| error_m / reach_m);
         let useless = summary.not_finite > 0.0 || summary.failed >= MOST;
@@ -117,6 +177,8 @@ impl CellReport {
             flagged: flags.into_iter().fold(0.0, f64::max),
             level: if useless { 4 } else { LEVELS.iter().filter(|limit| share > **limit).count() as u8 },
             broken: None,
+            wrong: Wrong::default(),
+            answers: Vec::new(),
             reach_m,
         }
     }
@@ -132,8 +194,24 @@ impl CellReport {
         is_far || self.missed >= MISCOUNT || self.invented >= MISCOUNT || self.level == 4
     }
 
+    /// The error (m) from which it is wrong, if the harmless point is this one.
+    pub fn limit_m(&self) -> f64 {
+        let own_m = if self.is_useless() { 0.0 } else { BROKEN_FACTOR * self.error_m.unwrap_or(0.0) };
+        own_m.max(BROKEN_SHARE * self.reach_m)
+    }
+
+    fn wrong(&self, limit_m: f64) -> Wrong {
+        let share = |is_flagged: bool| {
+            let is_wrong =
+                |answer: &&Answer| answer.is_wrong || answer.error_m.is_some_and(|error_m| error_m > limit_m);
+            let count = self.answers.iter().filter(|answer| answer.is_flagged == is_flagged).filter(is_wrong).count();
+            count as f64 / self.answers.len().max(1) as f64
+        };
+        Wrong { silent: share(false), flagged: share(true) }
+    }
+
     fn judged(&self, harmless: &Self) -> Option<Breakdown> {
-        let limit_m = (BROKEN_SHARE * self.reach_m).max(BROKEN_FACTOR * harmless.error_m.unwrap_or(0.0));
+        let limit_m = harmless.limit_m();
         let slow_us = SLOW_US.max(SLOW_FACTOR * harmless.p99_us);
         [
             (self.not_finite > 0.0, Breakdown::NotFinite),
@@ -148,6 +226,20 @@ impl CellReport {
     }
 }
 
+/// Between which amounts a judged row first breaks, in the order of severities; `None` of one that is never right or has no amounts.
+pub(super) fn margin(severities: &[f64], amounts: &[Option<f64>], cells: &[Option<CellReport>]) -> Option<Margin> {
+    let mut order: Vec<usize> = (0..cells.len()).filter(|index| cells[*index].is_some()).collect();
+    order.sort_by(|a, b| severities[*a].total_cmp(&severities[*b]));
+    let is_broken = |index: &usize| cells[*index].as_ref().is_some_and(|cell| cell.broken.is_some());
+    let first = order.iter().position(is_broken);
+    if first == Some(0) || order.iter().any(|index| amounts[*index].is_none()) {
+        return None;
+    }
+    let breaks = first.and_then(|first| amounts[order[first]]);
+    let below = order[..first.unwrap_or(order.len())].iter().filter_map(|index| amounts[*index]);
+    Some(Margin { holds: below.max_by(f64::total_cmp), breaks })
+}
+
 /// Judges the cells of a row, and finds where it breaks first.
 pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<CellReport>]) -> Option<Break> {
     let mut order: Vec<usize> = (0..cells.len()).filter(|index| cells[*index].is_some()).collect();
@@ -155,6 +247,7 @@ pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<Ce
     let harmless = cells[*order.first()?].clone()?;
     for cell in cells.iter_mut().flatten() {
         cell.broken = if harmless.is_useless() { Some(Breakdown::Never) } else { cell.judged(&harmless) };
+        cell.wrong = cell.wrong(harmless.limit_m());
     }
     let whole = cells.iter().flatten().filter(|cell| cell.broken.is_none()).count();
     let survives = whole as f64 / order.len() as f64;
@@ -175,10 +268,11 @@ pub(super) fn breaks(labels: &[&str], severities: &[f64], cells: &mut [Option<Ce
 mod tests {
     use super::*;
     use crate::score::Times;
+    use tactomo_touch::solve::Flags;
 
     fn cell(error_mm: f64) -> CellReport {
         let time_us = Times { median: 10.0, p99: 20.0, max: 30.0 };
-        CellReport::of(&Summary { error_m: Some(error_mm * 1e-3), time_us, ..Summary::default() }, 0.015)
+        CellReport::summed(&Summary { error_m: Some(error_mm * 1e-3), time_us, ..Summary::default() }, 0.015)
     }
 
     #[test]
@@ -192,6 +286,36 @@ mod tests {
             None,
             "within 0.15 of a distance"
         );
+    }
+
+    #[test]
+    fn frames_that_are_wrong_are_silent_or_flagged() {
+        let score = |error_mm: f64, misfit: bool| Score {
+            error_m: Some(1e-3 * error_mm),
+            flags: Flags { misfit, ..Flags::default() },
+            ..Score::default()
+        };
+        let refused = Score { failed: true, ..Score::default() };
+        let missed = Score { missed: Some(1), ..score(0.1, true) };
+        let all = [score(9.0, false), score(9.0, true), refused, missed, score(0.1, true), score(0.1, false)];
+        let mut cells = [vec![score(0.1, false)], all.into()].map(|scores| Some(CellReport::of(&scores, 0.015)));
+        breaks(&["a", "b"], &[0.0, 1.0], &mut cells);
+        let wrong = cells.map(|cell| cell.unwrap().wrong);
+        assert_eq!(wrong, [Wrong::default(), Wrong { silent: 1.0 / 6.0, flagged: 0.5 }]);
+        assert_eq!(Wrong::mean(wrong), Wrong { silent: 1.0 / 12.0, flagged: 0.25 });
+    }
+
+    #[test]
+    fn the_margin_is_between_what_holds_and_what_breaks() {
+        let mut cells = [9.0, 0.1, 0.2, 9.0].map(|mm| Some(cell(mm)));
+        let (severities, amounts) = ([2.0, 0.0, 1.0, 3.0], [4.0, 0.0, 1.0, 9.0].map(Some));
+        breaks(&["", "", "", ""], &severities, &mut cells);
+        let found = margin(&severities, &amounts, &cells);
+        assert_eq!(found, Some(Margin { holds: Some(1.0), breaks: Some(4.0) }));
+        assert_eq!(margin(&severities, &[None; 4], &cells), None);
+        cells.iter_mut().flatten().for_each(|cell| cell.broken = None);
+        let all = margin(&severities, &amounts, &cells);
+        assert_eq!(all, Some(Margin { holds: Some(9.0), breaks: None }));
     }
 
     #[test]
@@ -229,6 +353,6 @@ mod tests {
         let levels = [0.3, 1.0, 3.0, 7.0, 12.0].map(|mm| cell(mm).level);
         assert_eq!(levels, [0, 1, 2, 3, 4]);
         let refused = Summary { failed: 1.0, ..Summary::default() };
-        assert_eq!(CellReport::of(&refused, 0.015).level, 4);
+        assert_eq!(CellReport::summed(&refused, 0.015).level, 4);
     }
 }

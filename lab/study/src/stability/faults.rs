@@ -1,6 +1,6 @@
 //! Sweeps of a fault over all electrodes.
 
-use super::sweep::{Bench, Point, Sweep};
+use super::sweep::{Bench, Maker, Point, Sweep};
 use crate::experiment::StudyError;
 use crate::scenes::SceneKind;
 use tactomo_physics::simulate::Fault;
@@ -32,14 +32,16 @@ const GUARDED: [(&str, Method); 3] = [
     ("Two electrodes exchanged, left out", Method::Kernel),
 ];
 
-/// All of them.
-pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
-    let bare = KINDS.into_iter().map(|kind| sweep(bench, kind));
-    let guarded = KINDS.into_iter().zip(GUARDED).map(|(kind, guarded)| left_out(sweep(bench, kind)?, guarded));
-    bare.chain(guarded).collect()
+/// All of them, of so many electrodes.
+pub fn sweeps(electrodes: usize) -> Vec<Maker> {
+    let bare = KINDS.map(|kind| Maker::new(kind.0, electrodes, move |bench| sweep(bench, kind)));
+    let guarded = KINDS.into_iter().zip(GUARDED).map(|(kind, (title, method))| {
+        Maker::new(title, electrodes, move |bench| left_out(sweep(bench, kind)?, method))
+    });
+    bare.into_iter().chain(guarded).collect()
 }
 
-fn sweep(bench: &Bench, (title, note, fault): Kind) -> Result<Sweep, StudyError> {
+fn sweep(bench: &Bench, (_, note, fault): Kind) -> Result<Sweep, StudyError> {
     let count = bench.sound.detector.electrodes.len();
     let point = |label: String, severity: f64, faults: &[Fault]| -> Result<Point, StudyError> {
         bench.point(label, severity, bench.sound.with_faults(faults, bench.plan.seed)?, SceneKind::Firm)
@@ -49,17 +51,17 @@ fn sweep(bench: &Bench, (title, note, fault): Kind) -> Result<Sweep, StudyError>
         points.push(point(format!("no. {electrode}"), 1.0, &[fault(electrode, (electrode + 1) % count)])?);
     }
     let note = format!("{note} On a firm contact, each electrode in turn, counted from 0.");
-    Ok(Sweep { title, note, points })
+    Ok(Sweep::new(note, points))
 }
 
 /// The same sweep, solved without the electrodes that the guard finds wrong.
-fn left_out(sweep: Sweep, (title, method): (&'static str, Method)) -> Result<Sweep, StudyError> {
+fn left_out(sweep: Sweep, method: Method) -> Result<Sweep, StudyError> {
     let note = format!(
         "{} Solved without the electrodes that the guard of live finds wrong in {SEEN} frames: they stand behind the arrow.",
         sweep.note
     );
     let points = sweep.points.into_iter().map(|point| without_wrong(point, method)).collect::<Result<_, _>>()?;
-    Ok(Sweep { title, note, points })
+    Ok(Sweep::new(note, points))
 }
 
 fn without_wrong(mut point: Point, method: Method) -> Result<Point, StudyError> {
@@ -108,9 +110,8 @@ mod tests {
             as_built: None,
             calibrate: None,
         };
-        let mut silent = |_: &str| ();
-        let bench = Bench::new(&plan, Experiment::new(&plan.detector).unwrap(), &mut silent);
-        let Sweep { points, .. } = left_out(sweep(&bench, KINDS[0]).unwrap(), GUARDED[0]).unwrap();
+        let bench = Bench::new(&plan, Experiment::new(&plan.detector).unwrap());
+        let Sweep { points, .. } = left_out(sweep(&bench, KINDS[0]).unwrap(), GUARDED[0].1).unwrap();
         assert_eq!((points[0].label.as_str(), points[2].label.as_str()), ("none", "no. 5 → 5"));
         assert_eq!(points[2].places[0][0].readings.electrodes(), 15);
         let mut solver = Method::Contacts.build(&points[2].experiment.problem).unwrap();

@@ -1,7 +1,7 @@
 //! What came out of sweeps.
 
 use super::bounds::BoundReport;
-use super::breakdown::{Break, CellReport};
+use super::breakdown::{Break, CellReport, Margin, Wrong};
 use crate::machine::Machine;
 
 /// What came out.
@@ -27,6 +27,8 @@ pub struct Report {
     pub sweeps: Vec<SweepReport>,
     /// What noise allows, beside what solvers reach.
     pub bounds: BoundReport,
+    /// Sweeps and charts that were not done when the study was stopped.
+    pub missing: Vec<String>,
 }
 
 impl Report {
@@ -43,6 +45,8 @@ pub struct SweepReport {
     pub title: String,
     /// How.
     pub note: String,
+    /// What amounts are multiples of, if points have such.
+    pub unit: Option<String>,
     /// The points.
     pub points: Vec<PointReport>,
     /// A row for each solver.
@@ -59,6 +63,8 @@ pub struct PointReport {
     pub label: String,
     /// How bad it is: the larger, the worse; the smallest is the harmless one. Only the order counts.
     pub severity: f64,
+    /// How much of the sweep's unit it is.
+    pub amount: Option<f64>,
 }
 
 /// What a solver made of a sweep.
@@ -72,6 +78,10 @@ pub struct SolverRow {
     pub errors: ErrorRange,
     /// The mildest point at which it breaks, if it does.
     pub breaks: Option<Break>,
+    /// Share of wrong answers: the mean over the points.
+    pub wrong: Wrong,
+    /// How much of the sweep's unit it bears.
+    pub margin: Option<Margin>,
 }
 
 /// Errors of a solver over a sweep (m), with contacts missed and invented; `None` where no point has one.

@@ -1,38 +1,47 @@
 //! All sweeps, run one after the other.
 
-use super::breakdown::{CellReport, breaks};
+use super::bounds::{BoundReport, Charted};
+use super::breakdown::{CellReport, Wrong, breaks, margin};
 use super::report::{ErrorRange, PointReport, Report, SolverRow, SweepReport};
-use super::sweep::{Bench, Plan, Point, Sweep};
+use super::sweep::{Bench, Maker, Plan, Point, Sweep};
 use super::trials::Trials;
 use super::{bounds, faults, scenes, tolerances, wrong};
 use crate::experiment::{Experiment, StudyError};
 use crate::machine::Machine;
+use crate::progress::Progress;
 use crate::scenes::SceneKind;
 use tactomo_touch::solve::{Method, ParameterKind};
 
 /// Lambda's sweep, in shares of the largest singular value.
 const LAMBDAS: [f64; 7] = [1e-5, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0];
 
-/// Makes some sweeps.
-type Maker = fn(&Bench) -> Result<Vec<Sweep>, StudyError>;
-
-/// Runs all sweeps. `progress` is called with what is tried next.
+/// Runs all sweeps, until they are done or it is stopped: then what is missing is in the report.
 ///
 /// # Errors
 /// [`StudyError`] if the detector cannot be modelled or is curved.
-pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result<Report, StudyError> {
-    let bench = Bench::new(plan, Experiment::of(&plan.detector, plan.as_built)?, progress);
-    let makers: [Maker; 5] = [scenes::sweeps, wrong::sweeps, tolerances::sweeps, lambda, faults::sweeps];
-    let mut trials = Trials::default();
-    let mut sweeps = Vec::new();
-    for make in makers {
-        for sweep in make(&bench)? {
-            bench.tell(sweep.title);
-            sweeps.push(try_sweep(plan, sweep, &mut trials)?);
+pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, StudyError> {
+    let bench = Bench::new(plan, Experiment::of(&plan.detector, plan.as_built)?);
+    let makers = makers(plan);
+    let all = makers.iter().map(|maker| maker.work).chain(bounds::CHARTS.iter().map(Charted::work)).sum();
+    let progress = progress.part(0, all);
+    let mut trials = Trials::new(&bench);
+    let (mut sweeps, mut charts, mut missing, mut done) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    for maker in makers {
+        progress.tell(maker.title, done);
+        match try_sweep(&bench, &maker, &mut trials, progress)? {
+            Some(sweep) => sweeps.push(sweep),
+            None => missing.push(maker.title.to_owned()),
         }
+        done += maker.work;
     }
-    bench.tell("bounds");
-    let bounds = bounds::report(&bench, &mut trials)?;
+    for chart in &bounds::CHARTS {
+        progress.tell(chart.title, done);
+        match progress.is_stopped() {
+            true => missing.push(chart.title.to_owned()),
+            false => charts.push(chart.of(&bench, &mut trials)?),
+        }
+        done += chart.work();
+    }
     Ok(Report {
         machine: Machine::this(),
         command: command.to_owned(),
@@ -43,11 +52,22 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         places: plan.places,
         frames: plan.frames,
         sweeps,
-        bounds,
+        bounds: BoundReport { charts },
+        missing,
     })
 }
 
-fn lambda(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
+/// How all sweeps are made, in their order.
+fn makers(plan: &Plan) -> Vec<Maker> {
+    let mut makers = scenes::sweeps();
+    makers.extend(wrong::sweeps());
+    makers.extend(tolerances::sweeps(plan));
+    makers.push(Maker::new("Lambda", LAMBDAS.len(), lambda));
+    makers.extend(faults::sweeps(plan.detector.electrodes.len()));
+    makers
+}
+
+fn lambda(bench: &Bench) -> Result<Sweep, StudyError> {
     let points = bench
         .some(&LAMBDAS)
         .map(|lambda| {
@@ -59,58 +79,87 @@ fn lambda(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
         })
         .collect::<Result<_, StudyError>>()?;
     let note = "Of a firm contact; in shares of the largest singular value. Only of solvers that have one.";
-    Ok(vec![Sweep { title: "Lambda", note: note.to_owned(), points }])
+    Ok(Sweep::new(note, points))
 }
 
-fn try_sweep(plan: &Plan, sweep: Sweep, trials: &mut Trials) -> Result<SweepReport, StudyError> {
-    let sweeps_lambda = sweep.points.iter().any(|point| point.lambda.is_some());
+/// Lets all solvers try a sweep; `None` if it was stopped before they had.
+fn try_sweep(
+    bench: &Bench,
+    maker: &Maker,
+    trials: &mut Trials,
+    progress: Progress,
+) -> Result<Option<SweepReport>, StudyError> {
+    if progress.is_stopped() {
+        return Ok(None);
+    }
+    let Sweep { note, unit, points } = (maker.make)(bench)?;
+    let sweeps_lambda = points.iter().any(|point| point.lambda.is_some());
     let methods =
-        plan.methods.iter().filter(|method| !sweeps_lambda || method.parameter() == Some(ParameterKind::Lambda));
-    let before: Vec<&Point> = sweep.points.iter().collect();
-    let after: Vec<&Point> = sweep.points.iter().filter_map(|point| point.calibrated.as_deref()).collect();
+        bench.plan.methods.iter().filter(|method| !sweeps_lambda || method.parameter() == Some(ParameterKind::Lambda));
+    let before: Vec<&Point> = points.iter().collect();
+    let after: Vec<&Point> = points.iter().filter_map(|point| point.calibrated.as_deref()).collect();
     let (mut solvers, mut calibrated) = (Vec::new(), Vec::new());
     for method in methods {
-        solvers.push(row(*method, &before, trials)?);
-        if !after.is_empty() {
-            calibrated.push(row(*method, &after, trials)?);
+        for (points, rows) in [(&before, &mut solvers), (&after, &mut calibrated)] {
+            if !points.is_empty() {
+                match row(*method, points, trials, progress)? {
+                    Some(row) => rows.push(row),
+                    None => return Ok(None),
+                }
+            }
         }
     }
-    let point = |point: Point| PointReport { label: point.label, severity: point.severity };
-    Ok(SweepReport {
-        title: sweep.title.to_owned(),
-        note: sweep.note,
-        points: sweep.points.into_iter().map(point).collect(),
+    let point = |point: Point| PointReport { label: point.label, severity: point.severity, amount: point.amount };
+    let points = points.into_iter().map(point).collect();
+    Ok(Some(SweepReport {
+        title: maker.title.to_owned(),
+        note,
+        unit: unit.map(str::to_owned),
+        points,
         solvers,
         calibrated,
-    })
+    }))
 }
 
-fn row(method: Method, points: &[&Point], trials: &mut Trials) -> Result<SolverRow, StudyError> {
-    let cell = |point: &&Point| {
-        let summary = trials.summary(method, point)?;
-        Ok(summary.map(|summary| CellReport::of(&summary, point.experiment.reach_m())))
-    };
-    let mut cells = points.iter().map(cell).collect::<Result<Vec<_>, StudyError>>()?;
+/// What a solver makes of points; `None` if it was stopped before.
+fn row(
+    method: Method,
+    points: &[&Point],
+    trials: &mut Trials,
+    progress: Progress,
+) -> Result<Option<SolverRow>, StudyError> {
+    let mut cells = Vec::with_capacity(points.len());
+    for point in points {
+        if progress.is_stopped() {
+            return Ok(None);
+        }
+        let scores = trials.scores(method, point)?;
+        cells.push(scores.map(|scores| CellReport::of(&scores, point.experiment.reach_m())));
+    }
     let severities: Vec<f64> = points.iter().map(|point| point.severity).collect();
     let labels: Vec<&str> = points.iter().map(|point| point.label.as_str()).collect();
     let breaks = breaks(&labels, &severities, &mut cells);
     let errors = ErrorRange::of(&severities, &cells);
-    Ok(SolverRow { solver: method.name().to_owned(), cells, errors, breaks })
+    let amounts: Vec<Option<f64>> = points.iter().map(|point| point.amount).collect();
+    let margin = margin(&severities, &amounts, &cells);
+    let wrong = Wrong::mean(cells.iter().flatten().map(|cell| cell.wrong));
+    Ok(Some(SolverRow { solver: method.name().to_owned(), cells, errors, breaks, wrong, margin }))
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::LazyLock;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     use super::super::view;
     use super::*;
     use crate::calibrate::Calibrate;
+    use crate::progress::Step;
     use crate::view::{page, text};
     use tactomo_physics::detector::Detector;
 
-    /// One run for all tests.
-    static REPORT: LazyLock<Report> = LazyLock::new(|| {
-        let plan = Plan {
+    fn plan() -> Plan {
+        Plan {
             detector: Detector::preset(Detector::DEFAULT).unwrap(),
             methods: vec![Method::Tikhonov, Method::TikhonovPaper],
             places: 1,
@@ -119,8 +168,13 @@ mod tests {
             quick: true,
             as_built: None,
             calibrate: Some(Calibrate::Perfect),
-        };
-        run(&plan, "tactomo <stability>", &mut |_| {}).unwrap()
+        }
+    }
+
+    /// One run for all tests.
+    static REPORT: LazyLock<Report> = LazyLock::new(|| {
+        let stop = AtomicBool::new(false);
+        run(&plan(), "tactomo <stability>", Progress::new(&stop, &|_| {})).unwrap()
     });
 
     #[test]
@@ -164,7 +218,7 @@ mod tests {
         let views = [view(&REPORT)];
         let (page, table) = (page(&views, ""), text(&views));
         assert!(page.contains("All tolerances, calibrated") && page.contains("tikhonov, calibrated"));
-        assert_eq!(table.matches(", calibrated ").count(), 2 * 11, "{table}");
+        assert_eq!(table.matches(", calibrated ").count(), 2, "{table}");
     }
 
     #[test]
@@ -182,6 +236,25 @@ mod tests {
     }
 
     #[test]
+    fn what_is_stopped_says_what_is_missing() {
+        let (plan, stop) = (plan(), AtomicBool::new(false));
+        let after_two = |step: &Step| {
+            if step.what == "Bits of the converter" {
+                stop.store(true, Ordering::Relaxed);
+            }
+        };
+        let report = run(&plan, "", Progress::new(&stop, &after_two)).unwrap();
+        let titles: Vec<_> = report.sweeps.iter().map(|sweep| sweep.title.as_str()).collect();
+        assert_eq!(titles, ["Noise", "Noise where nothing touches"]);
+        assert_eq!(report.missing.len() + 2, REPORT.sweeps.len() + REPORT.bounds.charts.len());
+        let views = [view(&report)];
+        for shown in [page(&views, ""), text(&views)] {
+            assert!(shown.contains("Partial") && shown.contains("Bits of the converter; "), "{shown}");
+        }
+        assert!(REPORT.missing.is_empty() && !text(&[view(&REPORT)]).contains("Partial"));
+    }
+
+    #[test]
     fn page_and_table_show_every_sweep() {
         let report = &*REPORT;
         let views = [view(report)];
@@ -195,5 +268,10 @@ mod tests {
         let fits = page.find("heat whole").is_some_and(|at| at < page.find("Against what noise allows").unwrap());
         assert!(fits, "the overview takes the width of the page, whatever its columns");
         assert!(page.contains("tactomo &lt;stability&gt;") && page.contains("noise limit"));
+        let opened: usize = report.sweeps.iter().map(|sweep| sweep.solvers.len() + sweep.calibrated.len()).sum();
+        assert_eq!((page.matches("popovertarget=").count(), page.matches("<div popover ").count()), (opened, opened));
+        let row = |title: &str| &report.sweeps.iter().find(|sweep| sweep.title == title).unwrap().solvers[0];
+        assert!(row("Noise").wrong.silent > 0.1, "a linear image has no flags for noise");
+        assert!(row("A driving sheet that resists").margin.is_some() && row("A detector that leaks").margin.is_none());
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::sweep::{Bench, Sweep};
+use super::sweep::{Bench, Maker, NOISE, Sweep};
 use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
 use tactomo_physics::detector::{Adc, Detector};
@@ -18,6 +18,10 @@ const BITS: [u8; 5] = [16, 14, 12, 10, 8];
 const CONDUCTANCES: [f64; 10] = [0.003, 0.01, 0.03, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0];
 /// Distances (mean distances of electrodes).
 pub(super) const APART: [f64; 9] = [1.6, 1.2, 0.9, 0.7, 0.55, 0.4, 0.27, 0.2, 0.13];
+/// Distance to which two contacts part, each of which is shown alike when they begin on one spot (m).
+const PARTED_M: [f64; 6] = [0.024, 0.015, 0.01, 0.007, 0.005, 0.003];
+/// Frames in which they part: a tenth of a second at 100 frames a second.
+const PARTING: usize = 10;
 const FROM_EDGE: [f64; 6] = [0.5, 0.3, 0.2, 0.15, 0.12, 0.1];
 const FROM_PAD: [f64; 6] = [0.5, 0.3, 0.2, 0.13, 0.07, 0.0];
 /// Radius of a wide contact (mean distances of electrodes).
@@ -27,11 +31,20 @@ const TRIED: usize = 200;
 const LOWERED: [usize; 5] = [199, 60, 20, 5, 0];
 
 /// All of them.
-pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
-    [noise, noise_at_rest, bits, conductance, apart_firm, apart_light, edge, pad, width, lowered]
-        .into_iter()
-        .map(|make| make(bench))
-        .collect()
+pub fn sweeps() -> Vec<Maker> {
+    vec![
+        Maker::new("Noise", SNR_DB.len(), noise),
+        Maker::new("Noise where nothing touches", SNR_DB.len(), noise_at_rest),
+        Maker::new("Bits of the converter", BITS.len(), bits),
+        Maker::new("Force, from nothing to saturation", CONDUCTANCES.len(), conductance),
+        Maker::new("Distance of two firm contacts", APART.len(), apart_firm),
+        Maker::new("Distance of two light contacts", APART.len(), apart_light),
+        Maker::new("Two contacts that part while they are followed", PARTED_M.len(), parting),
+        Maker::new("Distance to the edge", FROM_EDGE.len(), edge),
+        Maker::new("Distance to an electrode's middle", FROM_PAD.len(), pad),
+        Maker::new("Radius of a wide contact", RADII.len(), width),
+        Maker::new("Two presses that give less signal than one", LOWERED.len(), lowered),
+    ]
 }
 
 /// The converter of the sweep of noise: fine enough that noise alone counts.
@@ -48,7 +61,7 @@ fn signal_v(bench: &Bench) -> Result<f64, StudyError> {
     Ok((readings.volts().iter().map(|volts| volts * volts).sum::<f64>() / readings.volts().len() as f64).sqrt())
 }
 
-fn noise_of(bench: &Bench, kind: SceneKind, title: &'static str, note: &str) -> Result<Sweep, StudyError> {
+fn noise_of(bench: &Bench, kind: SceneKind, note: &str) -> Result<Sweep, StudyError> {
     let signal_v = signal_v(bench)?;
     let points = bench
         .some(&SNR_DB)
@@ -57,25 +70,21 @@ fn noise_of(bench: &Bench, kind: SceneKind, title: &'static str, note: &str) -> 
             bench.point(format!("{snr_db} dB"), -snr_db, experiment, kind)
         })
         .collect::<Result<_, _>>()?;
-    Ok(Sweep { title, note: note.to_owned(), points })
+    let described_v = bench.sound.detector.adc.deviation_v();
+    let noise_v = |snr_db: &f64| signal_v * 10f64.powf(-snr_db / 20.0);
+    Ok(Sweep::new(note, points).in_units(NOISE, bench.some(&SNR_DB).map(|snr_db| noise_v(snr_db) / described_v)))
 }
 
 fn noise(bench: &Bench) -> Result<Sweep, StudyError> {
     noise_of(
         bench,
         SceneKind::Firm,
-        "Noise",
         "On a firm contact; root mean square of its readings over the standard deviation of noise, which solvers know, at 16 bits.",
     )
 }
 
 fn noise_at_rest(bench: &Bench) -> Result<Sweep, StudyError> {
-    noise_of(
-        bench,
-        SceneKind::None,
-        "Noise where nothing touches",
-        "The same noise, as if the firm contact were there. Right is: no contact.",
-    )
+    noise_of(bench, SceneKind::None, "The same noise, as if the firm contact were there. Right is: no contact.")
 }
 
 fn bits(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -91,7 +100,7 @@ fn bits(bench: &Bench) -> Result<Sweep, StudyError> {
         "On a light contact (0.03 sheet conductances), with {} LSB of noise.",
         bench.sound.detector.adc.noise_lsb
     );
-    Ok(Sweep { title: "Bits of the converter", note, points })
+    Ok(Sweep::new(note, points))
 }
 
 /// The sound experiment once more.
@@ -102,7 +111,6 @@ fn sound(bench: &Bench) -> Result<Experiment, StudyError> {
 /// A sweep of what touches, on the sound detector, from the harmless to the worst.
 fn touched<T: Copy>(
     bench: &Bench,
-    title: &'static str,
     note: &str,
     values: &[T],
     label: impl Fn(T) -> String,
@@ -113,7 +121,7 @@ fn touched<T: Copy>(
         .enumerate()
         .map(|(index, value)| bench.touched(label(*value), index as f64, sound(bench)?, |seed| touches(*value, seed)))
         .collect::<Result<_, _>>()?;
-    Ok(Sweep { title, note: note.to_owned(), points })
+    Ok(Sweep::new(note, points))
 }
 
 fn conductance(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -124,7 +132,6 @@ fn conductance(bench: &Bench) -> Result<Sweep, StudyError> {
     };
     let mut sweep = touched(
         bench,
-        "Force, from nothing to saturation",
         "Of one contact, in sheet conductances; its radius stays.",
         &CONDUCTANCES,
         |sheets| format!("{sheets}"),
@@ -156,24 +163,33 @@ pub(super) fn pair(bench: &Bench, kind: SceneKind, apart: f64, seed: u64) -> [Co
     ends.map(|[x_m, y_m]| Contact { x_m, y_m, ..contact })
 }
 
-fn apart(bench: &Bench, kind: SceneKind, title: &'static str, note: &str) -> Result<Sweep, StudyError> {
+fn apart(bench: &Bench, kind: SceneKind, note: &str) -> Result<Sweep, StudyError> {
     let millimetres = |share: f64| format!("{:.1} mm", share * bench.sound.reach_m() * 1e3);
-    touched(bench, title, note, &APART, millimetres, |share, seed| {
-        pair(bench, kind, share, seed).map(Touch::from).to_vec()
-    })
+    touched(bench, note, &APART, millimetres, |share, seed| pair(bench, kind, share, seed).map(Touch::from).to_vec())
 }
 
 fn apart_firm(bench: &Bench) -> Result<Sweep, StudyError> {
-    apart(
-        bench,
-        SceneKind::Firm,
-        "Distance of two firm contacts",
-        "0.3 sheet conductances each. Two that are found as one count as one missed.",
-    )
+    apart(bench, SceneKind::Firm, "0.3 sheet conductances each. Two that are found as one count as one missed.")
 }
 
 fn apart_light(bench: &Bench) -> Result<Sweep, StudyError> {
-    apart(bench, SceneKind::Light, "Distance of two light contacts", "0.03 sheet conductances each.")
+    apart(bench, SceneKind::Light, "0.03 sheet conductances each.")
+}
+
+/// Two that begin on one spot and part, which solvers follow from one contact to two.
+fn parting(bench: &Bench) -> Result<Sweep, StudyError> {
+    let point = |(index, parted_m): (usize, &f64)| {
+        let touches = |seed, share: f64| {
+            let apart = share * parted_m / bench.sound.reach_m();
+            pair(bench, SceneKind::Firm, apart, seed).map(Touch::from).to_vec()
+        };
+        bench.followed(format!("{:.0} mm", parted_m * 1e3), index as f64, sound(bench)?, PARTING, touches)
+    };
+    let points = bench.some(&PARTED_M).enumerate().map(point).collect::<Result<_, _>>()?;
+    let note = format!(
+        "Two firm contacts of 0.3 sheet conductances that begin on one spot and part to this distance in {PARTING} frames. What counts is what is found there."
+    );
+    Ok(Sweep::new(note, points))
 }
 
 fn edge(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -184,7 +200,7 @@ fn edge(bench: &Bench) -> Result<Sweep, StudyError> {
         vec![Touch::from(Contact { x_m: 0.5 * width_m - distance_m(share), ..contact })]
     };
     let label = |share: f64| format!("{:.1} mm", distance_m(share) * 1e3);
-    touched(bench, "Distance to the edge", "Of the middle of a firm contact.", &FROM_EDGE, label, touches)
+    touched(bench, "Of the middle of a firm contact.", &FROM_EDGE, label, touches)
 }
 
 fn pad(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -199,14 +215,7 @@ fn pad(bench: &Bench) -> Result<Sweep, StudyError> {
         vec![Touch::from(Contact { x_m: at(pad.x_m), y_m: at(pad.y_m), ..contact })]
     };
     let label = |share: f64| format!("{:.1} mm", share * bench.sound.reach_m() * 1e3);
-    touched(
-        bench,
-        "Distance to an electrode's middle",
-        "Of a light contact, smaller than a pad.",
-        &FROM_PAD,
-        label,
-        touches,
-    )
+    touched(bench, "Of a light contact, smaller than a pad.", &FROM_PAD, label, touches)
 }
 
 fn width(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -221,7 +230,7 @@ fn width(bench: &Bench) -> Result<Sweep, StudyError> {
         vec![Touch::from(Contact { radius_m, x_m: within(0, contact.x_m), y_m: within(1, contact.y_m), ..contact })]
     };
     let label = |share: f64| format!("{:.1} mm", share * bench.sound.reach_m() * 1e3);
-    touched(bench, "Radius of a wide contact", "Of 0.3 sheet conductances in all.", &RADII, label, touches)
+    touched(bench, "Of 0.3 sheet conductances in all.", &RADII, label, touches)
 }
 
 /// A second press that lowers the signal of the first: nearer to where the current leaves than to where it is measured.
@@ -240,7 +249,7 @@ fn lowered(bench: &Bench) -> Result<Sweep, StudyError> {
         .collect::<Result<_, StudyError>>()?;
     let note = "A second press of the same conductance, at places that raise the signal or lower it: root mean square of both presses' \
                 readings over that of the first alone, at the first place.";
-    Ok(Sweep { title: "Two presses that give less signal than one", note: note.to_owned(), points })
+    Ok(Sweep::new(note, points))
 }
 
 /// Pairs of presses, the first always the same, with their signal over that of the first alone: the lowest first.

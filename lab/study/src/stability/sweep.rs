@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use super::tolerances::Known;
 use crate::calibrate::Calibrate;
 use crate::experiment::{Experiment, Frame, StudyError};
 use crate::scenes::SceneKind;
@@ -33,20 +34,68 @@ pub struct Plan {
     pub calibrate: Option<Calibrate>,
 }
 
+/// Makes a sweep.
+type Make = dyn Fn(&Bench) -> Result<Sweep, StudyError>;
+
+/// How a sweep is made, when its turn comes.
+pub(super) struct Maker {
+    /// What is varied.
+    pub title: &'static str,
+    /// How much work that is, in points that are tried without a calibration.
+    pub work: usize,
+    /// Makes it.
+    pub make: Box<Make>,
+}
+
+impl Maker {
+    /// Of a sweep of so many points.
+    pub fn new(title: &'static str, work: usize, make: impl Fn(&Bench) -> Result<Sweep, StudyError> + 'static) -> Self {
+        Self { title, work, make: Box::new(make) }
+    }
+}
+
 /// Something that is varied.
 pub(super) struct Sweep {
-    pub title: &'static str,
     pub note: String,
+    /// What [amounts](Point::amount) are multiples of, if they are of anything.
+    pub unit: Option<&'static str>,
     pub points: Vec<Point>,
+}
+
+/// What tolerances are multiples of: [`Tolerances`](tactomo_physics::detector::Tolerances) by default.
+pub(super) const BENCH: &str = "what a hobbyist's bench gives";
+
+/// What noise is multiples of.
+pub(super) const NOISE: &str = "the described converter's noise";
+
+impl Sweep {
+    /// Of some points.
+    pub fn new(note: impl Into<String>, points: Vec<Point>) -> Self {
+        Self { note: note.into(), unit: None, points }
+    }
+
+    /// With how much of a unit each point has.
+    pub fn in_units(mut self, unit: &'static str, amounts: impl IntoIterator<Item = f64>) -> Self {
+        self.unit = Some(unit);
+        for (point, amount) in self.points.iter_mut().zip(amounts) {
+            point.amount = Some(amount);
+            point.calibrated.iter_mut().for_each(|calibrated| calibrated.amount = Some(amount));
+        }
+        self
+    }
 }
 
 /// A value of it.
 pub(super) struct Point {
     pub label: String,
     pub severity: f64,
+    /// How much of the sweep's unit it is.
+    pub amount: Option<f64>,
     pub experiment: Experiment,
     /// Frames of each place.
     pub places: Vec<Vec<Frame>>,
+    /// So many of them come before those that count: solvers follow what touches.
+    pub lead: usize,
     /// What solvers know at each place, where that is another detector each time; none if they know the experiment's everywhere.
     pub known: Vec<Experiment>,
     /// What solvers' lambda is set to.
@@ -60,18 +109,16 @@ pub(super) struct Bench<'a> {
     pub plan: &'a Plan,
     /// The sound detector: as it is described, or as it was built where that is asked for.
     pub sound: Experiment,
-    progress: RefCell<&'a mut dyn FnMut(&str)>,
+    /// The same, of which solvers know the tolerances.
+    pub tolerant: Experiment,
+    /// Calibrations of detectors without any tolerances, once there are some.
+    pub exact: RefCell<Option<Known>>,
 }
 
 impl<'a> Bench<'a> {
     /// Of a plan and its sound detector.
-    pub fn new(plan: &'a Plan, sound: Experiment, progress: &'a mut dyn FnMut(&str)) -> Self {
-        Self { plan, sound, progress: RefCell::new(progress) }
-    }
-
-    /// Tells what is tried next.
-    pub fn tell(&self, step: &str) {
-        (self.progress.borrow_mut())(step);
+    pub fn new(plan: &'a Plan, sound: Experiment) -> Self {
+        Self { plan, tolerant: sound.tolerant(), sound, exact: RefCell::default() }
     }
 
     /// Another detector, as it is described or as it was built where that is asked for.
@@ -112,12 +159,25 @@ impl<'a> Bench<'a> {
         experiment: Experiment,
         touches: impl Fn(u64) -> Vec<Touch>,
     ) -> Result<Point, StudyError> {
-        let places = self
-            .seeds()
-            .into_iter()
-            .map(|seed| experiment.frames(&vec![touches(seed); self.plan.frames], seed))
-            .collect::<Result<_, _>>()?;
-        Ok(Point { label, severity, experiment, places, known: Vec::new(), lambda: None, calibrated: None })
+        self.followed(label, severity, experiment, 0, |seed, _| touches(seed))
+    }
+
+    /// A point at which something touches that a seed chooses and that moves over so many frames before those that count. It gets how far that
+    /// is done, from 0 to 1.
+    pub fn followed(
+        &self,
+        label: String,
+        severity: f64,
+        experiment: Experiment,
+        lead: usize,
+        touches: impl Fn(u64, f64) -> Vec<Touch>,
+    ) -> Result<Point, StudyError> {
+        let share = |frame: usize| if frame < lead { frame as f64 / lead as f64 } else { 1.0 };
+        let frames = |seed| (0..lead + self.plan.frames).map(|frame| touches(seed, share(frame))).collect::<Vec<_>>();
+        let places = self.seeds().into_iter().map(|seed| experiment.frames(&frames(seed), seed));
+        let places = places.collect::<Result<_, _>>()?;
+        let (known, lambda, calibrated) = (Vec::new(), None, None);
+        Ok(Point { label, severity, amount: None, experiment, places, lead, known, lambda, calibrated })
     }
 
     /// The one contact of a kind of scene at a seed.

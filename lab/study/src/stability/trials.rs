@@ -1,22 +1,37 @@
 //! Solvers on the points of sweeps.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
-use super::sweep::Point;
+use super::sweep::{Bench, Point};
 use crate::experiment::{Experiment, Frame, StudyError};
-use crate::score::{Score, Scorer, Summary};
+use crate::score::{Score, Scorer};
 use crate::variant::Variation;
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_touch::solve::{Method, Problem, Solver};
 
-/// Solvers and judges of the last problems, as long as they stay the same.
-#[derive(Default)]
+/// What solvers make of points. Each place is tried once: many sweeps begin at the same harmless point.
 pub(super) struct Trials {
-    scorer: Option<(Arc<Jacobian>, Scorer)>,
-    solvers: Vec<Kept>,
+    scorer: Scorer,
+    solvers: Solvers,
+    tried: Vec<Tried>,
 }
 
-/// A solver that is kept for the next point.
+/// What solvers made of the frames of a place.
+struct Tried {
+    /// The problem, by its address: that stays taken.
+    jacobian: Weak<Jacobian>,
+    frames: Vec<Frame>,
+    scores: Vec<(Variation, Option<Vec<Score>>)>,
+}
+
+/// Solvers of the problems that most points have, and the last one of another.
+struct Solvers {
+    shared: [Arc<Jacobian>; 2],
+    kept: Vec<Kept>,
+    last: Option<Kept>,
+}
+
+/// A solver, and the problem that it is made for.
 struct Kept {
     variation: Variation,
     jacobian: Arc<Jacobian>,
@@ -24,12 +39,16 @@ struct Kept {
     solver: Option<Box<dyn Solver>>,
 }
 
-/// Solvers that are kept at most.
-const MOST_KEPT: usize = 24;
-
 impl Trials {
-    /// What a solver makes of a point; `None` if it cannot be made for the model.
-    pub fn summary(&mut self, method: Method, point: &Point) -> Result<Option<Summary>, StudyError> {
+    /// None yet, of a bench's sweeps.
+    pub fn new(bench: &Bench) -> Self {
+        let shared = [&bench.sound, &bench.tolerant].map(|experiment| Arc::clone(&experiment.problem.jacobian));
+        let solvers = Solvers { shared, kept: Vec::new(), last: None };
+        Self { scorer: Scorer::of_contacts(bench.sound.reach_m()), solvers, tried: Vec::new() }
+    }
+
+    /// Scores of a solver at a point; `None` if it cannot be made for the model.
+    pub fn scores(&mut self, method: Method, point: &Point) -> Result<Option<Vec<Score>>, StudyError> {
         let variation = match point.lambda {
             Some(lambda) => Variation::with_lambda(method, lambda),
             None => Variation::default_of(method),
@@ -37,43 +56,61 @@ impl Trials {
         let mut scores = Vec::new();
         for (place, frames) in point.places.iter().enumerate() {
             let experiment = point.known.get(place).unwrap_or(&point.experiment);
-            match self.scores(variation, experiment, frames)? {
-                Some(more) => scores.extend(more),
+            match self.of_place(variation, experiment, frames)? {
+                Some(more) => scores.extend(more.into_iter().skip(point.lead)),
                 None => return Ok(None),
             }
         }
-        Ok(Some(Summary::of(&scores)))
+        Ok(Some(scores))
     }
 
     /// Scores of a solver on the frames of a place; `None` if it cannot be made for the model.
-    fn scores(
+    fn of_place(
         &mut self,
         variation: Variation,
         experiment: &Experiment,
         frames: &[Frame],
     ) -> Result<Option<Vec<Score>>, StudyError> {
-        let jacobian = &experiment.problem.jacobian;
-        if !self.scorer.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, jacobian)) {
-            self.scorer = Some((Arc::clone(jacobian), Scorer::new(experiment)));
+        let problem = &experiment.problem;
+        let same =
+            |tried: &Tried| Weak::as_ptr(&tried.jacobian) == Arc::as_ptr(&problem.jacobian) && tried.frames == frames;
+        let index = self.tried.iter().position(same).unwrap_or_else(|| {
+            let jacobian = Arc::downgrade(&problem.jacobian);
+            self.tried.push(Tried { jacobian, frames: frames.to_vec(), scores: Vec::new() });
+            self.tried.len() - 1
+        });
+        let tried = &mut self.tried[index].scores;
+        if let Some((_, scores)) = tried.iter().find(|(before, _)| *before == variation) {
+            return Ok(scores.clone());
         }
-        let index = self.kept(variation, &experiment.problem);
-        match (&mut self.scorer, &mut self.solvers[index].solver) {
-            (Some((_, scorer)), Some(solver)) => Ok(Some(scorer.run(&mut **solver, frames)?)),
-            _ => Ok(None),
-        }
+        let solver = self.solvers.of(variation, problem);
+        let scores = solver.map(|solver| self.scorer.run(solver, frames)).transpose()?;
+        tried.push((variation, scores.clone()));
+        Ok(scores)
     }
+}
 
-    /// Where a solver is kept; makes it if there is none.
-    fn kept(&mut self, variation: Variation, problem: &Problem) -> usize {
+impl Solvers {
+    /// A solver of a problem, which is made if it is not there; `None` if it cannot be made for the model.
+    fn of(&mut self, variation: Variation, problem: &Problem) -> Option<&mut dyn Solver> {
         let same = |kept: &Kept| kept.variation == variation && Arc::ptr_eq(&kept.jacobian, &problem.jacobian);
-        if let Some(index) = self.solvers.iter().position(same) {
-            return index;
+        let make = || {
+            let jacobian = Arc::clone(&problem.jacobian);
+            Kept { variation, jacobian, solver: variation.build(problem).ok() }
+        };
+        let kept = if self.shared.iter().any(|shared| Arc::ptr_eq(shared, &problem.jacobian)) {
+            let index = self.kept.iter().position(same).unwrap_or_else(|| {
+                self.kept.push(make());
+                self.kept.len() - 1
+            });
+            &mut self.kept[index]
+        } else {
+            let last = self.last.take().filter(same).unwrap_or_else(make);
+            self.last.insert(last)
+        };
+        match &mut kept.solver {
+            Some(solver) => Some(&mut **solver),
+            None => None,
         }
-        if self.solvers.len() >= MOST_KEPT {
-            self.solvers.remove(0);
-        }
-        let solver = variation.build(problem).ok();
-        self.solvers.push(Kept { variation, jacobian: Arc::clone(&problem.jacobian), solver });
-        self.solvers.len() - 1
     }
 }

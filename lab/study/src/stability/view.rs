@@ -1,8 +1,8 @@
 //! What the report shows.
 
 use super::bounds::{BoundChart, BoundCurve};
-use super::{Breakdown, CellReport, Report, SolverRow, SweepReport};
-use crate::view::{Axis, Cell, Chart, Figures, MM, PERCENT, Series, Style, TEXT, Table, Unit, View};
+use super::{Break, Breakdown, CellReport, Margin, Report, SolverRow, SweepReport, Wrong};
+use crate::view::{Axis, Cell, Chart, Figures, MM, Mark, Outcome, PERCENT, Series, Style, TEXT, Table, Unit, View};
 use tactomo_touch::solve::Method;
 
 /// Colours of levels, and what they stand for.
@@ -14,27 +14,70 @@ const LEVELS: [(&str, &str); 5] = [
     ("h4", "above: error, as a share of the mean distance of electrodes"),
 ];
 
-/// Where each solver breaks, how far off it is, what noise allows, and every point.
+/// From this share of wrong answers that nothing is said of, a solver is a danger there.
+const OFTEN: f64 = 0.25;
+/// What is rarer shows as none: half of a per cent.
+const RARE: f64 = 0.005;
+
+/// Where each solver fails and whether it says so, how far off it is, what noise allows, and every point.
 pub fn view(report: &Report) -> View {
-    let lead = "Green holds, red is useless. **⚑** marks where the solver itself reports that something is wrong: **red without a flag is the danger**.";
-    let every = "Mean error in mm, where a contact missed or invented counts the mean distance of electrodes. − contacts are missed, + contacts are \
-                 invented, slow: a frame takes far longer, ∅ refused, NaN not finite.";
+    let lead = "What is **wrong and says nothing of it is the danger**: solid, with ✕. What is wrong and flagged is striped, with ⚑. **Click a cell** for \
+                its curve.";
+    let every = "Mean error in mm, where a contact missed or invented counts the mean distance of electrodes. − \
+                 contacts are missed, + contacts are invented, slow: a frame takes far longer, ∅ refused, NaN not finite.";
     let bounds = "Error of each solver, and the Cramer-Rao bound (dashed): no unbiased method can have a smaller root-mean-square error with this \
                   converter's noise. Where a solver is far above it, its model or its start is what limits it; below it, guesses are biased. Contacts \
                   missed or invented count the mean distance of electrodes.";
     let view = View::new("Where solvers break", lead)
+        .with(Figures { legend: outcomes(), ..Figures::of("", [overview(report)]) })
+        .heading("How far off")
         .with(Figures {
             legend: LEVELS.map(|(class, what)| (class, what.to_owned())).into(),
-            ..Figures::of("", [overview(report)])
+            ..Figures::of("", [errors(report)])
         })
-        .heading("How far off")
-        .figures("", [errors(report)])
         .heading("Against what noise allows")
         .figures(bounds, report.bounds.charts.iter().map(bound_chart))
         .heading("Every point")
-        .figures(every, report.sweeps.iter().map(heat))
+        .with(Figures { legend: outcomes(), ..Figures::of(every, report.sweeps.iter().map(heat)) })
         .with(breaks(report));
-    View { method: method(report), ..view }
+    View { method: method(report), ..view }.without(&report.missing)
+}
+
+fn outcomes() -> Vec<(&'static str, String)> {
+    Outcome::ALL.map(|(outcome, what)| (outcome.class(), what.to_owned())).into()
+}
+
+/// How a solver fails where it is wrong in such shares of frames.
+fn outcome(wrong: Wrong) -> Outcome {
+    match wrong {
+        Wrong { silent: OFTEN.., .. } => Outcome::Silent,
+        Wrong { silent: RARE.., .. } => Outcome::SometimesSilent,
+        Wrong { flagged: RARE.., .. } => Outcome::Flagged,
+        _ => Outcome::Right,
+    }
+}
+
+/// Shares of wrong answers, silent and flagged, in per cent.
+fn shares(wrong: Wrong) -> String {
+    match outcome(wrong) {
+        Outcome::Right => "0".to_owned(),
+        _ => format!("{:.0} / {:.0}", 100.0 * wrong.silent, 100.0 * wrong.flagged),
+    }
+}
+
+/// How much a solver bears, in multiples of what a good build has.
+fn borne(margin: Margin) -> String {
+    let times = |amount: f64| {
+        let digits = if amount >= 9.95 { 0 } else { 1 };
+        format!("{amount:.digits$}")
+    };
+    match (margin.holds.filter(|amount| *amount > 0.0), margin.breaks) {
+        (Some(holds), Some(breaks)) if times(holds) == times(breaks) => format!("{} x", times(holds)),
+        (Some(holds), Some(breaks)) => format!("{}–{} x", times(holds), times(breaks)),
+        (None, Some(breaks)) => format!("< {} x", times(breaks)),
+        (Some(holds), None) => format!("> {} x", times(holds)),
+        (None, None) => String::new(),
+    }
 }
 
 /// All rows of a sweep, those after a calibration behind those before; and what follows the name of the latter.
@@ -43,61 +86,101 @@ fn rows(sweep: &SweepReport) -> impl Iterator<Item = (&SolverRow, &'static str)>
     sweep.solvers.iter().enumerate().flat_map(move |(index, row)| std::iter::once((row, "")).chain(after(index)))
 }
 
+/// A sweep's solvers, before or after a calibration.
+type Solvers<'a> = (&'a SweepReport, &'static str, &'a [SolverRow]);
+
 /// A row for each sweep, a column for each solver.
-fn sweeps_by_solvers(report: &Report, title: String, note: &str, cell: fn(&SolverRow) -> Cell) -> Table {
+fn sweeps_by_solvers(report: &Report, title: String, note: &str, cell: fn(&SweepReport, &SolverRow) -> Cell) -> Table {
     let all = report.sweeps.iter().max_by_key(|sweep| sweep.solvers.len());
     let solvers = all.map(|sweep| sweep.solvers.iter().map(|row| row.solver.clone())).into_iter().flatten();
-    let row = |sweep: &SweepReport| {
-        let before = (sweep.title.clone(), sweep.solvers.clone());
-        let after = (format!("{}, calibrated", sweep.title), sweep.calibrated.clone());
-        [before, after].into_iter().filter(|(_, rows)| !rows.is_empty())
+    let rows = |sweep| {
+        let SweepReport { solvers, calibrated, .. }: &SweepReport = sweep;
+        let rows: [Solvers; 2] = [(sweep, "", solvers), (sweep, ", calibrated", calibrated)];
+        rows.into_iter().filter(|(.., rows)| !rows.is_empty())
     };
-    let table = Table::of(title, report.sweeps.iter().flat_map(row)).column("", TEXT, |(name, _)| name.clone());
-    let with = |table: crate::view::Rows<(String, Vec<SolverRow>)>, solver: String| {
-        let of = |(_, rows): &(String, Vec<SolverRow>)| {
-            let row = rows.iter().find(|row| row.solver == solver);
-            row.map_or_else(Cell::default, |row| {
-                if row.cells.iter().any(Option::is_some) { cell(row) } else { self::cell(&None) }
-            })
-        };
-        table.cells(solver.clone(), TEXT, of)
-    };
-    solvers.fold(table, with).note(note).style(Style::WholeHeat).into()
+    let name = |(sweep, suffix, _): &Solvers| format!("{}{suffix}", sweep.title);
+    let mut table = Table::of(title, report.sweeps.iter().flat_map(rows)).column("", TEXT, name);
+    for solver in solvers {
+        table =
+            table.cells(solver.clone(), TEXT, |(sweep, _, rows)| match rows.iter().find(|row| row.solver == solver) {
+                Some(row) if row.cells.iter().any(Option::is_some) => cell(sweep, row),
+                Some(_) => untried(),
+                None => Cell::default(),
+            });
+    }
+    table.note(note).style(Style::WholeHeat).into()
 }
 
 fn overview(report: &Report) -> Table {
-    let title = format!("{}{}: first break of each solver", report.detector, report.whose());
-    let note = "The mildest point of each sweep that breaks a solver: its error is above 15 % of the mean distance of electrodes and twice its own at \
-                the harmless point, or it miscounts, slows down or answers with no finite number. Where it holds: its error in mm at the harmless \
-                point and its largest, for what is off by 5 mm from the start holds up to 10.";
-    sweeps_by_solvers(report, title, note, |row| {
-        let range = format!("{} – {}", millimetres(row.errors.harmless_m), millimetres(row.errors.largest_m));
-        let Some(found) = &row.breaks else {
-            return Cell { level: worst_level(row), value: "holds".into(), detail: range, ..Cell::default() };
+    let title = format!("{}{}: wrong answers, silent / flagged, % of frames", report.detector, report.whose());
+    let note = "Over all points of a sweep. An answer is wrong if its error is above 15 % of the mean distance of electrodes and twice the solver's own \
+                at the harmless point, if it misses or invents a contact, is refused or not finite. Below: the margin to failure, as multiples of what \
+                a hobbyist's bench gives (docs/detector.md) or of the described converter's noise: the most that holds and the least that breaks; else the \
+                mildest point that breaks it.";
+    sweeps_by_solvers(report, title, note, |sweep, row| {
+        let first = row.breaks.as_ref();
+        let detail = match (row.margin, first) {
+            (Some(margin), _) => borne(margin),
+            (None, Some(Break { how: Breakdown::Never, .. })) => Breakdown::Never.name().to_owned(),
+            (None, Some(found)) => found.at.clone(),
+            (None, None) => "holds".to_owned(),
         };
-        let level = match found.survives {
-            0.6.. => 2,
-            0.35.. => 3,
-            _ => 4,
-        };
+        let breaks = first.map_or_else(
+            || "holds at all points".to_owned(),
+            |found| {
+                let Break { at, how, survives, .. } = found;
+                format!("first breaks at {at} ({}), holds at {:.0} % of the points", how.name(), 100.0 * survives)
+            },
+        );
+        let [harmless, largest] = [row.errors.harmless_m, row.errors.largest_m].map(millimetres);
         Cell {
-            level: Some(level),
-            value: found.at.as_str().into(),
-            detail: found.how.name().to_owned(),
-            is_flagged: found.is_reported,
-            tooltip: format!(
-                "holds at {:.0} % of the points; error in mm, at the harmless point and at most: {range}",
-                100.0 * found.survives
-            ),
+            value: shares(row.wrong).into(),
+            detail,
+            outcome: Some(outcome(row.wrong)),
+            tooltip: format!("{breaks}; error in mm, at the harmless point and at most: {harmless} – {largest}"),
+            opens: Some(Box::new(curve(sweep, row))),
+            ..Cell::default()
         }
     })
+}
+
+/// A solver's error over the points of a sweep, and how it fails at each.
+fn curve(sweep: &SweepReport, row: &SolverRow) -> Chart {
+    let points = || row.cells.iter().enumerate().filter_map(|(index, cell)| Some((index, cell.as_ref()?)));
+    let mark = |(index, cell): (usize, &CellReport)| Mark {
+        note: format!("{}: silent / flagged {} %", sweep.points[index].label, shares(cell.wrong)),
+        ..Mark::from((index as f64, cell.error_m))
+    };
+    let line = Series::line(row.solver.as_str(), class(&row.solver), points().map(mark)).undotted();
+    let told = |outcomes: &[Outcome], class, name: &str| {
+        let of = points().filter(|(_, cell)| outcomes.contains(&outcome(cell.wrong))).map(mark);
+        Series::dots(name, class, of).labelled_last().large()
+    };
+    let series = [
+        line,
+        told(&[Outcome::Right], "right", "right"),
+        told(&[Outcome::Flagged], "flagged", "flagged"),
+        told(&[Outcome::SometimesSilent, Outcome::Silent], "silent", "silent"),
+    ];
+    let axes = [
+        Axis::named(sweep.title.as_str(), sweep.points.iter().map(|point| point.label.clone())),
+        Axis::log("", Unit::Metres).floor(1e-5),
+    ];
+    let severities = sweep.points.iter().map(|point| point.severity);
+    let tried = severities.zip(&row.cells).filter_map(|(severity, cell)| Some((severity, cell.as_ref()?)));
+    let harmless = tried.min_by(|(a, _), (b, _)| a.total_cmp(b));
+    let level = harmless.map(|(_, cell)| (cell.limit_m(), "wrong above".to_owned()));
+    let margin = row.margin.map_or_else(String::new, |margin| format!("; margin to failure {}", borne(margin)));
+    let subtitle = format!("wrong answers, silent / flagged: {} % of frames{margin}", shares(row.wrong));
+    let title = format!("{}: error of {}", sweep.title, row.solver);
+    Chart { level, ..Chart::new(title, subtitle, axes, series).sized([520.0, 320.0]) }
 }
 
 /// Errors in millimetres, whatever they are at the harmless point.
 fn errors(report: &Report) -> Table {
     let title = format!("{}: errors of each solver, mm", report.detector);
     let note = "The median over the points of each sweep; below it, that at the harmless point and the largest. Colours are of the largest.";
-    sweeps_by_solvers(report, title, note, |row| {
+    sweeps_by_solvers(report, title, note, |_, row| {
         let [harmless, median, largest] =
             [row.errors.harmless_m, row.errors.median_m, row.errors.largest_m].map(millimetres);
         let detail = format!("{harmless} – {largest}");
@@ -137,11 +220,13 @@ fn heat(sweep: &SweepReport) -> Table {
     points.fold(table, with).into()
 }
 
+/// Where a solver cannot be made for the model.
+fn untried() -> Cell {
+    Cell { value: "n/a".into(), tooltip: "cannot be made for this model".to_owned(), ..Cell::default() }
+}
+
 fn cell(cell: &Option<CellReport>) -> Cell {
-    let Some(cell) = cell else {
-        let tooltip = "cannot be made for this model".to_owned();
-        return Cell { value: "n/a".into(), tooltip, ..Cell::default() };
-    };
+    let Some(cell) = cell else { return untried() };
     let marks = [
         (cell.not_finite > 0.0, " NaN"),
         (cell.failed > 0.0, " ∅"),
@@ -151,19 +236,19 @@ fn cell(cell: &Option<CellReport>) -> Cell {
     ];
     let marks: String = marks.into_iter().filter(|(is, _)| *is).map(|(_, mark)| mark).collect();
     Cell {
-        level: Some(cell.level),
         value: (millimetres(cell.error_m) + &marks).into(),
-        detail: String::new(),
-        is_flagged: cell.is_reported(),
+        outcome: Some(outcome(cell.wrong)),
         tooltip: format!(
-            "count right in {:.0} % of frames, missed {:.2}, invented {:.2}, conductance off by {} %, p99 {}, flagged in {:.0} % of frames",
-            100.0 * cell.count_right.unwrap_or(0.0),
+            "wrong in {:.0} % of frames silently, in {:.0} % with a flag; missed {:.2}, invented {:.2}, conductance off by {} %, p99 {}, flagged in {:.0} % of frames",
+            100.0 * cell.wrong.silent,
+            100.0 * cell.wrong.flagged,
             cell.missed,
             cell.invented,
             PERCENT.text(cell.conductance_error),
             Unit::Seconds.text(cell.p99_us * 1e-6),
             100.0 * cell.flagged
         ),
+        ..Cell::default()
     }
 }
 
@@ -194,6 +279,9 @@ fn breaks(report: &Report) -> Table {
         .column("breaks at", TEXT, found(|found| found.at.clone()))
         .column("how", TEXT, found(|found| found.how.name().to_owned()))
         .column("", TEXT, found(|found| if found.is_reported { "with a flag" } else { "silently" }.to_owned()))
+        .column("silent", PERCENT, |(_, row, _)| row.wrong.silent)
+        .column("flagged", PERCENT, |(_, row, _)| row.wrong.flagged)
+        .column("bears", TEXT, |(_, row, _)| row.margin.map_or_else(String::new, borne))
         .column("holds at", PERCENT, |(_, row, _)| row.breaks.as_ref().map_or(1.0, |found| found.survives))
         .note(
             "A solver holds as long as its error is below 15 % of the mean distance of electrodes or twice its own harmless one: see what that is. \

@@ -1,9 +1,10 @@
 //! Sweeps of what is wrong in the model or in the description of the detector.
 
-use super::sweep::{Bench, Sweep};
+use super::sweep::{BENCH, Bench, Maker, NOISE, Sweep};
 use crate::experiment::{Experiment, StudyError};
 use crate::scenes::SceneKind;
-use tactomo_physics::detector::{Adc, Detector, Layer};
+use tactomo_physics::detector::{Adc, Detector, Layer, Tolerances};
+use tactomo_physics::forward::ConnectingPoints;
 use tactomo_physics::forward::shell::Shell;
 use tactomo_physics::scene::Contact;
 use tactomo_physics::simulate::Fault;
@@ -27,15 +28,31 @@ const NOISES: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
 /// Voltage at which the converter saturates, as a share of the drive.
 const CLIPS: [f64; 6] = [1.0, 0.5, 0.3, 0.2, 0.1, 0.05];
 
+/// Sheet resistance of the driving layer (ohm per square), which no model has.
+const SHEETS_OHM: [f64; 7] = [0.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
+/// Conductance of layers that touch lightly everywhere (sheet conductances).
+const LEAKS: [f64; 6] = [0.0, 0.003, 0.01, 0.03, 0.1, 0.3];
+
 /// All of them.
-pub fn sweeps(bench: &Bench) -> Result<Vec<Sweep>, StudyError> {
-    [thickness, conductivity, spread, baseline, noise, clip, shell, nodes].into_iter().map(|make| make(bench)).collect()
+pub fn sweeps() -> Vec<Maker> {
+    vec![
+        Maker::new("Wrong thickness", THICKNESSES.len(), thickness),
+        Maker::new("Wrong conductivity", CONDUCTIVITIES.len(), conductivity),
+        Maker::new("Contact impedances that differ", SPREADS.len(), spread),
+        Maker::new("A baseline taken under load", BASELINES.len(), baseline),
+        Maker::new("More noise than expected", NOISES.len(), noise),
+        Maker::new("A driving sheet that resists", SHEETS_OHM.len(), driving_sheet),
+        Maker::new("A detector that leaks", LEAKS.len(), leak),
+        Maker::new("Readings that saturate", CLIPS.len(), clip),
+        Maker::new("A thick detector read with the thin-shell model", SHELL_THICKNESSES.len(), shell),
+        Maker::new("A finer or coarser image", NODES.len(), nodes),
+    ]
 }
 
 /// A sweep on a firm contact: how bad a value is, and the experiment for it.
 fn firm<T: Copy>(
     bench: &Bench,
-    (title, note): (&'static str, &str),
+    note: &str,
     values: &[T],
     label: impl Fn(T) -> String,
     severity: impl Fn(T) -> f64,
@@ -45,7 +62,7 @@ fn firm<T: Copy>(
         .some(values)
         .map(|value| bench.point(label(*value), severity(*value), experiment(*value)?, SceneKind::Firm))
         .collect::<Result<_, _>>()?;
-    Ok(Sweep { title, note: note.to_owned(), points })
+    Ok(Sweep::new(note, points))
 }
 
 /// A detector whose layers are thicker by a factor, of the same conductivity.
@@ -64,15 +81,28 @@ fn pad_radius_m(detector: &Detector) -> f64 {
 }
 
 fn thickness(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("Wrong thickness", "True thickness over the one in the model, at the same conductivity.");
+    let note = "True thickness over the one in the model, at the same conductivity.";
     let of = |factor| bench.sound.with_truth(&thicker(bench.sound.truth(), factor));
-    firm(bench, what, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
+    let sweep =
+        firm(bench, note, &THICKNESSES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)?;
+    let deviation = Tolerances::default().thickness_share;
+    let factors: Vec<f64> = bench.some(&THICKNESSES).copied().collect();
+    Ok(sweep.in_units(BENCH, deviations(&factors, deviation)))
 }
 
 fn conductivity(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("Wrong conductivity", "True conductivity over the one in the model.");
+    let note = "True conductivity over the one in the model.";
     let of = |factor| bench.sound.with_faults(&[Fault::Conductivity { factor }], 1);
-    firm(bench, what, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)
+    let sweep =
+        firm(bench, note, &CONDUCTIVITIES, |factor| format!("x {factor}"), |factor: f64| (factor - 1.0).abs(), of)?;
+    let deviation = Tolerances::default().conductivity_share;
+    let factors: Vec<f64> = bench.some(&CONDUCTIVITIES).copied().collect();
+    Ok(sweep.in_units(BENCH, deviations(&factors, deviation)))
+}
+
+/// Deviations of a factor's logarithm.
+fn deviations(factors: &[f64], deviation: f64) -> impl Iterator<Item = f64> {
+    factors.iter().map(move |factor| factor.ln().abs() / deviation)
 }
 
 fn percent(share: f64) -> String {
@@ -80,60 +110,77 @@ fn percent(share: f64) -> String {
 }
 
 fn spread(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = (
-        "Contact impedances that differ",
-        "Standard deviation of their logarithm, where pads have 1e-3 ohm m2, which the model has for all.",
-    );
+    let note = "Standard deviation of their logarithm, where pads have 1e-3 ohm m2, which the model has for all.";
     let felt = Detector { contact_impedance_ohm_m2: FELT_OHM_M2, ..bench.sound.detector.clone() };
     let felt = bench.experiment(&felt)?;
     let of = |deviation| felt.with_faults(&[Fault::ContactSpread { deviation }], bench.plan.seed);
-    firm(bench, what, &SPREADS, percent, |deviation| deviation, of)
+    let sweep = firm(bench, note, &SPREADS, percent, |deviation| deviation, of)?;
+    let bench_spread = Tolerances::default().contact_impedance_spread;
+    Ok(sweep.in_units(BENCH, bench.some(&SPREADS).map(|deviation| deviation / bench_spread)))
 }
 
 fn baseline(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = (
-        "A baseline taken under load",
-        "Conductance of a contact elsewhere that pressed while the baseline was taken, in sheet conductances, and is lifted afterwards.",
-    );
+    let note = "Conductance of a contact elsewhere that pressed while the baseline was taken, in sheet conductances, and is lifted afterwards.";
     let sheet_s = bench.sound.detector.sheet_conductance_s();
     let load = bench.contact(SceneKind::Firm, bench.plan.seed.wrapping_add(77));
     let of = |sheets| match sheets > 0.0 {
         true => bench.sound.with_baseline(&[Contact { conductance_s: sheets * sheet_s, ..load }]),
         false => bench.sound.with_faults(&[], 0),
     };
-    firm(bench, what, &BASELINES, |sheets| format!("{sheets}"), |sheets| sheets, of)
+    firm(bench, note, &BASELINES, |sheets| format!("{sheets}"), |sheets| sheets, of)
 }
 
 fn noise(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("More noise than expected", "True noise over the one that solvers expect.");
+    let note = "True noise over the one that solvers expect.";
     let adc = bench.sound.detector.adc;
     let of = |factor: f64| {
         let noisy = Adc { noise_lsb: factor * adc.noise_lsb, ..adc };
         bench.sound.with_truth(&Detector { adc: noisy, ..bench.sound.truth().clone() })
     };
-    firm(bench, what, &NOISES, |factor| format!("x {factor}"), |factor| factor, of)
+    let sweep = firm(bench, note, &NOISES, |factor| format!("x {factor}"), |factor| factor, of)?;
+    Ok(sweep.in_units(NOISE, bench.some(&NOISES).copied()))
+}
+
+fn driving_sheet(bench: &Bench) -> Result<Sweep, StudyError> {
+    let note = "Sheet resistance of the driving layer in ohm per square, connected at a corner; the model has none.";
+    let of = |ohm| match ohm > 0.0 {
+        true => bench.sound.with_faults(&[Fault::DrivingSheet { ohm, points: ConnectingPoints::One }], 1),
+        false => bench.sound.with_faults(&[], 0),
+    };
+    let sweep = firm(bench, note, &SHEETS_OHM, |ohm| format!("{ohm}"), |ohm| ohm, of)?;
+    let bench_ohm = Tolerances::default().driving_sheet_ohm;
+    Ok(sweep.in_units(BENCH, bench.some(&SHEETS_OHM).map(|ohm| ohm / bench_ohm)))
+}
+
+fn leak(bench: &Bench) -> Result<Sweep, StudyError> {
+    let note = "Conductance of layers that touch lightly everywhere, in sheet conductances. The baseline is taken off, and the leakage in it.";
+    let of = |sheets| match sheets > 0.0 {
+        true => bench.sound.with_faults(&[Fault::Leak { sheets }], 1),
+        false => bench.sound.with_faults(&[], 0),
+    };
+    firm(bench, note, &LEAKS, |sheets| format!("{sheets}"), |sheets| sheets, of)
 }
 
 fn clip(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("Readings that saturate", "Voltage at which the converter saturates, as a share of the drive.");
+    let note = "Voltage at which the converter saturates, as a share of the drive.";
     let drive_v = bench.sound.detector.drive_v;
     let of = |share| bench.sound.with_faults(&[Fault::Clip { range_v: [0.0, share * drive_v] }], 1);
-    firm(bench, what, &CLIPS, percent, |share: f64| -share, of)
+    firm(bench, note, &CLIPS, percent, |share: f64| -share, of)
 }
 
 fn shell(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("A thick detector read with the thin-shell model", "Thickness in radii of a pad.");
+    let note = "Thickness in radii of a pad.";
     let detector = &bench.sound.detector;
     let of = |radii| {
         let detector = as_thick(detector, radii * pad_radius_m(detector));
         let experiment = bench.experiment(&detector)?;
         Ok(experiment.inverted_on(Box::new(Shell::new(&detector)?)))
     };
-    firm(bench, what, &SHELL_THICKNESSES, |radii| format!("{radii}"), |radii| radii, of)
+    firm(bench, note, &SHELL_THICKNESSES, |radii| format!("{radii}"), |radii| radii, of)
 }
 
 fn nodes(bench: &Bench) -> Result<Sweep, StudyError> {
-    let what = ("A finer or coarser image", "Nodes of the image that is inverted; 2000 are the default.");
+    let note = "Nodes of the image that is inverted; 2000 are the default.";
     let of = |nodes| Ok(bench.sound.inverted_on(bench.sound.problem.model.on_image_of(nodes)?));
-    firm(bench, what, &NODES, |nodes| nodes.to_string(), |nodes| (nodes as f64 - 2000.0).abs(), of)
+    firm(bench, note, &NODES, |nodes| nodes.to_string(), |nodes| (nodes as f64 - 2000.0).abs(), of)
 }

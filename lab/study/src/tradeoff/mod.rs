@@ -11,6 +11,7 @@ use std::time::Duration;
 use super::calibrate::Calibrate;
 use super::experiment::{Experiment, StudyError};
 use super::machine::Machine;
+use super::progress::Progress;
 use super::scenes::{Group, SceneKind};
 use super::score::Summary;
 use super::variant::Variation;
@@ -73,6 +74,8 @@ pub struct Report {
     pub frames: usize,
     /// One for each detector.
     pub detectors: Vec<DetectorReport>,
+    /// What was not tried when the study was stopped.
+    pub missing: Vec<String>,
 }
 
 /// What came out on one detector.
@@ -188,13 +191,19 @@ impl SolverReport {
     }
 }
 
-/// Tries all solvers on all detectors. `progress` is called with what is tried next.
+/// Tries all solvers on all detectors, until that is done or it is stopped: then what is missing is in the report.
 ///
 /// # Errors
 /// [`StudyError`] if a detector cannot be modelled or is curved.
-pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result<Report, StudyError> {
-    let detectors =
-        plan.detectors.iter().map(|detector| on_detector(plan, detector, progress)).collect::<Result<_, _>>()?;
+pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, StudyError> {
+    let mut course = Course { progress: progress.part(0, plan.work()), done: 0, missing: Vec::new() };
+    let mut detectors = Vec::new();
+    for detector in &plan.detectors {
+        match course.goes_on(&detector.name) {
+            true => detectors.push(on_detector(plan, detector, &mut course)?),
+            false => course.missing.push(detector.name.clone()),
+        }
+    }
     Ok(Report {
         machine: Machine::this(),
         command: command.to_owned(),
@@ -203,28 +212,79 @@ pub fn run(plan: &Plan, command: &str, progress: &mut dyn FnMut(&str)) -> Result
         places: plan.places,
         frames: plan.frames,
         detectors,
+        missing: course.missing,
     })
 }
 
-fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str)) -> Result<DetectorReport, StudyError> {
-    progress(&format!("{}: data", detector.name));
+impl Plan {
+    /// Solvers with their defaults and, where that is asked for, with other values of their main parameters.
+    fn variations(&self) -> Vec<Variation> {
+        let sweep = |method: &Method| match self.sweep {
+            true => Variation::sweep(*method),
+            false => vec![Variation::default_of(*method)],
+        };
+        self.methods.iter().flat_map(sweep).collect()
+    }
+
+    /// What solvers know of detectors that are drawn from tolerances, one after the other.
+    fn known(&self) -> Vec<(Known, Option<Calibrate>)> {
+        let is_drawn = self.as_built.is_none() && self.drawn > 0;
+        let described = is_drawn.then_some((Known::Described, None));
+        let calibrated = self.calibrate.filter(|_| is_drawn).map(|calibrate| (Known::Calibrated, Some(calibrate)));
+        described.into_iter().chain(calibrated).collect()
+    }
+
+    /// How many solvers are tried.
+    fn work(&self) -> usize {
+        self.detectors.len() * (self.variations().len() + self.known().len() * self.methods.len())
+    }
+}
+
+/// How far the study is.
+struct Course<'a> {
+    progress: Progress<'a>,
+    done: usize,
+    missing: Vec<String>,
+}
+
+impl Course<'_> {
+    /// Tells what is tried next, unless it was stopped.
+    fn goes_on(&self, next: &str) -> bool {
+        self.progress.tell(next, self.done);
+        !self.progress.is_stopped()
+    }
+
+    /// What a solver reaches, as long as it was not stopped; `None` if it cannot be made for the model, which is added to `unavailable`.
+    fn tried(
+        &mut self,
+        whose: &str,
+        heap: Option<Heap>,
+        trials: &mut [Trial],
+        variation: Variation,
+        unavailable: &mut Vec<String>,
+    ) -> Option<SolverReport> {
+        let name = format!("{whose}: {}", variation.label());
+        let goes_on = self.goes_on(&name);
+        self.done += 1;
+        if !goes_on {
+            self.missing.push(name);
+            return None;
+        }
+        let tried = try_variation(heap, trials, variation);
+        tried.map_err(|error| unavailable.push(format!("{}: {}", variation.label(), with_causes(&error)))).ok()
+    }
+}
+
+fn on_detector(plan: &Plan, detector: &Detector, course: &mut Course) -> Result<DetectorReport, StudyError> {
     let described = Experiment::new(detector)?;
     let experiment = match plan.as_built {
         Some(seed) => described.as_built(seed)?,
         None => described,
     };
     let mut trials = [Trial::new(plan, experiment, 0..plan.places as u64)?];
-    let sweep = |method: &Method| match plan.sweep {
-        true => Variation::sweep(*method),
-        false => vec![Variation::default_of(*method)],
-    };
     let (mut solvers, mut unavailable) = (Vec::new(), Vec::new());
-    for variation in plan.methods.iter().flat_map(sweep) {
-        progress(&format!("{}: {}", detector.name, variation.label()));
-        match try_variation(plan.heap, &mut trials, variation) {
-            Ok(report) => solvers.push(report),
-            Err(error) => unavailable.push(format!("{}: {}", variation.label(), with_causes(&error))),
-        }
+    for variation in plan.variations() {
+        solvers.extend(course.tried(&detector.name, plan.heap, &mut trials, variation, &mut unavailable));
     }
     let [Trial { experiment, .. }] = trials;
     Ok(DetectorReport {
@@ -235,43 +295,46 @@ fn on_detector(plan: &Plan, detector: &Detector, progress: &mut dyn FnMut(&str))
         reach_m: experiment.reach_m(),
         unavailable,
         solvers,
-        as_built: if plan.as_built.is_some() { Vec::new() } else { as_built(plan, &experiment, progress)? },
+        as_built: as_built(plan, &experiment, course)?,
     })
 }
 
 /// Solvers on detectors drawn from the tolerances of a sound one: knowing the description, and calibrated if there is a way.
-fn as_built(plan: &Plan, sound: &Experiment, progress: &mut dyn FnMut(&str)) -> Result<Vec<AsBuiltReport>, StudyError> {
-    if plan.drawn == 0 || sound.detector.tolerances.is_exact() {
+fn as_built(plan: &Plan, sound: &Experiment, course: &mut Course) -> Result<Vec<AsBuiltReport>, StudyError> {
+    let name = &sound.detector.name;
+    if sound.detector.tolerances.is_exact() {
         return Ok(Vec::new());
     }
     let seeds = || (0..plan.drawn as u64).map(|index| (index, plan.seed.wrapping_add(index)));
-    let built = seeds().map(|(_, seed)| sound.as_built(seed)).collect::<Result<Vec<_>, _>>()?;
     let mut reports = Vec::new();
-    for (known, calibrate) in [(Known::Described, None), (Known::Calibrated, plan.calibrate)] {
-        if known == Known::Calibrated && calibrate.is_none() {
+    for (known, calibrate) in plan.known() {
+        let whose = format!("{name}: {} detectors as built, {}", plan.drawn, known.name());
+        if !course.goes_on(&whose) {
+            course.missing.push(whose);
             continue;
         }
-        progress(&format!("{}: {} detectors as built, {}", sound.detector.name, plan.drawn, known.name()));
+        // What solvers make of the tolerances is made once.
+        let tolerant = sound.tolerant();
         let mut refused = 0;
-        let trial = |((index, seed), built): ((u64, u64), &Experiment)| {
+        let trial = |(index, seed)| {
+            let built = tolerant.as_built(seed)?;
             let known = match calibrate {
                 Some(calibrate) => {
-                    let found = calibrate.find(built, seed)?;
+                    let found = calibrate.find(&built, seed)?;
                     refused += usize::from(found.refused.is_some());
-                    found
-                        .refused
-                        .iter()
-                        .for_each(|why| progress(&format!("{}: {}", built.detector.name, with_causes(why))));
+                    found.refused.iter().for_each(|why| tracing::warn!("{name}: {}", with_causes(why)));
                     built.known_as(&found.detector)?
                 }
-                None => built.with_faults(&[], 0)?,
+                None => built,
             };
             Trial::new(plan, known, index..index + 1)
         };
-        let mut trials = seeds().zip(&built).map(trial).collect::<Result<Vec<_>, _>>()?;
-        let variations = plan.methods.iter().map(|method| Variation::default_of(*method));
+        let mut trials = seeds().map(trial).collect::<Result<Vec<_>, StudyError>>()?;
         // What cannot be made for the model was told before.
-        let solvers = variations.filter_map(|variation| try_variation(None, &mut trials, variation).ok()).collect();
+        let untold = &mut Vec::new();
+        let variations = plan.methods.iter().map(|method| Variation::default_of(*method));
+        let solvers =
+            variations.filter_map(|variation| course.tried(&whose, None, &mut trials, variation, untold)).collect();
         let calibration = calibrate.map(Calibrate::name);
         reports.push(AsBuiltReport { known, calibration, refused, detectors: plan.drawn, solvers });
     }
@@ -294,6 +357,8 @@ fn milliseconds(time: Duration) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicBool;
+
     use super::*;
     use crate::view::text;
 
@@ -310,7 +375,7 @@ mod tests {
             drawn: 2,
             calibrate: Some(Calibrate::Perfect),
         };
-        run(&plan, "tactomo <tradeoff>", &mut |_| {}).unwrap()
+        run(&plan, "tactomo <tradeoff>", Progress::new(&AtomicBool::new(false), &|_| {})).unwrap()
     }
 
     #[test]
@@ -351,7 +416,9 @@ mod tests {
             drawn: 2,
             calibrate: Some(Calibrate::Perfect),
         };
-        let run = |as_built| run(&plan(as_built), "", &mut |_| {}).unwrap().detectors.remove(0);
+        let run = |as_built| {
+            run(&plan(as_built), "", Progress::new(&AtomicBool::new(false), &|_| {})).unwrap().detectors.remove(0)
+        };
         let one_m = |solvers: &[SolverReport]| solvers[0].group(Group::One).unwrap().error_m.unwrap();
         let paper = run(None);
         let [described, calibrated] = &paper.as_built[..] else { panic!("{:?}", paper.as_built) };

@@ -30,7 +30,8 @@ pub fn view(report: &Report) -> View {
          seed {}. Times are medians of the processor time of one thread. Memory is what is allocated beyond the model, counted by the allocator.",
         report.places, report.frames, report.seed
     );
-    report.detectors.iter().fold(view, |view, detector| of_detector(view, detector, report.as_built))
+    let view = report.detectors.iter().fold(view, |view, detector| of_detector(view, detector, report.as_built));
+    view.without(&report.missing)
 }
 
 fn of_detector(view: View, report: &DetectorReport, as_built: Option<u64>) -> View {

@@ -40,6 +40,8 @@ pub struct Axis {
     pub reaches: Vec<f64>,
     /// Smallest and largest value, where they do not follow from the marks.
     pub range: Option<[f64; 2]>,
+    /// Names of the values 0, 1 and so on, in place of numbers.
+    pub names: Vec<String>,
 }
 
 /// What an axis counts, for its ticks.
@@ -69,6 +71,8 @@ pub struct Series {
     pub is_joined: bool,
     /// Whether its marks are drawn.
     pub is_dotted: bool,
+    /// Whether all its marks are as large as the main one.
+    pub is_large: bool,
 }
 
 /// A mark.
@@ -154,12 +158,20 @@ impl Axis {
     /// A logarithmic one, at least a decade long.
     pub fn log(title: impl Into<String>, unit: Unit) -> Self {
         let (decades, floor) = (1.0, 1e-6);
-        Self { title: title.into(), unit, is_linear: false, floor, decades, reaches: Vec::new(), range: None }
+        let (reaches, range, names) = (Vec::new(), None, Vec::new());
+        Self { title: title.into(), unit, is_linear: false, floor, decades, reaches, range, names }
     }
 
     /// A linear one.
     pub fn linear(title: impl Into<String>, unit: Unit) -> Self {
         Self { is_linear: true, ..Self::log(title, unit) }
+    }
+
+    /// Of things that have names and no values.
+    pub fn named(title: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
+        let names: Vec<String> = names.into_iter().collect();
+        let last = names.len().saturating_sub(1) as f64;
+        Self { names, ..Self::linear(title, Unit::Plain).within([-0.5, last + 0.5]) }
     }
 
     /// At least so long.
@@ -208,13 +220,19 @@ impl Series {
         let marks = marks.into_iter().map(Into::into);
         let marks: Vec<Mark> = marks.filter(|mark| mark.x.is_finite() && mark.y.is_finite()).collect();
         let main = (marks.len() == 1).then_some(0);
-        Self { name: name.into(), class, marks, main, is_joined: false, is_dotted: true }
+        Self { name: name.into(), class, marks, main, is_joined: false, is_dotted: true, is_large: false }
     }
 
     /// With the label at the last mark.
     #[must_use]
     pub fn labelled_last(self) -> Self {
         Self { main: self.marks.len().checked_sub(1), ..self }
+    }
+
+    /// With large marks.
+    #[must_use]
+    pub fn large(self) -> Self {
+        Self { is_large: true, ..self }
     }
 
     /// Without a label, and with small marks only.

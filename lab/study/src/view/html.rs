@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::table::{Cell, Column, Style, Table};
-use super::{Figure, Figures, Part, View, svg, text};
+use super::table::{Cell, Column, Outcome, Style, Table};
+use super::{Chart, Figure, Figures, Part, View, svg, text};
 use crate::machine::Machine;
 
 /// The style sheet.
@@ -134,54 +134,93 @@ fn table(table: &Table) -> String {
         table.columns.iter().enumerate().filter(|(_, column)| !column.is_group).collect();
     let heads: String = columns.iter().map(|(_, column)| format!("<th>{}</th>", escaped(&column.head()))).collect();
     _ = writeln!(html, "<div class=\"wide\"><table><thead><tr>{heads}</tr></thead><tbody>");
-    let mut last = None;
-    for row in &table.rows {
+    let (mut last, mut opened) = (None, String::new());
+    for (at_row, row) in table.rows.iter().enumerate() {
         let group = text::group(table, row);
         if group.is_some() && group != last {
             let name = escaped(group.as_deref().unwrap_or_default());
             _ = writeln!(html, "<tr class=\"group\"><th colspan=\"{}\">{name}</th></tr>", columns.len());
             last = group;
         }
-        let cells = columns.iter().enumerate();
-        let cells: String = cells.map(|(at, (index, column))| cell(column, &row[*index], is_heat && at == 0)).collect();
+        let mut cells = String::new();
+        for (at, (index, column)) in columns.iter().enumerate() {
+            let id = format!("{}-{at_row}-{index}", slug(&table.title));
+            cells += &cell(column, &row[*index], is_heat && at == 0, &id);
+            opened += &row[*index].opens.as_deref().map_or_else(String::new, |chart| popover(&id, chart));
+        }
         _ = writeln!(html, "<tr>{cells}</tr>");
     }
-    html + "</tbody></table></div>" + if is_heat { "" } else { &note } + "</section>\n"
+    html + "</tbody></table></div>" + if is_heat { "" } else { &note } + &opened + "</section>\n"
 }
 
-fn cell(column: &Column, cell: &Cell, is_head: bool) -> String {
+/// A title as part of an id.
+fn slug(title: &str) -> String {
+    title.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
+}
+
+/// What a button opens over the page; a click elsewhere or Escape closes it. Browsers do that by themselves, without a script.
+fn popover(id: &str, chart: &Chart) -> String {
+    format!("<div popover id=\"{id}\" class=\"opened\">{}</div>\n", svg::of_chart(chart))
+}
+
+fn cell(column: &Column, cell: &Cell, is_head: bool, id: &str) -> String {
     let text = marked(&column.text(cell));
     if is_head {
         return format!("<th>{text}</th>");
     }
-    let class = cell.level.map_or(String::new(), |level| format!(" class=\"h{}\"", level.min(4)));
+    let class = cell.outcome.map(|outcome| outcome.class().to_owned());
+    let class = class.or(cell.level.map(|level| format!("h{}", level.min(4))));
+    let class = class.map_or(String::new(), |class| format!(" class=\"{class}\""));
     let title = if cell.tooltip.is_empty() { String::new() } else { format!(" title=\"{}\"", escaped(&cell.tooltip)) };
-    let flag = if cell.is_flagged { "<b class=\"flag\" aria-label=\"flagged\">⚑</b>" } else { "" };
+    let mark = cell.outcome.and_then(Outcome::mark).map_or(String::new(), |(mark, name)| {
+        format!("<b class=\"mark\" role=\"img\" aria-label=\"{name}\">{mark}</b>")
+    });
     let detail =
         if cell.detail.is_empty() { String::new() } else { format!("<small>{}</small>", marked(&cell.detail)) };
-    format!("<td{class}{title}>{text}{flag}{detail}</td>")
+    let content = format!("{text}{mark}{detail}");
+    match cell.opens {
+        Some(_) => format!("<td{class}{title}><button type=\"button\" popovertarget=\"{id}\">{content}</button></td>"),
+        None => format!("<td{class}{title}>{content}</td>"),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::table::TEXT;
+    use super::super::{Axis, Unit};
     use super::*;
 
     #[test]
-    fn cells_have_their_level_flag_and_detail() {
-        let cell = |level, is_flagged| Cell {
-            level,
-            value: "3 <".into(),
-            detail: "m&n".to_owned(),
-            is_flagged,
-            ..Cell::default()
-        };
-        let cells = [cell(Some(0), false), cell(Some(9), true), cell(None, false)];
+    fn cells_have_their_level_detail_and_mark() {
+        let cell =
+            |level, outcome| Cell { level, outcome, value: "3 <".into(), detail: "m&n".to_owned(), ..Cell::default() };
+        let cells = [cell(Some(0), None), cell(Some(9), None), cell(None, None), cell(None, Some(Outcome::Silent))];
         let heat = Table::of("T", cells).style(Style::Heat).column("", TEXT, |_| "x").cells("a", TEXT, Cell::clone);
         let html = table(&heat.into());
-        for part in ["class=\"h0\"", "class=\"h4\"", "<td>3 &lt;", "<small>m&amp;n</small>", "<th>x</th>"] {
+        let silent = "class=\"silent\"";
+        for part in ["class=\"h0\"", "class=\"h4\"", silent, "<td>3 &lt;", "<small>m&amp;n</small>", "<th>x</th>"] {
             assert!(html.contains(part), "{part}");
         }
-        assert_eq!(html.matches("⚑").count(), 1);
+        assert_eq!(html.matches("✕").count(), 1);
+    }
+
+    #[test]
+    fn a_cell_opens_its_chart_and_no_other() {
+        let axes = [Axis::linear("", Unit::Plain), Axis::linear("", Unit::Plain)];
+        let cell = |title: &&str| Cell {
+            value: "1".into(),
+            opens: Some(Box::new(Chart::new(*title, "", axes.clone(), []))),
+            ..Cell::default()
+        };
+        let table: Table = Table::of("A <T>", ["one", "two"]).cells("a", TEXT, cell).into();
+        let html = super::table(&table);
+        for (id, title) in [("a--t--0-0", "one"), ("a--t--1-0", "two")] {
+            assert_eq!(html.matches(&format!("popovertarget=\"{id}\"")).count(), 1, "{html}");
+            assert!(
+                html.contains(&format!("<div popover id=\"{id}\" class=\"opened\"><svg class=\"chart\"")),
+                "{html}"
+            );
+            assert!(html.contains(&format!("aria-label=\"{title}\"")));
+        }
     }
 }

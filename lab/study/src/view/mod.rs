@@ -11,7 +11,9 @@ mod text;
 pub use self::figure::{Axis, Chart, Map, Mark, Series, Unit, same_axis};
 pub use self::html::{page, picture};
 pub use self::svg::standalone;
-pub use self::table::{Cell, Column, Format, MM, PERCENT, PLAIN, Rows, S_PER_M, Style, TEXT, Table, US, Value};
+pub use self::table::{
+    Cell, Column, Format, MM, Outcome, PERCENT, PLAIN, Rows, S_PER_M, Style, TEXT, Table, US, Value,
+};
 pub use self::text::text;
 
 /// What a study shows.
@@ -101,6 +103,16 @@ impl View {
     #[must_use]
     pub fn folded(self, summary: impl Into<String>, parts: impl IntoIterator<Item = impl Into<Part>>) -> Self {
         self.with(Part::Folded(summary.into(), parts.into_iter().map(Into::into).collect()))
+    }
+
+    /// With what is missing because it was stopped, if anything is: before all other parts.
+    #[must_use]
+    pub fn without(mut self, missing: &[String]) -> Self {
+        if !missing.is_empty() {
+            let text = format!("**Partial: it was stopped before it was done.** Missing: {}.", missing.join("; "));
+            self.parts.insert(0, Part::Text(text));
+        }
+        self
     }
 
     /// All tables, those that are folded away too.

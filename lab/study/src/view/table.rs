@@ -1,5 +1,7 @@
 //! Tables with typed columns.
 
+use super::figure::Chart;
+
 /// A table.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Table {
@@ -106,12 +108,59 @@ pub struct Cell {
     /// What it says below that, smaller.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub detail: String,
-    /// Whether the method itself flagged that something is wrong.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub is_flagged: bool,
+    /// How a method fails there, in place of a level.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outcome: Option<Outcome>,
+    /// What it opens.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub opens: Option<Box<Chart>>,
     /// Shown when the mouse is over it.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub tooltip: String,
+}
+
+/// How a method fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// It does not.
+    Right,
+    /// It says so where it is wrong.
+    Flagged,
+    /// It is wrong at times and says nothing.
+    SometimesSilent,
+    /// It is often wrong and says nothing.
+    Silent,
+}
+
+impl Outcome {
+    /// All of them, with what they stand for.
+    pub const ALL: [(Self, &str); 4] = [
+        (Self::Right, "right"),
+        (Self::Flagged, "wrong, and flagged"),
+        (Self::SometimesSilent, "wrong at times, silently"),
+        (Self::Silent, "often wrong, silently: the danger"),
+    ];
+
+    /// Class that gives it its colour and pattern.
+    pub fn class(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Flagged => "flagged",
+            Self::SometimesSilent => "silent-few",
+            Self::Silent => "silent",
+        }
+    }
+
+    /// What stands behind a value, for those who see no colours, with its name.
+    pub(super) fn mark(self) -> Option<(&'static str, &'static str)> {
+        match self {
+            Self::Right => None,
+            Self::Flagged => Some(("⚑", "flagged")),
+            Self::SometimesSilent => Some(("✕", "silent at times")),
+            Self::Silent => Some(("✕", "silent")),
+        }
+    }
 }
 
 /// What a cell says.

@@ -65,9 +65,10 @@ impl<'a> Drawing<'a> {
         for (value, text) in self.x.ticks() {
             let [x, _] = self.at(value, self.y.range[0]);
             _ = write!(svg, "<path class=\"grid\" d=\"M{x:.1} {top}V{bottom}\"/>");
-            if x > free_from {
+            let half = Labels::width(&text).max(40.0) / 2.0;
+            if x - half > free_from {
                 *svg += &tick([x, bottom + 16.0], "middle", &text);
-                free_from = x + 46.0;
+                free_from = x + half;
             }
         }
         *svg += &tick([right, bottom + 33.0], "end", &self.chart.axes[0].title);
@@ -131,7 +132,7 @@ impl<'a> Drawing<'a> {
         marks.sort_by_key(|(index, _)| Some(*index) == series.main);
         for (index, mark) in marks {
             let [x, y] = self.at(mark.x, mark.y);
-            let radius = if Some(index) == series.main { 5.0 } else { 2.5 };
+            let radius = if series.is_large || Some(index) == series.main { 5.0 } else { 2.5 };
             _ = writeln!(
                 svg,
                 "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}</title></circle>",

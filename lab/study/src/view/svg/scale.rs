@@ -9,6 +9,7 @@ pub(super) struct Scale {
     pub range: [f64; 2],
     unit: Unit,
     is_linear: bool,
+    names: Vec<String>,
 }
 
 impl Scale {
@@ -28,7 +29,12 @@ impl Scale {
             let missing = (axis.decades - (high - low)).max(0.0) / 2.0 + 0.04 * (high - low).max(axis.decades);
             [low - missing, high + missing].map(|log| 10f64.powf(log))
         };
-        Self { range: axis.range.unwrap_or(around), unit: axis.unit, is_linear: axis.is_linear }
+        Self {
+            range: axis.range.unwrap_or(around),
+            unit: axis.unit,
+            is_linear: axis.is_linear,
+            names: axis.names.clone(),
+        }
     }
 
     /// Whether a value is within its ends.
@@ -49,6 +55,9 @@ impl Scale {
     /// Values of ticks, with their text: decades, and twos and fives where there are few of those.
     pub fn ticks(&self) -> Vec<(f64, String)> {
         let [low, high] = self.range;
+        if !self.names.is_empty() {
+            return self.names.iter().enumerate().map(|(index, name)| (index as f64, name.clone())).collect();
+        }
         if self.is_linear {
             return self.even_ticks();
         }
@@ -102,6 +111,13 @@ mod tests {
         assert!((axis.share(0.0) - 0.5).abs() < 1e-12);
         let ticks: Vec<_> = axis.ticks().into_iter().map(|(_, text)| text).collect();
         assert_eq!(ticks, ["-1", "-0.5", "0", "0.5", "1"]);
+    }
+
+    #[test]
+    fn things_without_values_have_their_names() {
+        let axis = Scale::of(&Axis::named("", ["a", "b"].map(str::to_owned)), [0.0, 1.0]);
+        assert_eq!(axis.ticks(), [(0.0, "a".to_owned()), (1.0, "b".to_owned())]);
+        assert_eq!((axis.share(0.0), axis.share(1.0)), (0.25, 0.75));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! How far a study is, and the end that Ctrl-C gives it.
+//! How far a study is, and the end that whoever runs it gives it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -19,8 +19,8 @@ pub struct Progress<'a> {
 /// How far a study is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
-    /// Of what, in a word or two.
-    pub what: &'static str,
+    /// Of what, or at what, in a few words.
+    pub what: String,
     /// How many are done.
     pub done: usize,
     /// Of how many.
@@ -48,19 +48,17 @@ impl<'a> Progress<'a> {
     }
 
     /// A function of each of some things on all cores, in their order; `None` of what was not begun when it was stopped.
-    pub fn map<T: Sync, R: Send>(
-        &self,
-        what: &'static str,
-        all: &[T],
-        function: impl Fn(&T) -> R + Sync,
-    ) -> Vec<Option<R>> {
-        let (before, count, start) = self.whole.unwrap_or((0, all.len(), Instant::now()));
-        let done = |done: usize| {
-            let done = before + done;
-            let left = start.elapsed().mul_f64(count.saturating_sub(done) as f64 / done.max(1) as f64);
-            (self.say)(&Step { what, done, all: count, left });
-        };
-        map_until(all, self.stop, &done, function)
+    pub fn map<T: Sync, R: Send>(&self, what: &str, all: &[T], function: impl Fn(&T) -> R + Sync) -> Vec<Option<R>> {
+        let progress = Self { whole: self.whole.or(Some((0, all.len(), Instant::now()))), ..*self };
+        map_until(all, self.stop, &|done| progress.tell(what, done), function)
+    }
+
+    /// Tells that so much of this part is done, and what that was or is next.
+    pub fn tell(&self, what: &str, done: usize) {
+        let Some((before, all, start)) = self.whole else { return };
+        let done = before + done;
+        let left = start.elapsed().mul_f64(all.saturating_sub(done) as f64 / done.max(1) as f64);
+        (self.say)(&Step { what: what.to_owned(), done, all, left });
     }
 }
 
@@ -81,5 +79,14 @@ mod tests {
         steps.sort_by_key(|step| step.done);
         assert_eq!(steps.iter().map(|step| step.done).collect::<Vec<_>>(), [1, 2, 3]);
         assert!(steps[2].left.is_zero() && steps[2].all == 3 && steps[2].what == "numbers");
+    }
+    #[test]
+    fn a_part_goes_on_from_what_was_done_before() {
+        let steps = Mutex::new(Vec::new());
+        let stop = AtomicBool::new(false);
+        let say = |step: &Step| steps.lock().unwrap().push(step.clone());
+        Progress::new(&stop, &say).part(6, 10).tell("a sweep", 2);
+        let steps = steps.into_inner().unwrap();
+        assert_eq!((steps[0].what.as_str(), steps[0].done, steps[0].all), ("a sweep", 8, 10));
     }
 }
