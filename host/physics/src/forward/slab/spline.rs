@@ -79,58 +79,22 @@ impl Grid {
     }
 
     /// Spline coefficients of sums of cosine modes, given by half waves along both sides and `columns x modes` amplitudes; modes of as many half
-    /// waves along `x` follow each other, those along `y` rising by one. Of all nodes, `x` running slowest and columns fastest.
+    /// waves along `x` follow each other. Of all nodes, `x` running slowest and columns fastest.
     pub fn synthesise(&self, modes: &[[usize; 2]], amplitudes: &DMatrix<f64>) -> Vec<f64> {
         let (columns, wide) = (amplitudes.nrows(), self.nodes(1));
         let alike: Vec<_> = modes.chunk_by(|a, b| a[0] == b[0]).collect();
         let y = self.cosines(1);
-        // For each number of half waves along x, the even ones first, the sum of those along y: `columns x nodes`.
-        let odd = |of: &&[[usize; 2]]| of[0][0] % 2;
-        let counts = [0, 1].map(|parity| alike.iter().filter(|of| odd(of) == parity).count());
+        // For each number of half waves along x, the sum of those along y: `columns x nodes`.
         let mut lines = DMatrix::zeros(columns * wide, alike.len());
-        let mut sums = [(); 2].map(|()| DMatrix::zeros(columns, self.half(1)));
-        let (mut first, mut next) = (0, [0, counts[0]]);
-        for of in &alike {
-            for (parity, sum) in sums.iter_mut().enumerate() {
-                // Every other mode, from the first of this parity.
-                let start = (of[0][1] + parity) % 2;
-                let count = (of.len() + 1 - start) / 2;
-                let waves = y.view_with_steps((of[0][1] + start, 1), (count, self.half(1)), (1, 0));
-                sum.gemm(1.0, &amplitudes.columns_with_step(first + start, count, 1), &waves, 0.0);
-            }
-            let mut line = lines.column_mut(next[odd(&of)]);
-            self.mirror(1, &sums, DMatrixViewMut::from_slice(line.as_mut_slice(), columns, wide));
-            next[odd(of)] += 1;
+        let mut first = 0;
+        for (line, of) in lines.as_mut_slice().chunks_exact_mut((columns * wide).max(1)).zip(&alike) {
+            let mut line = DMatrixViewMut::from_slice(line, columns, wide);
+            line.gemm(1.0, &amplitudes.columns(first, of.len()), &y.rows(of[0][1], of.len()), 0.0);
             first += of.len();
         }
         let x = self.cosines(0);
-        let sums = [0, 1].map(|parity| {
-            let of_parity: Vec<_> = alike.iter().filter(|of| odd(of) == parity).collect();
-            let waves = DMatrix::from_fn(of_parity.len(), self.half(0), |i, node| x[(of_parity[i][0][0], node + 1)]);
-            lines.columns(parity * counts[0], counts[parity]) * waves
-        });
-        let mut all = vec![0.0; columns * wide * self.nodes(0)];
-        self.mirror(0, &sums, DMatrixViewMut::from_slice(&mut all, columns * wide, self.nodes(0)));
-        all
-    }
-
-    /// Nodes along a direction up to the middle, from the edge on.
-    fn half(&self, axis: usize) -> usize {
-        self.cells[axis] / 2 + 1
-    }
-
-    /// Sums over even and over odd modes on one half of the nodes are those on the other half too, but for the odd ones' sign: a column for each
-    /// node of a direction.
-    fn mirror(&self, axis: usize, [even, odd]: &[DMatrix<f64>; 2], mut all: DMatrixViewMut<'_, f64>) {
-        for (node, mut column) in all.column_iter_mut().enumerate() {
-            let from_edge = node.abs_diff(1);
-            let (at, sign) = match self.cells[axis].abs_diff(from_edge) {
-                from_other if from_other < from_edge => (from_other, -1.0),
-                _ => (from_edge, 1.0),
-            };
-            let sums = even.column(at).into_iter().zip(odd.column(at));
-            column.iter_mut().zip(sums).for_each(|(to, (even, odd))| *to = even + sign * odd);
-        }
+        let waves = DMatrix::from_fn(alike.len(), self.nodes(0), |i, node| x[(alike[i][0][0], node)]);
+        (lines * waves).data.into()
     }
 
     /// Spline coefficients through the values of a function of the place (m): as [`synthesise`](Self::synthesise).
