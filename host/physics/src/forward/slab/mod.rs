@@ -64,8 +64,10 @@ pub struct Resolution {
     pub uneven_modes: usize,
     /// Wave numbers, times the thickness, up to which the pads' fields reach the top: those above have fallen to 2 exp(-this).
     pub across: usize,
-    /// Length at which the pads' fields on the top of a thin layer are split, in radii of the smallest pad.
+    /// Length at which the pads' fields on the top of a thin layer are split, at least, in radii of the smallest pad.
     pub split_in_pad: f64,
+    /// The same in pitches of the pads: nearly no place has more than two pads in reach then.
+    pub split_in_pitch: f64,
     /// Most steps in a pad's or dot's radius of the table of their fields, where they are not split: what limits it on layers that are thin against them.
     pub steps_in_pad: usize,
 }
@@ -79,6 +81,7 @@ impl Resolution {
         uneven_modes: 10,
         across: 11,
         split_in_pad: 1.25,
+        split_in_pitch: 0.2,
         steps_in_pad: 10,
     };
     /// For how readings change from one detector to another: on `square-60` changes are off by up to 3 % of themselves, those with a pad's own
@@ -90,6 +93,7 @@ impl Resolution {
         uneven_modes: 8,
         across: 6,
         split_in_pad: 2.0,
+        split_in_pitch: 0.25,
         steps_in_pad: 3,
     };
     /// Finer than any solver needs.
@@ -100,6 +104,7 @@ impl Resolution {
         uneven_modes: 16,
         across: 11,
         split_in_pad: 1.25,
+        split_in_pitch: 0.2,
         steps_in_pad: 10,
     };
 }

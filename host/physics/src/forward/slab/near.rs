@@ -22,11 +22,11 @@ use super::green::{Image, images};
 use super::pads::Pad;
 use super::quadrature::panels;
 
-/// Radii of a pad that its near field reaches at most.
-const REACH: f64 = 5.25;
+/// Radii of a pad that its near field reaches at most: the lesser is enough for most.
+const REACHES: [f64; 2] = [5.25, 10.5];
 
-/// `k a` in a panel of eight points: they resolve ten radians of the two Bessel functions' product.
-const PANEL: f64 = 10.0 / (REACH + 1.0);
+/// Radians of the two Bessel functions' product that a panel of eight points resolves.
+const PANEL: f64 = 10.0;
 
 /// `k a` that a table resolves; each next one twice as much.
 const COARSEST: f64 = 32.0;
@@ -140,7 +140,7 @@ fn reaching(size_m: [f64; 2], centre_m: [f64; 2], reach_m: f64) -> Vec<Image> {
 
 impl Profile {
     fn new(radius_m: f64, basis: &DiscBasis, covered: &Covered<'_>, split_m: f64, across: f64) -> Self {
-        let waves = Waves::of(across * radius_m / covered.thickness_m());
+        let waves = Waves::of(across * radius_m / covered.thickness_m(), reach(split_m / radius_m, across));
         let mut orders: Vec<[usize; 2]> = Vec::new();
         for density in basis.densities() {
             if !orders.contains(&[density.n, density.m]) {
@@ -198,25 +198,42 @@ fn cubic(t: f64) -> [f64; 4] {
     [-t * b * c / 6.0, a * b * c / 2.0, -a * t * c / 2.0, a * t * b / 6.0]
 }
 
+/// Radii of a pad within which its near field falls to `exp(-across)`, for a split length in radii: what is split off a point source is
+/// `E1(r^2 / R^2)` on a sheet.
+fn reach(split: f64, across: f64) -> f64 {
+    1.0 + across.sqrt() * split
+}
+
+/// The longest split length, in radii of a pad, whose near field is not cut off.
+pub(super) fn longest_split(across: f64) -> f64 {
+    (REACHES[REACHES.len() - 1] - 1.0) / across.sqrt()
+}
+
 /// Quadrature over `k a`, and the Bessel functions there: with the radius as unit they are the same for all slabs, so they are made once.
 struct Waves {
     /// `k a`, and `k a d(k a)`.
     points: Vec<[f64; 2]>,
+    reach: f64,
     steps_per_radius: f64,
     means: [OnceLock<Vec<f64>>; MAX_DEGREE + 1],
     waves: [OnceLock<DMatrix<f64>>; MAX_DEGREE + 1],
 }
 
 impl Waves {
-    /// That goes as far as a `k a`, or as far as there is any.
-    fn of(most: f64) -> &'static Self {
-        static ALL: [OnceLock<Waves>; LEVELS] = [const { OnceLock::new() }; LEVELS];
+    /// That goes as far as a `k a` and a reach in radii, or as far as there is any.
+    fn of(most: f64, reach: f64) -> &'static Self {
+        static ALL: [[OnceLock<Waves>; LEVELS]; REACHES.len()] =
+            [const { [const { OnceLock::new() }; LEVELS] }; REACHES.len()];
+        let which = REACHES.iter().position(|longest| *longest >= reach).unwrap_or(REACHES.len() - 1);
+        let reach = REACHES[which];
         let end = |level: usize| COARSEST * f64::from(1_u32 << level);
         let level = (0..LEVELS - 1).find(|level| end(*level) >= most).unwrap_or(LEVELS - 1);
-        ALL[level].get_or_init(|| {
-            let edges: Vec<f64> = (0..=(end(level) / PANEL).ceil() as usize).map(|i| PANEL * i as f64).collect();
+        ALL[which][level].get_or_init(|| {
+            let panel = PANEL / (reach + 1.0);
+            let edges: Vec<f64> = (0..=(end(level) / panel).ceil() as usize).map(|i| panel * i as f64).collect();
             Self {
                 points: panels(&edges, 8).into_iter().map(|[ka, weight]| [ka, ka * weight]).collect(),
+                reach,
                 steps_per_radius: STEPS * end(level),
                 means: [const { OnceLock::new() }; MAX_DEGREE + 1],
                 waves: [const { OnceLock::new() }; MAX_DEGREE + 1],
@@ -225,7 +242,7 @@ impl Waves {
     }
 
     fn steps(&self) -> usize {
-        (REACH * self.steps_per_radius) as usize
+        (self.reach * self.steps_per_radius) as usize
     }
 
     /// `J_(n+1)(k a) / (k a)`.
@@ -316,8 +333,9 @@ mod tests {
         detector.electrodes[4].radius_m = 0.0008;
         let finest = Resolution { pad_degree: 4, ..Resolution::STANDARD };
         let slab = |resolution| Slab::with_resolution(&detector, resolution).unwrap();
-        let [near, far] = [1.25, 1.6].map(|split_in_pad| slab(Resolution { split_in_pad, ..finest }));
-        let whole = slab(Resolution { split_in_pad: 0.01, steps_in_pad: 30, pad_degree: 8, ..finest });
+        let [near, far] = [1.25, 2.4].map(|split_in_pad| slab(Resolution { split_in_pad, ..finest }));
+        let whole = Resolution { split_in_pad: 0.01, split_in_pitch: 0.0, steps_in_pad: 30, ..finest };
+        let whole = slab(Resolution { pad_degree: 8, ..whole });
         let off = |a: &Slab, b: &Slab, at_m: [f64; 2]| {
             let contact = Contact::flat(at_m[0], at_m[1], 0.0004, 1e-4);
             let [a, b] = [a, b].map(|slab| {

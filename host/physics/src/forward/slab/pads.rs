@@ -15,7 +15,7 @@ use nalgebra::{Cholesky, DMatrix};
 use super::disc::{DiscBasis, DiscSelf};
 use super::driving::{Covered, Mode};
 use super::green::SurfaceGreen;
-use super::near::{NearFields, near_at_zero};
+use super::near::{NearFields, longest_split, near_at_zero};
 use super::spline::{Grid, signs};
 use super::uneven::Uneven;
 use super::{Resolution, from_corner};
@@ -185,7 +185,7 @@ impl PadFields {
         uneven: Option<&Uneven>,
         resolution: Resolution,
     ) -> Option<Self> {
-        let split_m = split_m(covered, smallest_m(pads), resolution);
+        let split_m = split_m(covered, pads, resolution);
         let (grid, modes) = match split_m {
             Some(split_m) => smooth_across(covered, split_m, resolution),
             None => across(covered, smallest_m(pads), resolution),
@@ -304,8 +304,11 @@ pub(super) fn smallest_m(pads: &[Pad]) -> f64 {
 
 /// Length at which fields of pads on the top are split (m); `None` where a table of all of them needs hardly finer steps, or is as fine for the
 /// driving layer's sake.
-fn split_m(covered: &Covered<'_>, smallest_m: f64, resolution: Resolution) -> Option<f64> {
-    let split_m = resolution.split_in_pad * smallest_m;
+fn split_m(covered: &Covered<'_>, pads: &[Pad], resolution: Resolution) -> Option<f64> {
+    let smallest_m = smallest_m(pads);
+    let pitch_m = (covered.size_m()[0] * covered.size_m()[1] / pads.len() as f64).sqrt();
+    let least_m = (resolution.split_in_pad * smallest_m).max(resolution.split_in_pitch * pitch_m);
+    let split_m = least_m.min(longest_split(resolution.across as f64) * smallest_m);
     let whole_m = PI * covered.thickness_m() / resolution.across as f64 / STEPS_IN_WAVE;
     let is_worth = PI / smooth_end(split_m, resolution) / STEPS_IN_SMOOTH_WAVE > WORTH * whole_m;
     (is_worth && covered.finest() == 0.0).then_some(split_m)
