@@ -46,10 +46,10 @@ impl Cloud {
         Some(Self { points, centre_m, squares_m2, along, conductance_s })
     }
 
-    /// The line of the same mean squares in a direction: of a length `l`, `l^2 / 12`.
-    fn line(&self, along: Point, square_m2: f64) -> Course {
-        let half_m = (3.0 * square_m2).sqrt();
-        Course::Line([-half_m, half_m].map(|by_m| [0, 1].map(|axis| self.centre_m[axis] + by_m * along[axis])))
+    /// The line of the same mean squares: of a length `l`, `l^2 / 12`.
+    fn line(&self) -> Course {
+        let half_m = (3.0 * self.squares_m2[0]).sqrt();
+        Course::Line([-half_m, half_m].map(|by_m| [0, 1].map(|axis| self.centre_m[axis] + by_m * self.along[axis])))
     }
 
     /// The circle of the same mean square.
@@ -74,16 +74,19 @@ impl Cloud {
     }
 }
 
-/// Strips of a usual width that contacts may stand for: lines and rings, the more of them the less contacts say. A single one is alike in all
-/// directions.
+/// Strips of a usual width that contacts may stand for: two of them for a line, one for a ring, more for both.
 pub(super) fn starts(contacts: &[FoundContact], usual_width_m: f64) -> Vec<Strip> {
     let Some(cloud) = Cloud::of(contacts, 0.5 * usual_width_m) else { return Vec::new() };
-    let ([x, y], [first_m2, other_m2]) = (cloud.along, cloud.squares_m2);
-    let mut courses = vec![cloud.line([x, y], first_m2), cloud.ring()];
-    match contacts.len() {
-        1 => courses.push(cloud.line([-y, x], other_m2)),
-        2 => {}
-        _ => courses.extend(cloud.circle().filter(|circle| are_apart(&cloud.ring(), circle))),
+    let mut courses = match contacts.len() {
+        1 => vec![cloud.ring()],
+        2 => vec![cloud.line()],
+        _ => vec![cloud.line(), cloud.ring()],
+    };
+    if contacts.len() > 2
+        && let Some(circle) = cloud.circle()
+        && are_apart(&cloud.ring(), &circle)
+    {
+        courses.push(circle);
     }
     let strip = |course| Strip { course, width_m: usual_width_m, conductance_s: cloud.conductance_s };
     courses.into_iter().map(strip).collect()
