@@ -1,5 +1,6 @@
 //! What the answer shows.
 
+use tactomo_physics::detector::short;
 use tactomo_study::view::{Axis, Chart, MM, PLAIN, Series, Style, TEXT, Table, Unit, View};
 
 use super::super::Reached;
@@ -12,7 +13,7 @@ pub fn view(answer: &Answer) -> View {
         Wish::Frames => wish.text(wishes.wanted(wish)),
         _ => format!("{} {}", wish.name(), wish.text(wishes.wanted(wish))),
     };
-    let [width_mm, height_mm] = wishes.size_m.map(|side_m| side_m * 1e3);
+    let [width_mm, height_mm] = wishes.size_m.map(|side_m| short(side_m * 1e3));
     let tried = format!(
         "Wanted: {width_mm} x {height_mm} mm, {}, at most {} electrodes. {} of {} candidates were tried, {} of them meet all wishes.",
         Wish::ALL.map(wanted).join(", "),
