@@ -11,7 +11,7 @@ use tactomo::hertz::{Beyond, Skin, Tip};
 use super::calibrate::force::PressArgs;
 use super::calibrate::force::gather::{Gathered, gather};
 use super::calibrate::force::known::measured;
-use super::calibrate::force::report::{ReportedPress, siemens, three};
+use super::calibrate::force::report::{ReportedPress, scatter_line, siemens, three};
 use super::calibrate::write;
 use super::scene::positive;
 use tactomo_cli::output::{self, NewFile, message};
@@ -203,11 +203,6 @@ impl<'a> Report<'a> {
             let (place, force) = (row.place, short(row.force_n));
             format!("{number:>5}  {place:<16} {force:>9}  {measured:>21}  {:>12.3e}{odd}", row.fitted_conductance_s)
         });
-        let per_cent = |share: f64| format!("{:.1} %", 100.0 * share);
-        let hysteresis = match self.hysteresis {
-            0.0 => "in the scatter".to_owned(),
-            half => format!("{} to either side", per_cent(half)),
-        };
         let kilopascals = [self.film_unit_pa, self.film_unit_deviation_pa].map(|pa| three(pa * 1e-3));
         let constriction = match self.constriction.zip(self.constriction_deviation) {
             Some((factor, deviation)) => {
@@ -222,7 +217,7 @@ impl<'a> Report<'a> {
                 kilopascals[1],
                 short(self.skin.young_pa * 1e-6)
             ),
-            format!("  scatter of presses    {} of the conductance; hysteresis {hysteresis}", per_cent(self.scatter)),
+            scatter_line(self.scatter, self.hysteresis),
             format!(
                 "  exponent              {} of the law, {} \u{b1} {} of the presses alone",
                 three(self.exponent),

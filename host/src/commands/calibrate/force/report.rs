@@ -92,18 +92,10 @@ impl<'a> Report<'a> {
         });
         let lines = std::iter::once(head).chain(rows).chain([self.law_line()]);
         let lines = lines.chain(self.parameters.iter().map(parameter_line));
-        let per_cent = |share: f64| format!("{:.1} %", 100.0 * share);
-        let hysteresis = match self.hysteresis {
-            0.0 => "in the scatter".to_owned(),
-            half => format!("{} to either side", per_cent(half)),
-        };
         lines
             .chain([
                 format!("  maximum force         {}", self.maximum_line()),
-                format!(
-                    "  scatter of presses    {} of the conductance; hysteresis {hysteresis}",
-                    per_cent(self.scatter)
-                ),
+                scatter_line(self.scatter, self.hysteresis),
                 format!("wrote {}: {} with newtons", self.out, self.detector),
             ])
             .collect::<Vec<_>>()
@@ -165,6 +157,16 @@ fn parameter_line(parameter: &FittedParameter) -> String {
         _ => "not determined".to_owned(),
     };
     format!("  {what:<21} {value}")
+}
+
+/// How far presses are from a law, and loading from unloading, in logarithms of the conductance.
+pub fn scatter_line(scatter: f64, hysteresis: f64) -> String {
+    let per_cent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let hysteresis = match hysteresis {
+        0.0 => "in the scatter".to_owned(),
+        half => format!("{} to either side", per_cent(half)),
+    };
+    format!("  scatter of presses    {} of the conductance; hysteresis {hysteresis}", per_cent(scatter))
 }
 
 /// A conductance with its standard error (S).

@@ -15,9 +15,6 @@ use crate::solve::methods::shapes::StripFit;
 use crate::solve::solver::{Hypothesis, Search};
 use tactomo_physics::readings::Readings;
 
-/// Contacts that stand for a line or a ring: as many as are searched.
-const STANDING: usize = 6;
-
 /// Chooses the model.
 pub(super) struct AutoSearch {
     pub(super) finder: Option<Arc<ContactFinder>>,
@@ -88,7 +85,8 @@ impl AutoSearch {
         error: Option<&Arc<ApproximationError>>,
         mean: &Mean,
     ) -> Option<(ContactHypothesis, StripFit)> {
-        let contacts = self.finder.as_ref()?.standing(from.strip().discs(STANDING), error, mean)?;
+        let finder = self.finder.as_ref()?;
+        let contacts = finder.standing(from.strip().discs(finder.most()), error, mean)?;
         let shape = self.surely(search, &contacts, Some(from), mean)?;
         Some((contacts, shape))
     }

@@ -291,6 +291,11 @@ impl ContactFinder {
         fit.cost > freedom * misfit_limit(freedom)
     }
 
+    /// How many contacts are searched at most.
+    pub fn most(&self) -> usize {
+        self.settings.most
+    }
+
     /// Whether a contact is as wide as a fit lets it be: then it stands for others that are missing, or for what is no disc.
     pub fn is_widest(&self, found: &ContactHypothesis) -> bool {
         found.fit.contacts.iter().any(|contact| contact.radius_m > 0.99 * self.widest_m)
