@@ -133,6 +133,22 @@ mod tests {
     }
 
     #[test]
+    fn discs_in_a_row_along_a_shape_give_it_back() {
+        let courses = [
+            Course::Line([[-0.012, 0.003], [0.015, -0.008]]),
+            Course::Ring { centre_m: [0.01, -0.004], radius_m: 0.012 },
+        ];
+        for (which, course) in courses.into_iter().enumerate() {
+            let discs = Strip { course, width_m: 0.002, conductance_s: 3e-3 }.discs(20);
+            assert!((discs.iter().map(|disc| disc.conductance_s).sum::<f64>() - 3e-3).abs() < 1e-12);
+            let contacts: Vec<_> =
+                discs.iter().map(|disc| FoundContact::flat(disc.x_m, disc.y_m, disc.conductance_s)).collect();
+            let found = starts(&contacts, 0.002)[which].course;
+            assert!((found.length_m() / course.length_m() - 1.0).abs() < 0.01, "{found:?}");
+        }
+    }
+
+    #[test]
     fn nothing_starts_from_nothing_and_a_perfect_contact_does_not_outweigh_the_rest() {
         assert!(starts(&[], 0.003).is_empty());
         let contact = |x_m: f64, conductance_s: f64| FoundContact {
