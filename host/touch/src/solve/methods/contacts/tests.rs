@@ -218,7 +218,7 @@ fn electrodes_that_are_left_out_take_what_their_converter_is_off_by_along_and_le
 
 #[test]
 fn a_number_is_named_beside_another_where_it_is_likely_enough() {
-    let certainty = |by_count: &[f64]| Certainty::of(1, by_count).map(|of| (of.share, of.alternative));
+    let certainty = |by_count: &[f64]| Certainty::of(1, by_count, 1.0).map(|of| (of.share, of.alternative));
     let none = f64::NEG_INFINITY;
     assert_eq!(certainty(&[none, -10.0, -13.0, none]), Some((1.0 / (1.0 + (-3.0_f64).exp()), None)));
     let even = Alternative { contacts: 2, certainty: 0.5 };
