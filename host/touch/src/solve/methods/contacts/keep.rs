@@ -99,12 +99,17 @@ impl ContactFinder {
 }
 
 impl ContactHypothesis {
-    /// Nats by which fewer contacts have to be likelier in some frames for one to be let go: what other frames said of their count is not forgotten for
-    /// what these do not need.
+    /// Nats by which fewer contacts have to be likelier in some frames for one to be let go.
     pub(super) fn needed(&self, target: &Target) -> f64 {
-        self.certainty.map_or(0.0, |Certainty { share, frames, .. }| {
-            let of_others = (1.0 - target.frames as f64 / frames).max(0.0);
-            of_others * (share / (1.0 - share)).ln().clamp(0.0, policy::gone_nats())
-        })
+        self.certainty.map_or(0.0, |certainty| certainty.needed(target.frames))
+    }
+}
+
+impl Certainty {
+    /// Nats by which another count has to be likelier in the mean of so many frames: what other frames said is not forgotten for what these do not
+    /// need.
+    pub(super) fn needed(self, frames: usize) -> f64 {
+        let of_others = (1.0 - frames as f64 / self.frames).max(0.0);
+        of_others * (self.share / (1.0 - self.share)).ln().clamp(0.0, policy::gone_nats())
     }
 }
