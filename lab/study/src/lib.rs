@@ -10,6 +10,7 @@ pub mod contacts;
 mod experiment;
 mod json_file;
 mod machine;
+pub mod picard;
 mod presses;
 mod progress;
 pub mod scanning;

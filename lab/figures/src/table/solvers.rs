@@ -23,7 +23,7 @@ const CLASSES: [(&str, &str, bool); 15] = [
 ];
 
 pub(super) fn figures() -> Vec<Figure> {
-    [random(), random_built(), built(), speed(), rows()].concat()
+    [random(), random_built(), built(), speed(), rows(), unknowns()].concat()
 }
 
 /// `auto` on random contacts.
@@ -105,6 +105,18 @@ fn built() -> Vec<Figure> {
         }
     }
     all
+}
+
+/// Singular values above the noise.
+fn unknowns() -> Vec<Figure> {
+    let of = |id: &str, says: &str, path: &str| {
+        let says = format!("singular values of square-60 that a light press lifts above the noise {says}");
+        figure("picard", format!("picard.square.{id}"), says, format!("detectors/detector=square-60/{path}"))
+    };
+    vec![
+        of("alone", "of a frame, nothing else pressed", "alone/above_noise").by(0.0),
+        of("averaged", "of the mean of 100 frames, beside a firm one", "beside_firm/above_averaged").by(1.0),
+    ]
 }
 
 /// Solvers of `tradeoff`, with their defaults.
