@@ -18,6 +18,7 @@ mod scenes;
 pub mod score;
 pub mod stability;
 pub mod stopwatch;
+pub mod surface;
 pub mod tradeoff;
 pub mod validate;
 mod variant;

@@ -23,7 +23,7 @@ const CLASSES: [(&str, &str, bool); 15] = [
 ];
 
 pub(super) fn figures() -> Vec<Figure> {
-    [random(), random_built(), built(), speed(), rows(), unknowns()].concat()
+    [random(), random_built(), built(), speed(), rows(), unknowns(), surface()].concat()
 }
 
 /// `auto` on random contacts.
@@ -117,6 +117,28 @@ fn unknowns() -> Vec<Figure> {
         of("alone", "of a frame, nothing else pressed", "alone/above_noise").by(0.0),
         of("averaged", "of the mean of 100 frames, beside a firm one", "beside_firm/above_averaged").by(1.0),
     ]
+}
+
+/// One press place by place.
+fn surface() -> Vec<Figure> {
+    let mut all = Vec::new();
+    for solver in
+        ["auto", "nonlinear", "bsbl", "tv", "nonnegative", "laplace", "noser", "tikhonov", "tsvd", "tikhonov-paper"]
+    {
+        let of = |id: &str, says: &str, field: &str| {
+            let says = format!("one firm press at each place of square-60, {solver}: {says}, median");
+            figure("surface", format!("surface.{solver}.{id}"), says, format!("solvers/solver={solver}/{field}/median"))
+        };
+        all.extend([
+            of("error", "error", "error_m").mm().share(0.1),
+            of("amplitude", "amplitude response", "amplitude_response").share(0.05),
+            of("position", "position error", "position_error_m").mm().by(0.05),
+            of("resolution", "resolution", "resolution").share(0.05),
+            of("deformation", "shape deformation", "shape_deformation").by(0.02),
+            of("ringing", "ringing", "ringing").by(0.02),
+        ]);
+    }
+    all
 }
 
 /// Solvers of `tradeoff`, with their defaults.

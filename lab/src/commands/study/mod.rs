@@ -5,6 +5,7 @@ mod built;
 mod contacts;
 mod design;
 mod picard;
+mod surface;
 
 pub use self::args::StudyArgs;
 
@@ -25,6 +26,7 @@ enum Study {
     Built(built::Args),
     Contacts(contacts::Args),
     Picard(picard::Args),
+    Surface(surface::Args),
     #[command(flatten)]
     Design(design::Study),
 }
@@ -35,6 +37,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Study::Built(args) => built::run(args),
         Study::Contacts(args) => contacts::run(args),
         Study::Picard(args) => picard::run(args),
+        Study::Surface(args) => surface::run(args),
         Study::Design(study) => design::run(study),
     }
 }

@@ -6,7 +6,7 @@ use super::super::figure::{Axis, Map};
 use super::super::html::escaped;
 use super::label::Labels;
 use super::scale::Scale;
-use super::{colour, opened, tick};
+use super::{colour, opened, tick, ticks_below};
 
 /// Room around the map: left, top, right (the scale), bottom (px).
 const ROOM: [f64; 4] = [52.0, 44.0, 64.0, 40.0];
@@ -22,7 +22,7 @@ pub(super) struct Drawing<'a> {
     map: &'a Map,
     /// To the right, and upwards.
     axes: [Scale; 2],
-    /// Smallest and largest value.
+    /// Values of the first and the last colour.
     extent: [f64; 2],
     /// Height (px).
     height: f64,
@@ -34,6 +34,7 @@ impl<'a> Drawing<'a> {
         let values = map.rows.iter().flatten().flatten();
         let extent = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], value| [a.min(*value), b.max(*value)]);
         let axes = [0, 1].map(|axis: usize| Scale::of(&around(&map.axes[axis], &map.ticks[axis]), []));
+        let extent = map.range.unwrap_or(extent);
         Self { map, axes, extent, height: SIDE * map.aspect }
     }
 
@@ -56,7 +57,7 @@ impl<'a> Drawing<'a> {
     /// How far a value is from the smallest to the largest, as colours count.
     fn share(&self, value: f64) -> f64 {
         let [low, high] = self.extent.map(|value| self.scaled(value));
-        if high > low { (self.scaled(value) - low) / (high - low) } else { 0.5 }
+        if high > low { ((self.scaled(value) - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 }
     }
 
     /// Width and height of a cell (px).
@@ -165,9 +166,10 @@ impl<'a> Drawing<'a> {
     fn ticks(&self, svg: &mut String) {
         let [x, y] = &self.axes;
         let bottom = ROOM[1] + self.height;
-        for (value, text) in x.ticks() {
-            *svg += &tick([self.at([value, y.range[0]])[0], bottom + 15.0], "middle", &text);
-        }
+        *svg += &ticks_below(
+            x.ticks().into_iter().map(|(value, text)| (self.at([value, y.range[0]])[0], text)),
+            bottom + 15.0,
+        );
         for (value, text) in y.ticks() {
             *svg += &tick([ROOM[0] - 5.0, self.at([x.range[0], value])[1] + 4.0], "end", &text);
         }
@@ -185,6 +187,10 @@ impl<'a> Drawing<'a> {
         let frame = [ROOM[0], ROOM[1], ROOM[0] + SIDE, ROOM[1] + self.height];
         let mut labels = Labels::new(frame, places.iter().copied(), []);
         for ([x, y], (_, name)) in places.iter().zip(&self.map.marks) {
+            if name.is_empty() {
+                _ = writeln!(svg, "<circle class=\"sample\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.2\"/>");
+                continue;
+            }
             let place = labels.place([*x, *y], name);
             if place.is_far {
                 let (to, height) = (place.left + 4.0, place.baseline - 4.0);
@@ -258,6 +264,7 @@ mod tests {
             rows,
             empty: "no figure",
             is_log: false,
+            range: None,
             format: PLAIN.digits(1),
             contours: 5,
             disc: None,
