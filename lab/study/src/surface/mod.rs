@@ -223,3 +223,75 @@ impl Spread {
         quantiles(values, [0.1, 0.5, 0.9]).map(|[p10, median, p90]| Self { p10, median, p90 })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::LazyLock;
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+    use crate::view::{csv, page, text};
+    use tactomo_physics::detector::Outline;
+
+    fn plan() -> Plan {
+        Plan {
+            detector: Detector::preset("square-50").unwrap(),
+            methods: vec![Method::Contacts, Method::Tikhonov],
+            across: 5,
+            sheets: 0.03,
+            seed: 2,
+            as_built: None,
+        }
+    }
+
+    /// One run for all tests.
+    static REPORT: LazyLock<Report> = LazyLock::new(|| {
+        let stop = AtomicBool::new(false);
+        run(&plan(), "", Progress::new(&stop, &|_| {})).unwrap()
+    });
+
+    #[test]
+    fn a_light_press_has_its_conductance_everywhere_and_contacts_are_sharper_than_an_image() {
+        let [contacts, image] = [0, 1].map(|index: usize| &REPORT.solvers[index]);
+        assert!(contacts.error_m.unwrap().p90 < 0.001, "{:?}", contacts.error_m);
+        for solver in [contacts, image] {
+            assert_eq!(solver.places.len(), 25);
+            let Spread { p10, p90, .. } = solver.amplitude_response.unwrap();
+            assert!(p10 > 0.8 && p90 < 1.2, "{} {p10} {p90}", solver.solver);
+        }
+        let sharp = |solver: &SolverReport| solver.resolution.unwrap().median;
+        assert!(sharp(contacts) < 0.5 * sharp(image));
+        assert!(image.ringing.unwrap().median > contacts.ringing.unwrap().median);
+    }
+
+    #[test]
+    fn presses_reach_the_edge_and_none_is_beside_the_outline() {
+        let [columns, rows] = &REPORT.grid_m;
+        assert_eq!((columns.len(), rows.len()), (5, 5));
+        assert!((columns[4] + REPORT.radius_m - 0.025).abs() < 1e-12);
+        // Three quarters of a square.
+        let outer = [[-1.0, -1.0], [1.0, -1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
+        let outline = Outline { outer: outer.map(|corner| corner.map(|x| 0.025 * x)).into(), holes: Vec::new() };
+        let detector = Detector { outline, ..plan().detector };
+        let on = places(&detector, &grid_m(&detector, 4, 0.002));
+        assert_eq!(on.len(), 12);
+        assert!(on.iter().all(|(_, [x_m, y_m])| *x_m < 0.0 || *y_m < 0.0), "{on:?}");
+    }
+
+    #[test]
+    fn each_solver_has_two_maps_and_a_row() {
+        let views = [view(&REPORT)];
+        let page = page(&views, "");
+        for solver in ["contacts", "tikhonov"] {
+            assert_eq!(page.matches(&format!("aria-label=\"{solver}\"")).count(), 2, "{solver}");
+        }
+        assert_eq!(csv(&views).lines().count(), 3);
+        assert!(text(&views).contains("amplitude response"));
+    }
+
+    #[test]
+    fn what_is_stopped_says_what_is_missing() {
+        let report = run(&plan(), "", Progress::new(&AtomicBool::new(true), &|_| {})).unwrap();
+        assert_eq!((report.solvers.len(), report.missing), (0, vec!["contacts".to_owned(), "tikhonov".to_owned()]));
+    }
+}

@@ -291,6 +291,16 @@ mod tests {
     }
 
     #[test]
+    fn values_beyond_a_range_have_the_colours_of_its_ends() {
+        let mut map = map(vec![vec![Some(0.0), Some(0.5), Some(3.0)]]);
+        let shares = |map: &Map| [0.0, 0.5, 3.0].map(|value| Drawing::of(map).share(value));
+        assert_eq!(shares(&map), [0.0, 0.5 / 3.0, 1.0]);
+        map.range = Some([0.5, 1.5]);
+        assert_eq!(shares(&map), [0.0, 0.0, 1.0]);
+        assert!(svg(&map).contains(">1.5</text>") && !svg(&map).contains(">3.0</text>"));
+    }
+
+    #[test]
     fn labels_of_marks_that_are_near_do_not_lie_on_one_another() {
         let mut crowded = map(vec![vec![Some(0.0); 3]; 3]);
         crowded.marks = ["AB", "BA", "AD", "DA"].map(|name| ([10.0, 10.0], name.to_owned())).into();
