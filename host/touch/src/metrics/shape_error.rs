@@ -1,10 +1,8 @@
 //! How far what was found of a touch of any shape is from it.
 
+use super::image::upper_half;
 use tactomo_physics::forward::ImageMesh;
 use tactomo_physics::space;
-
-/// What stands out of an image is at least this share of its highest value.
-const HALF: f64 = 0.5;
 
 /// Mean distance between what touches and what was found (m), both ways: of each place that stands out of one image (at least half of its highest
 /// value) to the nearest that stands out of the other, the mean over the places of each by their areas, and the mean of both; at most `most_m`,
@@ -25,9 +23,7 @@ pub fn shape_error_m(mesh: &ImageMesh, truth: &[f32], found: &[f32], most_m: f64
 
 /// Nodes at which an image is at least half of its highest value.
 fn standing_out(image: &[f32]) -> Vec<usize> {
-    let highest = f64::from(image.iter().copied().fold(0.0, f32::max));
-    let is = |node: &usize| highest > 0.0 && f64::from(image[*node]) >= HALF * highest;
-    (0..image.len()).filter(is).collect()
+    upper_half(image).map_or_else(Vec::new, |is_in| (0..image.len()).filter(|node| is_in[*node]).collect())
 }
 
 fn mean_distance_m(mesh: &ImageMesh, from: &[usize], to: &[usize], most_m: f64) -> f64 {

@@ -8,7 +8,7 @@ use tactomo_cli::choice::{self, DetectorArgs};
 use tactomo_cli::output;
 
 /// Places along the longer side: in a quick look, and else.
-const ACROSS: [u8; 2] = [8, 24];
+const ACROSS: [u8; 2] = [8, 20];
 
 /// Shows how each solver shows one press, place by place: GREIT's figures of merit, and maps of error and amplitude.
 ///
@@ -31,7 +31,7 @@ pub struct Args {
     /// A quick look, at few places
     #[arg(long, conflicts_with = "across")]
     quick: bool,
-    /// Places along the longer side [default: 24, with --quick 8]
+    /// Places along the longer side [default: 20, with --quick 8]
     #[arg(long, value_name = "PLACES", value_parser = clap::value_parser!(u8).range(2..))]
     across: Option<u8>,
     /// Conductance of the press, in sheet conductances: 0.03 is light, 0.3 firm

@@ -169,14 +169,17 @@ fn press(plan: &Plan, centre_m: Point, radius_m: f64) -> Touch {
     Touch::flat(centre_m, Shape::Disc { radius_m }, plan.sheets * plan.detector.sheet_conductance_s())
 }
 
-/// Columns and rows as far apart as each other, so that the press is nowhere over the edge of the outline's box.
+/// Middles of so many cells along the longer side, or of fewer that are as wide as the press; those of the shorter side are as wide or a little
+/// wider, two at least.
 fn grid_m(detector: &Detector, across: usize, radius_m: f64) -> [Vec<f64>; 2] {
     let [low, high] = detector.outline.bounds();
-    let length_m = [0, 1].map(|axis: usize| (high[axis] - low[axis] - 2.0 * radius_m).max(0.0));
-    let step_m = length_m[0].max(length_m[1]) / (across.max(2) - 1) as f64;
+    let length_m = [0, 1].map(|axis: usize| high[axis] - low[axis]);
+    let longer_m = length_m[0].max(length_m[1]);
+    let step_m = (longer_m / across as f64).max(2.0 * radius_m);
     [0, 1].map(|axis: usize| {
-        let steps = (length_m[axis] / step_m).round().max(1.0);
-        (0..=steps as usize).map(|step| low[axis] + radius_m + length_m[axis] * step as f64 / steps).collect()
+        // Rounding must not cost a cell.
+        let count = (length_m[axis] / step_m + 1e-9).floor().max(2.0);
+        (0..count as usize).map(|cell| low[axis] + length_m[axis] * (cell as f64 + 0.5) / count).collect()
     })
 }
 
@@ -265,10 +268,12 @@ mod tests {
     }
 
     #[test]
-    fn presses_reach_the_edge_and_none_is_beside_the_outline() {
+    fn cells_fill_the_outline_and_none_is_beside_the_outline() {
         let [columns, rows] = &REPORT.grid_m;
         assert_eq!((columns.len(), rows.len()), (5, 5));
-        assert!((columns[4] + REPORT.radius_m - 0.025).abs() < 1e-12);
+        assert!((columns[4] - 0.020).abs() < 1e-12);
+        let [columns, rows] = grid_m(&Detector::preset("strip-13x60").unwrap(), 50, 0.001).map(|middles| middles.len());
+        assert_eq!((columns, rows), (6, 30), "no cell is narrower than the press");
         // Three quarters of a square.
         let outer = [[-1.0, -1.0], [1.0, -1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
         let outline = Outline { outer: outer.map(|corner| corner.map(|x| 0.025 * x)).into(), holes: Vec::new() };

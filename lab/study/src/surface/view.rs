@@ -81,9 +81,15 @@ fn map(
         format,
         contours: 0,
         disc: None,
-        aspect: rows as f64 / columns.max(1) as f64,
+        aspect: length_m(&report.grid_m[1]) / length_m(&report.grid_m[0]),
         marks: report.electrodes_m.iter().map(|at_m| (*at_m, String::new())).collect(),
     }
+}
+
+/// Length of cells with such middles, which are two at least (m).
+fn length_m(middles_m: &[f64]) -> f64 {
+    middles_m.windows(2).map(|pair| pair[1] - pair[0]).sum::<f64>() * middles_m.len() as f64
+        / (middles_m.len() - 1).max(1) as f64
 }
 
 /// A median with what most places have, in words.
@@ -132,7 +138,7 @@ fn data(report: &Report) -> Table {
 fn method(report: &Report) -> String {
     let places = report.solvers.first().map_or(0, |solver| solver.places.len());
     format!(
-        "{places} places, each pressed once by {} sheet conductances over a radius of {:.2} mm, as far from the edge at least; each a cold start of one frame. \
+        "{places} places, each pressed once by {} sheet conductances over a radius of {:.2} mm; each a cold start of one frame. \
          Readings are simulated on a finer model than any that is inverted, with the converter's noise and steps, less a baseline; seed {}. The figures \
          are those of A. Adler et al., \"GREIT: a unified approach to 2D linear EIT reconstruction of lung images\", Physiological Measurement 30 (2009) \
          S35. `--json` has every place.",
