@@ -6,11 +6,15 @@ use super::experiment::{Experiment, Frame};
 use super::stopwatch::timed;
 use tactomo_physics::forward::{ForwardError, ImageMesh};
 use tactomo_physics::scene::{Contact, Touch};
-use tactomo_touch::metrics::{Comparison, Greit, ImageMetrics, Matching, PaperFigures, found_s_per_m2, truth_s_per_m2};
+use tactomo_touch::metrics::{
+    Comparison, Greit, ImageMetrics, Matching, PaperFigures, found_s_per_m2, shape_error_m, truth_s_per_m2,
+};
 use tactomo_touch::solve::{Flags, FoundContact, Solution, Solver};
 
 /// Images are smoothed by this share of the shorter side before they are compared: by 2 mm on 60 mm.
 const SMOOTHING_SHARE: f64 = 1.0 / 30.0;
+/// Radius of contacts without one, as discs beside a touch of another shape (mean distances of electrodes): 1.5 mm of 15.
+const POINT_SHARE: f64 = 0.1;
 
 /// What one frame's solution is worth. `None` where a figure is not defined.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,7 +27,7 @@ pub struct Score {
     pub not_finite: bool,
     /// Number of contacts found.
     pub found: usize,
-    /// Mean error with those missed and invented (m): [`Matching::ospa_m`].
+    /// Mean error with those missed and invented (m): [`Matching::ospa_m`]; of touches that are no discs [`shape_error_m`].
     pub error_m: Option<f64>,
     /// Mean distance of contacts found (m), however far.
     pub position_error_m: Option<f64>,
@@ -48,6 +52,8 @@ pub struct Score {
 /// Scores solutions on one detector.
 pub struct Scorer {
     reach_m: f64,
+    /// Where touches that are no discs are compared with what was found; `None` if images are.
+    shapes: Option<ImageMesh>,
     images: Option<Images>,
 }
 
@@ -64,12 +70,13 @@ struct Images {
 impl Scorer {
     /// For solutions of an experiment's problem.
     pub fn new(experiment: &Experiment) -> Self {
-        Self { images: Some(Images::new(experiment)), ..Self::of_contacts(experiment.reach_m()) }
+        Self { reach_m: experiment.reach_m(), shapes: None, images: Some(Images::new(experiment)) }
     }
 
-    /// For contacts alone: images are not looked at. What is further from the truth than `reach_m` counts as missed and invented.
-    pub fn of_contacts(reach_m: f64) -> Self {
-        Self { reach_m, images: None }
+    /// For errors alone: images are looked at where touches are no discs, which then have the [error](shape_error_m) of a shape.
+    pub fn of_errors(experiment: &Experiment) -> Self {
+        let shapes = Some(experiment.problem.jacobian.image_mesh.clone());
+        Self { reach_m: experiment.reach_m(), shapes, images: None }
     }
 
     /// Lets a solver read frames one after the other, and scores what it found.
@@ -103,6 +110,10 @@ impl Scorer {
         };
         if let Some(truth) = &frame.contacts {
             self.score_contacts(truth, &solution.contacts, &mut score);
+        } else if let Some(mesh) = &self.shapes {
+            let [truth, found] =
+                [truth_s_per_m2(mesh, &frame.touches)?, found_s_per_m2(mesh, solution, self.reach_m * POINT_SHARE)];
+            score.error_m = shape_error_m(mesh, &truth, &found, self.reach_m);
         }
         if let Some(images) = self.images.as_mut().filter(|_| !frame.touches.is_empty()) {
             images.score(frame, solution, &mut score)?;
@@ -330,6 +341,22 @@ mod tests {
         let frame = frame(&experiment, SceneKind::None);
         let score = Scorer::new(&experiment).score(&frame, &Solution::default()).unwrap();
         assert_eq!((score.error_m, score.invented, score.image.correlation), (Some(0.0), Some(0), None));
+    }
+
+    #[test]
+    fn touches_that_are_no_discs_have_an_error_too() {
+        let experiment = experiment();
+        let mut scorer = Scorer::of_errors(&experiment);
+        let frame = frame(&experiment, SceneKind::Line);
+        let truth = truth_s_per_m2(&experiment.problem.jacobian.image_mesh, &frame.touches).unwrap();
+        let right = Solution { image_s_per_m2: Some(truth), ..Solution::default() };
+        assert_eq!(scorer.score(&frame, &right).unwrap().error_m, Some(0.0));
+        let [x_m, y_m] = frame.touches[0].centre_m;
+        let middle = Solution { contacts: vec![FoundContact::flat(x_m, y_m, 1e-3)], ..Solution::default() };
+        let error_m = scorer.score(&frame, &middle).unwrap().error_m.unwrap();
+        assert!(error_m > 0.002 && error_m < experiment.reach_m(), "{error_m}");
+        let nothing = scorer.score(&frame, &Solution::default()).unwrap();
+        assert_eq!((nothing.error_m, nothing.missed), (Some(experiment.reach_m()), None));
     }
 
     #[test]

@@ -126,6 +126,7 @@ fn map(report: &Report, Figure(title, subtitle, is_log, format, of): &Figure) ->
         rows: ticks.iter().map(|top| ticks.iter().map(|bottom| value(*bottom, *top)).collect()).collect(),
         empty: if title.starts_with("SR") || title.starts_with("PA") { "collapsed" } else { "not determined" },
         is_log: *is_log,
+        range: None,
         format: *format,
         contours: 5,
         disc: None,

@@ -103,6 +103,8 @@ pub struct Map {
     pub empty: &'static str,
     /// Whether colours follow the logarithm.
     pub is_log: bool,
+    /// Values that have the first and the last colour, and what is beyond them too; `None` for the smallest and the largest.
+    pub range: Option<[f64; 2]>,
     /// How values are written.
     pub format: Format,
     /// Contour lines between the smallest and the largest value.
@@ -263,6 +265,9 @@ impl From<[f64; 2]> for Mark {
 impl Unit {
     /// A value with its unit, as short as it can be.
     pub fn text(self, value: f64) -> String {
+        if value == 0.0 {
+            return "0".to_owned();
+        }
         let scales: &[(f64, &str)] = match self {
             Self::Seconds => &[(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")],
             Self::Metres => &[(1.0, "m"), (1e-3, "mm"), (1e-6, "µm")],
@@ -306,6 +311,7 @@ mod tests {
             (Unit::Metres, -0.01, "-10 mm"),
             (Unit::Metres, 0.0001, "0.1 mm"),
             (Unit::Metres, 2e-5, "0.02 mm"),
+            (Unit::Metres, 0.0, "0"),
             (Unit::Plain, 0.3, "0.3"),
             (Unit::Plain, 200.0, "200"),
         ] {

@@ -6,7 +6,7 @@ use super::super::figure::{Chart, Mark, Series};
 use super::super::html::escaped;
 use super::label::Labels;
 use super::scale::Scale;
-use super::{opened, tick};
+use super::{opened, tick, ticks_below};
 
 /// Room around the plot: left, top, right, bottom (px).
 const ROOM: [f64; 4] = [58.0, 44.0, 14.0, 42.0];
@@ -61,16 +61,12 @@ impl<'a> Drawing<'a> {
             _ = write!(svg, "<path class=\"grid\" d=\"M{left} {y:.1}H{right}\"/>");
             *svg += &tick([left - 6.0, y + 4.0], "end", &text);
         }
-        let mut free_from = f64::NEG_INFINITY;
-        for (value, text) in self.x.ticks() {
-            let [x, _] = self.at(value, self.y.range[0]);
+        let ticks: Vec<_> =
+            self.x.ticks().into_iter().map(|(value, text)| (self.at(value, self.y.range[0])[0], text)).collect();
+        for (x, _) in &ticks {
             _ = write!(svg, "<path class=\"grid\" d=\"M{x:.1} {top}V{bottom}\"/>");
-            let half = Labels::width(&text).max(40.0) / 2.0;
-            if x - half > free_from {
-                *svg += &tick([x, bottom + 16.0], "middle", &text);
-                free_from = x + half;
-            }
         }
+        *svg += &ticks_below(ticks, bottom + 16.0);
         *svg += &tick([right, bottom + 33.0], "end", &self.chart.axes[0].title);
         if let Some((value, why)) = self.chart.guide.as_ref().filter(|(value, _)| self.x.has(*value)) {
             let [x, _] = self.at(*value, self.y.range[0]);
