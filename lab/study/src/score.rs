@@ -45,6 +45,20 @@ pub struct Score {
     pub residual: Option<f64>,
 }
 
+impl Score {
+    /// Whether the answer is wrong, whatever its error is: refused, not finite, or with a contact missed or invented.
+    pub fn is_wrong(&self) -> bool {
+        let miscounted = self.missed.unwrap_or(0) + self.invented.unwrap_or(0) > 0;
+        self.failed || self.not_finite || miscounted
+    }
+
+    /// Whether the image is wrong: refused, not finite, or explaining less than half of the truth's variance.
+    pub fn is_wrong_image(&self) -> bool {
+        let explained = self.image.correlation.map_or(0.0, |correlation| correlation.max(0.0).powi(2));
+        self.failed || self.not_finite || explained < 0.5
+    }
+}
+
 /// Scores solutions on one detector.
 pub struct Scorer {
     reach_m: f64,
@@ -174,6 +188,10 @@ pub struct Summary {
     pub not_finite: f64,
     /// Mean error with contacts missed and invented (m).
     pub error_m: Option<f64>,
+    /// How that error is spread over frames (m).
+    pub error_spread_m: Option<Spread>,
+    /// Share of frames whose answer [is wrong](Score::is_wrong).
+    pub wrong: f64,
     /// Mean distance of contacts found (m).
     pub position_error_m: Option<f64>,
     /// Share of frames with no contact missed and none invented.
@@ -186,6 +204,10 @@ pub struct Summary {
     pub conductance_error: Option<f64>,
     /// Correlation of the image with the truth, zero where there is no image to correlate.
     pub correlation: Option<f64>,
+    /// How that is spread over frames.
+    pub correlation_spread: Option<Spread>,
+    /// Share of frames whose image [is wrong](Score::is_wrong_image), where something touches.
+    pub wrong_image: Option<f64>,
     /// Dice's coefficient.
     pub dice: Option<f64>,
     /// Jaccard's index.
@@ -214,11 +236,26 @@ pub struct Summary {
     pub excluded: f64,
 }
 
+/// How a figure is spread over frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Spread {
+    /// A tenth of the frames is below.
+    pub p10: f64,
+    /// Half of them.
+    pub median: f64,
+    /// Nine tenths.
+    pub p90: f64,
+}
+
 /// Times (us).
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Times {
+    /// A tenth of the frames take less.
+    pub p10: f64,
     /// Half of the frames take less.
     pub median: f64,
+    /// Nine tenths of the frames take less.
+    pub p90: f64,
     /// Of a hundred frames, one takes longer.
     pub p99: f64,
     /// The longest.
@@ -235,18 +272,23 @@ impl Summary {
         let mean = |of: &dyn Fn(&Score) -> Option<f64>| mean(scores.iter().filter_map(|score| of(score)));
         // A solver that shows nothing where something touches is as wrong as one that shows anything.
         let touched = scores.iter().any(|score| score.image.correlation.is_some());
+        let correlation = |score: &Score| touched.then(|| score.image.correlation.unwrap_or(0.0));
         Self {
             frames: scores.len(),
             time_us: Times::of(scores.iter().map(|score| score.time)),
             failed: share(&|score| score.failed),
             not_finite: share(&|score| score.not_finite),
             error_m: mean(&|score| score.error_m),
+            error_spread_m: Spread::of(scores.iter().filter_map(|score| score.error_m)),
+            wrong: share(&|score| score.is_wrong()),
             position_error_m: mean(&|score| score.position_error_m),
             count_right: mean(&|score| Some(f64::from(u8::from(score.missed? + score.invented? == 0)))),
             missed: mean(&|score| score.missed.map(|count| count as f64)),
             invented: mean(&|score| score.invented.map(|count| count as f64)),
             conductance_error: median(scores.iter().filter_map(|score| score.conductance_error)),
-            correlation: mean(&|score| touched.then(|| score.image.correlation.unwrap_or(0.0))),
+            correlation: mean(&correlation),
+            correlation_spread: Spread::of(scores.iter().filter_map(|score| correlation(score))),
+            wrong_image: touched.then(|| share(&|score| score.is_wrong_image())),
             dice: mean(&|score| score.image.dice),
             iou: mean(&|score| score.image.iou),
             spatial_resolution: mean(&|score| Some(score.paper?.spatial_resolution)),
@@ -264,11 +306,35 @@ impl Summary {
     }
 }
 
+impl Spread {
+    /// Of some figures; `None` without one.
+    pub fn of(figures: impl Iterator<Item = f64>) -> Option<Self> {
+        quantiles(figures, [0.1, 0.5, 0.9]).map(|[p10, median, p90]| Self { p10, median, p90 })
+    }
+
+    /// The same of a function that rises.
+    #[must_use]
+    pub fn map(self, rising: impl Fn(f64) -> f64) -> Self {
+        Self { p10: rising(self.p10), median: rising(self.median), p90: rising(self.p90) }
+    }
+
+    /// The same of a function that falls.
+    #[must_use]
+    pub fn turned(self, falling: impl Fn(f64) -> f64) -> Self {
+        Self { p10: self.p90, median: self.median, p90: self.p10 }.map(falling)
+    }
+}
+
 impl Times {
+    /// How they are spread.
+    pub fn spread(self) -> Spread {
+        Spread { p10: self.p10, median: self.median, p90: self.p90 }
+    }
+
     fn of(times: impl Iterator<Item = Duration>) -> Self {
         let us = times.map(|time| time.as_secs_f64() * 1e6);
-        let [median, p99, max] = quantiles(us, [0.5, 0.99, 1.0]).unwrap_or_default();
-        Self { median, p99, max }
+        let [p10, median, p90, p99, max] = quantiles(us, [0.1, 0.5, 0.9, 0.99, 1.0]).unwrap_or_default();
+        Self { p10, median, p90, p99, max }
     }
 }
 

@@ -13,13 +13,13 @@ use super::experiment::{Experiment, StudyError};
 use super::machine::Machine;
 use super::progress::Progress;
 use super::scenes::{Group, SceneKind};
-use super::score::Summary;
+use super::score::{Spread, Summary};
 use super::variant::Variation;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
 use tactomo_touch::solve::{Family, Method};
 
-use self::trial::{Trial, try_variation};
+use self::trial::{Trial, floors, try_variation};
 
 pub use self::view::view;
 
@@ -30,8 +30,8 @@ pub struct Plan {
     pub detectors: Vec<Detector>,
     /// Solvers.
     pub methods: Vec<Method>,
-    /// Whether main parameters are swept.
-    pub sweep: bool,
+    /// Places of each kind of scene at which other values of main parameters are tried; none where they are not swept.
+    pub swept: usize,
     /// Places of each kind of scene.
     pub places: usize,
     /// Frames at each place, with new noise each.
@@ -44,6 +44,8 @@ pub struct Plan {
     pub as_built: Option<u64>,
     /// Else solvers are tried once more, with their defaults, on so many detectors drawn from the tolerances.
     pub drawn: usize,
+    /// A place of each of these kinds of scenes is on each of those.
+    pub drawn_scenes: Vec<SceneKind>,
     /// If given, and on those once more after a calibration.
     pub calibrate: Option<Calibrate>,
 }
@@ -93,6 +95,8 @@ pub struct DetectorReport {
     pub reach_m: f64,
     /// Solvers that cannot be made for this model, and why.
     pub unavailable: Vec<String>,
+    /// What noise allows there.
+    pub floors: Vec<Floor>,
     /// One for each solver and parameter.
     pub solvers: Vec<SolverReport>,
     /// The same solvers with their defaults on detectors drawn from the tolerances: as solvers know them, one after the other.
@@ -108,8 +112,12 @@ pub struct AsBuiltReport {
     pub calibration: Option<String>,
     /// How many calibrations were refused, which left solvers the description.
     pub refused: usize,
-    /// How many detectors, each with a place of each kind of scene.
+    /// How many detectors, each with a place of each of these kinds of scenes.
     pub detectors: usize,
+    /// The kinds.
+    pub scenes: Vec<SceneKind>,
+    /// What noise allows there.
+    pub floors: Vec<Floor>,
     /// One for each solver.
     pub solvers: Vec<SolverReport>,
 }
@@ -161,6 +169,31 @@ pub struct GroupReport {
     pub group: Group,
     /// Its means.
     pub summary: Summary,
+    /// Of the first frame at each place alone: a cold start.
+    pub first: Summary,
+    /// Of the frames that follow.
+    pub following: Summary,
+}
+
+/// Errors (m) of an unbiased method that is as good as noise allows in the places of contacts whose number is known and whose radii are known to a factor of
+/// two: normal ones with the covariance of the [Cramer-Rao bound](crate::cramer_rao), over the same frames.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Floor {
+    /// Of which scenes.
+    pub group: Group,
+    /// From one frame.
+    pub first_m: Option<Spread>,
+    /// From all frames at a place up to each of those that follow the first.
+    pub following_m: Option<Spread>,
+}
+
+/// Which frames of a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Course {
+    /// The first one: a cold start.
+    First,
+    /// Those that follow.
+    Following,
 }
 
 /// A kind's means.
@@ -180,6 +213,16 @@ impl AsBuiltReport {
 }
 
 impl SolverReport {
+    /// Figures of some frames of a group; `None` if there are none.
+    pub fn course(&self, group: Group, course: Course) -> Option<&Summary> {
+        let report = self.groups.iter().find(|report| report.group == group)?;
+        let summary = match course {
+            Course::First => &report.first,
+            Course::Following => &report.following,
+        };
+        (summary.frames > 0).then_some(summary)
+    }
+
     /// Means of a group.
     pub fn group(&self, group: Group) -> Option<&Summary> {
         Some(&self.groups.iter().find(|report| report.group == group)?.summary)
@@ -196,12 +239,13 @@ impl SolverReport {
 /// # Errors
 /// [`StudyError`] if a detector cannot be modelled or is curved.
 pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, StudyError> {
-    let mut course = Course { progress: progress.part(0, plan.work()), done: 0, missing: Vec::new() };
+    let progress = progress.part(0, plan.work());
+    let mut run = Run { progress, swept: plan.swept, done: 0, missing: Vec::new() };
     let mut detectors = Vec::new();
     for detector in &plan.detectors {
-        match course.goes_on(&detector.name) {
-            true => detectors.push(on_detector(plan, detector, &mut course)?),
-            false => course.missing.push(detector.name.clone()),
+        match run.goes_on(&detector.name) {
+            true => detectors.push(on_detector(plan, detector, &mut run)?),
+            false => run.missing.push(detector.name.clone()),
         }
     }
     Ok(Report {
@@ -212,16 +256,16 @@ pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, Stu
         places: plan.places,
         frames: plan.frames,
         detectors,
-        missing: course.missing,
+        missing: run.missing,
     })
 }
 
 impl Plan {
     /// Solvers with their defaults and, where that is asked for, with other values of their main parameters.
     fn variations(&self) -> Vec<Variation> {
-        let sweep = |method: &Method| match self.sweep {
-            true => Variation::sweep(*method),
-            false => vec![Variation::default_of(*method)],
+        let sweep = |method: &Method| match self.swept {
+            0 => vec![Variation::default_of(*method)],
+            _ => Variation::sweep(*method),
         };
         self.methods.iter().flat_map(sweep).collect()
     }
@@ -241,13 +285,15 @@ impl Plan {
 }
 
 /// How far the study is.
-struct Course<'a> {
+struct Run<'a> {
     progress: Progress<'a>,
+    /// Places at which values of parameters are tried that are not the defaults.
+    swept: usize,
     done: usize,
     missing: Vec<String>,
 }
 
-impl Course<'_> {
+impl Run<'_> {
     /// Tells what is tried next, unless it was stopped.
     fn goes_on(&self, next: &str) -> bool {
         self.progress.tell(next, self.done);
@@ -270,21 +316,25 @@ impl Course<'_> {
             self.missing.push(name);
             return None;
         }
-        let tried = try_variation(heap, trials, variation);
+        let most = if variation.parameter.is_some() { self.swept } else { usize::MAX };
+        let tried = try_variation(heap, trials, variation, most);
         tried.map_err(|error| unavailable.push(format!("{}: {}", variation.label(), with_causes(&error)))).ok()
     }
 }
 
-fn on_detector(plan: &Plan, detector: &Detector, course: &mut Course) -> Result<DetectorReport, StudyError> {
+fn on_detector(plan: &Plan, detector: &Detector, run: &mut Run) -> Result<DetectorReport, StudyError> {
     let described = Experiment::new(detector)?;
     let experiment = match plan.as_built {
         Some(seed) => described.as_built(seed)?,
         None => described,
     };
-    let mut trials = [Trial::new(plan, experiment, 0..plan.places as u64)?];
+    let mut trials = [Trial::new(plan, experiment, 0..plan.places as u64, &SceneKind::ALL)?];
+    let floors = floors(&trials)?;
     let (mut solvers, mut unavailable) = (Vec::new(), Vec::new());
     for variation in plan.variations() {
-        solvers.extend(course.tried(&detector.name, plan.heap, &mut trials, variation, &mut unavailable));
+        // With another value of its parameter a solver needs about the same memory.
+        let heap = plan.heap.filter(|_| variation.parameter.is_none());
+        solvers.extend(run.tried(&detector.name, heap, &mut trials, variation, &mut unavailable));
     }
     let [Trial { experiment, .. }] = trials;
     Ok(DetectorReport {
@@ -294,13 +344,14 @@ fn on_detector(plan: &Plan, detector: &Detector, course: &mut Course) -> Result<
         model_ms: milliseconds(experiment.model_time),
         reach_m: experiment.reach_m(),
         unavailable,
+        floors,
         solvers,
-        as_built: as_built(plan, &experiment, course)?,
+        as_built: as_built(plan, &experiment, run)?,
     })
 }
 
 /// Solvers on detectors drawn from the tolerances of a sound one: knowing the description, and calibrated if there is a way.
-fn as_built(plan: &Plan, sound: &Experiment, course: &mut Course) -> Result<Vec<AsBuiltReport>, StudyError> {
+fn as_built(plan: &Plan, sound: &Experiment, run: &mut Run) -> Result<Vec<AsBuiltReport>, StudyError> {
     let name = &sound.detector.name;
     if sound.detector.tolerances.is_exact() {
         return Ok(Vec::new());
@@ -309,8 +360,8 @@ fn as_built(plan: &Plan, sound: &Experiment, course: &mut Course) -> Result<Vec<
     let mut reports = Vec::new();
     for (known, calibrate) in plan.known() {
         let whose = format!("{name}: {} detectors as built, {}", plan.drawn, known.name());
-        if !course.goes_on(&whose) {
-            course.missing.push(whose);
+        if !run.goes_on(&whose) {
+            run.missing.push(whose);
             continue;
         }
         // What solvers make of the tolerances is made once.
@@ -327,16 +378,18 @@ fn as_built(plan: &Plan, sound: &Experiment, course: &mut Course) -> Result<Vec<
                 }
                 None => built,
             };
-            Trial::new(plan, known, index..index + 1)
+            Trial::new(plan, known, index..index + 1, &plan.drawn_scenes)
         };
         let mut trials = seeds().map(trial).collect::<Result<Vec<_>, StudyError>>()?;
+        let floors = floors(&trials)?;
         // What cannot be made for the model was told before.
         let untold = &mut Vec::new();
         let variations = plan.methods.iter().map(|method| Variation::default_of(*method));
         let solvers =
-            variations.filter_map(|variation| course.tried(&whose, None, &mut trials, variation, untold)).collect();
+            variations.filter_map(|variation| run.tried(&whose, None, &mut trials, variation, untold)).collect();
         let calibration = calibrate.map(Calibrate::name);
-        reports.push(AsBuiltReport { known, calibration, refused, detectors: plan.drawn, solvers });
+        let (detectors, scenes) = (plan.drawn, plan.drawn_scenes.clone());
+        reports.push(AsBuiltReport { known, calibration, refused, detectors, scenes, floors, solvers });
     }
     Ok(reports)
 }
@@ -366,13 +419,14 @@ mod tests {
         let plan = Plan {
             detectors: vec![Detector::preset(Detector::DEFAULT).unwrap()],
             methods: vec![Method::Tikhonov, Method::TikhonovPaper],
-            sweep: true,
+            swept: 1,
             places: 1,
             frames: 2,
             seed: 3,
             heap: None,
             as_built: None,
             drawn: 2,
+            drawn_scenes: SceneKind::ALL.into(),
             calibrate: Some(Calibrate::Perfect),
         };
         run(&plan, "tactomo <tradeoff>", Progress::new(&AtomicBool::new(false), &|_| {})).unwrap()
@@ -407,13 +461,14 @@ mod tests {
             detectors: vec![detector.clone()],
             // Trained on readings of the detector that it knows, and knows no tolerances.
             methods: vec![Method::Kernel],
-            sweep: false,
+            swept: 0,
             places: 1,
             frames: 1,
             seed: 3,
             heap: None,
             as_built,
             drawn: 2,
+            drawn_scenes: SceneKind::ALL.into(),
             calibrate: Some(Calibrate::Perfect),
         };
         let run = |as_built| {
@@ -437,7 +492,7 @@ mod tests {
         let (page, text) = (crate::view::page(&views, &report.command), text(&views));
         assert!(page.contains("2 detectors as built") && page.contains("calibrated without an error"));
         assert_eq!(text.matches("- 2 detectors as built, ").count(), 2, "{text}");
-        assert!(page.contains(": by their description: error") && page.contains(": calibrated: error"), "{page}");
+        assert!(page.contains(": by their description: tikhonov: of") && page.contains(": calibrated: tikhonov: of"));
         for solver in ["tikhonov", "tikhonov-paper", "tikhonov lambda 0.1"] {
             assert!(page.contains(solver) && text.contains(solver), "{solver}");
         }
