@@ -17,6 +17,7 @@ mod scenes;
 pub mod score;
 pub mod stability;
 pub mod stopwatch;
+mod summary;
 pub mod tradeoff;
 pub mod validate;
 mod variant;

@@ -88,7 +88,8 @@ fn drawn_m(bounds: &[Bound], noise: &mut Noise) -> f64 {
     bounds.iter().map(distance_m).sum::<f64>() / bounds.len().max(1) as f64
 }
 
-/// Lets a solver read all frames of all detectors, at so many places of each kind of scene at most, and tell what it allocates if that is counted.
+/// Lets a solver read all frames of all detectors, and tell what it allocates if that is counted; with a parameter that is not its default at so many
+/// places of each kind of scene at most.
 ///
 /// # Errors
 /// [`StudyError`] if it cannot be made for the model.
@@ -96,7 +97,7 @@ pub(super) fn try_variation(
     heap: Option<Heap>,
     trials: &mut [Trial],
     variation: Variation,
-    most: usize,
+    swept: usize,
 ) -> Result<SolverReport, StudyError> {
     let mut set_up = Duration::ZERO;
     let mut memory = None;
@@ -120,20 +121,23 @@ pub(super) fn try_variation(
                 last.insert((Arc::clone(jacobian), solver?))
             }
         };
-        let kinds = places.iter().map(|place| place.kind as usize).collect::<std::collections::BTreeSet<_>>().len();
-        for place in places.iter().take(most.saturating_mul(kinds)) {
-            scores.push((place.kind, scorer.run(&mut **solver, &place.frames)?));
+        let most = if variation.parameter.is_some() { swept } else { usize::MAX };
+        for kind in SceneKind::ALL {
+            for place in places.iter().filter(|place| place.kind == kind).take(most) {
+                scores.push((place.kind, scorer.run(&mut **solver, &place.frames)?));
+            }
         }
     }
     Ok(SolverReport {
         solver: variation.method.name().to_owned(),
         family: variation.method.family(),
         parameter: variation.parameter.map(|parameter| parameter.to_string()),
+        unknowns: trials.first().and_then(|trial| variation.unknowns(&trial.experiment.problem)),
         set_up_ms: milliseconds(set_up),
         memory,
         all: Summary::of(scores.iter().flat_map(|(_, scores)| scores)),
         groups: Group::ALL.into_iter().map(|group| group_report(&scores, group)).collect(),
-        scenes: SceneKind::ALL.into_iter().map(|scene| scene_report(&scores, scene)).collect(),
+        scenes: SceneKind::ALL.into_iter().map(|scene| scene_report(&scores, scene, swept)).collect(),
     })
 }
 
@@ -147,9 +151,9 @@ fn group_report(scores: &[(SceneKind, Vec<Score>)], group: Group) -> GroupReport
     }
 }
 
-fn scene_report(scores: &[(SceneKind, Vec<Score>)], scene: SceneKind) -> SceneReport {
-    let own = scores.iter().filter(|(kind, _)| *kind == scene).flat_map(|(_, scores)| scores);
-    SceneReport { scene, summary: Summary::of(own) }
+fn scene_report(scores: &[(SceneKind, Vec<Score>)], scene: SceneKind, swept: usize) -> SceneReport {
+    let own = || scores.iter().filter(|(kind, _)| *kind == scene).map(|(_, scores)| scores);
+    SceneReport { scene, summary: Summary::of(own().flatten()), swept: Summary::of(own().take(swept).flatten()) }
 }
 
 /// Lets a solver see the first frame of each kind of scene: a search needs more memory than what follows it.

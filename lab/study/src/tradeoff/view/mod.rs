@@ -1,5 +1,6 @@
 //! What the report shows.
 
+mod model_size;
 mod precision;
 mod tables;
 
@@ -45,6 +46,7 @@ fn of_detector(view: View, report: &DetectorReport, as_built: Option<u64>) -> Vi
         .with(exact)
         .text(nothing(report));
     let view = if report.as_built.is_empty() { view } else { view.with(built) };
+    let view = model_size::figures(report).into_iter().fold(view, View::with);
     view.with(tables::costs(report))
         .figures("Scene by scene, all frames, mean error", scene_by_scene(report))
         .folded("All figures", [tables::figures(report)])

@@ -18,7 +18,7 @@ const COURSES: [(Course, &str); 2] = [(Course::First, "first frame"), (Course::F
 /// What marks are, beside their colours.
 const MARKS: [(&str, &str); 5] = [
     ("", "right in all frames"),
-    ("half-right", "in half of them"),
+    ("partly-right", "in half of them"),
     ("never-right", "in none"),
     ("spread", "from the 10th to the 90th percentile"),
     ("leads", "no other is better in both"),

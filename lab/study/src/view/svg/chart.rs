@@ -206,7 +206,9 @@ impl<'a> Drawing<'a> {
             }
         }
         let small = self.chart.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
-        let mut labels = Labels::new(self.plot(), spots.iter().map(|spot| spot.at), small);
+        let large = self.chart.series.iter().filter(|series| series.is_large).flat_map(|series| &series.marks);
+        let taken = spots.iter().map(|spot| spot.at).chain(large.map(|mark| self.at(mark.x, mark.y)));
+        let mut labels = Labels::new(self.plot(), taken, small);
         let marks = self.chart.series.iter().flat_map(|series| &series.marks);
         for [[left, y], [right, _], [x, bottom], [_, top]] in marks.filter_map(|mark| self.ends(mark)) {
             labels.avoid([left, y - BAR, right, y + BAR]);
