@@ -8,6 +8,7 @@ mod calibrate;
 pub mod case;
 pub mod contacts;
 mod experiment;
+pub mod growth;
 mod json_file;
 mod machine;
 mod presses;

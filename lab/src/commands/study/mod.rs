@@ -4,6 +4,7 @@ mod args;
 mod built;
 mod contacts;
 mod design;
+mod growth;
 
 pub use self::args::StudyArgs;
 
@@ -23,6 +24,7 @@ pub struct Args {
 enum Study {
     Built(built::Args),
     Contacts(contacts::Args),
+    Growth(growth::Args),
     #[command(flatten)]
     Design(design::Study),
 }
@@ -32,6 +34,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.study {
         Study::Built(args) => built::run(args),
         Study::Contacts(args) => contacts::run(args),
+        Study::Growth(args) => growth::run(args),
         Study::Design(study) => design::run(study),
     }
 }

@@ -53,6 +53,8 @@ pub enum Unit {
     Seconds,
     /// Metres.
     Metres,
+    /// Bytes.
+    Bytes,
     /// Plain numbers.
     Plain,
 }
@@ -275,6 +277,7 @@ impl Unit {
     pub fn text(self, value: f64) -> String {
         let scales: &[(f64, &str)] = match self {
             Self::Seconds => &[(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")],
+            Self::Bytes => &[(1e9, "GB"), (1e6, "MB"), (1e3, "kB"), (1.0, "B")],
             Self::Metres => &[(1.0, "m"), (1e-3, "mm"), (1e-6, "µm")],
             Self::Plain => return short(value),
         };
