@@ -4,6 +4,7 @@ mod args;
 mod built;
 mod contacts;
 mod design;
+mod growth;
 mod picard;
 mod surface;
 
@@ -25,6 +26,7 @@ pub struct Args {
 enum Study {
     Built(built::Args),
     Contacts(contacts::Args),
+    Growth(growth::Args),
     Picard(picard::Args),
     Surface(surface::Args),
     #[command(flatten)]
@@ -36,6 +38,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.study {
         Study::Built(args) => built::run(args),
         Study::Contacts(args) => contacts::run(args),
+        Study::Growth(args) => growth::run(args),
         Study::Picard(args) => picard::run(args),
         Study::Surface(args) => surface::run(args),
         Study::Design(study) => design::run(study),

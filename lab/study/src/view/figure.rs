@@ -13,7 +13,8 @@ pub struct Chart {
     pub axes: [Axis; 2],
     /// What is in it.
     pub series: Vec<Series>,
-    /// Whether marks that no other beats in both directions are joined, and what is beaten steps back.
+    /// Whether marks that no other beats in both directions are joined, and what is beaten steps back. Where marks are [filled](Mark::filled), others are
+    /// asides, and do not count.
     pub has_front: bool,
     /// A value to the right that matters, and why.
     pub guide: Option<(f64, String)>,
@@ -52,6 +53,8 @@ pub enum Unit {
     Seconds,
     /// Metres.
     Metres,
+    /// Bytes.
+    Bytes,
     /// Plain numbers.
     Plain,
 }
@@ -84,6 +87,10 @@ pub struct Mark {
     pub y: f64,
     /// What else there is to say.
     pub note: String,
+    /// From where to where it is spread to the right and upwards, as bars.
+    pub spread: Option<[[f64; 2]; 2]>,
+    /// Which share of it is filled: of what was right.
+    pub filled: Option<f64>,
 }
 
 /// Values at the nodes of a grid that is even along both axes, as colours with contour lines.
@@ -143,16 +150,21 @@ impl Chart {
         Self { size, ..self }
     }
 
-    /// What its marks have along an axis.
+    /// What its marks have along an axis, with the ends of their bars.
     pub(super) fn values(&self, axis: usize) -> impl Iterator<Item = f64> {
-        self.series.iter().flat_map(|series| &series.marks).map(move |mark| [mark.x, mark.y][axis])
+        let of = move |mark: &Mark| {
+            let ends = mark.spread.map(|spread| spread[axis]);
+            std::iter::once([mark.x, mark.y][axis]).chain(ends.into_iter().flatten())
+        };
+        self.series.iter().flat_map(|series| &series.marks).flat_map(of)
     }
 }
 
 /// Gives charts the same axis to the right (0) or upwards (1), so that they can be compared.
 pub fn same_axis<'a>(charts: impl IntoIterator<Item = &'a mut Chart>, axis: usize) {
     let mut charts: Vec<&mut Chart> = charts.into_iter().collect();
-    let all: Vec<f64> = charts.iter().flat_map(|chart| chart.values(axis)).collect();
+    let own = |chart: &&mut Chart| chart.values(axis).chain(chart.axes[axis].reaches.clone()).collect::<Vec<_>>();
+    let all: Vec<f64> = charts.iter().flat_map(own).collect();
     charts.iter_mut().for_each(|chart| chart.axes[axis].reaches.extend(&all));
 }
 
@@ -252,13 +264,13 @@ impl Series {
 
 impl<Y: Into<Option<f64>>> From<(f64, Y)> for Mark {
     fn from((x, y): (f64, Y)) -> Self {
-        Self { x, y: y.into().unwrap_or(f64::NAN), note: String::new() }
+        Self::from([x, y.into().unwrap_or(f64::NAN)])
     }
 }
 
 impl From<[f64; 2]> for Mark {
     fn from([x, y]: [f64; 2]) -> Self {
-        Self { x, y, note: String::new() }
+        Self { x, y, note: String::new(), spread: None, filled: None }
     }
 }
 
@@ -270,6 +282,7 @@ impl Unit {
         }
         let scales: &[(f64, &str)] = match self {
             Self::Seconds => &[(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")],
+            Self::Bytes => &[(1e9, "GB"), (1e6, "MB"), (1e3, "kB"), (1.0, "B")],
             Self::Metres => &[(1.0, "m"), (1e-3, "mm"), (1e-6, "µm")],
             Self::Plain => return short(value),
         };
