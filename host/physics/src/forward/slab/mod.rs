@@ -238,7 +238,15 @@ impl Slab {
         }
         let [_, covered] = stacks(&self.detector, self.size_m, self.driving);
         let basis = DiscBasis::of_degree(self.resolution.pad_degree);
-        PadFields::new(self.points.pads(), basis, impedances, &covered, self.uneven.as_deref(), self.resolution)
+        PadFields::new(
+            self.points.pads(),
+            basis,
+            impedances,
+            &self.bottom,
+            &covered,
+            self.uneven.as_deref(),
+            self.resolution,
+        )
     }
 
     /// Impedances between all densities of the pads (ohm), below their layers alone.

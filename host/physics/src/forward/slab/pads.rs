@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::disc::{DiscBasis, DiscSelf};
+use super::disc::{Density, DiscBasis, DiscSelf};
 use super::driving::{Covered, Mode};
 use super::green::SurfaceGreen;
 use super::near::{NearFields, longest_split, near_at_zero};
@@ -27,6 +27,9 @@ const STEPS_IN_WAVE: f64 = 1.03;
 /// The same in the half wave of the finest mode of a split's smooth part, which falls more slowly before.
 const STEPS_IN_SMOOTH_WAVE: f64 = 1.9;
 
+/// Radial orders above the degree of a pad's basis that the smooth part has.
+const SMOOTH_ORDERS: usize = 4;
+
 /// Fields are split where that makes the steps longer by this factor.
 const WORTH: f64 = 1.4;
 
@@ -39,6 +42,11 @@ pub(super) struct Pad {
 }
 
 impl Pad {
+    /// Of its contact (ohm).
+    pub fn resistance_ohm(&self) -> f64 {
+        self.contact_impedance_ohm_m2 / (PI * self.radius_m * self.radius_m)
+    }
+
     fn is_placed_as(&self, other: &Self) -> bool {
         self.centre_m == other.centre_m && self.radius_m == other.radius_m
     }
@@ -105,10 +113,9 @@ impl PadPoints {
                 let mut block = basis.weights() * points * basis.weights().transpose();
                 if e == f {
                     let even = uneven.map_or(1.0, |uneven| uneven.inverse_root(pad.centre_m).powi(2));
-                    let area_m2 = PI * pad.radius_m * pad.radius_m;
                     let alike = own.take_if(|(radius_m, _)| *radius_m == pad.radius_m);
                     let local = alike.unwrap_or_else(|| (pad.radius_m, kernel.disc_self(pad.radius_m)));
-                    block += local.1.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, even);
+                    block += local.1.reduced(basis, pad.resistance_ohm(), even);
                     own = Some(local);
                 }
                 all.view_mut((e * size, f * size), (size, size)).copy_from(&block);
@@ -181,6 +188,7 @@ impl PadFields {
         pads: &[Pad],
         basis: &'static DiscBasis,
         impedances: DMatrix<f64>,
+        kernel: &SurfaceGreen,
         covered: &Covered<'_>,
         uneven: Option<&Uneven>,
         resolution: Resolution,
@@ -191,7 +199,13 @@ impl PadFields {
             None => across(covered, smallest_m(pads), resolution),
         };
         let uniform = uniform(pads, basis);
-        let fields = pad_modes(pads, basis, &grid, &modes, uneven);
+        let fields = match split_m {
+            Some(_) => {
+                let fine = DiscBasis::of_degree(basis.degree() + SMOOTH_ORDERS);
+                pad_modes(pads, fine, |pad| with_higher(pad, basis, fine, kernel), &grid, &modes, uneven)
+            }
+            None => pad_modes(pads, basis, |_| basis.weights().clone(), &grid, &modes, uneven),
+        };
         let [impedances, fields] = covered.connect([impedances, fields], &uniform, &grid, &modes);
         let others: Vec<_> = (0..fields.ncols()).filter(|i| !uniform.contains(i)).collect();
         let inner = impedances.select_rows(&others).select_columns(&others);
@@ -216,7 +230,8 @@ impl PadFields {
                     column *= uneven.inverse_root(pads[density / basis.len()].centre_m);
                 }
             }
-            NearFields::new(pads, basis, covered, split_m, resolution.across as f64, &shares)
+            let own = |radius_m| kernel.disc_self(radius_m);
+            NearFields::new(pads, basis, covered, split_m, resolution.across as f64, own, &shares)
         });
         Some(all)
     }
@@ -353,18 +368,32 @@ pub(super) fn across(covered: &Covered<'_>, smallest_m: f64, resolution: Resolut
     (grid, modes)
 }
 
+/// Densities of a pad with those that are eliminated and come with them, by the points of a finer basis: `densities x nodes`.
+fn with_higher(pad: &Pad, basis: &DiscBasis, fine: &DiscBasis, kernel: &SurfaceGreen) -> DMatrix<f64> {
+    let own = kernel.disc_self(pad.radius_m);
+    let mut shares = DMatrix::zeros(basis.len(), fine.len());
+    for (d, density) in basis.densities().iter().enumerate() {
+        for (n, share) in own.with_higher([density.n, density.m], basis.degree(), pad.resistance_ohm()) {
+            let same = fine.densities().iter().position(|other| *other == Density { n, ..*density });
+            same.into_iter().for_each(|higher| shares[(d, higher)] = share);
+        }
+    }
+    shares * fine.weights()
+}
+
 /// Amplitudes of the field on the top of each density of each pad: `modes x densities`; with unevenness but for the root of its factor at
-/// the top.
+/// the top. Densities of a pad are given by the points of a basis: `densities x nodes`.
 pub(super) fn pad_modes(
     pads: &[Pad],
     basis: &DiscBasis,
+    densities: impl Fn(&Pad) -> DMatrix<f64>,
     grid: &Grid,
     modes: &[Mode],
     uneven: Option<&Uneven>,
 ) -> DMatrix<f64> {
     let rows: HashMap<_, _> = modes.iter().enumerate().map(|(row, mode)| ([mode.m, mode.n], row)).collect();
-    let mut all = DMatrix::zeros(modes.len(), pads.len() * basis.len());
-    for (e, pad) in pads.iter().enumerate() {
+    let mut all = Vec::new();
+    for pad in pads {
         let nodes = basis.nodes_m(pad.centre_m, pad.radius_m);
         let along = |axis: usize, at_m: &[f64; 2]| cosines(grid.modes(axis), at_m[axis] / grid.size_m()[axis]);
         let waves: Vec<_> = nodes.iter().map(|at_m| [along(0, at_m), along(1, at_m)]).collect();
@@ -380,8 +409,8 @@ pub(super) fn pad_modes(
                 at_node *= uneven.inverse_root(*node);
             }
         }
-        let of_densities = basis.weights() * at_nodes;
-        all.view_mut((0, e * basis.len()), (modes.len(), basis.len())).tr_copy_from(&of_densities);
+        let of_densities = densities(pad) * at_nodes;
+        all.extend(of_densities.row_iter().map(|row| row.transpose()));
     }
-    all
+    DMatrix::from_columns(&all)
 }
