@@ -19,7 +19,7 @@ pub(super) const LOCAL_ORDERS: usize = 10;
 pub(super) const MAX_ORDER: usize = 31;
 
 /// Orders up to which the layers' part of the self-impedance is integrated; above it only the half-space's counts.
-const LAYERED_ORDER: usize = 8;
+const LAYERED_ORDER: usize = MAX_DEGREE;
 
 /// Share of the layers' part of the self-impedance that is left out, for each point of the quadrature.
 const NEGLIGIBLE: f64 = 1e-8;

@@ -144,14 +144,7 @@ fn reaching(size_m: [f64; 2], centre_m: [f64; 2], reach_m: f64) -> Vec<Image> {
 }
 
 impl Profile {
-    fn new(
-        pad: &Pad,
-        basis: &DiscBasis,
-        own: &DiscSelf,
-        covered: &Covered<'_>,
-        split_m: f64,
-        across: f64,
-    ) -> Self {
+    fn new(pad: &Pad, basis: &DiscBasis, own: &DiscSelf, covered: &Covered<'_>, split_m: f64, across: f64) -> Self {
         let Pad { radius_m, contact_impedance_ohm_m2, .. } = *pad;
         let waves = Waves::of(across * radius_m / covered.thickness_m(), reach(split_m / radius_m, across));
         let mut orders: Vec<[usize; 2]> = Vec::new();
@@ -169,7 +162,10 @@ impl Profile {
             for (n, share) in own.with_higher([n, m], basis.degree(), pad.resistance_ohm()) {
                 let factor = share * if (n - m).is_multiple_of(4) { 1.0 } else { -1.0 } / (PI * radius_m * radius_m);
                 let means = responses.iter().zip(waves.means(n));
-                weights.iter_mut().zip(means).for_each(|(weight, (response, mean))| *weight += factor * response * mean);
+                weights
+                    .iter_mut()
+                    .zip(means)
+                    .for_each(|(weight, (response, mean))| *weight += factor * response * mean);
             }
             let along = waves.waves(m).tr_mul(&weights);
             let parity = if m % 2 == 0 { 1.0 } else { -1.0 };
@@ -388,7 +384,8 @@ mod tests {
         detector.outline = Outline::rectangle(0.03, 0.03);
         detector.layers = vec![Layer::uniform(0.0004, 0.25)];
         detector.electrodes.truncate(4);
-        let corners = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]].map(|at: [f64; 2]| at.map(|side| 7e-3 * side));
+        let corners =
+            [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]].map(|at: [f64; 2]| at.map(|side| 7e-3 * side));
         detector.electrodes.iter_mut().zip(corners).for_each(|(pad, at)| [pad.x_m, pad.y_m] = at);
         let slab =
             |pad_degree| Slab::with_resolution(&detector, Resolution { pad_degree, ..Resolution::STANDARD }).unwrap();

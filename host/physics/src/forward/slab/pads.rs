@@ -27,8 +27,8 @@ const STEPS_IN_WAVE: f64 = 1.03;
 /// The same in the half wave of the finest mode of a split's smooth part, which falls more slowly before.
 const STEPS_IN_SMOOTH_WAVE: f64 = 1.9;
 
-/// Radial orders above the degree of a pad's basis that the smooth part has.
-const SMOOTH_ORDERS: usize = 4;
+/// Radial orders above the degree of a pad's basis that the smooth part has: of higher ones its factor leaves next to nothing.
+const SMOOTH_ORDERS: usize = 2;
 
 /// Fields are split where that makes the steps longer by this factor.
 const WORTH: f64 = 1.4;
