@@ -37,9 +37,7 @@ impl AutoSearch {
         let shapes = self.shapes.as_ref()?;
         let may_be = shapes.may_be(&solution.contacts) || evidence.is_misfit(target.count()) || from.is_some();
         let shape = may_be.then(|| shapes.search(&solution.contacts, from, target, evidence.score()))??;
-        // What is not known of a detector makes explanations more alike than their evidence tells.
-        let margin = if target.error().is_some() || target.is_provisional() { policy::shape_gain() } else { 0.0 };
-        (shape.evidence().score() < evidence.score() - margin).then_some(shape)
+        (shape.evidence().score() < evidence.score()).then_some(shape)
     }
 
     /// The line or ring that explains a frame of a detector that is not known exactly, where the contacts so far do not: each more

@@ -95,6 +95,21 @@ fn it_takes_no_more_than_the_scene_needs() {
 }
 
 #[test]
+fn two_alike_contacts_near_each_other_are_two_contacts_more_often_than_a_line() {
+    // 10.5 mm apart: a line of 18 mm leaves about as much.
+    let mut trial = AutoTrial::new();
+    let pairs = (0..8).map(|turn| {
+        let (sin, cos) = (0.8 * f64::from(turn)).sin_cos();
+        let at = |side: f64| Contact::flat(8e-3 * sin + side * cos, 8e-3 * cos + side * sin, 0.0014, 3.4e-4);
+        let pair = [-5.25e-3, 5.25e-3].map(at);
+        trial.auto.reset();
+        what(&trial.touched(&pair)).to_owned()
+    });
+    let pairs: Vec<_> = pairs.collect();
+    assert!(pairs.iter().filter(|what| *what == "2 contacts").count() >= 6, "{pairs:?}");
+}
+
+#[test]
 fn a_touch_is_seen_in_its_first_frame_where_it_is_and_nothing_is_seen_without_one() {
     let mut trial = AutoTrial::new();
     let Parts { mut tracker, .. } = Box::new(Auto::new(&trial.problem()).unwrap()).split();

@@ -30,8 +30,6 @@ const HOPE: f64 = 12.0;
 const NARROWEST: f64 = 0.02;
 /// Widest strip, in mean distances of electrodes: what is wider is a disc's or an image's business.
 const WIDEST: f64 = 0.7;
-/// Largest radius of a circle, in the shorter side of the detector.
-const LARGEST_RADIUS: f64 = 1.0;
 /// How far a line ends beyond an edge is not known; so far is taken as usual (usual widths), as a standard deviation.
 const BEYOND: f64 = 0.5;
 /// Rows of residuals for what is known before: width, conductance, and each coordinate of a line's ends.
@@ -41,8 +39,8 @@ pub(super) const PRIOR_ROWS: usize = 6;
 #[derive(Clone, Debug)]
 pub(crate) struct StripFit {
     pub(super) laid: Laid,
-    /// Sum of squares of the whitened residuals, without what was known before.
-    pub cost: f64,
+    /// What it leaves of the frame, and what it takes for that.
+    evidence: Evidence,
     /// Of the parameters, in the order of [`Strip::layout`].
     pub covariance: Option<DMatrix<f64>>,
     pub settled: bool,
@@ -65,9 +63,9 @@ impl StripFit {
         &self.laid.strip
     }
 
-    /// What it leaves of the frame, and what it takes for that: its parameters, and to say that it is a line or a ring at all.
+    /// What it leaves of the frame, and what it takes for that.
     pub fn evidence(&self) -> Evidence {
-        Evidence::of(self.cost, self.strip().parameters() + 1)
+        self.evidence
     }
 }
 
@@ -84,6 +82,16 @@ pub(super) struct Usual {
     pub spacing_m: f64,
     /// Corners of the detector's box.
     pub bounds_m: [Point; 2],
+    /// Area that strips can be on (m2).
+    pub area_m2: f64,
+}
+
+impl Usual {
+    /// Of a circle: the shorter side of the detector (m).
+    pub fn largest_radius_m(&self) -> f64 {
+        let [low, high] = self.bounds_m;
+        (high[0] - low[0]).min(high[1] - low[1])
+    }
 }
 
 /// What fits need beside the target.
@@ -161,8 +169,11 @@ impl StripFitter<'_> {
         let start = self.look(start, target);
         let found = minimise(&mut Descent { fitter: self, target, most, share: 1.0 }, start, steps, SCHEDULE);
         let Minimum { at: look, matrix, settled } = found;
-        let cost = look.residuals.rows(0, look.laid.volts.len()).norm_squared();
-        StripFit { laid: look.laid, cost, covariance: matrix.as_ref().and_then(covariance), settled }
+        let (Look { laid, residuals }, matrix) = (look, matrix.as_ref());
+        let cost = residuals.rows(0, laid.volts.len()).norm_squared();
+        let price = self.usual.price(&laid.strip, residuals.norm_squared() - cost, matrix);
+        let evidence = Evidence { cost, price, parameters: laid.strip.parameters() as f64 };
+        StripFit { laid, evidence, covariance: matrix.and_then(covariance), settled }
     }
 
     pub fn look(&self, laid: Laid, target: &Target) -> Look {
@@ -239,13 +250,12 @@ impl StripFitter<'_> {
     fn limited(&self, mut strip: Strip) -> Strip {
         let [low, high] = self.usual.bounds_m;
         let inside = |at: Point| [0, 1].map(|axis| at[axis].clamp(low[axis], high[axis]));
-        let shorter_m = (high[0] - low[0]).min(high[1] - low[1]);
         let mut widest_m = WIDEST * self.usual.spacing_m;
         match &mut strip.course {
             Course::Line(_) => {}
             Course::Ring { centre_m, radius_m } => {
                 *centre_m = inside(*centre_m);
-                *radius_m = radius_m.clamp(NARROWEST * self.usual.width_m, LARGEST_RADIUS * shorter_m);
+                *radius_m = radius_m.clamp(NARROWEST * self.usual.width_m, self.usual.largest_radius_m());
                 widest_m = widest_m.min(2.0 * *radius_m);
             }
         }

@@ -9,6 +9,7 @@
 //! 0.00007 to 0.0003 of the largest reading in the root of the mean square, no more than the 0.0003 that contacts allow for the slab; ends are
 //! right to 0.1 mm, radii to 0.03 mm (but where noise-free readings do not tell the width, and that is taken as usual), conductances to 2 %.
 
+mod evidence;
 mod fit;
 mod found;
 mod start;
@@ -88,6 +89,7 @@ impl ShapeFinder {
             conductance_deviation: policy::conductance_deviation(),
             spacing_m,
             bounds_m: geometry::bounds(&mesh.nodes_m),
+            area_m2: mesh.node_areas_m2.iter().sum(),
         };
         Ok(Some(Self {
             fine: Grid::new(Arc::clone(&problem.model)),
