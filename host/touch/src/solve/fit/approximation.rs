@@ -138,6 +138,17 @@ impl ApproximationError {
         }
     }
 
+    /// Rows applied to each direction, times its standard deviation: `rows x directions`.
+    pub fn patterns_through(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
+        let variances_v2 = self.directions.variances_v2();
+        let mut all = DMatrix::zeros(rows.nrows(), variances_v2.len());
+        self.directions.each(|i, readings, unit| {
+            let of_unit = rows.columns(readings.start, readings.len()) * DVector::from_column_slice(unit);
+            all.set_column(i, &(variances_v2[i].sqrt() * of_unit));
+        });
+        all
+    }
+
     /// This error, about a detector with such readings of the scene (V).
     pub fn about(self, linearised: &Arc<Linearised>, volts: &[f64]) -> Self {
         let linear = &self.patterns_v * DVector::from_column_slice(&linearised.steps);

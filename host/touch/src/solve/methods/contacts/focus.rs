@@ -101,7 +101,7 @@ mod tests {
             let readings = tactomo_physics::forward::readings_v(&impedance_ohm, &detector);
             let of = |grounds: &[usize]| {
                 let rows = readings.clone().hiding(|g, _| !grounds.contains(&g));
-                let target = finder.target_of_rows(&rows, &[]);
+                let target = finder.target_of_rows(&rows, None);
                 finder.disc_fitter().fit(vec![truth], &target, super::super::search::COLD).unwrap()
             };
             let all: Vec<usize> = (0..16).collect();

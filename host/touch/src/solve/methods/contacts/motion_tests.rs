@@ -8,7 +8,7 @@ use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{Resolution, Slab, readings_v};
 use tactomo_physics::readings::Range;
 use tactomo_physics::scene::Contact;
-use tactomo_physics::simulate::{Noise, measured};
+use tactomo_physics::simulate::{Noise, drawn, measured};
 
 static PROBLEM: LazyLock<Problem> = LazyLock::new(|| Problem::of(&detector()).unwrap());
 static FINE: LazyLock<Slab> = LazyLock::new(|| Slab::with_resolution(&detector(), Resolution::FINE).unwrap());
@@ -171,6 +171,31 @@ fn a_contact_that_lifts_below_the_converters_range_is_gone_in_rows_too() {
         counts[..20].iter().all(|count| *count == 1) && counts[120..].iter().all(|count| *count == 0),
         "{counts:?}"
     );
+}
+
+#[test]
+fn rows_after_whole_frames_go_on_from_what_these_were_off_by() {
+    let described = Detector::default();
+    let built = drawn(&described, 3);
+    let fine = Slab::with_resolution(&built, Resolution::FINE).unwrap();
+    let problem = Problem::of(&described).unwrap();
+    problem.nuisance();
+    let mut solver = Contacts::new(&problem, ContactSettings::of(&problem)).unwrap();
+    let mut noise = Noise::new(9);
+    let mut frame = |x_m: f64| {
+        let exact = readings_v(&fine.impedance_ohm(&[contact(x_m, -0.004, 1.0)]).unwrap(), &built);
+        measured(&exact, &built.adc, &mut noise)
+    };
+    let whole = (0..10).map(|_| solver.solve(&frame(0.007)).unwrap()).last().unwrap();
+    assert!(!whole.flags.is_doubtful(), "{whole:?}");
+    for index in 0..40 {
+        let all = frame(0.007 + 2.5e-5 * index as f64);
+        let rows = all.clone().hiding(|ground, _| ground % 8 != index % 8);
+        let solution = solver.solve_rows(&rows, &all, 1e-3).unwrap();
+        let [found] = solution.contacts[..] else { panic!("{solution:?}") };
+        let off_m = (found.x_m - 0.007 - 2.5e-5 * index as f64).hypot(found.y_m + 0.004);
+        assert!(off_m < 3e-4 && !solution.flags.is_doubtful(), "{index}: {off_m} {solution:?}");
+    }
 }
 
 #[test]

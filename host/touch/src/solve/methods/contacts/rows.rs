@@ -9,14 +9,12 @@ use super::systematic_error::SystematicError;
 use super::{ContactFinder, ContactHypothesis};
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::policy;
-use crate::solve::fit::target::{Errors, Target};
+use crate::solve::fit::target::Target;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Share of what readings are off by that remains when a contact has moved on.
-const REMAINS: f64 = 0.2;
 /// Steps of a frame at most, and the way, in radii or logarithms, that needs no further one.
 const FRAME_STEPS: usize = 3;
 const SMALL_WAY: f64 = 0.1;
@@ -30,12 +28,51 @@ pub(super) struct RowState {
     filters: MultipleModels,
     /// What model and board are off by goes into the parameters however many rows come.
     systematic_error: SystematicError,
-    /// What all readings are off by (V); none of a detector that is as described.
-    off_v: Vec<f64>,
+    off: Off,
     /// Frames in a row that do not fit.
     unfit: u32,
     /// Logarithm of the odds for there being nothing, of late.
     gone: f64,
+}
+
+/// What all readings are off by, of a detector that is not known exactly.
+///
+/// It goes with the readings: contacts that change these by a share of them change it by about the same share, and who knows how.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Off {
+    /// As it was found (V); none of a detector that is as described.
+    volts: Vec<f64>,
+    /// Readings of the contacts that it was found with (V).
+    found_with: Vec<f64>,
+    /// Share by which contacts have changed them since.
+    changed: f64,
+}
+
+impl Off {
+    fn new(found: &DiscFit, target: &Target) -> Self {
+        if target.error().is_none() {
+            return Self::default();
+        }
+        Self { volts: target.likely_off_v(&found.volts), found_with: found.volts.clone(), changed: 0.0 }
+    }
+
+    fn follow(&mut self, volts: &[f64]) {
+        let square = |all: &[f64]| dot(all, all);
+        let change: Vec<_> = self.found_with.iter().zip(volts).map(|(then, now)| now - then).collect();
+        let share = (square(&change) / square(&self.found_with).max(f64::MIN_POSITIVE)).sqrt();
+        self.changed = (share / policy::stale_share()).min(1.0);
+    }
+
+    /// What of it is left (V).
+    fn left_v(&self) -> impl Iterator<Item = f64> {
+        let left = (1.0 - self.changed * self.changed).sqrt();
+        self.volts.iter().map(move |volts| left * volts)
+    }
+
+    /// Standard deviation of what has come in its place, the same for all readings (V).
+    fn new_v(&self) -> f64 {
+        self.changed * (dot(&self.volts, &self.volts) / self.volts.len().max(1) as f64).sqrt()
+    }
 }
 
 /// What has come of a frame.
@@ -51,11 +88,10 @@ pub(super) enum Step {
 impl RowState {
     /// From an explanation by all readings of `target`.
     pub fn new(found: &ContactHypothesis, target: &Target) -> Self {
-        let off_v = if target.error().is_some() { target.likely_off_v(&found.fit.volts) } else { Vec::new() };
         Self {
             filters: MultipleModels::new(found.fit.normal.clone()),
             systematic_error: SystematicError::new(&found.fit, target),
-            off_v,
+            off: Off::new(&found.fit, target),
             unfit: 0,
             gone: 0.0,
         }
@@ -71,23 +107,26 @@ impl RowState {
         self.filters.moves()
     }
 
-    /// What all readings are off by (V); nothing of a detector that is as described.
-    pub fn off_v(&self) -> &[f64] {
-        &self.off_v
+    /// What all readings are off by.
+    pub fn off(&self) -> &Off {
+        &self.off
+    }
+
+    /// Whether contacts have changed so much that a whole frame has to tell anew what readings are off by.
+    pub fn is_stale(&self) -> bool {
+        self.off.changed >= 1.0
     }
 }
 
 impl ContactFinder {
     /// What rows are fitted as, less what all readings are off by; where that is not known yet of a detector, each by itself may be.
-    pub(super) fn target_of_rows(&self, rows: &Readings, off_v: &[f64]) -> Target {
-        if off_v.is_empty() {
+    pub(super) fn target_of_rows(&self, rows: &Readings, off: Option<&Off>) -> Target {
+        let Some(off) = off.filter(|off| !off.volts.is_empty()) else {
             return Target::provisional(rows, 1, &self.errors);
-        }
+        };
         let mut less = rows.clone();
-        less.volts_mut().iter_mut().zip(off_v).for_each(|(volts, off)| *volts -= off);
-        let root_v = (dot(off_v, off_v) / off_v.len() as f64).sqrt();
-        let model = self.errors.model.hypot(REMAINS * root_v / rows.largest_v().max(root_v));
-        Target::of_mean(&less, 1, &Errors { model, ..self.errors.clone() }, None)
+        less.volts_mut().iter_mut().zip(off.left_v()).for_each(|(volts, off_v)| *volts -= off_v);
+        Target::of_mean(&less, 1, &self.errors, None).with_model_error(off.new_v())
     }
 
     /// Brings contacts to rows that come `elapsed_s` (s) after those before.
@@ -105,7 +144,8 @@ impl ContactFinder {
             return Step::Gone;
         }
         let search = state.unfit >= policy::unfit_frames();
-        state.systematic_error.add(&fit, target, &self.errors, self.spacing_m);
+        state.off.follow(&fit.volts);
+        state.systematic_error.add(&fit, target, &self.errors, state.off.changed);
         let known = state.filters.information();
         let stays = state.systematic_error.covariance(&fit);
         let covariance = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());

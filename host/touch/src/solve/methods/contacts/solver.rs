@@ -41,6 +41,8 @@ pub(crate) struct ContactTracker {
     is_stale: bool,
     /// What is known besides by rows, since all readings were explained last.
     rows: Option<Box<RowState>>,
+    /// The newest whole frame, as what is followed was fitted to it: rows that come next go on from what it is off by.
+    whole: Option<Target>,
     /// The latest of each reading, while rows come.
     latest: Option<Latest>,
     /// Whether what is followed was found in some of the rows only.
@@ -139,6 +141,7 @@ impl ContactTracker {
             searched,
             is_stale: false,
             rows: None,
+            whole: None,
             latest: None,
             is_glimpsed: false,
             recounted_s: None,
@@ -191,7 +194,7 @@ impl ContactTracker {
 
     fn step_frame(&mut self, target: &Target) -> bool {
         self.before = self.association.clone();
-        (self.rows, self.latest) = (None, None);
+        (self.rows, self.whole, self.latest) = (None, None, None);
         self.restless = if target.frames > 1 { 0 } else { self.restless + 1 };
         self.is_of_key_frames = false;
         let Some(last) = self.last.take() else {
@@ -214,7 +217,7 @@ impl ContactTracker {
         // What is unknown of the detector is soon known, and asks for a search of its own.
         self.is_of_key_frames =
             self.keys.are_ripe() && !target.is_provisional() && !self.finder.is_misfit(&found.fit, target);
-        self.last = Some(found);
+        (self.last, self.whole) = (Some(found), Some(target.clone()));
         search || self.is_of_key_frames
     }
 
@@ -309,7 +312,7 @@ impl ContactTracker {
         (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
         (self.doubt, self.restless) = (Doubt::default(), 0);
         (self.keys, self.is_of_key_frames) = (KeyFrames::default(), false);
-        (self.rows, self.recounted_s) = (None, None);
+        (self.rows, self.whole, self.recounted_s) = (None, None, None);
     }
 
     /// Forgets all.

@@ -6,15 +6,17 @@
 //! has the patterns of pads and converters, and of each reading by itself the model's error and rounding.
 //!
 //! Of a detector that is not known exactly, what readings are off by was found with the contacts in all readings, and is taken off rows: they
-//! tell how contacts move from there, not where that was, so that all of the search's error stays. The farther contacts go, the less of what
-//! readings are off by is what was found.
+//! tell how contacts move from there, not where that was, so that all of that error stays. As contacts go on, what readings are off by changes
+//! with them ([`Off`](super::rows::Off)): to `E` comes that share of what it may be at all.
 
 use nalgebra::{Cholesky, DMatrix};
 
+use std::sync::Arc;
+
 use super::discs::{DiscFit, PARAMETERS};
+use crate::solve::fit::approximation::ApproximationError;
 use crate::solve::fit::target::{Errors, Target};
 use tactomo_physics::readings::Readings;
-use tactomo_physics::space::{Place, distance};
 
 /// Every so many frames it is reckoned, so that each row of a plan of 32 frames has its turn; and what is left of that after each: about the
 /// time over which a still contact is averaged.
@@ -23,27 +25,23 @@ const KEPT_SHARE: f64 = 0.97;
 /// Share of a model's own error that each reading has by itself. Of `square-60` the slab that is inverted and the finest are apart by
 /// 0.00002 to 0.00006 of the largest reading, but for pads and contact; taken as 0.0003 for any detector.
 const OWN_SHARE: f64 = 0.3;
-/// Way, in distances of electrodes, after which what readings are off by is no longer what was found. On detectors as built places are off by
-/// 0.12 mm where they were found, and by 0.3 and 0.5 mm a sixth and a third of a distance from there.
-const MOVED_ON: f64 = 0.2;
-
 /// The part of the contacts' covariance that frames do not average out. Places are in m, whatever the units of a fit's parameters.
 #[derive(Clone, Debug)]
 pub(super) struct SystematicError {
     information: DMatrix<f64>,
     /// `A` (1/V): a row for each parameter.
     pulls: DMatrix<f64>,
-    /// What the search left, of a detector that is not known exactly.
-    searched: Option<Searched>,
+    /// What all readings left, of a detector that is not known exactly.
+    found: Option<Found>,
     covariance: DMatrix<f64>,
     frames: u32,
 }
 
-/// Where contacts were found, and the covariance of that.
+/// The covariance of contacts as they were found, and what readings may be off by together.
 #[derive(Clone, Debug)]
-struct Searched {
-    places_m: Vec<Place>,
+struct Found {
     covariance: DMatrix<f64>,
+    error: Arc<ApproximationError>,
 }
 
 impl SystematicError {
@@ -51,21 +49,21 @@ impl SystematicError {
     pub fn new(fit: &DiscFit, target: &Target) -> Self {
         let units = units(fit);
         let per_m = |normal: &DMatrix<f64>| scaled(normal, |i, j| 1.0 / (units[i] * units[j]));
-        let searched = |covariance: DMatrix<f64>| Searched {
-            places_m: places_m(fit),
+        let found = |(error, covariance): (&Arc<ApproximationError>, DMatrix<f64>)| Found {
             covariance: scaled(&covariance, |i, j| units[i] * units[j]),
+            error: Arc::clone(error),
         };
         Self {
             information: per_m(&fit.normal),
             pulls: pulls(fit, target, &units),
-            searched: target.error().and_then(|_| fit.covariance()).map(searched),
+            found: target.error().zip(fit.covariance()).map(found),
             covariance: DMatrix::zeros(units.len(), units.len()),
             frames: 0,
         }
     }
 
-    /// Takes the rows of a target into account, on a detector whose electrodes are `spacing_m` (m) apart.
-    pub fn add(&mut self, fit: &DiscFit, target: &Target, errors: &Errors, spacing_m: f64) {
+    /// Takes the rows of a target into account; contacts have changed what readings are off by by the share `changed`.
+    pub fn add(&mut self, fit: &DiscFit, target: &Target, errors: &Errors, changed: f64) {
         let is_looked_at = self.frames.is_multiple_of(LOOKED_AT);
         self.frames += 1;
         if !is_looked_at {
@@ -77,23 +75,22 @@ impl SystematicError {
         let frames = f64::from(LOOKED_AT);
         self.information = KEPT_SHARE * &self.information + frames * &pulls * slopes;
         self.pulls = KEPT_SHARE * &self.pulls + frames * pulls;
-        if let Some(covariance) = self.reckoned(fit, target, errors, spacing_m) {
+        if let Some(covariance) = self.reckoned(fit, target, errors, changed) {
             self.covariance = covariance;
         }
     }
 
-    fn reckoned(&self, fit: &DiscFit, target: &Target, errors: &Errors, spacing_m: f64) -> Option<DMatrix<f64>> {
+    fn reckoned(&self, fit: &DiscFit, target: &Target, errors: &Errors, changed: f64) -> Option<DMatrix<f64>> {
         let gains = Cholesky::new(self.information.clone())?.solve(&self.pulls);
-        let by_each = |share: f64| (share * target.fixed_v()).powi(2) * &gains * gains.transpose();
-        if let Some(searched) = &self.searched {
-            let ways_m = places_m(fit).into_iter().zip(&searched.places_m).map(|(now, then)| distance(now, *then));
-            let moved = ways_m.fold(0.0, f64::max) / (MOVED_ON * spacing_m);
-            return Some(&searched.covariance + by_each(moved.min(1.0)));
+        if let Some(Found { covariance, error }) = &self.found {
+            let by_patterns = changed * error.patterns_through(&gains);
+            return Some(covariance + &by_patterns * by_patterns.transpose());
         }
         let n = fit.volts.len().isqrt();
         let by_patterns = &gains * errors.patterns_v(&Readings::from_fn(n, |g, e| fit.volts[g * n + e]));
         let own = if target.is_provisional() { 1.0 } else { OWN_SHARE };
-        Some(by_each(own) + &by_patterns * by_patterns.transpose())
+        let by_each = (own * target.fixed_v()).powi(2) * &gains * gains.transpose();
+        Some(by_each + &by_patterns * by_patterns.transpose())
     }
 
     /// Covariance of a fit's parameters that stays.
@@ -101,10 +98,6 @@ impl SystematicError {
         let units = units(fit);
         scaled(&self.covariance, |i, j| 1.0 / (units[i] * units[j]))
     }
-}
-
-fn places_m(fit: &DiscFit) -> Vec<Place> {
-    fit.contacts.iter().map(|contact| [contact.x_m, contact.y_m, contact.z_m]).collect()
 }
 
 /// Units of a fit's parameters: of places in m.

@@ -65,7 +65,7 @@ impl ContactTracker {
     /// where contacts are too many to be followed by few rows.
     pub fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
         match &self.last {
-            _ if self.doubt.needs_whole() => None,
+            _ if self.doubt.needs_whole() || self.rows.as_ref().is_some_and(|rows| rows.is_stale()) => None,
             Some(last) if self.moves() => Some(self.finder.telling_grounds(&last.fit, count)),
             Some(_) => Some(self.finder.all_grounds()),
             None => Some(self.finder.watching_grounds()),
@@ -86,13 +86,11 @@ impl ContactTracker {
     /// Brings the contacts to rows of readings; the rows as they were fitted, and whether the contacts have to be searched.
     fn step(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
         self.before = self.association.clone();
-        let off_v = |state: &Option<Box<RowState>>| state.as_ref().map_or(Vec::new(), |state| state.off_v().to_vec());
-        let off_v = off_v(&self.rows);
-        let is_known = self.finder.knows_unknowns() && !(self.is_provisional && self.last.is_some());
-        let target = match off_v.is_empty() && !is_known {
-            true => Target::provisional(rows, 1, &self.finder.errors),
-            false => self.finder.target_of_rows(rows, &off_v),
-        };
+        if let Some((last, whole)) = self.last.as_ref().zip(self.whole.take()) {
+            self.rows = Some(Box::new(RowState::new(last, &whole)));
+        }
+        let off = self.rows.as_ref().map(|state| state.off());
+        let target = self.finder.target_of_rows(rows, off);
         let Some(last) = self.last.take() else {
             self.rows = None;
             // A rough contact is better than none for the time of a search.
