@@ -1,8 +1,8 @@
-"""Sets `tactomo-lab learn` against scikit-learn's KernelRidge, on the same presses of five kinds of made-up skins.
+"""Sets `tactomo-lab learn` against scikit-learn's KernelRidge, on the same presses of six kinds of made-up skins.
 
 The presses are those of the example `skins`: 1800 taught, 400 unseen. KernelRidge has a Gaussian kernel, whose width and ridge are searched
 by cross-validation in three folds (least squares over x, y and z in metres), on each of two descriptions: the standardised channels,
-as one would begin with, and the direction and the logarithm of the size of the readings, from which `tactomo` begins too. Both are judged
+as one would begin with, and the direction and the logarithm of the size of the readings. `tactomo` chooses between the same two. All are judged
 by the root mean square distance on the unseen presses. A second table says how many readings `tactomo` flags that no press can give.
 
     python3 -m venv .venv && .venv/bin/pip install numpy scikit-learn
@@ -30,7 +30,7 @@ from sklearn.model_selection import GridSearchCV  # noqa: E402
 from sklearn.pipeline import make_pipeline  # noqa: E402
 from sklearn.preprocessing import FunctionTransformer, StandardScaler  # noqa: E402
 
-KINDS = ["opposite", "adjacent", "grounded", "cells", "dome"]
+KINDS = ["opposite", "adjacent", "grounded", "cells", "amplified", "dome"]
 # Shares of the inverse mean square distance: widths from 0.2 to 6 of the root of that.
 GAMMAS = np.logspace(-1.5, 1.5, 7)
 ALPHAS = np.logspace(-6, -1, 6)
@@ -137,8 +137,8 @@ def flagged(program, folder, seed):
 def main():
     folder, seed = pathlib.Path(sys.argv[1]), sys.argv[2]
     program = sys.argv[3] if len(sys.argv) > 3 else "target/release/tactomo-lab"
-    print("| skin | channels | KernelRidge: channels | directions | its search | tactomo | dimensions | fit | a press | flagged |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
+    print("| skin | channels | KernelRidge: channels | directions | its search | tactomo | described by | dimensions | fit | a press | flagged |")
+    print("|---" * 11 + "|")
     for kind in KINDS:
         taught, unseen = (presses(folder, kind, seed, part) for part in ("taught", "unseen"))
         errors, best, sklearn_s = sklearn_mm(taught, unseen)
@@ -146,7 +146,7 @@ def main():
         texts = [f"{'**' if name == best else ''}{errors[name]:.2f} mm{'**' if name == best else ''}" for name in errors]
         print(
             f"| `{kind}` | {learned['channels']} | {texts[0]} | {texts[1]} | {sklearn_s:.0f} s | {1e3 * scored['root_mean_square_m']:.2f} mm "
-            f"| {learned['components']} | {cpu_s:.1f} s | {scored['press_us']:.0f} us | {scored['flagged']} of {scored['presses']} |",
+            f"| {learned['description']} | {learned['components']} | {cpu_s:.1f} s | {scored['press_us']:.0f} us | {scored['flagged']} of {scored['presses']} |",
             flush=True,
         )
     flagged(program, folder, seed)
