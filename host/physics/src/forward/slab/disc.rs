@@ -19,7 +19,7 @@ pub(super) const LOCAL_ORDERS: usize = 10;
 pub(super) const MAX_ORDER: usize = 31;
 
 /// Orders up to which the layers' part of the self-impedance is integrated; above it only the half-space's counts.
-const LAYERED_ORDER: usize = 8;
+const LAYERED_ORDER: usize = MAX_DEGREE;
 
 /// Share of the layers' part of the self-impedance that is left out, for each point of the quadrature.
 const NEGLIGIBLE: f64 = 1e-8;
@@ -193,8 +193,7 @@ impl DiscSelf {
     pub fn reduced(&self, basis: &DiscBasis, resistance: f64, scale: f64) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(basis.len(), basis.len());
         for m in 0..=basis.degree {
-            let kept = (basis.degree - m) / 2 + 1;
-            let block = self.reduced_block(m, kept, basis.degree, resistance, scale);
+            let block = self.eliminated(m, basis.degree, resistance, scale).impedances;
             for (i, a) in basis.densities.iter().enumerate().filter(|(_, a)| a.m == m) {
                 for (j, b) in basis.densities.iter().enumerate().filter(|(_, b)| b.m == m && b.sine == a.sine) {
                     all[(i, j)] = block[((a.n - m) / 2, (b.n - m) / 2)];
@@ -204,21 +203,42 @@ impl DiscSelf {
         all
     }
 
-    fn reduced_block(&self, m: usize, kept: usize, degree: usize, resistance: f64, scale: f64) -> DMatrix<f64> {
-        let orders: Vec<_> = (m..=(degree + LOCAL_ORDERS).min(MAX_ORDER)).step_by(2).collect();
+    /// What a kept density of radial and angular order brings with it: radial orders and their shares, itself first, and then those above a degree,
+    /// which are eliminated.
+    pub fn with_higher(&self, [n, m]: [usize; 2], degree: usize, resistance: f64) -> Vec<(usize, f64)> {
+        let Eliminated { orders, of_kept, .. } = self.eliminated(m, degree, resistance, 1.0);
+        let higher = of_kept.column((n - m) / 2);
+        std::iter::once((n, 1.0)).chain(orders.into_iter().zip(higher.iter().copied())).collect()
+    }
+
+    /// Eliminates the orders above a degree of an angular order.
+    fn eliminated(&self, m: usize, degree: usize, resistance: f64, scale: f64) -> Eliminated {
+        let mut orders: Vec<_> = (m..=(degree + LOCAL_ORDERS).min(MAX_ORDER)).step_by(2).collect();
         let half = if m == 0 { 1.0 } else { 0.5 };
         let full = DMatrix::from_fn(orders.len(), orders.len(), |i, j| {
             let spread = if i == j { resistance / (orders[i] + 1) as f64 } else { 0.0 };
             half * (spread + scale * self.between(orders[i], orders[j]))
         });
-        let above = orders.len() - kept;
-        let low = full.view((0, 0), (kept, kept)).into_owned();
+        let kept = (degree - m) / 2 + 1;
+        let orders = orders.split_off(kept);
+        let above = orders.len();
         let cross = full.view((kept, 0), (above, kept)).into_owned();
-        match Cholesky::new(full.view((kept, kept), (above, above)).into_owned()) {
-            Some(factor) => low - cross.tr_mul(&factor.solve(&cross)),
-            None => low,
-        }
+        let of_kept = match Cholesky::new(full.view((kept, kept), (above, above)).into_owned()) {
+            Some(factor) => -factor.solve(&cross),
+            None => DMatrix::zeros(above, kept),
+        };
+        Eliminated { impedances: full.view((0, 0), (kept, kept)) + cross.tr_mul(&of_kept), orders, of_kept }
     }
+}
+
+/// What is left of an angular order where the radial orders above a degree are eliminated.
+struct Eliminated {
+    /// Impedances between those kept.
+    impedances: DMatrix<f64>,
+    /// Those eliminated.
+    orders: Vec<usize>,
+    /// What each of them is for each of those kept.
+    of_kept: DMatrix<f64>,
 }
 
 /// `integral J_(n+1) J_(n'+1) / x^2 dx` for orders of equal parity, `n' <= n` (Weber and Schafheitlin).

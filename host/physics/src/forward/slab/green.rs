@@ -157,27 +157,31 @@ impl SurfaceGreen {
 
     /// Mirror images that bring a disc at `b` within reach of a disc at `a`; `gap_m` is added to the reach.
     pub fn images(&self, a: [f64; 2], b: [f64; 2], gap_m: f64) -> Vec<Image> {
-        let reach_m = self.reach_m() + gap_m;
-        // Along one direction: sign and offset.
-        let along = |axis: usize| {
-            let period_m = 2.0 * self.size_m[axis];
-            let turns = (reach_m / period_m) as i32 + 1;
-            (-turns..=turns)
-                .flat_map(move |turn| [[1.0, f64::from(turn) * period_m], [-1.0, f64::from(turn) * period_m]])
-                .filter(move |[sign, offset_m]| (a[axis] - (sign * b[axis] + offset_m)).abs() < reach_m)
-        };
-        let mut found = Vec::new();
-        for [sign_x, offset_x_m] in along(0) {
-            for [sign_y, offset_y_m] in along(1) {
-                let image = Image { sign: [sign_x, sign_y], offset_m: [offset_x_m, offset_y_m] };
-                let at = image.of(b);
-                if (a[0] - at[0]).powi(2) + (a[1] - at[1]).powi(2) < reach_m * reach_m {
-                    found.push(image);
-                }
+        images(self.size_m, a, b, self.reach_m() + gap_m)
+    }
+}
+
+/// Mirror images in the walls of a rectangle that bring `b` within a distance of `a` (m).
+pub(super) fn images(size_m: [f64; 2], a: [f64; 2], b: [f64; 2], reach_m: f64) -> Vec<Image> {
+    // Along one direction: sign and offset.
+    let along = |axis: usize| {
+        let period_m = 2.0 * size_m[axis];
+        let turns = (reach_m / period_m) as i32 + 1;
+        (-turns..=turns)
+            .flat_map(move |turn| [[1.0, f64::from(turn) * period_m], [-1.0, f64::from(turn) * period_m]])
+            .filter(move |[sign, offset_m]| (a[axis] - (sign * b[axis] + offset_m)).abs() < reach_m)
+    };
+    let mut found = Vec::new();
+    for [sign_x, offset_x_m] in along(0) {
+        for [sign_y, offset_y_m] in along(1) {
+            let image = Image { sign: [sign_x, sign_y], offset_m: [offset_x_m, offset_y_m] };
+            let at = image.of(b);
+            if (a[0] - at[0]).powi(2) + (a[1] - at[1]).powi(2) < reach_m * reach_m {
+                found.push(image);
             }
         }
-        found
     }
+    found
 }
 
 /// One mirror image of the plane in the slab's walls.
@@ -191,6 +195,11 @@ impl Image {
     /// Where the image of a point is (m).
     pub fn of(&self, point: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| self.sign[axis] * point[axis] + self.offset_m[axis])
+    }
+
+    /// Of both directions there, seen from here.
+    pub fn sign(&self) -> [f64; 2] {
+        self.sign
     }
 
     /// Whether this is the point itself.

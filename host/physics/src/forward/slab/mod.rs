@@ -14,6 +14,7 @@ mod driving;
 mod green;
 mod image;
 mod layers;
+mod near;
 mod pads;
 mod quadrature;
 mod spline;
@@ -51,7 +52,7 @@ use crate::scene::Contact;
 const IMAGE_NODES: usize = 2000;
 
 /// How finely a [`Slab`] is resolved: degrees of the polynomials that current densities are made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resolution {
     /// On the pads.
     pub pad_degree: usize,
@@ -63,21 +64,49 @@ pub struct Resolution {
     pub uneven_modes: usize,
     /// Wave numbers, times the thickness, up to which the pads' fields reach the top: those above have fallen to 2 exp(-this).
     pub across: usize,
-    /// Most steps in a pad's radius of the table of the pads' fields: what limits it on layers that are thin against the pads.
+    /// Length at which the pads' fields on the top of a thin layer are split, at least, in radii of the smallest pad.
+    pub split_in_pad: f64,
+    /// The same in pitches of the pads: nearly no place has more than two pads in reach then.
+    pub split_in_pitch: f64,
+    /// Most steps in a pad's or dot's radius of the table of their fields, where they are not split: what limits it on layers that are thin against them.
     pub steps_in_pad: usize,
 }
 
 impl Resolution {
     /// Enough for readings within a few tenths of a per cent: against reference readings, one degree more changes nothing.
-    pub const STANDARD: Self =
-        Self { pad_degree: 2, contact_degree: 2, dot_degree: 3, uneven_modes: 10, across: 11, steps_in_pad: 10 };
+    pub const STANDARD: Self = Self {
+        pad_degree: 2,
+        contact_degree: 2,
+        dot_degree: 3,
+        uneven_modes: 10,
+        across: 11,
+        split_in_pad: 1.25,
+        split_in_pitch: 0.2,
+        steps_in_pad: 10,
+    };
     /// For how readings change from one detector to another: on `square-60` changes are off by up to 3 % of themselves, those with a pad's own
     /// impedance by a sixth.
-    pub const COARSE: Self =
-        Self { pad_degree: 1, contact_degree: 2, dot_degree: 2, uneven_modes: 8, across: 6, steps_in_pad: 3 };
+    pub const COARSE: Self = Self {
+        pad_degree: 1,
+        contact_degree: 2,
+        dot_degree: 2,
+        uneven_modes: 8,
+        across: 6,
+        split_in_pad: 2.0,
+        split_in_pitch: 0.25,
+        steps_in_pad: 3,
+    };
     /// Finer than any solver needs.
-    pub const FINE: Self =
-        Self { pad_degree: 3, contact_degree: 4, dot_degree: 4, uneven_modes: 16, across: 11, steps_in_pad: 10 };
+    pub const FINE: Self = Self {
+        pad_degree: 3,
+        contact_degree: 4,
+        dot_degree: 4,
+        uneven_modes: 16,
+        across: 11,
+        split_in_pad: 1.25,
+        split_in_pitch: 0.2,
+        steps_in_pad: 10,
+    };
 }
 
 /// A rectangular detector, layered in depth.
@@ -209,7 +238,15 @@ impl Slab {
         }
         let [_, covered] = stacks(&self.detector, self.size_m, self.driving);
         let basis = DiscBasis::of_degree(self.resolution.pad_degree);
-        PadFields::new(self.points.pads(), basis, impedances, &covered, self.uneven.as_deref(), self.resolution)
+        PadFields::new(
+            self.points.pads(),
+            basis,
+            impedances,
+            &self.bottom,
+            &covered,
+            self.uneven.as_deref(),
+            self.resolution,
+        )
     }
 
     /// Impedances between all densities of the pads (ohm), below their layers alone.

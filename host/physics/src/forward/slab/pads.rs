@@ -12,9 +12,10 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::disc::{DiscBasis, DiscSelf};
+use super::disc::{Density, DiscBasis, DiscSelf};
 use super::driving::{Covered, Mode};
 use super::green::SurfaceGreen;
+use super::near::{NearFields, longest_split, near_at_zero};
 use super::spline::{Grid, signs};
 use super::uneven::Uneven;
 use super::{Resolution, from_corner};
@@ -22,6 +23,15 @@ use crate::detector::{Detector, cosines};
 
 /// Table steps in the half wave of the finest mode that crosses the slab: it still fits.
 const STEPS_IN_WAVE: f64 = 1.03;
+
+/// The same in the half wave of the finest mode of a split's smooth part, which falls more slowly before.
+const STEPS_IN_SMOOTH_WAVE: f64 = 1.9;
+
+/// Radial orders above the degree of a pad's basis that the smooth part has: of higher ones its factor leaves next to nothing.
+const SMOOTH_ORDERS: usize = 2;
+
+/// Fields are split where that makes the steps longer by this factor.
+const WORTH: f64 = 1.4;
 
 /// A pad, from the corner (m).
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +42,17 @@ pub(super) struct Pad {
 }
 
 impl Pad {
+    /// Of its contact (ohm).
+    pub fn resistance_ohm(&self) -> f64 {
+        self.contact_impedance_ohm_m2 / (PI * self.radius_m * self.radius_m)
+    }
+
+    /// Whether another one differs in its place alone.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let kind = |pad: &Self| (pad.radius_m, pad.contact_impedance_ohm_m2);
+        kind(self) == kind(other)
+    }
+
     fn is_placed_as(&self, other: &Self) -> bool {
         self.centre_m == other.centre_m && self.radius_m == other.radius_m
     }
@@ -98,10 +119,9 @@ impl PadPoints {
                 let mut block = basis.weights() * points * basis.weights().transpose();
                 if e == f {
                     let even = uneven.map_or(1.0, |uneven| uneven.inverse_root(pad.centre_m).powi(2));
-                    let area_m2 = PI * pad.radius_m * pad.radius_m;
                     let alike = own.take_if(|(radius_m, _)| *radius_m == pad.radius_m);
                     let local = alike.unwrap_or_else(|| (pad.radius_m, kernel.disc_self(pad.radius_m)));
-                    block += local.1.reduced(basis, pad.contact_impedance_ohm_m2 / area_m2, even);
+                    block += local.1.reduced(basis, pad.resistance_ohm(), even);
                     own = Some(local);
                 }
                 all.view_mut((e * size, f * size), (size, size)).copy_from(&block);
@@ -160,6 +180,8 @@ pub(super) struct PadFields {
     columns: usize,
     /// Spline coefficients: all columns of a node together.
     table: Vec<f32>,
+    /// What the table lacks near the pads, if there is anything.
+    near: Option<NearFields>,
     /// The factor that unevenness has on all of them at a place.
     roots: Option<Vec<f32>>,
     /// Between the electrodes (ohm): `n x n`.
@@ -170,15 +192,33 @@ impl PadFields {
     /// Eliminates the pads from `impedances`; `None` if they are not positive definite.
     pub fn new(
         pads: &[Pad],
-        basis: &DiscBasis,
+        basis: &'static DiscBasis,
         impedances: DMatrix<f64>,
+        kernel: &SurfaceGreen,
         covered: &Covered<'_>,
         uneven: Option<&Uneven>,
         resolution: Resolution,
     ) -> Option<Self> {
-        let (grid, modes) = across(covered, smallest_m(pads), resolution);
+        let split_m = split_m(covered, pads, resolution);
+        let (grid, modes) = match split_m {
+            Some(split_m) => smooth_across(covered, split_m, resolution),
+            None => across(covered, smallest_m(pads), resolution),
+        };
         let uniform = uniform(pads, basis);
-        let fields = pad_modes(pads, basis, &grid, &modes, uneven);
+        let fields = match split_m {
+            Some(_) => {
+                let fine = DiscBasis::of_degree(basis.degree() + SMOOTH_ORDERS);
+                // Most pads are alike: what a disc is to itself is an integral over the layers.
+                let mut last: Option<(Pad, DMatrix<f64>)> = None;
+                let densities = |pad: &Pad| {
+                    let alike = last.take_if(|(of, _)| pad.is_like(of));
+                    let of_kind = alike.unwrap_or_else(|| (*pad, with_higher(pad, basis, fine, kernel)));
+                    last.insert(of_kind).1.clone()
+                };
+                pad_modes(pads, fine, densities, &grid, &modes, uneven)
+            }
+            None => pad_modes(pads, basis, |_| basis.weights().clone(), &grid, &modes, uneven),
+        };
         let [impedances, fields] = covered.connect([impedances, fields], &uniform, &grid, &modes);
         let others: Vec<_> = (0..fields.ncols()).filter(|i| !uniform.contains(i)).collect();
         let inner = impedances.select_rows(&others).select_columns(&others);
@@ -188,8 +228,25 @@ impl PadFields {
         let electrodes_ohm = impedances.select_rows(&uniform).select_columns(&uniform) - coupling.tr_mul(&coupling);
 
         let correction = fields.select_columns(&others) * inverse.transpose();
-        let electrodes = fields.select_columns(&uniform) - &correction * coupling;
-        Some(Self::of(grid, &modes, Eliminated { electrodes_ohm, electrodes, correction }, uneven))
+        let electrodes = fields.select_columns(&uniform) - &correction * &coupling;
+        let mut all = Self::of(grid, &modes, Eliminated { electrodes_ohm, electrodes, correction }, uneven);
+        all.near = split_m.map(|split_m| {
+            let mut shares = DMatrix::zeros(all.columns, fields.ncols());
+            let to_electrodes = -coupling.tr_mul(&inverse);
+            for (i, density) in others.iter().enumerate() {
+                shares.view_mut((0, *density), (uniform.len(), 1)).copy_from(&to_electrodes.column(i));
+                shares.view_mut((uniform.len(), *density), (others.len(), 1)).copy_from(&inverse.column(i));
+            }
+            uniform.iter().enumerate().for_each(|(pad, density)| shares[(pad, *density)] = 1.0);
+            if let Some(uneven) = uneven {
+                for (density, mut column) in shares.column_iter_mut().enumerate() {
+                    column *= uneven.inverse_root(pads[density / basis.len()].centre_m);
+                }
+            }
+            let own = |radius_m| kernel.disc_self(radius_m);
+            NearFields::new(pads, basis, covered, split_m, resolution.across as f64, own, &shares)
+        });
+        Some(all)
     }
 
     /// The table of fields that are given by modes.
@@ -203,7 +260,7 @@ impl PadFields {
         let single = |values: Vec<f64>| values.into_iter().map(|value| value as f32).collect();
         let table = single(grid.synthesise(&waves, &amplitudes));
         let roots = uneven.map(|uneven| single(grid.through(|at_m| uneven.inverse_root(at_m))));
-        Self { grid, electrodes: own, columns, table, roots, electrodes_ohm }
+        Self { grid, electrodes: own, columns, table, near: None, roots, electrodes_ohm }
     }
 
     /// Number of electrodes.
@@ -231,6 +288,9 @@ impl PadFields {
         for (node, weight) in (0..16).map(taps) {
             let values = &self.table[node * self.columns..][..out.len()];
             out.iter_mut().zip(values).for_each(|(sum, value)| *sum += root * weight * value);
+        }
+        if let Some(near) = &self.near {
+            near.add(at_m, root, out);
         }
     }
 
@@ -270,6 +330,41 @@ pub(super) fn smallest_m(pads: &[Pad]) -> f64 {
     pads.iter().map(|pad| pad.radius_m).fold(f64::INFINITY, f64::min)
 }
 
+/// Length at which fields of pads on the top are split (m); `None` where a table of all of them needs hardly finer steps, or is as fine for the
+/// driving layer's sake.
+fn split_m(covered: &Covered<'_>, pads: &[Pad], resolution: Resolution) -> Option<f64> {
+    let smallest_m = smallest_m(pads);
+    let pitch_m = (covered.size_m()[0] * covered.size_m()[1] / pads.len() as f64).sqrt();
+    let least_m = (resolution.split_in_pad * smallest_m).max(resolution.split_in_pitch * pitch_m);
+    let split_m = least_m.min(longest_split(resolution.across as f64) * smallest_m);
+    let whole_m = PI * covered.thickness_m() / resolution.across as f64 / STEPS_IN_WAVE;
+    let is_worth = PI / smooth_end(split_m, resolution) / STEPS_IN_SMOOTH_WAVE > WORTH * whole_m;
+    (is_worth && covered.finest() == 0.0).then_some(split_m)
+}
+
+/// Wave number (1/m) at which the smooth part's factor has fallen as far as modes that cross the layers do where they end.
+fn smooth_end(split_m: f64, resolution: Resolution) -> f64 {
+    2.0 * (resolution.across as f64).sqrt() / split_m
+}
+
+/// The smooth part of the modes that cross the layers, and the grid of its table.
+fn smooth_across(covered: &Covered<'_>, split_m: f64, resolution: Resolution) -> (Grid, Vec<Mode>) {
+    let end = smooth_end(split_m, resolution);
+    let grid = Grid::new(covered.size_m(), PI / end / STEPS_IN_SMOOTH_WAVE);
+    let area_m2 = covered.size_m()[0] * covered.size_m()[1];
+    let amplitude = |[m, n]: [usize; 2]| {
+        let k = grid.wave_number(0, m).hypot(grid.wave_number(1, n));
+        let value = match m + n {
+            // The near part's own mean belongs to mode 0.
+            0 => covered.floating().tb - near_at_zero(covered, split_m),
+            _ => covered.response(k).tb * (-0.25 * (k * split_m).powi(2)).exp(),
+        };
+        Mode { m, n, amplitude: signs([m, n]) * value / area_m2 }
+    };
+    let modes = grid.modes_within(end).into_iter().map(amplitude).collect();
+    (grid, modes)
+}
+
 /// The modes that cross the layers, and the grid of a table of fields on the top. Finer modes than some in the radius of the smallest pad or dot only
 /// matter at its rim.
 pub(super) fn across(covered: &Covered<'_>, smallest_m: f64, resolution: Resolution) -> (Grid, Vec<Mode>) {
@@ -286,18 +381,32 @@ pub(super) fn across(covered: &Covered<'_>, smallest_m: f64, resolution: Resolut
     (grid, modes)
 }
 
+/// Densities of a pad with those that are eliminated and come with them, by the points of a finer basis: `densities x nodes`.
+fn with_higher(pad: &Pad, basis: &DiscBasis, fine: &DiscBasis, kernel: &SurfaceGreen) -> DMatrix<f64> {
+    let own = kernel.disc_self(pad.radius_m);
+    let mut shares = DMatrix::zeros(basis.len(), fine.len());
+    for (d, density) in basis.densities().iter().enumerate() {
+        for (n, share) in own.with_higher([density.n, density.m], basis.degree(), pad.resistance_ohm()) {
+            let same = fine.densities().iter().position(|other| *other == Density { n, ..*density });
+            same.into_iter().for_each(|higher| shares[(d, higher)] = share);
+        }
+    }
+    shares * fine.weights()
+}
+
 /// Amplitudes of the field on the top of each density of each pad: `modes x densities`; with unevenness but for the root of its factor at
-/// the top.
+/// the top. Densities of a pad are given by the points of a basis: `densities x nodes`.
 pub(super) fn pad_modes(
     pads: &[Pad],
     basis: &DiscBasis,
+    mut densities: impl FnMut(&Pad) -> DMatrix<f64>,
     grid: &Grid,
     modes: &[Mode],
     uneven: Option<&Uneven>,
 ) -> DMatrix<f64> {
     let rows: HashMap<_, _> = modes.iter().enumerate().map(|(row, mode)| ([mode.m, mode.n], row)).collect();
-    let mut all = DMatrix::zeros(modes.len(), pads.len() * basis.len());
-    for (e, pad) in pads.iter().enumerate() {
+    let mut all = Vec::new();
+    for pad in pads {
         let nodes = basis.nodes_m(pad.centre_m, pad.radius_m);
         let along = |axis: usize, at_m: &[f64; 2]| cosines(grid.modes(axis), at_m[axis] / grid.size_m()[axis]);
         let waves: Vec<_> = nodes.iter().map(|at_m| [along(0, at_m), along(1, at_m)]).collect();
@@ -313,8 +422,8 @@ pub(super) fn pad_modes(
                 at_node *= uneven.inverse_root(*node);
             }
         }
-        let of_densities = basis.weights() * at_nodes;
-        all.view_mut((0, e * basis.len()), (modes.len(), basis.len())).tr_copy_from(&of_densities);
+        let of_densities = densities(pad) * at_nodes;
+        all.extend(of_densities.row_iter().map(|row| row.transpose()));
     }
-    all
+    DMatrix::from_columns(&all)
 }

@@ -88,9 +88,8 @@ impl Grid {
         let mut lines = DMatrix::zeros(columns * wide, alike.len());
         let mut first = 0;
         for (line, of) in lines.as_mut_slice().chunks_exact_mut((columns * wide).max(1)).zip(&alike) {
-            let waves = DMatrix::from_fn(of.len(), wide, |i, node| y[(of[i][1], node)]);
             let mut line = DMatrixViewMut::from_slice(line, columns, wide);
-            line.gemm(1.0, &amplitudes.columns(first, of.len()), &waves, 0.0);
+            line.gemm(1.0, &amplitudes.columns(first, of.len()), &y.rows(of[0][1], of.len()), 0.0);
             first += of.len();
         }
         let x = self.cosines(0);

@@ -135,7 +135,7 @@ impl Stacks<'_> {
     fn pads_to_dots(&self, places: Option<&[UnevenPlace]>) -> DMatrix<f64> {
         let [covered, _] = self.covered;
         let (grid, modes) = across(&covered, smallest_m(self.pads).min(self.dots.radius_m()), self.resolution);
-        let fields = pad_modes(self.pads, self.basis, &grid, &modes, self.uneven[0]);
+        let fields = pad_modes(self.pads, self.basis, |_| self.basis.weights().clone(), &grid, &modes, self.uneven[0]);
         let mut all = fields.tr_mul(&means(self.dots.basis, &self.dots.centres_m, self.dots.radius_m(), &grid, &modes));
         scale_dots(&mut all, places);
         all
