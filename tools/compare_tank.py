@@ -1,25 +1,28 @@
 """Images of real tanks with a known answer: by the fields of tactomo's thin shell, and by pyEIT.
 
-Three data sets that come with EIDORS, in its folder `eidors/sample_data`; they stay where they are. All have 16 electrodes, adjacent drive and
-adjacent readings:
+Four data sets that come with EIDORS (https://github.com/eidors3d/eidors-readonly), in its folders `eidors/sample_data` and `htdocs/data_contrib`; they
+stay where they are. All have 16 electrodes, adjacent drive and adjacent readings:
 
-- `iirc_data_2006.mat`: a tank of 20 cm with electrodes of 1 cm, empty, and with a rod of 2 cm that is rotated in it.
+- `iirc_data_2006.mat`: a tank of 20 cm with round electrodes of 1 cm and 6 cm of saline, empty, and with a rod of 2 cm that is rotated in it.
 - `montreal_data_1995.mat` (A. Adler, CC BY-ND 2.5; A. Adler and W. R. B. Lionheart, "Uses and abuses of EIDORS", Physiol. Meas. 2006): a rod is moved
   in a circle around a tank of 30 cm, and diametrically across it.
 - `ottawa_2dphantom_data_2008.mat`: a glass and a metal target in a tank, round and squeezed at two and at three points, photographed from above. The
   readme has the picture's places. The photographed electrodes are fitted to a regular polygon (an affine map, which takes out the camera's view and
   most of a squeeze), and the targets go with them.
+- `ds_data_2004.zip` (D. Stephenson): a metal and a plastic rod in the same place near the first electrode, and two of either 45, 90 and 180 degrees
+  apart about the middle. So their names say, and nothing else does.
 
 Both programs are told that tanks are round and electrodes even. Places are in radii of the tank, the first electrode at the top and the others clockwise.
 
-First the empty tanks: how far the readings of either model are from the measured ones, over the root mean square of these, after one factor for all.
-Montreal's are not of this kind: gains differ from channel to channel. Then images: one step of Gauss and Newton on relative changes, with the same
-prior and lambda, on each program's own mesh and Jacobian. A target is the middle, by area and value, of where the image is beyond half of its extreme.
+First the empty tanks: how far the readings of either model are from the measured ones, over the root mean square of these, after one factor for all,
+and those of an even disc with points on its rim, by formula: no sheet can do much better in a tank that has depth. Montreal's are not of this kind:
+gains differ from channel to channel. Then images: one step of Gauss and Newton on relative changes, with the same prior and lambda, on each program's
+own mesh and Jacobian. A target is where the image is beyond half of its extreme: its middle, by area and value, and the radius of a disc of its area.
 
     python3 -m venv .venv && .venv/bin/pip install pyeit==1.2.4
-    .venv/bin/python tools/compare_tank.py FOLDER [PROGRAM]
+    .venv/bin/python tools/compare_tank.py EIDORS [PROGRAM]
 
-PROGRAM is the example `tank` where it is built already.
+EIDORS is its folder, PROGRAM the example `tank` where it is built already.
 """
 
 import pathlib
@@ -27,6 +30,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import zipfile
 
 import numpy as np
 import pyeit.eit.jac as jac
@@ -58,7 +62,7 @@ def onto(places, targets):
 
 
 def photographed(folder):
-    """Of each frame the target's middle, if there is one, and how well it is known, in radii."""
+    """Of each frame the target's middle and radius, if there is one, and how far electrodes are off their places, in radii of the tank."""
     text = (folder / f"{OTTAWA}-readme.txt").read_text(errors="replace")
     rows = re.search(r"d = \[(.*?)\];", text, re.DOTALL).group(1).split(";")
     table = np.array([[float(word) for word in row.split(",")] for row in rows])
@@ -67,7 +71,8 @@ def photographed(folder):
         # Rows of a picture go down.
         places = table[:, 2 * column] - 1j * table[:, 2 * column + 1]
         mapped, off = onto(places[3 : 3 + ELECTRODES], REGULAR)
-        known[frame] = (mapped(places[20]) if places[20] else None, off)
+        target = (mapped(places[20]), abs(mapped(places[21]) - mapped(places[20]))) if places[20] else None
+        known[frame] = (target, off)
     return known
 
 
@@ -76,6 +81,15 @@ def measured(folder, name):
     where = [ELECTRODES * drive + read for drive, read in PAIRS]
     arrays = scipy.io.loadmat(folder / f"{name}.mat")
     return {key: np.abs(of[where]).astype(float) for key, of in arrays.items() if np.shape(of)[:1] == (ELECTRODES**2,)}
+
+
+def stephenson(folder):
+    """Readings (V) by file; water is the mean of three."""
+    with zipfile.ZipFile(folder / "ds_data_2004.zip") as files:
+        texts = {pathlib.PurePath(name).stem: files.read(name).decode() for name in files.namelist() if name.endswith(".txt")}
+    rows = {name: np.loadtxt(text.splitlines())[: len(PAIRS)] for name, text in texts.items()}
+    volts = {name: np.hypot(of[:, 0], of[:, 1]) for name, of in rows.items()}
+    return volts | {"water": np.mean([of for name, of in volts.items() if name.startswith("water")], axis=0)}
 
 
 def changes(full, empty):
@@ -122,13 +136,36 @@ def apart(model, tank):
     return np.linalg.norm(tank - factor * model) / np.linalg.norm(tank)
 
 
-def middle(triangles, image):
-    """Of what is beyond half of the extreme, and the extreme."""
+def points():
+    """Readings of an even disc with points on its rim: a current's potential there is that of a logarithm."""
+    apart = lambda a, b: -np.log(abs(REGULAR[a % ELECTRODES] - REGULAR[b % ELECTRODES]))
+    return np.array([apart(r, d) - apart(r + 1, d) - apart(r, d + 1) + apart(r + 1, d + 1) for d, r in PAIRS])
+
+
+def spot(triangles, image):
+    """Of what is beyond half of the extreme the middle, the extreme, and the radius of a disc of its area."""
     a, b, c = triangles.T
     areas = np.abs(((b - a) * (c - a).conj()).imag) / 2
     extreme = image[np.argmax(np.abs(image))]
-    weights = np.where(image / extreme > 0.5, image / extreme * areas, 0.0)
-    return weights @ triangles.mean(axis=1) / weights.sum(), extreme
+    is_spot = image / extreme > 0.5
+    weights = np.where(is_spot, image / extreme * areas, 0.0)
+    return weights @ triangles.mean(axis=1) / weights.sum(), extreme, np.sqrt(areas[is_spot].sum() / np.pi)
+
+
+def two(triangles, image):
+    """The middles of the two parts that what is beyond half of the extreme falls into best (two means)."""
+    a, b, c = triangles.T
+    shares = image / image[np.argmax(np.abs(image))]
+    weights = np.where(shares > 0.5, shares * np.abs(((b - a) * (c - a).conj()).imag), 0.0)
+    places, best = triangles.mean(axis=1), (np.inf, None)
+    for angle in np.linspace(0, np.pi, 12, endpoint=False):
+        pair = weights @ places / weights.sum() + 0.3 * np.exp(1j * angle) * np.array([1, -1])
+        for _ in range(50):
+            nearest = np.abs(places[:, None] - pair).argmin(axis=1)
+            parts = weights[:, None] * np.eye(2)[nearest]
+            pair = places @ parts / np.maximum(parts.sum(axis=0), 1e-300)
+        best = min(best, (weights @ np.abs(places - pair[nearest]) ** 2, pair), key=lambda one: one[0])
+    return best[1]
 
 
 def circle(places):
@@ -148,8 +185,9 @@ def line(places):
 
 def main():
     if len(sys.argv) < 2:
-        sys.exit("the folder eidors/sample_data of EIDORS is needed")
-    folder = pathlib.Path(sys.argv[1])
+        sys.exit("the folder of EIDORS is needed")
+    folder = pathlib.Path(sys.argv[1]) / "eidors/sample_data"
+    rods = stephenson(pathlib.Path(sys.argv[1]) / "htdocs/data_contrib/ds_tank_phantom")
     known = photographed(folder)
     ottawa, montreal, iirc = (measured(folder, name) for name in (OTTAWA, MONTREAL, IIRC))
     tank = {frame: ottawa[f"phantomdata_{frame}"] for frame in known}
@@ -158,38 +196,52 @@ def main():
         for shape, (empty, *full) in TANKS.items()
         for target, frame in zip(("glass", "metal"), full)
     ]
+    single, pairs = ([f"{of}_{rest}" for of in ("metal", "plastic") for rest in names] for names in (("1",), ("2_45", "2_90", "2_180")))
     parts = [
         *(changes(tank[frame], tank[empty]) for *_, frame, empty in targets),
         changes(montreal["zc_demo3"], montreal["zc_h_demo3"]),
         changes(montreal["zc_demo4"], montreal["zc_h_demo4"]),
         changes(iirc["v_rotate"], iirc["v_reference"]),
+        *(changes(rods[name][:, None], rods["water"][:, None]) for name in single + pairs),
     ]
     ends = np.cumsum([len(part) for part in parts])
-    found = {}
+    tanks = {"IIRC": iirc["v_reference"].ravel(), "Ottawa": tank[20].ravel(), "Stephenson": rods["water"]}
+    misfits = lambda model: ", ".join(f"{tank} {100 * apart(model, readings):.1f} %" for tank, readings in tanks.items())
+    print(f"empty tanks, a disc with points on its rim: {misfits(points())}")
+    found, degrees = {}, {}
     for name, method in {"tactomo": by_tactomo, "pyEIT": by_pyeit}.items():
         rest, triangles, images = method(list(np.concatenate(parts)))
-        off = (100 * apart(rest, empty.ravel()) for empty in (iirc["v_reference"], tank[20]))
-        print(f"{name}: {len(triangles)} triangles; empty tanks: IIRC's to {next(off):.1f} %, Ottawa's to {next(off):.1f} %")
-        found[name] = np.split(np.array([middle(triangles, image) for image in images]), ends[:-1])
+        print(f"empty tanks, {name}, {len(triangles)} triangles: {misfits(rest)}; {100 * apart(rest, points()):.1f} % from the disc")
+        found[name] = np.split(np.array([spot(triangles, image) for image in images]), ends[:-1])
+        both = (two(triangles, image) for image in images[-len(pairs) :])
+        degrees[name] = [np.degrees(abs(np.angle(one / other))) for one, other in both]
 
-    print("\n| tank | target | photographed at | electrodes off by | " + " | ".join(f"{name} | apart" for name in found) + " |")
-    print("|---" * (4 + 2 * len(found)) + "|")
+    print("\n| tank | target | photographed at | radius | electrodes off by | " + " | ".join(f"{name} | apart | radius" for name in found) + " |")
+    print("|---" * (5 + 3 * len(found)) + "|")
     for index, (shape, target, frame, _) in enumerate(targets):
-        at, off = known[frame]
-        cells = [shape, target, f"{at.real:+.2f}, {at.imag:+.2f}", f"{off:.2f}"]
+        (at, radius), off = known[frame]
+        cells = [shape, target, f"{at.real:+.2f}, {at.imag:+.2f}", f"{radius:.2f}", f"{off:.2f}"]
         for of in found.values():
-            (place, extreme), *_ = of[index]
+            place, extreme, seen = of[index][0]
             sign = "+" if extreme.real > 0 else "-"
-            cells += [f"{place.real:+.2f}, {place.imag:+.2f} ({sign})", f"{abs(place - at):.2f}"]
+            cells += [f"{place.real:+.2f}, {place.imag:+.2f} ({sign})", f"{abs(place - at):.2f}", f"{seen.real:.2f}"]
         print("| " + " | ".join(cells) + " |")
 
-    print("\n| rod in a circle | | mean radius | its deviation | middle off by |\n|---|---|---|---|---|")
-    for data, part in (("Montreal", -3), ("IIRC", -1)):
+    print("\n| rod in a circle | | distance from the middle | its deviation | circle's middle off by | rod's radius |\n|---|---|---|---|---|---|")
+    circled, across, rotated = range(len(targets), len(targets) + 3)
+    for data, part in (("Montreal", circled), ("IIRC", rotated)):
         for name, of in found.items():
-            print(f"| {data} | {name} | {circle(of[part][:, 0])} |")
+            print(f"| {data} | {name} | {circle(of[part][:, 0])} | {of[part][:, 2].real.mean():.2f} |")
     print("\n| rod across | | off a straight line | line off the middle |\n|---|---|---|---|")
     for name, of in found.items():
-        print(f"| Montreal | {name} | {line(of[-2][:, 0])} |")
+        print(f"| Montreal | {name} | {line(of[across][:, 0])} |")
+
+    print("\n| Stephenson | metal at | plastic at | apart | " + " | ".join(f"{name}: degrees" for name in pairs) + " |")
+    print("|---" * (4 + len(pairs)) + "|")
+    for name, of in found.items():
+        metal, plastic = (of[rotated + 1 + index][0, 0] for index in range(len(single)))
+        cells = [f"{place.real:+.2f}, {place.imag:+.2f}" for place in (metal, plastic)] + [f"{abs(metal - plastic):.2f}"]
+        print(f"| {name} | " + " | ".join(cells + [f"{angle:.0f}" for angle in degrees[name]]) + " |")
 
 
 if __name__ == "__main__":
