@@ -17,7 +17,8 @@ Both programs are told that tanks are round and electrodes even. Places are in r
 First the empty tanks: how far the readings of either model are from the measured ones, over the root mean square of these, after one factor for all,
 and those of an even disc with points on its rim, by formula: no sheet can do much better in a tank that has depth. Montreal's are not of this kind:
 gains differ from channel to channel. Then images: one step of Gauss and Newton on relative changes, with the same prior and lambda, on each program's
-own mesh and Jacobian. A target is where the image is beyond half of its extreme: its middle, by area and value, and the radius of a disc of its area.
+own mesh and Jacobian, drawn on 32 x 32 pixels as GREIT does (Adler and others, Physiol. Meas. 2009): tactomo's triangles are far smaller at electrodes.
+A target is where the image is beyond half of its extreme: its middle, by area and value, and the radius of a disc of its area.
 
     python3 -m venv .venv && .venv/bin/pip install pyeit==1.2.4
     .venv/bin/python tools/compare_tank.py EIDORS [PROGRAM]
@@ -32,6 +33,7 @@ import sys
 import tempfile
 import zipfile
 
+import matplotlib.tri
 import numpy as np
 import pyeit.eit.jac as jac
 import pyeit.eit.protocol as protocol
@@ -41,6 +43,8 @@ import scipy.io
 ELECTRODES = 16
 OTTAWA, MONTREAL, IIRC = "ottawa_2dphantom_data_2008", "montreal_data_1995", "iirc_data_2006"
 POWER, LAMBDA = 0.5, 0.01
+# Pixels from side to side, and places in each of them, from side to side, that its mean is taken over.
+PIXELS, INSIDE = 32, 8
 # Numbers of the photographed frames: empty, and with a glass and a metal target.
 TANKS = {"round": (20, 21, 22), "squeezed at two points": (23, 24, 25), "squeezed at three points": (26, 27, 28)}
 PAIRS = [(drive, read) for drive in range(ELECTRODES) for read in range(ELECTRODES) if (read - drive) % ELECTRODES not in (0, 1, 15)]
@@ -142,22 +146,36 @@ def points():
     return np.array([apart(r, d) - apart(r + 1, d) - apart(r, d + 1) + apart(r + 1, d + 1) for d, r in PAIRS])
 
 
-def spot(triangles, image):
-    """Of what is beyond half of the extreme the middle, the extreme, and the radius of a disc of its area."""
-    a, b, c = triangles.T
-    areas = np.abs(((b - a) * (c - a).conj()).imag) / 2
+def drawn(triangles, images):
+    """Middles of pixels, how much of each is in the tank, and a row of their values for each image."""
+    nodes, corners = np.unique(triangles, return_inverse=True)
+    find = matplotlib.tri.Triangulation(nodes.real, nodes.imag, corners.reshape(triangles.shape)).get_trifinder()
+    along = (np.arange(PIXELS * INSIDE) + 0.5) / (PIXELS * INSIDE) * 2 - 1
+    found = find(*np.meshgrid(along, along))
+    in_pixels = lambda of: of.reshape(PIXELS, INSIDE, PIXELS, INSIDE).sum(axis=(1, 3)).ravel()
+    counts = in_pixels((found >= 0).astype(float))
+    values = [in_pixels(np.where(found >= 0, image[found], 0.0)) / np.maximum(counts, 1) for image in images]
+    middles = along.reshape(PIXELS, INSIDE).mean(axis=1)
+    return (middles + 1j * middles[:, None]).ravel(), counts / INSIDE**2, values
+
+
+def beyond_half(shares, image):
+    """The extreme, and how much of a pixel counts where the image is beyond half of it."""
     extreme = image[np.argmax(np.abs(image))]
-    is_spot = image / extreme > 0.5
-    weights = np.where(is_spot, image / extreme * areas, 0.0)
-    return weights @ triangles.mean(axis=1) / weights.sum(), extreme, np.sqrt(areas[is_spot].sum() / np.pi)
+    return extreme, np.where(image / extreme > 0.5, shares, 0.0)
 
 
-def two(triangles, image):
+def spot(places, shares, image):
+    """Of what is beyond half of the extreme the middle, the extreme, and the radius of a disc of its area."""
+    extreme, counted = beyond_half(shares, image)
+    weights = counted * image / extreme
+    return weights @ places / weights.sum(), extreme, np.sqrt(counted.sum() / np.pi) * 2 / PIXELS
+
+
+def two(places, shares, image):
     """The middles of the two parts that what is beyond half of the extreme falls into best (two means)."""
-    a, b, c = triangles.T
-    shares = image / image[np.argmax(np.abs(image))]
-    weights = np.where(shares > 0.5, shares * np.abs(((b - a) * (c - a).conj()).imag), 0.0)
-    places, best = triangles.mean(axis=1), (np.inf, None)
+    extreme, counted = beyond_half(shares, image)
+    weights, best = counted * image / extreme, (np.inf, None)
     for angle in np.linspace(0, np.pi, 12, endpoint=False):
         pair = weights @ places / weights.sum() + 0.3 * np.exp(1j * angle) * np.array([1, -1])
         for _ in range(50):
@@ -212,8 +230,9 @@ def main():
     for name, method in {"tactomo": by_tactomo, "pyEIT": by_pyeit}.items():
         rest, triangles, images = method(list(np.concatenate(parts)))
         print(f"empty tanks, {name}, {len(triangles)} triangles: {misfits(rest)}; {100 * apart(rest, points()):.1f} % from the disc")
-        found[name] = np.split(np.array([spot(triangles, image) for image in images]), ends[:-1])
-        both = (two(triangles, image) for image in images[-len(pairs) :])
+        places, shares, images = drawn(triangles, images)
+        found[name] = np.split(np.array([spot(places, shares, image) for image in images]), ends[:-1])
+        both = (two(places, shares, image) for image in images[-len(pairs) :])
         degrees[name] = [np.degrees(abs(np.angle(one / other))) for one, other in both]
 
     print("\n| tank | target | photographed at | radius | electrodes off by | " + " | ".join(f"{name} | apart | radius" for name in found) + " |")

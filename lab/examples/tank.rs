@@ -21,6 +21,7 @@ use nalgebra::{Cholesky, DMatrix, Vector2};
 use tactomo_physics::detector::{Detector, Electrode, Layer, Outline};
 use tactomo_physics::forward::ForwardModel;
 use tactomo_physics::forward::shell::Shell;
+use tactomo_physics::geometry;
 use tactomo_table::{NpzWriter, Table};
 
 const ELECTRODES: usize = 16;
@@ -44,15 +45,15 @@ fn main() -> Result<()> {
     let (frames, out) = words.next().zip(words.next()).context("two files are needed: FRAMES and OUT")?;
     let frames = frames_of(Path::new(&frames))?;
     let shell = Shell::with_nodes(&tank()?, NODES)?;
-    let (rest, jacobian) = (rest(&shell), jacobian(&shell));
+    let (mesh, triangles) = (shell.image_mesh(), triangles(&shell));
+    let (rest, jacobian) = (rest(&shell), jacobian(&shell, &triangles));
     let image = image(&jacobian, &rest, &frames)?;
-    let mesh = shell.image_mesh();
     let mut file = NpzWriter::new(File::create(out)?);
     file.add("rest", &[READINGS], &rest)?;
     file.add("nodes", &[mesh.nodes_m.len(), 2], &mesh.nodes_m.concat())?;
-    let corners: Vec<f64> = mesh.triangles.iter().flatten().map(|&corner| f64::from(corner)).collect();
-    file.add("triangles", &[mesh.triangles.len(), 3], &corners)?;
-    file.add("image", &[frames.ncols(), mesh.triangles.len()], image.as_slice())?;
+    let corners: Vec<f64> = triangles.iter().flatten().map(|&corner| f64::from(corner)).collect();
+    file.add("triangles", &[triangles.len(), 3], &corners)?;
+    file.add("image", &[frames.ncols(), triangles.len()], image.as_slice())?;
     file.finish()?;
     Ok(())
 }
@@ -105,15 +106,28 @@ fn rest(shell: &Shell) -> Vec<f64> {
     readings().map(volts).collect()
 }
 
+/// Those that are under no pad: a pad conducts, and what is under it changes nothing.
+fn triangles(shell: &Shell) -> Vec<[u32; 3]> {
+    let mesh = shell.image_mesh();
+    let is_free = |corners: &&[u32; 3]| {
+        let [a, b, c] = corners.map(|node| mesh.nodes_m[node as usize]);
+        let middle = [0, 1].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
+        let pads = &shell.detector().electrodes;
+        pads.iter().all(|pad| geometry::distance(middle, [pad.x_m, pad.y_m]) > pad.radius_m)
+    };
+    mesh.triangles.iter().filter(is_free).copied().collect()
+}
+
 /// Change of the voltages by the logarithm of each triangle's conductivity: `readings x triangles`.
-fn jacobian(shell: &Shell) -> DMatrix<f64> {
+fn jacobian(shell: &Shell, triangles: &[[u32; 3]]) -> DMatrix<f64> {
     let (mesh, fields) = (shell.image_mesh(), shell.fields_ohm());
-    let areas = mesh.triangle_areas_m2();
     let readings: Vec<_> = readings().collect();
-    let mut jacobian = DMatrix::zeros(readings.len(), areas.len());
-    for (index, (corners, area)) in mesh.triangles.iter().zip(&areas).enumerate() {
+    let mut jacobian = DMatrix::zeros(readings.len(), triangles.len());
+    for (index, corners) in triangles.iter().enumerate() {
+        let [a, b, c] = corners.map(|node| mesh.nodes_m[node as usize]);
+        let area = geometry::cross(a, b, c).abs() / 2.0;
         let of = |electrode: usize| {
-            gradient(corners.map(|node| (mesh.nodes_m[node as usize], fields[(node as usize, electrode)])), *area)
+            gradient(corners.map(|node| (mesh.nodes_m[node as usize], fields[(node as usize, electrode)])), area)
         };
         let gradients: Vec<_> = (0..ELECTRODES).map(of).collect();
         let between = |[a, b]: [usize; 2]| gradients[a] - gradients[b];
