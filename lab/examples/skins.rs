@@ -1,4 +1,4 @@
-//! Presses on five kinds of made-up skins: `cargo run --release --package tactomo-lab --example skins -- FOLDER [SEED [TAUGHT [UNSEEN]]]`.
+//! Presses on six kinds of made-up skins: `cargo run --release --package tactomo-lab --example skins -- FOLDER [SEED [TAUGHT [UNSEEN]]]`.
 //!
 //! Writes `KIND-SEED-taught.npz` and `KIND-SEED-unseen.npz` for each kind, presses of one run mixed, as `tactomo-lab learn` reads them. They differ in their
 //! pattern of drive and read, in the law of their force, in sensitivities, noise and drift. None of them is a detector of this program, nor is
@@ -21,6 +21,8 @@ const RADIUS_M: f64 = 0.05;
 const REACH: f64 = 0.9;
 /// Forces (N).
 const FORCES_N: [f64; 2] = [0.3, 8.0];
+/// Of a robot that presses with about the same force everywhere (N).
+const STEADY_N: [f64; 2] = [2.0, 2.4];
 
 type Point = [f64; 2];
 
@@ -39,11 +41,12 @@ struct Kind {
 
 type Skin = Box<dyn FnMut(&Press, f64, &mut Noise) -> Vec<f64>>;
 
-const KINDS: [Kind; 5] = [
+const KINDS: [Kind; 6] = [
     Kind { name: "opposite", make: opposite },
     Kind { name: "adjacent", make: adjacent },
     Kind { name: "grounded", make: grounded },
     Kind { name: "cells", make: cells },
+    Kind { name: "amplified", make: amplified },
     Kind { name: "dome", make: dome },
 ];
 
@@ -58,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut random = fastrand::Rng::with_seed(seed ^ 0x5eed);
         let mut skin = (kind.make)(&mut noise);
         let count = taught + unseen;
-        let presses: Vec<Press> = (0..count).map(|_| press(&mut random, kind.name == "dome")).collect();
+        let presses: Vec<Press> = (0..count).map(|_| press(&mut random, kind.name)).collect();
         let time = |index: usize| index as f64 / count as f64;
         let readings: Vec<Vec<f64>> =
             presses.iter().enumerate().map(|(index, press)| skin(press, time(index), &mut noise)).collect();
@@ -93,12 +96,13 @@ fn write(
     Ok(file.finish()?)
 }
 
-/// Anywhere within reach, at any force; on a dome higher in the middle.
-fn press(random: &mut fastrand::Rng, is_dome: bool) -> Press {
+/// Anywhere within reach, at any force; on a dome higher in the middle; steady where channels are amplified.
+fn press(random: &mut fastrand::Rng, kind: &str) -> Press {
     let (radius_m, angle) = (REACH * RADIUS_M * random.f64().sqrt(), TAU * random.f64());
-    let force_n = FORCES_N[0] * (FORCES_N[1] / FORCES_N[0]).powf(random.f64());
+    let [least_n, most_n] = if kind == "amplified" { STEADY_N } else { FORCES_N };
+    let force_n = least_n * (most_n / least_n).powf(random.f64());
     let at_m = [radius_m * angle.cos(), radius_m * angle.sin()];
-    let z_m = if is_dome { 0.02 * (1.0 - (radius_m / RADIUS_M).powi(2)) } else { 0.0 };
+    let z_m = if kind == "dome" { 0.02 * (1.0 - (radius_m / RADIUS_M).powi(2)) } else { 0.0 };
     Press { at_m, z_m, force_n }
 }
 
@@ -205,6 +209,15 @@ fn cells(noise: &mut Noise) -> Skin {
             3.0 * felt / (felt + 5.0) + 0.01 * noise.normal()
         };
         (0..192).map(cell).collect()
+    })
+}
+
+/// As `cells`, each with an amplifier of its own, of a factor from 1 to 1000, and all noise before it; pressed steadily.
+fn amplified(noise: &mut Noise) -> Skin {
+    let mut cells = cells(noise);
+    let factor = |cell: usize| 1000f64.powf((0.618_034 * cell as f64).fract());
+    Box::new(move |press, time, noise| {
+        cells(press, time, noise).iter().enumerate().map(|(cell, volts)| factor(cell) * volts).collect()
     })
 }
 

@@ -42,10 +42,18 @@ impl PaperSolver {
     /// # Errors
     /// [`ForwardError`] if there is no thin shell of it.
     pub fn new(detector: &Detector) -> Result<Self, ForwardError> {
+        Self::with_lambda(detector, Lambda::PAPER)
+    }
+
+    /// The same with another lambda.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new).
+    pub fn with_lambda(detector: &Detector, lambda: Lambda) -> Result<Self, ForwardError> {
         let sheet_s = detector.sheet_conductance_s();
         let layers = vec![Layer::uniform(THICKNESS_M, sheet_s / THICKNESS_M)];
         let jacobian = Jacobian::of(&Shell::new(&Detector { layers, ..detector.taken_as_exact() })?);
-        let tikhonov = Tikhonov::new(&jacobian, Lambda::PAPER, Variant::Paper);
+        let tikhonov = Tikhonov::new(&jacobian, lambda, Variant::Paper);
         Ok(Self { tikhonov, mesh: jacobian.image_mesh, sheet_s, width_m: detector.outline.size_m()[0] })
     }
 

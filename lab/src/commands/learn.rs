@@ -38,7 +38,7 @@ pub struct Args {
     /// The detector, if the channels are its readings, row by row: then the force is taken out of them before places are learned
     #[arg(long, value_name = "NAME|FILE")]
     detector: Option<Chosen>,
-    /// Prints `{presses, channels, components, left_out_m, middle_m, no_better_than_middle, strength, left_out_strength_share, seconds, out}` as JSON
+    /// Prints `{presses, channels, description, components, left_out_m, middle_m, no_better_than_middle, strength, left_out_strength_share, seconds, out}` as JSON
     #[arg(long)]
     json: bool,
 }
@@ -47,6 +47,7 @@ pub struct Args {
 struct Report {
     presses: usize,
     channels: usize,
+    description: &'static str,
     components: usize,
     left_out_m: f64,
     middle_m: Option<f64>,
@@ -73,6 +74,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         output::print(&serde_json::to_string(&Report {
             presses: kernel.presses(),
             channels: kernel.channels(),
+            description: kernel.description().name(),
             components: kernel.components(),
             left_out_m: kernel.left_out_m(),
             middle_m: kernel.middle_m(),

@@ -59,5 +59,5 @@ pub use self::pipeline::parameter::{Parameter, ParameterKind};
 pub use self::pipeline::without::without;
 pub use self::problem::{LearnedElsewhere, Problem};
 pub use self::solver::{Followed, Hypothesis, Parts, Search, Solver, Tracker};
-pub use crate::learned::kernel::{Kernel, Press, Presses, PressesError, Strength, TeachError};
+pub use crate::learned::kernel::{Description, Kernel, Press, Presses, PressesError, Strength, TeachError};
 pub use crate::learned::network::{Network, NetworkError};

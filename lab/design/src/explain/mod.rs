@@ -15,7 +15,7 @@ use tactomo_physics::detector::Detector;
 
 use self::bench::Bench;
 pub use self::causes::Figures;
-use self::causes::SETUPS;
+use self::causes::{SETUPS, Setup};
 pub use self::fit::Judged;
 use self::laws::{CHOSEN, LAWS};
 pub use self::view::view;
@@ -117,9 +117,12 @@ pub fn run(plan: &Plan, progress: Progress) -> Result<Report, DesignError> {
         Tried { name: law.name, formula: law.formula, source: law.source, eighth: *eighth, fitted }
     });
     let chosen = chosen(&benches, progress);
-    let solver = PaperSolver::new(&Detector::default())?;
-    let steps: Vec<_> = SETUPS.iter().flat_map(|setup| samples.iter().map(move |one| (setup, *one))).collect();
-    let figures = progress.map("causes", &steps, |(setup, one)| causes::figures(*one, setup, &solver, plan.seed));
+    let solver = |setup: &Setup| PaperSolver::with_lambda(&Detector::default(), setup.lambda);
+    let solvers: Vec<PaperSolver> = SETUPS.iter().map(solver).collect::<Result<_, _>>()?;
+    let setups = SETUPS.iter().zip(&solvers);
+    let steps: Vec<_> = setups.flat_map(|setup| samples.iter().map(move |one| (setup, *one))).collect();
+    let figures =
+        progress.map("causes", &steps, |((setup, solver), one)| causes::figures(*one, setup, solver, plan.seed));
     let is_stopped = laws.iter().any(Option::is_none) || chosen.is_none() || figures.iter().any(Option::is_none);
     let figures: Vec<Figures> = figures.into_iter().map_while(|one| one).collect::<Result<_, _>>()?;
     let whole = figures.chunks_exact(samples.len()).zip(SETUPS);
@@ -210,6 +213,20 @@ mod tests {
         assert!(left[1][0].unwrap().ln() < 0.4 * left[0][0].unwrap().ln(), "{left:?}");
         assert!(left[2][1].unwrap().ln() < 0.6 * left[1][1].unwrap().ln(), "{left:?}");
         assert_eq!(left[1][0], left[2][0], "eq. (8) has nothing to do with SENS");
+        let of = |part: &str| report.causes.iter().find(|cause| cause.name.contains(part)).unwrap();
+        let [printed, image] = [of("as printed"), of("the image's value")];
+        // Rubber in series with contacts makes no difference to where all current ends up, and all saturate earlier.
+        let (rubber, unloading) = (of("rubber"), of("unloading"));
+        for (with, without) in rubber.figures.iter().zip(&printed.figures) {
+            assert!(with.maximum_n < without.maximum_n, "{with:?} {without:?}");
+        }
+        // What conducts more while unloading has half of the drive at less force; the images are those of loading.
+        for (with, without) in unloading.figures.iter().zip(&printed.figures) {
+            assert!(with.maximum_n < without.maximum_n && with.spatial_resolution == without.spatial_resolution);
+        }
+        // Another lambda changes what images tell, and nothing else does so alike.
+        let [little, much] = ["of 50", "500 000"].map(of);
+        assert!(little.figures != image.figures && much.figures != image.figures && little.figures != much.figures);
         let view = [view(&report)];
         let [text, page] = [tactomo_study::view::text(&view), tactomo_study::view::page(&view, "")];
         assert!(text.contains("cube, on a film") && text.contains("34975, failed fit"), "{text}");

@@ -102,7 +102,7 @@ fn left(report: &Report) -> Table {
         .column("with it", PLAIN.digits(0), |cause| count(cause, 3))
         .note(
             "Factors (each counted as 20 at most) and differences, root mean square over the samples that have a figure; images that have collapsed have none. The first three rows add up; each later one adds to \
-             the third.",
+             the third, those with an image to the image too. Rubber and unloading are bounds: the paper has no numbers of them.",
         )
         .into()
 }

@@ -66,8 +66,8 @@ pub enum Study {
     ///
     /// Laws of how a contact conducts under force are fitted to the four single foams, and have to
     /// predict the seven stacks. Then what each cause explains of sensitivity, maximum force, spatial
-    /// resolution and position accuracy: the law, eq. (8) as printed, tolerances, noise, the
-    /// converter's floor, the image.
+    /// resolution and position accuracy: the law, eq. (8) as printed, tolerances, rubber on the
+    /// contactor, unloading, the image and its lambda, noise, the converter's floor.
     ///
     /// Examples:
     ///   tactomo-lab study explain --out explain.html

@@ -1,13 +1,13 @@
 //! A kernel in a file: what it writes to a container, and what it reads of one that nobody vouches for.
 
 use super::classes::Classes;
-use super::features::Features;
+use super::features::{Description, Features};
 use super::left_over::LeftOver;
 use super::novelty::Novelty;
 use super::points::{Likeness, Points};
 use super::regression::Regression;
 use super::{Kernel, Limits, Strength};
-use crate::learned::{Container, ContainerError, wrong};
+use crate::learned::{Container, ContainerError, VERSION, wrong};
 
 /// Most channels, presses and classes of a file: more than any that fits into one.
 const MOST: usize = 1 << 24;
@@ -16,7 +16,9 @@ impl Kernel {
     /// What its files say they are.
     pub const KIND: &str = "kernel";
     /// Version of their layout.
-    pub const VERSION: &str = "1";
+    pub const VERSION: &str = "2";
+    /// The version before, which is read too: its readings are described by directions, and it does not say so.
+    pub const BEFORE: &str = "1";
 
     /// Writes it.
     pub fn to_container(&self, to: &mut Container) {
@@ -26,7 +28,9 @@ impl Kernel {
         if let Some(drive_v) = self.features.drive_v {
             to.set_text("drive_v", drive_v.to_string());
         }
+        to.set_text("description", self.features.description.name());
         to.set_array("mean", &[channels], &self.features.mean);
+        to.set_array("scale", &[channels], &self.features.scale);
         to.set_array("axes", &[self.features.dimensions(), channels], &self.features.axes);
         to.set_array("coordinates", &[presses, self.points.dimensions], &self.points.coordinates);
         to.set_array("log_sizes", &[presses], &self.points.log_sizes);
@@ -104,11 +108,28 @@ fn features(from: &Container) -> Result<Features, ContainerError> {
     if drive_v.is_some() && channels.isqrt().pow(2) != channels {
         return Err(wrong("drive_v", "a detector, which has as many readings as the square of its electrodes,"));
     }
+    let description = description(from)?;
+    let scale = match description {
+        None => vec![1.0; channels],
+        Some(_) => from.checked("scale", &[channels], |scale| scale > 0.0, "a scale above zero")?.to_vec(),
+    };
     Ok(Features {
+        description: description.unwrap_or(Description::Directions),
         drive_v,
         mean: from.array("mean", &[channels])?.to_vec(),
+        scale,
         axes: from.array("axes", &[dimensions, channels])?.to_vec(),
     })
+}
+
+/// `None` in a file of the version before.
+fn description(from: &Container) -> Result<Option<Description>, ContainerError> {
+    if from.text(VERSION)? == Kernel::BEFORE {
+        return Ok(None);
+    }
+    let name = from.text("description")?;
+    let description = Description::ALL.into_iter().find(|description| description.name() == name);
+    description.map(Some).ok_or_else(|| wrong("description", "directions or channels"))
 }
 
 fn points(from: &Container, features: &Features) -> Result<Points, ContainerError> {
@@ -116,11 +137,9 @@ fn points(from: &Container, features: &Features) -> Result<Points, ContainerErro
     if presses == 0 || presses > MOST || dimensions == 0 || dimensions > features.dimensions() {
         return Err(wrong("coordinates", "presses in no more dimensions than there are axes"));
     }
-    Ok(Points {
-        dimensions,
-        coordinates: from.array("coordinates", &[presses, dimensions])?.to_vec(),
-        log_sizes: from.array("log_sizes", &[presses])?.to_vec(),
-    })
+    let coordinates = from.array("coordinates", &[presses, dimensions])?.to_vec();
+    let log_sizes = from.array("log_sizes", &[presses])?.to_vec();
+    Ok(Points::new(features.description, dimensions, coordinates, log_sizes))
 }
 
 fn strength(from: &Container) -> Result<Strength, ContainerError> {

@@ -1,4 +1,4 @@
-//! What of readings no press had: the part of their direction that is in none of the dimensions in which most presses are.
+//! What of readings no press had: the part of their description that is in none of the dimensions in which most presses are.
 //!
 //! A channel that is dead, at an end of its range, or exchanged with another leaves that to itself or to a few; noise and readings of something
 //! else leave it to all. So both are looked at: the whole, and each channel in what is usual for it.
@@ -11,7 +11,7 @@ const MOST_DIMENSIONS: usize = 60;
 /// Presses, and channels, for each dimension at least: else what is left over of a press is what it has in common with no other.
 const PRESSES_EACH: usize = 5;
 const CHANNELS_EACH: usize = 3;
-/// Smallest usual part of a direction: rounding.
+/// Smallest usual part of a description: rounding.
 const SMALLEST: f64 = 1e-9;
 /// Most of a press that it makes of the dimensions by itself.
 const MOST_LEVERAGE: f64 = 0.9;
@@ -75,10 +75,10 @@ impl LeftOver {
 /// What is left over of each press if the dimensions are those of the others: by its leverage, which is exact for a regression on the
 /// coordinates and nearly so for the dimensions themselves.
 fn left_out(features: &Features, described: &[Described], dimensions: usize) -> Vec<Vec<f64>> {
-    let sum = |axis: usize| described.iter().map(|described| described.direction[axis].powi(2)).sum::<f64>();
+    let sum = |axis: usize| described.iter().map(|described| described.coordinates[axis].powi(2)).sum::<f64>();
     let sums: Vec<f64> = (0..dimensions).map(sum).collect();
     let left = |described_one: &Described| {
-        let along = described_one.direction.iter().zip(&sums).map(|(along, sum)| along * along / sum).sum::<f64>();
+        let along = described_one.coordinates.iter().zip(&sums).map(|(along, sum)| along * along / sum).sum::<f64>();
         let leverage = (along + 1.0 / described.len() as f64).min(MOST_LEVERAGE);
         features.left_over(described_one, dimensions).iter().map(|left| left / (1.0 - leverage)).collect()
     };

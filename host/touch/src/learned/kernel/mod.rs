@@ -1,7 +1,7 @@
 //! Place and strength of a press, learned from presses at known places: no model, no detector, any number of channels.
 //!
-//! Readings are told apart by their direction and their size ([`features`]); place, and the strength over the size, are learned by
-//! regression with a Gaussian kernel ([`regression`]), its parameters chosen by leaving one press out. One contact is all that such presses
+//! Readings are told apart by a description of them and their size ([`features`]); place, and the strength over the size, are learned by
+//! regression with a Gaussian kernel ([`regression`]), the description and all parameters chosen by leaving one press out. One contact is all that such presses
 //! teach. Readings unlike all that were taught ([`novelty`]) are answered, and flagged.
 
 mod classes;
@@ -17,6 +17,7 @@ mod sentence;
 
 use self::classes::Classes;
 use self::columns::Columns;
+pub use self::features::Description;
 use self::features::{Described, Features};
 use self::left_over::LeftOver;
 use self::novelty::Novelty;
@@ -26,9 +27,9 @@ use self::regression::{Lesson, Regression};
 use crate::solve::answer::{Flags, FoundContact, Solution};
 use tactomo_table::{Array, Table};
 
-/// How much the size of readings tells of the place of a press: of a detector nothing, once the force is taken out of them.
+/// How much the size of readings tells of the place of a press beside their direction: of a detector nothing, once the force is taken out of them.
 const SIZE_FOR_PLACE: f64 = 0.02;
-/// How much it tells of the strength over the size.
+/// How much it tells of the strength over the size. Channels tell the size by themselves.
 const SIZE_FOR_STRENGTH: f64 = 0.3;
 /// A size beyond those taught by this factor is too far, and below those taught no contact.
 const SIZES_BEYOND: f64 = 2.0;
@@ -90,21 +91,22 @@ impl Kernel {
     pub fn train(presses: &Presses) -> Result<Self, TeachError> {
         presses.check().map_err(TeachError)?;
         let alike = || TeachError("their readings are all alike".to_owned());
-        let (features, described) = Features::of(presses).ok_or_else(alike)?;
-        let points = Points::of(&described);
-        let size_weight = if presses.drive_v.is_some() { 0.0 } else { SIZE_FOR_PLACE };
+        let told: Vec<_> =
+            Description::ALL.into_iter().filter_map(|description| Told::of(presses, description)).collect();
         let places_m = presses.places_m.concat();
-        let lesson = Lesson { points: &points, targets: &places_m, count: 3, size_weight };
-        let places = Regression::learn(&lesson).ok_or_else(alike)?;
-        let shares = shares(presses, &points);
-        let lesson = Lesson { targets: &shares, count: 1, size_weight: SIZE_FOR_STRENGTH, ..lesson };
+        let learned = told.iter().filter_map(|told| Some((told, Regression::learn(&told.places(&places_m))?)));
+        let best = learned.min_by(|(_, a), (_, b)| a.missed().total_cmp(&b.missed()));
+        let (told, places) = best.ok_or_else(alike)?;
+        let Told { features, described, points } = told;
+        let shares = shares(presses, points);
+        let lesson = told.strengths(&shares);
         let strengths = match presses.strength {
             Some(strength) => Some((strength, Regression::learn(&lesson).ok_or_else(alike)?)),
             None => None,
         };
         let sizes_v: Vec<f64> = described.iter().map(|described| described.size_v).collect();
         let classes = Classes::of(&sizes_v);
-        let left_over = LeftOver::of(&features, &described, &classes);
+        let left_over = LeftOver::of(features, described, &classes);
         let limits = Limits {
             places_m: [0, 1, 2].map(|axis| range(presses.places_m.iter().map(|place_m| place_m[axis]))),
             shares: range(shares.iter().copied()),
@@ -112,10 +114,10 @@ impl Kernel {
         };
         let for_strength = strengths.as_ref().map_or(0, |(_, strengths)| strengths.likeness.components);
         let compared = places.likeness.components.max(for_strength);
-        let points = points.keeping(compared);
+        let points = points.clone().keeping(compared);
         Ok(Self {
             names: presses.names.clone(),
-            features: features.keeping(compared.max(left_over.dimensions)),
+            features: features.clone().keeping(compared.max(left_over.dimensions)),
             novelty: Novelty::of(&places, &points, &classes),
             points,
             places,
@@ -150,6 +152,11 @@ impl Kernel {
         self.strengths.as_ref().map(|(strength, _)| *strength)
     }
 
+    /// How it describes readings.
+    pub fn description(&self) -> Description {
+        self.features.description
+    }
+
     /// Dimensions in which the places of presses are told apart.
     pub fn components(&self) -> usize {
         self.places.likeness.components
@@ -162,7 +169,7 @@ impl Kernel {
 
     /// Root mean square distance (m) by which it misses a press that it was not taught.
     pub fn left_out_m(&self) -> f64 {
-        self.places.left_out.iter().map(|missed_m| missed_m * missed_m).sum::<f64>().sqrt()
+        self.places.missed()
     }
 
     /// Root mean square distance (m) by which the middle of all presses taught misses one of them: who reads nothing does as well.
@@ -218,12 +225,44 @@ impl Kernel {
     fn squares(&self, described: &Described) -> [Vec<f64>; 2] {
         let for_places = self.places.likeness.components;
         let Some((_, strengths)) = &self.strengths else {
-            return self.points.squares_to(&described.direction, for_places, 0);
+            return self.points.squares_to(&described.coordinates, for_places, 0);
         };
         let for_strengths = strengths.likeness.components;
         let [few, many] = [for_places.min(for_strengths), for_places.max(for_strengths)];
-        let [of_few, of_many] = self.points.squares_to(&described.direction, few, many);
+        let [of_few, of_many] = self.points.squares_to(&described.coordinates, few, many);
         if for_places == few { [of_few, of_many] } else { [of_many, of_few] }
+    }
+}
+
+/// Presses as one description has them.
+struct Told {
+    features: Features,
+    described: Vec<Described>,
+    points: Points,
+}
+
+impl Told {
+    /// `None` if they are all alike.
+    fn of(presses: &Presses, description: Description) -> Option<Self> {
+        let (features, described) = Features::of(presses, description)?;
+        let points = Points::of(&features, &described);
+        Some(Self { features, described, points })
+    }
+
+    fn places<'a>(&'a self, places_m: &'a [f64]) -> Lesson<'a> {
+        let size_weight = match (self.features.description, self.features.drive_v) {
+            (Description::Directions, None) => SIZE_FOR_PLACE,
+            _ => 0.0,
+        };
+        Lesson { points: &self.points, targets: places_m, count: 3, size_weight }
+    }
+
+    fn strengths<'a>(&'a self, shares: &'a [f64]) -> Lesson<'a> {
+        let size_weight = match self.features.description {
+            Description::Directions => SIZE_FOR_STRENGTH,
+            Description::Channels => 0.0,
+        };
+        Lesson { points: &self.points, targets: shares, count: 1, size_weight }
     }
 }
 

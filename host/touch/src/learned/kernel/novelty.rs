@@ -1,4 +1,4 @@
-//! Whether the direction of readings is among those of the presses taught.
+//! Whether what describes readings is among that of the presses taught.
 //!
 //! By the variance of a Gaussian process, `1 - k' (K + M)^-1 k`: 0 among what is known, 1 far from everything. Only the nearest presses matter to
 //! it, so that a system of their few equations is solved instead of one of all. What variance is usual is what each press has by the others.
@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::classes::Classes;
 use super::points::{Likeness, Points, square};
-use super::regression::{Regression, doubts};
+use super::regression::Regression;
 
 /// Nearest presses that count: with 16 or 32, as many are flagged as with all 1200.
 const NEIGHBOURS: usize = 32;
@@ -38,11 +38,11 @@ impl Novelty {
 
     /// The same with limits that are known already.
     pub fn with_limits(regression: &Regression, points: &Points, limits: Vec<f64>) -> Self {
-        let ridges = doubts(points).iter().map(|doubt| regression.ridge * doubt).collect();
+        let ridges = points.doubts.iter().map(|doubt| regression.ridge * doubt).collect();
         Self { likeness: regression.likeness, ridges, limits }
     }
 
-    /// Whether readings are new whose direction has such squares of the distance to those of the presses; of such a size and its class.
+    /// Whether readings are new with such squares of the distances to the presses; of such a size and its class.
     pub fn is_new(&self, points: &Points, squares: &[f64], log_size: f64, class: usize) -> bool {
         self.variance(points, squares, log_size, None) > self.limits[class]
     }
@@ -80,13 +80,14 @@ impl Novelty {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learned::kernel::features::Description;
     use crate::learned::kernel::regression::Lesson;
 
     #[test]
     fn what_lies_among_the_presses_is_known_and_what_lies_beside_is_new() {
         let coordinates: Vec<f64> = (0..60).map(|i| f64::from(i) / 60.0).collect();
         let targets: Vec<f64> = coordinates.iter().map(|x| (5.0 * x).sin()).collect();
-        let points = Points { dimensions: 1, coordinates, log_sizes: vec![0.0; 60] };
+        let points = Points::new(Description::Directions, 1, coordinates, vec![0.0; 60]);
         let lesson = Lesson { points: &points, targets: &targets, count: 1, size_weight: 0.0 };
         let regression = Regression::learn(&lesson).unwrap();
         let novelty = Novelty::of(&regression, &points, &Classes::of(&[1.0; 60]));

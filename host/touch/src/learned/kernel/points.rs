@@ -1,8 +1,12 @@
-//! Presses as points: where their directions are, and how large their readings are. How alike two presses are is a kernel of their distance.
+//! Presses as points: where what describes them is, and how large their readings are. How alike two presses are is a kernel of their distance.
 
 use nalgebra::DMatrix;
 use tactomo_physics::algebra::gram_of_rows;
 
+use super::features::Description;
+
+/// Smallest and largest doubt.
+const DOUBTS: [f64; 2] = [0.03, 30.0];
 /// Sums that run side by side.
 const LANES: usize = 8;
 
@@ -36,12 +40,14 @@ fn sum(a: &[f64], b: &[f64], of: impl Fn(f64, f64) -> f64) -> f64 {
 /// Points, one for each press.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Points {
-    /// Coordinates of each direction, those in which presses differ most first.
+    /// Coordinates of each, those in which presses differ most first.
     pub dimensions: usize,
     /// `points x dimensions`, row by row.
     pub coordinates: Vec<f64>,
     /// Logarithm of the size of the readings (V) of each.
     pub log_sizes: Vec<f64>,
+    /// Variance of noise in the coordinates of each over that of a press of median size.
+    pub doubts: Vec<f64>,
 }
 
 /// How alike presses are: a Gaussian kernel of the distance in the first coordinates and in the size.
@@ -64,6 +70,20 @@ impl Likeness {
 }
 
 impl Points {
+    /// Presses with such coordinates, one press after the other, and logarithms of sizes. Noise is the same in all readings, so that it turns the direction
+    /// of light presses more than that of firm ones: by its share of their size.
+    pub fn new(description: Description, dimensions: usize, coordinates: Vec<f64>, log_sizes: Vec<f64>) -> Self {
+        let mut sorted = log_sizes.clone();
+        sorted.sort_by(f64::total_cmp);
+        let median = sorted.get(sorted.len() / 2).copied().unwrap_or_default();
+        let doubt = |log_size: &f64| match description {
+            Description::Directions => (2.0 * (median - log_size)).exp().clamp(DOUBTS[0], DOUBTS[1]),
+            Description::Channels => 1.0,
+        };
+        let doubts = log_sizes.iter().map(doubt).collect();
+        Self { dimensions, coordinates, log_sizes, doubts }
+    }
+
     /// Number of points.
     pub fn count(&self) -> usize {
         self.log_sizes.len()
@@ -86,7 +106,7 @@ impl Points {
         Self { dimensions: kept, coordinates, ..self }
     }
 
-    /// Squares of the distances of a direction to all points, in the first `few` and in the first `many` coordinates.
+    /// Squares of the distances of coordinates to all points, in the first `few` and in the first `many` coordinates.
     pub fn squares_to(&self, direction: &[f64], few: usize, many: usize) -> [Vec<f64>; 2] {
         pulp::Arch::new().dispatch(
             #[inline(always)]
@@ -128,7 +148,7 @@ mod tests {
     #[test]
     fn squares_of_distances_add_up_over_coordinates() {
         let coordinates: Vec<f64> = (0..60).map(|i| f64::from(i * i % 17)).collect();
-        let points = Points { dimensions: 20, coordinates, log_sizes: vec![0.0; 3] };
+        let points = Points::new(Description::Directions, 20, coordinates, vec![0.0; 3]);
         let [few, many] = points.squares_to(points.at(2), 11, 20);
         let mut squares = DMatrix::zeros(2, 2);
         for coordinates in [0..11, 11..20] {

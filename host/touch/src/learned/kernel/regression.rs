@@ -5,8 +5,7 @@
 //! Williams, "Gaussian Processes for Machine Learning", 2006, eq. 5.12). With the Cholesky factor `K + M = L L'`, the diagonal is the sum of
 //! squares of the columns of `L^-1`.
 //!
-//! Noise is the same in all readings, so that it turns the direction of light presses more than that of firm ones: by its share of their size.
-//! The ridge, which stands for the variance of noise, of a press is that of all over the square of its size in medians.
+//! The ridge stands for the variance of noise: that of a press of median size, times the doubt of each.
 
 use nalgebra::{DMatrix, DVector};
 use tactomo_physics::algebra::Cholesky;
@@ -23,8 +22,6 @@ const RIDGES: [f64; 7] = [1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1];
 const ROUNDS: [(usize, usize); 2] = [(200, 20), (500, 1)];
 /// From the best of the last round, neighbours are tried on all presses, as long as one is better: so many at most.
 const MOST_NEIGHBOURS: usize = 6;
-/// Smallest and largest ridge of a press, in that of all.
-const DOUBTS: [f64; 2] = [0.03, 30.0];
 
 /// A regression that has learned.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,15 +99,6 @@ struct Solved {
     missed: Vec<f64>,
 }
 
-/// Ridge of each press over that of a press of median size.
-pub fn doubts(points: &Points) -> Vec<f64> {
-    let mut sorted = points.log_sizes.clone();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted.get(sorted.len() / 2).copied().unwrap_or_default();
-    let doubt = |log_size: &f64| (2.0 * (median - log_size)).exp().clamp(DOUBTS[0], DOUBTS[1]);
-    points.log_sizes.iter().map(doubt).collect()
-}
-
 impl Regression {
     /// Learns; `None` if the presses are all alike, or no parameters serve.
     pub fn learn(lesson: &Lesson<'_>) -> Option<Self> {
@@ -123,7 +111,12 @@ impl Regression {
         Some(Self { likeness, ridge, means, weights, left_out })
     }
 
-    /// The targets of readings whose directions have such squares of the distance to those of the presses, and of such a size.
+    /// Root mean square, over all targets together, of what is missed when a press is left out.
+    pub fn missed(&self) -> f64 {
+        self.left_out.iter().map(|missed| missed * missed).sum::<f64>().sqrt()
+    }
+
+    /// The targets of readings with such squares of the distances to the presses, and of such a size.
     pub fn values(&self, points: &Points, squares: &[f64], log_size: f64) -> Vec<f64> {
         let mut values = self.means.clone();
         let known = squares.iter().zip(&points.log_sizes).zip(self.weights.chunks_exact(self.means.len()));
@@ -243,7 +236,7 @@ impl Lesson<'_> {
 
     /// Weights, and what is missed of a press that is left out; `None` if the matrix is singular to rounding.
     fn solve(&self, kernel: &DMatrix<f64>, part: &[usize], ridge: f64, means: &[f64]) -> Option<Solved> {
-        let (rows, doubts) = (part.len(), doubts(self.points));
+        let (rows, doubts) = (part.len(), &self.points.doubts);
         let mut matrix = kernel.clone();
         part.iter().enumerate().for_each(|(row, &press)| matrix[(row, row)] += ridge * doubts[press]);
         let factor = Cholesky::new(matrix).ok()?;
@@ -262,6 +255,7 @@ impl Lesson<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::learned::kernel::features::Description;
 
     fn points(dimensions: usize) -> Points {
         let even = |i: u32| [0.754_877_666, 0.569_840_291].map(|step| (f64::from(i) * step).fract());
@@ -269,7 +263,8 @@ mod tests {
         let noise =
             |i: u32| (2..dimensions as u32).map(move |axis| 0.3 * (f64::from(i * i * axis) * 0.618_034).fract());
         let coordinates = (0..60).flat_map(|i| even(i).into_iter().chain(noise(i))).collect();
-        Points { dimensions, coordinates, log_sizes: (0..60).map(|i| f64::from(i % 7) * 0.1).collect() }
+        let log_sizes = (0..60).map(|i| f64::from(i % 7) * 0.1).collect();
+        Points::new(Description::Directions, dimensions, coordinates, log_sizes)
     }
 
     fn targets(points: &Points, noise: f64) -> Vec<f64> {
@@ -355,7 +350,7 @@ mod tests {
 
     #[test]
     fn points_that_are_all_alike_teach_nothing() {
-        let points = Points { dimensions: 1, coordinates: vec![0.5; 20], log_sizes: vec![0.0; 20] };
+        let points = Points::new(Description::Directions, 1, vec![0.5; 20], vec![0.0; 20]);
         assert!(Regression::learn(&lesson(&points, &[1.0; 40])).is_none());
     }
 }

@@ -19,11 +19,12 @@ impl Kernel {
             false => "",
         };
         format!(
-            "learned from {} presses on {} channels, in {} dimensions; a press that is left out is found within {:.2} mm{strength} (root mean \
+            "learned from {} presses on {} channels, in {} dimensions of {}; a press that is left out is found within {:.2} mm{strength} (root mean \
              square){middle}{warning}",
             self.presses(),
             self.channels(),
             self.components(),
+            self.description().words(),
             self.left_out_m() * 1e3
         )
     }

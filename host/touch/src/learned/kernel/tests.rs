@@ -152,6 +152,38 @@ fn what_was_never_taught_is_flagged_and_single_presses_are_not() {
     }
 }
 
+/// Those of about one force.
+fn steady(presses: &Presses) -> Presses {
+    let kept: Vec<usize> =
+        (0..presses.places_m.len()).filter(|&index| (2.0..2.4).contains(&presses.strengths[index])).collect();
+    let channels = presses.channels;
+    Presses {
+        readings_v: kept.iter().flat_map(|index| presses.readings_v[channels * index..][..channels].to_vec()).collect(),
+        places_m: kept.iter().map(|&index| presses.places_m[index]).collect(),
+        strengths: kept.iter().map(|&index| presses.strengths[index]).collect(),
+        ..presses.clone()
+    }
+}
+
+#[test]
+fn steady_presses_on_channels_of_unequal_gains_are_described_by_channels() {
+    let equal = cells(4000, 21);
+    // Factors from 1 to 1000, of the cells and of their noise alike.
+    let factor = |index: usize| 1000f64.powf((0.618_034 * (index % 48) as f64).fract());
+    let amplified = equal.readings_v.iter().enumerate().map(|(index, volts)| volts * factor(index)).collect();
+    let unequal = steady(&Presses { readings_v: amplified, ..equal.clone() });
+    let mut errors_m = Vec::new();
+    for description in Description::ALL {
+        let told = Told::of(&unequal, description).unwrap();
+        errors_m.push(Regression::learn(&told.places(&unequal.places_m.concat())).unwrap().missed());
+    }
+    let kernel = Kernel::train(&unequal).unwrap();
+    assert_eq!((kernel.description(), kernel.left_out_m()), (Description::Channels, errors_m[1]));
+    assert!(errors_m[1] < 0.95 * errors_m[0], "{errors_m:?}");
+    // Of all forces and even gains, those that are alike but for their strength had better be alike.
+    assert_eq!(Kernel::train(&cells(500, 21)).unwrap().description(), Description::Directions);
+}
+
 #[test]
 fn a_height_that_is_noise_does_not_change_places() {
     let flat = cells(300, 5);
