@@ -3,11 +3,13 @@
 //! Standard errors are Cramer and Rao's bounds of one frame under the converter's noise, [`cramer_rao`]; the range of strengths runs from
 //! where noise hides a contact to where the contact is at nine tenths of the drive, eq. (4). The radius of a contact is known to a factor of two only.
 
+use std::f64::consts::LN_2;
+
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
 use tactomo_physics::geometry::Point;
 use tactomo_physics::scene::Contact;
-use tactomo_study::{Bound, cramer_rao};
+use tactomo_study::{Bound, Errors, cramer_rao};
 
 use super::press::{MIDDLE, Press, nine_places};
 
@@ -66,7 +68,8 @@ impl Limit {
     ) -> Result<Self, ForwardError> {
         let detector = model.detector();
         let noise_v = detector.adc.deviation_v();
-        let bounds = at_nine_places(model, press, strength, noise_v)?;
+        let errors = Errors::of_noise(detector, noise_v);
+        let bounds = at_nine_places(model, press, strength, &errors)?;
         let largest_v = readings_v(&model.impedance_ohm(&[press.at(MIDDLE, strength)])?, detector).largest_v();
         Ok(Self {
             signal_to_noise_db: 20.0 * (largest_v / noise_v).log10(),
@@ -75,8 +78,8 @@ impl Limit {
                 .as_ref()
                 .map(|bounds| bounds.iter().map(|bound| bound.position_any_radius_m).fold(0.0, f64::max)),
             conductance: bounds.as_ref().map(|bounds| bounds[4].conductance),
-            two_points_m: two_points_m(model, press, strength, noise_v)?,
-            range: range(model, press, strengths, noise_v)?,
+            two_points_m: two_points_m(model, press, strength, &errors)?,
+            range: range(model, press, strengths, &errors)?,
         })
     }
 }
@@ -86,10 +89,10 @@ fn at_nine_places(
     model: &dyn ForwardModel,
     press: &Press,
     strength: f64,
-    noise_v: f64,
+    errors: &Errors<'_>,
 ) -> Result<Option<Vec<Bound>>, ForwardError> {
     let of = |place: Point| {
-        let bound = cramer_rao(model, &[press.at(place, strength)], noise_v)?;
+        let bound = cramer_rao(model, &[press.at(place, strength)], errors)?;
         Ok(bound.and_then(|bounds| bounds.first().copied()).filter(|bound| bound.position_m.is_finite()))
     };
     nine_places(model.detector()).into_iter().map(of).collect()
@@ -102,8 +105,8 @@ fn rms_m(bounds: &[Bound]) -> f64 {
 
 /// [`Limit::place_m`] alone.
 pub(crate) fn place_m(model: &dyn ForwardModel, press: &Press, strength: f64) -> Result<Option<f64>, ForwardError> {
-    let noise_v = model.detector().adc.deviation_v();
-    Ok(at_nine_places(model, press, strength, noise_v)?.as_deref().map(rms_m))
+    let errors = Errors::of_noise(model.detector(), model.detector().adc.deviation_v());
+    Ok(at_nine_places(model, press, strength, &errors)?.as_deref().map(rms_m))
 }
 
 /// Standard errors of places over a surface.
@@ -118,6 +121,11 @@ pub struct Spread {
 }
 
 impl Spread {
+    /// Half of the errors are less than this (m): those of a normal error, as large in both directions, are so within `sqrt(ln 2)` of its standard error.
+    pub fn median_error_m(&self) -> f64 {
+        LN_2.sqrt() * self.median_m
+    }
+
     /// Of standard errors (m); `None` of none.
     fn of(mut errors_m: Vec<f64>) -> Option<Self> {
         errors_m.sort_by(f64::total_cmp);
@@ -132,7 +140,15 @@ impl Spread {
     }
 }
 
-/// Standard errors of a place over so many places all over the surface; `None` if it is not told at one of them.
+/// Places all over a surface of such sides (m), from the middle (m), without end: the more, the closer.
+pub(crate) fn everywhere(sides_m: [f64; 2]) -> impl Iterator<Item = Point> {
+    (0..).map(move |index| {
+        let share = |axis: usize| (0.5 + STEPS[axis] * f64::from(index)).fract() * (1.0 - 2.0 * MARGIN) + MARGIN - 0.5;
+        [0, 1].map(|axis| share(axis) * sides_m[axis])
+    })
+}
+
+/// Standard errors of a place over so many places all over the surface, without end where it is not told; `None` if that is at half of them.
 ///
 /// # Errors
 /// [`ForwardError`] if the model cannot have the contact.
@@ -140,23 +156,18 @@ pub fn places_everywhere(
     model: &dyn ForwardModel,
     press: &Press,
     strength: f64,
-    noise_v: f64,
+    errors: &Errors<'_>,
     places: usize,
 ) -> Result<Option<Spread>, ForwardError> {
-    let sides_m = model.detector().outline.size_m();
     let mut errors_m = Vec::with_capacity(places);
-    for index in 0..places {
-        let share = |axis: usize| (0.5 + STEPS[axis] * index as f64).fract() * (1.0 - 2.0 * MARGIN) + MARGIN - 0.5;
-        let place = [0, 1].map(|axis| share(axis) * sides_m[axis]);
-        let bounds = cramer_rao(model, &[press.at(place, strength)], noise_v)?;
-        let Some(bound) = bounds.and_then(|bounds| bounds.first().copied()) else { return Ok(None) };
-        errors_m.push(bound.position_any_radius_m);
+    for place in everywhere(model.detector().outline.size_m()).take(places) {
+        let bounds = cramer_rao(model, &[press.at(place, strength)], errors)?;
+        errors_m.push(bounds.map_or(f64::INFINITY, |bounds| bounds[0].position_any_radius_m));
     }
-    Ok(Spread::of(errors_m).filter(|spread| spread.rms_m.is_finite()))
+    Ok(Spread::of(errors_m).filter(|spread| spread.median_m.is_finite()))
 }
 
-/// Least distance of two contacts of a strength, side by side about the middle, that can be told apart (m) where a reading has noise of such a standard
-/// deviation (V).
+/// Least distance of two contacts of a strength, side by side about the middle, that can be told apart (m) with readings of such errors.
 ///
 /// # Errors
 /// [`ForwardError`] if the contacts are off the detector.
@@ -164,7 +175,7 @@ pub fn two_points_m(
     model: &dyn ForwardModel,
     press: &Press,
     strength: f64,
-    noise_v: f64,
+    errors: &Errors<'_>,
 ) -> Result<Option<f64>, ForwardError> {
     let detector = model.detector();
     let [width_m, height_m] = detector.outline.size_m();
@@ -176,7 +187,7 @@ pub fn two_points_m(
             let contact = press.at(along.map(|part| part * share * distance_m), strength);
             Contact { radius_m: contact.radius_m.min(RADIUS_OF_DISTANCE * distance_m), ..contact }
         });
-        let bounds = cramer_rao(model, &pair, noise_v)?.unwrap_or_default();
+        let bounds = cramer_rao(model, &pair, errors)?.unwrap_or_default();
         // Both coordinates of a place; along the line between them it is at most that.
         let error_m = bounds.iter().map(|bound| bound.position_any_radius_m).fold(f64::NAN, f64::max);
         Ok::<_, ForwardError>(distance_m >= APART_DEVIATIONS * error_m)
@@ -193,12 +204,12 @@ pub fn range(
     model: &dyn ForwardModel,
     press: &Press,
     strengths: [f64; 2],
-    noise_v: f64,
+    errors: &Errors<'_>,
 ) -> Result<[Option<f64>; 2], ForwardError> {
     let hardest = hardest(model, press, strengths)?;
     // Of a contact that is saturated, the conductance is not told.
     let [low, high] = strengths;
-    Ok([lightest(model, press, [low, hardest.map_or(high, |hardest| hardest.min(high))], noise_v)?, hardest])
+    Ok([lightest(model, press, [low, hardest.map_or(high, |hardest| hardest.min(high))], errors)?, hardest])
 }
 
 /// The strength from which on a contact in the middle is seen.
@@ -206,10 +217,10 @@ fn lightest(
     model: &dyn ForwardModel,
     press: &Press,
     [low, high]: [f64; 2],
-    noise_v: f64,
+    errors: &Errors<'_>,
 ) -> Result<Option<f64>, ForwardError> {
     let seen = |strength: f64| {
-        let bound = match cramer_rao(model, &[press.at(MIDDLE, strength)], noise_v) {
+        let bound = match cramer_rao(model, &[press.at(MIDDLE, strength)], errors) {
             // So light that it conducts nothing in numbers of this size.
             Err(ForwardError::NoContact) => None,
             bound => bound?,
@@ -295,7 +306,8 @@ mod tests {
         let (detector, press) = (Detector::default(), Press::PAPER);
         let slab = Slab::new(&detector).unwrap();
         let [seen, saturated] = limit(&detector, 1.0).range.map(Option::unwrap);
-        let bound = cramer_rao(&slab, &[press.at(MIDDLE, seen)], detector.adc.deviation_v()).unwrap().unwrap()[0];
+        let errors = Errors::of_noise(&detector, detector.adc.deviation_v());
+        let bound = cramer_rao(&slab, &[press.at(MIDDLE, seen)], &errors).unwrap().unwrap()[0];
         assert!((3.0 * bound.conductance - 1.0).abs() < 0.01, "{bound:?}");
         assert!((of_drive(&slab, &press.at(MIDDLE, saturated)).unwrap() - 0.9).abs() < 0.001);
         // A ball on an ideal sample A saturates where `tactomo_physics::hertz` says that it does.

@@ -2,7 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
+use tactomo_physics::detector::Detector;
+use tactomo_physics::forward::{ForwardError, ForwardModel, Nuisance, readings_v};
+use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
 /// Step of a place, as a share of the contact's radius, and of a conductance, as a share of it.
@@ -24,22 +26,105 @@ pub struct Bound {
     pub conductance: f64,
 }
 
+/// By what readings differ from those of a model.
+#[derive(Clone)]
+pub struct Errors<'a> {
+    /// The detector as it is driven and measured: beyond the ends of its converters, readings tell nothing.
+    pub measured: &'a Detector,
+    /// Standard deviation of the noise of a reading (V).
+    pub deviation_v: f64,
+    /// What may be different of the detector as built; and then gain and bow of its converters are those of some chip.
+    pub nuisance: Option<&'a Nuisance>,
+}
+
+impl<'a> Errors<'a> {
+    /// Noise of a standard deviation (V) alone.
+    pub fn of_noise(measured: &'a Detector, deviation_v: f64) -> Self {
+        Self { measured, deviation_v, nuisance: None }
+    }
+
+    /// The readings that tell anything.
+    fn seen(&self, readings: &Readings) -> Vec<usize> {
+        let ranges: Vec<_> =
+            self.measured.converters.iter().map(|converter| converter.range(self.deviation_v)).collect();
+        let is_seen = |index: usize| {
+            let of = self.measured.electrodes[index % readings.electrodes()].converter;
+            let volts = readings.volts()[index];
+            ranges.get(of).is_none_or(|range| (range.floor_v..range.ceiling_v).contains(&volts))
+        };
+        (0..readings.volts().len()).filter(|index| is_seen(*index)).collect()
+    }
+
+    /// Changes of readings of contacts (V) by one standard deviation of each thing that is not known.
+    fn patterns_v(&self, contacts: &[Contact], readings: &Readings) -> Result<Option<DMatrix<f64>>, ForwardError> {
+        let Some(nuisance) = self.nuisance else { return Ok(None) };
+        let mut patterns = nuisance.patterns_v(contacts, self.measured)?;
+        for (which, converter) in self.measured.converters.iter().enumerate() {
+            let is_on = |index: usize| self.measured.electrodes[index % readings.electrodes()].converter == which;
+            let changes_v = |index: usize, volts: &f64| {
+                if is_on(index) { converter.changes_v(*volts) } else { [0.0; 2] }
+            };
+            for error in 0..2 {
+                let column = patterns.ncols();
+                patterns = patterns.insert_column(column, 0.0);
+                let volts = readings.volts().iter().enumerate();
+                let mut into = patterns.column_mut(column);
+                volts.for_each(|(index, volts)| into[index] = changes_v(index, volts)[error]);
+            }
+        }
+        Ok(Some(patterns))
+    }
+}
+
 /// The Cramer-Rao bound of contacts of known number, each with place and conductance unknown and its radius known or not, from one frame of readings with
-/// independent normal noise of a standard deviation (V).
+/// independent normal noise, and with what is not known of the detector as a normal error that readings share.
 ///
-/// With `J` the derivatives of the readings by the unknowns, Fisher's information is `J'J / deviation^2`, and no unbiased estimate has
-/// a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of the model. `None` if the readings do not
-/// separate the unknowns.
+/// With `J` the derivatives of the readings by the unknowns and `R` the covariance of the readings, Fisher's information is `J' R^-1 J`, and no unbiased
+/// estimate has a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of the model. Readings below a floor tell
+/// nothing. `None` if the others do not separate the unknowns.
 ///
 /// # Errors
 /// [`ForwardError`] if a contact, or one a step beside it, is off the detector.
 pub fn cramer_rao(
     model: &dyn ForwardModel,
     contacts: &[Contact],
-    deviation_v: f64,
+    errors: &Errors<'_>,
 ) -> Result<Option<Vec<Bound>>, ForwardError> {
-    let rows = RowInformation::new(model, contacts, deviation_v)?;
-    Ok(rows.bounds(&vec![1.0; model.detector().electrodes.len()]))
+    let readings = readings_v(&model.impedance_ohm(contacts)?, errors.measured);
+    let seen = errors.seen(&readings);
+    // In standard deviations.
+    let jacobian = derivatives(model, contacts, errors.measured)?.select_rows(&seen) / errors.deviation_v;
+    let mut information = jacobian.tr_mul(&jacobian);
+    if let Some(patterns_v) = errors.patterns_v(contacts, &readings)? {
+        // (1 + P P')^-1 = 1 - P (1 + P' P)^-1 P' (Woodbury).
+        let patterns = patterns_v.select_rows(&seen) / errors.deviation_v;
+        let inner = DMatrix::identity(patterns.ncols(), patterns.ncols()) + patterns.tr_mul(&patterns);
+        let cross = patterns.tr_mul(&jacobian);
+        let Some(factor) = inner.cholesky() else { return Ok(None) };
+        information -= cross.tr_mul(&factor.solve(&cross));
+    }
+    Ok(bounds(information, contacts.iter().map(|contact| contact.radius_m)))
+}
+
+/// Standard errors of contacts of such radii (m) by Fisher's information; `None` if it does not separate the unknowns.
+fn bounds(mut information: DMatrix<f64>, radii_m: impl Iterator<Item = f64>) -> Option<Vec<Bound>> {
+    let size = information.nrows();
+    let known: Vec<_> = (0..size).filter(|unknown| unknown % UNKNOWNS < 3).collect();
+    let of_known = information.select_rows(&known).select_columns(&known);
+    for radius in (UNKNOWNS - 1..size).step_by(UNKNOWNS) {
+        information[(radius, radius)] += RADIUS_DEVIATION.powi(-2);
+    }
+    let inverse = |information: DMatrix<f64>| information.cholesky().map(|factor| factor.inverse());
+    let (known, any) = (inverse(of_known)?, inverse(information)?);
+    let of = |(k, radius_m): (usize, f64)| {
+        let position_m = |all: &DMatrix<f64>, x: usize| radius_m * (all[(x, x)] + all[(x + 1, x + 1)]).sqrt();
+        Bound {
+            position_m: position_m(&known, 3 * k),
+            position_any_radius_m: position_m(&any, UNKNOWNS * k),
+            conductance: known[(3 * k + 2, 3 * k + 2)].sqrt(),
+        }
+    };
+    Some(radii_m.enumerate().map(of).collect())
 }
 
 /// What the row of each ground tells of some contacts, of which the [bound](cramer_rao) of any rows is made.
@@ -57,7 +142,7 @@ impl RowInformation {
     /// [`ForwardError`] if a contact, or one a step beside it, is off the detector.
     pub fn new(model: &dyn ForwardModel, contacts: &[Contact], deviation_v: f64) -> Result<Self, ForwardError> {
         let electrodes = model.detector().electrodes.len();
-        let jacobian_v = derivatives(model, contacts)?;
+        let jacobian_v = derivatives(model, contacts, model.detector())?;
         let of_row = |g: usize| {
             let row_v = jacobian_v.rows(g * electrodes, electrodes);
             row_v.transpose() * row_v / (deviation_v * deviation_v)
@@ -73,29 +158,18 @@ impl RowInformation {
         let size = UNKNOWNS * self.radii_m.len();
         let mut information = DMatrix::zeros(size, size);
         self.rows.iter().zip(times).for_each(|(row, times)| information += row * *times);
-        let known: Vec<_> = (0..size).filter(|unknown| unknown % UNKNOWNS < 3).collect();
-        let of_known = information.select_rows(&known).select_columns(&known);
-        for radius in (UNKNOWNS - 1..size).step_by(UNKNOWNS) {
-            information[(radius, radius)] += RADIUS_DEVIATION.powi(-2);
-        }
-        let inverse = |information: DMatrix<f64>| information.cholesky().map(|factor| factor.inverse());
-        let (known, any) = (inverse(of_known)?, inverse(information)?);
-        let of = |(k, radius_m): (usize, &f64)| {
-            let position_m = |all: &DMatrix<f64>, x: usize| radius_m * (all[(x, x)] + all[(x + 1, x + 1)]).sqrt();
-            Bound {
-                position_m: position_m(&known, 3 * k),
-                position_any_radius_m: position_m(&any, UNKNOWNS * k),
-                conductance: known[(3 * k + 2, 3 * k + 2)].sqrt(),
-            }
-        };
-        Some(self.radii_m.iter().enumerate().map(of).collect())
+        bounds(information, self.radii_m.iter().copied())
     }
 }
 
 /// Derivatives of the readings (V) by x and y in radii and by the logarithms of conductance and radius of each contact: alike in size, so that
 /// the information is well scaled.
-fn derivatives(model: &dyn ForwardModel, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
-    let readings = |contacts: &[Contact]| Ok(readings_v(&model.impedance_ohm(contacts)?, model.detector()));
+fn derivatives(
+    model: &dyn ForwardModel,
+    contacts: &[Contact],
+    measured: &Detector,
+) -> Result<DMatrix<f64>, ForwardError> {
+    let readings = |contacts: &[Contact]| Ok(readings_v(&model.impedance_ohm(contacts)?, measured));
     let electrodes = model.detector().electrodes.len();
     let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, UNKNOWNS * contacts.len());
     for (unknown, mut column) in jacobian_v.column_iter_mut().enumerate() {
@@ -120,8 +194,10 @@ fn derivatives(model: &dyn ForwardModel, contacts: &[Contact]) -> Result<DMatrix
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use tactomo_physics::detector::Detector;
+    use tactomo_physics::detector::ConverterErrors;
     use tactomo_physics::forward::Slab;
     use tactomo_physics::simulate::Noise;
 
@@ -137,7 +213,9 @@ mod tests {
     #[test]
     fn errors_grow_with_noise_and_as_contacts_come_near() {
         let slab = slab();
-        let of = |contacts: &[Contact], noise_v| cramer_rao(&slab, contacts, noise_v).unwrap().unwrap()[0];
+        let of = |contacts: &[Contact], noise_v| {
+            cramer_rao(&slab, contacts, &Errors::of_noise(slab.detector(), noise_v)).unwrap().unwrap()[0]
+        };
         let one = of(&[firm(0.004, 0.007)], 1e-3);
         let noisy = of(&[firm(0.004, 0.007)], 2e-3);
         assert!((noisy.position_m / one.position_m - 2.0).abs() < 1e-9);
@@ -159,7 +237,9 @@ mod tests {
 
     #[test]
     fn contacts_on_one_spot_cannot_be_separated() {
-        let bound = cramer_rao(&slab(), &[firm(0.004, 0.007), firm(0.004, 0.007)], 1e-3).unwrap();
+        let slab = slab();
+        let errors = Errors::of_noise(slab.detector(), 1e-3);
+        let bound = cramer_rao(&slab, &[firm(0.004, 0.007), firm(0.004, 0.007)], &errors).unwrap();
         assert!(bound.as_ref().is_none_or(|bound| bound[0].position_m > 1.0), "{bound:?}");
     }
 
@@ -167,8 +247,9 @@ mod tests {
     #[test]
     fn least_squares_has_the_errors_that_the_bound_says() {
         let (slab, contact, noise_v) = (slab(), firm(-0.011, 0.003), 1e-3);
-        let bound = cramer_rao(&slab, &[contact], noise_v).unwrap().unwrap()[0];
-        let jacobian_v = derivatives(&slab, &[contact]).unwrap();
+        let errors = Errors::of_noise(slab.detector(), noise_v);
+        let bound = cramer_rao(&slab, &[contact], &errors).unwrap().unwrap()[0];
+        let jacobian_v = derivatives(&slab, &[contact], slab.detector()).unwrap();
         let jacobian_v = jacobian_v.columns(0, 3).into_owned();
         let inverse = jacobian_v.clone().pseudo_inverse(1e-12).unwrap();
         let mut noise = Noise::new(3);
@@ -181,5 +262,36 @@ mod tests {
             .sum();
         let found_m = (squares / f64::from(trials)).sqrt();
         assert!((found_m / bound.position_m - 1.0).abs() < 0.06, "{found_m} {bound:?}");
+    }
+
+    #[test]
+    fn what_is_below_a_floor_tells_nothing() {
+        let slab = slab();
+        let contact = [firm(0.004, 0.007)];
+        let error_m = |floor_v: f64| {
+            let converter = ConverterErrors { gain_share: 0.0, bow_v: 0.0, range_v: [floor_v, 3.1] };
+            let measured = Detector { converters: vec![converter], ..slab.detector().clone() };
+            cramer_rao(&slab, &contact, &Errors::of_noise(&measured, 1e-3)).unwrap().map(|bounds| bounds[0].position_m)
+        };
+        let readings = readings_v(&slab.impedance_ohm(&contact).unwrap(), slab.detector());
+        let largest_v = readings.largest_v();
+        assert!(error_m(0.7 * largest_v) > error_m(0.3 * largest_v) && error_m(0.3 * largest_v) > error_m(0.0));
+        assert_eq!(error_m(largest_v), None);
+    }
+
+    /// The bound of a detector as built is what the errors of its parameters and the noise make of least squares that knows their covariance.
+    #[test]
+    fn tolerances_cost_places_and_exact_ones_nothing() {
+        let detector = Detector::default();
+        let of = |factor: f64| {
+            let described = Detector { tolerances: detector.tolerances.times(factor), ..detector.clone() };
+            let model: Arc<dyn ForwardModel> = Arc::new(Slab::new(&described).unwrap().on_image(100));
+            let nuisance = Nuisance::new(&model, &described, 1).unwrap();
+            let errors = Errors { nuisance: nuisance.as_ref(), ..Errors::of_noise(&described, 1e-3) };
+            cramer_rao(&*model, &[firm(0.004, 0.007)], &errors).unwrap().unwrap()[0].position_m
+        };
+        let [exact, hardly, half, built] = [0.0, 1e-3, 0.5, 1.0].map(of);
+        assert!((hardly / exact - 1.0).abs() < 0.01, "{exact} {hardly}");
+        assert!(half > 3.0 * exact && built > 1.5 * half && built < 1e-3, "{exact} {half} {built}");
     }
 }
