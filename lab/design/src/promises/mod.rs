@@ -167,3 +167,33 @@ fn row(
         promised,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::search::Board;
+    use super::*;
+    use tactomo_physics::detector::Adc;
+
+    fn plan() -> Plan {
+        let board = |electrodes: usize| Board {
+            name: "even".to_owned(),
+            adc: Adc::default(),
+            ground_v: 0.0,
+            converters: Vec::new(),
+            inputs: vec![0; electrodes.max(16)],
+            frames_per_s: vec![400.0; electrodes.max(16)],
+        };
+        Plan { wanted: wanted(board), foams: Material::of_paper(), most: 1, built: 3, presses: 6, seed: 1 }
+    }
+
+    /// The median of 18 presses is known to a quarter of itself.
+    #[test]
+    fn places_are_found_about_as_well_as_promised() {
+        let plan = plan();
+        let Wanted { name, wishes } = &plan.wanted[4];
+        let row = row(name, &naive(wishes), None, wishes, &plan).unwrap();
+        let over = row.place_over_promise().unwrap();
+        assert!((0.6..1.7).contains(&over) && row.one > 0.9, "{row:?}");
+        assert!(row.smallest_seen.is_some_and(|seen| seen > 0.5) && !row.is_chosen, "{row:?}");
+    }
+}
