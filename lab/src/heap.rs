@@ -1,4 +1,4 @@
-//! Counts what the program allocates while `tactomo-lab tradeoff` asks for it; the rest of the time it only looks at a flag.
+//! Counts what the program allocates while `tactomo-lab tradeoff` or `study growth` asks for it; the rest of the time it only looks at a flag.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicIsize, Ordering::Relaxed};

@@ -108,7 +108,8 @@ pub fn shape_integrals_m2(polygon: &[Point], corners: [Point; 3]) -> Option<[f64
     let (area_m2, centroid) = area_and_centroid(&clip(polygon, corners))?;
     let [a, b, c] = corners;
     let twice_m2 = cross(a, b, c);
-    Some([(b, c), (c, a), (a, b)].map(|(from, to)| area_m2 * cross(from, to, centroid) / twice_m2))
+    // A centroid on an edge may be beyond it by rounding.
+    Some([(b, c), (c, a), (a, b)].map(|(from, to)| (area_m2 * cross(from, to, centroid) / twice_m2).max(0.0)))
 }
 
 #[cfg(test)]

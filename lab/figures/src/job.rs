@@ -74,6 +74,8 @@ pub const JOBS: &[Job] = &[
     job("samples", "tactomo-lab study samples --seed 1"),
     job("bonding", "tactomo-lab study bonding"),
     job("electrodes", "tactomo-lab study electrodes --seed 1"),
+    job("picard", "tactomo-lab study picard --seed 1"),
+    job("surface", "tactomo-lab study surface --seed 1"),
     slow("thickness", "tactomo-lab study thickness"),
     slow("scan", "tactomo-lab tradeoff --scan --places 6 --seed 21"),
     of_machine("tradeoff", "tactomo-lab tradeoff --quick --seed 1"),

@@ -94,7 +94,7 @@ const FILMS: &[&str] = &[
     "lab/figures/src/palette.rs",
 ];
 /// What charts are drawn by.
-const CHARTS: &[&str] = &["lab/study/src/view", "lab/study/src/tradeoff/view.rs"];
+const CHARTS: &[&str] = &["lab/study/src/view", "lab/study/src/tradeoff/view"];
 
 const fn live(
     file: &'static str,
@@ -129,7 +129,7 @@ pub const PICTURES: &[Picture] = &[
     Picture {
         file: "docs/tradeoff.png",
         how: How::Chart { job: "tradeoff", option: "--picture" },
-        size: [1320, 470],
+        size: [1320, 880],
         sources: &[CHARTS],
     },
     Picture {

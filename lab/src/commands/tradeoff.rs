@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use tactomo_physics::detector::Chosen;
+use tactomo_study::SceneKind;
 use tactomo_study::scanning::{self, Settings};
 use tactomo_study::tradeoff::{self, Plan};
 use tactomo_study::view::picture as picture_of;
@@ -19,6 +20,23 @@ const DETECTORS: [&str; 4] = ["square-60", "strip-13x60", "display-140x70", "fin
 /// Detectors drawn from the tolerances of each: in a quick look, and else.
 const DRAWN: [usize; 2] = [1, 4];
 
+/// What touches those in a quick look: a search for a ring or a whole hand on a detector that is not the one described takes `contacts` and `auto` a
+/// second or two, half of the time of all else.
+const QUICK_DRAWN: [SceneKind; 12] = [
+    SceneKind::None,
+    SceneKind::Light,
+    SceneKind::Firm,
+    SceneKind::Hard,
+    SceneKind::Edge,
+    SceneKind::Corner,
+    SceneKind::MovingBall,
+    SceneKind::TwoNear,
+    SceneKind::TwoFar,
+    SceneKind::Three,
+    SceneKind::Wide,
+    SceneKind::Line,
+];
+
 /// Scenes of each number of contacts of --scan: in a quick look, and else.
 const SCENES: [usize; 2] = [1, 6];
 /// Numbers of contacts of --scan.
@@ -28,7 +46,7 @@ const CONTACTS: [usize; 3] = [1, 2, 3];
 ///
 /// Readings are simulated on a finer model than the ones inverted, with the converter's noise
 /// and steps; then once more on detectors that are not quite the ones described, before and after a calibration. Takes some minutes, with
-/// --quick about half a minute. Ctrl-C keeps what is done. Let nothing else run meanwhile.
+/// --quick 20 seconds. Ctrl-C keeps what is done. Let nothing else run meanwhile.
 ///
 /// Examples:
 ///   tactomo-lab tradeoff --quick --out tradeoff.html
@@ -58,17 +76,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let Args { detector, study, picture, .. } = args;
     let files = study.shown.files()?;
     let picture = NewFile::optional(picture.as_ref(), study.shown.overwrite)?;
-    let [places, frames] = study.places_and_frames(if study.quick { [2, 3] } else { [6, 5] });
+    let [places, frames] = study.places_and_frames(if study.quick { [2, 2] } else { [6, 5] });
     let plan = Plan {
         detectors: choice::detectors(detector, if study.quick { &DETECTORS[..1] } else { &DETECTORS })?,
         methods: study.methods(),
-        sweep: true,
+        swept: if study.quick { 1 } else { places },
         places,
         frames,
         seed: study.seed,
         heap: Some(HEAP),
         as_built: study.as_built,
         drawn: if study.quick { DRAWN[0] } else { DRAWN[1] },
+        drawn_scenes: if study.quick { QUICK_DRAWN.into() } else { SceneKind::ALL.into() },
         calibrate: study.calibrate(),
     };
     let report = watched(|progress| tradeoff::run(&plan, &output::command_line(), progress))?;

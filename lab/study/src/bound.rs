@@ -16,12 +16,14 @@ pub const RADIUS_DEVIATION: f64 = 0.7;
 const UNKNOWNS: usize = 4;
 
 /// Smallest standard errors that an unbiased method can have for a contact.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Bound {
     /// Of the place (m): the root of the sum of both coordinates' variances.
     pub position_m: f64,
     /// The same where the radius is not known, but for [`RADIUS_DEVIATION`].
     pub position_any_radius_m: f64,
+    /// The same along the long and the short axis of the ellipse of errors (m).
+    pub axes_any_radius_m: [f64; 2],
     /// Of the conductance, as a share of it.
     pub conductance: f64,
 }
@@ -118,7 +120,11 @@ fn bounds(mut information: DMatrix<f64>, radii_m: impl Iterator<Item = f64>) -> 
     let (known, any) = (inverse(of_known)?, inverse(information)?);
     let of = |(k, radius_m): (usize, f64)| {
         let position_m = |all: &DMatrix<f64>, x: usize| radius_m * (all[(x, x)] + all[(x + 1, x + 1)]).sqrt();
+        let [x, y] = [0, 1].map(|axis| UNKNOWNS * k + axis);
+        let (middle, half) = (0.5 * (any[(x, x)] + any[(y, y)]), 0.5 * (any[(x, x)] - any[(y, y)]));
+        let apart = half.hypot(any[(x, y)]);
         Bound {
+            axes_any_radius_m: [middle + apart, middle - apart].map(|square| radius_m * square.max(0.0).sqrt()),
             position_m: position_m(&known, 3 * k),
             position_any_radius_m: position_m(&any, UNKNOWNS * k),
             conductance: known[(3 * k + 2, 3 * k + 2)].sqrt(),
@@ -220,6 +226,8 @@ mod tests {
         let noisy = of(&[firm(0.004, 0.007)], 2e-3);
         assert!((noisy.position_m / one.position_m - 2.0).abs() < 1e-9);
         assert!((noisy.conductance / one.conductance - 2.0).abs() < 1e-9);
+        let [long_m, short_m] = one.axes_any_radius_m;
+        assert!(long_m >= short_m && (long_m.hypot(short_m) / one.position_any_radius_m - 1.0).abs() < 1e-9);
         let pair = |apart_m: f64| of(&[firm(0.004, 0.007), firm(0.004 + apart_m, 0.007)], 1e-3).position_m;
         assert!(one.position_m < pair(0.02) && pair(0.02) < pair(0.009) && pair(0.009) < pair(0.004));
     }

@@ -18,6 +18,8 @@ use tactomo_touch::solve::{Problem, SolveError};
 /// Frames before the first that the baseline is taken from, as many as live takes. At rest it is never zero: the converter cuts off what
 /// noise would be below zero, so 1.5 LSB of noise read 0.6 LSB in the mean, which is a press to a solver that looks at 1024 readings.
 const BASELINE_FRAMES: u8 = 32;
+/// What is added to the seed of a baseline that was taken before something changed: its noise is another.
+const BEFORE: u64 = 1 << 40;
 
 /// Why a study cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -89,6 +91,8 @@ pub struct Experiment {
     whole: Arc<Jacobian>,
     /// Impedance while the baseline is taken (ohm), if something presses meanwhile.
     rest_ohm: Option<DMatrix<f64>>,
+    /// The detector while the baseline is taken, where it changes afterwards.
+    before: Option<Arc<Self>>,
 }
 
 impl Experiment {
@@ -116,6 +120,7 @@ impl Experiment {
             built: with_right_converters(detector),
             faults: Vec::new(),
             rest_ohm: None,
+            before: None,
         })
     }
 
@@ -208,6 +213,12 @@ impl Experiment {
         Ok(Self { rest_ohm: Some(self.truth.impedance_ohm(contacts)?), ..self.again() })
     }
 
+    /// The same, whose baseline was taken of a detector as it was before, and is not followed: what `--rest` says of a recording.
+    #[must_use]
+    pub fn changed_since(self, before: &Self) -> Self {
+        Self { before: Some(Arc::new(before.again())), ..self }
+    }
+
     /// The same readings, measured by another converter or drive, which solvers know of.
     pub fn measured_as(&self, detector: &Detector) -> Self {
         let problem = self.problem.measured_as(&self.as_known(detector));
@@ -245,10 +256,17 @@ impl Experiment {
             whole: Arc::clone(&self.whole),
             faults: self.faults.clone(),
             rest_ohm: self.rest_ohm.clone(),
+            before: self.before.clone(),
         }
     }
 
-    /// The baseline: what the first frames are.
+    /// The baseline, what the first frames are; and leakage.
+    fn rest_and_leakage(&self, measurement: &mut Measurement) -> (Baseline, Option<(Leakage, f64)>) {
+        let rest = self.rest(measurement);
+        let leakage = self.leakage(&rest);
+        (rest, leakage)
+    }
+
     fn rest(&self, measurement: &mut Measurement) -> Baseline {
         // Of a detector that leaks there is something to read even then.
         let rest_ohm = self.rest_ohm.clone().or_else(|| self.truth.impedance_ohm(&[]).ok());
@@ -289,8 +307,16 @@ impl Experiment {
         let ranges = self.ranges();
         // At rest a converter with a floor tells nothing.
         let has_floor = ranges.iter().any(|range| range.floor_v.is_finite());
-        let rest = if has_floor { None } else { Some(self.rest(&mut measurement)) };
-        let leakage = rest.as_ref().and_then(|rest| self.leakage(rest));
+        let taken = match self.before.as_deref() {
+            _ if has_floor => None,
+            Some(before) => {
+                let seed = seed.wrapping_add(BEFORE);
+                let mut measurement = Measurement::new(&before.built, &before.faults, seed)?;
+                Some(before.rest_and_leakage(&mut measurement))
+            }
+            None => Some(self.rest_and_leakage(&mut measurement)),
+        };
+        let (rest, leakage) = taken.map_or((None, None), |(rest, leakage)| (Some(rest), leakage));
         let mut frames: Vec<Frame> = Vec::with_capacity(touches.len());
         let mut last = None;
         for touches in touches {

@@ -4,13 +4,18 @@ use std::time::Duration;
 
 use super::experiment::{Experiment, Frame};
 use super::stopwatch::timed;
+pub use super::summary::{ChosenReport, Spread, Summary, Times, quantiles};
 use tactomo_physics::forward::{ForwardError, ImageMesh};
 use tactomo_physics::scene::{Contact, Touch};
-use tactomo_touch::metrics::{Comparison, Greit, ImageMetrics, Matching, PaperFigures, found_s_per_m2, truth_s_per_m2};
-use tactomo_touch::solve::{Flags, FoundContact, Solution, Solver};
+use tactomo_touch::metrics::{
+    Comparison, Greit, ImageMetrics, Matching, PaperFigures, found_s_per_m2, shape_error_m, truth_s_per_m2,
+};
+use tactomo_touch::solve::{Flags, FoundContact, FoundShape, NonlinearSettings, Solution, Solver};
 
 /// Images are smoothed by this share of the shorter side before they are compared: by 2 mm on 60 mm.
 const SMOOTHING_SHARE: f64 = 1.0 / 30.0;
+/// Radius of contacts without one, as discs beside a touch of another shape (mean distances of electrodes): 1.5 mm of 15.
+const POINT_SHARE: f64 = 0.1;
 
 /// What one frame's solution is worth. `None` where a figure is not defined.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,7 +28,7 @@ pub struct Score {
     pub not_finite: bool,
     /// Number of contacts found.
     pub found: usize,
-    /// Mean error with those missed and invented (m): [`Matching::ospa_m`].
+    /// Mean error with those missed and invented (m): [`Matching::ospa_m`]; of touches that are no discs [`shape_error_m`].
     pub error_m: Option<f64>,
     /// Mean distance of contacts found (m), however far.
     pub position_error_m: Option<f64>,
@@ -43,11 +48,58 @@ pub struct Score {
     pub flags: Flags,
     /// The solver's own residual.
     pub residual: Option<f64>,
+    /// What a solver that chooses took it for.
+    pub chosen: Option<Chosen>,
+}
+
+/// What a solver that chooses took a frame for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chosen {
+    /// The model: nothing, `2 contacts`, `line`, `ring`, `image`.
+    pub what: String,
+    /// How many unknowns that has.
+    pub unknowns: usize,
+}
+
+/// Unknowns of a contact: place, conductance and radius.
+pub(crate) const OF_CONTACT: usize = 4;
+/// Of a line, two ends, width and conductance; and of a ring, middle, radius, width and conductance.
+const OF_LINE: usize = 6;
+const OF_RING: usize = 5;
+
+impl Chosen {
+    /// Of a solution, if its solver chooses.
+    fn of(solution: &Solution) -> Option<Self> {
+        let what = solution.choice.as_ref()?.what.clone();
+        let unknowns = match &solution.shape {
+            Some(FoundShape::Line(_)) => OF_LINE,
+            Some(FoundShape::Ring(_)) => OF_RING,
+            None if solution.is_contacts() => OF_CONTACT * solution.contacts.len(),
+            None => NonlinearSettings::default().nodes,
+        };
+        Some(Self { what, unknowns })
+    }
+}
+
+impl Score {
+    /// Whether the answer is wrong, whatever its error is: refused, not finite, or with a contact missed or invented.
+    pub fn is_wrong(&self) -> bool {
+        let miscounted = self.missed.unwrap_or(0) + self.invented.unwrap_or(0) > 0;
+        self.failed || self.not_finite || miscounted
+    }
+
+    /// Whether the image is wrong: refused, not finite, or explaining less than half of the truth's variance.
+    pub fn is_wrong_image(&self) -> bool {
+        let explained = self.image.correlation.map_or(0.0, |correlation| correlation.max(0.0).powi(2));
+        self.failed || self.not_finite || explained < 0.5
+    }
 }
 
 /// Scores solutions on one detector.
 pub struct Scorer {
     reach_m: f64,
+    /// Where touches that are no discs are compared with what was found; `None` if images are.
+    shapes: Option<ImageMesh>,
     images: Option<Images>,
 }
 
@@ -64,12 +116,13 @@ struct Images {
 impl Scorer {
     /// For solutions of an experiment's problem.
     pub fn new(experiment: &Experiment) -> Self {
-        Self { images: Some(Images::new(experiment)), ..Self::of_contacts(experiment.reach_m()) }
+        Self { reach_m: experiment.reach_m(), shapes: None, images: Some(Images::new(experiment)) }
     }
 
-    /// For contacts alone: images are not looked at. What is further from the truth than `reach_m` counts as missed and invented.
-    pub fn of_contacts(reach_m: f64) -> Self {
-        Self { reach_m, images: None }
+    /// For errors alone: images are looked at where touches are no discs, which then have the [error](shape_error_m) of a shape.
+    pub fn of_errors(experiment: &Experiment) -> Self {
+        let shapes = Some(experiment.problem.jacobian.image_mesh.clone());
+        Self { reach_m: experiment.reach_m(), shapes, images: None }
     }
 
     /// Lets a solver read frames one after the other, and scores what it found.
@@ -99,10 +152,15 @@ impl Scorer {
             not_finite: !is_finite(solution),
             flags: solution.flags.clone(),
             residual: solution.residual,
+            chosen: Chosen::of(solution),
             ..Score::default()
         };
         if let Some(truth) = &frame.contacts {
             self.score_contacts(truth, &solution.contacts, &mut score);
+        } else if let Some(mesh) = &self.shapes {
+            let [truth, found] =
+                [truth_s_per_m2(mesh, &frame.touches)?, found_s_per_m2(mesh, solution, self.reach_m * POINT_SHARE)];
+            score.error_m = shape_error_m(mesh, &truth, &found, self.reach_m);
         }
         if let Some(images) = self.images.as_mut().filter(|_| !frame.touches.is_empty()) {
             images.score(frame, solution, &mut score)?;
@@ -161,134 +219,6 @@ fn is_finite(solution: &Solution) -> bool {
         && solution.residual.is_none_or(f64::is_finite)
 }
 
-/// Means over frames. `None` where a figure is not defined in any.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Summary {
-    /// How many frames.
-    pub frames: usize,
-    /// Time a frame (us).
-    pub time_us: Times,
-    /// Share of frames that the solver refused.
-    pub failed: f64,
-    /// Share of frames with something that is no finite number.
-    pub not_finite: f64,
-    /// Mean error with contacts missed and invented (m).
-    pub error_m: Option<f64>,
-    /// Mean distance of contacts found (m).
-    pub position_error_m: Option<f64>,
-    /// Share of frames with no contact missed and none invented.
-    pub count_right: Option<f64>,
-    /// Contacts missed, a frame.
-    pub missed: Option<f64>,
-    /// Contacts invented, a frame.
-    pub invented: Option<f64>,
-    /// Relative error of conductance: the median, as what is pressed hard may conduct anything.
-    pub conductance_error: Option<f64>,
-    /// Correlation of the image with the truth, zero where there is no image to correlate.
-    pub correlation: Option<f64>,
-    /// Dice's coefficient.
-    pub dice: Option<f64>,
-    /// Jaccard's index.
-    pub iou: Option<f64>,
-    /// The paper's spatial resolution SR.
-    pub spatial_resolution: Option<f64>,
-    /// The paper's position accuracy PA.
-    pub position_accuracy: Option<f64>,
-    /// GREIT's amplitude response.
-    pub amplitude_response: Option<f64>,
-    /// GREIT's position error (m), above zero where pulled to the middle.
-    pub greit_position_error_m: Option<f64>,
-    /// GREIT's resolution.
-    pub resolution: Option<f64>,
-    /// GREIT's shape deformation.
-    pub shape_deformation: Option<f64>,
-    /// GREIT's ringing.
-    pub ringing: Option<f64>,
-    /// Share of frames flagged as not fitting the model.
-    pub misfit: f64,
-    /// Share of frames flagged as saturated.
-    pub saturated: f64,
-    /// Share of frames flagged as unfinished.
-    pub unfinished: f64,
-    /// Share of frames solved without some electrodes.
-    pub excluded: f64,
-}
-
-/// Times (us).
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Times {
-    /// Half of the frames take less.
-    pub median: f64,
-    /// Of a hundred frames, one takes longer.
-    pub p99: f64,
-    /// The longest.
-    pub max: f64,
-}
-
-impl Summary {
-    /// Of all scores.
-    pub fn of<'a>(scores: impl IntoIterator<Item = &'a Score>) -> Self {
-        let scores: Vec<_> = scores.into_iter().collect();
-        let share = |is: &dyn Fn(&Score) -> bool| {
-            scores.iter().filter(|score| is(score)).count() as f64 / scores.len().max(1) as f64
-        };
-        let mean = |of: &dyn Fn(&Score) -> Option<f64>| mean(scores.iter().filter_map(|score| of(score)));
-        // A solver that shows nothing where something touches is as wrong as one that shows anything.
-        let touched = scores.iter().any(|score| score.image.correlation.is_some());
-        Self {
-            frames: scores.len(),
-            time_us: Times::of(scores.iter().map(|score| score.time)),
-            failed: share(&|score| score.failed),
-            not_finite: share(&|score| score.not_finite),
-            error_m: mean(&|score| score.error_m),
-            position_error_m: mean(&|score| score.position_error_m),
-            count_right: mean(&|score| Some(f64::from(u8::from(score.missed? + score.invented? == 0)))),
-            missed: mean(&|score| score.missed.map(|count| count as f64)),
-            invented: mean(&|score| score.invented.map(|count| count as f64)),
-            conductance_error: median(scores.iter().filter_map(|score| score.conductance_error)),
-            correlation: mean(&|score| touched.then(|| score.image.correlation.unwrap_or(0.0))),
-            dice: mean(&|score| score.image.dice),
-            iou: mean(&|score| score.image.iou),
-            spatial_resolution: mean(&|score| Some(score.paper?.spatial_resolution)),
-            position_accuracy: mean(&|score| Some(score.paper?.position_accuracy)),
-            amplitude_response: mean(&|score| Some(score.greit?.amplitude_response)),
-            greit_position_error_m: mean(&|score| Some(score.greit?.position_error_m)),
-            resolution: mean(&|score| Some(score.greit?.resolution)),
-            shape_deformation: mean(&|score| Some(score.greit?.shape_deformation)),
-            ringing: mean(&|score| Some(score.greit?.ringing)),
-            misfit: share(&|score| score.flags.misfit),
-            saturated: share(&|score| score.flags.saturated),
-            unfinished: share(&|score| score.flags.unfinished),
-            excluded: share(&|score| !score.flags.excluded.is_empty()),
-        }
-    }
-}
-
-impl Times {
-    fn of(times: impl Iterator<Item = Duration>) -> Self {
-        let us = times.map(|time| time.as_secs_f64() * 1e6);
-        let [median, p99, max] = quantiles(us, [0.5, 0.99, 1.0]).unwrap_or_default();
-        Self { median, p99, max }
-    }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
-    (count > 0).then(|| sum / f64::from(count))
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    quantiles(values, [0.5]).map(|[median]| median)
-}
-
-/// The values below which such shares of all of them lie; `None` without a value.
-pub fn quantiles<const N: usize>(values: impl Iterator<Item = f64>, shares: [f64; N]) -> Option<[f64; N]> {
-    let mut values: Vec<_> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    Some(shares.map(|share| values[(share * last as f64).round() as usize]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -333,16 +263,26 @@ mod tests {
     }
 
     #[test]
+    fn touches_that_are_no_discs_have_an_error_too() {
+        let experiment = experiment();
+        let mut scorer = Scorer::of_errors(&experiment);
+        let frame = frame(&experiment, SceneKind::Line);
+        let truth = truth_s_per_m2(&experiment.problem.jacobian.image_mesh, &frame.touches).unwrap();
+        let right = Solution { image_s_per_m2: Some(truth), ..Solution::default() };
+        assert_eq!(scorer.score(&frame, &right).unwrap().error_m, Some(0.0));
+        let [x_m, y_m] = frame.touches[0].centre_m;
+        let middle = Solution { contacts: vec![FoundContact::flat(x_m, y_m, 1e-3)], ..Solution::default() };
+        let error_m = scorer.score(&frame, &middle).unwrap().error_m.unwrap();
+        assert!(error_m > 0.002 && error_m < experiment.reach_m(), "{error_m}");
+        let nothing = scorer.score(&frame, &Solution::default()).unwrap();
+        assert_eq!((nothing.error_m, nothing.missed), (Some(experiment.reach_m()), None));
+    }
+
+    #[test]
     fn what_is_no_number_is_seen() {
         let experiment = experiment();
         let frame = frame(&experiment, SceneKind::Firm);
         let solution = Solution { contacts: vec![FoundContact::flat(f64::NAN, 0.0, 1e-3)], ..Solution::default() };
         assert!(Scorer::new(&experiment).score(&frame, &solution).unwrap().not_finite);
-    }
-
-    #[test]
-    fn times_are_ranks() {
-        let times = Times::of((0..=100).rev().map(Duration::from_micros));
-        assert_eq!([times.median, times.p99, times.max].map(f64::round), [50.0, 99.0, 100.0]);
     }
 }

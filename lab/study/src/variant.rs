@@ -1,7 +1,10 @@
 //! The solvers that studies try, with values of their main parameters.
 
+use super::score::OF_CONTACT;
 use tactomo_physics::forward::ForwardError;
-use tactomo_touch::solve::{Lambda, Method, Parameter, ParameterKind, Problem, Solver};
+use tactomo_touch::solve::{
+    ContactSettings, Lambda, Method, NonlinearSettings, Parameter, ParameterKind, Problem, Solver,
+};
 
 /// Shares of the largest singular value that are tried in place of the default, for lambda or where singular values are left out:
 /// from where noise shows in images to where they are flat.
@@ -10,8 +13,9 @@ const SHARES: [f64; 5] = [1e-3, 0.01, 0.1, 0.3, 1.0];
 const RULES: [Lambda; 3] = [Lambda::Discrepancy(1.0), Lambda::LCurve, Lambda::Gcv];
 /// Most contacts that are tried in place of the default.
 const MAX_CONTACTS: [usize; 3] = [1, 2, 3];
-/// Nodes of a nonlinear image that are tried in place of the default: 10 x 10 and 15 x 15 on a square.
-const NODES: [usize; 2] = [100, 225];
+/// Nodes of a nonlinear image that are tried in place of the default: 5 x 5, 10 x 10 and 15 x 15 on a square. 30 x 30 take half a second a
+/// frame.
+const NODES: [usize; 3] = [25, 100, 225];
 
 /// A solver with a value of its main parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +61,17 @@ impl Variation {
     /// [`ForwardError`] if the model cannot give what the solver needs.
     pub fn build(&self, problem: &Problem) -> Result<Box<dyn Solver>, ForwardError> {
         self.method.build_with(problem, self.parameter)
+    }
+
+    /// The most unknowns that its model has, where that is its main parameter, and of a linear image: its nodes.
+    pub fn unknowns(&self, problem: &Problem) -> Option<usize> {
+        match (self.method.parameter()?, self.parameter) {
+            (ParameterKind::MaxContacts, Some(Parameter::MaxContacts(most))) => Some(OF_CONTACT * most),
+            (ParameterKind::MaxContacts, _) => Some(OF_CONTACT * ContactSettings::of(problem).most),
+            (ParameterKind::Nodes, Some(Parameter::Nodes(nodes))) => Some(nodes),
+            (ParameterKind::Nodes, _) => Some(NonlinearSettings::default().nodes),
+            _ => (*self == Self::default_of(Method::Tikhonov)).then(|| problem.jacobian.image_mesh.nodes_m.len()),
+        }
     }
 
     /// Name for people: that of the solver, and its parameter if that is not the default.

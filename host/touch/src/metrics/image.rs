@@ -7,7 +7,7 @@ use tactomo_physics::space;
 
 /// A Gaussian is cut off at so many standard deviations.
 const CUT_OFF: f64 = 3.0;
-/// What stands out of an image for [`ImageMetrics::dice`] and `iou`: at least this share of its highest value.
+/// What stands out of an image for [`ImageMetrics::dice`], `iou` and [`shape_error_m`](super::shape_error_m): at least this share of its highest value.
 const HALF: f64 = 0.5;
 
 /// Contact conductance per area that touches make (S/m2) at the nodes of an image's mesh: of each node, what its shape function gathers, over
@@ -129,7 +129,7 @@ fn normalised(weights: Vec<(u32, f64)>) -> Vec<(u32, f32)> {
 }
 
 /// Where an image is at least half of its highest value, if that is above zero.
-fn upper_half(image: &[f32]) -> Option<Vec<bool>> {
+pub(super) fn upper_half(image: &[f32]) -> Option<Vec<bool>> {
     let highest = f64::from(image.iter().copied().fold(0.0, f32::max));
     (highest > 0.0).then(|| image.iter().map(|value| f64::from(*value) >= HALF * highest).collect())
 }

@@ -6,11 +6,13 @@ mod contacts;
 mod greit;
 mod image;
 mod paper;
+mod shape_error;
 
 pub use self::contacts::{Matching, Pair, position_error_m};
 pub use self::greit::Greit;
 pub use self::image::{Comparison, ImageMetrics, found_s_per_m2, truth_s_per_m2};
 pub use self::paper::{PaperFigures, centroid_m};
+pub use self::shape_error::shape_error_m;
 
 #[cfg(test)]
 mod tests {

@@ -96,6 +96,7 @@ fn map(title: String, subtitle: &str, [x_m, y_m]: [Vec<f64>; 2], value: impl Fn(
         ticks: [x_m, y_m],
         empty: "",
         is_log: false,
+        range: None,
         format: DENSITY,
         contours: 0,
         disc: None,

@@ -126,6 +126,7 @@ fn map(report: &Report, Figure(title, subtitle, is_log, format, of): &Figure) ->
         rows: ticks.iter().map(|top| ticks.iter().map(|bottom| value(*bottom, *top)).collect()).collect(),
         empty: if title.starts_with("SR") || title.starts_with("PA") { "collapsed" } else { "not determined" },
         is_log: *is_log,
+        range: None,
         format: *format,
         contours: 5,
         disc: None,
@@ -154,7 +155,8 @@ fn positions(report: &Report, indices: [usize; 2]) -> Chart {
     let mark = |c: &Condition| {
         let [x, y] = indices.map(|index| shown(index, c).0.map_or(f64::NAN, scale(index)));
         let text = |index: usize| format!("{} {}", EXACT[index].0, PLAIN.text(shown(index, c).0));
-        Mark { x, y, note: format!("{}, {}, {}", c.title(), text(indices[0]), text(indices[1])) }
+        let note = format!("{}, {}, {}", c.title(), text(indices[0]), text(indices[1]));
+        Mark { note, ..Mark::from([x, y]) }
     };
     let sample = |c: &Condition| {
         let is_collapsed = indices.iter().any(|index| shown(*index, c).1);

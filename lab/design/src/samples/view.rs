@@ -114,7 +114,7 @@ fn below_the_middle(report: &Report) -> String {
 fn dot(sample: &Sample, [(x, is_x), (y, is_y)]: [(Option<f64>, bool); 2], note: String) -> Series {
     let [x, y] = [x, y].map(|value| value.unwrap_or(f64::NAN));
     let class = if is_x && is_y { "contacts" } else { "collapsed" };
-    Series::dots(sample.measured.name, class, [Mark { x, y, note }])
+    Series::dots(sample.measured.name, class, [Mark { note, ..Mark::from([x, y]) }])
 }
 
 /// Each sample's simulated figure over its measured one. Failed fits are left out.

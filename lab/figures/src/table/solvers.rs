@@ -23,7 +23,7 @@ const CLASSES: [(&str, &str, bool); 15] = [
 ];
 
 pub(super) fn figures() -> Vec<Figure> {
-    [random(), random_built(), built(), speed(), rows()].concat()
+    [random(), random_built(), built(), speed(), rows(), unknowns(), surface()].concat()
 }
 
 /// `auto` on random contacts.
@@ -103,6 +103,40 @@ fn built() -> Vec<Figure> {
             all.push(of("p95", "error, 95 % below", "p95_m").mm().share(0.1));
             all.push(of("count", "count right", "count_right").per_cent().by(3.0));
         }
+    }
+    all
+}
+
+/// Singular values above the noise.
+fn unknowns() -> Vec<Figure> {
+    let of = |id: &str, says: &str, path: &str| {
+        let says = format!("singular values of square-60 that a light press lifts above the noise {says}");
+        figure("picard", format!("picard.square.{id}"), says, format!("detectors/detector=square-60/{path}"))
+    };
+    vec![
+        of("alone", "of a frame, nothing else pressed", "alone/above_noise").by(0.0),
+        of("averaged", "of the mean of 100 frames, beside a firm one", "beside_firm/above_averaged").by(1.0),
+    ]
+}
+
+/// One press place by place.
+fn surface() -> Vec<Figure> {
+    let mut all = Vec::new();
+    for solver in
+        ["auto", "nonlinear", "bsbl", "tv", "nonnegative", "laplace", "noser", "tikhonov", "tsvd", "tikhonov-paper"]
+    {
+        let of = |id: &str, says: &str, field: &str| {
+            let says = format!("one firm press at each place of square-60, {solver}: {says}, median");
+            figure("surface", format!("surface.{solver}.{id}"), says, format!("solvers/solver={solver}/{field}/median"))
+        };
+        all.extend([
+            of("error", "error", "error_m").mm().share(0.1),
+            of("amplitude", "amplitude response", "amplitude_response").share(0.05),
+            of("position", "position error", "position_error_m").mm().by(0.05),
+            of("resolution", "resolution", "resolution").share(0.05),
+            of("deformation", "shape deformation", "shape_deformation").by(0.02),
+            of("ringing", "ringing", "ringing").by(0.02),
+        ]);
     }
     all
 }

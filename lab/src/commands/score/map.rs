@@ -89,6 +89,7 @@ impl Map {
             rows: values,
             empty: "no press",
             is_log: false,
+            range: None,
             format: MM.digits(2),
             contours: 0,
             disc: None,

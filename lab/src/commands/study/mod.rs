@@ -4,6 +4,9 @@ mod args;
 mod built;
 mod contacts;
 mod design;
+mod growth;
+mod picard;
+mod surface;
 
 pub use self::args::StudyArgs;
 
@@ -23,6 +26,9 @@ pub struct Args {
 enum Study {
     Built(built::Args),
     Contacts(contacts::Args),
+    Growth(growth::Args),
+    Picard(picard::Args),
+    Surface(surface::Args),
     #[command(flatten)]
     Design(design::Study),
 }
@@ -32,6 +38,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.study {
         Study::Built(args) => built::run(args),
         Study::Contacts(args) => contacts::run(args),
+        Study::Growth(args) => growth::run(args),
+        Study::Picard(args) => picard::run(args),
+        Study::Surface(args) => surface::run(args),
         Study::Design(study) => design::run(study),
     }
 }

@@ -204,8 +204,10 @@ mod tests {
     use super::*;
     use tactomo_touch::solve::{Flags, Uncertainty};
 
-    const CLEAR: Bound = Bound { position_m: 1e-4, position_any_radius_m: 1e-4, conductance: 0.05 };
-    const FAINT: Bound = Bound { position_m: 2e-3, position_any_radius_m: 2e-3, conductance: 0.5 };
+    const CLEAR: Bound =
+        Bound { position_m: 1e-4, position_any_radius_m: 1e-4, conductance: 0.05, axes_any_radius_m: [0.0; 2] };
+    const FAINT: Bound =
+        Bound { position_m: 2e-3, position_any_radius_m: 2e-3, conductance: 0.5, axes_any_radius_m: [0.0; 2] };
 
     fn there(x_mm: f64, y_mm: f64) -> Contact {
         Contact::flat(1e-3 * x_mm, 1e-3 * y_mm, 2e-3, 1e-3)

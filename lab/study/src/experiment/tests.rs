@@ -148,3 +148,22 @@ fn gains_that_are_described_are_taken_off_and_others_are_not() {
     // Noise is that of one seed, so codes differ by rounding alone: 0.8 of 0.8 mV in 0.3 V.
     assert!(off(&wrong) > 0.02 && off(&right) < 0.006, "{} {}", off(&wrong), off(&right));
 }
+
+#[test]
+fn what_changes_after_the_baseline_is_in_the_readings() {
+    let experiment = experiment();
+    let at_rest = |experiment: &Experiment| experiment.frames(&vec![Vec::new(); 20], 1).unwrap();
+    let mean_v = |experiment: &Experiment, channel: usize| {
+        let of = |frame: &Frame| (0..16).map(|g| frame.readings.at(g, channel)).sum::<f64>() / 16.0;
+        at_rest(experiment).iter().map(of).sum::<f64>() / 20.0
+    };
+    let mut shifted = experiment.truth().clone();
+    shifted.electrodes[3].offset_v += 0.05;
+    let shifted = experiment.with_truth(&shifted).unwrap();
+    assert!(mean_v(&shifted, 3).abs() < 2e-3, "a baseline takes offsets off");
+    let since = shifted.changed_since(&experiment);
+    assert!((mean_v(&since, 3) - 0.05).abs() < 2e-3 && mean_v(&since, 4).abs() < 2e-3);
+    let leaking = experiment.with_faults(&[Fault::Leak { sheets: 0.03 }], 1).unwrap();
+    let leak_v = |experiment: &Experiment| at_rest(experiment)[0].readings.largest_v();
+    assert!(leak_v(&leaking.changed_since(&experiment)) > 0.05);
+}

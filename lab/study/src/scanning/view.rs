@@ -79,7 +79,7 @@ fn charts(report: &Report, subtitle: fn(f64) -> &'static str, error_m: fn(&Point
 
 fn series(report: &Report, contacts: usize, speed_m_per_s: f64, error_m: fn(&Point) -> f64) -> Vec<Series> {
     let points = |choice: Choice| report.of(contacts, speed_m_per_s).filter(move |point| point.choice == choice);
-    let mark = |point: &Point, y: f64| Mark { x: point.frames_per_s, y, note: note(point) };
+    let mark = |point: &Point, y: f64| Mark { note: note(point), ..Mark::from([point.frames_per_s, y]) };
     let of = |(choice, class, _): (Choice, &'static str, &str)| {
         // The legend names the others: labels would be in each other's way.
         let name = if choice == Choice::Whole { choice.name() } else { "" };

@@ -108,14 +108,9 @@ pub(super) struct Answer {
 
 impl Answer {
     fn of(score: &Score) -> Self {
-        let miscounted = score.missed.unwrap_or(0) + score.invented.unwrap_or(0) > 0;
         let flags = &score.flags;
         let is_flagged = flags.misfit || flags.saturated || flags.unfinished || !flags.excluded.is_empty();
-        Self {
-            error_m: score.error_m,
-            is_wrong: score.failed || score.not_finite || miscounted,
-            is_flagged: is_flagged || score.failed,
-        }
+        Self { error_m: score.error_m, is_wrong: score.is_wrong(), is_flagged: is_flagged || score.failed }
     }
 }
 
@@ -271,7 +266,7 @@ mod tests {
     use tactomo_touch::solve::Flags;
 
     fn cell(error_mm: f64) -> CellReport {
-        let time_us = Times { median: 10.0, p99: 20.0, max: 30.0 };
+        let time_us = Times { median: 10.0, p99: 20.0, max: 30.0, ..Times::default() };
         CellReport::summed(&Summary { error_m: Some(error_mm * 1e-3), time_us, ..Summary::default() }, 0.015)
     }
 

@@ -7,6 +7,7 @@ mod faults;
 mod report;
 mod run;
 mod scenes;
+mod shapes;
 mod sweep;
 mod tolerances;
 mod trials;

@@ -5,7 +5,7 @@ use super::breakdown::{CellReport, Wrong, breaks, margin};
 use super::report::{ErrorRange, PointReport, Report, SolverRow, SweepReport};
 use super::sweep::{Bench, Maker, Plan, Point, Sweep};
 use super::trials::Trials;
-use super::{bounds, faults, scenes, tolerances, wrong};
+use super::{bounds, faults, scenes, shapes, tolerances, wrong};
 use crate::experiment::{Experiment, StudyError};
 use crate::machine::Machine;
 use crate::progress::Progress;
@@ -60,6 +60,7 @@ pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, Stu
 /// How all sweeps are made, in their order.
 fn makers(plan: &Plan) -> Vec<Maker> {
     let mut makers = scenes::sweeps();
+    makers.extend(shapes::sweeps());
     makers.extend(wrong::sweeps());
     makers.extend(tolerances::sweeps(plan));
     makers.push(Maker::new("Lambda", LAMBDAS.len(), lambda));

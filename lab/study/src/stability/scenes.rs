@@ -18,8 +18,12 @@ const BITS: [u8; 5] = [16, 14, 12, 10, 8];
 const CONDUCTANCES: [f64; 10] = [0.003, 0.01, 0.03, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0];
 /// Distances (mean distances of electrodes).
 pub(super) const APART: [f64; 9] = [1.6, 1.2, 0.9, 0.7, 0.55, 0.4, 0.27, 0.2, 0.13];
-/// Distance to which two contacts part, each of which is shown alike when they begin on one spot (m).
-const PARTED_M: [f64; 6] = [0.024, 0.015, 0.01, 0.007, 0.005, 0.003];
+/// Distance to which two contacts part, each of which is shown alike when they begin on one spot (mean distances of electrodes).
+const PARTED: [f64; 6] = [1.6, 1.0, 2.0 / 3.0, 7.0 / 15.0, 1.0 / 3.0, 0.2];
+/// Distance of two contacts that keep still (mean distances of electrodes).
+const STILL: [f64; 5] = [1.0, 2.0 / 3.0, 7.0 / 15.0, 1.0 / 3.0, 0.2];
+/// Frames in which they do: a third of a second at 100 frames a second.
+const KEPT: usize = 32;
 /// Frames in which they part: a tenth of a second at 100 frames a second.
 const PARTING: usize = 10;
 const FROM_EDGE: [f64; 6] = [0.5, 0.3, 0.2, 0.15, 0.12, 0.1];
@@ -39,7 +43,8 @@ pub fn sweeps() -> Vec<Maker> {
         Maker::new("Force, from nothing to saturation", CONDUCTANCES.len(), conductance),
         Maker::new("Distance of two firm contacts", APART.len(), apart_firm),
         Maker::new("Distance of two light contacts", APART.len(), apart_light),
-        Maker::new("Two contacts that part while they are followed", PARTED_M.len(), parting),
+        Maker::new("Two contacts that part while they are followed", PARTED.len(), parting),
+        Maker::new("Two contacts that keep still while they are followed", STILL.len(), still),
         Maker::new("Distance to the edge", FROM_EDGE.len(), edge),
         Maker::new("Distance to an electrode's middle", FROM_PAD.len(), pad),
         Maker::new("Radius of a wide contact", RADII.len(), width),
@@ -109,7 +114,7 @@ fn sound(bench: &Bench) -> Result<Experiment, StudyError> {
 }
 
 /// A sweep of what touches, on the sound detector, from the harmless to the worst.
-fn touched<T: Copy>(
+pub(super) fn touched<T: Copy>(
     bench: &Bench,
     note: &str,
     values: &[T],
@@ -164,8 +169,8 @@ pub(super) fn pair(bench: &Bench, kind: SceneKind, apart: f64, seed: u64) -> [Co
 }
 
 fn apart(bench: &Bench, kind: SceneKind, note: &str) -> Result<Sweep, StudyError> {
-    let millimetres = |share: f64| format!("{:.1} mm", share * bench.sound.reach_m() * 1e3);
-    touched(bench, note, &APART, millimetres, |share, seed| pair(bench, kind, share, seed).map(Touch::from).to_vec())
+    let touches = |share, seed| pair(bench, kind, share, seed).map(Touch::from).to_vec();
+    touched(bench, note, &APART, |share| millimetres(bench, share), touches)
 }
 
 fn apart_firm(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -178,18 +183,40 @@ fn apart_light(bench: &Bench) -> Result<Sweep, StudyError> {
 
 /// Two that begin on one spot and part, which solvers follow from one contact to two.
 fn parting(bench: &Bench) -> Result<Sweep, StudyError> {
-    let point = |(index, parted_m): (usize, &f64)| {
-        let touches = |seed, share: f64| {
-            let apart = share * parted_m / bench.sound.reach_m();
-            pair(bench, SceneKind::Firm, apart, seed).map(Touch::from).to_vec()
-        };
-        bench.followed(format!("{:.0} mm", parted_m * 1e3), index as f64, sound(bench)?, PARTING, touches)
-    };
-    let points = bench.some(&PARTED_M).enumerate().map(point).collect::<Result<_, _>>()?;
     let note = format!(
         "Two firm contacts of 0.3 sheet conductances that begin on one spot and part to this distance in {PARTING} frames. What counts is what is found there."
     );
+    followed(bench, note, &PARTED, PARTING, |parted, share| share * parted)
+}
+
+/// Two that keep still, which frames tell better the longer they do.
+fn still(bench: &Bench) -> Result<Sweep, StudyError> {
+    let note = format!(
+        "Two firm contacts of 0.3 sheet conductances at this distance for {KEPT} frames. What counts is what is found then."
+    );
+    followed(bench, note, &STILL, KEPT, |apart, _| apart)
+}
+
+/// Two firm contacts over so many frames, at a distance (mean distances of electrodes) that is a value's when a share of the frames is over.
+fn followed(
+    bench: &Bench,
+    note: String,
+    values: &[f64],
+    lead: usize,
+    apart: impl Fn(f64, f64) -> f64,
+) -> Result<Sweep, StudyError> {
+    let point = |(index, value): (usize, &f64)| {
+        let touches =
+            |seed, share: f64| pair(bench, SceneKind::Firm, apart(*value, share), seed).map(Touch::from).to_vec();
+        bench.followed(millimetres(bench, *value), index as f64, sound(bench)?, lead, touches)
+    };
+    let points = bench.some(values).enumerate().map(point).collect::<Result<_, _>>()?;
     Ok(Sweep::new(note, points))
+}
+
+/// Mean distances of electrodes, for people.
+pub(super) fn millimetres(bench: &Bench, share: f64) -> String {
+    format!("{:.1} mm", share * bench.sound.reach_m() * 1e3)
 }
 
 fn edge(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -199,8 +226,7 @@ fn edge(bench: &Bench) -> Result<Sweep, StudyError> {
         let contact = bench.contact(SceneKind::Firm, seed);
         vec![Touch::from(Contact { x_m: 0.5 * width_m - distance_m(share), ..contact })]
     };
-    let label = |share: f64| format!("{:.1} mm", distance_m(share) * 1e3);
-    touched(bench, "Of the middle of a firm contact.", &FROM_EDGE, label, touches)
+    touched(bench, "Of the middle of a firm contact.", &FROM_EDGE, |share| millimetres(bench, share), touches)
 }
 
 fn pad(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -214,8 +240,7 @@ fn pad(bench: &Bench) -> Result<Sweep, StudyError> {
         let at = |pad_m: f64| pad_m * (1.0 - share * bench.sound.reach_m() / to_middle_m);
         vec![Touch::from(Contact { x_m: at(pad.x_m), y_m: at(pad.y_m), ..contact })]
     };
-    let label = |share: f64| format!("{:.1} mm", share * bench.sound.reach_m() * 1e3);
-    touched(bench, "Of a light contact, smaller than a pad.", &FROM_PAD, label, touches)
+    touched(bench, "Of a light contact, smaller than a pad.", &FROM_PAD, |share| millimetres(bench, share), touches)
 }
 
 fn width(bench: &Bench) -> Result<Sweep, StudyError> {
@@ -229,8 +254,7 @@ fn width(bench: &Bench) -> Result<Sweep, StudyError> {
         };
         vec![Touch::from(Contact { radius_m, x_m: within(0, contact.x_m), y_m: within(1, contact.y_m), ..contact })]
     };
-    let label = |share: f64| format!("{:.1} mm", share * bench.sound.reach_m() * 1e3);
-    touched(bench, "Of 0.3 sheet conductances in all.", &RADII, label, touches)
+    touched(bench, "Of 0.3 sheet conductances in all.", &RADII, |share| millimetres(bench, share), touches)
 }
 
 /// A second press that lowers the signal of the first: nearer to where the current leaves than to where it is measured.

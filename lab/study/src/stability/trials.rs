@@ -44,7 +44,7 @@ impl Trials {
     pub fn new(bench: &Bench) -> Self {
         let shared = [&bench.sound, &bench.tolerant].map(|experiment| Arc::clone(&experiment.problem.jacobian));
         let solvers = Solvers { shared, kept: Vec::new(), last: None };
-        Self { scorer: Scorer::of_contacts(bench.sound.reach_m()), solvers, tried: Vec::new() }
+        Self { scorer: Scorer::of_errors(&bench.sound), solvers, tried: Vec::new() }
     }
 
     /// Scores of a solver at a point; `None` if it cannot be made for the model.

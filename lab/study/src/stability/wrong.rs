@@ -7,7 +7,7 @@ use tactomo_physics::detector::{Adc, Detector, Layer, Tolerances};
 use tactomo_physics::forward::ConnectingPoints;
 use tactomo_physics::forward::shell::Shell;
 use tactomo_physics::scene::Contact;
-use tactomo_physics::simulate::Fault;
+use tactomo_physics::simulate::{Fault, Noise};
 
 /// True thickness over the one in the model.
 const THICKNESSES: [f64; 9] = [0.5, 0.7, 0.85, 0.95, 1.0, 1.05, 1.15, 1.4, 2.0];
@@ -33,6 +33,9 @@ const SHEETS_OHM: [f64; 7] = [0.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 /// Conductance of layers that touch lightly everywhere (sheet conductances).
 const LEAKS: [f64; 6] = [0.0, 0.003, 0.01, 0.03, 0.1, 0.3];
 
+/// By how much the offset of each channel changes after the baseline was taken: standard deviation (LSB).
+const OFFSETS_LSB: [f64; 6] = [0.0, 0.3, 1.0, 3.0, 10.0, 30.0];
+
 /// All of them.
 pub fn sweeps() -> Vec<Maker> {
     vec![
@@ -43,6 +46,8 @@ pub fn sweeps() -> Vec<Maker> {
         Maker::new("More noise than expected", NOISES.len(), noise),
         Maker::new("A driving sheet that resists", SHEETS_OHM.len(), driving_sheet),
         Maker::new("A detector that leaks", LEAKS.len(), leak),
+        Maker::new("Offsets that change after --rest", OFFSETS_LSB.len(), offsets_since),
+        Maker::new("A leak that grows after --rest", LEAKS.len(), leak_since),
         Maker::new("Readings that saturate", CLIPS.len(), clip),
         Maker::new("A thick detector read with the thin-shell model", SHELL_THICKNESSES.len(), shell),
         Maker::new("A finer or coarser image", NODES.len(), nodes),
@@ -159,6 +164,32 @@ fn leak(bench: &Bench) -> Result<Sweep, StudyError> {
         false => bench.sound.with_faults(&[], 0),
     };
     firm(bench, note, &LEAKS, |sheets| format!("{sheets}"), |sheets| sheets, of)
+}
+
+/// What the sweeps of changes after the baseline have in common, for their notes.
+const SINCE: &str = "The baseline was taken before and is not followed, as by `--rest`.";
+
+fn offsets_since(bench: &Bench) -> Result<Sweep, StudyError> {
+    let note = format!("Standard deviation of the change of each channel's offset, in LSB. {SINCE}");
+    let lsb_v = bench.sound.detector.adc.lsb_v();
+    let of = |deviation_lsb: f64| {
+        if deviation_lsb == 0.0 {
+            return bench.sound.with_faults(&[], 0);
+        }
+        let (mut changed, mut random) = (bench.sound.truth().clone(), Noise::new(bench.plan.seed));
+        changed.electrodes.iter_mut().for_each(|pad| pad.offset_v += deviation_lsb * lsb_v * random.normal());
+        Ok(bench.sound.with_truth(&changed)?.changed_since(&bench.sound))
+    };
+    firm(bench, &note, &OFFSETS_LSB, |lsb| format!("{lsb} LSB"), |lsb| lsb, of)
+}
+
+fn leak_since(bench: &Bench) -> Result<Sweep, StudyError> {
+    let note = format!("Conductance of layers that come to touch lightly everywhere, in sheet conductances. {SINCE}");
+    let of = |sheets| match sheets > 0.0 {
+        true => Ok(bench.sound.with_faults(&[Fault::Leak { sheets }], 1)?.changed_since(&bench.sound)),
+        false => bench.sound.with_faults(&[], 0),
+    };
+    firm(bench, &note, &LEAKS, |sheets| format!("{sheets}"), |sheets| sheets, of)
 }
 
 fn clip(bench: &Bench) -> Result<Sweep, StudyError> {

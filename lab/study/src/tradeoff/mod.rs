@@ -3,6 +3,7 @@
 //! Times are processor times of one thread with nothing else of this program running. Memory is what is allocated beyond what was before, as a
 //! [`Heap`] counts it.
 
+mod report;
 mod trial;
 mod view;
 
@@ -13,14 +14,16 @@ use super::experiment::{Experiment, StudyError};
 use super::machine::Machine;
 use super::progress::Progress;
 use super::scenes::{Group, SceneKind};
-use super::score::Summary;
 use super::variant::Variation;
 use tactomo_physics::causes::with_causes;
 use tactomo_physics::detector::Detector;
-use tactomo_touch::solve::{Family, Method};
+use tactomo_touch::solve::Method;
 
-use self::trial::{Trial, try_variation};
+use self::trial::{Trial, floors, try_variation};
 
+pub use self::report::{
+    AsBuiltReport, Course, DetectorReport, Floor, GroupReport, Known, Memory, Report, SceneReport, SolverReport,
+};
 pub use self::view::view;
 
 /// What is tried.
@@ -30,8 +33,8 @@ pub struct Plan {
     pub detectors: Vec<Detector>,
     /// Solvers.
     pub methods: Vec<Method>,
-    /// Whether main parameters are swept.
-    pub sweep: bool,
+    /// Places of each kind of scene at which other values of main parameters are tried; none where they are not swept.
+    pub swept: usize,
     /// Places of each kind of scene.
     pub places: usize,
     /// Frames at each place, with new noise each.
@@ -44,6 +47,8 @@ pub struct Plan {
     pub as_built: Option<u64>,
     /// Else solvers are tried once more, with their defaults, on so many detectors drawn from the tolerances.
     pub drawn: usize,
+    /// A place of each of these kinds of scenes is on each of those.
+    pub drawn_scenes: Vec<SceneKind>,
     /// If given, and on those once more after a calibration.
     pub calibrate: Option<Calibrate>,
 }
@@ -57,151 +62,18 @@ pub struct Heap {
     pub stop: fn() -> Memory,
 }
 
-/// What came out.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Report {
-    /// Where it ran.
-    pub machine: Machine,
-    /// How to run it again.
-    pub command: String,
-    /// Seed.
-    pub seed: u64,
-    /// The seed of the detectors as they were built, if all is simulated on such.
-    pub as_built: Option<u64>,
-    /// Places of each kind of scene.
-    pub places: usize,
-    /// Frames at each place.
-    pub frames: usize,
-    /// One for each detector.
-    pub detectors: Vec<DetectorReport>,
-    /// What was not tried when the study was stopped.
-    pub missing: Vec<String>,
-}
-
-/// What came out on one detector.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct DetectorReport {
-    /// Its name.
-    pub detector: String,
-    /// Width and height (m).
-    pub size_m: [f64; 2],
-    /// Model that was inverted.
-    pub model: String,
-    /// Time to make that model and its Jacobian (ms).
-    pub model_ms: f64,
-    /// What a contact missed or invented counts (m).
-    pub reach_m: f64,
-    /// Solvers that cannot be made for this model, and why.
-    pub unavailable: Vec<String>,
-    /// One for each solver and parameter.
-    pub solvers: Vec<SolverReport>,
-    /// The same solvers with their defaults on detectors drawn from the tolerances: as solvers know them, one after the other.
-    pub as_built: Vec<AsBuiltReport>,
-}
-
-/// What came out on detectors drawn from the tolerances of one.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct AsBuiltReport {
-    /// What solvers know of them.
-    pub known: Known,
-    /// The calibration, if they are calibrated.
-    pub calibration: Option<String>,
-    /// How many calibrations were refused, which left solvers the description.
-    pub refused: usize,
-    /// How many detectors, each with a place of each kind of scene.
-    pub detectors: usize,
-    /// One for each solver.
-    pub solvers: Vec<SolverReport>,
-}
-
-/// What solvers know of a detector as it was built.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Known {
-    /// Its description.
-    Described,
-    /// What a calibration found.
-    Calibrated,
-}
-
-/// What came out for one solver.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct SolverReport {
-    /// Its name.
-    pub solver: String,
-    /// What it is made of.
-    pub family: Family,
-    /// Its main parameter, where that is not the default.
-    pub parameter: Option<String>,
-    /// Time to make it (ms).
-    pub set_up_ms: f64,
-    /// Memory, if it was counted.
-    pub memory: Option<Memory>,
-    /// Over all scenes.
-    pub all: Summary,
-    /// Over the scenes of each group.
-    pub groups: Vec<GroupReport>,
-    /// Over each kind of scene.
-    pub scenes: Vec<SceneReport>,
-}
-
-/// What a solver allocates beyond the model (bytes).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Memory {
-    /// Kept after all frames.
-    pub kept_bytes: usize,
-    /// At most, while it was made or solved.
-    pub peak_bytes: usize,
-}
-
-/// A group's means.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct GroupReport {
-    /// The group.
-    pub group: Group,
-    /// Its means.
-    pub summary: Summary,
-}
-
-/// A kind's means.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct SceneReport {
-    /// The kind.
-    pub scene: SceneKind,
-    /// Its means.
-    pub summary: Summary,
-}
-
-impl AsBuiltReport {
-    /// Figures of a solver.
-    pub fn of(&self, solver: &str) -> Option<&SolverReport> {
-        self.solvers.iter().find(|report| report.solver == solver)
-    }
-}
-
-impl SolverReport {
-    /// Means of a group.
-    pub fn group(&self, group: Group) -> Option<&Summary> {
-        Some(&self.groups.iter().find(|report| report.group == group)?.summary)
-    }
-
-    /// Means of a kind.
-    pub fn scene(&self, kind: SceneKind) -> Option<&Summary> {
-        Some(&self.scenes.iter().find(|report| report.scene == kind)?.summary)
-    }
-}
-
 /// Tries all solvers on all detectors, until that is done or it is stopped: then what is missing is in the report.
 ///
 /// # Errors
 /// [`StudyError`] if a detector cannot be modelled or is curved.
 pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, StudyError> {
-    let mut course = Course { progress: progress.part(0, plan.work()), done: 0, missing: Vec::new() };
+    let progress = progress.part(0, plan.work());
+    let mut run = Run { progress, swept: plan.swept, done: 0, missing: Vec::new() };
     let mut detectors = Vec::new();
     for detector in &plan.detectors {
-        match course.goes_on(&detector.name) {
-            true => detectors.push(on_detector(plan, detector, &mut course)?),
-            false => course.missing.push(detector.name.clone()),
+        match run.goes_on(&detector.name) {
+            true => detectors.push(on_detector(plan, detector, &mut run)?),
+            false => run.missing.push(detector.name.clone()),
         }
     }
     Ok(Report {
@@ -212,16 +84,16 @@ pub fn run(plan: &Plan, command: &str, progress: Progress) -> Result<Report, Stu
         places: plan.places,
         frames: plan.frames,
         detectors,
-        missing: course.missing,
+        missing: run.missing,
     })
 }
 
 impl Plan {
     /// Solvers with their defaults and, where that is asked for, with other values of their main parameters.
     fn variations(&self) -> Vec<Variation> {
-        let sweep = |method: &Method| match self.sweep {
-            true => Variation::sweep(*method),
-            false => vec![Variation::default_of(*method)],
+        let sweep = |method: &Method| match self.swept {
+            0 => vec![Variation::default_of(*method)],
+            _ => Variation::sweep(*method),
         };
         self.methods.iter().flat_map(sweep).collect()
     }
@@ -241,13 +113,15 @@ impl Plan {
 }
 
 /// How far the study is.
-struct Course<'a> {
+struct Run<'a> {
     progress: Progress<'a>,
+    /// Places at which values of parameters are tried that are not the defaults.
+    swept: usize,
     done: usize,
     missing: Vec<String>,
 }
 
-impl Course<'_> {
+impl Run<'_> {
     /// Tells what is tried next, unless it was stopped.
     fn goes_on(&self, next: &str) -> bool {
         self.progress.tell(next, self.done);
@@ -270,21 +144,24 @@ impl Course<'_> {
             self.missing.push(name);
             return None;
         }
-        let tried = try_variation(heap, trials, variation);
+        let tried = try_variation(heap, trials, variation, self.swept);
         tried.map_err(|error| unavailable.push(format!("{}: {}", variation.label(), with_causes(&error)))).ok()
     }
 }
 
-fn on_detector(plan: &Plan, detector: &Detector, course: &mut Course) -> Result<DetectorReport, StudyError> {
+fn on_detector(plan: &Plan, detector: &Detector, run: &mut Run) -> Result<DetectorReport, StudyError> {
     let described = Experiment::new(detector)?;
     let experiment = match plan.as_built {
         Some(seed) => described.as_built(seed)?,
         None => described,
     };
-    let mut trials = [Trial::new(plan, experiment, 0..plan.places as u64)?];
+    let mut trials = [Trial::new(plan, experiment, 0..plan.places as u64, &SceneKind::ALL)?];
+    let floors = floors(&trials)?;
     let (mut solvers, mut unavailable) = (Vec::new(), Vec::new());
     for variation in plan.variations() {
-        solvers.extend(course.tried(&detector.name, plan.heap, &mut trials, variation, &mut unavailable));
+        // With another value of its parameter a solver needs about the same memory.
+        let heap = plan.heap.filter(|_| variation.parameter.is_none());
+        solvers.extend(run.tried(&detector.name, heap, &mut trials, variation, &mut unavailable));
     }
     let [Trial { experiment, .. }] = trials;
     Ok(DetectorReport {
@@ -294,13 +171,14 @@ fn on_detector(plan: &Plan, detector: &Detector, course: &mut Course) -> Result<
         model_ms: milliseconds(experiment.model_time),
         reach_m: experiment.reach_m(),
         unavailable,
+        floors,
         solvers,
-        as_built: as_built(plan, &experiment, course)?,
+        as_built: as_built(plan, &experiment, run)?,
     })
 }
 
 /// Solvers on detectors drawn from the tolerances of a sound one: knowing the description, and calibrated if there is a way.
-fn as_built(plan: &Plan, sound: &Experiment, course: &mut Course) -> Result<Vec<AsBuiltReport>, StudyError> {
+fn as_built(plan: &Plan, sound: &Experiment, run: &mut Run) -> Result<Vec<AsBuiltReport>, StudyError> {
     let name = &sound.detector.name;
     if sound.detector.tolerances.is_exact() {
         return Ok(Vec::new());
@@ -309,8 +187,8 @@ fn as_built(plan: &Plan, sound: &Experiment, course: &mut Course) -> Result<Vec<
     let mut reports = Vec::new();
     for (known, calibrate) in plan.known() {
         let whose = format!("{name}: {} detectors as built, {}", plan.drawn, known.name());
-        if !course.goes_on(&whose) {
-            course.missing.push(whose);
+        if !run.goes_on(&whose) {
+            run.missing.push(whose);
             continue;
         }
         // What solvers make of the tolerances is made once.
@@ -327,28 +205,20 @@ fn as_built(plan: &Plan, sound: &Experiment, course: &mut Course) -> Result<Vec<
                 }
                 None => built,
             };
-            Trial::new(plan, known, index..index + 1)
+            Trial::new(plan, known, index..index + 1, &plan.drawn_scenes)
         };
         let mut trials = seeds().map(trial).collect::<Result<Vec<_>, StudyError>>()?;
+        let floors = floors(&trials)?;
         // What cannot be made for the model was told before.
         let untold = &mut Vec::new();
         let variations = plan.methods.iter().map(|method| Variation::default_of(*method));
         let solvers =
-            variations.filter_map(|variation| course.tried(&whose, None, &mut trials, variation, untold)).collect();
+            variations.filter_map(|variation| run.tried(&whose, None, &mut trials, variation, untold)).collect();
         let calibration = calibrate.map(Calibrate::name);
-        reports.push(AsBuiltReport { known, calibration, refused, detectors: plan.drawn, solvers });
+        let (detectors, scenes) = (plan.drawn, plan.drawn_scenes.clone());
+        reports.push(AsBuiltReport { known, calibration, refused, detectors, scenes, floors, solvers });
     }
     Ok(reports)
-}
-
-impl Known {
-    /// For people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Described => "by their description",
-            Self::Calibrated => "calibrated",
-        }
-    }
 }
 
 fn milliseconds(time: Duration) -> f64 {
@@ -366,13 +236,14 @@ mod tests {
         let plan = Plan {
             detectors: vec![Detector::preset(Detector::DEFAULT).unwrap()],
             methods: vec![Method::Tikhonov, Method::TikhonovPaper],
-            sweep: true,
+            swept: 1,
             places: 1,
             frames: 2,
             seed: 3,
             heap: None,
             as_built: None,
             drawn: 2,
+            drawn_scenes: SceneKind::ALL.into(),
             calibrate: Some(Calibrate::Perfect),
         };
         run(&plan, "tactomo <tradeoff>", Progress::new(&AtomicBool::new(false), &|_| {})).unwrap()
@@ -407,13 +278,14 @@ mod tests {
             detectors: vec![detector.clone()],
             // Trained on readings of the detector that it knows, and knows no tolerances.
             methods: vec![Method::Kernel],
-            sweep: false,
+            swept: 0,
             places: 1,
             frames: 1,
             seed: 3,
             heap: None,
             as_built,
             drawn: 2,
+            drawn_scenes: SceneKind::ALL.into(),
             calibrate: Some(Calibrate::Perfect),
         };
         let run = |as_built| {
@@ -437,7 +309,7 @@ mod tests {
         let (page, text) = (crate::view::page(&views, &report.command), text(&views));
         assert!(page.contains("2 detectors as built") && page.contains("calibrated without an error"));
         assert_eq!(text.matches("- 2 detectors as built, ").count(), 2, "{text}");
-        assert!(page.contains(": by their description: error") && page.contains(": calibrated: error"), "{page}");
+        assert!(page.contains(": by their description: tikhonov: of") && page.contains(": calibrated: tikhonov: of"));
         for solver in ["tikhonov", "tikhonov-paper", "tikhonov lambda 0.1"] {
             assert!(page.contains(solver) && text.contains(solver), "{solver}");
         }

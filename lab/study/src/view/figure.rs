@@ -13,7 +13,8 @@ pub struct Chart {
     pub axes: [Axis; 2],
     /// What is in it.
     pub series: Vec<Series>,
-    /// Whether marks that no other beats in both directions are joined, and what is beaten steps back.
+    /// Whether marks that no other beats in both directions are joined, and what is beaten steps back. Where marks are [filled](Mark::filled), others are
+    /// asides, and do not count.
     pub has_front: bool,
     /// A value to the right that matters, and why.
     pub guide: Option<(f64, String)>,
@@ -52,6 +53,8 @@ pub enum Unit {
     Seconds,
     /// Metres.
     Metres,
+    /// Bytes.
+    Bytes,
     /// Plain numbers.
     Plain,
 }
@@ -84,6 +87,10 @@ pub struct Mark {
     pub y: f64,
     /// What else there is to say.
     pub note: String,
+    /// From where to where it is spread to the right and upwards, as bars.
+    pub spread: Option<[[f64; 2]; 2]>,
+    /// Which share of it is filled: of what was right.
+    pub filled: Option<f64>,
 }
 
 /// Values at the nodes of a grid that is even along both axes, as colours with contour lines.
@@ -103,6 +110,8 @@ pub struct Map {
     pub empty: &'static str,
     /// Whether colours follow the logarithm.
     pub is_log: bool,
+    /// Values that have the first and the last colour, and what is beyond them too; `None` for the smallest and the largest.
+    pub range: Option<[f64; 2]>,
     /// How values are written.
     pub format: Format,
     /// Contour lines between the smallest and the largest value.
@@ -141,16 +150,21 @@ impl Chart {
         Self { size, ..self }
     }
 
-    /// What its marks have along an axis.
+    /// What its marks have along an axis, with the ends of their bars.
     pub(super) fn values(&self, axis: usize) -> impl Iterator<Item = f64> {
-        self.series.iter().flat_map(|series| &series.marks).map(move |mark| [mark.x, mark.y][axis])
+        let of = move |mark: &Mark| {
+            let ends = mark.spread.map(|spread| spread[axis]);
+            std::iter::once([mark.x, mark.y][axis]).chain(ends.into_iter().flatten())
+        };
+        self.series.iter().flat_map(|series| &series.marks).flat_map(of)
     }
 }
 
 /// Gives charts the same axis to the right (0) or upwards (1), so that they can be compared.
 pub fn same_axis<'a>(charts: impl IntoIterator<Item = &'a mut Chart>, axis: usize) {
     let mut charts: Vec<&mut Chart> = charts.into_iter().collect();
-    let all: Vec<f64> = charts.iter().flat_map(|chart| chart.values(axis)).collect();
+    let own = |chart: &&mut Chart| chart.values(axis).chain(chart.axes[axis].reaches.clone()).collect::<Vec<_>>();
+    let all: Vec<f64> = charts.iter().flat_map(own).collect();
     charts.iter_mut().for_each(|chart| chart.axes[axis].reaches.extend(&all));
 }
 
@@ -250,21 +264,25 @@ impl Series {
 
 impl<Y: Into<Option<f64>>> From<(f64, Y)> for Mark {
     fn from((x, y): (f64, Y)) -> Self {
-        Self { x, y: y.into().unwrap_or(f64::NAN), note: String::new() }
+        Self::from([x, y.into().unwrap_or(f64::NAN)])
     }
 }
 
 impl From<[f64; 2]> for Mark {
     fn from([x, y]: [f64; 2]) -> Self {
-        Self { x, y, note: String::new() }
+        Self { x, y, note: String::new(), spread: None, filled: None }
     }
 }
 
 impl Unit {
     /// A value with its unit, as short as it can be.
     pub fn text(self, value: f64) -> String {
+        if value == 0.0 {
+            return "0".to_owned();
+        }
         let scales: &[(f64, &str)] = match self {
             Self::Seconds => &[(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")],
+            Self::Bytes => &[(1e9, "GB"), (1e6, "MB"), (1e3, "kB"), (1.0, "B")],
             Self::Metres => &[(1.0, "m"), (1e-3, "mm"), (1e-6, "µm")],
             Self::Plain => return short(value),
         };
@@ -306,6 +324,7 @@ mod tests {
             (Unit::Metres, -0.01, "-10 mm"),
             (Unit::Metres, 0.0001, "0.1 mm"),
             (Unit::Metres, 2e-5, "0.02 mm"),
+            (Unit::Metres, 0.0, "0"),
             (Unit::Plain, 0.3, "0.3"),
             (Unit::Plain, 200.0, "200"),
         ] {

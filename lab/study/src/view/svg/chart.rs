@@ -1,12 +1,13 @@
 //! Charts of marks between two axes.
 
+use std::f64::consts::TAU;
 use std::fmt::Write;
 
 use super::super::figure::{Chart, Mark, Series};
 use super::super::html::escaped;
 use super::label::Labels;
 use super::scale::Scale;
-use super::{opened, tick};
+use super::{opened, tick, ticks_below};
 
 /// Room around the plot: left, top, right, bottom (px).
 const ROOM: [f64; 4] = [58.0, 44.0, 14.0, 42.0];
@@ -14,6 +15,11 @@ const ROOM: [f64; 4] = [58.0, 44.0, 14.0, 42.0];
 const ROOMY: f64 = 350.0;
 /// Marks nearer than this have one label (px).
 const ONE_SPOT: f64 = 14.0;
+/// Radius of a main mark and of others, and of those of which a share is filled (px).
+const RADII: [f64; 2] = [5.0, 2.5];
+const FILLED_RADII: [f64; 2] = [6.0, 4.0];
+/// Labels keep so far from a bar where there is room (px).
+const BAR: f64 = 1.0;
 
 /// A chart with its axes found.
 pub(super) struct Drawing<'a> {
@@ -61,36 +67,53 @@ impl<'a> Drawing<'a> {
             _ = write!(svg, "<path class=\"grid\" d=\"M{left} {y:.1}H{right}\"/>");
             *svg += &tick([left - 6.0, y + 4.0], "end", &text);
         }
-        let mut free_from = f64::NEG_INFINITY;
-        for (value, text) in self.x.ticks() {
-            let [x, _] = self.at(value, self.y.range[0]);
+        let ticks: Vec<_> =
+            self.x.ticks().into_iter().map(|(value, text)| (self.at(value, self.y.range[0])[0], text)).collect();
+        for (x, _) in &ticks {
             _ = write!(svg, "<path class=\"grid\" d=\"M{x:.1} {top}V{bottom}\"/>");
-            let half = Labels::width(&text).max(40.0) / 2.0;
-            if x - half > free_from {
-                *svg += &tick([x, bottom + 16.0], "middle", &text);
-                free_from = x + half;
-            }
         }
+        *svg += &ticks_below(ticks, bottom + 16.0);
         *svg += &tick([right, bottom + 33.0], "end", &self.chart.axes[0].title);
         if let Some((value, why)) = self.chart.guide.as_ref().filter(|(value, _)| self.x.has(*value)) {
             let [x, _] = self.at(*value, self.y.range[0]);
             _ = write!(svg, "<path class=\"guide\" d=\"M{x:.1} {top}V{bottom}\"/>");
             *svg += &tick([x + 5.0, top + 10.0], "start", why);
         }
-        if let Some((value, why)) = self.chart.level.as_ref().filter(|(value, _)| self.y.has(*value)) {
+        if let Some((value, _)) = self.level() {
             let [_, y] = self.at(self.x.range[0], *value);
             _ = write!(svg, "<path class=\"guide\" d=\"M{left} {y:.1}H{right}\"/>");
-            *svg += &tick([right, y - 4.0], "end", why);
         }
         if self.chart.has_front {
             _ = writeln!(svg, "<text class=\"better\" x=\"{left}\" y=\"{}\">↙ better</text>", bottom + 33.0);
         }
     }
 
+    /// A level that is within the axis.
+    fn level(&self) -> Option<&(f64, String)> {
+        self.chart.level.as_ref().filter(|(value, _)| self.y.has(*value))
+    }
+
+    /// What a level says, above its line on the side where fewer marks are near: from where to where, on which baseline.
+    fn level_text(&self) -> Option<([f64; 2], f64, &str)> {
+        let (value, why) = self.level()?;
+        let [left, _, right, _] = self.plot();
+        let [_, y] = self.at(self.x.range[0], *value);
+        let width = Labels::width(why);
+        let marks = || self.chart.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
+        let near = |from: f64, to: f64| {
+            marks().filter(|[x, mark_y]| (from..to).contains(x) && (y - 30.0..y + 10.0).contains(mark_y)).count()
+        };
+        let is_left = near(left, left + width) < near(right - width, right);
+        let from = if is_left { left + 4.0 } else { right - width };
+        Some(([from, from + width], y - 4.0, why))
+    }
+
     /// Marks that no other beats, from the left: each is lower than all before it.
     fn front(&self) -> Vec<[f64; 2]> {
-        let marks = self.chart.series.iter().flat_map(|series| &series.marks);
-        let mut all: Vec<_> = marks.map(|mark| [mark.x, mark.y]).collect();
+        let marks = || self.chart.series.iter().flat_map(|series| &series.marks);
+        let has_asides = marks().any(|mark| mark.filled.is_some());
+        let counted = marks().filter(|mark| mark.filled.is_some() || !has_asides);
+        let mut all: Vec<_> = counted.map(|mark| [mark.x, mark.y]).collect();
         all.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
         let mut lowest = f64::INFINITY;
         all.retain(|[_, y]| {
@@ -132,14 +155,30 @@ impl<'a> Drawing<'a> {
         marks.sort_by_key(|(index, _)| Some(*index) == series.main);
         for (index, mark) in marks {
             let [x, y] = self.at(mark.x, mark.y);
-            let radius = if series.is_large || Some(index) == series.main { 5.0 } else { 2.5 };
-            _ = writeln!(
-                svg,
-                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}</title></circle>",
-                escaped(&self.tooltip(series, mark))
-            );
+            let of = usize::from(!series.is_large && Some(index) != series.main);
+            self.bars(mark, svg);
+            let title = format!("<title>{}</title>", escaped(&self.tooltip(series, mark)));
+            match mark.filled {
+                Some(share) => *svg += &filled([x, y], FILLED_RADII[of], share, &title),
+                None => {
+                    let radius = RADII[of];
+                    _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\">{title}</circle>");
+                }
+            }
         }
         *svg += "</g>\n";
+    }
+
+    /// From where to where a mark is spread.
+    fn bars(&self, mark: &Mark, svg: &mut String) {
+        let Some([[left, y], [right, _], [x, bottom], [_, top]]) = self.ends(mark) else { return };
+        _ = writeln!(svg, "<path class=\"bar\" d=\"M{left:.1} {y:.1}H{right:.1}M{x:.1} {bottom:.1}V{top:.1}\"/>");
+    }
+
+    /// Where the bars of a mark end: left, right, bottom, top.
+    fn ends(&self, mark: &Mark) -> Option<[[f64; 2]; 4]> {
+        let [along, up] = mark.spread?;
+        Some([self.at(along[0], mark.y), self.at(along[1], mark.y), self.at(mark.x, up[0]), self.at(mark.x, up[1])])
     }
 
     /// What a mark is, and what else there is to say.
@@ -163,15 +202,28 @@ impl<'a> Drawing<'a> {
             }
         }
         let small = self.chart.series.iter().flat_map(|series| &series.marks).map(|mark| self.at(mark.x, mark.y));
-        let mut labels = Labels::new(self.plot(), spots.iter().map(|spot| spot.at), small);
-        let [_, top, right, _] = self.plot();
+        let large = self.chart.series.iter().filter(|series| series.is_large).flat_map(|series| &series.marks);
+        let taken = spots.iter().map(|spot| spot.at).chain(large.map(|mark| self.at(mark.x, mark.y)));
+        let mut labels = Labels::new(self.plot(), taken, small);
+        let marks = self.chart.series.iter().flat_map(|series| &series.marks);
+        for [[left, y], [right, _], [x, bottom], [_, top]] in marks.filter_map(|mark| self.ends(mark)) {
+            labels.avoid([left, y - BAR, right, y + BAR]);
+            labels.avoid([x - BAR, top, x + BAR, bottom]);
+        }
+        let [_, top, ..] = self.plot();
         if let Some((value, why)) = &self.chart.guide {
             let left = self.at(*value, self.y.range[0])[0] + 5.0;
             // Clear of the line itself too.
             labels.keep_clear([left - 8.0, left + Labels::width(why)], top + 10.0);
         }
-        if let Some((value, why)) = &self.chart.level {
-            labels.keep_clear([right - Labels::width(why), right], self.at(self.x.range[0], *value)[1] - 4.0);
+        if let Some(([from, to], baseline, why)) = self.level_text() {
+            labels.keep_clear([from, to], baseline);
+            let (x, anchor) = if from < self.plot()[0] + 10.0 { (from, "start") } else { (to, "end") };
+            _ = writeln!(
+                svg,
+                "<text class=\"told\" x=\"{x:.1}\" y=\"{baseline:.1}\" text-anchor=\"{anchor}\">{}</text>",
+                escaped(why)
+            );
         }
         for spot in &spots {
             let text = spot.text(if self.chart.size[0] > ROOMY { usize::MAX } else { 1 });
@@ -191,6 +243,21 @@ impl<'a> Drawing<'a> {
             );
         }
     }
+}
+
+/// A mark of which a share is filled, clockwise from its top.
+fn filled([x, y]: [f64; 2], radius: f64, share: f64, title: &str) -> String {
+    if share >= 1.0 {
+        return format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\">{title}</circle>\n");
+    }
+    let mut mark = format!("<circle class=\"ring\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\">{title}</circle>");
+    if share > 0.0 {
+        let (sin, cos) = (TAU * share).sin_cos();
+        let (to_x, to_y, is_long) = (x + radius * sin, y - radius * cos, u8::from(share > 0.5));
+        let arc = format!("V{:.1}A{radius} {radius} 0 {is_long} 1 {to_x:.1} {to_y:.1}Z", y - radius);
+        _ = write!(mark, "<path class=\"wedge\" d=\"M{x:.1} {y:.1}{arc}\">{title}</path>");
+    }
+    mark + "\n"
 }
 
 /// Marks on one spot, for their label.
@@ -251,6 +318,20 @@ mod tests {
         let svg = |value| Drawing::of(&with(value)).svg();
         assert!(svg(10.0).contains("M58 151.0H386") && svg(10.0).contains("the &lt;middle&gt;"));
         assert!(!svg(1000.0).contains("the &lt;middle"), "a value beyond the axis has no line");
+    }
+
+    #[test]
+    fn marks_have_bars_and_are_filled_as_far_as_they_were_right() {
+        let with = |filled| {
+            let mut chart = chart(&[[10.0, 10.0]]);
+            let mark = &mut chart.series[0].marks[0];
+            (mark.filled, mark.spread) = (Some(filled), Some([[1.0, 100.0], [5.0, 20.0]]));
+            Drawing::of(&chart).svg()
+        };
+        let [wrong, half, right] = [0.0, 0.5, 1.0].map(with);
+        assert!(right.contains("M58.0 151.0H386.0M222.0 183.2V118.8"), "{right}");
+        assert!(!right.contains("ring") && !wrong.contains("wedge") && wrong.contains("class=\"ring\""));
+        assert!(half.contains("d=\"M222.0 151.0V145.0A6 6 0 0 1 222.0 157.0Z\""), "{half}");
     }
 
     #[test]

@@ -50,6 +50,11 @@ impl Labels {
         self.taken.push([left, baseline - LINE, right, baseline + 4.0]);
     }
 
+    /// Keeps labels clear of an area where there is room elsewhere.
+    pub fn avoid(&mut self, area: Area) {
+        self.small.push(area);
+    }
+
     /// Width of a text (px).
     pub fn width(text: &str) -> f64 {
         CHARACTER * text.chars().count() as f64

@@ -6,12 +6,14 @@ use super::super::figure::{Axis, Map};
 use super::super::html::escaped;
 use super::label::Labels;
 use super::scale::Scale;
-use super::{colour, opened, tick};
+use super::{colour, opened, tick, ticks_below};
 
 /// Room around the map: left, top, right (the scale), bottom (px).
 const ROOM: [f64; 4] = [52.0, 44.0, 64.0, 40.0];
-/// Width of a map (px).
+/// Width of a map (px), of one that is not much higher than wide.
 const SIDE: f64 = 240.0;
+/// Height of a map over that, at most: what is higher is narrower.
+const HIGHEST: f64 = 1.5;
 /// Colours that cells are drawn in: neighbours of one colour are one rectangle.
 const COLOURS: usize = 64;
 /// Values beside the scale of colours, at most.
@@ -22,9 +24,10 @@ pub(super) struct Drawing<'a> {
     map: &'a Map,
     /// To the right, and upwards.
     axes: [Scale; 2],
-    /// Smallest and largest value.
+    /// Values of the first and the last colour.
     extent: [f64; 2],
-    /// Height (px).
+    /// Width and height (px).
+    width: f64,
     height: f64,
 }
 
@@ -34,12 +37,14 @@ impl<'a> Drawing<'a> {
         let values = map.rows.iter().flatten().flatten();
         let extent = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], value| [a.min(*value), b.max(*value)]);
         let axes = [0, 1].map(|axis: usize| Scale::of(&around(&map.axes[axis], &map.ticks[axis]), []));
-        Self { map, axes, extent, height: SIDE * map.aspect }
+        let extent = map.range.unwrap_or(extent);
+        let width = SIDE * (HIGHEST / map.aspect).min(1.0);
+        Self { map, axes, extent, width, height: width * map.aspect }
     }
 
     /// The map as SVG, for a page with the style sheet.
     pub fn svg(&self) -> String {
-        let size = [ROOM[0] + SIDE + ROOM[2], ROOM[1] + self.height + ROOM[3]];
+        let size = [ROOM[0] + self.width + ROOM[2], ROOM[1] + self.height + ROOM[3]];
         let mut svg = opened("chart map", size, &self.map.title, &self.map.subtitle);
         self.cells(&mut svg);
         self.contours(&mut svg);
@@ -56,12 +61,12 @@ impl<'a> Drawing<'a> {
     /// How far a value is from the smallest to the largest, as colours count.
     fn share(&self, value: f64) -> f64 {
         let [low, high] = self.extent.map(|value| self.scaled(value));
-        if high > low { (self.scaled(value) - low) / (high - low) } else { 0.5 }
+        if high > low { ((self.scaled(value) - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 }
     }
 
     /// Width and height of a cell (px).
     fn cell(&self) -> [f64; 2] {
-        [SIDE / self.map.ticks[0].len().max(1) as f64, self.height / self.map.ticks[1].len().max(1) as f64]
+        [self.width / self.map.ticks[0].len().max(1) as f64, self.height / self.map.ticks[1].len().max(1) as f64]
     }
 
     fn cells(&self, svg: &mut String) {
@@ -159,19 +164,20 @@ impl<'a> Drawing<'a> {
     }
 
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [ROOM[0] + SIDE * self.axes[0].share(x), ROOM[1] + self.height * (1.0 - self.axes[1].share(y))]
+        [ROOM[0] + self.width * self.axes[0].share(x), ROOM[1] + self.height * (1.0 - self.axes[1].share(y))]
     }
 
     fn ticks(&self, svg: &mut String) {
         let [x, y] = &self.axes;
         let bottom = ROOM[1] + self.height;
-        for (value, text) in x.ticks() {
-            *svg += &tick([self.at([value, y.range[0]])[0], bottom + 15.0], "middle", &text);
-        }
+        *svg += &ticks_below(
+            x.ticks().into_iter().map(|(value, text)| (self.at([value, y.range[0]])[0], text)),
+            bottom + 15.0,
+        );
         for (value, text) in y.ticks() {
             *svg += &tick([ROOM[0] - 5.0, self.at([x.range[0], value])[1] + 4.0], "end", &text);
         }
-        *svg += &tick([ROOM[0] + SIDE / 2.0, bottom + 31.0], "middle", &self.map.axes[0].title);
+        *svg += &tick([ROOM[0] + self.width / 2.0, bottom + 31.0], "middle", &self.map.axes[0].title);
         _ = writeln!(
             svg,
             "<text class=\"tick\" transform=\"translate(12 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
@@ -182,9 +188,13 @@ impl<'a> Drawing<'a> {
 
     fn draw_marks(&self, svg: &mut String) {
         let places: Vec<[f64; 2]> = self.map.marks.iter().map(|(at, _)| self.at(*at)).collect();
-        let frame = [ROOM[0], ROOM[1], ROOM[0] + SIDE, ROOM[1] + self.height];
+        let frame = [ROOM[0], ROOM[1], ROOM[0] + self.width, ROOM[1] + self.height];
         let mut labels = Labels::new(frame, places.iter().copied(), []);
         for ([x, y], (_, name)) in places.iter().zip(&self.map.marks) {
+            if name.is_empty() {
+                _ = writeln!(svg, "<circle class=\"sample\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.2\"/>");
+                continue;
+            }
             let place = labels.place([*x, *y], name);
             if place.is_far {
                 let (to, height) = (place.left + 4.0, place.baseline - 4.0);
@@ -207,7 +217,7 @@ impl<'a> Drawing<'a> {
         if low > high {
             return;
         }
-        let (left, steps) = (ROOM[0] + SIDE + 10.0, 32);
+        let (left, steps) = (ROOM[0] + self.width + 10.0, 32);
         let height = self.height / f64::from(steps);
         for step in 0..steps {
             _ = write!(
@@ -258,6 +268,7 @@ mod tests {
             rows,
             empty: "no figure",
             is_log: false,
+            range: None,
             format: PLAIN.digits(1),
             contours: 5,
             disc: None,
@@ -284,6 +295,16 @@ mod tests {
     }
 
     #[test]
+    fn values_beyond_a_range_have_the_colours_of_its_ends() {
+        let mut map = map(vec![vec![Some(0.0), Some(0.5), Some(3.0)]]);
+        let shares = |map: &Map| [0.0, 0.5, 3.0].map(|value| Drawing::of(map).share(value));
+        assert_eq!(shares(&map), [0.0, 0.5 / 3.0, 1.0]);
+        map.range = Some([0.5, 1.5]);
+        assert_eq!(shares(&map), [0.0, 0.0, 1.0]);
+        assert!(svg(&map).contains(">1.5</text>") && !svg(&map).contains(">3.0</text>"));
+    }
+
+    #[test]
     fn labels_of_marks_that_are_near_do_not_lie_on_one_another() {
         let mut crowded = map(vec![vec![Some(0.0); 3]; 3]);
         crowded.marks = ["AB", "BA", "AD", "DA"].map(|name| ([10.0, 10.0], name.to_owned())).into();
@@ -291,6 +312,13 @@ mod tests {
         let places: std::collections::BTreeSet<&str> =
             svg.lines().filter_map(|line| line.split("<text class=\"sample\"").nth(1)?.split('>').next()).collect();
         assert_eq!(places.len(), 4, "{places:?}");
+    }
+
+    #[test]
+    fn a_narrow_map_is_not_higher_than_a_page_shows() {
+        let narrow = Map { aspect: 5.0, ..map(vec![vec![Some(0.0), Some(1.0)]; 10]) };
+        let drawing = Drawing::of(&narrow);
+        assert_eq!((drawing.width, drawing.height), (SIDE * 0.3, SIDE * 1.5));
     }
 
     #[test]

@@ -272,6 +272,36 @@ fn a_shape_and_contacts_of_the_past_do_not_replace_each_other() {
 }
 
 #[test]
+fn a_ring_that_has_moved_on_a_detector_as_built_is_found_from_where_it_was() {
+    let described = Detector::preset(Detector::DEFAULT).unwrap();
+    let built = drawn(&described, 3);
+    let fine = Slab::with_resolution(&built, Resolution::FINE).unwrap().on_image(3000);
+    let mut noise = Noise::new(7);
+    let mut ring_at = |x_m: f64| {
+        let ring = Shape::Ring { radius_m: 0.013, width_m: 0.003 };
+        let touch = Touch::flat([x_m, -0.003], ring, 1.5 * described.sheet_conductance_s());
+        measured(&readings_v(&touched_impedance_ohm(&fine, &[touch]).unwrap(), &built), &built.adc, &mut noise)
+    };
+    let Parts { mut tracker, search } = Box::new(Auto::new(&Problem::of(&described).unwrap()).unwrap()).split();
+    let mut search = search.unwrap();
+    let (before, after) = (ring_at(0.008), ring_at(-0.008));
+    let found = search.search(Hypothesis::default(), &before, &mut |_| {}).unwrap();
+    let followed = tracker.adopt(found, &before).unwrap();
+    assert_eq!(what(&followed.solution), "ring");
+    assert!(tracker.follow(&after).unwrap().search, "it has gone farther than it is followed");
+    let moved = search.search(tracker.hypothesis(), &after, &mut |_| {}).unwrap();
+    let moved = tracker.adopt(moved, &after).unwrap().solution;
+    let Some(FoundShape::Ring(ring)) = &moved.shape else { panic!("{moved:?}") };
+    assert!(
+        (ring.centre_m[0] + 0.008).hypot(ring.centre_m[1] + 0.003) < 1.5e-3 && !moved.flags.is_doubtful(),
+        "{ring:?} {:?}",
+        moved.flags
+    );
+    // Contacts that were searched from nothing are fewer.
+    assert_eq!(moved.contacts.len(), 6, "they stand in a row along where it was");
+}
+
+#[test]
 fn a_press_at_a_wall_of_a_detector_that_is_far_from_its_description_is_one_contact() {
     // A quarter thicker. As described, two contacts explain the press better than one, and a ring better than these.
     let described = Detector::preset(Detector::DEFAULT).unwrap();

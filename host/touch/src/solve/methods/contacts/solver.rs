@@ -9,7 +9,6 @@ use std::sync::Arc;
 use self::frame_tracker::FrameTracker;
 use super::discs::DiscFit;
 use super::doubt::Doubt;
-use super::keep::needed;
 use super::rows::RowState;
 use super::window::KeyFrames;
 use super::{ContactFinder, ContactHypothesis, ContactSettings};
@@ -211,7 +210,9 @@ impl ContactTracker {
             || target.is_stale(&found.fit.volts)
             || self.finder.is_outdated(target);
         self.keys.take(target, &found.fit, &self.finder);
-        self.is_of_key_frames = self.keys.are_ripe() && !self.finder.is_misfit(&found.fit, target);
+        // What is unknown of the detector is soon known, and asks for a search of its own.
+        self.is_of_key_frames =
+            self.keys.are_ripe() && !target.is_provisional() && !self.finder.is_misfit(&found.fit, target);
         self.last = Some(found);
         search || self.is_of_key_frames
     }
@@ -243,7 +244,7 @@ impl ContactTracker {
             found.as_ref().map_or_else(|| self.finder.evidence_of_nothing(target), of)
         };
         let are_fewer = count(&caught_up) < count(&self.last);
-        let needed = self.last.as_ref().filter(|_| are_fewer).map_or(0.0, |last| needed(&last.fit));
+        let needed = self.last.as_ref().filter(|_| are_fewer).map_or(0.0, |last| last.needed(target));
         if self.is_stale || evidence(&caught_up) >= evidence(&self.last) + needed {
             (self.last, self.is_stale) = (caught_up, false);
         }
