@@ -10,6 +10,7 @@ use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
 use tactomo_physics::geometry::Point;
 use tactomo_physics::scene::Contact;
 use tactomo_study::{Bound, Errors, cramer_rao};
+use tactomo_touch::solve::contact_over_needed;
 
 use super::press::{MIDDLE, Press, nine_places};
 
@@ -230,8 +231,43 @@ fn lightest(
     least([LIGHTEST * low, high], STRENGTH_HALVINGS, seen)
 }
 
+/// The strength from which on `auto` looks for a contact in half of the frames, at half of so many places all over the surface; `None` if it does not at the end of
+/// a range of strengths.
+///
+/// # Errors
+/// [`ForwardError`] if the model cannot have the contact.
+pub(crate) fn lightest_found(
+    model: &dyn ForwardModel,
+    press: &Press,
+    [low, high]: [f64; 2],
+    errors: &Errors<'_>,
+    places: usize,
+) -> Result<Option<f64>, ForwardError> {
+    let readings = |place: Point, strength: f64| match model.impedance_ohm(&[press.at(place, strength)]) {
+        // So light that it conducts nothing in numbers of this size.
+        Err(ForwardError::NoContact) => Ok(None),
+        impedance_ohm => Ok(Some(readings_v(&impedance_ohm?, errors.measured))),
+    };
+    // Which places are better than others hardly depends on the strength.
+    let mut all = Vec::with_capacity(places);
+    for place in everywhere(model.detector().outline.size_m()).take(places) {
+        all.push((readings(place, low)?.map_or(0.0, |readings| contact_over_needed(&readings, model)), place));
+    }
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, median)) = all.get(places / 2) else { return Ok(None) };
+    let is_found = |strength: f64| {
+        let readings = readings(*median, strength)?;
+        Ok(readings.is_some_and(|readings| contact_over_needed(&errors.bounded(readings), model) >= 1.0))
+    };
+    least([LIGHTEST * low, high], STRENGTH_HALVINGS, is_found)
+}
+
 /// The strength at which a contact in the middle saturates.
-fn hardest(model: &dyn ForwardModel, press: &Press, [low, high]: [f64; 2]) -> Result<Option<f64>, ForwardError> {
+pub(crate) fn hardest(
+    model: &dyn ForwardModel,
+    press: &Press,
+    [low, high]: [f64; 2],
+) -> Result<Option<f64>, ForwardError> {
     at_share_of_drive(model, press, [low, high], SATURATED)
 }
 

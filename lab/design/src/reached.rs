@@ -26,38 +26,26 @@ pub fn by_auto(detector: &Detector, contacts: &[Contact], seed: u64) -> Result<R
     Ok(presses.reached())
 }
 
-/// What `auto` reaches with presses of detectors as built, drawn from the tolerances with seeds from one on, of which it knows the description: what a user
-/// sees of a detector that nobody calibrated, with the first frame.
+/// What `auto` reaches with each of some groups of presses of detectors as built, drawn from the tolerances with such seeds, of which it knows the description:
+/// what a user sees of a detector that nobody calibrated, with the first frame.
 ///
 /// # Errors
 /// As for [`by_auto`].
 pub fn as_built(
     detector: &Detector,
-    presses: &[Vec<Contact>],
+    groups: &[Vec<Vec<Contact>>],
     seeds: impl IntoIterator<Item = u64>,
-) -> Result<AsBuilt, StudyError> {
+) -> Result<Vec<AsBuilt>, StudyError> {
     let described = Experiment::new(detector)?.tolerant();
-    let mut all = AsBuilt::default();
+    let mut all = vec![AsBuilt::default(); groups.len()];
     for seed in seeds {
         let experiment = described.as_built(seed)?;
         let mut solver = Method::Auto.build(&experiment.problem)?;
-        let touches: Vec<_> =
-            presses.iter().map(|contacts| contacts.iter().copied().map(Touch::from).collect()).collect();
-        for (contacts, frame) in presses.iter().zip(experiment.frames(&touches, seed)?) {
-            solver.reset();
-            let solution = solver
-                .solve(&frame.readings)
-                .map_err(|error| StudyError::Solve { solver: solver.name().to_owned(), error })?;
-            let found = if solution.is_contacts() { &solution.contacts[..] } else { &[] };
-            let matching = Matching::within(f64::INFINITY, contacts, found);
-            all.errors_m.extend(matching.pairs.iter().map(|pair| pair.distance_m));
-            all.errors_m.extend(matching.missed.iter().map(|_| f64::INFINITY));
-            all.presses += 1;
-            all.seen += usize::from(!found.is_empty());
-            all.counted += usize::from(found.len() == contacts.len());
+        for (presses, all) in groups.iter().zip(&mut all) {
+            all.press(&experiment, &mut *solver, presses, seed)?;
         }
     }
-    all.errors_m.sort_by(f64::total_cmp);
+    all.iter_mut().for_each(|one| one.errors_m.sort_by(f64::total_cmp));
     Ok(all)
 }
 
@@ -72,6 +60,31 @@ pub struct AsBuilt {
 }
 
 impl AsBuilt {
+    fn press(
+        &mut self,
+        experiment: &Experiment,
+        solver: &mut dyn Solver,
+        presses: &[Vec<Contact>],
+        seed: u64,
+    ) -> Result<(), StudyError> {
+        let touches: Vec<_> =
+            presses.iter().map(|contacts| contacts.iter().copied().map(Touch::from).collect()).collect();
+        for (contacts, frame) in presses.iter().zip(experiment.frames(&touches, seed)?) {
+            solver.reset();
+            let solution = solver
+                .solve(&frame.readings)
+                .map_err(|error| StudyError::Solve { solver: solver.name().to_owned(), error })?;
+            let found = if solution.is_contacts() { &solution.contacts[..] } else { &[] };
+            let matching = Matching::within(f64::INFINITY, contacts, found);
+            self.errors_m.extend(matching.pairs.iter().map(|pair| pair.distance_m));
+            self.errors_m.extend(matching.missed.iter().map(|_| f64::INFINITY));
+            self.presses += 1;
+            self.seen += usize::from(!found.is_empty());
+            self.counted += usize::from(found.len() == contacts.len());
+        }
+        Ok(())
+    }
+
     /// Half of the places are found better (m); `None` if half were missed.
     pub fn place_m(&self) -> Option<f64> {
         self.errors_m.get(self.errors_m.len() / 2).copied().filter(|error_m| error_m.is_finite())
@@ -136,7 +149,7 @@ mod tests {
         let detector = Detector::default();
         let contacts = [Contact::flat(0.004, 0.007, 0.002, 1e-3), Contact::flat(-0.014, 0.011, 0.002, 1e-3)];
         let exact = by_auto(&detector, &contacts, 1).unwrap();
-        let built = as_built(&detector, &contacts.map(|contact| vec![contact]), 1..=2).unwrap();
+        let built = as_built(&detector, &[contacts.map(|contact| vec![contact]).to_vec()], 1..=2).unwrap().remove(0);
         assert!(built.place_m().unwrap() > 2.0 * exact.place_m.unwrap(), "{exact:?} {built:?}");
         assert_eq!((built.seen(), built.errors_m.len()), (1.0, 4));
     }

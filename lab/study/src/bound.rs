@@ -2,9 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use tactomo_physics::detector::Detector;
+use tactomo_physics::detector::{Detector, Electrode};
 use tactomo_physics::forward::{ForwardError, ForwardModel, Nuisance, readings_v};
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::scene::Contact;
 
 /// Step of a place, as a share of the contact's radius, and of a conductance, as a share of it.
@@ -45,16 +45,18 @@ impl<'a> Errors<'a> {
         Self { measured, deviation_v, nuisance: None }
     }
 
+    /// Readings as the converters have them: beyond their ends they are bounds.
+    pub fn bounded(&self, readings: Readings) -> Readings {
+        let Detector { converters, electrodes, .. } = self.measured;
+        let of = |pad: &Electrode| Some(converters.get(pad.converter)?.range(self.deviation_v));
+        let ranges: Vec<_> = electrodes.iter().filter_map(of).collect();
+        if ranges.is_empty() { readings } else { readings.within(&ranges) }
+    }
+
     /// The readings that tell anything.
     fn seen(&self, readings: &Readings) -> Vec<usize> {
-        let ranges: Vec<_> =
-            self.measured.converters.iter().map(|converter| converter.range(self.deviation_v)).collect();
-        let is_seen = |index: usize| {
-            let of = self.measured.electrodes[index % readings.electrodes()].converter;
-            let volts = readings.volts()[index];
-            ranges.get(of).is_none_or(|range| (range.floor_v..range.ceiling_v).contains(&volts))
-        };
-        (0..readings.volts().len()).filter(|index| is_seen(*index)).collect()
+        let (n, bounded) = (readings.electrodes(), self.bounded(readings.clone()));
+        (0..n * n).filter(|index| bounded.says(index / n, index % n) == Says::Voltage).collect()
     }
 
     /// Changes of readings of contacts (V) by one standard deviation of each thing that is not known.

@@ -1,7 +1,8 @@
 //! What `design` promises, and what is found: detectors that it chooses for five wishes, simulated as built, beside an even grid of 4 x 4 electrodes on foam A.
 //!
 //! Readings come of finer models of detectors drawn from the tolerances, through a chip of the board, and `auto` finds what pressed from the description and one
-//! frame. Nothing of this is in the promises, which are bounds of the described detector with its tolerances.
+//! frame. Nothing of this is in the promises: places and two points are bounds of the described detector with its tolerances, and the smallest force is what
+//! `auto` asks of a frame before it looks for a contact.
 
 mod view;
 mod wanted;
@@ -13,7 +14,7 @@ use tactomo_physics::hertz::Skin;
 use tactomo_physics::scene::Contact;
 
 use super::limit::everywhere;
-use super::reached::as_built;
+use super::reached::{AsBuilt, as_built};
 use super::search::{self, DRIVE_V, Material, Rating, Wishes, hertz};
 use super::{DesignError, Layout, Press, Progress};
 
@@ -25,6 +26,13 @@ const NAIVE_THICKNESS_M: f64 = 5e-3;
 const NAIVE_DIAMETER_M: f64 = 4e-3;
 /// Shorter side of `square-60` (m).
 const NAIVE_SIDE_M: f64 = 60e-3;
+
+/// Forces are tried in steps of this factor, from so many steps below the smallest that is promised to so many above.
+const FORCE_STEP: f64 = 1.3;
+const FORCE_STEPS: std::ops::RangeInclusive<i32> = -3..=4;
+/// Distances of two points are tried in steps of this factor, from that of the bound on, as far as half the shorter side.
+const DISTANCE_STEP: f64 = 1.4;
+const DISTANCE_STEPS: i32 = 8;
 
 /// What is tried.
 #[derive(Clone, Debug)]
@@ -71,16 +79,26 @@ pub struct Row {
     pub place_m: Option<f64>,
     /// Share of these presses of which one contact was found.
     pub one: f64,
-    /// Share of presses with the smallest force promised that were seen; `None` if none is promised.
-    pub smallest_seen: Option<f64>,
-    /// Share of two presses at the distance promised of which two contacts were found; `None` if none is promised.
-    pub two_told: Option<f64>,
+    /// Least force (N) from which on half of presses were seen, in steps of a factor; `None` if none is promised, or they were seen at none of those tried.
+    pub smallest_n: Option<f64>,
+    /// Least distance (m) from which on half of two presses were found as two contacts, in steps of a factor, likewise.
+    pub two_points_m: Option<f64>,
 }
 
 impl Row {
     /// What is found over what is promised of places.
     pub fn place_over_promise(&self) -> Option<f64> {
         Some(self.place_m? / self.promised.place_m?)
+    }
+
+    /// The same of the smallest force.
+    pub fn smallest_over_promise(&self) -> Option<f64> {
+        Some(self.smallest_n? / self.promised.smallest_n?)
+    }
+
+    /// The same of two points, which are a bound.
+    pub fn two_points_over_bound(&self) -> Option<f64> {
+        Some(self.two_points_m? / self.promised.two_points_m?)
     }
 }
 
@@ -145,16 +163,26 @@ fn row(
     let press = Press::Ball { radius_m: wishes.tip_m, hertz: hertz(detector)? };
     // Others than those that the promise is made of.
     let places: Vec<_> = everywhere(wishes.size_m).skip(plan.seed as usize * 1000 + 1000).take(plan.presses).collect();
-    let found = |presses: Vec<Vec<Contact>>| as_built(detector, &presses, plan.seed..plan.seed + plan.built);
     let single = |force_n: f64| places.iter().map(|place_m| vec![press.at(*place_m, force_n)]).collect();
-    let middle = found(single(wishes.middle_n()))?;
-    let smallest = promised.smallest_n.map(|smallest_n| found(single(smallest_n))).transpose()?;
+    let side_m = wishes.size_m[0].min(wishes.size_m[1]);
     let pair = |apart_m: f64| -> Vec<Contact> {
         let along = if wishes.size_m[0] >= wishes.size_m[1] { [0.5, 0.0] } else { [0.0, 0.5] };
         let at = |sign: f64| press.at(along.map(|part| sign * part * apart_m), wishes.middle_n());
         vec![at(-1.0), at(1.0)]
     };
-    let two = promised.two_points_m.map(|apart_m| found(vec![pair(apart_m)])).transpose()?;
+    let forces_n =
+        promised.smallest_n.map(|smallest_n| FORCE_STEPS.map(move |step| smallest_n * FORCE_STEP.powi(step)));
+    let forces_n: Vec<f64> = forces_n.into_iter().flatten().collect();
+    let distances_m = promised.two_points_m.map(|bound_m| {
+        (0..DISTANCE_STEPS).map(move |step| bound_m * DISTANCE_STEP.powi(step)).filter(|m| *m <= side_m / 2.0)
+    });
+    let distances_m: Vec<f64> = distances_m.into_iter().flatten().collect();
+    let mut groups = vec![single(wishes.middle_n())];
+    groups.extend(forces_n.iter().map(|force_n| single(*force_n)));
+    groups.extend(distances_m.iter().map(|apart_m| vec![pair(*apart_m)]));
+    let found = as_built(detector, &groups, plan.seed..plan.seed + plan.built)?;
+    let (middle, found) = (&found[0], &found[1..]);
+    let (forces, pairs) = found.split_at(forces_n.len());
     Ok(Row {
         wish: wish.to_owned(),
         detector: detector.name.clone(),
@@ -162,10 +190,16 @@ fn row(
         meets_all: promised.meets(wishes, None),
         place_m: middle.place_m(),
         one: middle.counted(),
-        smallest_seen: smallest.map(|found| found.seen()),
-        two_told: two.map(|found| found.counted()),
+        smallest_n: from_half_on(&forces_n, forces, AsBuilt::seen),
+        two_points_m: from_half_on(&distances_m, pairs, AsBuilt::counted),
         promised,
     })
+}
+
+/// The least of some values, of which there are more and more, from which on a share is a half at least.
+fn from_half_on(values: &[f64], found: &[AsBuilt], share: impl Fn(&AsBuilt) -> f64) -> Option<f64> {
+    let from_last = values.iter().zip(found).rev();
+    from_last.take_while(|(_, found)| share(found) >= 0.5).last().map(|(value, _)| *value)
 }
 
 #[cfg(test)]
@@ -186,14 +220,16 @@ mod tests {
         Plan { wanted: wanted(board), foams: Material::of_paper(), most: 1, built: 3, presses: 6, seed: 1 }
     }
 
-    /// The median of 18 presses is known to a quarter of itself.
+    /// The median of 18 presses is known to a quarter of itself, and the smallest force to a step.
     #[test]
-    fn places_are_found_about_as_well_as_promised() {
+    fn places_and_the_smallest_force_are_found_about_as_promised() {
         let plan = plan();
         let Wanted { name, wishes } = &plan.wanted[4];
         let row = row(name, &naive(wishes), None, wishes, &plan).unwrap();
         let over = row.place_over_promise().unwrap();
         assert!((0.6..1.7).contains(&over) && row.one > 0.9, "{row:?}");
-        assert!(!row.is_chosen, "{row:?}");
+        let over = row.smallest_over_promise().unwrap();
+        assert!((0.7..1.5).contains(&over), "{row:?}");
+        assert!(!row.is_chosen && row.two_points_over_bound().is_none_or(|over| over >= 1.0), "{row:?}");
     }
 }

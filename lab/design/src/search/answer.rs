@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
 
-use super::super::reached::as_built;
+use super::super::reached::{AsBuilt, as_built};
 use super::super::{DesignError, Press, Progress};
 use super::find::{Found, find, front};
 use super::rating::hertz;
@@ -238,13 +238,13 @@ fn choice(found: &Found, reason: &str, plan: &Plan) -> Result<Choice, DesignErro
         let place_m = [0, 1].map(|axis| shares[axis] * wishes.size_m[axis]);
         vec![press.at(place_m, wishes.middle_n())]
     };
-    let presses: Vec<_> = TRIED.iter().map(at).collect();
+    let presses = [TRIED.iter().map(at).collect()];
     Ok(Choice {
         name: found.detector.name.clone(),
         reason: reason.to_owned(),
         rating: found.rating,
         meets_all: found.rating.meets(wishes, None),
-        place_found_m: as_built(&found.detector, &presses, [plan.seed])?.place_m(),
+        place_found_m: as_built(&found.detector, &presses, [plan.seed])?.first().and_then(AsBuilt::place_m),
         detector: found.detector.clone(),
     })
 }

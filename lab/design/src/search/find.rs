@@ -125,7 +125,11 @@ impl Tried {
             self.rate_in_full(&next, wishes, progress)?;
             sort(&mut self.found, wishes);
             let nearest = self.found.iter().filter(|found| found.is_in_full).take(NEAREST);
-            next = nearest.flat_map(|found| space.neighbours(&found.candidate)).collect();
+            let around: Vec<_> = nearest.flat_map(|found| space.neighbours(&found.candidate)).collect();
+            // Those that the search did not come to.
+            self.rate(space, wishes, around.clone(), self.seen.len() + around.len(), progress);
+            sort(&mut self.found, wishes);
+            next = around.into_iter().collect();
             // As described none gives less than as built: what is no better then will not be.
             let least = self.found.first().map_or(f64::NEG_INFINITY, |found| found.rating.score(wishes));
             let may_be_best = |found: &&Found| !found.is_in_full && found.rating.score(wishes) > least;

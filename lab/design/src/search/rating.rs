@@ -7,29 +7,32 @@ use tactomo_physics::forward::{ForwardModel, Nuisance, Resolution, Slab};
 use tactomo_physics::hertz::{Beyond, Hertz};
 use tactomo_study::Errors;
 
-use super::super::limit::{places_everywhere, range, two_points_m};
+use super::super::limit::{hardest, lightest_found, places_everywhere, two_points_m};
 use super::super::{DesignError, Press};
 use super::{Wish, Wishes};
 
 /// Places whose median error is that of places.
 const PLACES: usize = 24;
-/// A wish that is met by more than this factor is met: more brings nothing.
+/// A wish that is met by more than this factor is met: more brings nothing, but for places.
 const ENOUGH: f64 = 2.0;
-/// What all wishes together count beside the one that is met worst.
+/// What all wishes together count beside the one that is missed most.
 const TOGETHER: f64 = 0.02;
+/// What places count besides, however good they are: places that are twice as good make up for 7 % of what is missed.
+const PLACES_COUNT: f64 = 0.1;
 /// What a wish counts that is not met at all, as a logarithm.
 const NOT_AT_ALL: f64 = -20.0;
 
 /// What a detector gives of each wish.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Rating {
-    /// Smallest force that is seen (N); `None` if none is.
+    /// Smallest force that `auto` finds a contact of, in half of the frames and at half of all places (N); `None` if it finds none.
     pub smallest_n: Option<f64>,
     /// Force from which on it saturates (N); `None` if it does at no force that was tried.
     pub largest_n: Option<f64>,
     /// Error of places (m): half of presses all over the surface are told better.
     pub place_m: Option<f64>,
-    /// Two points told apart (m); `None` if they are not at half the shorter side.
+    /// Two points that noise and tolerances allow to be told apart (m): a bound, from which `auto` is farther the less its evidence for two is. `None` if
+    /// they are not at half the shorter side.
     pub two_points_m: Option<f64>,
     /// On the board that was named.
     pub frames_per_s: f64,
@@ -72,8 +75,10 @@ impl Rating {
         let hertz = hertz(detector)?;
         let press = Press::Ball { radius_m: wishes.tip_m, hertz };
         let middle_n = wishes.middle_n();
+        let largest_n = hardest(model, &press, [wishes.smallest_n, wishes.largest_n])?;
+        let forces_n = [wishes.smallest_n, largest_n.unwrap_or(f64::INFINITY).min(wishes.largest_n)];
         // Whether there is anything is told from noise, whatever the detector is.
-        let [smallest_n, largest_n] = range(model, &press, [wishes.smallest_n, wishes.largest_n], &noise)?;
+        let smallest_n = lightest_found(model, &press, forces_n, &noise, PLACES)?;
         Ok(Self {
             smallest_n,
             largest_n,
@@ -117,11 +122,12 @@ impl Rating {
         self.worst(wishes, but) >= 0.0
     }
 
-    /// How well it meets the wishes: the margin of the one met worst, and a little of all.
+    /// How well it meets the wishes: by how much the one is missed that is missed most, a little of the margins of all, and among those that are alike in this,
+    /// places.
     pub fn score(&self, wishes: &Wishes) -> f64 {
         let margins = Wish::ALL.map(|wish| self.margin(wish, wishes).min(ENOUGH.ln()));
-        let worst = margins.into_iter().fold(f64::INFINITY, f64::min);
-        worst + TOGETHER * margins.into_iter().sum::<f64>()
+        let missed = self.worst(wishes, None).min(0.0);
+        missed + TOGETHER * margins.into_iter().sum::<f64>() + PLACES_COUNT * self.margin(Wish::Place, wishes)
     }
 
     /// The wish that is met worst.

@@ -46,7 +46,8 @@ pub fn view(answer: &Answer) -> View {
     }
     let method = format!(
         "Places are the error that half of presses have less than, by Cramer and Rao's bounds of one frame for a ball of {} mm pressed with {} N, with the board's \
-         noise and floor and the detector's tolerances, without calibration; two points likewise; forces run from three standard errors of noise to nine tenths of the drive, by the measured law of \
+         noise and floor and the detector's tolerances, without calibration; two points likewise: what noise allows, which auto does not reach; forces run from \
+         the lightest that auto finds to nine tenths of the drive, by the measured law of \
          contact. In {:.1} s.",
         2e3 * wishes.tip_m,
         PLAIN.text(Some(wishes.middle_n())),
