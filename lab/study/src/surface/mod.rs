@@ -256,11 +256,16 @@ mod tests {
     #[test]
     fn a_light_press_has_its_conductance_everywhere_and_contacts_are_sharper_than_an_image() {
         let [contacts, image] = [0, 1].map(|index: usize| &REPORT.solvers[index]);
-        assert!(contacts.error_m.unwrap().p90 < 0.001, "{:?}", contacts.error_m);
-        for solver in [contacts, image] {
+        // By the pads in the corners a light press has two places that readings tell apart by less than noise.
+        let is_corner = |at: [usize; 2]| at.iter().all(|index| [0, 4].contains(index));
+        let inner = |solver: &SolverReport| {
             assert_eq!(solver.places.len(), 25);
-            let Spread { p10, p90, .. } = solver.amplitude_response.unwrap();
-            assert!(p10 > 0.8 && p90 < 1.2, "{} {p10} {p90}", solver.solver);
+            solver.places.iter().filter(|place| !is_corner(place.at)).cloned().collect::<Vec<_>>()
+        };
+        assert!(inner(contacts).iter().all(|place| place.error_m.unwrap() < 0.001), "{:?}", contacts.places);
+        for solver in [contacts, image] {
+            let amplitude = |place: &PlaceReport| place.greit.unwrap().amplitude_response;
+            assert!(inner(solver).iter().all(|place| (0.8..1.2).contains(&amplitude(place))), "{:?}", solver.places);
         }
         let sharp = |solver: &SolverReport| solver.resolution.unwrap().median;
         assert!(sharp(contacts) < 0.5 * sharp(image));

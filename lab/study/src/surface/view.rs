@@ -26,7 +26,7 @@ const COLUMNS: [Column; 6] = [
 pub fn view(report: &Report) -> View {
     let whose = report.as_built.map_or_else(String::new, |seed| format!(", as built with seed {seed}"));
     let title = format!("One press, place by place: {}{whose}", report.detector);
-    let lead = "The same press at each place, one after the other: a square of a map is where it was. **A good solver has one colour all over.** Dots are \
+    let lead = "The same press at each place, one after the other: a cell of a map is where it was. **A good solver has one colour all over.** Dots are \
                 electrodes.";
     let error = "How far off contacts are (mm), where one missed or invented counts the mean distance of electrodes. **Dark is right.**";
     let amplitude = "The image's whole conductance over that of the press: GREIT's amplitude response. **1, in the middle of the scale, is right**; what is \

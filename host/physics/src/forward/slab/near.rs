@@ -9,7 +9,7 @@
 //! (-1)^((n - m) / 2) cos(m theta) / pi  integral tb(k) (1 - exp(-k^2 R^2 / 4)) J_(n+1)(k a) / (k a) J_m(k r) k dk
 //! ```
 //!
-//! a function of the distance alone, that all pads of a radius share. Mirror images in the walls do the rest. The orders that are [eliminated on the
+//! a function of the distance alone, that pads of one radius and contact share. Mirror images in the walls do the rest. The orders that are [eliminated on the
 //! disc](DiscSelf::with_higher) reach the top of so thin a layer, too, so each density has those that come with it: current crowds at a wide pad's
 //! rim as far in as the layer is thick.
 
@@ -72,9 +72,8 @@ struct Source {
 /// Fields of the densities of pads of one radius, by distance.
 #[derive(Clone, Debug)]
 struct Profile {
-    radius_m: f64,
-    /// Of the pad's contact (ohm m2).
-    contact_impedance_ohm_m2: f64,
+    /// One of the pads that it is of.
+    pad: Pad,
     reach_m: f64,
     steps_per_m: f64,
     /// Orders of the densities, without those that differ by the sine.
@@ -97,7 +96,7 @@ impl NearFields {
         let mut profiles: Vec<Profile> = Vec::new();
         let mut sources = Vec::new();
         for (pad, at) in pads.iter().enumerate() {
-            let known = profiles.iter().position(|profile| profile.is_of(at));
+            let known = profiles.iter().position(|profile| profile.pad.is_like(at));
             let profile = known.unwrap_or(profiles.len());
             if known.is_none() {
                 profiles.push(Profile::new(at, basis, &own(at.radius_m), covered, split_m, across));
@@ -145,7 +144,7 @@ fn reaching(size_m: [f64; 2], centre_m: [f64; 2], reach_m: f64) -> Vec<Image> {
 
 impl Profile {
     fn new(pad: &Pad, basis: &DiscBasis, own: &DiscSelf, covered: &Covered<'_>, split_m: f64, across: f64) -> Self {
-        let Pad { radius_m, contact_impedance_ohm_m2, .. } = *pad;
+        let radius_m = pad.radius_m;
         let waves = Waves::of(across * radius_m / covered.thickness_m(), reach(split_m / radius_m, across));
         let mut orders: Vec<[usize; 2]> = Vec::new();
         for density in basis.densities() {
@@ -178,11 +177,7 @@ impl Profile {
         values.truncate((last + 3) * orders.len());
         let steps_per_m = waves.steps_per_radius / radius_m;
         let reach_m = (last - 1).max(1) as f64 / steps_per_m;
-        Self { radius_m, contact_impedance_ohm_m2, reach_m, steps_per_m, orders, values }
-    }
-
-    fn is_of(&self, pad: &Pad) -> bool {
-        (self.radius_m, self.contact_impedance_ohm_m2) == (pad.radius_m, pad.contact_impedance_ohm_m2)
+        Self { pad: *pad, reach_m, steps_per_m, orders, values }
     }
 
     /// Tells the field of each density in turn, at a way from the middle (m) and its length.

@@ -47,6 +47,12 @@ impl Pad {
         self.contact_impedance_ohm_m2 / (PI * self.radius_m * self.radius_m)
     }
 
+    /// Whether another one differs in its place alone.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let kind = |pad: &Self| (pad.radius_m, pad.contact_impedance_ohm_m2);
+        kind(self) == kind(other)
+    }
+
     fn is_placed_as(&self, other: &Self) -> bool {
         self.centre_m == other.centre_m && self.radius_m == other.radius_m
     }
@@ -202,7 +208,14 @@ impl PadFields {
         let fields = match split_m {
             Some(_) => {
                 let fine = DiscBasis::of_degree(basis.degree() + SMOOTH_ORDERS);
-                pad_modes(pads, fine, |pad| with_higher(pad, basis, fine, kernel), &grid, &modes, uneven)
+                // Most pads are alike: what a disc is to itself is an integral over the layers.
+                let mut last: Option<(Pad, DMatrix<f64>)> = None;
+                let densities = |pad: &Pad| {
+                    let alike = last.take_if(|(of, _)| pad.is_like(of));
+                    let of_kind = alike.unwrap_or_else(|| (*pad, with_higher(pad, basis, fine, kernel)));
+                    last.insert(of_kind).1.clone()
+                };
+                pad_modes(pads, fine, densities, &grid, &modes, uneven)
             }
             None => pad_modes(pads, basis, |_| basis.weights().clone(), &grid, &modes, uneven),
         };
@@ -386,7 +399,7 @@ fn with_higher(pad: &Pad, basis: &DiscBasis, fine: &DiscBasis, kernel: &SurfaceG
 pub(super) fn pad_modes(
     pads: &[Pad],
     basis: &DiscBasis,
-    densities: impl Fn(&Pad) -> DMatrix<f64>,
+    mut densities: impl FnMut(&Pad) -> DMatrix<f64>,
     grid: &Grid,
     modes: &[Mode],
     uneven: Option<&Uneven>,

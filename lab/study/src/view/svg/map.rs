@@ -44,7 +44,8 @@ impl<'a> Drawing<'a> {
 
     /// The map as SVG, for a page with the style sheet.
     pub fn svg(&self) -> String {
-        let size = [ROOM[0] + self.width + ROOM[2], ROOM[1] + self.height + ROOM[3]];
+        // As wide as others, so that all have letters of one size.
+        let size = [ROOM[0] + SIDE + ROOM[2], ROOM[1] + self.height + ROOM[3]];
         let mut svg = opened("chart map", size, &self.map.title, &self.map.subtitle);
         self.cells(&mut svg);
         self.contours(&mut svg);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::discs::{DiscFit, Effort, PARAMETERS};
-use super::{Certainty, ContactFinder, ContactHypothesis};
+use super::{ContactFinder, ContactHypothesis};
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use tactomo_physics::scene::Contact;
@@ -35,7 +35,7 @@ impl ContactFinder {
         if weak.is_empty() && !self.is_misfit(&found.fit, target) {
             return Some(found);
         }
-        let evidence = self.evidence(&found.fit) + found.needed(target);
+        let evidence = self.evidence(&found.fit) + needed(&found.fit);
         if self.evidence_of_nothing(target) > evidence {
             return None;
         }
@@ -56,23 +56,23 @@ impl ContactFinder {
             Some(freer) => self.disc_fitter().go_on(&freer, target, WARM)?,
             None => fit,
         };
-        let fit = if self.is_misfit(&fit, target) { self.without_lifted(last, fit, target) } else { fit };
+        let fit = if self.is_misfit(&fit, target) { self.without_lifted(&last.fit, fit, target) } else { fit };
         let certainty = last.certainty.filter(|_| fit.contacts.len() == last.fit.contacts.len());
         Some(ContactHypothesis { fit, certainty, ..last.clone() })
     }
 
     /// A fit without the contacts that have become much lighter, if these are gone: the logarithm of a conductance falls by one in each
     /// step, however light the contact is to become.
-    fn without_lifted(&self, before: &ContactHypothesis, fit: DiscFit, target: &Target) -> DiscFit {
+    fn without_lifted(&self, before: &DiscFit, fit: DiscFit, target: &Target) -> DiscFit {
         let is_lighter =
             |(now, before): &(&Contact, &Contact)| now.conductance_s < policy::lifted_share() * before.conductance_s;
-        let pairs = fit.contacts.iter().zip(&before.fit.contacts).enumerate();
+        let pairs = fit.contacts.iter().zip(&before.contacts).enumerate();
         let kept: Vec<_> = pairs.filter(|(_, pair)| !is_lighter(pair)).map(|(k, _)| k).collect();
         if kept.is_empty() || kept.len() == fit.contacts.len() {
             return fit;
         }
         match self.some_of(&fit, &kept, target) {
-            Some(fewer) if self.evidence(&fewer) > self.evidence(&fit) + before.needed(target) => fewer,
+            Some(fewer) if self.evidence(&fewer) > self.evidence(&fit) + needed(&fit) => fewer,
             _ => fit,
         }
     }
@@ -98,18 +98,8 @@ impl ContactFinder {
     }
 }
 
-impl ContactHypothesis {
-    /// Nats by which fewer contacts have to be likelier in some frames for one to be let go.
-    pub(super) fn needed(&self, target: &Target) -> f64 {
-        self.certainty.map_or(0.0, |certainty| certainty.needed(target.frames))
-    }
-}
-
-impl Certainty {
-    /// Nats by which another count has to be likelier in the mean of so many frames: what other frames said is not forgotten for what these do not
-    /// need.
-    pub(super) fn needed(self, frames: usize) -> f64 {
-        let of_others = (1.0 - frames as f64 / self.frames).max(0.0);
-        of_others * (self.share / (1.0 - self.share)).ln().clamp(0.0, policy::gone_nats())
-    }
+/// Nats by which contacts of a fit have to be less likely than fewer to be let go: what several frames say is not forgotten for what one of them does not
+/// need.
+pub(super) fn needed(fit: &DiscFit) -> f64 {
+    if fit.still.is_some() { policy::gone_nats() } else { 0.0 }
 }

@@ -152,19 +152,17 @@ struct Certainty {
     share: f64,
     /// The likeliest other count, if that is worth to be named.
     alternative: Option<Alternative>,
-    /// Frames in whose mean it was found; infinite if in frames that differ, none of which shows it by itself.
-    frames: f64,
 }
 
 impl Certainty {
-    /// Of so many contacts in so many frames, by the logarithms of the evidence for each count; `None` if nothing can be said.
-    fn of(count: usize, by_count: &[f64], frames: f64) -> Option<Self> {
+    /// Of so many contacts, by the logarithms of the evidence for each count; `None` if nothing can be said.
+    fn of(count: usize, by_count: &[f64]) -> Option<Self> {
         let shares = || by_count.iter().map(|other| (other - by_count[count]).exp());
         let share = Some(1.0 / shares().sum::<f64>()).filter(|share| share.is_finite())?;
         let others = shares().enumerate().filter(|(other, _)| *other != count);
         let other = others.max_by(|(_, a), (_, b)| a.total_cmp(b));
         let other = other.map(|(contacts, of)| Alternative { contacts, certainty: of * share });
-        Some(Self { share, alternative: other.filter(|other| other.certainty >= policy::named_share()), frames })
+        Some(Self { share, alternative: other.filter(|other| other.certainty >= policy::named_share()) })
     }
 }
 
@@ -199,7 +197,7 @@ impl ContactHypothesis {
 
     /// A fit, with the logarithms of the evidence for each count.
     fn new(fit: DiscFit, by_count: &[f64], target: &Target) -> Self {
-        Self { certainty: Certainty::of(fit.contacts.len(), by_count, target.frames as f64), ..Self::of(fit, target) }
+        Self { certainty: Certainty::of(fit.contacts.len(), by_count), ..Self::of(fit, target) }
     }
 }
 

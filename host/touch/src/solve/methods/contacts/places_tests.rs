@@ -84,8 +84,9 @@ fn single_contacts_are_found_on_outlines_shells_curved_surfaces_and_dots_of_glue
     }
 }
 
-/// Where a thin layer tells places worst. A shell has no thickness: with it the first of these is found 7.5 mm off, for there its readings are off by 5.7 mV and
-/// where it finds it by 3.8, at 1.2 mV of noise. By pads in corners a light press has two places that are nearly alike, so others of them are not asked for.
+/// Where a thin layer tells places worst. With a shell, which has no thickness, the first of these is found 7.5 mm off: its readings differ from those measured
+/// by 5.7 mV at the true place and by 3.8 mV where it finds the press, and noise is 1.2 mV. By pads in corners two places of a light press read nearly alike, so
+/// no others there are tried.
 #[test]
 fn contacts_at_the_rims_of_pads_on_a_thin_layer_are_found() {
     let mut trial = PlacesTrial::new(thin(), 37);

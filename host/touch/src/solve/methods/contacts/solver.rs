@@ -9,6 +9,7 @@ use std::sync::Arc;
 use self::frame_tracker::FrameTracker;
 use super::discs::DiscFit;
 use super::doubt::Doubt;
+use super::keep::needed;
 use super::rows::RowState;
 use super::window::KeyFrames;
 use super::{ContactFinder, ContactHypothesis, ContactSettings};
@@ -244,7 +245,7 @@ impl ContactTracker {
             found.as_ref().map_or_else(|| self.finder.evidence_of_nothing(target), of)
         };
         let are_fewer = count(&caught_up) < count(&self.last);
-        let needed = self.last.as_ref().filter(|_| are_fewer).map_or(0.0, |last| last.needed(target));
+        let needed = self.last.as_ref().filter(|_| are_fewer).map_or(0.0, |last| needed(&last.fit));
         if self.is_stale || evidence(&caught_up) >= evidence(&self.last) + needed {
             (self.last, self.is_stale) = (caught_up, false);
         }

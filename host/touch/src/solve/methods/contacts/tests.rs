@@ -218,19 +218,10 @@ fn electrodes_that_are_left_out_take_what_their_converter_is_off_by_along_and_le
 
 #[test]
 fn a_number_is_named_beside_another_where_it_is_likely_enough() {
-    let certainty = |by_count: &[f64]| Certainty::of(1, by_count, 1.0).map(|of| (of.share, of.alternative));
+    let certainty = |by_count: &[f64]| Certainty::of(1, by_count).map(|of| (of.share, of.alternative));
     let none = f64::NEG_INFINITY;
     assert_eq!(certainty(&[none, -10.0, -13.0, none]), Some((1.0 / (1.0 + (-3.0_f64).exp()), None)));
     let even = Alternative { contacts: 2, certainty: 0.5 };
     assert_eq!(certainty(&[none, -10.0, -10.0, none]), Some((0.5, Some(even))));
     assert_eq!(certainty(&[none, none, -10.0]), None);
-}
-
-#[test]
-fn a_count_is_kept_by_what_other_frames_said_of_it() {
-    let sure = |nats: f64, frames| Certainty::of(1, &[-nats, 0.0], frames).unwrap();
-    assert!((sure(5.0, 50.0).needed(1) - 0.98 * 5.0).abs() < 1e-9);
-    assert_eq!([1, 60].map(|frames| sure(5.0, 1.0).needed(frames)), [0.0; 2], "no other frame was looked at");
-    assert_eq!(sure(300.0, f64::INFINITY).needed(1000), policy::gone_nats());
-    assert_eq!(sure(-2.0, 50.0).needed(1), 0.0, "what was not likelier is not kept");
 }
