@@ -257,7 +257,7 @@ pub(crate) fn lightest_found(
     let Some((_, median)) = all.get(places / 2) else { return Ok(None) };
     let is_found = |strength: f64| {
         let readings = readings(*median, strength)?;
-        Ok(readings.is_some_and(|readings| contact_over_needed(&errors.bounded(readings), model) >= 1.0))
+        Ok(readings.is_some_and(|readings| contact_over_needed(&errors.bounded(errors.on_average(readings)), model) >= 1.0))
     };
     least([LIGHTEST * low, high], STRENGTH_HALVINGS, is_found)
 }

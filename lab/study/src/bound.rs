@@ -1,5 +1,7 @@
 //! How well any method can do: the Cramer-Rao bound of contacts under the converter's noise.
 
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
 use nalgebra::DMatrix;
 
 use tactomo_physics::detector::{Detector, Electrode};
@@ -53,6 +55,16 @@ impl<'a> Errors<'a> {
         if ranges.is_empty() { readings } else { readings.within(&ranges) }
     }
 
+    /// Readings as converters have them on average, less what they have where nothing touches: they give nothing below zero, which cuts off half of the
+    /// noise there, and with it half of what is small against noise.
+    pub fn on_average(&self, mut readings: Readings) -> Readings {
+        let (ground_v, deviation_v) = (self.measured.ground_v, self.deviation_v);
+        let at_rest_v = mean_above_zero(ground_v, deviation_v);
+        let volts = readings.volts_mut().iter_mut();
+        volts.for_each(|volts| *volts = mean_above_zero(*volts + ground_v, deviation_v) - at_rest_v);
+        readings
+    }
+
     /// The readings that tell anything.
     fn seen(&self, readings: &Readings) -> Vec<usize> {
         let (n, bounded) = (readings.electrodes(), self.bounded(readings.clone()));
@@ -80,11 +92,18 @@ impl<'a> Errors<'a> {
     }
 }
 
+/// Mean of a normal number where it is above zero, and of zero where it is below.
+fn mean_above_zero(mean: f64, deviation: f64) -> f64 {
+    let normal = mean / deviation;
+    let density = (-0.5 * normal * normal).exp() / (2.0 * PI).sqrt();
+    deviation * density + 0.5 * mean * libm::erfc(-FRAC_1_SQRT_2 * normal)
+}
+
 /// The Cramer-Rao bound of contacts of known number, each with place and conductance unknown and its radius known or not, from one frame of readings with
 /// independent normal noise, and with what is not known of the detector as a normal error that readings share.
 ///
 /// With `J` the derivatives of the readings by the unknowns and `R` the covariance of the readings, Fisher's information is `J' R^-1 J`, and no unbiased
-/// estimate has a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of the model. Readings below a floor tell
+/// estimate has a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of what the model changes to first order. Readings below a floor tell
 /// nothing. `None` if the others do not separate the unknowns.
 ///
 /// # Errors
@@ -94,10 +113,10 @@ pub fn cramer_rao(
     contacts: &[Contact],
     errors: &Errors<'_>,
 ) -> Result<Option<Vec<Bound>>, ForwardError> {
-    let readings = readings_v(&model.impedance_ohm(contacts)?, errors.measured);
+    let (readings, jacobian_v) = derivatives(model, contacts, errors.measured)?;
     let seen = errors.seen(&readings);
     // In standard deviations.
-    let jacobian = derivatives(model, contacts, errors.measured)?.select_rows(&seen) / errors.deviation_v;
+    let jacobian = jacobian_v.select_rows(&seen) / errors.deviation_v;
     let mut information = jacobian.tr_mul(&jacobian);
     if let Some(patterns_v) = errors.patterns_v(contacts, &readings)? {
         // (1 + P P')^-1 = 1 - P (1 + P' P)^-1 P' (Woodbury).
@@ -150,7 +169,7 @@ impl RowInformation {
     /// [`ForwardError`] if a contact, or one a step beside it, is off the detector.
     pub fn new(model: &dyn ForwardModel, contacts: &[Contact], deviation_v: f64) -> Result<Self, ForwardError> {
         let electrodes = model.detector().electrodes.len();
-        let jacobian_v = derivatives(model, contacts, model.detector())?;
+        let (_, jacobian_v) = derivatives(model, contacts, model.detector())?;
         let of_row = |g: usize| {
             let row_v = jacobian_v.rows(g * electrodes, electrodes);
             row_v.transpose() * row_v / (deviation_v * deviation_v)
@@ -170,34 +189,36 @@ impl RowInformation {
     }
 }
 
-/// Derivatives of the readings (V) by x and y in radii and by the logarithms of conductance and radius of each contact: alike in size, so that
+/// Readings (V) and their derivatives by x and y in radii and by the logarithms of conductance and radius of each contact: alike in size, so that
 /// the information is well scaled.
 fn derivatives(
     model: &dyn ForwardModel,
     contacts: &[Contact],
     measured: &Detector,
-) -> Result<DMatrix<f64>, ForwardError> {
-    let readings = |contacts: &[Contact]| Ok(readings_v(&model.impedance_ohm(contacts)?, measured));
-    let electrodes = model.detector().electrodes.len();
-    let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, UNKNOWNS * contacts.len());
-    for (unknown, mut column) in jacobian_v.column_iter_mut().enumerate() {
-        let stepped = |step: f64| {
-            let mut contacts = contacts.to_vec();
-            let contact = &mut contacts[unknown / UNKNOWNS];
-            match unknown % UNKNOWNS {
-                0 => contact.x_m += step * contact.radius_m,
-                1 => contact.y_m += step * contact.radius_m,
-                2 => contact.conductance_s *= step.exp(),
-                _ => contact.radius_m *= step.exp(),
-            }
-            readings(&contacts)
-        };
-        let (after, before) = (stepped(STEP)?, stepped(-STEP)?);
+) -> Result<(Readings, DMatrix<f64>), ForwardError> {
+    let stepped = |unknown: usize, step: f64| {
+        let mut contact = contacts[unknown / UNKNOWNS];
+        match unknown % UNKNOWNS {
+            0 => contact.x_m += step * contact.radius_m,
+            1 => contact.y_m += step * contact.radius_m,
+            2 => contact.conductance_s *= step.exp(),
+            _ => contact.radius_m *= step.exp(),
+        }
+        (unknown / UNKNOWNS, contact)
+    };
+    let unknowns = 0..UNKNOWNS * contacts.len();
+    let replaced: Vec<_> =
+        unknowns.flat_map(|unknown| [STEP, -STEP].map(|step| stepped(unknown, step))).collect();
+    let (impedance_ohm, changes_ohm) = model.impedance_with_changes_ohm(contacts, &replaced)?;
+    let electrodes = impedance_ohm.nrows();
+    let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, replaced.len() / 2);
+    for (mut column, changes_ohm) in jacobian_v.column_iter_mut().zip(changes_ohm.chunks_exact(2)) {
+        let [after, before] = [0, 1].map(|which| readings_v(&(&impedance_ohm + &changes_ohm[which]), measured));
         for (value, (after, before)) in column.iter_mut().zip(after.volts().iter().zip(before.volts())) {
             *value = (after - before) / (2.0 * STEP);
         }
     }
-    Ok(jacobian_v)
+    Ok((readings_v(&impedance_ohm, measured), jacobian_v))
 }
 
 #[cfg(test)]
@@ -259,7 +280,7 @@ mod tests {
         let (slab, contact, noise_v) = (slab(), firm(-0.011, 0.003), 1e-3);
         let errors = Errors::of_noise(slab.detector(), noise_v);
         let bound = cramer_rao(&slab, &[contact], &errors).unwrap().unwrap()[0];
-        let jacobian_v = derivatives(&slab, &[contact], slab.detector()).unwrap();
+        let (_, jacobian_v) = derivatives(&slab, &[contact], slab.detector()).unwrap();
         let jacobian_v = jacobian_v.columns(0, 3).into_owned();
         let inverse = jacobian_v.clone().pseudo_inverse(1e-12).unwrap();
         let mut noise = Noise::new(3);
@@ -272,6 +293,27 @@ mod tests {
             .sum();
         let found_m = (squares / f64::from(trials)).sqrt();
         assert!((found_m / bound.position_m - 1.0).abs() < 0.06, "{found_m} {bound:?}");
+    }
+
+    /// Against the mean of many readings.
+    #[test]
+    fn a_converter_that_ends_at_zero_halves_what_is_small_against_noise() {
+        let exact = Detector::default();
+        let deviation_v = exact.adc.deviation_v();
+        let volts = [-0.5, 0.1, 0.5, 1.0, 4.0].map(|deviations| deviations * deviation_v);
+        let readings = |value: &dyn Fn(usize) -> f64| Readings::from_fn(5, |_, e| value(e));
+        for ground_v in [0.0, deviation_v, 0.2] {
+            let measured = Detector { ground_v, ..exact.clone() };
+            let found = Errors::of_noise(&measured, deviation_v).on_average(readings(&|e| volts[e]));
+            let mut noise = Noise::new(7);
+            let many = 100_000;
+            for (e, volts) in volts.iter().enumerate() {
+                let above = |volts: f64, noise: &mut Noise| (ground_v + volts + deviation_v * noise.normal()).max(0.0);
+                let sum_v: f64 = (0..many).map(|_| above(*volts, &mut noise) - above(0.0, &mut noise)).sum();
+                let off_v = found.at(0, e) - sum_v / f64::from(many);
+                assert!(off_v.abs() < 0.02 * deviation_v, "{ground_v} {volts} {off_v}");
+            }
+        }
     }
 
     #[test]

@@ -134,11 +134,11 @@ fn of_compared(compared: &Compared, rated: usize) -> String {
 }
 
 fn chart(answer: &Answer, wish: Wish, (title, unit): (&str, Unit), x: fn(&Rating) -> Option<f64>) -> Chart {
-    let point = |rating: &Rating| (x(rating).unwrap_or(f64::NAN), rating.given(wish));
     let wanted = answer.wishes.wanted(wish);
-    // What is nowhere near would only make the axis longer.
-    let is_near = |rating: &&Rating| rating.given(wish).is_some_and(|given| given < FAR * wanted);
-    let tried = Series::dots("", "bound", answer.all.iter().filter(is_near).map(point)).unlabelled();
+    // What misses by far would only make the axes longer.
+    let is_near = |rating: &Rating| Wish::ALL.iter().all(|wish| rating.margin(*wish, &answer.wishes) > -FAR.ln());
+    let point = |rating: &Rating| (x(rating).unwrap_or(f64::NAN), rating.given(wish).filter(|_| is_near(rating)));
+    let tried = Series::dots("", "bound", answer.all.iter().map(point)).unlabelled();
     let chosen = answer
         .choices
         .iter()
