@@ -3,7 +3,7 @@
 //! Standard errors are Cramer and Rao's bounds of one frame under the converter's noise, [`cramer_rao`]; the range of strengths runs from
 //! where noise hides a contact to where the contact is at nine tenths of the drive, eq. (4). The radius of a contact is known to a factor of two only.
 
-use std::f64::consts::LN_2;
+use std::f64::consts::FRAC_PI_2;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
@@ -28,6 +28,8 @@ const DISTANCES: [f64; 2] = [1e-3, 0.5];
 const STEPS: [f64; 2] = [0.754_877_666, 0.569_840_291];
 /// Share of each side that is left free at each edge.
 const MARGIN: f64 = 0.05;
+/// Directions of a quarter of an ellipse of errors that are averaged over: of one ten times as long as wide, the share of errors is right to 1 %.
+const ANGLES: usize = 16;
 /// Halvings of a range in its logarithm: of five decades to 0.2 %.
 const DISTANCE_HALVINGS: usize = 8;
 const STRENGTH_HALVINGS: usize = 15;
@@ -119,16 +121,15 @@ pub struct Spread {
     pub p90_m: f64,
     /// Root mean square (m): the few worst places rule it.
     pub rms_m: f64,
+    /// Half of the errors of presses all over the surface are less (m), by the ellipses of normal errors.
+    pub median_error_m: f64,
 }
 
 impl Spread {
-    /// Half of the errors are less than this (m): those of a normal error, as large in both directions, are so within `sqrt(ln 2)` of its standard error.
-    pub fn median_error_m(&self) -> f64 {
-        LN_2.sqrt() * self.median_m
-    }
-
-    /// Of standard errors (m); `None` of none.
-    fn of(mut errors_m: Vec<f64>) -> Option<Self> {
+    /// Of bounds at some places, those that are not told among them; `None` if that is half of them.
+    fn of(bounds: &[Option<Bound>]) -> Option<Self> {
+        let errors_m = bounds.iter().map(|bound| bound.map_or(f64::INFINITY, |bound| bound.position_any_radius_m));
+        let mut errors_m: Vec<f64> = errors_m.collect();
         errors_m.sort_by(f64::total_cmp);
         let last = errors_m.len().checked_sub(1)? as f64;
         // Between the two nearest ranks, as most programs do.
@@ -137,8 +138,33 @@ impl Spread {
             errors_m[below] + rest * (errors_m.get(below + 1).unwrap_or(&errors_m[below]) - errors_m[below])
         };
         let squares_m2: Vec<f64> = errors_m.iter().map(|error_m| error_m.powi(2)).collect();
-        Some(Self { median_m: quantile(0.5), p90_m: quantile(0.9), rms_m: super::rank::mean(&squares_m2)?.sqrt() })
+        let rms_m = super::rank::mean(&squares_m2)?.sqrt();
+        let all =
+            Self { median_m: quantile(0.5), p90_m: quantile(0.9), rms_m, median_error_m: median_error_m(bounds)? };
+        Some(all).filter(|all| all.median_m.is_finite())
     }
+}
+
+/// Error (m) that half of presses have less than, each at one of some places; `None` if half of the places are not told.
+fn median_error_m(bounds: &[Option<Bound>]) -> Option<f64> {
+    let told = || bounds.iter().flatten().filter(|bound| bound.axes_any_radius_m[0].is_finite());
+    let largest_m = told().map(|bound| bound.axes_any_radius_m[0]).fold(0.0, f64::max);
+    let is_median = |error_m: f64| {
+        let share: f64 = told().map(|bound| share_within(error_m, bound.axes_any_radius_m)).sum();
+        Ok(share >= 0.5 * bounds.len() as f64)
+    };
+    // Of five decades, to one in ten thousand.
+    least([1e-5 * largest_m, 10.0 * largest_m], 20, is_median).ok().flatten()
+}
+
+/// Share of normal errors that are less than `error_m`, of such standard deviations along the axes of their ellipse (m): one in a direction that is drawn
+/// evenly has the length of a Rayleigh number times that of the ellipse.
+fn share_within(error_m: f64, [long_m, short_m]: [f64; 2]) -> f64 {
+    let of = |index: usize| {
+        let (sin, cos) = ((index as f64 + 0.5) * FRAC_PI_2 / ANGLES as f64).sin_cos();
+        -(-0.5 * error_m.powi(2) / ((long_m * cos).powi(2) + (short_m * sin).powi(2))).exp_m1()
+    };
+    (0..ANGLES).map(of).sum::<f64>() / ANGLES as f64
 }
 
 /// Places all over a surface of such sides (m), from the middle (m), without end: the more, the closer.
@@ -160,12 +186,10 @@ pub fn places_everywhere(
     errors: &Errors<'_>,
     places: usize,
 ) -> Result<Option<Spread>, ForwardError> {
-    let mut errors_m = Vec::with_capacity(places);
-    for place in everywhere(model.detector().outline.size_m()).take(places) {
-        let bounds = cramer_rao(model, &[press.at(place, strength)], errors)?;
-        errors_m.push(bounds.map_or(f64::INFINITY, |bounds| bounds[0].position_any_radius_m));
-    }
-    Ok(Spread::of(errors_m).filter(|spread| spread.median_m.is_finite()))
+    let at = everywhere(model.detector().outline.size_m()).take(places);
+    let of = |place| Ok(cramer_rao(model, &[press.at(place, strength)], errors)?.map(|bounds| bounds[0]));
+    let bounds = at.map(of).collect::<Result<Vec<_>, ForwardError>>()?;
+    Ok(Spread::of(&bounds))
 }
 
 /// Least distance of two contacts of a strength, side by side about the middle, that can be told apart (m) with readings of such errors.
@@ -257,7 +281,8 @@ pub(crate) fn lightest_found(
     let Some((_, median)) = all.get(places / 2) else { return Ok(None) };
     let is_found = |strength: f64| {
         let readings = readings(*median, strength)?;
-        Ok(readings.is_some_and(|readings| contact_over_needed(&errors.bounded(errors.on_average(readings)), model) >= 1.0))
+        Ok(readings
+            .is_some_and(|readings| contact_over_needed(&errors.bounded(errors.on_average(readings)), model) >= 1.0))
     };
     least([LIGHTEST * low, high], STRENGTH_HALVINGS, is_found)
 }
@@ -357,13 +382,37 @@ mod tests {
     fn a_spread_tells_the_few_worst_places_from_the_others() {
         let mut errors_m = vec![1e-5; 20];
         errors_m[7] = 1e-3;
-        let spread = Spread::of(errors_m).unwrap();
+        let spread = Spread::of(&round(&errors_m)).unwrap();
         assert_eq!((spread.median_m, spread.p90_m), (1e-5, 1e-5));
         assert!((spread.rms_m / (1e-3 / 20f64.sqrt()) - 1.0).abs() < 1e-2, "{spread:?}");
         // 1 to 11: the median is the sixth, nine tenths of the way is the tenth.
-        let even = Spread::of((1..=11).map(f64::from).collect()).unwrap();
+        let even = Spread::of(&round(&(1..=11).map(f64::from).collect::<Vec<_>>())).unwrap();
         assert_eq!((even.median_m, even.p90_m), (6.0, 10.0));
-        assert_eq!(Spread::of(Vec::new()), None);
+        assert_eq!(Spread::of(&[]), None);
+    }
+
+    /// Bounds of such standard errors, as large in all directions.
+    fn round(errors_m: &[f64]) -> Vec<Option<Bound>> {
+        errors_m.iter().map(|error_m| Some(ellipse([error_m / 2f64.sqrt(); 2]))).collect()
+    }
+
+    fn ellipse(axes_m: [f64; 2]) -> Bound {
+        let position_m = axes_m[0].hypot(axes_m[1]);
+        Bound { axes_any_radius_m: axes_m, position_any_radius_m: position_m, position_m, ..Bound::default() }
+    }
+
+    /// In a plane half of normal errors are within `sqrt(2 ln 2)` deviations, along a line within 0.6745.
+    #[test]
+    fn half_of_the_errors_are_less_than_their_median_whatever_their_ellipse() {
+        for (axes_m, median_m) in [([1e-3, 1e-3], 1.1774e-3), ([1e-3, 1e-6], 0.6745e-3)] {
+            let found_m = median_error_m(&[Some(ellipse(axes_m))]).unwrap();
+            assert!((found_m / median_m - 1.0).abs() < 0.01, "{axes_m:?} {found_m}");
+        }
+        // Of places of which one is told far worse, half of the errors are those that three quarters have at the others.
+        let far = [Some(ellipse([1e-3, 1e-3])), Some(ellipse([1e-3, 1e-3])), Some(ellipse([1.0, 1.0]))];
+        let three_quarters_m = (2.0 * 4f64.ln()).sqrt() * 1e-3;
+        assert!((median_error_m(&far).unwrap() / three_quarters_m - 1.0).abs() < 0.01);
+        assert_eq!(median_error_m(&[Some(ellipse([1e-3, 1e-3])), None, None]), None);
     }
 
     #[test]

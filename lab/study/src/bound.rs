@@ -207,8 +207,7 @@ fn derivatives(
         (unknown / UNKNOWNS, contact)
     };
     let unknowns = 0..UNKNOWNS * contacts.len();
-    let replaced: Vec<_> =
-        unknowns.flat_map(|unknown| [STEP, -STEP].map(|step| stepped(unknown, step))).collect();
+    let replaced: Vec<_> = unknowns.flat_map(|unknown| [STEP, -STEP].map(|step| stepped(unknown, step))).collect();
     let (impedance_ohm, changes_ohm) = model.impedance_with_changes_ohm(contacts, &replaced)?;
     let electrodes = impedance_ohm.nrows();
     let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, replaced.len() / 2);

@@ -28,8 +28,8 @@ const NAIVE_DIAMETER_M: f64 = 4e-3;
 const NAIVE_SIDE_M: f64 = 60e-3;
 
 /// Forces are tried in steps of this factor, from so many steps below the smallest that is promised to so many above.
-const FORCE_STEP: f64 = 1.3;
-const FORCE_STEPS: std::ops::RangeInclusive<i32> = -3..=4;
+const FORCE_STEP: f64 = 1.1;
+const FORCE_STEPS: std::ops::RangeInclusive<i32> = -5..=8;
 /// Distances of two points are tried in steps of this factor, from that of the bound on, as far as half the shorter side.
 const DISTANCE_STEP: f64 = 1.4;
 const DISTANCE_STEPS: i32 = 8;

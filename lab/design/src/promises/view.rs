@@ -28,7 +28,7 @@ pub fn view(report: &Report) -> View {
         .column("found / bound", PLAIN, |row| row.two_points_over_bound());
     let method = format!(
         "Medians over presses and detectors drawn from the tolerances; readings of finer models through a chip of the board. The smallest force is that from which on half of \
-         presses are seen, tried in steps of 1.3; two points are found from where half are two contacts, tried in steps of 1.4. Two points are no promise: the bound is what noise \
+         presses are seen, tried in steps of 1.1; two points are found from where half are two contacts, tried in steps of 1.4. Two points are no promise: the bound is what noise \
          and tolerances allow, and auto asks for more evidence before it calls two. Computed in {:.1} s.",
         report.seconds
     );

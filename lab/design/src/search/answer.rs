@@ -208,7 +208,7 @@ fn reason(found: &Found, best_in: &[&str], wishes: &Wishes) -> String {
         .into_iter()
         .filter(|wish| rating.margin(*wish, wishes) < 0.0)
         .map(|wish| match rating.given(wish) {
-            Some(given) => format!("{} is {}, not {}", wish.name(), wish.text(given), wish.text(wishes.wanted(wish))),
+            Some(given) => format!("{} is {}, not {}", wish.name(), wish.text(given), wish.wished(wishes.wanted(wish))),
             None => format!("{} is not told at all", wish.name()),
         })
         .collect();

@@ -63,8 +63,13 @@ impl Rating {
     /// [`DesignError`] if there is no model of it.
     pub fn of(detector: &Detector, wishes: &Wishes) -> Result<Self, DesignError> {
         let slab: Arc<dyn ForwardModel> = Arc::new(Slab::new(detector)?);
+        let mut described = detector.clone();
+        // A baseline takes away what channels read where nothing is, if their ground is lifted so that nothing is cut off.
+        if detector.ground_v > 0.0 {
+            described.tolerances.offset_lsb = 0.0;
+        }
         // Candidates are rated side by side.
-        let nuisance = Nuisance::new(&slab, detector, 1)?;
+        let nuisance = Nuisance::new(&slab, &described, 1)?;
         Self::at(&*slab, nuisance.as_ref(), wishes)
     }
 
@@ -82,7 +87,7 @@ impl Rating {
         Ok(Self {
             smallest_n,
             largest_n,
-            place_m: places_everywhere(model, &press, middle_n, &errors, PLACES)?.map(|spread| spread.median_error_m()),
+            place_m: places_everywhere(model, &press, middle_n, &errors, PLACES)?.map(|spread| spread.median_error_m),
             two_points_m: two_points_m(model, &press, middle_n, &errors)?,
             frames_per_s: wishes.board.frames_per_s(detector.electrodes.len()),
             drive_v: detector.drive_v,

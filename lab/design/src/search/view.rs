@@ -12,8 +12,8 @@ const FAR: f64 = 5.0;
 pub fn view(answer: &Answer) -> View {
     let wishes = &answer.wishes;
     let wanted = |wish: Wish| match wish {
-        Wish::Frames => wish.text(wishes.wanted(wish)),
-        _ => format!("{} {}", wish.name(), wish.text(wishes.wanted(wish))),
+        Wish::Frames => wish.wished(wishes.wanted(wish)),
+        _ => format!("{} {}", wish.name(), wish.wished(wishes.wanted(wish))),
     };
     let [width_mm, height_mm] = wishes.size_m.map(|side_m| short(side_m * 1e3));
     let tried = format!(
@@ -89,7 +89,7 @@ fn of_costliest(costliest: &Costliest) -> String {
     format!(
         "the wish that costs most is {} {}: without it, all others would be missed by a factor of {others_missed:.1} at most (by {by}, which {given})",
         wish.name(),
-        wish.text(*wanted)
+        wish.wished(*wanted)
     )
 }
 
@@ -98,7 +98,7 @@ fn of_unmet(unmet: &Unmet) -> String {
         "{} is at best {}, where {} is wanted (by {})",
         unmet.wish.name(),
         unmet.wish.text(unmet.best),
-        unmet.wish.text(unmet.wanted),
+        unmet.wish.wished(unmet.wanted),
         unmet.by
     )
 }

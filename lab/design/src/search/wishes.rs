@@ -1,5 +1,7 @@
 //! What a person wants of a detector.
 
+use tactomo_physics::detector::short;
+
 use super::Board;
 
 /// What is wanted; all of it at once.
@@ -71,14 +73,24 @@ impl Wish {
         matches!(self, Self::Smallest | Self::Place | Self::TwoPoints)
     }
 
-    /// A value of it with its unit.
+    /// What is given of it, to three digits, with its unit.
     pub fn text(self, value: f64) -> String {
-        let three = |value: f64| tactomo_study::view::PLAIN.text(Some(value));
         match self {
             // Below this it is the mesh between the layers that decides, which nothing here knows.
             Self::Smallest if value < 1e-3 => "under 0.001 N".to_owned(),
-            Self::Smallest | Self::Largest => format!("{} N", three(value)),
-            Self::Place | Self::TwoPoints => format!("{} mm", three(value * 1e3)),
+            _ => self.with_unit(value, |value| tactomo_study::view::PLAIN.text(Some(value))),
+        }
+    }
+
+    /// What is wished of it, as people write it, with its unit.
+    pub fn wished(self, value: f64) -> String {
+        self.with_unit(value, short)
+    }
+
+    fn with_unit(self, value: f64, digits: impl Fn(f64) -> String) -> String {
+        match self {
+            Self::Smallest | Self::Largest => format!("{} N", digits(value)),
+            Self::Place | Self::TwoPoints => format!("{} mm", digits(value * 1e3)),
             Self::Frames => format!("{value:.0} frames/s"),
         }
     }
