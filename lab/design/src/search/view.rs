@@ -30,10 +30,10 @@ pub fn view(answer: &Answer) -> View {
     let had = "Every candidate that was rated as built and comes within a factor of five; numbers are the choices above. Left and down is better; the dashed line joins those that no other beats \
                in both.";
     let charts = [
-        chart(answer, Wish::Place, ("time of a frame", Unit::Seconds), |rating| Some(1.0 / rating.frames_per_s)),
-        chart(answer, Wish::TwoPoints, ("error of places", Unit::Metres), |rating| rating.place_m),
-        chart(answer, Wish::Place, ("1 / force at saturation, 1/N", Unit::Plain), |rating| {
-            Some(1.0 / rating.largest_n?)
+        chart(answer, Wish::Place, ("time of a frame", Unit::Seconds), Wish::Frames, |frames_per_s| 1.0 / frames_per_s),
+        chart(answer, Wish::TwoPoints, ("error of places", Unit::Metres), Wish::Place, |place_m| place_m),
+        chart(answer, Wish::Place, ("1 / force at saturation, 1/N", Unit::Plain), Wish::Largest, |largest_n| {
+            1.0 / largest_n
         }),
     ];
     let mut view = View::new("Which detector to order", "").text(tried);
@@ -104,18 +104,18 @@ fn of_unmet(unmet: &Unmet) -> String {
 }
 
 fn gives(rating: &Rating) -> String {
-    let given = |wish: Wish| match rating.given(wish) {
-        Some(given) if given.is_finite() => wish.text(given),
-        Some(_) => "any".to_owned(),
+    let given = |before: &str, wish: Wish| match rating.given(wish) {
+        Some(given) if given.is_finite() => format!("{before}{}", wish.text(given)),
+        Some(_) => format!("{before}any"),
         None => "not told".to_owned(),
     };
     format!(
-        "{} to {}; places to {}; two points {}; {}; {} electrodes; {} mm thick; {} V",
-        given(Wish::Smallest),
-        given(Wish::Largest),
-        given(Wish::Place),
-        given(Wish::TwoPoints),
-        given(Wish::Frames),
+        "{}{}; places {}; two points {}; {}; {} electrodes; {} mm thick; {} V",
+        given("", Wish::Smallest),
+        given(" to ", Wish::Largest),
+        given("to ", Wish::Place),
+        given("at best ", Wish::TwoPoints),
+        given("", Wish::Frames),
         rating.electrodes,
         super::space::plain(rating.thickness_m * 1e3),
         rating.drive_v
@@ -133,11 +133,16 @@ fn of_compared(compared: &Compared, rated: usize) -> String {
     )
 }
 
-fn chart(answer: &Answer, wish: Wish, (title, unit): (&str, Unit), x: fn(&Rating) -> Option<f64>) -> Chart {
-    let wanted = answer.wishes.wanted(wish);
+/// A wish upwards over another one to the right, of which `less` makes what is better the less it is.
+fn chart(answer: &Answer, wish: Wish, (title, unit): (&str, Unit), other: Wish, less: impl Fn(f64) -> f64) -> Chart {
+    let wanted = |wish: Wish| answer.wishes.wanted(wish);
     // What misses by far would only make the axes longer.
     let is_near = |rating: &Rating| Wish::ALL.iter().all(|wish| rating.margin(*wish, &answer.wishes) > -FAR.ln());
-    let point = |rating: &Rating| (x(rating).unwrap_or(f64::NAN), rating.given(wish).filter(|_| is_near(rating)));
+    let point = |rating: &Rating| {
+        // What nothing saturates has no place on such an axis.
+        let x = rating.given(other).map(&less).filter(|x| *x > 0.0);
+        (x.unwrap_or(f64::NAN), rating.given(wish).filter(|_| is_near(rating)))
+    };
     let tried = Series::dots("", "bound", answer.all.iter().map(point)).unlabelled();
     let chosen = answer
         .choices
@@ -148,6 +153,6 @@ fn chart(answer: &Answer, wish: Wish, (title, unit): (&str, Unit), x: fn(&Rating
         answer.compared.iter().map(|compared| Series::dots(compared.name.as_str(), "paper", [point(&compared.rating)]));
     let axes = [Axis::log(title, unit).decades(0.6), Axis::log("", Unit::Metres).decades(0.6)];
     let series = std::iter::once(tried).chain(chosen).chain(compared);
-    let level = Some((wanted, "wanted".to_owned()));
-    Chart { has_front: true, level, ..Chart::new(wish.name(), format!("{title} to the right"), axes, series) }
+    let [guide, level] = [less(wanted(other)), wanted(wish)].map(|value| Some((value, "wanted".to_owned())));
+    Chart { has_front: true, guide, level, ..Chart::new(wish.name(), format!("{title} to the right"), axes, series) }
 }
