@@ -63,13 +63,8 @@ impl Rating {
     /// [`DesignError`] if there is no model of it.
     pub fn of(detector: &Detector, wishes: &Wishes) -> Result<Self, DesignError> {
         let slab: Arc<dyn ForwardModel> = Arc::new(Slab::new(detector)?);
-        let mut described = detector.clone();
-        // A baseline takes away what channels read where nothing is, if their ground is lifted so that nothing is cut off.
-        if detector.ground_v > 0.0 {
-            described.tolerances.offset_lsb = 0.0;
-        }
         // Candidates are rated side by side.
-        let nuisance = Nuisance::new(&slab, &described, 1)?;
+        let nuisance = Nuisance::new(&slab, detector, 1)?;
         Self::at(&*slab, nuisance.as_ref(), wishes)
     }
 
