@@ -393,7 +393,8 @@ mod tests {
 
     /// Bounds of such standard errors, as large in all directions.
     fn round(errors_m: &[f64]) -> Vec<Option<Bound>> {
-        errors_m.iter().map(|error_m| Some(ellipse([error_m / 2f64.sqrt(); 2]))).collect()
+        let of = |error_m: &f64| Bound { position_any_radius_m: *error_m, ..ellipse([error_m / 2f64.sqrt(); 2]) };
+        errors_m.iter().map(|error_m| Some(of(error_m))).collect()
     }
 
     fn ellipse(axes_m: [f64; 2]) -> Bound {
