@@ -86,6 +86,8 @@ fn wrong_wishes_and_foams_say_what_is_allowed() {
         (vec!["design", "--size", "60"], "60x60"),
         (vec!["design", "--smallest", "3", "--largest", "1"], "not below --largest"),
         (vec!["design", "--electrodes", "64"], "4 to 32"),
+        (vec!["design", "--electrodes", "20", "--board", "esp32"], "inputs for 16"),
+        (vec!["design", "--board", "esp64"], "esp32c3"),
         (vec!["design", "--two-points", "90"], "shorter side"),
         (vec!["design", "--compare", "square-60", "--material", "AX"], "A, B, C or D"),
         (vec!["study", "materials", "--side", "1"], "2..=301"),

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tactomo_board::record::{Header, RecordError, RecordReader};
+use tactomo_board::simulated::BoardModel;
 use tactomo_physics::detector::{Chosen, Detector, Stack};
 use tactomo_physics::forward::shell::Shell;
 use tactomo_physics::forward::{Auto, DrivingLayer, ForwardError, ForwardModel, Resolution, Slab};
@@ -171,6 +172,12 @@ pub fn place_and(text: &str, names: &str) -> Result<([f64; 3], [f64; 2]), String
         }
     };
     Ok((place_mm.map(|mm| mm * 1e-3), others))
+}
+
+/// Parses the name of a simulated board.
+pub fn board_model() -> impl TypedValueParser<Value = BoardModel> {
+    let values = BoardModel::ALL.map(|model| PossibleValue::new(model.name()).help(model.explanation()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<BoardModel>())
 }
 
 #[cfg(test)]

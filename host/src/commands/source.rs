@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::ArgGroup;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::record::RecordReader;
 use tactomo::board::session::RequestedSettings;
@@ -16,7 +15,7 @@ use tactomo::sink::page::Finger;
 use tactomo_protocol::Settings;
 
 use super::scene::{self, SceneArgs};
-use tactomo_cli::choice::DetectorArgs;
+use tactomo_cli::choice::{DetectorArgs, board_model};
 
 /// How firmly the mouse presses on the simulated detector, from 0 to 1.
 const MOUSE_FIRMNESS: f64 = 0.3;
@@ -127,12 +126,6 @@ pub fn recording(path: PathBuf, speed: f64, is_watched: bool) -> Box<dyn Source>
 /// The detector that is chosen; unless one is given, that of a recording.
 pub fn recorded_detector(chosen: &DetectorArgs, path: &Path) -> anyhow::Result<Detector> {
     chosen.of_recording(path, RecordReader::open(path)?.header())
-}
-
-/// Parses the name of a board to simulate.
-fn board_model() -> impl TypedValueParser<Value = BoardModel> {
-    let values = BoardModel::ALL.map(|model| PossibleValue::new(model.name()).help(model.explanation()));
-    PossibleValuesParser::new(values).try_map(|name| name.parse::<BoardModel>())
 }
 
 /// A speed above zero, or `max`.

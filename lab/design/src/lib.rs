@@ -16,6 +16,7 @@ pub mod materials;
 mod metrics;
 mod paper;
 mod press;
+pub mod promises;
 mod rank;
 mod reached;
 mod report;

@@ -1,21 +1,26 @@
 //! `tactomo-lab design`: from what is wanted to a detector that can be ordered.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use anyhow::{Context, ensure};
+use clap::builder::TypedValueParser;
 use tactomo_board::inputs::{self, Settling};
-use tactomo_design::search::{self, Material, Plan, Wishes};
-use tactomo_physics::detector::{Chosen, Detector, Stack};
+use tactomo_board::simulated::BoardModel;
+use tactomo_design::search::{self, Board, Material, Plan, Wishes};
+use tactomo_physics::detector::{Adc, Chosen, Detector, Stack};
 use tactomo_study::view::{self, View};
 
 use super::shown::watched;
+use tactomo_cli::choice::board_model;
 use tactomo_cli::output::{self, NewFile, message};
 
-/// Finds the detector that meets what you want: foams, thicknesses, electrodes and drive.
+/// Finds the detector that meets what you want: foams, thicknesses and electrodes.
 ///
 /// Searches all detectors of that size that can be made of the foams at hand, and answers with the
-/// few best and why, what is impossible and which wish to relax, and how far tolerances spoil each.
+/// few best and why, what is impossible and which wish to relax. The best are rated as built, within
+/// their tolerances and read by a board.
 /// With --out the best is written as a detector file, ready for `live --simulate --detector`.
 ///
 /// Examples:
@@ -46,6 +51,12 @@ pub struct Args {
     /// Electrodes at most: the channels of the board
     #[arg(long, value_name = "COUNT", default_value_t = 16)]
     electrodes: usize,
+    /// Board that reads it, with its noise, the floor of its converter and its frames a second [default: esp32; of more than 16 electrodes ideal]
+    #[arg(long, value_name = "BOARD", value_parser = board_model())]
+    board: Option<BoardModel>,
+    /// Voltage that the multiplexer's ground is lifted to, V: above the board's floor nothing is hidden (docs/hardware.md)
+    #[arg(long, value_name = "V", default_value_t = 0.0, value_parser = ground())]
+    ground: f64,
     /// Diameter of what presses, mm [default: 5, or a fifth of the shorter side if that is less]
     #[arg(long, value_name = "MM")]
     tip: Option<f64>,
@@ -142,6 +153,32 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Voltages that a ground can be lifted to: half of the drive is left at least.
+const GROUNDS_V: RangeInclusive<f64> = 0.0..=1.2;
+
+/// Parses a voltage that the ground is lifted to.
+pub(super) fn ground() -> impl TypedValueParser<Value = f64> {
+    clap::builder::NonEmptyStringValueParser::new().try_map(|text| match text.parse::<f64>() {
+        Ok(volts) if GROUNDS_V.contains(&volts) => Ok(volts),
+        _ => Err(format!("a voltage from {} to {} is needed", GROUNDS_V.start(), GROUNDS_V.end())),
+    })
+}
+
+/// The board that is named, or the usual one for so many electrodes, with its ground lifted so far (V).
+pub(super) fn board_for(electrodes: usize, named: Option<BoardModel>, ground_v: f64) -> Board {
+    let is_usual = electrodes <= BoardModel::Esp32.most_electrodes();
+    let model = named.unwrap_or(if is_usual { BoardModel::Esp32 } else { BoardModel::Ideal });
+    let (converters, inputs) = model.converters();
+    Board {
+        name: model.name().to_owned(),
+        adc: model.adc(Adc::default()),
+        ground_v,
+        frames_per_s: (1..=inputs.len()).map(|electrodes| model.frames_per_s(electrodes)).collect(),
+        converters,
+        inputs,
+    }
+}
+
 /// What is printed: the answer, and how boards as they are after a reset suit the pads of each choice.
 #[derive(serde::Serialize)]
 struct Output<'a> {
@@ -180,6 +217,7 @@ impl Args {
             frames_per_s: self.frames,
             electrodes: self.electrodes,
             tip_m: self.tip.map_or((5e-3_f64).min(side_m / 5.0), |mm| mm * 1e-3) / 2.0,
+            board: board_for(self.electrodes, self.board, self.ground),
         };
         wishes.check()?;
         let compared = match &self.compare {

@@ -1,8 +1,12 @@
 //! How well any method can do: the Cramer-Rao bound of contacts under the converter's noise.
 
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
 use nalgebra::DMatrix;
 
-use tactomo_physics::forward::{ForwardError, ForwardModel, readings_v};
+use tactomo_physics::detector::{Detector, Electrode};
+use tactomo_physics::forward::{ForwardError, ForwardModel, Nuisance, readings_v};
+use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::scene::Contact;
 
 /// Step of a place, as a share of the contact's radius, and of a conductance, as a share of it.
@@ -26,22 +30,128 @@ pub struct Bound {
     pub conductance: f64,
 }
 
+/// By what readings differ from those of a model.
+#[derive(Clone)]
+pub struct Errors<'a> {
+    /// The detector as it is driven and measured: beyond the ends of its converters, readings tell nothing.
+    pub measured: &'a Detector,
+    /// Standard deviation of the noise of a reading (V).
+    pub deviation_v: f64,
+    /// What may be different of the detector as built; and then gain and bow of its converters are those of some chip.
+    pub nuisance: Option<&'a Nuisance>,
+}
+
+impl<'a> Errors<'a> {
+    /// Noise of a standard deviation (V) alone.
+    pub fn of_noise(measured: &'a Detector, deviation_v: f64) -> Self {
+        Self { measured, deviation_v, nuisance: None }
+    }
+
+    /// Readings as the converters have them: beyond their ends they are bounds.
+    pub fn bounded(&self, readings: Readings) -> Readings {
+        let Detector { converters, electrodes, .. } = self.measured;
+        let of = |pad: &Electrode| Some(converters.get(pad.converter)?.range(self.deviation_v));
+        let ranges: Vec<_> = electrodes.iter().filter_map(of).collect();
+        if ranges.is_empty() { readings } else { readings.within(&ranges) }
+    }
+
+    /// Readings as converters have them on average, less what they have where nothing touches: they give nothing below zero, which cuts off half of the
+    /// noise there, and with it half of what is small against noise.
+    pub fn on_average(&self, mut readings: Readings) -> Readings {
+        let (ground_v, deviation_v) = (self.measured.ground_v, self.deviation_v);
+        let at_rest_v = mean_above_zero(ground_v, deviation_v);
+        let volts = readings.volts_mut().iter_mut();
+        volts.for_each(|volts| *volts = mean_above_zero(*volts + ground_v, deviation_v) - at_rest_v);
+        readings
+    }
+
+    /// The readings that tell anything.
+    fn seen(&self, readings: &Readings) -> Vec<usize> {
+        let (n, bounded) = (readings.electrodes(), self.bounded(readings.clone()));
+        (0..n * n).filter(|index| bounded.says(index / n, index % n) == Says::Voltage).collect()
+    }
+
+    /// Changes of readings of contacts (V) by one standard deviation of each thing that is not known.
+    fn patterns_v(&self, contacts: &[Contact], readings: &Readings) -> Result<Option<DMatrix<f64>>, ForwardError> {
+        let Some(nuisance) = self.nuisance else { return Ok(None) };
+        let mut patterns = nuisance.patterns_v(contacts, self.measured)?;
+        for (which, converter) in self.measured.converters.iter().enumerate() {
+            let is_on = |index: usize| self.measured.electrodes[index % readings.electrodes()].converter == which;
+            let changes_v = |index: usize, volts: &f64| {
+                if is_on(index) { converter.changes_v(*volts) } else { [0.0; 2] }
+            };
+            for error in 0..2 {
+                let column = patterns.ncols();
+                patterns = patterns.insert_column(column, 0.0);
+                let volts = readings.volts().iter().enumerate();
+                let mut into = patterns.column_mut(column);
+                volts.for_each(|(index, volts)| into[index] = changes_v(index, volts)[error]);
+            }
+        }
+        Ok(Some(patterns))
+    }
+}
+
+/// Mean of a normal number where it is above zero, and of zero where it is below.
+fn mean_above_zero(mean: f64, deviation: f64) -> f64 {
+    let normal = mean / deviation;
+    let density = (-0.5 * normal * normal).exp() / (2.0 * PI).sqrt();
+    deviation * density + 0.5 * mean * libm::erfc(-FRAC_1_SQRT_2 * normal)
+}
+
 /// The Cramer-Rao bound of contacts of known number, each with place and conductance unknown and its radius known or not, from one frame of readings with
-/// independent normal noise of a standard deviation (V).
+/// independent normal noise, and with what is not known of the detector as a normal error that readings share.
 ///
-/// With `J` the derivatives of the readings by the unknowns, Fisher's information is `J'J / deviation^2`, and no unbiased estimate has
-/// a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of the model. `None` if the readings do not
-/// separate the unknowns.
+/// With `J` the derivatives of the readings by the unknowns and `R` the covariance of the readings, Fisher's information is `J' R^-1 J`, and no unbiased
+/// estimate has a covariance below its inverse (Rao, 1945; Cramer, 1946). Derivatives are central differences of what the model changes to first order. Readings below a floor tell
+/// nothing. `None` if the others do not separate the unknowns.
 ///
 /// # Errors
 /// [`ForwardError`] if a contact, or one a step beside it, is off the detector.
 pub fn cramer_rao(
     model: &dyn ForwardModel,
     contacts: &[Contact],
-    deviation_v: f64,
+    errors: &Errors<'_>,
 ) -> Result<Option<Vec<Bound>>, ForwardError> {
-    let rows = RowInformation::new(model, contacts, deviation_v)?;
-    Ok(rows.bounds(&vec![1.0; model.detector().electrodes.len()]))
+    let (readings, jacobian_v) = derivatives(model, contacts, errors.measured)?;
+    let seen = errors.seen(&readings);
+    // In standard deviations.
+    let jacobian = jacobian_v.select_rows(&seen) / errors.deviation_v;
+    let mut information = jacobian.tr_mul(&jacobian);
+    if let Some(patterns_v) = errors.patterns_v(contacts, &readings)? {
+        // (1 + P P')^-1 = 1 - P (1 + P' P)^-1 P' (Woodbury).
+        let patterns = patterns_v.select_rows(&seen) / errors.deviation_v;
+        let inner = DMatrix::identity(patterns.ncols(), patterns.ncols()) + patterns.tr_mul(&patterns);
+        let cross = patterns.tr_mul(&jacobian);
+        let Some(factor) = inner.cholesky() else { return Ok(None) };
+        information -= cross.tr_mul(&factor.solve(&cross));
+    }
+    Ok(bounds(information, contacts.iter().map(|contact| contact.radius_m)))
+}
+
+/// Standard errors of contacts of such radii (m) by Fisher's information; `None` if it does not separate the unknowns.
+fn bounds(mut information: DMatrix<f64>, radii_m: impl Iterator<Item = f64>) -> Option<Vec<Bound>> {
+    let size = information.nrows();
+    let known: Vec<_> = (0..size).filter(|unknown| unknown % UNKNOWNS < 3).collect();
+    let of_known = information.select_rows(&known).select_columns(&known);
+    for radius in (UNKNOWNS - 1..size).step_by(UNKNOWNS) {
+        information[(radius, radius)] += RADIUS_DEVIATION.powi(-2);
+    }
+    let inverse = |information: DMatrix<f64>| information.cholesky().map(|factor| factor.inverse());
+    let (known, any) = (inverse(of_known)?, inverse(information)?);
+    let of = |(k, radius_m): (usize, f64)| {
+        let position_m = |all: &DMatrix<f64>, x: usize| radius_m * (all[(x, x)] + all[(x + 1, x + 1)]).sqrt();
+        let [x, y] = [0, 1].map(|axis| UNKNOWNS * k + axis);
+        let (middle, half) = (0.5 * (any[(x, x)] + any[(y, y)]), 0.5 * (any[(x, x)] - any[(y, y)]));
+        let apart = half.hypot(any[(x, y)]);
+        Bound {
+            axes_any_radius_m: [middle + apart, middle - apart].map(|square| radius_m * square.max(0.0).sqrt()),
+            position_m: position_m(&known, 3 * k),
+            position_any_radius_m: position_m(&any, UNKNOWNS * k),
+            conductance: known[(3 * k + 2, 3 * k + 2)].sqrt(),
+        }
+    };
+    Some(radii_m.enumerate().map(of).collect())
 }
 
 /// What the row of each ground tells of some contacts, of which the [bound](cramer_rao) of any rows is made.
@@ -59,7 +169,7 @@ impl RowInformation {
     /// [`ForwardError`] if a contact, or one a step beside it, is off the detector.
     pub fn new(model: &dyn ForwardModel, contacts: &[Contact], deviation_v: f64) -> Result<Self, ForwardError> {
         let electrodes = model.detector().electrodes.len();
-        let jacobian_v = derivatives(model, contacts)?;
+        let (_, jacobian_v) = derivatives(model, contacts, model.detector())?;
         let of_row = |g: usize| {
             let row_v = jacobian_v.rows(g * electrodes, electrodes);
             row_v.transpose() * row_v / (deviation_v * deviation_v)
@@ -75,59 +185,47 @@ impl RowInformation {
         let size = UNKNOWNS * self.radii_m.len();
         let mut information = DMatrix::zeros(size, size);
         self.rows.iter().zip(times).for_each(|(row, times)| information += row * *times);
-        let known: Vec<_> = (0..size).filter(|unknown| unknown % UNKNOWNS < 3).collect();
-        let of_known = information.select_rows(&known).select_columns(&known);
-        for radius in (UNKNOWNS - 1..size).step_by(UNKNOWNS) {
-            information[(radius, radius)] += RADIUS_DEVIATION.powi(-2);
-        }
-        let inverse = |information: DMatrix<f64>| information.cholesky().map(|factor| factor.inverse());
-        let (known, any) = (inverse(of_known)?, inverse(information)?);
-        let of = |(k, radius_m): (usize, &f64)| {
-            let position_m = |all: &DMatrix<f64>, x: usize| radius_m * (all[(x, x)] + all[(x + 1, x + 1)]).sqrt();
-            let [x, y] = [0, 1].map(|axis| UNKNOWNS * k + axis);
-            let (middle, half) = (0.5 * (any[(x, x)] + any[(y, y)]), 0.5 * (any[(x, x)] - any[(y, y)]));
-            let apart = half.hypot(any[(x, y)]);
-            Bound {
-                axes_any_radius_m: [middle + apart, middle - apart].map(|square| radius_m * square.max(0.0).sqrt()),
-                position_m: position_m(&known, 3 * k),
-                position_any_radius_m: position_m(&any, UNKNOWNS * k),
-                conductance: known[(3 * k + 2, 3 * k + 2)].sqrt(),
-            }
-        };
-        Some(self.radii_m.iter().enumerate().map(of).collect())
+        bounds(information, self.radii_m.iter().copied())
     }
 }
 
-/// Derivatives of the readings (V) by x and y in radii and by the logarithms of conductance and radius of each contact: alike in size, so that
+/// Readings (V) and their derivatives by x and y in radii and by the logarithms of conductance and radius of each contact: alike in size, so that
 /// the information is well scaled.
-fn derivatives(model: &dyn ForwardModel, contacts: &[Contact]) -> Result<DMatrix<f64>, ForwardError> {
-    let readings = |contacts: &[Contact]| Ok(readings_v(&model.impedance_ohm(contacts)?, model.detector()));
-    let electrodes = model.detector().electrodes.len();
-    let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, UNKNOWNS * contacts.len());
-    for (unknown, mut column) in jacobian_v.column_iter_mut().enumerate() {
-        let stepped = |step: f64| {
-            let mut contacts = contacts.to_vec();
-            let contact = &mut contacts[unknown / UNKNOWNS];
-            match unknown % UNKNOWNS {
-                0 => contact.x_m += step * contact.radius_m,
-                1 => contact.y_m += step * contact.radius_m,
-                2 => contact.conductance_s *= step.exp(),
-                _ => contact.radius_m *= step.exp(),
-            }
-            readings(&contacts)
-        };
-        let (after, before) = (stepped(STEP)?, stepped(-STEP)?);
+fn derivatives(
+    model: &dyn ForwardModel,
+    contacts: &[Contact],
+    measured: &Detector,
+) -> Result<(Readings, DMatrix<f64>), ForwardError> {
+    let stepped = |unknown: usize, step: f64| {
+        let mut contact = contacts[unknown / UNKNOWNS];
+        match unknown % UNKNOWNS {
+            0 => contact.x_m += step * contact.radius_m,
+            1 => contact.y_m += step * contact.radius_m,
+            2 => contact.conductance_s *= step.exp(),
+            _ => contact.radius_m *= step.exp(),
+        }
+        (unknown / UNKNOWNS, contact)
+    };
+    let unknowns = 0..UNKNOWNS * contacts.len();
+    let replaced: Vec<_> = unknowns.flat_map(|unknown| [STEP, -STEP].map(|step| stepped(unknown, step))).collect();
+    let (impedance_ohm, changes_ohm) = model.impedance_with_changes_ohm(contacts, &replaced)?;
+    let electrodes = impedance_ohm.nrows();
+    let mut jacobian_v = DMatrix::zeros(electrodes * electrodes, replaced.len() / 2);
+    for (mut column, changes_ohm) in jacobian_v.column_iter_mut().zip(changes_ohm.chunks_exact(2)) {
+        let [after, before] = [0, 1].map(|which| readings_v(&(&impedance_ohm + &changes_ohm[which]), measured));
         for (value, (after, before)) in column.iter_mut().zip(after.volts().iter().zip(before.volts())) {
             *value = (after - before) / (2.0 * STEP);
         }
     }
-    Ok(jacobian_v)
+    Ok((readings_v(&impedance_ohm, measured), jacobian_v))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use tactomo_physics::detector::Detector;
+    use tactomo_physics::detector::ConverterErrors;
     use tactomo_physics::forward::Slab;
     use tactomo_physics::simulate::Noise;
 
@@ -143,7 +241,9 @@ mod tests {
     #[test]
     fn errors_grow_with_noise_and_as_contacts_come_near() {
         let slab = slab();
-        let of = |contacts: &[Contact], noise_v| cramer_rao(&slab, contacts, noise_v).unwrap().unwrap()[0];
+        let of = |contacts: &[Contact], noise_v| {
+            cramer_rao(&slab, contacts, &Errors::of_noise(slab.detector(), noise_v)).unwrap().unwrap()[0]
+        };
         let one = of(&[firm(0.004, 0.007)], 1e-3);
         let noisy = of(&[firm(0.004, 0.007)], 2e-3);
         assert!((noisy.position_m / one.position_m - 2.0).abs() < 1e-9);
@@ -167,7 +267,9 @@ mod tests {
 
     #[test]
     fn contacts_on_one_spot_cannot_be_separated() {
-        let bound = cramer_rao(&slab(), &[firm(0.004, 0.007), firm(0.004, 0.007)], 1e-3).unwrap();
+        let slab = slab();
+        let errors = Errors::of_noise(slab.detector(), 1e-3);
+        let bound = cramer_rao(&slab, &[firm(0.004, 0.007), firm(0.004, 0.007)], &errors).unwrap();
         assert!(bound.as_ref().is_none_or(|bound| bound[0].position_m > 1.0), "{bound:?}");
     }
 
@@ -175,8 +277,9 @@ mod tests {
     #[test]
     fn least_squares_has_the_errors_that_the_bound_says() {
         let (slab, contact, noise_v) = (slab(), firm(-0.011, 0.003), 1e-3);
-        let bound = cramer_rao(&slab, &[contact], noise_v).unwrap().unwrap()[0];
-        let jacobian_v = derivatives(&slab, &[contact]).unwrap();
+        let errors = Errors::of_noise(slab.detector(), noise_v);
+        let bound = cramer_rao(&slab, &[contact], &errors).unwrap().unwrap()[0];
+        let (_, jacobian_v) = derivatives(&slab, &[contact], slab.detector()).unwrap();
         let jacobian_v = jacobian_v.columns(0, 3).into_owned();
         let inverse = jacobian_v.clone().pseudo_inverse(1e-12).unwrap();
         let mut noise = Noise::new(3);
@@ -189,5 +292,57 @@ mod tests {
             .sum();
         let found_m = (squares / f64::from(trials)).sqrt();
         assert!((found_m / bound.position_m - 1.0).abs() < 0.06, "{found_m} {bound:?}");
+    }
+
+    /// Against the mean of many readings.
+    #[test]
+    fn a_converter_that_ends_at_zero_halves_what_is_small_against_noise() {
+        let exact = Detector::default();
+        let deviation_v = exact.adc.deviation_v();
+        let volts = [-0.5, 0.1, 0.5, 1.0, 4.0].map(|deviations| deviations * deviation_v);
+        let readings = |value: &dyn Fn(usize) -> f64| Readings::from_fn(5, |_, e| value(e));
+        for ground_v in [0.0, deviation_v, 0.2] {
+            let measured = Detector { ground_v, ..exact.clone() };
+            let found = Errors::of_noise(&measured, deviation_v).on_average(readings(&|e| volts[e]));
+            let mut noise = Noise::new(7);
+            let many = 100_000;
+            for (e, volts) in volts.iter().enumerate() {
+                let above = |volts: f64, noise: &mut Noise| (ground_v + volts + deviation_v * noise.normal()).max(0.0);
+                let sum_v: f64 = (0..many).map(|_| above(*volts, &mut noise) - above(0.0, &mut noise)).sum();
+                let off_v = found.at(0, e) - sum_v / f64::from(many);
+                assert!(off_v.abs() < 0.02 * deviation_v, "{ground_v} {volts} {off_v}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_below_a_floor_tells_nothing() {
+        let slab = slab();
+        let contact = [firm(0.004, 0.007)];
+        let error_m = |floor_v: f64| {
+            let converter = ConverterErrors { gain_share: 0.0, bow_v: 0.0, range_v: [floor_v, 3.1] };
+            let measured = Detector { converters: vec![converter], ..slab.detector().clone() };
+            cramer_rao(&slab, &contact, &Errors::of_noise(&measured, 1e-3)).unwrap().map(|bounds| bounds[0].position_m)
+        };
+        let readings = readings_v(&slab.impedance_ohm(&contact).unwrap(), slab.detector());
+        let largest_v = readings.largest_v();
+        assert!(error_m(0.7 * largest_v) > error_m(0.3 * largest_v) && error_m(0.3 * largest_v) > error_m(0.0));
+        assert_eq!(error_m(largest_v), None);
+    }
+
+    /// The bound of a detector as built is what the errors of its parameters and the noise make of least squares that knows their covariance.
+    #[test]
+    fn tolerances_cost_places_and_exact_ones_nothing() {
+        let detector = Detector::default();
+        let of = |factor: f64| {
+            let described = Detector { tolerances: detector.tolerances.times(factor), ..detector.clone() };
+            let model: Arc<dyn ForwardModel> = Arc::new(Slab::new(&described).unwrap().on_image(100));
+            let nuisance = Nuisance::new(&model, &described, 1).unwrap();
+            let errors = Errors { nuisance: nuisance.as_ref(), ..Errors::of_noise(&described, 1e-3) };
+            cramer_rao(&*model, &[firm(0.004, 0.007)], &errors).unwrap().unwrap()[0].position_m
+        };
+        let [exact, hardly, half, built] = [0.0, 1e-3, 0.5, 1.0].map(of);
+        assert!((hardly / exact - 1.0).abs() < 0.01, "{exact} {hardly}");
+        assert!(half > 3.0 * exact && built > 1.5 * half && built < 1e-3, "{exact} {half} {built}");
     }
 }

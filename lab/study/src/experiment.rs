@@ -7,10 +7,10 @@ use nalgebra::DMatrix;
 
 use super::scenes::electrode_distance_m;
 use tactomo_physics::baseline::{Baseline, BaselinePatterns, BaselineSum, Leakage};
-use tactomo_physics::detector::{Adc, Detector, Problem as Wrong, Tolerances};
+use tactomo_physics::detector::{Adc, Detector, Electrode, Problem as Wrong, Tolerances};
 use tactomo_physics::forward::jacobian::Jacobian;
 use tactomo_physics::forward::{Auto, ForwardError, ForwardModel, touched_impedance_ohm};
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Range, Readings};
 use tactomo_physics::scene::{Contact, Touch};
 use tactomo_physics::simulate::{Fault, FaultError, Measurement, drawn, finer_model};
 use tactomo_touch::solve::{Problem, SolveError};
@@ -117,7 +117,7 @@ impl Experiment {
             model_time,
             model: name,
             truth,
-            built: detector.clone(),
+            built: with_right_converters(detector),
             faults: Vec::new(),
             rest_ohm: None,
             before: None,
@@ -291,19 +291,32 @@ impl Experiment {
         electrode_distance_m(&self.detector)
     }
 
+    /// What the readings of each electrode can tell; nothing of a description alone, without a board.
+    fn ranges(&self) -> Vec<Range> {
+        let Detector { adc, converters, electrodes, .. } = &self.detector;
+        let of = |pad: &Electrode| Some(converters.get(pad.converter)?.range(adc.deviation_v()));
+        electrodes.iter().filter_map(of).collect()
+    }
+
     /// Readings of touches, one frame after the other, at noise of a `seed`.
     ///
     /// # Errors
     /// [`StudyError`] if a touch is off the detector.
     pub fn frames(&self, touches: &[Vec<Touch>], seed: u64) -> Result<Vec<Frame>, StudyError> {
         let mut measurement = Measurement::new(&self.built, &self.faults, seed)?;
-        let (rest, leakage) = match self.before.as_deref() {
+        let ranges = self.ranges();
+        // At rest a converter with a floor tells nothing.
+        let has_floor = ranges.iter().any(|range| range.floor_v.is_finite());
+        let taken = match self.before.as_deref() {
+            _ if has_floor => None,
             Some(before) => {
                 let seed = seed.wrapping_add(BEFORE);
-                before.rest_and_leakage(&mut Measurement::new(&before.built, &before.faults, seed)?)
+                let mut measurement = Measurement::new(&before.built, &before.faults, seed)?;
+                Some(before.rest_and_leakage(&mut measurement))
             }
-            None => self.rest_and_leakage(&mut measurement),
+            None => Some(self.rest_and_leakage(&mut measurement)),
         };
+        let (rest, leakage) = taken.map_or((None, None), |(rest, leakage)| (Some(rest), leakage));
         let mut frames: Vec<Frame> = Vec::with_capacity(touches.len());
         let mut last = None;
         for touches in touches {
@@ -315,8 +328,10 @@ impl Experiment {
                 },
             };
             let measured = measurement.readings_v(impedance_ohm.as_ref());
-            let mut readings = measured.clone();
-            rest.subtract(measured.volts(), readings.volts_mut());
+            let mut readings = if ranges.is_empty() { measured.clone() } else { measured.clone().within(&ranges) };
+            if let Some(rest) = &rest {
+                rest.subtract(measured.volts(), readings.volts_mut());
+            }
             readings.correct_channels(&self.detector);
             if let Some((leakage, sheets)) = &leakage {
                 leakage.take_off(readings.volts_mut(), *sheets);
@@ -329,9 +344,17 @@ impl Experiment {
     }
 }
 
+/// A detector on a chip whose converters are without errors.
+fn with_right_converters(detector: &Detector) -> Detector {
+    let mut detector = detector.clone();
+    detector.converters.iter_mut().for_each(|converter| (converter.gain_share, converter.bow_v) = (0.0, 0.0));
+    detector
+}
+
 /// A detector without what measures it: of detectors that are alike in this, one model is enough.
 fn unmeasured(detector: &Detector) -> Detector {
     let mut bare = Detector { drive_v: 0.0, on_resistance_ohm: 0.0, adc: Adc::default(), ..detector.taken_as_exact() };
+    bare.converters.clear();
     bare.electrodes.iter_mut().for_each(|pad| (pad.gain, pad.offset_v) = (1.0, 0.0));
     bare
 }

@@ -26,7 +26,7 @@ pub mod validate;
 mod variant;
 pub mod view;
 
-pub use self::bound::{Bound, RADIUS_DEVIATION, cramer_rao};
+pub use self::bound::{Bound, Errors, RADIUS_DEVIATION, cramer_rao};
 pub use self::calibrate::{Calibrate, Calibrated};
 pub use self::experiment::{Experiment, Frame, StudyError};
 pub use self::machine::Machine;

@@ -5,8 +5,9 @@
 use std::str::FromStr;
 
 use tactomo_firmware::Adc as FirmwareAdc;
-use tactomo_physics::detector::{Adc, Detector};
-use tactomo_protocol::{ConverterErrors, Range};
+use tactomo_firmware::mux::ONE_INPUT_SELECT_US;
+use tactomo_physics::detector::{self, Adc, Detector};
+use tactomo_protocol::{ConverterErrors, Range, Settings};
 
 use crate::inputs::{self, InputFigures};
 
@@ -111,6 +112,11 @@ const NOISE_MV: f64 = 5.0;
 pub const FRAME_INSTRUCTIONS: u64 = 66_867;
 /// Cycles of a row of 16 of them, at one and a half for an instruction.
 const ROW_CYCLES: u64 = FRAME_INSTRUCTIONS * 3 / 2 / 16;
+const ROW_ELECTRODES: f64 = 16.0;
+
+/// Bytes of a coded frame beside the readings, and of a reading.
+const FRAME_BYTES: f64 = 18.0;
+const BYTES_PER_READING: f64 = 0.75;
 
 /// Integral non-linearity 12 LSB of 0.76 mV by the data sheet, and 60 mV of total error from 150 to 2450 mV after calibration at this
 /// attenuation: a bow of 12 mV and a gain of 1 % make 60 mV at 2450 mV about twice their deviation together.
@@ -244,6 +250,41 @@ impl BoardModel {
         }
     }
 
+    /// What is known of its converters' errors, and the converter of each electrode that it has an input for.
+    pub fn converters(self) -> (Vec<detector::ConverterErrors>, Vec<usize>) {
+        let Some(analog) = &self.figures().analog else { return (Vec::new(), vec![0; self.most_electrodes()]) };
+        let errors = |of: &ConverterFigures| detector::ConverterErrors {
+            gain_share: of.gain_deviation,
+            bow_v: 1e-3 * of.bow_mv,
+            range_v: [of.floor_mv, of.ceiling_mv].map(|mv| 1e-3 * mv),
+        };
+        let inputs = analog.converters.iter().enumerate();
+        let inputs = inputs.flat_map(|(which, converter)| std::iter::repeat_n(which, converter.electrodes));
+        (analog.converters.iter().map(errors).collect(), inputs.collect())
+    }
+
+    /// Frames a second of so many electrodes at the settings after a reset: what the scan or the line allows, whichever is less (`docs/firmware.md`).
+    pub fn frames_per_s(self, electrodes: usize) -> f64 {
+        let Figures { wiring, conversion_ns, row_work_ns, line, analog, .. } = self.figures();
+        let settings = Settings::default();
+        let select_us: u16 = if *wiring == Wiring::Latched { ONE_INPUT_SELECT_US } else { 0 };
+        // Converters work side by side.
+        let in_turn = |converters: &[ConverterFigures]| {
+            let before =
+                converters.iter().scan(0, |sum, converter| Some(std::mem::replace(sum, *sum + converter.electrodes)));
+            let on_it =
+                converters.iter().zip(before).map(|(of, before)| of.electrodes.min(electrodes.saturating_sub(before)));
+            on_it.max().unwrap_or(electrodes)
+        };
+        let in_turn = analog.as_ref().map_or(electrodes, |analog| in_turn(analog.converters)) as f64;
+        let row_s = in_turn * (1e-9 * *conversion_ns as f64 + 1e-6 * f64::from(select_us))
+            + 1e-6 * f64::from(settings.settle_us)
+            + 1e-9 * *row_work_ns as f64 * electrodes as f64 / ROW_ELECTRODES;
+        let line_s =
+            line.map_or(0.0, |line| (FRAME_BYTES + BYTES_PER_READING * electrodes.pow(2) as f64) / line.bytes_per_s);
+        1.0 / (electrodes as f64 * row_s).max(line_s)
+    }
+
     /// What the firmware knows of its converters, where the board has some of its own.
     pub(super) fn firmware_adc(self) -> Option<FirmwareAdc> {
         let analog = self.figures().analog.as_ref()?;
@@ -259,5 +300,35 @@ impl ConverterFigures {
         let [noise_uv, bow_uv] = [self.noise_mv, self.bow_mv].map(|mv| (1e3 * mv) as u16);
         let errors = ConverterErrors { noise_uv, gain_ppm: (1e6 * self.gain_deviation) as u16, bow_uv };
         Range { electrodes: self.electrodes as u8, floor, ceiling, errors }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As `docs/firmware.md` works them out.
+    #[test]
+    fn frames_a_second_are_those_of_the_documents() {
+        for (model, electrodes, frames_per_s) in [
+            (BoardModel::Esp32, 16, 428.0),
+            (BoardModel::Esp32c3, 16, 66.0),
+            // 16 of (20 + 16 x 2) us.
+            (BoardModel::Ideal, 16, 1e6 / 832.0),
+            // Six on the first converter, three on the second: 9 of (60 + 20) us and nine sixteenths of a row's work each.
+            (BoardModel::Esp32, 9, 1e6 / (9.0 * 80.0 + 81.0 / 256.0 * 417.9)),
+        ] {
+            let found = model.frames_per_s(electrodes);
+            assert!((found / frames_per_s - 1.0).abs() < 0.01, "{} {electrodes}: {found}", model.name());
+        }
+    }
+
+    #[test]
+    fn floors_are_those_of_each_electrodes_converter() {
+        let (converters, inputs) = BoardModel::Esp32.converters();
+        let floor_v = |input: usize| converters[inputs[input]].range_v[0];
+        assert_eq!((inputs.len(), floor_v(0), floor_v(5), floor_v(6)), (16, 0.142, 0.142, 0.128));
+        let (ideal, c3) = (BoardModel::Ideal.converters(), BoardModel::Esp32c3.converters());
+        assert!(ideal.0.is_empty() && ideal.1.len() == 32 && c3.0[0].range_v[0] == 0.0 && c3.1.len() == 16);
     }
 }

@@ -35,6 +35,7 @@ pub use self::uneven::Unevenness;
 pub(crate) use self::uneven::cosines;
 use crate::geometry;
 use crate::hertz::Skin;
+use crate::readings::Range;
 
 /// A detection layer with its electrodes and the circuit that measures it.
 ///
@@ -115,7 +116,20 @@ impl ConverterErrors {
         let share = ((volts - low_v) / (high_v - low_v)).clamp(0.0, 1.0);
         [self.gain_share * volts, self.bow_v * 4.0 * share * (1.0 - share)]
     }
+
+    /// What its readings can tell, with noise of a standard deviation (V): as near to its ends as that, they say no more than a bound. At a floor of
+    /// zero there is nothing that hides.
+    pub fn range(&self, deviation_v: f64) -> Range {
+        let [low_v, high_v] = self.range_v;
+        let margin_v = ENDS * deviation_v;
+        let floor_v = if low_v > 0.0 { low_v + margin_v } else { f64::NEG_INFINITY };
+        Range { floor_v, ceiling_v: high_v - margin_v }
+    }
 }
+
+/// Standard deviations of noise within which a reading counts as at an end of a converter's range: a voltage a little below a floor reads as much
+/// above it as noise is.
+const ENDS: f64 = 2.0;
 
 /// Closed polygons, without repeating the first corner (m).
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -23,7 +23,8 @@ pub fn as_built(detector: &Detector, faults: &[Fault], seed: u64) -> Detector {
 }
 
 /// A detector as it may have been built by a description: each of its parameters off by its tolerance, and `seed` chooses by how much. What
-/// is returned is exact: it is what was built, which solvers do not know. Pads stay apart and within the outline.
+/// is returned is exact: it is what was built, which solvers do not know. Pads stay apart and within the outline. Converters, if the board that
+/// measures it is known, have gain and bow of one chip in place of the deviations.
 pub fn drawn(detector: &Detector, seed: u64) -> Detector {
     let mut noise = Noise::of(seed, Stream::AsBuilt);
     let mut built = detector.stepped(&steps(detector, &detector.tolerances, &mut noise));
@@ -31,6 +32,10 @@ pub fn drawn(detector: &Detector, seed: u64) -> Detector {
     let code_v = detector.adc.lsb_v();
     for pad in &mut built.electrodes {
         pad.offset_v += detector.tolerances.offset_lsb * code_v * noise.normal();
+    }
+    for converter in &mut built.converters {
+        converter.gain_share *= noise.normal();
+        converter.bow_v *= noise.normal();
     }
     Detector { calibration: None, correction: None, tolerances: Tolerances::EXACT, ..built }
 }

@@ -21,7 +21,8 @@ const PICKED_UP: f64 = 0.02;
 ///
 /// Where nothing conducts, everything is at the ground's potential. A channel whose wire is broken, when it is
 /// grounded, takes no current: everything else is at the drive's potential, and it reads 0 V itself. When it is not, its input
-/// floats: it drifts about, and picks up what is around, the same for the same seed.
+/// floats: it drifts about, and picks up what is around, the same for the same seed. [Converters](Detector::converters) of the detector are taken as what
+/// they are: off by that gain and that bow.
 ///
 /// ```
 /// use tactomo_physics::detector::Detector;
@@ -84,8 +85,13 @@ impl Measurement {
     /// The next frame as the converter gives it (V), with its noise and in its steps.
     pub fn readings_v(&mut self, impedance_ohm: Option<&DMatrix<f64>>) -> Readings {
         let mut volts = self.pad_voltages(impedance_ohm);
-        let ground_v = self.detector.ground_v;
-        volts.volts_mut().iter_mut().for_each(|volts| *volts += ground_v);
+        let Detector { ground_v, converters, electrodes, .. } = &self.detector;
+        for (index, volts) in volts.volts_mut().iter_mut().enumerate() {
+            let converter = converters.get(electrodes[index % electrodes.len()].converter);
+            let off_v = converter.map_or(0.0, |converter| converter.changes_v(*volts).into_iter().sum());
+            *volts += off_v + ground_v;
+        }
+        let ground_v = *ground_v;
         let mut readings = measured(&volts, &self.detector.adc, &mut self.conversion);
         readings.volts_mut().iter_mut().for_each(|volts| *volts -= ground_v);
         readings

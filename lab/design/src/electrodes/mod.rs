@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::Slab;
+use tactomo_study::Errors;
 
 use super::limit::{Spread, places_everywhere};
 use super::press::{COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M, nine_places};
@@ -141,7 +142,8 @@ fn row(group: Group, layout: Layout, diameter_m: f64, seed: u64) -> Result<Row, 
     let slab = Slab::new(&detector)?;
     let conversions = layout.count().pow(2);
     let noise_v = detector.adc.deviation_v();
-    let everywhere = places_everywhere(&slab, &Press::PAPER, COMPARED_S_PER_M, noise_v, PLACES)?;
+    let errors = Errors::of_noise(&detector, noise_v);
+    let everywhere = places_everywhere(&slab, &Press::PAPER, COMPARED_S_PER_M, &errors, PLACES)?;
     let contacts = nine_places(&detector).map(|place| Press::PAPER.at(place, COMPARED_S_PER_M));
     let name = match group {
         Group::Diameter => format!("{:.0} mm", diameter_m * 1e3),

@@ -4,6 +4,7 @@
 //! hardly pressed. Here all are as far from saturation.
 
 use tactomo_physics::forward::{ForwardError, ForwardModel};
+use tactomo_study::Errors;
 
 use super::super::limit::{at_share_of_drive, place_m, two_points_m};
 use super::super::metrics::Sweep;
@@ -38,11 +39,12 @@ impl AtHalf {
         solver: &PaperSolver,
     ) -> Result<Option<Self>, ForwardError> {
         let Some(strength) = at_share_of_drive(model, press, strengths, SHARE)? else { return Ok(None) };
+        let errors = Errors::of_noise(model.detector(), model.detector().adc.deviation_v());
         Ok(Some(Self {
             strength_s_per_m: strength,
             imaging: Sweep::of(model, press, &[], strength)?.metrics(solver).imaging,
             place_m: place_m(model, press, strength)?,
-            two_points_m: two_points_m(model, press, strength, model.detector().adc.deviation_v())?,
+            two_points_m: two_points_m(model, press, strength, &errors)?,
         }))
     }
 }

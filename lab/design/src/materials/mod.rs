@@ -14,6 +14,7 @@ use tactomo_physics::detector::{Detector, Layer, Stack};
 use tactomo_physics::forward::Slab;
 use tactomo_physics::hertz::Skin;
 use tactomo_physics::simulate::Noise;
+use tactomo_study::Errors;
 
 pub(crate) use self::claims::extent;
 pub use self::half::AtHalf;
@@ -153,6 +154,7 @@ fn condition(base: &Detector, task: &Task, solver: &PaperSolver, reached: bool) 
     let [bottom, top] = [task.layers.first(), task.layers.last()];
     let pressed = || nine_places(&detector).map(|place| Press::PAPER.at(place, COMPARED_S_PER_M));
     let reached = if reached || task.name.is_some() { Some(by_auto(&detector, &pressed(), task.seed)?) } else { None };
+    let errors = Errors::of_noise(&detector, detector.adc.deviation_v());
     Ok(Condition {
         name: task.name,
         bottom_s_per_m: bottom.map_or(0.0, |layer| layer.bottom_s_per_m),
@@ -161,7 +163,7 @@ fn condition(base: &Detector, task: &Task, solver: &PaperSolver, reached: bool) 
         noisy: sweep.noisy_metrics(solver, &mut Noise::new(task.seed)),
         limit: Limit::of(&slab, &Press::PAPER, COMPARED_S_PER_M, CONDUCTIVITIES_S_PER_M)?,
         at_half: AtHalf::of(&slab, &Press::PAPER, CONDUCTIVITIES_S_PER_M, solver)?,
-        force_range_n: range(&slab, &Press::indenter(&detector, task.skin)?, FORCES_N, detector.adc.deviation_v())?,
+        force_range_n: range(&slab, &Press::indenter(&detector, task.skin)?, FORCES_N, &errors)?,
         reached,
     })
 }

@@ -4,18 +4,15 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use tactomo_physics::detector::Detector;
-use tactomo_physics::scene::Contact;
 
-use super::super::reached::{as_built, by_auto};
-use super::super::{DesignError, Press, Progress, Reached};
+use super::super::reached::{AsBuilt, as_built};
+use super::super::{DesignError, Press, Progress};
 use super::find::{Found, find, front};
 use super::rating::hertz;
 use super::{Material, Rating, Space, Wish, Wishes};
 
-/// Detectors that are drawn from the tolerances of each choice.
-const DRAWN: u64 = 2;
 /// Presses that choices are tried with: shares of the sides from the middle.
-const TRIED: [[f64; 2]; 4] = [[0.03, -0.07], [-0.28, 0.17], [0.21, 0.31], [0.36, -0.33]];
+const TRIED: [[f64; 2]; 5] = [[0.03, -0.07], [-0.28, 0.17], [0.21, 0.31], [0.36, -0.33], [-0.13, -0.22]];
 
 /// What to search.
 #[derive(Clone, Debug)]
@@ -43,10 +40,8 @@ pub struct Choice {
     pub rating: Rating,
     /// Whether it meets all wishes.
     pub meets_all: bool,
-    /// What `auto` makes of four presses, one frame each, on the detector as described.
-    pub reached: Reached,
-    /// What a fit misses of the same presses on detectors as built, drawn from the tolerances, if the description is taken as exact.
-    pub as_built: Reached,
+    /// Error of places (m) that half of some presses on a detector as built, drawn from the tolerances, are told better than by `auto`, with one frame each.
+    pub place_found_m: Option<f64>,
     /// The detector itself.
     #[serde(skip)]
     pub detector: Detector,
@@ -59,10 +54,25 @@ pub struct Unmet {
     pub wish: Wish,
     /// What was wanted.
     pub wanted: f64,
-    /// The best there is: of all candidates if it is impossible, else of those that meet all other wishes.
+    /// The best there is: of all candidates, those not rated as built as described, if it is impossible; else of those that meet all other wishes as built.
     pub best: f64,
     /// By which candidate.
     pub by: String,
+}
+
+/// The wish without which the others are met best, where no candidate meets all but one.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Costliest {
+    /// Which.
+    pub wish: Wish,
+    /// What was wanted.
+    pub wanted: f64,
+    /// The candidate that meets the others best.
+    pub by: String,
+    /// What that gives of the wish; `None` if nothing.
+    pub given: Option<f64>,
+    /// Factor by which it misses that of the others which it misses most.
+    pub others_missed: f64,
 }
 
 /// How a detector that was compared does.
@@ -74,7 +84,7 @@ pub struct Compared {
     pub rating: Rating,
     /// Whether it meets all wishes.
     pub meets_all: bool,
-    /// How many of the candidates that were tried meet the wishes better.
+    /// How many of the candidates that were rated as built meet the wishes better.
     pub better: usize,
     /// How many are at least as good in everything, and better in something.
     pub beaten_by: usize,
@@ -89,7 +99,9 @@ pub struct Answer {
     pub candidates: usize,
     /// Those that could be built.
     pub tried: usize,
-    /// How many of those meet all wishes.
+    /// The best of them, and those that no other beat: what they give as built, within their tolerances, was rated.
+    pub rated: usize,
+    /// How many of these meet all wishes.
     pub meeting: usize,
     /// The few best, the best first.
     pub choices: Vec<Choice>,
@@ -97,9 +109,11 @@ pub struct Answer {
     pub impossible: Vec<Unmet>,
     /// If no candidate meets all: wishes of which one is to be relaxed, and how far.
     pub relax: Vec<Unmet>,
+    /// If none meets all but one either: the one that costs most.
+    pub costliest: Option<Costliest>,
     /// Those that no other beats: what each gives.
     pub front: Vec<Rating>,
-    /// All that were tried.
+    /// All that were rated as built.
     #[serde(skip)]
     pub all: Vec<Rating>,
     /// The detector that was compared.
@@ -122,22 +136,30 @@ pub fn answer(plan: &Plan, progress: Progress) -> Result<Answer, DesignError> {
     if found.is_empty() && !progress.is_stopped() {
         return Err(DesignError::NothingFits { electrodes: wishes.electrodes });
     }
-    let in_full: Vec<&Found> = found.iter().filter(|found| found.is_in_full).collect();
-    let picked = picked(&in_full, wishes);
+    // As described no detector gives less than as built, so that what none gives is impossible; whatever else is said needs those rated as built.
+    let impossible = unmet(&found, wishes, |_, _| true);
+    let tried = found.len();
+    let found: Vec<Found> = found.into_iter().filter(|found| found.is_in_full).collect();
+    let picked = picked(&found, wishes);
     // Also after a search that was stopped: without choices there is no answer.
     let never = AtomicBool::new(false);
     let choices = Progress::new(&never, progress.say)
         .map("choices as built", &picked, |(found, reason)| choice(found, reason, plan));
     let compared = plan.compared.as_ref().map(|detector| compared(detector, &found, wishes)).transpose()?;
     let meeting = found.iter().filter(|found| found.rating.meets(wishes, None)).count();
-    let is_met = in_full.iter().any(|found| found.rating.meets(wishes, None));
+    let relax = match meeting {
+        0 => unmet(&found, wishes, |rating, wish| rating.meets(wishes, Some(wish))),
+        _ => Vec::new(),
+    };
     Ok(Answer {
         candidates: space.count(),
-        tried: found.len(),
+        tried,
+        rated: found.len(),
         meeting,
         choices: choices.into_iter().flatten().collect::<Result<_, _>>()?,
-        impossible: unmet(&found, wishes, |_, _| true),
-        relax: if is_met { Vec::new() } else { unmet(&found, wishes, |rating, wish| rating.meets(wishes, Some(wish))) },
+        impossible,
+        costliest: if meeting == 0 && relax.is_empty() { costliest(&found, wishes) } else { None },
+        relax,
         front: front(&found).into_iter().map(|found| found.rating).collect(),
         all: found.iter().map(|found| found.rating).collect(),
         compared,
@@ -149,12 +171,12 @@ pub fn answer(plan: &Plan, progress: Progress) -> Result<Answer, DesignError> {
 
 /// The few best: the one that meets the wishes best, and those that are best in one thing among those that meet all (or, if none does, among those
 /// that miss least).
-fn picked<'a>(found: &[&'a Found], wishes: &Wishes) -> Vec<(&'a Found, String)> {
+fn picked<'a>(found: &'a [Found], wishes: &Wishes) -> Vec<(&'a Found, String)> {
     let Some(best) = found.iter().max_by(|a, b| a.rating.score(wishes).total_cmp(&b.rating.score(wishes))) else {
         return Vec::new();
     };
-    let meeting: Vec<&Found> = found.iter().copied().filter(|found| found.rating.meets(wishes, None)).collect();
-    let pool = if meeting.is_empty() { found.to_vec() } else { meeting };
+    let meeting: Vec<&Found> = found.iter().filter(|found| found.rating.meets(wishes, None)).collect();
+    let pool = if meeting.is_empty() { found.iter().collect() } else { meeting };
     let value = |found: &Found, wish: Wish| found.rating.margin(wish, wishes);
     let most = |of: &dyn Fn(&Found) -> f64| pool.iter().copied().max_by(|a, b| of(a).total_cmp(&of(b)));
     let specialists = [
@@ -186,7 +208,7 @@ fn reason(found: &Found, best_in: &[&str], wishes: &Wishes) -> String {
         .into_iter()
         .filter(|wish| rating.margin(*wish, wishes) < 0.0)
         .map(|wish| match rating.given(wish) {
-            Some(given) => format!("{} is {}, not {}", wish.name(), wish.text(given), wish.text(wishes.wanted(wish))),
+            Some(given) => format!("{} is {}, not {}", wish.name(), wish.text(given), wish.wished(wishes.wanted(wish))),
             None => format!("{} is not told at all", wish.name()),
         })
         .collect();
@@ -212,16 +234,17 @@ fn wish_text(wish: Wish, given: f64) -> String {
 fn choice(found: &Found, reason: &str, plan: &Plan) -> Result<Choice, DesignError> {
     let wishes = &plan.wishes;
     let press = Press::Ball { radius_m: wishes.tip_m, hertz: hertz(&found.detector)? };
-    let middle_n = (wishes.smallest_n * wishes.largest_n).sqrt();
-    let contacts: Vec<Contact> =
-        TRIED.iter().map(|shares| press.at([0, 1].map(|axis| shares[axis] * wishes.size_m[axis]), middle_n)).collect();
+    let at = |shares: &[f64; 2]| {
+        let place_m = [0, 1].map(|axis| shares[axis] * wishes.size_m[axis]);
+        vec![press.at(place_m, wishes.middle_n())]
+    };
+    let presses = [TRIED.iter().map(at).collect()];
     Ok(Choice {
         name: found.detector.name.clone(),
         reason: reason.to_owned(),
         rating: found.rating,
         meets_all: found.rating.meets(wishes, None),
-        reached: by_auto(&found.detector, &contacts, plan.seed)?,
-        as_built: as_built(&found.detector, &contacts, plan.seed, DRAWN)?,
+        place_found_m: as_built(&found.detector, &presses, [plan.seed])?.first().and_then(AsBuilt::place_m),
         detector: found.detector.clone(),
     })
 }
@@ -238,8 +261,25 @@ fn unmet(found: &[Found], wishes: &Wishes, counts: impl Fn(&Rating, Wish) -> boo
     Wish::ALL.into_iter().filter_map(of).collect()
 }
 
+/// The wish without which the others are met best.
+fn costliest(found: &[Found], wishes: &Wishes) -> Option<Costliest> {
+    let without = |wish: Wish| {
+        let worst = |found: &Found| found.rating.worst(wishes, Some(wish));
+        let best = found.iter().max_by(|a, b| worst(a).total_cmp(&worst(b)))?;
+        Some((worst(best), wish, best))
+    };
+    let (worst, wish, by) = Wish::ALL.into_iter().filter_map(without).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(Costliest {
+        wish,
+        wanted: wishes.wanted(wish),
+        by: by.detector.name.clone(),
+        given: by.rating.given(wish),
+        others_missed: (-worst).exp(),
+    })
+}
+
 fn compared(detector: &Detector, found: &[Found], wishes: &Wishes) -> Result<Compared, DesignError> {
-    let rating = Rating::as_driven(detector, wishes)?;
+    let rating = Rating::of(&wishes.board.measuring(detector.clone()), wishes)?;
     let score = rating.score(wishes);
     Ok(Compared {
         name: detector.name.clone(),
@@ -276,7 +316,7 @@ mod tests {
 
     #[test]
     fn modest_wishes_are_met_and_the_file_is_a_detector() {
-        let answer = answered(Wishes { two_points_m: 18e-3, electrodes: 9, ..wishes() });
+        let answer = answered(Wishes { place_m: 1.5e-3, two_points_m: 18e-3, electrodes: 9, ..wishes() });
         assert!(answer.meeting > 0 && answer.impossible.is_empty() && answer.relax.is_empty(), "{answer:?}");
         let best = &answer.choices[0];
         assert!(best.meets_all && best.reason.contains("meets the wishes best"), "{}", best.reason);
@@ -285,7 +325,7 @@ mod tests {
         assert_eq!((file.skin, &file.layers), (best.detector.skin, &best.detector.layers));
         assert!(file.skin.is_some());
         assert!(answer.compared.is_some_and(|compared| compared.rating.electrodes == 16));
-        assert!(!answer.front.is_empty() && answer.front.len() <= answer.tried);
+        assert!(!answer.front.is_empty() && answer.front.len() <= answer.rated && answer.rated <= answer.tried);
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! The search: a sample of all, then the neighbours of the best, again and again.
 //!
 //! Pareto local search (Paquete, Chiarandini and Stuetzle, 2004): every candidate that no other beats in all wishes has its neighbours looked
-//! at, and so have the few that meet the wishes best, until there is none left or enough was tried. That is done on coarse models; the best, and
-//! those that none beats, are then rated in full.
+//! at, and so have the few that meet the wishes best, until there is none left or enough was tried. That is done on coarse models of detectors as
+//! described; the best, and those that none beats, are then rated in full, as built within their tolerances.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::atomic::AtomicBool;
 
 use tactomo_physics::detector::Detector;
@@ -17,19 +17,23 @@ const SAMPLED: f64 = 0.3;
 /// Candidates whose neighbours are looked at in a round: the best ones, and as many of those that none beats.
 const BEST: usize = 12;
 
-/// So many of the best, and so many of those that none beats, are rated in full.
-const IN_FULL: usize = 24;
+/// So many of the best as described, and so many of those that none beats, are rated in full first.
+const FIRST_IN_FULL: usize = 12;
+/// So many of the best as built have their neighbours rated in full next.
+const NEAREST: usize = 4;
+/// So many are rated in full at most.
+const IN_FULL: usize = 48;
 
 /// A candidate that was tried.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Which.
     pub candidate: Candidate,
-    /// The detector, with the drive that suits it best.
+    /// The detector.
     pub detector: Detector,
     /// What it gives.
     pub rating: Rating,
-    /// Whether that was found on a standard model, with all drives.
+    /// Whether that was found on a standard model, with its tolerances.
     pub is_in_full: bool,
 }
 
@@ -55,7 +59,7 @@ pub fn find(
     let searching = progress.part(0, most.min(space.count()));
     if most >= space.count() {
         tried.rate(space, wishes, space.all(), most, searching);
-        return tried.in_full(wishes, progress);
+        return tried.in_full(space, wishes, progress);
     }
     let mut random = fastrand::Rng::with_seed(seed);
     let sample = std::iter::repeat_with(|| space.any(&mut random)).take((most as f64 * SAMPLED) as usize).collect();
@@ -68,7 +72,7 @@ pub fn find(
         let room = most - tried.seen.len();
         tried.rate(space, wishes, next.into_iter().take(room).collect(), most, searching);
     }
-    tried.in_full(wishes, progress)
+    tried.in_full(space, wishes, progress)
 }
 
 impl Tried {
@@ -85,8 +89,7 @@ impl Tried {
             progress.part(self.seen.len() - new.len(), most).map("detectors", &built, |(candidate, detector)| {
                 // What has no model, such as electrodes that touch, is no candidate.
                 let rating = Rating::roughly(detector, wishes).ok()?;
-                let detector = Detector { drive_v: rating.drive_v, ..detector.clone() };
-                Some(Found { candidate: *candidate, detector, rating, is_in_full: false })
+                Some(Found { candidate: *candidate, detector: detector.clone(), rating, is_in_full: false })
             });
         self.found.extend(rated.into_iter().flatten().flatten());
     }
@@ -107,30 +110,51 @@ impl Tried {
         next
     }
 
-    /// All, the best first, with those that matter rated in full: also after a search that was stopped, whose answer they are.
-    fn in_full(mut self, wishes: &Wishes, progress: Progress) -> Result<Vec<Found>, DesignError> {
+    /// All, the best first, with those that matter rated in full: also after a search that was stopped, whose answer they are. First those that are best
+    /// as described, and of those that none beats; then, as tolerances do not cost all alike, neighbours of what is best as built.
+    fn in_full(mut self, space: &Space, wishes: &Wishes, progress: Progress) -> Result<Vec<Found>, DesignError> {
         let never = AtomicBool::new(false);
         let progress = Progress::new(&never, progress.say);
         sort(&mut self.found, wishes);
-        let best = self.found.iter().take(IN_FULL);
-        let unbeaten = front(&self.found).into_iter().take(IN_FULL);
-        let chosen: HashMap<Candidate, Found> =
-            best.chain(unbeaten).map(|found| (found.candidate, found.clone())).collect();
-        let chosen: Vec<Found> = self.found.iter().filter_map(|found| chosen.get(&found.candidate).cloned()).collect();
-        let rated = progress.map("best detectors in full", &chosen, |found| {
-            let rating = Rating::of(&found.detector, wishes)?;
-            let detector = Detector { drive_v: rating.drive_v, ..found.detector.clone() };
-            Ok((found.candidate, Found { detector, rating, is_in_full: true, ..found.clone() }))
-        });
-        let rated: HashMap<Candidate, Found> =
-            rated.into_iter().flatten().collect::<Result<HashMap<_, _>, DesignError>>()?;
-        for found in &mut self.found {
-            if let Some(full) = rated.get(&found.candidate) {
-                *found = full.clone();
+        let best = self.found.iter().take(FIRST_IN_FULL);
+        let unbeaten = front(&self.found).into_iter().take(FIRST_IN_FULL);
+        let mut next: HashSet<Candidate> = best.chain(unbeaten).map(|found| found.candidate).collect();
+        let mut rated = 0;
+        while !next.is_empty() && rated < IN_FULL {
+            rated += next.len();
+            self.rate_in_full(&next, wishes, progress)?;
+            sort(&mut self.found, wishes);
+            let nearest = self.found.iter().filter(|found| found.is_in_full).take(NEAREST);
+            let around: Vec<_> = nearest.flat_map(|found| space.neighbours(&found.candidate)).collect();
+            // Those that the search did not come to.
+            self.rate(space, wishes, around.clone(), self.seen.len() + around.len(), progress);
+            sort(&mut self.found, wishes);
+            next = around.into_iter().collect();
+            // As described none gives less than as built: what is no better then will not be.
+            let least = self.found.first().map_or(f64::NEG_INFINITY, |found| found.rating.score(wishes));
+            let may_be_best = |found: &&Found| !found.is_in_full && found.rating.score(wishes) > least;
+            let open = self.found.iter().filter(may_be_best).map(|found| found.candidate);
+            next = open.filter(|candidate| next.contains(candidate)).take(IN_FULL - rated.min(IN_FULL)).collect();
+        }
+        Ok(self.found)
+    }
+
+    fn rate_in_full(
+        &mut self,
+        chosen: &HashSet<Candidate>,
+        wishes: &Wishes,
+        progress: Progress,
+    ) -> Result<(), DesignError> {
+        let mut chosen: Vec<&mut Found> =
+            self.found.iter_mut().filter(|found| chosen.contains(&found.candidate)).collect();
+        let detectors: Vec<&Detector> = chosen.iter().map(|found| &found.detector).collect();
+        let ratings = progress.map("best detectors as built", &detectors, |detector| Rating::of(detector, wishes));
+        for (found, rating) in chosen.iter_mut().zip(ratings) {
+            if let Some(rating) = rating {
+                (found.rating, found.is_in_full) = (rating?, true);
             }
         }
-        sort(&mut self.found, wishes);
-        Ok(self.found)
+        Ok(())
     }
 }
 
@@ -142,7 +166,7 @@ fn sort(found: &mut [Found], wishes: &Wishes) {
 }
 
 /// Those that no other beats in all wishes and in the number of electrodes, in their order.
-pub fn front(found: &[Found]) -> Vec<&Found> {
+pub fn front<'a>(found: impl IntoIterator<Item = &'a Found>) -> Vec<&'a Found> {
     let mut front: Vec<&Found> = Vec::new();
     for one in found {
         if !front.iter().any(|other| one.rating.is_beaten_by(&other.rating)) {

@@ -1,6 +1,7 @@
 //! From what a person wants to a detector that can be ordered.
 
 mod answer;
+mod board;
 mod find;
 mod foams;
 mod rating;
@@ -8,10 +9,13 @@ mod space;
 mod view;
 mod wishes;
 
-pub use self::answer::{Answer, Choice, Compared, Plan, Unmet, answer};
+pub use self::answer::{Answer, Choice, Compared, Costliest, Plan, Unmet, answer};
+pub use self::board::Board;
 pub use self::find::{Found, find};
 pub use self::foams::{FoamsError, Material, WrongFoam};
-pub use self::rating::{Rating, frames_per_s};
+pub use self::rating::Rating;
+pub(crate) use self::rating::hertz;
+pub(crate) use self::space::DRIVE_V;
 pub use self::space::{Candidate, Space};
 pub use self::view::view;
 pub use self::wishes::{Wish, Wishes, WrongWish};

@@ -1,6 +1,6 @@
-//! All detectors that can be made of the foams at hand, as a grid of choices with neighbours; but for the drive, which each is tried with in turn.
+//! All detectors that can be made of the foams at hand, as a grid of choices with neighbours.
 
-use tactomo_physics::detector::{Adc, Detector, Layer, Outline};
+use tactomo_physics::detector::{Detector, Layer, Outline};
 use tactomo_physics::hertz::Skin;
 
 use super::super::Layout;
@@ -18,10 +18,12 @@ const ALONG: usize = 8;
 const PITCHES: f64 = 3.1;
 /// A stack has so many layers at most.
 const LAYERS: usize = 2;
+/// Voltage of the driving layer (V): all readings are in proportion to it, and the ESP32's converter is calibrated up to 2.45 V at its widest range.
+pub(crate) const DRIVE_V: f64 = 2.4;
 /// Diameters are rounded to this (m): what can be ordered.
 const STEP_M: f64 = 0.1e-3;
 
-/// A choice of everything but the drive.
+/// A choice of everything.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Candidate {
     /// Foam and thickness of each layer, bottom first; by index.
@@ -195,12 +197,12 @@ impl Space {
                 .map(|(thickness_m, foam)| Layer::uniform(*thickness_m, foam.conductivity_s_per_m))
                 .collect(),
             electrodes: layout.electrodes(self.wishes.size_m, diameter_m / 2.0),
-            adc: Adc::default(),
+            drive_v: DRIVE_V - self.wishes.board.ground_v,
             skin: Some(Skin::of_layers(layers.iter().map(|(thickness_m, foam)| (*thickness_m, foam.elasticity_pa)))),
             ..Detector::default()
         };
         detector.check().ok()?;
-        Some(detector)
+        Some(self.wishes.board.measuring(detector))
     }
 
     /// Room that an electrode has along the shorter pitch (m).

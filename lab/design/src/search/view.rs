@@ -3,32 +3,37 @@
 use tactomo_physics::detector::short;
 use tactomo_study::view::{Axis, Chart, MM, PLAIN, Series, Style, TEXT, Table, Unit, View};
 
-use super::super::Reached;
-use super::{Answer, Choice, Compared, Rating, Unmet, Wish};
+use super::{Answer, Choice, Compared, Costliest, Rating, Unmet, Wish};
+
+/// Candidates that miss a wish by more than this factor are in no chart.
+const FAR: f64 = 5.0;
 
 /// What to order, and the front of what can be had.
 pub fn view(answer: &Answer) -> View {
     let wishes = &answer.wishes;
     let wanted = |wish: Wish| match wish {
-        Wish::Frames => wish.text(wishes.wanted(wish)),
-        _ => format!("{} {}", wish.name(), wish.text(wishes.wanted(wish))),
+        Wish::Frames => wish.wished(wishes.wanted(wish)),
+        _ => format!("{} {}", wish.name(), wish.wished(wishes.wanted(wish))),
     };
     let [width_mm, height_mm] = wishes.size_m.map(|side_m| short(side_m * 1e3));
     let tried = format!(
-        "Wanted: {width_mm} x {height_mm} mm, {}, at most {} electrodes. {} of {} candidates were tried, {} of them meet all wishes.",
+        "Wanted: {width_mm} x {height_mm} mm, {}, at most {} electrodes, read by the board {}. {} of {} candidates were tried; {} of the {} best meet all wishes as \
+         built.",
         Wish::ALL.map(wanted).join(", "),
         wishes.electrodes,
+        wishes.board.name,
         answer.tried,
         answer.candidates,
-        answer.meeting
+        answer.meeting,
+        answer.rated
     );
-    let had = "Every candidate that was tried; numbers are the choices above. Left and down is better; the dashed line joins those that no other beats \
+    let had = "Every candidate that was rated as built and comes within a factor of five; numbers are the choices above. Left and down is better; the dashed line joins those that no other beats \
                in both.";
     let charts = [
-        chart(answer, Wish::Place, ("time of a frame", Unit::Seconds), |rating| Some(1.0 / rating.frames_per_s)),
-        chart(answer, Wish::TwoPoints, ("error of places", Unit::Metres), |rating| rating.place_m),
-        chart(answer, Wish::Place, ("1 / force at saturation, 1/N", Unit::Plain), |rating| {
-            Some(1.0 / rating.largest_n?)
+        chart(answer, Wish::Place, ("time of a frame", Unit::Seconds), Wish::Frames, |frames_per_s| 1.0 / frames_per_s),
+        chart(answer, Wish::TwoPoints, ("error of places", Unit::Metres), Wish::Place, |place_m| place_m),
+        chart(answer, Wish::Place, ("1 / force at saturation, 1/N", Unit::Plain), Wish::Largest, |largest_n| {
+            1.0 / largest_n
         }),
     ];
     let mut view = View::new("Which detector to order", "").text(tried);
@@ -37,27 +42,26 @@ pub fn view(answer: &Answer) -> View {
     }
     view = advice(answer).into_iter().fold(view, |view, line| view.text(format!("**{line}**"))).with(choices(answer));
     if let Some(compared) = &answer.compared {
-        view = view.text(of_compared(compared, answer.tried));
+        view = view.text(of_compared(compared, answer.rated));
     }
     let method = format!(
-        "Places and two points are Cramer and Rao's bounds of one frame for a ball of {} mm pressed with {} N; forces run from three standard errors of \
-         noise to nine tenths of the drive, Hertz on the foams' elasticities, without the mesh that a press must bend first. Frames a second are an \
-         ESP32's at 921 600 baud. In {:.1} s.",
+        "Places are the error that half of presses have less than, by Cramer and Rao's bounds of one frame for a ball of {} mm pressed with {} N, with the board's \
+         noise and floor and the detector's tolerances, without calibration; two points likewise: what noise allows, which auto does not reach; forces run from \
+         the lightest that auto finds to nine tenths of the drive, by the measured law of \
+         contact. In {:.1} s.",
         2e3 * wishes.tip_m,
-        PLAIN.text(Some((wishes.smallest_n * wishes.largest_n).sqrt())),
+        PLAIN.text(Some(wishes.middle_n())),
         answer.seconds
     );
     View { method, ..view.heading("What can be had").figures(had, charts) }
 }
 
 fn choices(answer: &Answer) -> Table {
-    let auto = |choice: &Choice| reached(&choice.reached);
     Table::of("", answer.choices.iter().enumerate())
         .column("detector", TEXT, |(index, choice)| format!("{}. {}", index + 1, choice.name))
         .column("why", TEXT, |(_, choice)| choice.reason.as_str())
         .column("gives", TEXT, |(_, choice)| gives(&choice.rating))
-        .column("places by auto, one frame", TEXT, |(_, choice)| auto(choice))
-        .column("as built, not calibrated and tolerances ignored", TEXT, |(_, choice)| reached(&choice.as_built))
+        .column("places by auto on one as built", MM, |(_, choice)| choice.place_found_m)
         .style(Style::Prose)
         .into()
 }
@@ -65,13 +69,28 @@ fn choices(answer: &Answer) -> Table {
 /// What is impossible, and what to relax.
 fn advice(answer: &Answer) -> Vec<String> {
     let impossible = answer.impossible.iter().map(|unmet| format!("impossible with these foams: {}", of_unmet(unmet)));
-    let nothing = answer.meeting == 0 && answer.impossible.is_empty() && answer.relax.is_empty();
     let relax =
         answer.relax.iter().map(|unmet| format!("with all other wishes kept, {}: relax that one", of_unmet(unmet)));
-    let several = nothing.then(|| {
-        "no candidate meets all wishes, nor all but one: relax two of those that the choices below miss".to_owned()
+    let nearest = (answer.meeting == 0)
+        .then(|| format!("of the {} rated as built none meets all wishes: choice 1 is the nearest", answer.rated));
+    let misses_light = |choice: &Choice| choice.rating.margin(Wish::Smallest, &answer.wishes) < 0.0;
+    let floor = (answer.wishes.board.has_floor() && answer.choices.first().is_some_and(misses_light)).then(|| {
+        format!(
+            "the floor of the converters of {} hides light presses: lift its ground and say so, --ground 0.25, or take a board without a floor",
+            answer.wishes.board.name
+        )
     });
-    impossible.chain(relax).chain(several).collect()
+    impossible.chain(nearest).chain(relax).chain(answer.costliest.as_ref().map(of_costliest)).chain(floor).collect()
+}
+
+fn of_costliest(costliest: &Costliest) -> String {
+    let Costliest { wish, wanted, by, given, others_missed } = costliest;
+    let given = given.map_or_else(|| "tells nothing of it".to_owned(), |given| format!("gives {}", wish.text(given)));
+    format!(
+        "the wish that costs most is {} {}: without it, all others would be missed by a factor of {others_missed:.1} at most (by {by}, which {given})",
+        wish.name(),
+        wish.wished(*wanted)
+    )
 }
 
 fn of_unmet(unmet: &Unmet) -> String {
@@ -79,38 +98,33 @@ fn of_unmet(unmet: &Unmet) -> String {
         "{} is at best {}, where {} is wanted (by {})",
         unmet.wish.name(),
         unmet.wish.text(unmet.best),
-        unmet.wish.text(unmet.wanted),
+        unmet.wish.wished(unmet.wanted),
         unmet.by
     )
 }
 
 fn gives(rating: &Rating) -> String {
-    let given = |wish: Wish| match rating.given(wish) {
-        Some(given) if given.is_finite() => wish.text(given),
-        Some(_) => "any".to_owned(),
+    let given = |before: &str, wish: Wish| match rating.given(wish) {
+        Some(given) if given.is_finite() => format!("{before}{}", wish.text(given)),
+        Some(_) => format!("{before}any"),
         None => "not told".to_owned(),
     };
     format!(
-        "{} to {}; places to {}; two points {}; {}; {} electrodes; {} mm thick; {} V",
-        given(Wish::Smallest),
-        given(Wish::Largest),
-        given(Wish::Place),
-        given(Wish::TwoPoints),
-        given(Wish::Frames),
+        "{}{}; places {}; two points {}; {}; {} electrodes; {} mm thick; {} V",
+        given("", Wish::Smallest),
+        given(" to ", Wish::Largest),
+        given("to ", Wish::Place),
+        given("at best ", Wish::TwoPoints),
+        given("", Wish::Frames),
         rating.electrodes,
         super::space::plain(rating.thickness_m * 1e3),
         rating.drive_v
     )
 }
 
-fn reached(reached: &Reached) -> String {
-    let found = if reached.found < 1.0 { format!(" ({:.0} % found)", 100.0 * reached.found) } else { String::new() };
-    format!("{} mm{found}", MM.text(reached.place_m))
-}
-
-fn of_compared(compared: &Compared, tried: usize) -> String {
+fn of_compared(compared: &Compared, rated: usize) -> String {
     format!(
-        "{}: {}; {}. {} of the {tried} candidates meet the wishes better, {} are nowhere worse",
+        "{}: {}; {}. {} of the {rated} best candidates meet the wishes better, {} are nowhere worse",
         compared.name,
         if compared.meets_all { "meets all wishes" } else { "does not meet all wishes" },
         gives(&compared.rating),
@@ -119,8 +133,16 @@ fn of_compared(compared: &Compared, tried: usize) -> String {
     )
 }
 
-fn chart(answer: &Answer, wish: Wish, (title, unit): (&str, Unit), x: fn(&Rating) -> Option<f64>) -> Chart {
-    let point = |rating: &Rating| (x(rating).unwrap_or(f64::NAN), rating.given(wish));
+/// A wish upwards over another one to the right, of which `less` makes what is better the less it is.
+fn chart(answer: &Answer, wish: Wish, (title, unit): (&str, Unit), other: Wish, less: impl Fn(f64) -> f64) -> Chart {
+    let wanted = |wish: Wish| answer.wishes.wanted(wish);
+    // What misses by far would only make the axes longer.
+    let is_near = |rating: &Rating| Wish::ALL.iter().all(|wish| rating.margin(*wish, &answer.wishes) > -FAR.ln());
+    let point = |rating: &Rating| {
+        // What nothing saturates has no place on such an axis.
+        let x = rating.given(other).map(&less).filter(|x| *x > 0.0);
+        (x.unwrap_or(f64::NAN), rating.given(wish).filter(|_| is_near(rating)))
+    };
     let tried = Series::dots("", "bound", answer.all.iter().map(point)).unlabelled();
     let chosen = answer
         .choices
@@ -131,5 +153,6 @@ fn chart(answer: &Answer, wish: Wish, (title, unit): (&str, Unit), x: fn(&Rating
         answer.compared.iter().map(|compared| Series::dots(compared.name.as_str(), "paper", [point(&compared.rating)]));
     let axes = [Axis::log(title, unit).decades(0.6), Axis::log("", Unit::Metres).decades(0.6)];
     let series = std::iter::once(tried).chain(chosen).chain(compared);
-    Chart { has_front: true, ..Chart::new(wish.name(), format!("{title} to the right"), axes, series) }
+    let [guide, level] = [less(wanted(other)), wanted(wish)].map(|value| Some((value, "wanted".to_owned())));
+    Chart { has_front: true, guide, level, ..Chart::new(wish.name(), format!("{title} to the right"), axes, series) }
 }

@@ -1,5 +1,9 @@
 //! What a person wants of a detector.
 
+use tactomo_physics::detector::short;
+
+use super::Board;
+
 /// What is wanted; all of it at once.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Wishes {
@@ -19,6 +23,8 @@ pub struct Wishes {
     pub electrodes: usize,
     /// Radius of what presses (m).
     pub tip_m: f64,
+    /// What reads it.
+    pub board: Board,
 }
 
 /// One of the wishes that can be met more or less.
@@ -67,20 +73,35 @@ impl Wish {
         matches!(self, Self::Smallest | Self::Place | Self::TwoPoints)
     }
 
-    /// A value of it with its unit.
+    /// What is given of it, to three digits, with its unit.
     pub fn text(self, value: f64) -> String {
-        let three = |value: f64| tactomo_study::view::PLAIN.text(Some(value));
         match self {
             // Below this it is the mesh between the layers that decides, which nothing here knows.
             Self::Smallest if value < 1e-3 => "under 0.001 N".to_owned(),
-            Self::Smallest | Self::Largest => format!("{} N", three(value)),
-            Self::Place | Self::TwoPoints => format!("{} mm", three(value * 1e3)),
+            _ => self.with_unit(value, |value| tactomo_study::view::PLAIN.text(Some(value))),
+        }
+    }
+
+    /// What is wished of it, as people write it, with its unit.
+    pub fn wished(self, value: f64) -> String {
+        self.with_unit(value, short)
+    }
+
+    fn with_unit(self, value: f64, digits: impl Fn(f64) -> String) -> String {
+        match self {
+            Self::Smallest | Self::Largest => format!("{} N", digits(value)),
+            Self::Place | Self::TwoPoints => format!("{} mm", digits(value * 1e3)),
             Self::Frames => format!("{value:.0} frames/s"),
         }
     }
 }
 
 impl Wishes {
+    /// Force that places and two points are told at (N): as far from the smallest as from the largest.
+    pub fn middle_n(&self) -> f64 {
+        (self.smallest_n * self.largest_n).sqrt()
+    }
+
     /// What is wanted of one of them.
     pub fn wanted(&self, wish: Wish) -> f64 {
         match wish {
@@ -132,14 +153,26 @@ impl Wishes {
                 format!("is {}; {} to {} are possible", self.electrodes, allowed.start(), allowed.end()),
             );
         }
-        let fastest = super::rating::frames_per_s(*allowed.start());
+        if self.electrodes > self.board.most_electrodes() {
+            return wrong(
+                "--electrodes",
+                format!(
+                    "is {}; the board {} has inputs for {}: give --board ideal, or fewer",
+                    self.electrodes,
+                    self.board.name,
+                    self.board.most_electrodes()
+                ),
+            );
+        }
+        let fastest = self.board.frames_per_s(*allowed.start());
         if self.frames_per_s > fastest {
             return wrong(
                 "--frames",
                 format!(
-                    "is {}; with the {} electrodes that a detector needs at least, {fastest:.0} frames a second are possible",
+                    "is {}; with the {} electrodes that a detector needs at least, {fastest:.0} frames a second are possible on the board {}",
                     self.frames_per_s,
-                    allowed.start()
+                    allowed.start(),
+                    self.board.name
                 ),
             );
         }
@@ -151,6 +184,13 @@ impl Wishes {
 pub(super) mod tests {
     use super::*;
 
+    /// A board without a floor, of as many frames a second whatever it reads.
+    pub fn board() -> Board {
+        let adc = tactomo_physics::detector::Adc::default();
+        let (converters, inputs) = (Vec::new(), vec![0; 16]);
+        Board { name: "even".to_owned(), adc, ground_v: 0.0, converters, inputs, frames_per_s: vec![400.0; 16] }
+    }
+
     pub fn wishes() -> Wishes {
         Wishes {
             size_m: [0.06, 0.06],
@@ -161,6 +201,7 @@ pub(super) mod tests {
             frames_per_s: 100.0,
             electrodes: 16,
             tip_m: 2.5e-3,
+            board: board(),
         }
     }
 
@@ -173,6 +214,7 @@ pub(super) mod tests {
             (Wishes { smallest_n: 6.0, ..wishes() }, "--smallest", "not below --largest"),
             (Wishes { two_points_m: 0.07, ..wishes() }, "--two-points", "shorter side"),
             (Wishes { electrodes: 3, ..wishes() }, "--electrodes", "4 to 32"),
+            (Wishes { electrodes: 17, ..wishes() }, "--electrodes", "the board even has inputs for 16"),
             (Wishes { frames_per_s: 1e6, ..wishes() }, "--frames", "are possible"),
             (Wishes { largest_n: f64::NAN, ..wishes() }, "--largest", "above zero"),
         ] {

@@ -1,10 +1,15 @@
 //! `tactomo-lab study materials` and the other studies of detectors.
 
+use anyhow::ensure;
 use serde::Serialize;
-use tactomo_design::{DesignError, Progress, bonding, electrodes, explain, materials, overview, samples, thickness};
+use tactomo_design::search::Material;
+use tactomo_design::{
+    DesignError, Progress, bonding, electrodes, explain, materials, overview, promises, samples, thickness,
+};
 use tactomo_study::view::View;
 use tactomo_touch::solve::Method;
 
+use super::super::design::{board_for, ground};
 use super::super::shown::{Shown, watched};
 use tactomo_cli::choice;
 
@@ -94,6 +99,35 @@ pub enum Study {
     ///   tactomo-lab study electrodes --csv electrodes.csv
     #[command(verbatim_doc_comment)]
     Electrodes(Seeded),
+    /// Holds what `design` promises against what is found: five wishes, from a fingertip to a seat.
+    ///
+    /// A detector is searched for each wish, built five times within its tolerances, read by a chip
+    /// of the board and pressed; `auto` knows its description and one frame. Beside each stands an even
+    /// grid of 4 x 4 electrodes on foam A.
+    ///
+    /// Examples:
+    ///   tactomo-lab study promises --out promises.html
+    ///   tactomo-lab study promises --wish strip --try 300 --json
+    #[command(verbatim_doc_comment)]
+    Promises {
+        /// Wishes whose names have this in them [default: all five]
+        #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
+        wish: String,
+        /// Voltage that the multiplexer's ground is lifted to, V: above the board's floor nothing is hidden (docs/hardware.md)
+        #[arg(long, value_name = "V", default_value_t = 0.0, value_parser = ground())]
+        ground: f64,
+        /// Candidates that each search tries at most
+        #[arg(long = "try", value_name = "COUNT", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(1..))]
+        most: u32,
+        /// Detectors as built of each
+        #[arg(long, value_name = "COUNT", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..))]
+        built: u8,
+        /// Presses of each of these
+        #[arg(long, value_name = "COUNT", default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..))]
+        presses: u16,
+        #[command(flatten)]
+        args: Seeded,
+    },
     /// All studies of detectors, on one page: what of the paper holds, and what of it belongs to its solver.
     ///
     /// Examples:
@@ -174,6 +208,21 @@ pub fn run(study: &Study) -> anyhow::Result<()> {
         Study::Electrodes(Seeded { seed, shown }) => {
             let plan = electrodes::Plan { seed: *seed };
             found(shown, |progress| electrodes::run(&plan, progress), |report| vec![electrodes::view(report)])
+        }
+        Study::Promises { wish, ground, most, built, presses, args: Seeded { seed, shown } } => {
+            let mut wanted = promises::wanted(|electrodes| board_for(electrodes, None, *ground));
+            let names = wanted.iter().map(|wanted| wanted.name.as_str()).collect::<Vec<_>>().join(", ");
+            wanted.retain(|wanted| wanted.name.contains(wish.as_str()));
+            ensure!(!wanted.is_empty(), "--wish {wish} is in none of {names}");
+            let plan = promises::Plan {
+                wanted,
+                foams: Material::of_paper(),
+                most: *most as usize,
+                built: u64::from(*built),
+                presses: usize::from(*presses),
+                seed: *seed,
+            };
+            found(shown, |progress| promises::run(&plan, progress), |report| vec![promises::view(report)])
         }
         Study::All(Seeded { seed, shown }) => found(shown, |progress| All::run(*seed, progress), All::views),
     }

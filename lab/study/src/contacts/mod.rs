@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use self::scenes::RandomScene;
-use super::bound::cramer_rao;
+use super::bound::{Errors, cramer_rao};
 use super::calibrate::{Calibrate, Calibrated};
 use super::experiment::{Experiment, StudyError};
 use super::machine::Machine;
@@ -187,7 +187,8 @@ fn try_scene(
         solutions.push(solution.map_err(|error| refused(solver, error))?);
     }
     let detector = &experiment.detector;
-    let bounds = cramer_rao(&*experiment.problem.model, &scene.contacts, detector.adc.deviation_v())?;
+    let errors = Errors::of_noise(detector, detector.adc.deviation_v());
+    let bounds = cramer_rao(&*experiment.problem.model, &scene.contacts, &errors)?;
     let solution = &solutions[frames.max(1) - 1];
     Ok(Trial {
         scene: scene.index,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::{Floor, Group, GroupReport, Heap, Plan, SceneReport, SolverReport, milliseconds};
-use crate::bound::{Bound, cramer_rao};
+use crate::bound::{Bound, Errors, cramer_rao};
 use crate::experiment::{Experiment, Frame, StudyError};
 use crate::scenes::SceneKind;
 use crate::score::{Score, Scorer, Spread, Summary};
@@ -68,8 +68,8 @@ fn floor(trials: &[Trial], group: Group) -> Result<Floor, StudyError> {
             for (before, frame) in place.frames.iter().enumerate() {
                 let contacts = frame.contacts.as_deref().unwrap_or_default();
                 // Whoever follows may use all frames until then: their information adds up.
-                let deviation_v = deviation_v / (1.0 + before as f64).sqrt();
-                let Some(bounds) = cramer_rao(&*experiment.problem.model, contacts, deviation_v)? else { continue };
+                let errors = Errors::of_noise(&experiment.detector, deviation_v / (1.0 + before as f64).sqrt());
+                let Some(bounds) = cramer_rao(&*experiment.problem.model, contacts, &errors)? else { continue };
                 let errors_m = if before == 0 { &mut first_m } else { &mut following_m };
                 errors_m.extend((0..FLOOR_DRAWS).map(|_| drawn_m(&bounds, &mut noise)));
             }

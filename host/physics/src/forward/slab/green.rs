@@ -48,14 +48,18 @@ impl SurfaceGreen {
         let area_m2 = size_m[0] * size_m[1];
         // The near part's own mean belongs to mode 0; the smooth part carries the rest of the floating response.
         let mean = surface.floating - split_m * split_m / (4.0 * surface.sheet_s);
-        let modes = grid.modes_within(SMOOTH_END / split_m);
-        let amplitude = |mode: &[usize; 2]| {
+        let end = SMOOTH_END / split_m;
+        let amplitude = |mode: [usize; 2]| {
             let k = grid.wave_number(0, mode[0]).hypot(grid.wave_number(1, mode[1]));
-            let value = if k > 0.0 { (surface.response)(k) * (-0.25 * (k * split_m).powi(2)).exp() } else { mean };
-            signs(*mode) / area_m2 * value
+            let value = match k {
+                0.0 => mean,
+                _ if k < end => (surface.response)(k) * (-0.25 * (k * split_m).powi(2)).exp(),
+                _ => 0.0,
+            };
+            signs(mode) / area_m2 * value
         };
-        let amplitudes = DMatrix::from_iterator(1, modes.len(), modes.iter().map(amplitude));
-        let smooth = grid.synthesise(&modes, &amplitudes);
+        let [m, n] = [0, 1].map(|axis| (0..=grid.modes(axis)).filter(|m| grid.wave_number(axis, *m) < end).count());
+        let smooth = grid.series(&DMatrix::from_fn(n, m, |n, m| amplitude([m, n])));
         Self {
             size_m,
             split_m,

@@ -97,6 +97,14 @@ impl Grid {
         (lines * waves).data.into()
     }
 
+    /// Spline coefficients of one sum of cosine modes, by the amplitudes of the lowest: `half waves along y x half waves along x`. In the order of
+    /// [`synthesise`](Self::synthesise).
+    pub fn series(&self, amplitudes: &DMatrix<f64>) -> Vec<f64> {
+        let [x, y] = [0, 1].map(|axis| self.cosines(axis));
+        let lines = y.rows(0, amplitudes.nrows()).transpose() * amplitudes;
+        (lines * x.rows(0, amplitudes.ncols())).data.into()
+    }
+
     /// Spline coefficients through the values of a function of the place (m): as [`synthesise`](Self::synthesise).
     pub fn through(&self, function: impl Fn([f64; 2]) -> f64) -> Vec<f64> {
         let at_m = |axis: usize, node: usize| node as f64 / self.cells_per_m[axis];
@@ -109,7 +117,8 @@ impl Grid {
     /// What each mode adds to the spline coefficients of each node along a direction: `modes x nodes`.
     fn cosines(&self, axis: usize) -> DMatrix<f64> {
         let cells = self.cells[axis];
-        let cosine = |phase: usize| (PI * (phase % (2 * cells)) as f64 / cells as f64).cos();
+        let period: Vec<f64> = (0..2 * cells).map(|phase| (PI * phase as f64 / cells as f64).cos()).collect();
+        let cosine = |phase: usize| period[phase % period.len()];
         let symbol: Vec<f64> = (0..=cells).map(|mode| (2.0 + cosine(mode)) / 3.0).collect();
         DMatrix::from_fn(cells + 1, self.nodes(axis), |mode, node| cosine(mode * node.abs_diff(1)) / symbol[mode])
     }
@@ -155,6 +164,11 @@ mod tests {
         let (kx, ky) = (grid.wave_number(0, 5), grid.wave_number(1, 3));
         let wave = |[x, y]: [f64; 2]| 2.0 * (kx * x).cos() * (ky * y).cos();
         let of_series = grid.synthesise(&[[0, 1], [5, 2], [5, 3]], &DMatrix::from_row_slice(1, 3, &[0.0, 0.0, 2.0]));
+        let mut amplitudes = DMatrix::zeros(4, 6);
+        amplitudes[(3, 5)] = 2.0;
+        for (one, other) in grid.series(&amplitudes).iter().zip(&of_series) {
+            assert!((one - other).abs() < 1e-12);
+        }
         for table in [of_series, grid.through(wave)] {
             for at in [[0.0, 0.0], [0.0123, 0.0271], [0.05, 0.03], [-0.017, 0.041], [0.0999, 0.0]] {
                 let ((x, x_slopes), (y, _)) = (grid.taps_with_slopes(0, at[0]), grid.taps_with_slopes(1, at[1]));

@@ -48,6 +48,7 @@ use crate::solve::answer::{Alternative, Calibrated, Flags, FoundContact, Solutio
 use crate::solve::before::adaptive_mean;
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
 use crate::solve::fit::approximation::ApproximationError;
+use crate::solve::fit::balance::balance;
 use crate::solve::fit::evidence::{Evidence, misfit_limit};
 use crate::solve::fit::linear::full_v;
 use crate::solve::fit::policy;
@@ -56,7 +57,7 @@ use crate::solve::fit::target::{Errors, Target};
 use crate::solve::problem::Problem;
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
-use tactomo_physics::readings::Readings;
+use tactomo_physics::readings::{Readings, Says};
 use tactomo_physics::space;
 
 /// Places of the scan.
@@ -85,12 +86,30 @@ pub struct ContactSettings {
 impl ContactSettings {
     /// For fingers on a detector: contacts of a sixth of the mean distance of its electrodes.
     pub fn of(problem: &Problem) -> Self {
-        // Against three times its nodes, a shell of 2000 is off by 0.0005 (curved) to 0.002 (0.4 mm of square-60), in the root of
-        // the mean square and but for the pads' own impedances; the slab by 0.0002 to 0.0005.
-        let model_error = if problem.model.name() == "shell" { 0.0015 } else { 0.0003 };
+        let model_error = model_error(&*problem.model);
         // Five fingers and a palm.
         Self { most: 6, radius_m: problem.usual_radius_m(), radius_deviation: 0.7, model_error, pad_error: 0.03 }
     }
+}
+
+/// Error of a forward model, as a share of the largest reading.
+fn model_error(model: &dyn ForwardModel) -> f64 {
+    // Against three times its nodes, a shell of 2000 is off by 0.0005 (curved) to 0.002 (0.4 mm of square-60), in the root of
+    // the mean square and but for the pads' own impedances; the slab by 0.0002 to 0.0005.
+    if model.name() == "shell" { 0.0015 } else { 0.0003 }
+}
+
+/// Square of readings of a single contact, without noise, over what it has to be for a contact to be looked for: where it is one, half of frames are taken
+/// for nothing. Balanced, such readings are a multiple of one pattern, so that all of their square is what a search gains by a
+/// contact at the right place. Readings that are bounds count nothing.
+pub fn contact_over_needed(readings: &Readings, model: &dyn ForwardModel) -> f64 {
+    let (n, detector) = (readings.electrodes(), model.detector());
+    let deviation_v = detector.adc.deviation_v().hypot(model_error(model) * readings.largest_v());
+    let mut volts = readings.volts().to_vec();
+    balance(&mut volts, n, detector.drive_v);
+    let is_read = |index: &usize| readings.says(index / n, index % n) == Says::Voltage;
+    let square_v2: f64 = (0..n * n).filter(is_read).map(|index| volts[index] * volts[index]).sum();
+    square_v2 / (deviation_v * deviation_v * policy::first_gain())
 }
 
 /// What finds contacts: the same for all frames, and shared by the threads that follow and search.
