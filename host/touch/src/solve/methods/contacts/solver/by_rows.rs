@@ -61,12 +61,13 @@ impl ContactTracker {
     }
 
     /// The grounds whose rows tell most of what moves, so many of them; of what stands or has just come, all: no number of rows takes away what the
-    /// model of a reading is off by, and a new contact is seen by all. Of nothing, those that see a contact come. None where rows do not tell it, as
+    /// model of a reading is off by, and a new contact is seen by all; nor do a few tell what readings are off by, once contacts have changed. Of nothing, those that see a contact come. None where rows do not tell it, as
     /// where contacts are too many to be followed by few rows.
     pub fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
+        let is_stale = self.rows.as_ref().is_some_and(|rows| rows.is_stale());
         match &self.last {
-            _ if self.doubt.needs_whole() || self.rows.as_ref().is_some_and(|rows| rows.is_stale()) => None,
-            Some(last) if self.moves() => Some(self.finder.telling_grounds(&last.fit, count)),
+            _ if self.doubt.needs_whole() => None,
+            Some(last) if self.moves() && !is_stale => Some(self.finder.telling_grounds(&last.fit, count)),
             Some(_) => Some(self.finder.all_grounds()),
             None => Some(self.finder.watching_grounds()),
         }
