@@ -256,7 +256,7 @@ impl BoardModel {
         let errors = |of: &ConverterFigures| detector::ConverterErrors {
             gain_share: of.gain_deviation,
             bow_v: 1e-3 * of.bow_mv,
-            range_v: [of.floor_mv, of.ceiling_mv].map(|mv| 1e-3 * mv),
+            range_v: [of.floor_mv, of.ceiling_mv].map(|mv| mv / 1e3),
         };
         let inputs = analog.converters.iter().enumerate();
         let inputs = inputs.flat_map(|(which, converter)| std::iter::repeat_n(which, converter.electrodes));

@@ -124,6 +124,8 @@ fn a_recording_begun_while_frames_come_is_read_from_its_first_frame_on() {
         while host.frames.len() < before + 20 {
             host.exchange(read_bytes);
         }
+        // On a busy machine one read has several of them.
+        let received = host.frames.len() - before;
         let closing = host.recorder.take().unwrap().close();
         while !closing.is_done() {
             host.exchange(4096);
@@ -131,7 +133,7 @@ fn a_recording_begun_while_frames_come_is_read_from_its_first_frame_on() {
         closing.wait().unwrap();
         let mut file = FrameFile::open(&path, None).unwrap();
         let frames = std::iter::from_fn(|| file.next_frame().unwrap()).count();
-        assert!((19..=20).contains(&frames), "{frames} frames with reads of {read_bytes} bytes");
+        assert!((received - 1..=received).contains(&frames), "{frames} of {received} with reads of {read_bytes} bytes");
         assert!(!file.loss().unwrap().is_any(), "{}", file.loss().unwrap());
         assert_eq!(file.header().unwrap().detector(&path).unwrap(), Some(detector()));
         std::fs::remove_file(path).unwrap();
