@@ -37,14 +37,15 @@ pub(super) struct RowState {
 
 /// What all readings are off by, of a detector that is not known exactly.
 ///
-/// It goes with the readings: contacts that change these by a share of them change it by about the same share, and who knows how.
+/// It changes with the contacts: once these have changed the readings by [`stale_share`](policy::stale_share), nothing of what was found is left, and
+/// what has come in its place is unknown but for its size.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Off {
     /// As it was found (V); none of a detector that is as described.
     volts: Vec<f64>,
     /// Readings of the contacts that it was found with (V).
     found_with: Vec<f64>,
-    /// Share by which contacts have changed them since.
+    /// How much of it is no longer what was found: 0 to 1.
     changed: f64,
 }
 
@@ -56,6 +57,7 @@ impl Off {
         Self { volts: target.likely_off_v(&found.volts), found_with: found.volts.clone(), changed: 0.0 }
     }
 
+    /// Takes note of the readings that contacts predict now (V).
     fn follow(&mut self, volts: &[f64]) {
         let square = |all: &[f64]| dot(all, all);
         let change: Vec<_> = self.found_with.iter().zip(volts).map(|(then, now)| now - then).collect();

@@ -41,7 +41,7 @@ pub(crate) struct ContactTracker {
     is_stale: bool,
     /// What is known besides by rows, since all readings were explained last.
     rows: Option<Box<RowState>>,
-    /// The newest whole frame, as what is followed was fitted to it: rows that come next go on from what it is off by.
+    /// The newest whole frame of a detector that is not known exactly: rows that come next go on from what it is off by.
     whole: Option<Target>,
     /// The latest of each reading, while rows come.
     latest: Option<Latest>,
@@ -217,7 +217,7 @@ impl ContactTracker {
         // What is unknown of the detector is soon known, and asks for a search of its own.
         self.is_of_key_frames =
             self.keys.are_ripe() && !target.is_provisional() && !self.finder.is_misfit(&found.fit, target);
-        (self.last, self.whole) = (Some(found), Some(target.clone()));
+        (self.last, self.whole) = (Some(found), target.error().map(|_| target.clone()));
         search || self.is_of_key_frames
     }
 

@@ -62,7 +62,7 @@ impl SystematicError {
         }
     }
 
-    /// Takes the rows of a target into account; contacts have changed what readings are off by by the share `changed`.
+    /// Takes the rows of a target into account; of what readings are off by, the share `changed` is no longer what was found.
     pub fn add(&mut self, fit: &DiscFit, target: &Target, errors: &Errors, changed: f64) {
         let is_looked_at = self.frames.is_multiple_of(LOOKED_AT);
         self.frames += 1;

@@ -60,9 +60,9 @@ impl ContactTracker {
         self.is_glimpsed = mean.is_some_and(|mean| !mean.readings.is_whole());
     }
 
-    /// The grounds whose rows tell most of what moves, so many of them; of what stands or has just come, all: no number of rows takes away what the
-    /// model of a reading is off by, and a new contact is seen by all; nor do a few tell what readings are off by, once contacts have changed. Of nothing, those that see a contact come. None where rows do not tell it, as
-    /// where contacts are too many to be followed by few rows.
+    /// The grounds whose rows tell most of what moves, so many of them. All, of what stands or has just come: no number of rows takes away what the model
+    /// of a reading is off by, and a new contact is seen by all; and once contacts have changed so much that it has to be found anew what readings
+    /// are off by. Of nothing, those that see a contact come. None where rows do not tell it, as where contacts are too many to be followed by few.
     pub fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
         let is_stale = self.rows.as_ref().is_some_and(|rows| rows.is_stale());
         match &self.last {
