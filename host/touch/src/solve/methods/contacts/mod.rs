@@ -23,6 +23,7 @@ mod places_tests;
 mod rows;
 mod scan;
 mod search;
+mod smoother;
 mod solver;
 mod spot_fit;
 mod starts;
@@ -337,8 +338,7 @@ impl ContactFinder {
     }
 
     /// An explanation as a solution, but for the certainty of its count: whoever answers knows whether it is an answer.
-    fn solution(&self, found: &ContactHypothesis, target: &Target) -> Solution {
-        let fit = &found.fit;
+    fn solution(&self, fit: &DiscFit, target: &Target) -> Solution {
         let covariance = fit.covariance();
         let logs: Vec<_> = (0..fit.contacts.len()).map(|k| self.logs(fit, k, covariance.as_ref())).collect();
         let mut contacts: Vec<_> =

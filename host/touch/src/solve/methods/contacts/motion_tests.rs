@@ -78,6 +78,34 @@ fn standard_errors_shrink_with_frames_until_the_model_is_the_limit() {
 }
 
 #[test]
+fn a_contact_that_glides_is_known_better_than_by_each_frame_and_as_well_as_is_said() {
+    let (mut off, mut by_frame_m, mut said_m) = (Vec::new(), 0.0, 0.0);
+    for phase in 0..4 {
+        let mut trial = MotionTrial::new();
+        trial.noise = Noise::new(20 + phase);
+        for frame in 0..90 {
+            // Round in four seconds, at 400 frames a second and 35 mm/s.
+            let (sin, cos) = (1.57 * (f64::from(frame) / 400.0 + phase as f64)).sin_cos();
+            let truth = contact(0.022 * cos, 0.022 * sin, 0.02);
+            trial.touch(&[truth]);
+            let solution = trial.solve();
+            let [found] = &solution.contacts[..] else { panic!("{frame}: {solution:?}") };
+            if frame >= 30 {
+                let of_frame = trial.solver.found().unwrap().fit.contacts[0];
+                by_frame_m += (of_frame.x_m - truth.x_m).hypot(of_frame.y_m - truth.y_m);
+                let uncertainty = found.uncertainty.as_ref().unwrap();
+                said_m += uncertainty.x_m.hypot(uncertainty.y_m);
+                off.extend([(found.x_m - truth.x_m, uncertainty.x_m), (found.y_m - truth.y_m, uncertainty.y_m)]);
+            }
+        }
+    }
+    let off_m: f64 = off.chunks(2).map(|pair| pair[0].0.hypot(pair[1].0)).sum();
+    let within = off.iter().filter(|(off_m, sigma_m)| off_m.abs() < *sigma_m).count() as f64 / off.len() as f64;
+    let report = format!("{off_m:.1e} m in all, {by_frame_m:.1e} by frames, {said_m:.1e} said, {within:.2} within");
+    assert!(off_m < 0.7 * by_frame_m && within > 0.6 && said_m < 3.0 * off_m, "{report}");
+}
+
+#[test]
 fn a_light_contact_is_found_after_some_frames_where_one_is_too_noisy() {
     let mut trial = MotionTrial::new();
     let truth = contact(-0.010, 0.006, 0.003);

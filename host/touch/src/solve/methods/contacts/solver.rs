@@ -11,6 +11,7 @@ use super::discs::DiscFit;
 use super::doubt::Doubt;
 use super::keep::needed;
 use super::rows::RowState;
+use super::smoother::Smoother;
 use super::window::KeyFrames;
 use super::{ContactFinder, ContactHypothesis, ContactSettings};
 use crate::solve::after::association::Association;
@@ -43,6 +44,8 @@ pub(crate) struct ContactTracker {
     rows: Option<Box<RowState>>,
     /// The newest whole frame of a detector that is not known exactly: rows that come next go on from what it is off by.
     whole: Option<Target>,
+    /// What whole frames before the newest say of what is followed.
+    smoother: Option<Smoother>,
     /// The latest of each reading, while rows come.
     latest: Option<Latest>,
     /// Whether what is followed was found in some of the rows only.
@@ -142,6 +145,7 @@ impl ContactTracker {
             is_stale: false,
             rows: None,
             whole: None,
+            smoother: None,
             latest: None,
             is_glimpsed: false,
             recounted_s: None,
@@ -186,7 +190,10 @@ impl ContactTracker {
 
     /// Brings the contacts to the next frame; whether they have to be searched.
     pub fn follow(&mut self, target: &Target) -> bool {
+        let before = self.smoother.take();
         let search = self.step_frame(target);
+        let followed = self.last.as_ref().filter(|_| !self.is_stale);
+        self.smoother = followed.and_then(|last| self.finder.smoothed(before, &last.fit, target));
         let fits = |last: &ContactHypothesis| !self.finder.is_misfit(&last.fit, target);
         self.doubt.whole(!self.is_stale && self.last.as_ref().map_or(!search, fits));
         search
@@ -231,6 +238,7 @@ impl ContactTracker {
     /// what it has found does not explain this frame as well as its own.
     pub fn adopt(&mut self, found: Option<ContactHypothesis>, frames: usize, target: &Target) -> bool {
         self.association = self.before.clone();
+        self.smoother = None;
         let expected_v = self.expected_v().map(<[f64]>::to_vec);
         let count = |found: &Option<ContactHypothesis>| found.as_ref().map_or(0, |found| found.fit.contacts.len());
         let before = count(&self.last);
@@ -295,8 +303,9 @@ impl ContactTracker {
 
     /// What is followed, as a solution, with the numbers that contacts keep.
     pub fn solution(&mut self, target: &Target) -> Solution {
-        let mut solution =
-            self.last.as_ref().map_or_else(|| self.finder.nothing(target), |found| self.finder.solution(found, target));
+        let shown = self.smoother.as_ref().and_then(|smoother| smoother.shown.as_ref());
+        let of = |last: &ContactHypothesis| self.finder.solution(shown.unwrap_or(&last.fit), target);
+        let mut solution = self.last.as_ref().map_or_else(|| self.finder.nothing(target), of);
         solution.flags.unfinished |= self.is_stale;
         // Among explanations none of which explains the readings, or of which better ones are still sought, the share of one says nothing.
         let certainty = self.last.as_ref().and_then(|found| found.certainty);
@@ -312,7 +321,7 @@ impl ContactTracker {
         (self.last, self.searched, self.is_stale) = (None, Searched::default(), false);
         (self.doubt, self.restless) = (Doubt::default(), 0);
         (self.keys, self.is_of_key_frames) = (KeyFrames::default(), false);
-        (self.rows, self.whole, self.recounted_s) = (None, None, None);
+        (self.rows, self.whole, self.smoother, self.recounted_s) = (None, None, None, None);
     }
 
     /// Forgets all.
@@ -336,7 +345,7 @@ impl ContactSearch {
     /// [`SolveError`] if the readings cannot be those of the detector.
     pub fn solution(&self, found: &ContactHypothesis, mean: &Mean) -> Result<Solution, SolveError> {
         let target = self.finder.target_of(mean, found.error())?;
-        Ok(self.finder.solution(found, &target))
+        Ok(self.finder.solution(&found.fit, &target))
     }
 
     /// The contacts that explain the mean of some frames, and the solution that they are; `None` if nothing touches. Better ones on the way there go

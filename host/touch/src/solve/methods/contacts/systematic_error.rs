@@ -109,8 +109,8 @@ fn scaled(matrix: &DMatrix<f64>, scale: impl Fn(usize, usize) -> f64) -> DMatrix
     DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| scale(i, j) * matrix[(i, j)])
 }
 
-/// `J^T W` of the readings of a target (1/V), in units of m.
-fn pulls(fit: &DiscFit, target: &Target, units: &[f64]) -> DMatrix<f64> {
+/// `J^T W` of the readings of a target (1/V), in such units of the parameters.
+pub(super) fn pulls(fit: &DiscFit, target: &Target, units: &[f64]) -> DMatrix<f64> {
     let active = target.at(&fit.volts);
     let mut pulls = DMatrix::zeros(units.len(), fit.volts.len());
     for ((mut row, slope), unit) in pulls.row_iter_mut().zip(fit.slopes_v()).zip(units) {

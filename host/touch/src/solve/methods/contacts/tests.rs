@@ -180,7 +180,7 @@ fn as_long_as_nothing_is_known_of_its_errors_a_detector_as_built_invents_little_
             invented[0] += usize::from(exact.fit.contacts.len() > 1);
             let target = finder.target_of(&Mean { readings, frames: 1 }, None).unwrap();
             let found = finder.search_exact(None, &target, &mut |_| ControlFlow::Continue(())).unwrap();
-            let solution = finder.solution(&found, &target);
+            let solution = finder.solution(&found.fit, &target);
             assert!(solution.flags.unfinished);
             invented[1] += usize::from(solution.contacts.len() > 1);
             let nearest =

@@ -86,7 +86,7 @@ impl ContactTracker {
 
     /// Brings the contacts to rows of readings; the rows as they were fitted, and whether the contacts have to be searched.
     fn step(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
-        self.before = self.association.clone();
+        (self.before, self.smoother) = (self.association.clone(), None);
         if let Some((last, whole)) = self.last.as_ref().zip(self.whole.take()) {
             self.rows = Some(Box::new(RowState::new(last, &whole)));
         }
