@@ -62,8 +62,8 @@ async fn calibrates(stage: &Stage<Live>, folder: &Path) -> Result<()> {
     let last_mm = done.number("errorMm");
     eprintln!("expected {first_mm:.2} mm, after {:.0} s more {last_mm:.2} mm", begin.elapsed().as_secs_f64());
     ensure!(
-        // The first fit of ten presses is nearly as good as it gets; a later one may be a chance worse.
-        last_mm < 1.1 * first_mm && done.number("rubbed") > 0.8 && done.text("recommended") == "true",
+        // The first fit of ten presses is nearly as good as it gets: six guides ended with 0.11 to 0.14 mm.
+        last_mm < 0.2 && done.number("rubbed") > 0.8 && done.text("recommended") == "true",
         "from {first_mm} mm to {last_mm} mm: {done:?}"
     );
     pictured(stage, pictures.as_deref(), "done").await?;
@@ -85,7 +85,7 @@ async fn calibrates(stage: &Stage<Live>, folder: &Path) -> Result<()> {
     let after_mm = off_mm(stage).await?;
     eprintln!("contacts are off by {before_mm:.2} mm before, {after_mm:.2} mm after");
     pictured(stage, pictures.as_deref(), "used").await?;
-    ensure!(after_mm < 1.0, "{before_mm} mm before, {after_mm} mm after");
+    ensure!(after_mm < 2.0 * last_mm, "{before_mm} mm before, {after_mm} mm after, where {last_mm} mm were expected");
     stage.browser.click("calibrate-close").await?;
     stage.browser.until("the end", |told| told.text("calibrating").is_empty()).await?;
     Ok(())

@@ -10,8 +10,8 @@
 //! That is new in every frame, and a [filter](super::multiple_models) that takes fits as measurements lessens it to some `P`. The rest of `C`
 //! stays as it is, as the same is off in every frame: the contacts that are shown have the covariance `C - N + P`.
 //!
-//! Limits: the mean of several frames is taken as one frame, which it brings anew; where contacts stand still, so that the mean is of many, the
-//! fit by itself is better, and is shown. Near edges a fit's place is no normal variable, and it is shown as well.
+//! Limits: the mean of several frames is taken as one frame, which it brings anew. Where contacts stand still, so that the mean is of many, the
+//! fit by itself is as good, and is shown. Near edges a fit's place is no normal variable, and it is shown as well.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -25,6 +25,9 @@ use tactomo_physics::scene::Contact;
 /// Time from one whole frame to the next (s): the ESP32's scans take so long, those of faster boards a third. Speeds are in proportion to it, and
 /// those of [motions](super::multiple_models) are five times apart.
 const FRAME_S: f64 = 2.4e-3;
+/// A mean of so many frames is as good as what frames before add: of a contact that glides by 0.9 standard errors a frame, that leaves 0.44 of
+/// a frame's error.
+const STILL_FRAMES: usize = 5;
 
 /// What frames before say of contacts.
 #[derive(Clone, Debug)]
@@ -38,8 +41,11 @@ pub(super) struct Smoother {
 }
 
 impl ContactFinder {
-    /// Adds what frames `before` say of a fit to the next; `None` where its parameters are not determined.
+    /// Adds what frames `before` say to a fit to the next; `None` where they add nothing, as its contacts stand still, or are not determined.
     pub(super) fn smoothed(&self, before: Option<Smoother>, fit: &DiscFit, target: &Target) -> Option<Smoother> {
+        if target.frames >= STILL_FRAMES {
+            return None;
+        }
         let [all_v, fixed_v] = [1, usize::MAX].map(|frames| self.errors.of_mean_v(frames));
         let covariance = fit.covariance()?;
         let gains = &covariance * pulls(fit, target, &vec![1.0; covariance.nrows()]);
