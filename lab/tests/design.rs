@@ -37,6 +37,12 @@ fn what_is_compared_has_to_be_of_the_size_that_is_wished() {
 }
 
 #[test]
+fn a_design_is_not_written_as_a_page_by_its_name() {
+    let message = refused(&["design", "--size", "30x30", "--out", "mine.html"]);
+    assert!(message.contains("for a page, --page mine.html"), "{message}");
+}
+
+#[test]
 fn a_design_is_a_detector_that_live_takes() {
     let folder = Folder::new("design");
     let path = folder.path("chosen.toml");

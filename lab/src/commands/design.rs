@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::builder::TypedValueParser;
 use tactomo_board::inputs::{self, Settling};
 use tactomo_board::simulated::BoardModel;
@@ -134,6 +134,9 @@ fn check_size(detector: &Detector, size_m: [f64; 2]) -> anyhow::Result<()> {
 /// Searches and answers.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let plan = args.plan()?;
+    if let Some(page) = args.out.as_ref().filter(|path| path.extension().is_some_and(|ending| ending == "html")) {
+        bail!("--out {0}: the choice is written as a detector file, in TOML; for a page, --page {0}", page.display());
+    }
     let file = NewFile::optional(args.out.as_ref(), args.overwrite)?;
     let page = NewFile::optional(args.page.as_ref(), args.overwrite)?;
     let answer = watched(|progress| search::answer(&plan, progress))?;
