@@ -264,7 +264,7 @@ impl ContactTracker {
         if before > 0 && self.last.is_some() && self.recounted_s.is_some() {
             self.doubt.recounted();
         }
-        self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(last, target)));
+        self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(&self.finder, last, target)));
         if let Some(mut latest) = self.latest.take() {
             latest.change_model(expected_v.as_deref(), self.expected_v());
             self.latest = Some(latest);
