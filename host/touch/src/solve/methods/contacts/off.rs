@@ -7,9 +7,9 @@
 //! mean s = (d^2 I + P^T P)^-1 P^T r,   covariance (I + P^T (I - H) P / d^2)^-1
 //! ```
 //!
-//! where `H` projects on what the contacts' parameters change. Steps are the detector's and stay; patterns are those of the contacts and change with them. So where contacts go, their patterns `P'` are made
-//! anew: readings are off by `P' s`, and how far that is unknown is the steps' covariance seen through `P'`. Between two makings nothing is said of
-//! the share that has changed but its size.
+//! where `H` projects on what the contacts' parameters change. Steps are the detector's and stay; patterns are those of the contacts and change
+//! with them. So where contacts go, their patterns `P'` are made anew: readings are off by `P' s`, and how far that is unknown is the steps'
+//! covariance seen through `P'`. Between two makings nothing is said of the share that has changed but its size.
 
 use std::sync::Arc;
 
@@ -33,8 +33,9 @@ pub(super) struct Off {
     /// What it may be besides, in independent patterns of one standard deviation (V), a column each.
     pub patterns_v: DMatrix<f64>,
     steps: Option<Arc<Steps>>,
-    /// Readings of the contacts that it was made for (V), and of those that were in the whole frame.
+    /// Readings of the contacts that it was made for (V).
     made_for: Vec<f64>,
+    /// Readings of those that were in the whole frame (V).
     found_with: Vec<f64>,
     /// How much of it is no longer what it was made as: 0 to 1.
     changed: f64,
