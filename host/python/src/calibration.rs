@@ -10,7 +10,6 @@ use tactomo::calibrate::{Frame, Rub, RubSettings, Step, rub};
 use tactomo::date::today;
 use tactomo::detector::{CalibratedParameter, Calibration as Found, Detector as Described};
 
-use crate::array;
 use crate::detector::Detector;
 use crate::error::{raised, refused};
 use crate::given;
@@ -81,8 +80,7 @@ impl Calibration {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let mut frames: Vec<Frame> =
-            given::frames(readings)?.into_iter().map(|readings| Frame { readings, known_m: None }).collect();
-        array::require_volts(frames.iter().map(|frame| &frame.readings), &detector.0)?;
+            given::frames(readings, &detector.0)?.into_iter().map(|readings| Frame { readings, known_m: None }).collect();
         for (index, x_m, y_m) in known {
             let count = frames.len();
             let frame = frames.get_mut(index);

@@ -1,10 +1,13 @@
 //! Readings in whichever form they are given.
 
-use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods};
+use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use tactomo::detector::Detector;
 use tactomo::readings::Readings;
+use tactomo::solve::check;
 
-use crate::array::of_array;
+use crate::array::{of_array, require_volts, sides};
+use crate::error::{raised, refused};
 use crate::live::TouchEvent;
 use crate::recording::Frame;
 
@@ -23,7 +26,34 @@ pub fn readings(given: &Bound<'_, PyAny>) -> PyResult<Readings> {
     of_array(&array)
 }
 
-/// Frames of readings: an array `(frames, n, n)`, `(frames, n * n)`, or a list of what [`readings`] takes.
-pub fn frames(given: &Bound<'_, PyAny>) -> PyResult<Vec<Readings>> {
-    given.try_iter()?.map(|frame| readings(&frame?)).collect()
+/// Frames of a detector's readings: an array `(frames, n, n)` or `(frames, n * n)`, or any iterable of what [`readings`] takes.
+///
+/// What cannot be readings of that detector is refused by the index of its frame, before anything is computed.
+pub fn frames(given: &Bound<'_, PyAny>, detector: &Detector) -> PyResult<Vec<Readings>> {
+    require_frames(given, detector.electrodes.len())?;
+    let named = |index: usize, error: PyErr| refused(format!("frames[{index}]: {}", error.value(given.py())));
+    let mut all = Vec::new();
+    for (index, frame) in given.try_iter()?.enumerate() {
+        let readings = readings(&frame?).map_err(|error| named(index, error))?;
+        check(&readings, detector.electrodes.len()).map_err(|error| named(index, raised(error)))?;
+        all.push(readings);
+    }
+    require_volts(&all, detector)?;
+    Ok(all)
+}
+
+/// Refuses an array whose rows are no frames: a single frame, above all.
+fn require_frames(given: &Bound<'_, PyAny>, electrodes: usize) -> PyResult<()> {
+    let Ok(array) = given.cast::<PyUntypedArray>() else { return Ok(()) };
+    match *array.shape() {
+        [_, grounded, read] if grounded == electrodes && read == electrodes => Ok(()),
+        [_, readings] if readings == electrodes * electrodes => Ok(()),
+        // Of objects, which may be frames.
+        [_] => Ok(()),
+        ref shape => Err(refused(format!(
+            "frames: an array of frames x {electrodes} x {electrodes} is needed (V), but it is one of {}{}",
+            sides(shape),
+            if *shape == [electrodes, electrodes] { ": one frame is frames[numpy.newaxis]" } else { "" }
+        ))),
+    }
 }

@@ -15,6 +15,7 @@ mod mesh;
 mod pickle;
 mod recording;
 mod solution;
+mod solutions;
 mod solver;
 
 use pyo3::prelude::*;
@@ -38,6 +39,8 @@ mod _tactomo {
     use super::recording::{Frame, Frames, Recording};
     #[pymodule_export]
     use super::solution::{Flags, FoundContact, Shape, Solution, Total};
+    #[pymodule_export]
+    use super::solutions::Solutions;
     #[pymodule_export]
     use super::solver::Solver;
 
