@@ -2,6 +2,7 @@
 
 use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyList;
 use tactomo::detector::Detector;
 use tactomo::readings::Readings;
 use tactomo::solve::check;
@@ -40,6 +41,25 @@ pub fn frames(given: &Bound<'_, PyAny>, detector: &Detector) -> PyResult<Vec<Rea
     }
     require_volts(&all, detector)?;
     Ok(all)
+}
+
+/// Frames, and when they were measured.
+pub struct Given {
+    /// Readings (V).
+    pub readings: Vec<Readings>,
+    /// Of a recording, whose frames follow each other: the time of each (s).
+    pub times_s: Option<Vec<f64>>,
+}
+
+/// What [`frames`] takes; with times where all are frames of a recording.
+pub fn timed(given: &Bound<'_, PyAny>, detector: &Detector) -> PyResult<Given> {
+    require_frames(given, detector.electrodes.len())?;
+    // An iterator gives them once.
+    let all = given.try_iter()?.collect::<PyResult<Vec<_>>>()?;
+    let time_s = |frame: &Bound<'_, PyAny>| Some(frame.cast::<Frame>().ok()?.get().time_s());
+    let times_s: Option<Vec<f64>> = all.iter().map(time_s).collect();
+    let readings = frames(PyList::new(given.py(), all)?.as_any(), detector)?;
+    Ok(Given { readings, times_s: times_s.filter(|times_s| !times_s.is_empty()) })
 }
 
 /// Refuses an array whose rows are no frames: a single frame, above all.

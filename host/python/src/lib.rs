@@ -10,6 +10,8 @@ mod error;
 mod forward;
 mod given;
 mod json;
+mod known;
+mod learned;
 mod live;
 mod mesh;
 mod pickle;
@@ -17,6 +19,7 @@ mod recording;
 mod solution;
 mod solutions;
 mod solver;
+mod views;
 
 use pyo3::prelude::*;
 
@@ -30,7 +33,11 @@ mod _tactomo {
     #[pymodule_export]
     use super::error::TactomoError;
     #[pymodule_export]
-    use super::forward::{Contact, Simulator, forward};
+    use super::forward::{Contact, Model, Simulator};
+    #[pymodule_export]
+    use super::known::{Correction, ForceLaw};
+    #[pymodule_export]
+    use super::learned::{Learned, learn};
     #[pymodule_export]
     use super::live::{Live, TouchEvent};
     #[pymodule_export]

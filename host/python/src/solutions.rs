@@ -11,10 +11,10 @@ use crate::array::square;
 use crate::solution::{Solution, contact_dtype};
 
 /// A flag: its name, and whether it is set.
-type Flag = (&'static str, fn(&Flags) -> bool);
+pub type Flag = (&'static str, fn(&Flags) -> bool);
 
 /// Flags of `Solutions.flags`.
-const FLAGS: [Flag; 4] = [
+pub const FLAGS: [Flag; 4] = [
     ("saturated", |flags| flags.saturated),
     ("misfit", |flags| flags.misfit),
     ("unfinished", |flags| flags.unfinished),
@@ -28,7 +28,7 @@ const FLAGS: [Flag; 4] = [
 /// (array([1]), (1, 1))
 #[pyclass(frozen, sequence, module = "tactomo")]
 pub struct Solutions {
-    answers: Vec<Answer>,
+    pub answers: Vec<Answer>,
     array: PyOnceLock<Py<PyAny>>,
     images: PyOnceLock<Option<Py<PyArray2<f32>>>>,
 }
@@ -87,34 +87,34 @@ impl Solutions {
 
     /// Contacts of each frame, `(frames,)`.
     #[getter]
-    fn count<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+    pub fn count<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(py, self.answers.iter().map(|answer| answer.contacts.len() as i64))
     }
 
     /// The contacts of all frames as a structured array `(frames, most contacts of a frame)`: the fields of `tactomo.CONTACT_FIELDS`, all
     /// float64, NaN where not known and where a frame has fewer contacts. `array["x_m"][frame, contact]`.
     #[getter]
-    fn array<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    pub fn array<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(self.array.get_or_try_init(py, || self.made_array(py).map(Bound::unbind))?.bind(py).clone())
     }
 
     /// How far the readings of each frame are from those of what was found, `(frames,)`: root mean square, in standard deviations of the
     /// noise; NaN of a method that predicts none.
     #[getter]
-    fn residual<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    pub fn residual<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.numbers(py, |answer| answer.residual)
     }
 
     /// Probability that as many contacts touch as were found in each frame, `(frames,)`; NaN where none is told.
     #[getter]
-    fn certainty<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    pub fn certainty<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.numbers(py, |answer| answer.certainty)
     }
 
     /// What to know before each frame is believed: a structured array `(frames,)` of booleans `saturated`, `misfit`, `unfinished` and
     /// `calibrate`, as in `Solution.flags`.
     #[getter]
-    fn flags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    pub fn flags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let set = self.answers.iter().flat_map(|answer| FLAGS.iter().map(|(_, is_set)| is_set(&answer.flags)));
         let array: Bound<'_, PyUntypedArray> = PyArray1::from_vec(py, set.collect()).cast_into()?;
         array.call_method1("view", (FLAGS.map(|(name, _)| (name, "?")).to_vec(),))
@@ -123,7 +123,7 @@ impl Solutions {
     /// Images of all frames on the nodes of the solver's mesh (S/m2), `(frames, nodes)`, float32; NaN of a frame without one, `None` where
     /// no frame has one.
     #[getter]
-    fn images<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+    pub fn images<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         let images = self.images.get_or_try_init(py, || self.made_images(py))?;
         Ok(images.as_ref().map(|images| images.bind(py).clone()))
     }

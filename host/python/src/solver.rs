@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use pyo3::prelude::*;
 use tactomo::causes::with_causes;
 use tactomo::forward::ForwardError;
+use tactomo::learned::Learned as Taught;
 use tactomo::readings::Readings;
 use tactomo::solve::{
     FaultTolerant, Lambda, Method, Parameter, ParameterKind, Problem, Solution as Answer, SolveError, Solver as Solves,
@@ -18,6 +19,7 @@ use crate::array::require_volts;
 use crate::detector::Detector;
 use crate::error::{raised, refused};
 use crate::given::{frames, readings};
+use crate::learned::Learned;
 use crate::mesh::Mesh;
 use crate::solution::Solution;
 use crate::solutions::Solutions;
@@ -27,9 +29,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// A method that reads touch from the readings of a frame.
 ///
-/// `name` is one of `tactomo.SOLVERS`, which says what each is for. It leaves out electrodes that are broken or exchanged, once it has seen
+/// `name` is one of `tactomo.SOLVERS`, which says what each is for; unless given, `auto`. It leaves out electrodes that are broken or exchanged, once it has seen
 /// that. `lambda_` is that of a linear image: a share of the largest singular value, or `"discrepancy"`, `"l-curve"` or `"gcv"`; with it,
-/// no electrode is left out.
+/// no electrode is left out. `learned` is what presses on the sensor itself have taught: its own solver takes that, and is chosen unless named.
 ///
 /// Some solvers go on from the frame before: one solver for one stream of frames.
 #[pyclass(frozen, module = "tactomo")]
@@ -43,31 +45,37 @@ pub struct Solver {
 #[pymethods]
 impl Solver {
     #[new]
-    #[pyo3(signature = (name = "auto", detector = None, *, lambda_ = None))]
+    #[pyo3(signature = (name = None, detector = None, *, lambda_ = None, learned = None))]
     fn new(
         py: Python<'_>,
-        name: &str,
+        name: Option<&str>,
         detector: Option<&Detector>,
         lambda_: Option<&Bound<'_, PyAny>>,
+        learned: Option<&Learned>,
     ) -> PyResult<Self> {
-        let method: Method = name.parse().map_err(raised)?;
+        let taught = learned.map(|learned| learned.taught.clone());
+        let method = chosen(name, taught.as_ref())?;
         let lambda = lambda_.map(|lambda| lambda.str()?.extract::<String>()).transpose()?;
         let lambda: Option<Lambda> =
             lambda.map(|lambda| lambda.parse().map_err(|error| refused(format!("lambda_: {error}")))).transpose()?;
         if lambda.is_some() && method.parameter() != Some(ParameterKind::Lambda) {
-            return Err(refused(format!("the solver {name} has no lambda: leave out lambda_")));
+            return Err(refused(format!("the solver {} has no lambda: leave out lambda_", method.name())));
         }
         let detector = detector.map(|detector| detector.0.clone()).unwrap_or_default();
         let parameter = lambda.map(Parameter::Lambda);
-        let made = py.detach(|| -> Result<_, ForwardError> {
-            let problem = Problem::of(&detector)?;
+        let made = py.detach(|| -> PyResult<_> {
+            let problem = Problem::of(&detector).map_err(raised)?;
+            let problem = match taught {
+                Some(taught) => problem.with_learned(taught).map_err(raised)?,
+                None => problem,
+            };
             let solves: Box<dyn Solves> = match parameter {
-                None => Box::new(FaultTolerant::new(method, &problem)?),
-                parameter => method.build_with(&problem, parameter)?,
+                None => Box::new(FaultTolerant::new(method, &problem).map_err(raised)?),
+                parameter => method.build_with(&problem, parameter).map_err(raised)?,
             };
             Ok((problem, solves))
         });
-        let (problem, solves) = made.map_err(raised)?;
+        let (problem, solves) = made?;
         Ok(Self { method, parameter, problem, solves: Mutex::new(solves) })
     }
 
@@ -183,6 +191,19 @@ impl Solver {
             })
         };
         answers.into_iter().flatten().enumerate().map(named).collect()
+    }
+}
+
+/// The solver that is named, or the one that uses what was learned.
+pub fn chosen(name: Option<&str>, learned: Option<&Taught>) -> PyResult<Method> {
+    let named = name.map(|name| name.parse::<Method>().map_err(raised)).transpose()?;
+    match (named, learned.map(Taught::method)) {
+        (Some(named), Some(taught)) if named != taught => Err(refused(format!(
+            "what was learned is for the solver {}, not {}: leave out its name",
+            taught.name(),
+            named.name()
+        ))),
+        (named, taught) => Ok(named.or(taught).unwrap_or(Method::Auto)),
     }
 }
 

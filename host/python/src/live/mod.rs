@@ -22,6 +22,7 @@ use tactomo::run::calibration::Learning;
 use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::scanning::ScanChoice;
 use tactomo::run::{LinkState, Request, Snapshot, TouchEvent as Answered};
+use tactomo::learned::Learned as Taught;
 use tactomo::scene::SceneName;
 use tactomo::solve::{Method, Problem};
 use tokio::sync::watch;
@@ -33,6 +34,8 @@ use crate::detector::Detector;
 use crate::error::{raised, refused};
 use crate::forward::touches;
 use crate::json;
+use crate::learned::Learned;
+use crate::solver::chosen;
 
 /// Longest wait before it is asked whether somebody has pressed Ctrl-C.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -46,8 +49,9 @@ const REQUESTS: usize = 64;
 /// `replay` plays a recording, `speed` times as fast. `record` keeps every byte in a new file. `settle_us`, `average` (1, 2, 4 ... 256 conversions),
 /// `max_frames_per_s`, `select_us` and `discard` are asked of the board, and `scan`: `whole`, `four`, `adaptive`, or a list of grounds such as `"0,5,10,15"`.
 ///
-/// The detector of a board is learned from what presses on it, and used once that helps, unless `learn` is false. The file `learned` keeps that for
-/// the next time; what it holds is used from the start.
+/// The detector of a board is learned from what presses on it, and used once that helps, unless `learn` is false. The file `kept` keeps that for
+/// the next time; what it holds is used from the start. `learned` is what known presses on the sensor have taught (`Learned`), as for `Solver`;
+/// then the detector is taken as described.
 ///
 /// Up to `queue` events wait; if more come, the oldest are lost and counted in `lost`: a slow loop never slows the board.
 ///
@@ -59,6 +63,7 @@ pub struct Live {
     source: Chosen,
     detector: Described,
     method: Method,
+    learned: Option<Taught>,
     scan: ScanChoice,
     settings: RequestedSettings,
     seconds: Option<Duration>,
@@ -90,20 +95,21 @@ impl Drop for Running {
 impl Live {
     #[new]
     #[pyo3(signature = (
-        port = None, *, detector = None, solver = "auto", seconds = None, queue = 4096, simulate = false, scene = None, board = None,
-        faults = None, seed = None, as_built = None, replay = None, speed = 1.0, record = None, learn = true, learned = None, scan = "whole", settle_us = None, average = None,
+        port = None, *, detector = None, solver = None, learned = None, seconds = None, queue = 4096, simulate = false, scene = None, board = None,
+        faults = None, seed = None, as_built = None, replay = None, speed = 1.0, record = None, learn = true, kept = None, scan = "whole", settle_us = None, average = None,
         max_frames_per_s = None, select_us = None, discard = None, baud = DEFAULT_BAUD
     ))]
     #[pyo3(
-        text_signature = "(port=None, *, detector=None, solver='auto', seconds=None, queue=4096, simulate=False, scene=None, board=None, \
-        faults=None, seed=None, as_built=None, replay=None, speed=1.0, record=None, learn=True, learned=None, scan='whole', settle_us=None, average=None, \
+        text_signature = "(port=None, *, detector=None, solver=None, learned=None, seconds=None, queue=4096, simulate=False, scene=None, board=None, \
+        faults=None, seed=None, as_built=None, replay=None, speed=1.0, record=None, learn=True, kept=None, scan='whole', settle_us=None, average=None, \
         max_frames_per_s=None, select_us=None, discard=None, baud=921600)"
     )]
     #[allow(clippy::too_many_arguments)]
     fn new(
         port: Option<String>,
         detector: Option<&Detector>,
-        solver: &str,
+        solver: Option<&str>,
+        learned: Option<&Learned>,
         seconds: Option<f64>,
         queue: usize,
         simulate: bool,
@@ -116,7 +122,7 @@ impl Live {
         speed: f64,
         record: Option<PathBuf>,
         learn: bool,
-        learned: Option<PathBuf>,
+        kept: Option<PathBuf>,
         scan: &str,
         settle_us: Option<u16>,
         average: Option<u16>,
@@ -149,12 +155,14 @@ impl Live {
             (port, false, None) => Chosen::Board { port, baud },
             _ => return Err(refused("give one of port, simulate and replay")),
         };
-        if learned.is_some() && (!learn || source.is_replay()) {
-            return Err(refused("learned: nothing is learned of a recording, or with learn=False"));
+        let learned = learned.map(|learned| learned.taught.clone());
+        let learns = learn && learned.is_none() && !source.is_replay();
+        if kept.is_some() && !learns {
+            return Err(refused("kept: no detector is learned of a recording, with learn=False, or by learned"));
         }
         let detector = source.detector(detector.map(|detector| detector.0.clone()))?;
-        let learning = Learning::of(&detector, None).filter(|_| learn && !source.is_replay());
-        let learning = learning.map(|learning| Learning { file: learned, ..learning });
+        let learning = Learning::of(&detector, None).filter(|_| learns);
+        let learning = learning.map(|learning| Learning { file: kept, ..learning });
         let scan: ScanChoice = scan.parse().map_err(|error: String| refused(format!("scan: {error}")))?;
         scan.check(detector.electrodes.len()).map_err(|error| refused(format!("scan: {error}")))?;
         let seconds = seconds.map(|seconds| {
@@ -164,7 +172,8 @@ impl Live {
             return Err(refused("queue: room for one event at least is needed"));
         }
         Ok(Self {
-            method: solver.parse().map_err(raised)?,
+            method: chosen(solver, learned.as_ref())?,
+            learned,
             scan,
             settings: RequestedSettings {
                 settle_us,
@@ -185,11 +194,16 @@ impl Live {
         })
     }
 
-    /// Starts the run.
+    /// Starts the run, and waits for its first event: a port that does not open, a board that does not answer or does not fit the detector
+    /// fail here.
     fn __enter__(slf: Bound<'_, Self>) -> PyResult<Bound<'_, Self>> {
         let live = slf.get();
         slf.py().detach(|| live.start())?;
-        Ok(slf)
+        let begun = live.await_first(slf.py());
+        if begun.is_err() {
+            live.stop(slf.py());
+        }
+        begun.map(|()| slf)
     }
 
     /// Ends it.
@@ -315,6 +329,10 @@ impl Live {
         let kept = self.learning.as_ref().map(Learning::kept).transpose().map_err(refused)?.flatten();
         let detector = kept.unwrap_or_else(|| self.detector.clone());
         let problem = Problem::of(&detector).map_err(raised)?;
+        let problem = match &self.learned {
+            Some(learned) => problem.with_learned(learned.clone()).map_err(raised)?,
+            None => problem,
+        };
         let record = |path: &PathBuf| Recorder::create(path, &Header::now(&detector, source.name()));
         let options = RunOptions {
             recorder: self.record.as_ref().map(record).transpose().map_err(raised)?,
@@ -339,6 +357,21 @@ impl Live {
         self.has_begun.store(true, Ordering::Relaxed);
         *running = Some(Running { stop, requests: request, snapshots: shown, thread });
         Ok(())
+    }
+
+    /// Waits until there is an event; what keeps the run from giving one is an error.
+    fn await_first(&self, py: Python<'_>) -> PyResult<()> {
+        while !py.detach(|| self.queue.has_begun(LOOK_EVERY)) {
+            py.check_signals()?;
+            let link = self.running().as_ref().map(|running| running.snapshots.borrow().link.clone());
+            if let Some(LinkState::Silent(why) | LinkState::Lost(why)) = link {
+                return Err(refused(in_python(&why)));
+            }
+        }
+        match self.queue.ended() {
+            Some(Err(why)) => Err(refused(why)),
+            _ => Ok(()),
+        }
     }
 
     /// The next event, or `Some(None)` at the end; `None` if nothing came within `patience`.
@@ -376,9 +409,15 @@ impl Live {
 fn ended(run: thread::Result<Result<tactomo::run::options::Summary, tactomo::run::options::LiveError>>) -> Ended {
     match run {
         Ok(Ok(summary)) => serde_json::to_string(&summary).map_err(|error| error.to_string()),
-        Ok(Err(error)) => Err(with_causes(&error)),
+        Ok(Err(error)) => Err(in_python(&with_causes(&error))),
         Err(_) => Err("the run panicked: this is a mistake in tactomo, please report it".to_owned()),
     }
+}
+
+/// The program's words, with its options as the arguments of [`Live`].
+fn in_python(words: &str) -> String {
+    let options = [("`--port`", "`port`"), ("`--simulate`", "`simulate=True`"), ("`--detector`", "`detector`")];
+    options.into_iter().fold(words.to_owned(), |words, (option, argument)| words.replace(option, argument))
 }
 
 fn average_log2(count: u16) -> PyResult<u8> {
