@@ -66,17 +66,22 @@ def record(path, count, seed, detector, as_built=None, held_s=0.1):
     random, rows = np.random.default_rng(seed), []
     options = {"detector": detector, "as_built": as_built, "scene": "rest", "solver": "tikhonov", "seed": seed, "learn": False}
     with tactomo.Live(simulate=True, record=path, **options) as live:
-        event = next(event for event in live if not event.rezeroing)
+        next(event for event in live if not event.rezeroing)
         for _ in range(count):
             x_m, y_m = random.uniform(-0.022, 0.022, 2)
             live.press([(x_m, y_m, 0.004, 10 ** random.uniform(-3.3, -2.5))])
-            # A request takes some frames on its way to the board.
-            begin = after(live, event.time_s + 0.5 * held_s)
+            begin = stands(live, True)
             end = after(live, begin.time_s + held_s)
             rows.append((begin.sequence, end.sequence, x_m, y_m))
             live.press()
-            event = after(live, end.time_s + 0.5 * held_s)
+            stands(live, False)
     np.savetxt(path.with_suffix(".csv"), rows, delimiter=",", header="from_sequence,to_sequence,x_m,y_m", comments="")
+
+
+def stands(live, is_touched):
+    """An event some frames after something has begun to touch, or has ceased to: a request takes its time to the board."""
+    begin = next(event for event in live if bool(event.contacts) == is_touched)
+    return after(live, begin.time_s + 0.02)
 
 
 def after(live, time_s):

@@ -10,6 +10,7 @@ use tactomo::calibrate::force::{
 use tactomo::calibrate::known::{Corrected, KnownPress, correction};
 use tactomo::calibrate::pressed::{Found, Solved, pressed, single};
 use tactomo::detector::{Detector as Described, ForceLaw as KeptLaw};
+use tactomo::readings::Readings;
 use tactomo::solve::{FaultTolerant, Method, Problem, Solver as _};
 
 use crate::detector::Detector;
@@ -36,7 +37,7 @@ impl Frames {
     /// Contacts of each frame; `times_s` of a recording, whose frames follow each other.
     fn solved(&mut self) -> PyResult<Vec<Solved>> {
         let Self { solver, given: Given { readings, times_s } } = self;
-        let one = |(index, readings)| {
+        let one = |(index, readings): (usize, &Readings)| -> PyResult<Solved> {
             if times_s.is_none() {
                 solver.reset();
             }

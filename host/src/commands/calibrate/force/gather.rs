@@ -2,7 +2,7 @@
 
 use anyhow::{Context, bail, ensure};
 use tactomo::calibrate::force::{Moment, pairs};
-use tactomo::calibrate::pressed::{Pressed, pressed};
+use tactomo::calibrate::pressed::{Pressed, Solved, pressed};
 use tactomo::detector::{Detector, ForceLaw};
 use tactomo::solve::Method;
 
