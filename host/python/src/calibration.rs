@@ -74,8 +74,10 @@ impl Calibration {
         presses: usize,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
-        let mut frames: Vec<Frame> =
-            given::frames(readings, &detector.0)?.into_iter().map(|readings| Frame { readings, known_m: None }).collect();
+        let mut frames: Vec<Frame> = given::frames(readings, &detector.0)?
+            .into_iter()
+            .map(|readings| Frame { readings, known_m: None })
+            .collect();
         for (index, x_m, y_m) in known {
             let count = frames.len();
             let frame = frames.get_mut(index);

@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 
 use numpy::{AllowTypeChange, PyArray1, PyArrayLike1, PyArrayLike2};
 use pyo3::prelude::*;
-use tactomo::calibrate::force::{
-    Direction, ForceFit, ForcePress, Law, MaximumForce, Moment, fit_force, pairs,
-};
+use tactomo::calibrate::force::{Direction, ForceFit, ForcePress, Law, MaximumForce, Moment, fit_force, pairs};
 use tactomo::calibrate::known::{Corrected, KnownPress, correction};
 use tactomo::calibrate::pressed::{Found, Solved, pressed, single};
 use tactomo::detector::{Detector as Described, ForceLaw as KeptLaw};
@@ -79,7 +77,9 @@ impl Correction {
         let described = &detector.0;
         let places = places_m.as_array();
         if places.ncols() != 2 {
-            return Err(refused("places_m: an array (presses, 2) is needed: x and y from the middle of the sensor (m)"));
+            return Err(refused(
+                "places_m: an array (presses, 2) is needed: x and y from the middle of the sensor (m)",
+            ));
         }
         let known_m: Vec<[f64; 2]> = places.rows().into_iter().map(|row| [row[0], row[1]]).collect();
         if let Some(index) = known_m.iter().position(|place_m| !described.outline.holds(*place_m)) {

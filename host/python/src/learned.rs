@@ -67,7 +67,9 @@ impl Learned {
         let volts: Vec<f64> = readings.as_array().iter().copied().collect();
         let press = py.detach(|| kernel.press(&volts)).map_err(|channel| match channel {
             Some(channel) => refused(format!("channel {channel} is not a finite number")),
-            None => refused(format!("{} readings, but it has learned from {} channels", volts.len(), kernel.channels())),
+            None => {
+                refused(format!("{} readings, but it has learned from {} channels", volts.len(), kernel.channels()))
+            }
         })?;
         Ok(Solution::new(py, press.map(|press| press.solution(kernel.strength())).unwrap_or_default()))
     }

@@ -47,7 +47,8 @@ impl Solutions {
     fn made_array<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let most = self.most();
         let contacts = |answer: &Answer| {
-            let found = answer.contacts.iter().flat_map(|contact| CONTACT_COLUMNS.iter().map(|column| column.value(contact)));
+            let found =
+                answer.contacts.iter().flat_map(|contact| CONTACT_COLUMNS.iter().map(|column| column.value(contact)));
             let found: Vec<_> = found.map(|value| value.unwrap_or(f64::NAN)).collect();
             let none = vec![f64::NAN; most * CONTACT_COLUMNS.len() - found.len()];
             [found, none].concat()
@@ -77,11 +78,11 @@ impl Solutions {
     }
 
     fn __getitem__(&self, py: Python<'_>, index: isize) -> PyResult<Solution> {
-        // Python adds the length to what counts from the end.
-        let answer = usize::try_from(index).ok().and_then(|index| self.answers.get(index));
-        let answer = answer.ok_or_else(|| {
-            PyIndexError::new_err(format!("there is no frame {index} among {}", self.answers.len()))
-        })?;
+        let from_start = if index < 0 { index.checked_add_unsigned(self.answers.len()) } else { Some(index) };
+        let from_start = from_start.and_then(|index| usize::try_from(index).ok());
+        let answer = from_start.and_then(|index| self.answers.get(index));
+        let answer = answer
+            .ok_or_else(|| PyIndexError::new_err(format!("there is no frame {index} among {}", self.answers.len())))?;
         Ok(Solution::new(py, answer.clone()))
     }
 
