@@ -4,15 +4,17 @@
     python cluster.py dataset --address auto                # on a cluster that runs: see `ray start`
     python cluster.py dataset --kill                        # kills a worker in the middle, to see what comes of it
 
-Needs ray. The folder gets a file of 1000 frames for each chunk, `frames-000007.npz`: `readings_v` (frames, 16, 16), `contacts`
-(frames, 3, 4) with `x_m`, `y_m`, `radius_m` and `conductance_s`, NaN where fewer touch, and `built`, the seed of the detector that was
-simulated. A chunk's number says all that is in it, whoever makes it: whatever is missing is made by calling this again.
+Needs ray. The folder, which all machines of a cluster must see, gets a file of 1000 frames for each chunk, `frames-000007.npz`:
+`readings_v` (frames, 16, 16), `contacts` (frames, 3, 4) with `x_m`, `y_m`, `radius_m` and `conductance_s`, NaN where fewer touch, and
+`built`, the seed of the detector that was simulated. A chunk's number says all that is in it, whoever makes it: whatever is missing is made
+by calling this again.
 """
 
 import argparse
 import os
 import pathlib
 import signal
+import sys
 import time
 
 import numpy as np
@@ -43,9 +45,14 @@ def chunk(number, frames):
     return {"readings_v": readings_v, "contacts": padded, "built": number}
 
 
+def file_of(folder, number):
+    """The file of a chunk."""
+    return pathlib.Path(folder) / f"frames-{number:06}.npz"
+
+
 def write(folder, number, frames):
     """Makes a chunk's file. Half a file is never there under its name: who is killed leaves one that nobody reads."""
-    path = pathlib.Path(folder) / f"frames-{number:06}.npz"
+    path = file_of(folder, number)
     if not path.exists():
         unfinished = path.with_suffix(f".{os.getpid()}.part")
         with unfinished.open("wb") as file:
@@ -92,10 +99,12 @@ def main():
     begin = time.perf_counter()
     make(args.folder.resolve(), chunks, args.chunk, args.kill)
     took_s = time.perf_counter() - begin
-    files = sorted(args.folder.glob("frames-*.npz"))
-    assert len(files) == chunks, f"{chunks - len(files)} chunks are missing"
-    with np.load(files[0]) as written:
-        assert all(np.array_equal(written[name], one[name], equal_nan=True) for name in one), "another worker made another chunk"
+    missing = [number for number in range(chunks) if not file_of(args.folder, number).exists()]
+    if missing:
+        sys.exit(f"chunks are missing: {missing}")
+    with np.load(file_of(args.folder, 0)) as written:
+        if not all(np.array_equal(written[name], one[name], equal_nan=True) for name in one):
+            sys.exit(f"{file_of(args.folder, 0)} is not the chunk that is made here: it is of another --chunk or version")
     total = chunks * args.chunk
     print(f"{total} frames in {took_s:.1f} s, {total / took_s:.0f} a second; one process: {args.chunk / alone_s:.0f} a second")
 

@@ -1,11 +1,8 @@
 //! `Detector`: what is pressed.
 
-use std::fs::File;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use numpy::PyArray2;
-use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use tactomo::detector::{Chosen, Detector as Described, Stack};
@@ -13,6 +10,7 @@ use tactomo::simulate;
 
 use crate::array;
 use crate::error::raised;
+use crate::file::write_new;
 use crate::pickle::{Restored, restored};
 
 /// A detection layer with its electrodes and the circuit that measures it.
@@ -59,14 +57,10 @@ impl Detector {
     /// Writes it to a new TOML file, for `Detector(path)` and `--detector`, and the surface of a curved one beside it as OBJ; a file
     /// that exists is not replaced.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        let new = |path: &Path, text: &str| {
-            let named = |error| PyOSError::new_err(format!("cannot write {}: {error}", path.display()));
-            File::create_new(path).and_then(|mut file| file.write_all(text.as_bytes())).map_err(named)
-        };
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let (text, surface) = self.0.to_files(&stem);
-        new(&path, &text)?;
-        surface.map_or(Ok(()), |(name, obj)| new(&path.with_file_name(name), &obj))
+        write_new(&path, text.as_bytes())?;
+        surface.map_or(Ok(()), |(name, obj)| write_new(&path.with_file_name(name), obj.as_bytes()))
     }
 
     /// A detector as it may have been built by this description: each quantity off by its tolerance, drawn with `seed`. It is what a

@@ -194,7 +194,7 @@ impl ForceLaw {
         detector: &Detector,
         readings: &Bound<'_, PyAny>,
         force_n: PyArrayLike1<'_, f64, AllowTypeChange>,
-        unloading: Option<Vec<bool>>,
+        unloading: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
         time_s: Option<PyArrayLike1<'_, f64, AllowTypeChange>>,
         law: Option<&str>,
     ) -> PyResult<Self> {
@@ -211,6 +211,7 @@ impl ForceLaw {
             Some(time_s) => Told::Sensor(sensor(&time_s, &force_n)?),
             None => {
                 let forces_n = forces(&force_n, force_n.as_array().len())?;
+                let unloading = unloading.map(|unloading| unloading.as_array().to_vec());
                 if unloading.as_ref().is_some_and(|unloading| unloading.len() != forces_n.len()) {
                     return Err(refused("unloading: as many values as forces are needed"));
                 }
@@ -301,7 +302,7 @@ impl Told {
             }
             false => {
                 require_as_many(solved.len(), forces_n.len(), "force_n")?;
-                let moments = solved.iter().map(Moment::of);
+                let moments = solved.iter().map(Solved::moment);
                 moments.map(|moment| (moment.contacts, moment.conductance_s, moment.deviation_s)).collect()
             }
         };
@@ -327,7 +328,7 @@ fn of_sensor(frames: &mut Frames, sensor: &[[f64; 2]]) -> PyResult<Vec<ForcePres
     if frames.given.times_s.is_none() {
         return Err(refused("time_s: frames of a Recording are needed, whose times a force sensor's can belong to"));
     }
-    let moments: Vec<Moment> = frames.solved()?.iter().map(Moment::of).collect();
+    let moments: Vec<Moment> = frames.solved()?.iter().map(Solved::moment).collect();
     let presses = pairs(&moments, sensor);
     if presses.is_empty() {
         return Err(refused(

@@ -1,11 +1,8 @@
 //! `Learned` and `learn`: touch learned from presses at known places.
 
-use std::fs::File;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use numpy::{AllowTypeChange, PyArrayLike1, PyArrayLike2, PyArrayLikeDyn};
-use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 use tactomo::learned::Learned as Taught;
@@ -13,6 +10,7 @@ use tactomo::solve::{Kernel, Presses, Strength};
 
 use crate::detector::Detector;
 use crate::error::{raised, refused};
+use crate::file::write_new;
 use crate::given;
 use crate::pickle::{Restored, restored};
 use crate::solution::Solution;
@@ -44,18 +42,13 @@ impl Learned {
 impl Learned {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        py.detach(|| {
-            // Checks the file, and names it where it is wrong.
-            Taught::read(&path).map_err(raised)?;
-            let read = std::fs::read(&path);
-            Self::of(read.map_err(|error| PyOSError::new_err(format!("cannot read {}: {error}", path.display())))?)
-        })
+        let (taught, bytes) = py.detach(|| Taught::read_with_bytes(&path)).map_err(raised)?;
+        Ok(Self { taught, bytes })
     }
 
     /// Writes it to a new file, for `Learned(path)` and `--learned`; a file that exists is not replaced.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        let written = File::create_new(&path).and_then(|mut file| file.write_all(&self.bytes));
-        written.map_err(|error| PyOSError::new_err(format!("cannot write {}: {error}", path.display())))
+        write_new(&path, &self.bytes)
     }
 
     /// What the channels of any sensor, less those at rest (V), say of a press: `(channels,)`. On a detector, `Solver(learned=...)` does the

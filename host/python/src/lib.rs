@@ -7,6 +7,7 @@ mod array;
 mod calibration;
 mod detector;
 mod error;
+mod file;
 mod forward;
 mod given;
 mod json;

@@ -1,6 +1,6 @@
 //! `Solution` and what it is made of; names are those of the one schema, [`tactomo::schema`].
 
-use numpy::{PyArray1, PyArrayDescr, PyUntypedArray};
+use numpy::{PyArray1, PyArrayDescr, PyArrayMethods, PyUntypedArray};
 use pyo3::IntoPyObjectExt;
 use pyo3::PyClass;
 use pyo3::prelude::*;
@@ -41,6 +41,12 @@ impl Solution {
     pub fn new(py: Python<'_>, mut answer: Answer) -> Self {
         let image = answer.image_s_per_m2.take().map(|image| PyArray1::from_vec(py, image).unbind());
         Self { answer, image }
+    }
+
+    /// The answer again, with a copy of its image.
+    pub fn answer(&self, py: Python<'_>) -> PyResult<Answer> {
+        let image = self.image.as_ref().map(|image| image.bind(py).to_vec()).transpose()?;
+        Ok(Answer { image_s_per_m2: image, ..self.answer.clone() })
     }
 }
 

@@ -4,10 +4,12 @@ use numpy::{PyArray1, PyArray2, PyUntypedArray};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyRange, PyType};
 use tactomo::schema::CONTACT_COLUMNS;
 use tactomo::solve::{Flags, Solution as Answer};
 
 use crate::array::square;
+use crate::pickle::{Restored, restored};
 use crate::solution::{Solution, contact_dtype};
 
 /// A flag: its name, and whether it is set.
@@ -84,6 +86,22 @@ impl Solutions {
         let answer = answer
             .ok_or_else(|| PyIndexError::new_err(format!("there is no frame {index} among {}", self.answers.len())))?;
         Ok(Solution::new(py, answer.clone()))
+    }
+
+    fn __iter__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let indices = PyRange::new(slf.py(), 0, slf.len()?.try_into()?)?;
+        slf.py().import("builtins")?.getattr("map")?.call1((slf.getattr("__getitem__")?, indices))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Restored<'py, (Vec<Solution>,)>> {
+        let answers = &slf.get().answers;
+        restored(slf, (answers.iter().map(|answer| Solution::new(slf.py(), answer.clone())).collect(),))
+    }
+
+    #[classmethod]
+    fn _restored(class: &Bound<'_, PyType>, solutions: Vec<PyRef<'_, Solution>>) -> PyResult<Self> {
+        let answers = solutions.iter().map(|solution| solution.answer(class.py()));
+        Ok(Self::new(answers.collect::<PyResult<_>>()?))
     }
 
     /// Contacts of each frame, `(frames,)`.

@@ -29,9 +29,10 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// A method that reads touch from the readings of a frame.
 ///
-/// `name` is one of `tactomo.SOLVERS`, which says what each is for; unless given, `auto`. It leaves out electrodes that are broken or exchanged, once it has seen
-/// that. `lambda_` is that of a linear image: a share of the largest singular value, or `"discrepancy"`, `"l-curve"` or `"gcv"`; with it,
-/// no electrode is left out. `learned` is what presses on the sensor itself have taught: its own solver takes that, and is chosen unless named.
+/// `name` is one of `tactomo.SOLVERS`, which says what each is for; unless given, `auto`. It leaves out electrodes that are broken or
+/// exchanged, once it has seen that. `lambda_` is that of a linear image: a share of the largest singular value, or `"discrepancy"`,
+/// `"l-curve"` or `"gcv"`; with it, no electrode is left out. `learned` is what presses on the sensor itself have taught; unless `name` is
+/// given, the solver that uses it is chosen.
 ///
 /// Some solvers go on from the frame before: one solver for one stream of frames.
 #[pyclass(frozen, module = "tactomo")]

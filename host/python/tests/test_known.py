@@ -83,7 +83,7 @@ def test_known_forces_are_a_law_by_which_contacts_carry_newtons(detector, simula
     (contact,) = tactomo.Solver("contacts", tactomo.Detector(path)).solve(simulator.readings([ball])).contacts
     assert contact.force_n == pytest.approx(0.8, abs=3 * contact.force_deviation_n) and contact.force_n == pytest.approx(0.8, rel=0.15)
     forced_twice = np.concatenate([forced, forced])
-    both = tactomo.ForceLaw.of_presses(detector, forced_twice, np.tile(FORCES_N, 2), unloading=np.repeat([False, True], 8).tolist())
+    both = tactomo.ForceLaw.of_presses(detector, forced_twice, np.tile(FORCES_N, 2), unloading=np.repeat([False, True], 8))
     assert both.hysteresis < 0.05
 
 
@@ -116,6 +116,8 @@ def test_known_presses_say_what_is_wrong(detector, forced, pressed, places_m):
         tactomo.ForceLaw.of_presses(detector, forced, np.where(np.arange(8) == 2, -1, FORCES_N))
     with refused(tactomo.TactomoError, match="press 1 is too light to be found"):
         tactomo.ForceLaw.of_presses(detector, np.where(np.arange(8)[:, None, None] == 1, 0, forced), FORCES_N)
+    with refused(tactomo.TactomoError, match="unloading: as many values as forces"):
+        tactomo.ForceLaw.of_presses(detector, forced, FORCES_N, unloading=[True])
     with refused(tactomo.TactomoError, match="law: `power` or `saturating`"):
         tactomo.ForceLaw.of_presses(detector, forced, FORCES_N, law="linear")
     with refused(tactomo.TactomoError, match="frames of a Recording are needed"):

@@ -185,7 +185,7 @@ class ForceLaw:
         readings: _Frames,
         force_n: ArrayLike,
         *,
-        unloading: Sequence[bool] | None = None,
+        unloading: ArrayLike | None = None,
         time_s: ArrayLike | None = None,
         law: Literal["power", "saturating"] | None = None,
     ) -> ForceLaw: ...
@@ -345,6 +345,7 @@ class Solution:
 class Solutions:
     def __len__(self) -> int: ...
     def __getitem__(self, key: int, /) -> Solution: ...
+    def __iter__(self) -> Iterator[Solution]: ...
     @property
     def count(self) -> NDArray[np.int64]: ...
     @property

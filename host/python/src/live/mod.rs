@@ -2,36 +2,30 @@
 
 mod event;
 mod queue;
+mod running;
 mod source;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
-use std::thread::{self, JoinHandle};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 use tactomo::board::link::Control;
 use tactomo::board::link::serial::DEFAULT_BAUD;
-use tactomo::board::record::{Header, Recorder};
 use tactomo::board::session::RequestedSettings;
-use tactomo::causes::with_causes;
 use tactomo::changes::Changes;
-use tactomo::detector::Detector as Described;
-use tactomo::learned::Learned as Taught;
 use tactomo::run::calibration::Learning;
-use tactomo::run::options::{Ends, RunOptions, Solving};
 use tactomo::run::scanning::ScanChoice;
-use tactomo::run::{LinkState, Request, Snapshot, TouchEvent as Answered};
+use tactomo::run::{LinkState, Request, TouchEvent as Answered};
 use tactomo::scene::SceneName;
-use tactomo::solve::{Method, Problem};
-use tokio::sync::watch;
 
 pub use self::event::TouchEvent;
-use self::queue::{Ended, Next, Queue, Tail};
+use self::queue::{Next, Queue};
+use self::running::{Running, Wanted};
 use self::source::{Chosen, Simulated};
 use crate::detector::Detector;
-use crate::error::{raised, refused};
+use crate::error::{in_python, raised, refused};
 use crate::forward::touches;
 use crate::json;
 use crate::learned::Learned;
@@ -39,8 +33,6 @@ use crate::solver::chosen;
 
 /// Longest wait before it is asked whether somebody has pressed Ctrl-C.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Requests that may wait.
-const REQUESTS: usize = 64;
 
 /// The events of a board, as they come: a context manager, and an iterator that ends with the run.
 ///
@@ -60,35 +52,11 @@ const REQUESTS: usize = 64;
 /// ...         print(event.time_s, event.contacts)
 #[pyclass(frozen, module = "tactomo")]
 pub struct Live {
-    source: Chosen,
-    detector: Described,
-    method: Method,
-    learned: Option<Taught>,
-    scan: ScanChoice,
-    settings: RequestedSettings,
-    seconds: Option<Duration>,
-    record: Option<PathBuf>,
-    learning: Option<Learning>,
+    wanted: Wanted,
     queue: Arc<Queue>,
     changes: Mutex<Changes>,
     has_begun: AtomicBool,
     running: Mutex<Option<Running>>,
-}
-
-/// A run under way.
-struct Running {
-    stop: Arc<AtomicBool>,
-    requests: mpsc::SyncSender<Request>,
-    snapshots: watch::Receiver<Arc<Snapshot>>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        // Whatever ended it is in the queue.
-        let _ = self.thread.take().map(JoinHandle::join);
-    }
 }
 
 #[pymethods]
@@ -171,7 +139,7 @@ impl Live {
         if queue == 0 {
             return Err(refused("queue: room for one event at least is needed"));
         }
-        Ok(Self {
+        let wanted = Wanted {
             method: chosen(solver, learned.as_ref())?,
             learned,
             scan,
@@ -185,12 +153,15 @@ impl Live {
             seconds: seconds.transpose()?,
             record,
             learning,
+            source,
+            detector,
+        };
+        Ok(Self {
+            wanted,
             queue: Arc::new(Queue::new(queue)),
             changes: Mutex::default(),
             has_begun: AtomicBool::new(false),
             running: Mutex::new(None),
-            source,
-            detector,
         })
     }
 
@@ -284,13 +255,13 @@ impl Live {
     /// The detector that the events are of.
     #[getter]
     fn detector(&self) -> Detector {
-        Detector(self.detector.clone())
+        Detector(self.wanted.detector.clone())
     }
 
     /// How the link to the board fares: `searching`, `waiting`, `streaming`, or in words what is wrong.
     #[getter]
     fn link(&self) -> String {
-        match self.running().as_ref().map(|running| running.snapshots.borrow().link.clone()) {
+        match self.running().as_ref().map(Running::link) {
             None => "not running".to_owned(),
             Some(LinkState::Searching) => "searching".to_owned(),
             Some(LinkState::Waiting) => "waiting".to_owned(),
@@ -302,7 +273,7 @@ impl Live {
     /// What to know of the baseline, in words; `None` if all is well.
     #[getter]
     fn notice(&self) -> Option<String> {
-        self.running().as_ref().and_then(|running| running.snapshots.borrow().baseline.clone())
+        self.running().as_ref().and_then(|running| running.notice())
     }
 
     /// What a run that has ended has come to, as `tactomo live --json` prints it; `None` before.
@@ -321,41 +292,12 @@ impl Live {
     }
 
     fn start(&self) -> PyResult<()> {
-        let mut running = self.running();
-        if self.has_begun.load(Ordering::Relaxed) {
+        if self.has_begun.swap(true, Ordering::Relaxed) {
             return Err(refused("this Live has run: make another one"));
         }
-        let mut source = self.source.open(&self.detector)?;
-        let kept = self.learning.as_ref().map(Learning::kept).transpose().map_err(refused)?.flatten();
-        let detector = kept.unwrap_or_else(|| self.detector.clone());
-        let problem = Problem::of(&detector).map_err(raised)?;
-        let problem = match &self.learned {
-            Some(learned) => problem.with_learned(learned.clone()).map_err(raised)?,
-            None => problem,
-        };
-        let record = |path: &PathBuf| Recorder::create(path, &Header::now(&detector, source.name()));
-        let options = RunOptions {
-            recorder: self.record.as_ref().map(record).transpose().map_err(raised)?,
-            settings: self.settings,
-            scan: self.scan.clone(),
-            solving: Some(Solving { learning: self.learning.clone(), ..Solving::new(self.method, problem) }),
-            listeners: vec![Box::new(Tail(Arc::clone(&self.queue)))],
-            seconds: self.seconds,
-            ..RunOptions::new(detector)
-        };
-        let stop = Arc::new(AtomicBool::new(false));
-        let (snapshots, shown) = watch::channel(Arc::new(Snapshot::default()));
-        let (request, requests) = mpsc::sync_channel(REQUESTS);
-        let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
-        let queue = Arc::clone(&self.queue);
-        let work = move || {
-            let run = std::panic::AssertUnwindSafe(|| tactomo::run::run(&mut *source, options, ends));
-            queue.end(ended(std::panic::catch_unwind(run)));
-        };
-        let thread = thread::Builder::new().name("tactomo".to_owned()).spawn(work);
-        let thread = Some(thread.map_err(|error| refused(format!("cannot start a thread: {error}")))?);
-        self.has_begun.store(true, Ordering::Relaxed);
-        *running = Some(Running { stop, requests: request, snapshots: shown, thread });
+        let running = self.wanted.start(&self.queue);
+        self.has_begun.store(running.is_ok(), Ordering::Relaxed);
+        *self.running() = Some(running?);
         Ok(())
     }
 
@@ -363,8 +305,7 @@ impl Live {
     fn await_first(&self, py: Python<'_>) -> PyResult<()> {
         while !py.detach(|| self.queue.has_begun(LOOK_EVERY)) {
             py.check_signals()?;
-            let link = self.running().as_ref().map(|running| running.snapshots.borrow().link.clone());
-            if let Some(LinkState::Silent(why) | LinkState::Lost(why)) = link {
+            if let Some(LinkState::Silent(why) | LinkState::Lost(why)) = self.running().as_ref().map(Running::link) {
                 return Err(refused(in_python(&why)));
             }
         }
@@ -400,24 +341,8 @@ impl Live {
 
     fn ask(&self, request: Request) -> PyResult<()> {
         let running = self.running();
-        let running = running.as_ref().ok_or_else(|| refused("nothing runs: use it in a `with` statement"))?;
-        running.requests.try_send(request).map_err(|_| refused("too many requests wait, or the run has ended"))
+        running.as_ref().ok_or_else(|| refused("nothing runs: use it in a `with` statement"))?.ask(request)
     }
-}
-
-/// How a run has ended, in words.
-fn ended(run: thread::Result<Result<tactomo::run::options::Summary, tactomo::run::options::LiveError>>) -> Ended {
-    match run {
-        Ok(Ok(summary)) => serde_json::to_string(&summary).map_err(|error| error.to_string()),
-        Ok(Err(error)) => Err(in_python(&with_causes(&error))),
-        Err(_) => Err("the run panicked: this is a mistake in tactomo, please report it".to_owned()),
-    }
-}
-
-/// The program's words, with its options as the arguments of [`Live`].
-fn in_python(words: &str) -> String {
-    let options = [("`--port`", "`port`"), ("`--simulate`", "`simulate=True`"), ("`--detector`", "`detector`")];
-    options.into_iter().fold(words.to_owned(), |words, (option, argument)| words.replace(option, argument))
 }
 
 fn average_log2(count: u16) -> PyResult<u8> {

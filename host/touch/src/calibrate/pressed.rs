@@ -15,6 +15,19 @@ pub struct Solved {
     pub contacts: Vec<FoundContact>,
 }
 
+impl Solved {
+    /// What it conducts, on a detector with [`ForceLaw::siemens`](tactomo_physics::detector::ForceLaw::siemens): newtons are conductances then.
+    pub fn moment(&self) -> Moment {
+        let first = self.contacts.first();
+        Moment {
+            time_s: self.time_s,
+            contacts: self.contacts.len(),
+            conductance_s: first.and_then(|contact| contact.force_n).unwrap_or_default(),
+            deviation_s: first.and_then(|contact| contact.force_deviation_n).unwrap_or_default(),
+        }
+    }
+}
+
 /// What was found of a press: its only contact, or how many there are.
 pub type Found = Result<FoundContact, usize>;
 
@@ -47,7 +60,7 @@ pub struct OtherCount {
 /// # Errors
 /// [`OtherCount`] if there are more or fewer; `what` is told of them.
 pub fn pressed(frames: &[Solved], told: usize, what: &'static str) -> Result<Vec<Pressed>, OtherCount> {
-    let moments: Vec<Moment> = frames.iter().map(Moment::of).collect();
+    let moments: Vec<Moment> = frames.iter().map(Solved::moment).collect();
     let found = plateaus(&moments);
     if found.len() != told {
         return Err(OtherCount { begin_s: found.iter().map(|plateau| plateau.time_s[0]).collect(), told, what });

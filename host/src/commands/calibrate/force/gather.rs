@@ -89,7 +89,7 @@ fn of_plateaus(reader: &mut Reader, forces: &[KnownForce]) -> anyhow::Result<Vec
 }
 
 fn of_sensor(reader: &mut Reader, forces: &[[f64; 2]]) -> anyhow::Result<Vec<ReportedPress>> {
-    let moments: Vec<Moment> = frames(reader)?.iter().map(Moment::of).collect();
+    let moments: Vec<Moment> = frames(reader)?.iter().map(Solved::moment).collect();
     let found = pairs(&moments, forces);
     let span = |times: &mut dyn Iterator<Item = f64>| {
         let [from_s, to_s] =

@@ -1,7 +1,6 @@
 //! Presses in a recording: stretches in which something stands on the detector, and what it conducts meanwhile.
 
 use super::{Direction, ForcePress};
-use crate::calibrate::pressed::Solved;
 
 /// Shortest stretch without a contact that ends a press (s): shorter ones are contacts that were lost for some frames.
 const LIFTED_S: f64 = 0.1;
@@ -30,19 +29,6 @@ pub struct Moment {
     pub conductance_s: f64,
     /// Its standard error (S); zero where it is not known.
     pub deviation_s: f64,
-}
-
-impl Moment {
-    /// Of a frame, on a detector with [`ForceLaw::siemens`](tactomo_physics::detector::ForceLaw::siemens): newtons are conductances then.
-    pub fn of(Solved { time_s, contacts }: &Solved) -> Self {
-        let first = contacts.first();
-        Self {
-            time_s: *time_s,
-            contacts: contacts.len(),
-            conductance_s: first.and_then(|contact| contact.force_n).unwrap_or_default(),
-            deviation_s: first.and_then(|contact| contact.force_deviation_n).unwrap_or_default(),
-        }
-    }
 }
 
 /// A plateau: a stretch of time in which something stands on the detector.
