@@ -38,6 +38,9 @@ pub fn of_array(array: &PyReadonlyArrayDyn<'_, f64>) -> PyResult<Readings> {
 
 /// The shape of an array in words: `16 x 15`.
 pub fn sides(shape: &[usize]) -> String {
+    if shape.is_empty() {
+        return "one number".to_owned();
+    }
     shape.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ")
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use numpy::{AllowTypeChange, PyArray1, PyArrayLike1, PyArrayLike2};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use tactomo::calibrate::force::{Direction, ForceFit, ForcePress, Law, MaximumForce, Moment, fit_force, pairs};
 use tactomo::calibrate::known::{Corrected, KnownPress, correction};
@@ -71,24 +71,22 @@ impl Correction {
         py: Python<'_>,
         detector: &Detector,
         readings: &Bound<'_, PyAny>,
-        places_m: PyArrayLike2<'_, f64, AllowTypeChange>,
-        force_n: Option<PyArrayLike1<'_, f64, AllowTypeChange>>,
+        places_m: &Bound<'_, PyAny>,
+        force_n: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let described = &detector.0;
-        let places = places_m.as_array();
-        if places.ncols() != 2 {
-            return Err(refused(
-                "places_m: an array (presses, 2) is needed: x and y from the middle of the sensor (m)",
-            ));
-        }
-        let known_m: Vec<[f64; 2]> = places.rows().into_iter().map(|row| [row[0], row[1]]).collect();
-        if let Some(index) = known_m.iter().position(|place_m| !described.outline.holds(*place_m)) {
+        let known_m: Vec<[f64; 2]> = given::places(places_m)?;
+        let is_on_it = |[x_m, y_m]: [f64; 2]| x_m.is_finite() && y_m.is_finite() && described.outline.holds([x_m, y_m]);
+        if let Some(index) = known_m.iter().position(|place_m| !is_on_it(*place_m)) {
             let [x_m, y_m] = known_m[index];
             return Err(refused(format!(
                 "places_m[{index}]: {x_m}, {y_m} m is not on the sensor: x and y count from its middle, in metres"
             )));
         }
-        let forces = force_n.map(|force_n| forces(&force_n, known_m.len())).transpose()?;
+        let forces = force_n.map(forces).transpose()?;
+        if let Some(forces) = forces.as_ref().filter(|forces| forces.len() != known_m.len()) {
+            return Err(refused(format!("force_n: {} forces are given, but {} places", forces.len(), known_m.len())));
+        }
         if forces.is_some() && described.force.is_none() {
             return Err(refused("force_n: the detector has no law of force: fit one by ForceLaw.of_presses first"));
         }
@@ -193,9 +191,9 @@ impl ForceLaw {
         py: Python<'_>,
         detector: &Detector,
         readings: &Bound<'_, PyAny>,
-        force_n: PyArrayLike1<'_, f64, AllowTypeChange>,
-        unloading: Option<PyArrayLike1<'_, bool, AllowTypeChange>>,
-        time_s: Option<PyArrayLike1<'_, f64, AllowTypeChange>>,
+        force_n: &Bound<'_, PyAny>,
+        unloading: Option<&Bound<'_, PyAny>>,
+        time_s: Option<&Bound<'_, PyAny>>,
         law: Option<&str>,
     ) -> PyResult<Self> {
         let law = match law {
@@ -208,10 +206,12 @@ impl ForceLaw {
             Some(_) if unloading.is_some() => {
                 return Err(refused("unloading: a force sensor tells that itself: leave it out"));
             }
-            Some(time_s) => Told::Sensor(sensor(&time_s, &force_n)?),
+            Some(time_s) => Told::Sensor(sensor(time_s, force_n)?),
             None => {
-                let forces_n = forces(&force_n, force_n.as_array().len())?;
-                let unloading = unloading.map(|unloading| unloading.as_array().to_vec());
+                let forces_n = forces(force_n)?;
+                let unloading = unloading.map(|unloading| given::numbers("unloading", unloading)).transpose()?;
+                let unloading: Option<Vec<bool>> =
+                    unloading.map(|unloading| unloading.iter().map(|is_set| *is_set != 0.0).collect());
                 if unloading.as_ref().is_some_and(|unloading| unloading.len() != forces_n.len()) {
                     return Err(refused("unloading: as many values as forces are needed"));
                 }
@@ -309,10 +309,10 @@ impl Told {
         let press = |(index, (contacts, conductance_s, deviation_s)): (usize, (usize, f64, f64))| {
             if contacts != 1 || conductance_s <= 0.0 {
                 let what = match contacts {
-                    0 => format!("is too light to be found ({} N): leave it out", forces_n[index]),
+                    0 => "is too light to be found: leave it out".to_owned(),
                     contacts => format!("has {contacts} contacts: {ONE_TIP}"),
                 };
-                return Err(refused(format!("press {index} {what}")));
+                return Err(refused(format!("force_n[{index}]: its press, of {} N, {what}", forces_n[index])));
             }
             let direction = unloading.as_ref().map(|unloading| match unloading[index] {
                 true => Direction::Unloading,
@@ -357,10 +357,9 @@ fn require_as_many(frames: usize, told: usize, what: &str) -> PyResult<()> {
     }
 }
 
-/// Forces above zero, so many of them.
-fn forces(given: &PyArrayLike1<'_, f64, AllowTypeChange>, count: usize) -> PyResult<Vec<f64>> {
-    let forces_n = given.as_array().to_vec();
-    require_as_many(count, forces_n.len(), "force_n")?;
+/// Forces above zero.
+fn forces(force_n: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let forces_n = given::numbers("force_n", force_n)?;
     match forces_n.iter().position(|force_n| !(force_n.is_finite() && *force_n > 0.0)) {
         Some(index) => Err(refused(format!("force_n[{index}]: a force above zero is needed (N)"))),
         None => Ok(forces_n),
@@ -368,15 +367,12 @@ fn forces(given: &PyArrayLike1<'_, f64, AllowTypeChange>, count: usize) -> PyRes
 }
 
 /// Times and forces of a force sensor.
-fn sensor(
-    time_s: &PyArrayLike1<'_, f64, AllowTypeChange>,
-    force_n: &PyArrayLike1<'_, f64, AllowTypeChange>,
-) -> PyResult<Vec<[f64; 2]>> {
-    let (times_s, forces_n) = (time_s.as_array(), force_n.as_array());
+fn sensor(time_s: &Bound<'_, PyAny>, force_n: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 2]>> {
+    let (times_s, forces_n) = (given::numbers("time_s", time_s)?, given::numbers("force_n", force_n)?);
     if times_s.len() != forces_n.len() {
         return Err(refused(format!("time_s: {} times, but {} forces are given", times_s.len(), forces_n.len())));
     }
-    let all: Vec<[f64; 2]> = times_s.iter().zip(forces_n).map(|(time_s, force_n)| [*time_s, *force_n]).collect();
+    let all: Vec<[f64; 2]> = times_s.into_iter().zip(forces_n).map(|(time_s, force_n)| [time_s, force_n]).collect();
     let is_finite = all.iter().flatten().all(|value| value.is_finite());
     if !is_finite || all.windows(2).any(|pair| pair[1][0] <= pair[0][0]) {
         return Err(refused("time_s: finite times that rise are needed, and finite forces"));

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use numpy::{AllowTypeChange, PyArrayLike1, PyArrayLike2, PyArrayLikeDyn};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 use tactomo::learned::Learned as Taught;
@@ -53,11 +52,11 @@ impl Learned {
 
     /// What the channels of any sensor, less those at rest (V), say of a press: `(channels,)`. On a detector, `Solver(learned=...)` does the
     /// same, and leaves out broken electrodes.
-    fn solve(&self, py: Python<'_>, readings: PyArrayLikeDyn<'_, f64, AllowTypeChange>) -> PyResult<Solution> {
+    fn solve(&self, py: Python<'_>, readings: &Bound<'_, PyAny>) -> PyResult<Solution> {
         let kernel = self.kernel().ok_or_else(|| {
             refused("a network was learned for a detector: use it in Solver(\"network\", detector, learned=...)")
         })?;
-        let volts: Vec<f64> = readings.as_array().iter().copied().collect();
+        let volts: Vec<f64> = given::array("readings", readings)?.as_array().iter().copied().collect();
         let press = py.detach(|| kernel.press(&volts)).map_err(|channel| match channel {
             Some(channel) => refused(format!("channel {channel} is not a finite number")),
             None => {
@@ -137,17 +136,17 @@ impl Learned {
 pub fn learn(
     py: Python<'_>,
     readings: &Bound<'_, PyAny>,
-    places_m: PyArrayLike2<'_, f64, AllowTypeChange>,
+    places_m: &Bound<'_, PyAny>,
     detector: Option<&Detector>,
-    force_n: Option<PyArrayLike1<'_, f64, AllowTypeChange>>,
-    depth_m: Option<PyArrayLike1<'_, f64, AllowTypeChange>>,
-    conductance_s: Option<PyArrayLike1<'_, f64, AllowTypeChange>>,
+    force_n: Option<&Bound<'_, PyAny>>,
+    depth_m: Option<&Bound<'_, PyAny>>,
+    conductance_s: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Learned> {
     let (channels, readings_v) = channels(readings, detector)?;
     let given = [(Strength::Force, force_n), (Strength::Depth, depth_m), (Strength::Conductance, conductance_s)];
     let mut given = given.into_iter().filter_map(|(strength, values)| Some((strength, values?)));
     let (strength, strengths) = match given.next() {
-        Some((strength, values)) => (Some(strength), values.as_array().to_vec()),
+        Some((strength, values)) => (Some(strength), given::numbers(strength.name(), values)?),
         None => (None, Vec::new()),
     };
     if given.next().is_some() {
@@ -157,7 +156,7 @@ pub fn learn(
         channels,
         names: Vec::new(),
         readings_v,
-        places_m: places(&places_m)?,
+        places_m: given::places(places_m)?,
         strengths,
         strength,
         drive_v: detector.map(|detector| detector.0.drive_v),
@@ -175,19 +174,10 @@ fn channels(readings: &Bound<'_, PyAny>, detector: Option<&Detector>) -> PyResul
         let all = frames.iter().flat_map(|readings| readings.volts().iter().copied()).collect();
         return Ok((detector.electrodes.len().pow(2), all));
     }
-    let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = readings.extract()?;
+    let array = given::array("readings", readings)?;
     let all = array.as_array();
     match all.shape() {
         [_, channels @ ..] if !channels.is_empty() => Ok((channels.iter().product(), all.iter().copied().collect())),
         _ => Err(refused("readings: an array (presses, channels) is needed (V)")),
     }
-}
-
-/// Places `(presses, 2)` or `(presses, 3)`.
-fn places(given: &PyArrayLike2<'_, f64, AllowTypeChange>) -> PyResult<Vec<[f64; 3]>> {
-    let rows = given.as_array();
-    if ![2, 3].contains(&rows.ncols()) {
-        return Err(refused("places_m: an array (presses, 2) or (presses, 3) is needed: x, y and perhaps z (m)"));
-    }
-    Ok(rows.rows().into_iter().map(|row| [row[0], row[1], row.get(2).copied().unwrap_or_default()]).collect())
 }

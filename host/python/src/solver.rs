@@ -108,19 +108,21 @@ impl Solver {
         &self,
         py: Python<'_>,
         frames: &Bound<'_, PyAny>,
-        cores: Option<usize>,
+        cores: Option<i64>,
         in_sequence: bool,
     ) -> PyResult<Solutions> {
-        if cores == Some(0) {
-            return Err(refused("cores: a number of threads from 1 on is needed, or None for all cores"));
-        }
+        let cores = match cores.map(usize::try_from) {
+            None => threads::cores(),
+            Some(Ok(cores)) if cores > 0 => cores,
+            _ => return Err(refused("cores: a number of threads from 1 on is needed, or None for all cores")),
+        };
         let mut all = self::frames(frames, self.problem.detector())?;
         let asked = Interrupt::new();
         let answers = py.detach(|| {
             all.iter_mut().for_each(|readings| readings.correct_channels(self.problem.detector()));
             match in_sequence {
                 true => self.one_after_the_other(&all, &asked),
-                false => self.independently(&all, cores.unwrap_or_else(threads::cores), &asked),
+                false => self.independently(&all, cores, &asked),
             }
         });
         match asked.raised.into_inner().unwrap_or_else(PoisonError::into_inner) {

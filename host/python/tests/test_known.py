@@ -106,6 +106,17 @@ def test_known_presses_say_what_is_wrong(detector, forced, pressed, places_m):
     refused = pytest.raises
     with refused(tactomo.TactomoError, match=r"places_m\[3\]: .* is not on the sensor"):
         tactomo.Correction.of_presses(detector, pressed, np.where(np.arange(16)[:, None] == 3, 20.0, places_m))
+    with refused(tactomo.TactomoError, match=r"places_m\[0\]: nan, .* is not on the sensor"):
+        tactomo.Correction.of_presses(detector, pressed, np.full((16, 2), np.nan))
+    for wrong, words in {
+        "here": "places_m: numbers are needed: could not convert",
+        (1.0, 2.0): r"places_m: an array \(presses, 2\) is needed, .* but it is one of 2$",
+        ((0, 0, 0),): r"places_m: an array \(presses, 2\) is needed, .* 1 x 3$",
+    }.items():
+        with refused(tactomo.TactomoError, match=words):
+            tactomo.Correction.of_presses(detector, pressed, wrong)
+    with refused(tactomo.TactomoError, match="force_n: a list of numbers is needed, but it is an array of 8 x 1"):
+        tactomo.ForceLaw.of_presses(detector, forced, FORCES_N[:, None])
     with refused(tactomo.TactomoError, match="places_m: 15 are given, but 16 frames"):
         tactomo.Correction.of_presses(detector, pressed, places_m[:15])
     with refused(tactomo.TactomoError, match="no law of force"):
@@ -114,7 +125,7 @@ def test_known_presses_say_what_is_wrong(detector, forced, pressed, places_m):
         tactomo.ForceLaw.of_presses(detector, forced, FORCES_N[:7])
     with refused(tactomo.TactomoError, match=r"force_n\[2\]: a force above zero"):
         tactomo.ForceLaw.of_presses(detector, forced, np.where(np.arange(8) == 2, -1, FORCES_N))
-    with refused(tactomo.TactomoError, match="press 1 is too light to be found"):
+    with refused(tactomo.TactomoError, match=r"force_n\[1\]: its press, of 0.37 N, is too light to be found"):
         tactomo.ForceLaw.of_presses(detector, np.where(np.arange(8)[:, None, None] == 1, 0, forced), FORCES_N)
     with refused(tactomo.TactomoError, match="unloading: as many values as forces"):
         tactomo.ForceLaw.of_presses(detector, forced, FORCES_N, unloading=[True])
@@ -179,5 +190,5 @@ def test_any_sensor_can_be_learned():
         tactomo.learn(heard[:5], places_m[:5])
     with pytest.raises(tactomo.TactomoError, match="one of force_n, depth_m"):
         tactomo.learn(heard, places_m, force_n=np.ones(200), depth_m=np.ones(200))
-    with pytest.raises(tactomo.TactomoError, match=r"places_m: an array \(presses, 2\)"):
+    with pytest.raises(tactomo.TactomoError, match=r"places_m: an array \(presses, 2\) or \(presses, 3\) .* 200 x 1$"):
         tactomo.learn(heard, places_m[:, :1])

@@ -87,6 +87,8 @@ def test_no_frames_are_no_answers(detector):
         (lambda frames: [*frames[:2], frames[2][:15, :15]], r"frames\[2\]: readings of 15 electrodes"),
         (lambda frames: 1e3 * frames, "millivolts"),
         (lambda frames: [frames[0], "here"], r"frames\[1\]"),
+        (lambda frames: [None], r"frames\[0\]: an array of one number is no frame"),
+        (lambda frames: len(frames), "frames: an array or a list is needed"),
     ],
 )
 @pytest.mark.parametrize("in_sequence", [False, True])
@@ -101,8 +103,9 @@ def test_a_reading_that_is_not_finite_is_named(wrong, detector, frames):
     broken[7, 2, 3] = wrong
     with pytest.raises(tactomo.TactomoError, match=r"frames\[7\]: the reading of electrode 3 with electrode 2 grounded is not a finite"):
         tactomo.Solver("tikhonov", detector).solve_many(broken)
-    with pytest.raises(tactomo.TactomoError, match="cores: a number of threads from 1"):
-        tactomo.Solver("tikhonov", detector).solve_many(frames, 0)
+    for cores in (0, -1):
+        with pytest.raises(tactomo.TactomoError, match="cores: a number of threads from 1"):
+            tactomo.Solver("tikhonov", detector).solve_many(frames, cores)
 
 
 def test_numbers_of_other_types_are_frames_too(detector, frames):
