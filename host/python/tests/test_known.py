@@ -106,7 +106,7 @@ def test_known_presses_say_what_is_wrong(detector, forced, pressed, places_m):
     refused = pytest.raises
     with refused(tactomo.TactomoError, match=r"places_m\[3\]: .* is not on the sensor"):
         tactomo.Correction.of_presses(detector, pressed, np.where(np.arange(16)[:, None] == 3, 20.0, places_m))
-    with refused(tactomo.TactomoError, match=r"places_m\[0\]: nan, .* is not on the sensor"):
+    with refused(tactomo.TactomoError, match=r"places_m\[0\]: NaN, .* is not on the sensor"):
         tactomo.Correction.of_presses(detector, pressed, np.full((16, 2), np.nan))
     for wrong, words in {
         "here": "places_m: numbers are needed: could not convert",
