@@ -62,7 +62,7 @@ impl Live {
             source: "simulated board".to_owned(),
             finger: Some(Finger::from(touch(&hand, [0.0; 2], FIRMNESS)?)),
         };
-        let server = Server::start(Listen { port: Some(0), ..Listen::default() }, page, receiver.clone(), sender)?;
+        let server = Server::start(Listen { port: Some(0), ..Listen::default() }, vec![shown(page, receiver.clone(), sender)])?;
         let stop = Arc::default();
         let ends = Ends { snapshots, requests, stop: Arc::clone(&stop) };
         let board = SimulatedBoard::simulate(built, simulation, Options::default())?;

@@ -53,7 +53,7 @@ impl Rig {
     fn listening(listen: Listen, finger: Option<Finger>) -> Result<Self> {
         let (snapshots, receiver) = watch::channel(Arc::default());
         let (sender, requests) = sync_channel(64);
-        let server = Server::start(listen, setup(finger)?, receiver, sender)?;
+        let server = Server::start(listen, vec![shown(setup(finger)?, receiver, sender)])?;
         Ok(Self { server, snapshots, requests })
     }
 
@@ -343,7 +343,7 @@ fn a_busy_port_is_named_and_the_default_gives_way() -> Result<()> {
     let rig = Rig::start(None)?;
     let start = |port| {
         let (_, receiver) = watch::channel(Arc::default());
-        Server::start(local(port), setup(None)?, receiver, sync_channel(1).0).map_err(anyhow::Error::from)
+        Server::start(local(port), vec![shown(setup(None)?, receiver, sync_channel(1).0)]).map_err(anyhow::Error::from)
     };
     let error = start(Some(rig.server.port())).err().context("a busy port")?;
     assert!(matches!(error.downcast_ref(), Some(ServerError::Busy { port, .. }) if *port == rig.server.port()));
