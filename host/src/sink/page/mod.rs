@@ -58,6 +58,17 @@ pub struct Shown {
     pub requests: SyncSender<Request>,
 }
 
+impl Shown {
+    /// One that is shown alone, and needs no name.
+    pub fn alone(
+        setup: PageSetup,
+        snapshots: watch::Receiver<Arc<Snapshot>>,
+        requests: SyncSender<Request>,
+    ) -> Vec<Self> {
+        vec![Self { name: String::new(), setup, snapshots, requests }]
+    }
+}
+
 /// What does not change while the program runs.
 #[derive(Clone, Debug)]
 pub struct PageSetup {
