@@ -219,8 +219,8 @@ impl Server {
         let prefix = access.prefix();
         let picture = |shown: Shown| {
             let name = || shown.setup.detector.name.clone();
-            let setup_message =
-                wire::setup(&shown.setup).map_err(|source| ServerError::PageSetup { detector: name(), source })?;
+            let setup_message = wire::setup(&shown.setup, &shown.name)
+                .map_err(|source| ServerError::PageSetup { detector: name(), source })?;
             Ok(Arc::new(Picture { shown, setup_message, rezeros: AtomicU64::new(0), door: listen.door.clone() }))
         };
         let pictures: Vec<_> = all.into_iter().map(picture).collect::<Result<_, _>>()?;

@@ -20,14 +20,16 @@ function tell() {
 
 // What a tile has besides its picture, and between tiles (pixels): as the style sheet has it.
 const [HEAD, GAP] = [56, 12];
+const SMALLEST = 150;
 
 // As many columns as make the tiles largest without scrolling.
 function arrange() {
   const [width, height] = [box.clientWidth - GAP, window.innerHeight - box.offsetTop - GAP];
   const sideOf = (columns) => Math.min(width / columns - GAP, height / Math.ceil(tiles.length / columns) - GAP - HEAD);
-  const best = tiles.map((_, i) => i + 1).reduce((a, b) => (sideOf(b) > sideOf(a) ? b : a));
-  const side = Math.max(180, Math.floor(sideOf(best)));
-  box.style.gridTemplateColumns = `repeat(auto-fill, ${side}px)`;
+  const best = tiles.map((_, i) => i + 1).reduce((a, b) => (sideOf(b) > sideOf(a) ? b : a), 1);
+  const side = Math.floor(sideOf(best));
+  // Where all together would be too small, the page scrolls.
+  box.style.gridTemplateColumns = side < SMALLEST ? `repeat(auto-fill, minmax(${SMALLEST}px, 1fr))` : `repeat(${best}, ${side}px)`;
 }
 
 arrange();

@@ -31,8 +31,10 @@ function wordsOf({ contacts, shape }) {
 export class Tile {
   isLive = false;
   isTouched = false;
+  drawn = false;
   setup = null;
   waiting = null;
+  theme; changed; text; colours; scale; field; heat; at; over;
 
   constructor(name, theme, changed) {
     Object.assign(this, { theme, changed });
