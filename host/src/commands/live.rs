@@ -60,7 +60,7 @@ const REQUESTS: usize = 64;
 pub struct Args {
     /// Shows several detectors, each with its board, on one page: a TOML file with a [[patch]] for each, that has a name and options of this
     /// command
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "simulate", "replay", "detector", "record", "stream", "foxglove", "mcap", "elf", "scan"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "simulate", "replay", "detector", "record", "foxglove", "mcap", "elf", "scan"])]
     pub skin: Option<PathBuf>,
     #[command(flatten)]
     pub board: BoardArgs,
@@ -168,7 +168,8 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         let show = prepared(Args { picture, seconds: args.seconds, ..patch });
         Ok((name.clone(), show.with_context(|| format!("patch {name} of {}", path.display()))?))
     };
-    show_all(skin::read(path)?.into_iter().map(of_patch).collect::<anyhow::Result<_>>()?)
+    let shows = skin::read(path)?.into_iter().map(of_patch).collect::<anyhow::Result<_>>()?;
+    show_all(shows, Some(&args.streams))
 }
 
 /// What one detector is shown by.
@@ -222,7 +223,7 @@ fn kept(learning: Option<&Learning>) -> Option<Detector> {
 
 /// Serves the page of one detector, or only counts, until the end.
 pub fn show(show: Show) -> anyhow::Result<()> {
-    show_all(vec![(String::new(), show)])
+    show_all(vec![(String::new(), show)], None)
 }
 
 /// A detector that is about to be shown.
@@ -237,14 +238,22 @@ struct Begun {
     json: bool,
 }
 
-/// Serves the page of detectors, each by its name, or only counts, until the end. What ends one leaves the others as they are.
-fn show_all(shows: Vec<(String, Show)>) -> anyhow::Result<()> {
+/// Serves the page of detectors, each by its name, or only counts, until the end. What ends one leaves the others as they are. `streams` have
+/// lines of all.
+fn show_all(shows: Vec<(String, Show)>, streams: Option<&StreamArgs>) -> anyhow::Result<()> {
     let stop = interrupt::flag()?;
     let Some((_, Show { picture, seconds, .. })) = shows.first() else { return Ok(()) };
     let (picture, has_end) = (picture.clone(), seconds.is_some());
     // Whatever cannot be is said before a page opens.
     let begun = shows.into_iter().map(|(name, show)| begin(name, show, &stop)).collect::<anyhow::Result<Vec<_>>>()?;
-    let (begun, shown): (Vec<_>, Vec<_>) = begun.into_iter().unzip();
+    let (mut begun, shown): (Vec<_>, Vec<_>) = begun.into_iter().unzip();
+    let mut of_all = Sinks::new(Arc::clone(&stop));
+    if let Some(streams) = streams {
+        streams.check(picture.json)?;
+        of_all = streams.begin_lines(Arc::clone(&stop))?;
+    }
+    let listeners = of_all.listeners(begun.iter().map(|begun| begun.name.as_str()));
+    begun.iter_mut().zip(listeners).for_each(|(begun, listener)| begun.options.listeners.extend(listener));
     // The page may outlive the pipelines, so the snapshots have senders here too.
     let _outlive: Vec<_> = begun.iter().map(|begun| begun.ends.snapshots.clone()).collect();
     let server = serve(&picture, shown)?;
@@ -253,7 +262,10 @@ fn show_all(shows: Vec<(String, Show)>) -> anyhow::Result<()> {
         runs.into_iter().map(|run| run.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
     });
     let is_left = ended.iter().any(|ended| ended.as_ref().is_ok_and(|ended| *ended == Ended::ReaderIsGone));
+    let is_left = is_left || of_all.reader_is_gone();
+    let streamed = of_all.finish();
     ended.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
+    streamed?;
     if server.is_some() && !has_end && !is_left {
         wait(&stop);
     }
