@@ -272,6 +272,24 @@ fn the_detectors_of_a_skin_are_shown_each_by_its_name() {
 }
 
 #[test]
+fn a_stream_of_several_detectors_names_each_and_keeps_the_order_of_its_times() {
+    let (folder, skin) = (Folder::new("several"), concat!(env!("CARGO_MANIFEST_DIR"), "/examples/skins/hand.toml"));
+    let stream = folder.path("hand.jsonl");
+    let output = TACTOMO.run(&["live", "--skin", skin, "--seconds", "0.5", "--json", "--stream", &stream]);
+    assert_eq!(output.status.code(), Some(0));
+    let text = std::fs::read_to_string(&stream).unwrap();
+    let mut times = std::collections::BTreeMap::<String, Vec<f64>>::new();
+    for line in text.lines() {
+        let line: serde_json::Value = serde_json::from_str(line).unwrap();
+        let patch = line["patch"].as_str().unwrap().to_owned();
+        times.entry(patch).or_default().push(line["time_s"].as_f64().unwrap());
+    }
+    let names: Vec<_> = times.keys().map(String::as_str).collect();
+    assert_eq!(names, ["index", "little", "middle", "ring", "thumb"]);
+    assert!(times.values().all(|times| times.len() > 50 && times.is_sorted()));
+}
+
+#[test]
 fn a_patch_that_fails_is_named_and_harms_no_other() {
     let folder = Folder::new("skin");
     let text = "[[patch]]\nname = \"lame\"\nport = \"/dev/null\"\n[[patch]]\nname = \"sound\"\nsimulate = true\n";
