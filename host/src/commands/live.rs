@@ -60,7 +60,7 @@ const REQUESTS: usize = 64;
 pub struct Args {
     /// Shows several detectors, each with its board, on one page: a TOML file with a [[patch]] for each, that has a name and options of this
     /// command
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "simulate", "replay", "detector", "record", "foxglove", "mcap", "elf", "scan"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = skin::OF_ONE)]
     pub skin: Option<PathBuf>,
     #[command(flatten)]
     pub board: BoardArgs,
@@ -258,15 +258,13 @@ fn show_all(shows: Vec<(String, Show)>, streams: Option<&StreamArgs>) -> anyhow:
     let _outlive: Vec<_> = begun.iter().map(|begun| begun.ends.snapshots.clone()).collect();
     let server = serve(&picture, shown)?;
     let ended: Vec<_> = thread::scope(|scope| {
-        let runs: Vec<_> = begun.into_iter().map(|begun| scope.spawn(move || one(begun))).collect();
+        let runs: Vec<_> = begun.into_iter().map(|begun| scope.spawn(|| one(begun, &of_all))).collect();
         runs.into_iter().map(|run| run.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
     });
-    let is_left = ended.iter().any(|ended| ended.as_ref().is_ok_and(|ended| *ended == Ended::ReaderIsGone));
-    let is_left = is_left || of_all.reader_is_gone();
     let streamed = of_all.finish();
     ended.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
     streamed?;
-    if server.is_some() && !has_end && !is_left {
+    if server.is_some() && !has_end {
         wait(&stop);
     }
     Ok(())
@@ -292,16 +290,9 @@ fn begin(name: String, mut show: Show, stop: &Arc<AtomicBool>) -> anyhow::Result
     Ok((Begun { name, source: show.source, options, ends, sinks, json: show.picture.json }, shown))
 }
 
-/// How a run has ended, if not by an error.
-#[derive(Debug, PartialEq)]
-enum Ended {
-    Told,
-    /// Whoever reads what it writes has gone: it ends as quietly as `head` does.
-    ReaderIsGone,
-}
-
-/// Shows one detector to its end, and says what that came to.
-fn one(begun: Begun) -> anyhow::Result<Ended> {
+/// Shows one detector to its end, and says what that came to, unless whoever reads what it or all write has gone: then it ends as quietly as
+/// `head` does.
+fn one(begun: Begun, of_all: &Sinks) -> anyhow::Result<()> {
     let Begun { name, mut source, options, ends, sinks, json } = begun;
     let named = |error: anyhow::Error| if name.is_empty() { error } else { error.context(format!("patch {name}")) };
     let summary = match tactomo::run::run(&mut *source, options, ends) {
@@ -314,13 +305,12 @@ fn one(begun: Begun) -> anyhow::Result<Ended> {
             return Err(error);
         }
     };
-    let is_left = sinks.reader_is_gone();
+    let is_left = sinks.reader_is_gone() || of_all.reader_is_gone();
     let ended = sinks.finish();
     if !is_left {
         report(&name, &summary, json)?;
     }
-    ended.map_err(|error| named(error.into()))?;
-    Ok(if is_left { Ended::ReaderIsGone } else { Ended::Told })
+    ended.map_err(|error| named(error.into()))
 }
 
 fn problem(args: &PictureArgs, detector: &Detector) -> anyhow::Result<Problem> {

@@ -54,6 +54,11 @@ impl StreamArgs {
         Ok(())
     }
 
+    /// Whether a stream goes to stdout.
+    pub fn use_stdout(&self) -> bool {
+        self.stream.contains(&Target::Stdout)
+    }
+
     /// Begins streams of lines alone, as `begin` does.
     pub fn begin_lines(&self, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
         let mut sinks = Sinks::new(stop);

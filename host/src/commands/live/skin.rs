@@ -12,8 +12,36 @@ use super::Args;
 
 /// Options of the program as a whole, which a patch has none of.
 const OF_ALL: [&str; 7] = ["skin", "http-port", "listen", "allow-origin", "no-open", "json", "seconds"];
-/// Options whose values are files, beside the skin's unless their paths are absolute.
-const FILES: [&str; 7] = ["detector", "learned", "jacobian", "replay", "record", "mcap", "elf"];
+/// Arguments of one board, which patches have in place of the command line; `simulated` are those of scenes.
+pub const OF_ONE: [&str; 25] = [
+    "port",
+    "simulate",
+    "baud",
+    "settle_us",
+    "average",
+    "max_fps",
+    "select_us",
+    "discard",
+    "replay",
+    "detector",
+    "material",
+    "solver",
+    "learned",
+    "jacobian",
+    "no_learning",
+    "pointer",
+    "scan",
+    "record",
+    "foxglove",
+    "mcap",
+    "elf",
+    "board",
+    "time_factor",
+    "speed",
+    "simulated",
+];
+/// Options whose values are files that are read, beside the skin's unless their paths are absolute.
+const FILES: [&str; 5] = ["detector", "learned", "jacobian", "replay", "elf"];
 
 /// Why a skin cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -96,6 +124,9 @@ fn of_text(text: &str, path: &Path) -> Result<Vec<(String, Args)>, SkinError> {
         }
         let words = words(&options, path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;
         let parsed = Options::try_parse_from(words).map_err(|error| wrong(said(&error)))?;
+        if parsed.args.streams.use_stdout() {
+            return Err(wrong("stdout is of all: give --stream - on the command line".to_owned()));
+        }
         read.push((name, parsed.args));
     }
     Ok(read)
@@ -166,6 +197,23 @@ mod tests {
     }
 
     #[test]
+    fn options_of_one_board_are_refused_beside_a_skin_and_none_is_ignored() {
+        let command = <Options as clap::CommandFactory>::command();
+        for option in command.get_arguments().filter_map(clap::Arg::get_long) {
+            let of_streams = option.starts_with("stream");
+            if OF_ALL.contains(&option) || of_streams {
+                continue;
+            }
+            let values = ["", "=1", "=a", "=4", "=rest", "=esp32", "=A", "=auto"];
+            let is_taken = |value: &&str| {
+                let words = ["--skin=hand.toml".to_owned(), format!("--{option}{value}")];
+                Options::try_parse_from(words).is_ok()
+            };
+            assert!(!values.iter().any(|value| is_taken(&value)), "--{option} beside --skin is ignored");
+        }
+    }
+
+    #[test]
     fn what_is_wrong_is_named_with_its_patch() {
         let of = |options: &str| read(&format!("[[patch]]\nname = \"thumb\"\n{options}\n")).err().unwrap();
         for (options, what) in [
@@ -179,6 +227,7 @@ mod tests {
             ("[[patch]]\nname = \"thumb\"", "another patch has this name"),
             ("[[patch]]\nname = \"a/b\"", "letters, digits"),
             ("fault = [[1]]", "fault has to be a text"),
+            ("simulate = true\nstream = \"-\"", "give --stream - on the command line"),
         ] {
             assert!(of(options).contains(what), "{options}: {}", of(options));
         }
