@@ -209,7 +209,7 @@ mod tests {
                 let words = ["--skin=hand.toml".to_owned(), format!("--{option}{value}")];
                 Options::try_parse_from(words).is_ok()
             };
-            assert!(!values.iter().any(|value| is_taken(value)), "--{option} beside --skin is ignored");
+            assert!(!values.iter().any(is_taken), "--{option} beside --skin is ignored");
         }
     }
 
