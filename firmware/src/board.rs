@@ -2,8 +2,8 @@
 
 use heapless::String;
 use tactomo_protocol::{
-    BoardMessage, Command, CommandReceiver, DecodeError, Fault, Hello, MAX_ELECTRODES, MIN_ELECTRODES, Plan, Request,
-    Settings, frame, scope, wire_bytes,
+    BoardMessage, Clock, Command, CommandReceiver, DecodeError, Fault, Hello, MAX_ELECTRODES, MIN_ELECTRODES, Plan,
+    Request, Settings, frame, scope, wire_bytes,
 };
 
 use crate::inbox::Inbox;
@@ -186,7 +186,11 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
 
     fn obey(&mut self, Request { tag, command }: Request) {
         match self.carry_out(tag, command) {
-            Ok(()) => self.say_hello(tag),
+            Ok(()) => {
+                self.say_hello(tag);
+                let time_us = self.parts.chip.now_us() as u32;
+                self.uplink.message(&BoardMessage::Clock(Clock { answers: tag, time_us }));
+            }
             Err(refusal) => self.fault(refusal),
         }
         self.boot_fault.take().into_iter().for_each(|fault| self.fault(fault));

@@ -178,6 +178,7 @@ fn board_message(packet: &[u8], keys: &mut Keys<MAX_READINGS>) -> Result<BoardMe
             Fault::UnknownVersion(_) if version < VERSION => return Err(DecodeError::Version(version)),
             fault => BoardMessage::Fault(fault),
         },
+        Kind::Clock => BoardMessage::Clock(from_postcard(body)?),
         Kind::Command => return Err(DecodeError::Body),
     })
 }

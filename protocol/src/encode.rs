@@ -56,6 +56,7 @@ pub fn encode_board(message: &BoardMessage, out: &mut [u8]) -> Result<usize, Enc
         BoardMessage::Hello(hello) => encode_body(Kind::Hello, hello, out),
         BoardMessage::Frame(frame) => encode_rows(frame.head, &frame.scope, &frame.readings, out),
         BoardMessage::Log(log) => encode_log(&log.0, out),
+        BoardMessage::Clock(clock) => encode_body(Kind::Clock, clock, out),
         BoardMessage::Fault(fault) => encode_body(Kind::Fault, fault, out),
     }
 }

@@ -61,7 +61,8 @@ pub use decode::{BoardReceiver, CommandReceiver, Counters, DecodeError, Receiver
 pub use encode::{EncodeError, encode_board, encode_frame, encode_keyed, encode_log, encode_request, encode_rows};
 pub use frame::{Frame, FrameHead, Status};
 pub use message::{
-    BoardMessage, Command, ConverterErrors, Fault, Hello, Kind, Log, MAX_LOG, MAX_RANGES, Range, Request, Settings,
+    BoardMessage, Clock, Command, ConverterErrors, Fault, Hello, Kind, Log, MAX_LOG, MAX_RANGES, Range, Request,
+    Settings,
 };
 pub use scope::{MAX_PLAN_ROWS, MAX_ROWS, Plan, Scope};
 

@@ -26,13 +26,15 @@ pub enum Kind {
     Fault = 3,
     /// [`Frame`], board to host, as the [differences](crate::coded) from another.
     CodedFrame = 4,
+    /// [`Clock`], board to host.
+    Clock = 6,
     /// [`Request`], host to board.
     Command = 8,
 }
 
 impl Kind {
     pub(crate) fn from_bits(bits: u8) -> Option<Self> {
-        let all = [Self::Hello, Self::Frame, Self::Log, Self::Fault, Self::CodedFrame, Self::Command];
+        let all = [Self::Hello, Self::Frame, Self::Log, Self::Fault, Self::CodedFrame, Self::Clock, Self::Command];
         all.into_iter().find(|kind| *kind as u8 == bits)
     }
 }
@@ -49,6 +51,8 @@ pub enum BoardMessage {
     Log(Log),
     /// Something went wrong on the board.
     Fault(Fault),
+    /// What the board's clock showed when it obeyed a command.
+    Clock(Clock),
 }
 
 /// Who the board is, what its readings mean, and what it does.
@@ -209,6 +213,16 @@ impl Default for Settings {
 /// Bytes of the board's defmt stream, in order. A gap is possible when the link is slow.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Log(pub Vec<u8, MAX_LOG>);
+
+/// What the board's clock showed between the arrival of a command and its [`Hello`]: so its host, which knows when it sent the one and got the other,
+/// knows what its own clock showed then. It follows the Hello that answers the command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Clock {
+    /// Tag of the command.
+    pub answers: u8,
+    /// Board time, as [frames](crate::FrameHead) have it, in microseconds (us), modulo 2^32.
+    pub time_us: u32,
+}
 
 /// Something went wrong on the board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,6 +6,7 @@
 pub mod baseline;
 pub mod board_log;
 pub mod check;
+pub mod clock;
 pub mod frames;
 pub mod identity;
 pub mod inputs;

@@ -9,6 +9,7 @@ mod pace;
 mod plan;
 mod rate;
 mod requested;
+mod timing;
 
 use std::time::{Duration, Instant};
 
@@ -17,6 +18,7 @@ use tactomo_protocol::{Command, Fault, Hello, Plan, Request, Settings};
 use self::pace::Paces;
 use self::plan::PlanWish;
 use self::rate::{KEEP_ALIVE, Rates};
+use self::timing::Timing;
 
 pub use greet::{GreetError, explain, greet};
 pub use line::send;
@@ -99,6 +101,7 @@ pub struct Session {
     /// When the board was last heard of, or asked.
     heard: Option<Instant>,
     refusal: Option<Refusal>,
+    timing: Timing,
 }
 
 impl Session {
@@ -120,6 +123,7 @@ impl Session {
             started: false,
             heard: None,
             refusal: None,
+            timing: Timing::new(Instant::now()),
         }
     }
 
@@ -321,6 +325,7 @@ impl Session {
     fn board_has_started(&mut self, hello: &Hello, now: Instant) {
         self.heard = Some(now);
         self.pending = None;
+        self.timing.restart();
         (self.settings_due, self.start_due) = (true, true);
         self.plan.forget();
         self.hello = Some(hello.clone());

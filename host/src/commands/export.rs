@@ -176,6 +176,7 @@ fn event(
     let arrived = Duration::from_secs_f64(frame.arrived_s.unwrap_or(time_s).max(0.0));
     let came = Frame {
         sequence: frame.sequence.unwrap_or_default(),
+        delay: frame.delay,
         board_time_us: (time_s * 1e6).round() as u64,
         lost,
         ..Frame::first(measured, used.saying(|g, e| touch.says(g, e)), Arrival::recorded(started + arrived))

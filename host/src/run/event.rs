@@ -64,10 +64,13 @@ impl TouchEvent {
 
     /// As it leaves the program, with all that is known; whoever wants less takes fields away.
     pub fn report(&self) -> FrameReport<'_> {
+        let scanned = self.frame.scanned();
         FrameReport {
             sequence: Some(self.frame.sequence),
             time_s: Some(self.frame.time_s()),
             arrived_unix_s: Some(self.frame.arrived.unix_ns as f64 * 1e-9),
+            host_time_ns: scanned.map(|scanned| scanned.unix_ns),
+            host_time_error_ns: scanned.map(|scanned| scanned.error_ns),
             lost_before: Some(self.lost_before),
             age_us: self.age.map(|age| age.as_secs_f64() * 1e6),
             revised: self.is_revision,

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use tactomo_board::clock::Delay;
 use tactomo_physics::readings::Readings;
 use tactomo_protocol::Status;
 use tactomo_touch::solve::Latest;
@@ -15,6 +16,8 @@ pub struct Frame {
     pub board_time_us: u64,
     /// When its last byte came.
     pub arrived: Arrival,
+    /// How long before that it was scanned, as far as the board's clock is known.
+    pub delay: Option<Delay>,
     /// What happened during the scan.
     pub status: Status,
     /// Frames that the link or the board have lost since the run began, up to this one, as the sequence numbers say.
@@ -29,13 +32,29 @@ pub struct Frame {
 impl Frame {
     /// The first of a board, which comes at this time.
     pub fn first(measured: Readings, used: Readings, arrived: Arrival) -> Self {
-        Self { sequence: 0, board_time_us: 0, arrived, status: Status::default(), lost: 0, measured, used }
+        Self { sequence: 0, board_time_us: 0, arrived, delay: None, status: Status::default(), lost: 0, measured, used }
     }
 
     /// Board time in the middle of the scan (s).
     pub fn time_s(&self) -> f64 {
         self.board_time_us as f64 / 1e6
     }
+
+    /// When the middle of the scan was, by the clock of the machine that received it; `None` if the board's clock is not known.
+    pub fn scanned(&self) -> Option<HostTime> {
+        let Delay { delay_s, error_s } = self.delay?;
+        let unix_ns = self.arrived.unix_ns.saturating_add_signed(-((delay_s * 1e9).round() as i64));
+        Some(HostTime { unix_ns, error_ns: (error_s * 1e9).ceil() as u64 })
+    }
+}
+
+/// A moment by the clock of the machine that received a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HostTime {
+    /// Nanoseconds since 1970 (ns).
+    pub unix_ns: u64,
+    /// How far that is from the truth at most (ns).
+    pub error_ns: u64,
 }
 
 /// When the last byte of a frame came.

@@ -203,6 +203,7 @@ impl Reader {
             self.plans.ask(&mut connection.session);
             match connection.exchange(link, &mut buffer) {
                 Ok(count) => {
+                    self.recordings.asked(connection.session.take_sent());
                     if link.jumped() {
                         self.sequence.restart();
                         self.newest = None;
@@ -246,6 +247,7 @@ impl Reader {
             match message {
                 Ok(BoardMessage::Frame(frame)) => self.frame(connection, &frame, received),
                 Ok(BoardMessage::Hello(hello)) => self.hello(connection, hello, received)?,
+                Ok(BoardMessage::Clock(clock)) => connection.session.clock(clock, received),
                 Ok(BoardMessage::Log(log)) => self.options.board_log.take(&log.0),
                 Ok(BoardMessage::Fault(fault)) => {
                     // What answers a command is told where that is given up.
@@ -339,8 +341,9 @@ impl Reader {
         };
         self.course.add(place.time_us, &used);
         let (sequence, board_time_us, arrived) = (place.sequence, place.time_us, Arrival::at(received));
+        let delay = connection.session.delay(frame.head.time_us, received);
         let (status, lost) = (frame.head.status, self.frames_lost);
-        let taken = Taken::new(Frame { sequence, board_time_us, arrived, status, lost, measured, used }, rows);
+        let taken = Taken::new(Frame { sequence, board_time_us, arrived, delay, status, lost, measured, used }, rows);
         self.inbox.put_frame(taken, board.noise_v);
     }
 

@@ -91,6 +91,15 @@ impl Recordings {
         self.notice.change(|snapshot| (snapshot.refused.recording, snapshot.marks) = (refused, marks));
     }
 
+    /// Sets down when the board was sent commands of such tags.
+    pub fn asked(&mut self, sent: Vec<(u8, Instant)>) {
+        let Some(recorder) = &mut self.recorder else { return };
+        for (tag, at) in sent {
+            // What cannot be written is told with the next bytes.
+            let _ = recorder.note(Note::Asked { tag }, at);
+        }
+    }
+
     /// Sets down what a calibration has found, in this recording and those to come.
     pub fn found(&mut self, detector: Option<Arc<Detector>>) {
         let (Some(detector), known) = (detector, &self.found) else { return };

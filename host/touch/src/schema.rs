@@ -68,6 +68,13 @@ pub struct FrameReport<'a> {
     /// When the frame's last byte came, by the clock of the machine: seconds since 1970 (s), within half a microsecond.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub arrived_unix_s: Option<f64>,
+    /// When the middle of the scan was, by the clock of the machine that received it: nanoseconds since 1970 (ns); of boards that tell what their
+    /// clock shows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub host_time_ns: Option<u64>,
+    /// How far that is from the truth at most (ns).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub host_time_error_ns: Option<u64>,
     /// Frames lost or damaged since the one before.
     #[serde(skip_serializing_if = "is_none_or_zero")]
     pub lost_before: Option<u64>,
@@ -177,11 +184,17 @@ pub struct FrameColumn {
 }
 
 /// The numbers of a frame but for its contacts and image, in the order of every format.
-pub const FRAME_COLUMNS: [FrameColumn; 17] = [
+pub const FRAME_COLUMNS: [FrameColumn; 19] = [
     FrameColumn { name: "frame", kind: Kind::Integer, of: |frame| frame.frame.map(|frame| frame as f64) },
     FrameColumn { name: "sequence", kind: Kind::Integer, of: |frame| frame.sequence.map(|sequence| sequence as f64) },
     FrameColumn { name: "time_s", kind: Kind::Number, of: |frame| frame.time_s },
     FrameColumn { name: "arrived_unix_s", kind: Kind::Number, of: |frame| frame.arrived_unix_s },
+    FrameColumn { name: "host_time_ns", kind: Kind::Integer, of: |frame| frame.host_time_ns.map(|time| time as f64) },
+    FrameColumn {
+        name: "host_time_error_ns",
+        kind: Kind::Integer,
+        of: |frame| frame.host_time_error_ns.map(|error| error as f64),
+    },
     FrameColumn { name: "lost_before", kind: Kind::Integer, of: |frame| frame.lost_before.map(|count| count as f64) },
     FrameColumn { name: "rezeroing", kind: Kind::Flag, of: |frame| Some(f64::from(frame.rezeroing)) },
     FrameColumn { name: "frame_us", kind: Kind::Number, of: |frame| frame.frame_us },

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Keys, Log, MAX_WIRE, Plan,
+    BoardMessage, BoardReceiver, Clock, Command, CommandReceiver, Fault, Frame, FrameHead, Hello, Keys, Log, MAX_WIRE, Plan,
     Range, Request, Scope, Settings, encode_board, encode_keyed, encode_request,
 };
 
@@ -68,6 +68,7 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Fault(Fault::AdcStuck),
         BoardMessage::Fault(Fault::BadPlan { answers: 9 }),
         BoardMessage::Fault(Fault::BadRate { answers: 6 }),
+        BoardMessage::Clock(Clock { answers: 6, time_us: 0 }),
         BoardMessage::Fault(Fault::Reset("watchdog".try_into().expect("short"))),
     ]
 }

@@ -3,7 +3,7 @@
 use heapless::Vec as Fixed;
 use proptest::prelude::*;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, CommandReceiver, ConverterErrors, Counters, DecodeError, Fault, Frame,
+    BoardMessage, BoardReceiver, Clock, Command, CommandReceiver, ConverterErrors, Counters, DecodeError, Fault, Frame,
     FrameHead, Hello, Log, MAX_COMMAND, MAX_WIRE, Plan, Range, Request, Scope, Settings, Status, encode_board,
     encode_request,
 };
@@ -127,8 +127,12 @@ fn fault() -> impl Strategy<Value = BoardMessage> {
     .prop_map(BoardMessage::Fault)
 }
 
+fn clock() -> impl Strategy<Value = BoardMessage> {
+    (any::<u8>(), any::<u32>()).prop_map(|(answers, time_us)| BoardMessage::Clock(Clock { answers, time_us }))
+}
+
 pub fn board_message() -> impl Strategy<Value = BoardMessage> {
-    prop_oneof![any_hello(), frame(), log(), fault()]
+    prop_oneof![any_hello(), frame(), log(), fault(), clock()]
 }
 
 /// Any plan that the wire carries, whether or not a board would take it.

@@ -6,8 +6,8 @@ use std::fmt::Debug;
 
 use heapless::Vec as Fixed;
 use tactomo_protocol::{
-    BoardMessage, BoardReceiver, Command, DecodeError, Fault, Frame, FrameHead, Keys, Log, MAX_WIRE, Plan, Request,
-    Scope, Settings, Status, encode_keyed,
+    BoardMessage, BoardReceiver, Clock, Command, DecodeError, Fault, Frame, FrameHead, Keys, Log, MAX_WIRE, Plan,
+    Request, Scope, Settings, Status, encode_keyed,
 };
 
 use crate::common::{board_wire, hello, packet, receive_command, request_wire};
@@ -59,6 +59,7 @@ fn board_messages() -> Vec<BoardMessage> {
         BoardMessage::Fault(Fault::UnknownVersion(3)),
         BoardMessage::Fault(Fault::BadPlan { answers: 9 }),
         BoardMessage::Fault(Fault::BadRate { answers: 13 }),
+        BoardMessage::Clock(Clock { answers: 7, time_us: 67_305_985 }),
     ]
 }
 

@@ -156,6 +156,7 @@ fn kind(message: &BoardMessage) -> char {
         BoardMessage::Frame(_) => 'F',
         BoardMessage::Log(_) => 'L',
         BoardMessage::Fault(_) => 'X',
+        BoardMessage::Clock(_) => 'C',
     }
 }
 

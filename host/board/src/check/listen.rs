@@ -204,7 +204,7 @@ impl Listening {
                     }
                 }
                 Err(DecodeError::Version(found)) => return Err(version(&*self.link, found)),
-                Ok(BoardMessage::Log(_)) | Err(_) => {}
+                Ok(BoardMessage::Log(_) | BoardMessage::Clock(_)) | Err(_) => {}
             }
         }
         Ok(())

@@ -13,6 +13,7 @@ use tactomo_protocol::Hello;
 pub use self::recorded::{Recorded, RecordingLoss};
 pub use self::survey::Survey;
 use crate::baseline::BaselineTracker;
+use crate::clock::Delay;
 use crate::record::{self, OtherProtocol, RecordError};
 use tactomo_physics::readings::{Readings, Says};
 use tactomo_table::{Array, Table, TableError};
@@ -41,6 +42,8 @@ pub struct FileFrame {
     pub time_s: Option<f64>,
     /// When its last byte came (s since the recording's start), if the file tells.
     pub arrived_s: Option<f64>,
+    /// How long before that it was scanned, if that is known.
+    pub delay: Option<Delay>,
     /// The board's number of the scan, if the file tells.
     pub sequence: Option<u64>,
     /// Scans that are missing since the frame before: lost on the way, or damaged in the file.
@@ -244,6 +247,7 @@ impl Rows {
         let volts: Vec<f64> = self.rows.by_ref().take(self.channels).collect();
         (volts.len() == self.channels).then_some(FileFrame {
             time_s: None,
+            delay: None,
             arrived_s: None,
             sequence: None,
             lost_before: 0,

@@ -4,10 +4,12 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use tactomo_protocol::{BoardMessage, BoardReceiver, DecodeError, Frame, Hello};
 
 use super::{FileFrame, FramesError};
+use crate::clock::BoardClock;
 use crate::measured::Volts;
 use crate::record::{Entry, Header, Loss, Note, OtherProtocol, RecordReader};
 use crate::sequence::Sequence;
@@ -27,6 +29,7 @@ pub struct Recorded {
     corrupt_before: u64,
     lost: RecordingLoss,
     times: Times,
+    clock: BoardClock,
     notes: Vec<(f64, Note)>,
     frames: VecDeque<FileFrame>,
 }
@@ -108,12 +111,16 @@ impl Recorded {
     pub(super) fn open(path: &Path) -> Result<Self, FramesError> {
         let mut reader = RecordReader::open(path)?;
         let (mut receiver, mut chunk, mut notes) = (BoardReceiver::default(), Vec::new(), Vec::new());
+        let mut clock = BoardClock::default();
         loop {
             let mut times = Times::default();
             match read(&mut reader, &mut chunk, path)? {
                 None => return Err(FramesError::NoHello { path: path.to_owned() }),
-                Some(entry) if entry.note.is_some() => {
-                    notes.push((entry.time_us as f64 * 1e-6, entry.note.unwrap_or(Note::Unknown)));
+                Some(Entry { time_us, note: Some(note) }) => {
+                    match note {
+                        Note::Asked { tag } => clock.asked(tag, Duration::from_micros(time_us)),
+                        note => notes.push((time_us as f64 * 1e-6, note)),
+                    }
                     continue;
                 }
                 Some(entry) => times.arrived_us = entry.time_us,
@@ -140,6 +147,7 @@ impl Recorded {
                     lost: RecordingLoss::default(),
                     sequence: Sequence::default(),
                     times,
+                    clock,
                     notes,
                     frames: VecDeque::new(),
                 };
@@ -190,6 +198,7 @@ impl Recorded {
                     self.times.arrived_us = entry.time_us;
                     self.decode();
                 }
+                Some(Note::Asked { tag }) => self.clock.asked(tag, Duration::from_micros(entry.time_us)),
                 Some(note) => {
                     if matches!(note, Note::Joined { .. }) {
                         self.begin_another();
@@ -205,6 +214,7 @@ impl Recorded {
         self.corrupt_before += self.receiver.counters().corrupt - self.junk;
         (self.receiver, self.junk) = (BoardReceiver::default(), 0);
         self.sequence.restart();
+        self.clock.restart();
         self.times.base = None;
     }
 
@@ -213,11 +223,14 @@ impl Recorded {
         let chunk = std::mem::take(&mut self.chunk);
         let mut input = &chunk[..];
         while let Some(message) = self.receiver.receive(&mut input) {
-            if let Ok(BoardMessage::Frame(frame)) = message {
-                match self.in_volts(&frame) {
+            match message {
+                Ok(BoardMessage::Frame(frame)) => match self.in_volts(&frame) {
                     Some(frame) => self.frames.push_back(frame),
                     None => self.lost.other_frames += 1,
-                }
+                },
+                Ok(BoardMessage::Clock(said)) => self.clock.said(said, Duration::from_micros(self.times.arrived_us)),
+                Ok(BoardMessage::Hello(Hello { answers: 0, .. })) => self.clock.restart(),
+                _ => {}
             }
         }
         self.chunk = chunk;
@@ -237,6 +250,7 @@ impl Recorded {
         Some(FileFrame {
             time_s: Some(self.times.place(place.time_us)),
             arrived_s: Some(self.times.arrived_us as f64 * 1e-6),
+            delay: self.clock.frame(frame.head.time_us, Duration::from_micros(self.times.arrived_us)),
             sequence: Some(place.sequence),
             lost_before: place.dropped,
             volts: readings.volts().to_vec(),

@@ -29,6 +29,11 @@ pub enum Note {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         surface_obj: Option<String>,
     },
+    /// The board was sent a command: what its clock showed when it obeyed is among its bytes.
+    Asked {
+        /// The command's tag.
+        tag: u8,
+    },
     /// Here another recording was joined on: its board counts anew.
     Joined {
         /// Seconds since 1970 at its start (s).

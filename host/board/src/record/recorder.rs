@@ -75,8 +75,12 @@ impl Recorder {
     /// [`RecordError`] if the file cannot be written, or is there already: no recording is overwritten.
     pub fn create(path: &Path, header: &Header) -> Result<Self, RecordError> {
         let open = |source| RecordError::Open { path: path.to_owned(), source };
+        // The header tells the time at which its owner calls this.
+        let began = Instant::now();
         let writer = Self::file(path, header).map_err(open)?;
-        Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)
+        let mut recorder = Self::start(path, writer, |file| file.get_ref().sync_all(), MAX_WAITING).map_err(open)?;
+        recorder.began = began;
+        Ok(recorder)
     }
 
     /// A new file with its header.

@@ -187,6 +187,8 @@ pub(super) fn touch() -> Value {
             ("sequence", integer()),
             ("time_s", number()),
             ("arrived_unix_s", number()),
+            ("host_time_ns?", integer()),
+            ("host_time_error_ns?", integer()),
             ("lost_before?", integer()),
             ("missed_before?", integer()),
             ("revised?", boolean()),
