@@ -187,9 +187,10 @@ impl<M: Mux, S: Sampler, L: Serial, C: Chip, const READINGS: usize, const WIRE: 
     fn obey(&mut self, Request { tag, command }: Request) {
         match self.carry_out(tag, command) {
             Ok(()) => {
-                self.say_hello(tag);
+                // Before the Hello, behind which nothing may come while the line's rate changes.
                 let time_us = self.parts.chip.now_us() as u32;
                 self.uplink.message(&BoardMessage::Clock(Clock { answers: tag, time_us }));
+                self.say_hello(tag);
             }
             Err(refusal) => self.fault(refusal),
         }

@@ -215,7 +215,7 @@ impl Default for Settings {
 pub struct Log(pub Vec<u8, MAX_LOG>);
 
 /// What the board's clock showed between the arrival of a command and its [`Hello`]: so its host, which knows when it sent the one and got the other,
-/// knows what its own clock showed then. It follows the Hello that answers the command.
+/// knows what its own clock showed then. It comes just before the Hello that answers the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Clock {
     /// Tag of the command.

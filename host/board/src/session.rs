@@ -228,7 +228,8 @@ impl Session {
     /// What is to be sent to the board next.
     fn due(&mut self, now: Instant) -> Option<Command> {
         let keep_alive = self.rates.as_ref().is_some_and(|rates| rates.is_keep_alive_due(now));
-        let silence = (keep_alive || self.is_silent(now)).then_some(Command::Hello);
+        let clock = self.started && self.timing.is_due(now);
+        let silence = (keep_alive || clock || self.is_silent(now)).then_some(Command::Hello);
         let Some(hello) = &self.hello else { return silence };
         let wanted = self.requested.over(hello.settings);
         let is_other = wanted != hello.settings || self.settings_in_doubt;

@@ -15,7 +15,7 @@ use std::convert::Infallible;
 use std::io;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tactomo_firmware::mux::{LatchLines, Latched, Transparent};
 use tactomo_firmware::{Activity, Adc, Board32, Identity, Mux, NewBoardError, Parts};
@@ -330,44 +330,31 @@ fn millivolts(detector: &Detector, field: &'static str, volts: f64) -> Result<u1
 fn run(mut step: Step, circuit: &Circuit, line: &Line) {
     // Even if the board's thread panics, the host is not left waiting.
     let _closes = line::CloseOnDrop(line);
-    let clocks = Clocks { circuit, start: Instant::now() };
     while line.is_open() {
         match step() {
-            Activity::Row => clocks.wait_if_ahead_by(AHEAD),
-            Activity::Frame => clocks.wait_if_ahead_by(Duration::ZERO),
-            Activity::Idle if line.is_full() => clocks.idle(line, FULL),
-            Activity::Idle => clocks.idle(line, IDLE),
+            Activity::Row => wait_if_ahead_by(AHEAD, circuit),
+            Activity::Frame => wait_if_ahead_by(Duration::ZERO, circuit),
+            Activity::Idle if line.is_full() => idle(line, circuit, FULL),
+            Activity::Idle => idle(line, circuit, IDLE),
             Activity::Waiting { until_us } => {
-                clocks.idle(line, Duration::from_micros(until_us).saturating_sub(clocks.wall()).min(IDLE));
+                idle(line, circuit, Duration::from_micros(until_us).saturating_sub(circuit.wall()).min(IDLE));
             }
         }
     }
 }
 
-/// The board's clock against the wall clock.
-struct Clocks<'a> {
-    circuit: &'a Circuit,
-    start: Instant,
+/// Sleeps until the wall clock has caught up, if the board's is ahead by more than `bound`.
+fn wait_if_ahead_by(bound: Duration, circuit: &Circuit) {
+    let (board, wall) = (circuit.now(), circuit.wall());
+    if board > wall + bound {
+        circuit.wait_until(board);
+    } else if wall > board + BEHIND {
+        circuit.advance_to(wall);
+    }
 }
 
-impl Clocks<'_> {
-    fn wall(&self) -> Duration {
-        self.start.elapsed()
-    }
-
-    /// Sleeps until the wall clock has caught up, if the board's is ahead by more than `bound`.
-    fn wait_if_ahead_by(&self, bound: Duration) {
-        let (board, wall) = (self.circuit.now(), self.wall());
-        if board > wall + bound {
-            thread::sleep(board - wall);
-        } else if wall > board + BEHIND {
-            self.circuit.advance_to(wall);
-        }
-    }
-
-    /// Waits for a command, at most for `bound`; the board's time passes as the wall clock's does.
-    fn idle(&self, line: &Line, bound: Duration) {
-        line.down.wait(bound);
-        self.circuit.advance_to(self.wall());
-    }
+/// Waits for a command, at most for `bound`; the board's time passes as the wall clock's does.
+fn idle(line: &Line, circuit: &Circuit, bound: Duration) {
+    line.down.wait(bound);
+    circuit.advance_to(circuit.wall());
 }

@@ -132,6 +132,10 @@ impl Recorded {
                     Err(DecodeError::Version(found)) => {
                         return Err(FramesError::Protocol { path: path.to_owned(), other: OtherProtocol { found } });
                     }
+                    Ok(BoardMessage::Clock(said)) => {
+                        clock.said(said, Duration::from_micros(times.arrived_us));
+                        continue;
+                    }
                     _ => continue,
                 };
                 let rest = input.to_vec();

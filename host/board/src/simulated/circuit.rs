@@ -3,7 +3,8 @@
 use std::convert::Infallible;
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{ErrorType, OutputPin};
@@ -25,6 +26,8 @@ pub(super) struct Circuit {
     selected_ns: AtomicU64,
     /// When the first scan began: the scene begins with it, however long the host took to start the board.
     scene_began_ns: OnceLock<u64>,
+    /// When the board's clock began, by the wall clock.
+    began: OnceLock<Instant>,
     /// The firmware's own work for a row.
     row_work_ns: u64,
 }
@@ -67,6 +70,16 @@ impl Circuit {
 
     pub(super) fn now_ns(&self) -> u64 {
         self.now_ns.load(Relaxed)
+    }
+
+    /// Time since the board's clock began, by the wall clock: the board's own may be ahead of it, or behind.
+    pub(super) fn wall(&self) -> Duration {
+        self.began.get_or_init(Instant::now).elapsed()
+    }
+
+    /// Sleeps until the wall clock has caught up with a board time.
+    pub(super) fn wait_until(&self, time: Duration) {
+        thread::sleep(time.saturating_sub(self.wall()));
     }
 
     /// Moves the board's clock on to `time`, never back.

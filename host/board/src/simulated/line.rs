@@ -218,6 +218,11 @@ impl Serial for BoardEnd {
     fn push(&mut self, bytes: &[u8]) -> usize {
         let room = self.fifo.as_mut().map_or(bytes.len(), |fifo| fifo.room(self.circuit.now()));
         let mut sent = bytes[..bytes.len().min(room)].to_vec();
+        // A packet comes when its last byte has left, and not before the board's own clock says so.
+        if sent.len() == bytes.len() && sent.ends_with(&[0]) {
+            let leaves = self.fifo.as_ref().map_or(Duration::ZERO, |fifo| fifo.time_of(sent.len()));
+            self.circuit.wait_until(self.circuit.now() + leaves);
+        }
         self.line.garble(&mut sent);
         let count = self.line.up.put(&sent);
         self.line.is_full.store(count < bytes.len(), Relaxed);
@@ -229,6 +234,10 @@ impl Serial for BoardEnd {
 
     fn pull(&mut self, buffer: &mut [u8]) -> usize {
         let count = self.line.down.take(buffer);
+        if count > 0 {
+            // A command is not obeyed before it was sent, by the board's own clock.
+            self.circuit.advance_to(self.circuit.wall());
+        }
         // The board's thread may have slept since they came, where a board would have looked.
         self.line.garble(&mut buffer[..count]);
         count
@@ -247,7 +256,8 @@ impl Serial for BoardEnd {
     }
 }
 
-/// The FIFO of a transmitter that empties at a steady rate. A byte reaches the host when the FIFO takes it: up to a FIFO's time early.
+/// The FIFO of a transmitter that empties at a steady rate. A packet reaches the host when its last byte has left; bytes before it, when the FIFO
+/// takes them.
 #[derive(Debug)]
 struct Fifo {
     figures: LineFigures,
@@ -262,6 +272,11 @@ impl Fifo {
         let left = std::mem::take(&mut self.held) / self.figures.bytes_per_s;
         self.at = now + Duration::from_secs_f64(left);
         self.at - now
+    }
+
+    /// Time until it has sent what it holds, and so many bytes more.
+    fn time_of(&self, bytes: usize) -> Duration {
+        Duration::from_secs_f64((self.held + bytes as f64) / self.figures.bytes_per_s)
     }
 
     /// Bytes that it has room for at this board time.
