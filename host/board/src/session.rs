@@ -185,6 +185,7 @@ impl Session {
         };
         self.heard = Some(now);
         self.rates.iter_mut().for_each(|rates| rates.sent(now));
+        self.timing.asked(request.tag, now);
         Some(request)
     }
 

@@ -30,7 +30,6 @@ impl Session {
             set_rate(rates, link, now)?;
         }
         while let Some(request) = self.command(Instant::now()) {
-            self.timing.asked(request.tag, Instant::now());
             send(link, &request)?;
         }
         Ok(())

@@ -4,6 +4,7 @@ use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use tactomo_board::clock::Delay;
 use tactomo_board::link::{Control, ControlError, Link, Playing};
 use tactomo_board::record::{PlainPackets, Recorder};
 use tactomo_board::session::{RequestedSettings, Session, send};
@@ -81,6 +82,8 @@ pub struct Host {
     pub receiver: BoardReceiver,
     pub hello: Option<Hello>,
     pub frames: Vec<Frame>,
+    /// For each frame when it came, and how long before it was scanned.
+    pub timed: Vec<(Instant, Option<Delay>)>,
     pub recorder: Option<Recorder>,
 }
 
@@ -95,6 +98,7 @@ impl Host {
             receiver,
             hello: None,
             frames: Vec::new(),
+            timed: Vec::new(),
             recorder: None,
         }
     }
@@ -119,8 +123,10 @@ impl Host {
                 }
                 Ok(BoardMessage::Frame(frame)) => {
                     self.session.frame(arrived);
+                    self.timed.push((arrived, self.session.delay(frame.head.time_us, arrived)));
                     self.frames.push(frame);
                 }
+                Ok(BoardMessage::Clock(clock)) => self.session.clock(clock, arrived),
                 Ok(BoardMessage::Fault(fault)) => drop(self.session.fault(&fault)),
                 _ => {}
             }

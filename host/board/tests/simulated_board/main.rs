@@ -5,12 +5,13 @@ mod host;
 mod models;
 
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tactomo_board::frames::FrameFile;
 use tactomo_board::link::{Control, ControlError, Link, Playing};
 use tactomo_board::record::{Header, Recorder};
 use tactomo_board::session::RequestedSettings;
+use tactomo_board::simulated::{BoardModel, Options, SimulatedBoard};
 use tactomo_physics::scene::{Contact, SceneName};
 use tactomo_protocol::{Frame, Settings};
 
@@ -59,6 +60,32 @@ fn settings_change_while_frames_come() {
     let steps = host.frames.windows(2).map(|pair| pair[1].head.sequence.wrapping_sub(pair[0].head.sequence));
     assert!(steps.into_iter().all(|step| step == 1), "no frame is lost for it");
     assert_eq!(host.session.refusal(), None);
+}
+
+/// The simulated board's clock runs as this machine's does, from when its thread began: some time between its making and its first Hello.
+#[test]
+fn scans_were_when_their_delays_say_within_what_is_told_of_their_errors() {
+    for model in [BoardModel::Ideal, BoardModel::Esp32] {
+        let made = Instant::now();
+        let board = SimulatedBoard::start(&detector(), Box::new(Untouched::default()), Options { seed: 1, model });
+        let mut host = Host::new(board.unwrap(), RequestedSettings::default());
+        host.exchange_until("hello", |host| host.hello.is_some());
+        let greeted = Instant::now();
+        host.frames_more(1000);
+        let board_s = |frame: &Frame| f64::from(frame.head.time_us) * 1e-6;
+        let began = host.timed.iter().zip(&host.frames).map(|((came, delay), frame)| {
+            let delay = delay.unwrap();
+            let began_s = came.duration_since(made).as_secs_f64() - delay.delay_s - board_s(frame);
+            [began_s - delay.error_s, began_s + delay.error_s]
+        });
+        let [least_s, most_s] = began
+            .fold([0.0, f64::INFINITY], |all, [least_s, most_s]| [f64::max(all[0], least_s), f64::min(all[1], most_s)]);
+        let latest_s = greeted.duration_since(made).as_secs_f64();
+        assert!(least_s <= most_s + 1e-6, "{model:?}: all frames tell of one beginning: {least_s} {most_s}");
+        assert!(most_s > 0.0 && least_s < latest_s, "{model:?}: {least_s} to {most_s}, and not {latest_s}");
+        let errors_s = host.timed.iter().filter_map(|(_, delay)| delay.map(|delay| delay.error_s));
+        assert!(errors_s.fold(f64::INFINITY, f64::min) < 0.1, "{model:?}");
+    }
 }
 
 #[test]
