@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use self::discover::NoBoard;
 use crate::link::Link;
+use crate::link::ports::named;
 use crate::link::replay::ReplayLink;
 use crate::link::serial::{PortError, SerialLink};
 use crate::record::RecordError;
@@ -51,7 +52,7 @@ pub enum SourceError {
 /// A board on the serial port of that name.
 #[derive(Clone, Debug)]
 pub struct NamedPort {
-    /// Such as `/dev/ttyUSB0`.
+    /// Such as `/dev/ttyUSB0`, or the serial number of its USB device.
     pub port: String,
     /// Bits a second.
     pub baud: u32,
@@ -63,7 +64,7 @@ impl Source for NamedPort {
     }
 
     fn open(&mut self) -> Result<Box<dyn Link>, SourceError> {
-        Ok(Box::new(SerialLink::open(&self.port, self.baud)?))
+        Ok(Box::new(SerialLink::open(&named(&self.port), self.baud)?))
     }
 
     fn comes_back(&self) -> bool {

@@ -40,6 +40,8 @@ def test_events_come_in_order_until_the_time_is_over():
     assert event.readings_v.shape == event.touch_v.shape == (16, 16) and event.readings_v.dtype == np.float64
     assert event.solution.image.shape == (2025,) and event.age_us > 0 and event.averaged >= 1
     assert abs(event.arrived_unix_s - time.time()) < PATIENCE_S
+    assert event.host_time_ns is not None and event.host_time_error_ns is not None
+    assert 0 < event.arrived_unix_s - event.host_time_ns * 1e-9 + event.host_time_error_ns * 1e-9 < PATIENCE_S
     assert run.summary["solved"] >= len(events) and run.summary["solver"] == "tikhonov"
     with pytest.raises(tactomo.TactomoError, match="make another one"), run:
         pass

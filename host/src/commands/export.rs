@@ -197,7 +197,7 @@ impl Out {
             Form::Mcap => {
                 let (detector, mesh) = reader.measured().zip(reader.mesh()).context("an MCAP file needs a detector")?;
                 let messages = Messages::new(detector, mesh.clone(), reader.usual_radius_m());
-                let mcap = McapFile::new(file.create()?, messages, streams::about(detector, source))?;
+                let mcap = McapFile::new(file.create()?, vec![messages], streams::about(detector, source))?;
                 return Ok(Self::Mcap(Box::new(mcap), file));
             }
         };

@@ -1,5 +1,6 @@
 //! `tactomo live`: the live picture.
 
+mod several;
 mod skin;
 
 use std::panic::resume_unwind;
@@ -29,7 +30,7 @@ use tactomo::solve::{ContactSettings, Method, Problem};
 use tokio::sync::watch;
 
 use super::source::{self, BoardArgs};
-use super::streams::StreamArgs;
+use super::streams::{StreamArgs, Streamed};
 use super::{browser, keep};
 use tactomo_cli::choice::{DetectorArgs, Model};
 use tactomo_cli::output::message;
@@ -37,6 +38,12 @@ use tactomo_cli::{interrupt, output};
 
 /// Requests of pages that may wait.
 const REQUESTS: usize = 64;
+
+/// What `--simulate` is here, where there may be several.
+const SIMULATE: &str = "Uses the simulated board: the real firmware on simulated pins. With a number so many of them, each with a scene of its own";
+/// What `--port` is here, where there may be several.
+const PORT: &str = "Serial port of the board, or the serial number of its USB device, as `ports` prints it. May be given several times, for boards on one page \
+     [default: the USB serial port on which a board answers]";
 
 /// Shows the live picture of a board, the simulated board or a recording.
 ///
@@ -54,12 +61,15 @@ const REQUESTS: usize = 64;
 ///   tactomo live --simulate --listen 0.0.0.0        for a phone or a projector on the same network
 ///   tactomo live --stream - --stream-hz 100 | python robot.py
 ///   tactomo live --foxglove --mcap touch.mcap       for Foxglove, live and afterwards
+///   tactomo live --simulate 5                       five boards on one page
 ///   tactomo live --skin hand.toml                   several detectors, each with its board, on one page
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
+#[command(mut_arg("simulate", |arg| arg.num_args(0..=1).help(SIMULATE)))]
+#[command(mut_arg("port", |arg| arg.help(PORT)))]
 pub struct Args {
     /// Shows several detectors, each with its board, on one page: a TOML file with a [[patch]] for each, that has a name and options of this
-    /// command
+    /// command; or a folder of recordings of several
     #[arg(long, value_name = "FILE", conflicts_with_all = skin::OF_ONE)]
     pub skin: Option<PathBuf>,
     #[command(flatten)]
@@ -79,7 +89,7 @@ pub struct Args {
     /// Ends this many seconds after the board said Hello
     #[arg(long, value_parser = source::seconds)]
     pub seconds: Option<Duration>,
-    /// Keeps all bytes that come in a new file
+    /// Keeps all bytes that come in a new file; of several boards in a new folder, with a file for each, which --skin FOLDER shows again
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
     #[command(flatten)]
@@ -161,14 +171,14 @@ pub struct Show {
 
 /// Shows what `args` choose.
 pub fn run(args: Args) -> anyhow::Result<()> {
-    let Some(path) = &args.skin else { return show(prepared(args)?) };
+    let Some(detectors) = several::detectors(&args)? else { return show(prepared(args)?) };
     let of_patch = |(name, patch): (String, Args)| {
         let PictureArgs { http_port, listen, allow_origin, no_open, json, .. } = args.picture.clone();
         let picture = PictureArgs { http_port, listen, allow_origin, no_open, json, ..patch.picture };
         let show = prepared(Args { picture, seconds: args.seconds, ..patch });
-        Ok((name.clone(), show.with_context(|| format!("patch {name} of {}", path.display()))?))
+        Ok((name.clone(), show.with_context(|| format!("patch {name}"))?))
     };
-    let shows = skin::read(path)?.into_iter().map(of_patch).collect::<anyhow::Result<_>>()?;
+    let shows = detectors.into_iter().map(of_patch).collect::<anyhow::Result<_>>()?;
     show_all(shows, Some(&args.streams))
 }
 
@@ -202,7 +212,7 @@ fn learning(args: &Args, description: &Detector) -> Option<Learning> {
     }
     let file = match &detector.detector {
         // No two simulations are of one sensor.
-        Some(Chosen::File(path)) if !args.board.simulate => Some(path.as_path()),
+        Some(Chosen::File(path)) if !args.board.is_simulated() => Some(path.as_path()),
         _ => None,
     };
     Learning::of(description, file)
@@ -234,6 +244,7 @@ struct Begun {
     options: RunOptions,
     ends: Ends,
     sinks: Sinks,
+    streamed: Streamed,
     /// Whether what it came to is told as JSON.
     json: bool,
 }
@@ -250,7 +261,8 @@ fn show_all(shows: Vec<(String, Show)>, streams: Option<&StreamArgs>) -> anyhow:
     let mut of_all = Sinks::new(Arc::clone(&stop));
     if let Some(streams) = streams {
         streams.check(picture.json)?;
-        of_all = streams.begin_lines(Arc::clone(&stop))?;
+        let detectors = begun.iter().map(|begun| begun.streamed.clone().of_patch(&begun.name)).collect();
+        of_all = streams.begin(detectors, door(&picture), Arc::clone(&stop))?;
     }
     let listeners = of_all.listeners(begun.iter().map(|begun| begun.name.as_str()));
     begun.iter_mut().zip(listeners).for_each(|(begun, listener)| begun.options.listeners.extend(listener));
@@ -276,7 +288,8 @@ fn begin(name: String, mut show: Show, stop: &Arc<AtomicBool>) -> anyhow::Result
     let (snapshots, newest) = watch::channel(Arc::new(Snapshot::default()));
     let (request, requests) = mpsc::sync_channel(REQUESTS);
     show.streams.check(show.picture.json)?;
-    let mut sinks = show.streams.begin(&problem, &show.source.name(), door(&show.picture), Arc::clone(stop))?;
+    let streamed = Streamed::new(&problem, &show.source.name());
+    let mut sinks = show.streams.begin(vec![streamed.clone()], door(&show.picture), Arc::clone(stop))?;
     let setup = PageSetup {
         detector: show.detector.clone(),
         mesh: problem.jacobian.image_mesh.clone(),
@@ -287,13 +300,13 @@ fn begin(name: String, mut show: Show, stop: &Arc<AtomicBool>) -> anyhow::Result
     let options = options(&mut show, problem, sinks.listener())?;
     let ends = Ends { snapshots, requests, stop: Arc::clone(stop) };
     let shown = Shown { name: name.clone(), setup, snapshots: newest, requests: request };
-    Ok((Begun { name, source: show.source, options, ends, sinks, json: show.picture.json }, shown))
+    Ok((Begun { name, source: show.source, options, ends, sinks, streamed, json: show.picture.json }, shown))
 }
 
 /// Shows one detector to its end, and says what that came to, unless whoever reads what it or all write has gone: then it ends as quietly as
 /// `head` does.
 fn one(begun: Begun, of_all: &Sinks) -> anyhow::Result<()> {
-    let Begun { name, mut source, options, ends, sinks, json } = begun;
+    let Begun { name, mut source, options, ends, sinks, json, .. } = begun;
     let named = |error: anyhow::Error| if name.is_empty() { error } else { error.context(format!("patch {name}")) };
     let summary = match tactomo::run::run(&mut *source, options, ends) {
         Ok(summary) => summary,

@@ -42,9 +42,11 @@ fn lines(lines: impl Iterator<Item = String>) -> String {
 }
 
 fn line(probe: &Probe) -> String {
-    let product = probe.port.product.as_deref().map(|name| format!(" ({name})")).unwrap_or_default();
-    let answer = probe.answer.as_ref().map_or_else(ToString::to_string, board);
-    format!("{}{product}  {answer}", probe.port.name)
+    let Probe { port, answer } = probe;
+    let serial = port.serial.as_ref().map(|serial| format!("serial number {serial}"));
+    let device: Vec<_> = [port.product.clone(), serial].into_iter().flatten().collect();
+    let device = if device.is_empty() { String::new() } else { format!(" ({})", device.join(", ")) };
+    format!("{}{device}  {}", port.name, answer.as_ref().map_or_else(ToString::to_string, board))
 }
 
 fn board(hello: &Hello) -> String {

@@ -63,6 +63,11 @@ impl SceneArgs {
         self.seed.unwrap_or(SEED)
     }
 
+    /// The same, of another seed by so much: another way to wander, and other noise.
+    pub fn later(self, seeds: u64) -> Self {
+        Self { seed: Some(self.seed().wrapping_add(seeds)), ..self }
+    }
+
     /// Name of the detector where none is chosen: the one that the scene was made for, or the default.
     pub fn preset(&self) -> &'static str {
         self.scene.and_then(SceneName::detector).unwrap_or(Detector::DEFAULT)

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::ensure;
 use clap::ArgGroup;
 use tactomo::board::link::serial::DEFAULT_BAUD;
 use tactomo::board::record::RecordReader;
@@ -25,12 +26,12 @@ const MOUSE_FIRMNESS: f64 = 0.3;
 #[command(next_help_heading = "Board")]
 #[command(group(ArgGroup::new("simulated").args(SceneArgs::NAMES).multiple(true).requires("simulate")))]
 pub struct BoardArgs {
-    /// Serial port of the board [default: the USB serial port on which a board answers]
-    #[arg(long, value_name = "PORT", conflicts_with = "simulate")]
-    pub port: Option<String>,
+    /// Serial port of the board, or the serial number of its USB device, as `ports` prints it [default: the USB serial port on which a board answers]
+    #[arg(id = "port", long, value_name = "PORT", conflicts_with = "simulate")]
+    pub ports: Vec<String>,
     /// Uses the simulated board: the real firmware on simulated pins
-    #[arg(long)]
-    pub simulate: bool,
+    #[arg(long, value_name = "BOARDS", num_args = 0, default_missing_value = "1", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub simulate: Option<u8>,
     /// Which board is simulated [default: esp32; of more than 16 electrodes ideal]
     #[arg(long, value_name = "BOARD", requires = "simulate", value_parser = board_model())]
     board: Option<BoardModel>,
@@ -76,10 +77,20 @@ impl BoardArgs {
     /// The board on a serial port.
     fn serial(&self) -> Box<dyn Source> {
         let baud = self.baud;
-        match &self.port {
+        match self.ports.first() {
             Some(port) => Box::new(NamedPort { port: port.clone(), baud }),
             None => Box::new(AnyBoard { baud }),
         }
+    }
+
+    /// Whether the board is simulated.
+    pub fn is_simulated(&self) -> bool {
+        self.simulate.is_some()
+    }
+
+    /// How many boards are asked for.
+    pub fn boards(&self) -> usize {
+        usize::from(self.simulate.unwrap_or(1)).max(self.ports.len())
     }
 }
 
@@ -98,7 +109,7 @@ impl SettingsArgs {
 
 /// What is told of the detector: one that is simulated is as it is described, unless it is one as built, and has the converter of its board.
 pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
-    if !args.simulate {
+    if !args.is_simulated() {
         return detector;
     }
     args.model(&detector).described(detector, args.scene.as_built.is_given())
@@ -106,7 +117,8 @@ pub fn described(args: &BoardArgs, detector: Detector) -> Detector {
 
 /// The board that is chosen, and what the mouse presses with on a simulated one.
 pub fn board(args: &BoardArgs, detector: &Detector) -> anyhow::Result<(Box<dyn Source>, Option<Finger>)> {
-    if !args.simulate {
+    ensure!(args.boards() == 1, "one board at a time, and {} are asked for: `live` takes several", args.boards());
+    if !args.is_simulated() {
         return Ok((args.serial(), None));
     }
     let scene = args.scene.scene(SceneName::Wandering, detector)?;

@@ -21,7 +21,7 @@ use super::scene;
 use tactomo_cli::output::message;
 
 /// Where answers go besides the page.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Streams")]
 pub struct StreamArgs {
     /// Writes each answer as a line of JSON: to a new file, to stdout with `-`, to all who connect to `tcp:PORT` (of this machine; of
@@ -59,8 +59,8 @@ impl StreamArgs {
         self.stream.contains(&Target::Stdout)
     }
 
-    /// Begins streams of lines alone, as `begin` does.
-    pub fn begin_lines(&self, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
+    /// Begins all of them, of one detector or several. `stop` is set when whoever reads stdout has gone, and `door` lets pages in.
+    pub fn begin(&self, detectors: Vec<Streamed>, door: Door, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
         let mut sinks = Sinks::new(stop);
         let form = Form { fields: self.stream_fields.unwrap_or_default(), most_per_s: self.stream_hz };
         for target in &self.stream {
@@ -68,21 +68,36 @@ impl StreamArgs {
                 message!("stream: tcp:{at}");
             }
         }
-        Ok(sinks)
-    }
-
-    /// Begins all of them. `stop` is set when whoever reads stdout has gone; `source` is where the bytes come from, and `door` lets pages in.
-    pub fn begin(&self, problem: &Problem, source: &str, door: Door, stop: Arc<AtomicBool>) -> anyhow::Result<Sinks> {
-        let mut sinks = self.begin_lines(stop)?;
+        let (messages, about): (Vec<_>, Vec<_>) = detectors.into_iter().map(|of| (of.messages, of.about)).unzip();
         if let Some(address) = &self.foxglove {
             let address = address.clone().unwrap_or(Address::local(foxglove::DEFAULT_PORT));
-            let at = sinks.add_foxglove(&address, messages(problem), door)?;
+            let at = sinks.add_foxglove(&address, messages.clone(), door)?;
             message!("Foxglove: open ws://{at} in the app");
         }
         if let Some(path) = &self.mcap {
-            sinks.add_mcap(path, messages(problem), about(problem.detector(), source))?;
+            sinks.add_mcap(path, messages, about.into_iter().flatten().collect())?;
         }
         Ok(sinks)
+    }
+}
+
+/// A detector, as streams know it.
+#[derive(Clone)]
+pub struct Streamed {
+    messages: Messages,
+    about: BTreeMap<String, String>,
+}
+
+impl Streamed {
+    /// Of a detector whose readings come from such a source.
+    pub fn new(problem: &Problem, source: &str) -> Self {
+        Self { messages: messages(problem), about: about(problem.detector(), source) }
+    }
+
+    /// The same, of one of several by this name.
+    pub fn of_patch(self, name: &str) -> Self {
+        let about = self.about.into_iter().map(|(key, value)| (format!("{name}.{key}"), value)).collect();
+        Self { messages: self.messages.of_patch(name), about }
     }
 }
 

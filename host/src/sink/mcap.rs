@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use self::writer::{Schema, Writer};
-use super::channels::{Channel, Messages};
+use super::channels::{Messages, Topic, Topics};
 use super::feed::{Delivery, Keeps};
 use super::running::{Sink, Sinks};
 use super::target::{DISK_PATIENCE, StreamError};
@@ -23,28 +23,30 @@ const CHUNK_BYTES: usize = 4 << 20;
 /// An MCAP file that is being written.
 pub struct McapFile<W: Write> {
     writer: Writer<W>,
-    messages: Messages,
-    /// Number of each channel in the file.
-    channels: [u16; Channel::ALL.len()],
+    topics: Topics,
+    /// Channels, with their numbers in the file.
+    channels: Vec<(Topic, u16)>,
     sequence: u32,
     out: Vec<u8>,
     flushed: Instant,
 }
 
 impl<W: Write> McapFile<W> {
-    /// Begins a file, with what is to be known of it, such as the detector.
+    /// Begins a file of detectors whose names are different, with what is to be known of it, such as the detector.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn new(out: W, messages: Messages, about: BTreeMap<String, String>) -> io::Result<Self> {
+    pub fn new(out: W, detectors: Vec<Messages>, about: BTreeMap<String, String>) -> io::Result<Self> {
         let mut writer = Writer::new(out, concat!("tactomo ", env!("CARGO_PKG_VERSION")), CHUNK_BYTES)?;
         writer.metadata("tactomo", &about)?;
-        let channels = Channel::ALL.map(|channel| {
-            let data = &channel.schema();
-            let schema = Schema { name: channel.schema_name(), encoding: "jsonschema", data };
-            writer.channel(channel.topic(), "json", &schema)
-        });
-        Ok(Self { writer, messages, channels, sequence: 0, out: Vec::new(), flushed: Instant::now() })
+        let topics = Topics::new(detectors);
+        let channel = |topic: Topic| {
+            let data = &topic.channel.schema();
+            let schema = Schema { name: topic.channel.schema_name(), encoding: "jsonschema", data };
+            (topic, writer.channel(&topics.name(topic), "json", &schema))
+        };
+        let channels = topics.all().map(channel).collect();
+        Ok(Self { writer, topics, channels, sequence: 0, out: Vec::new(), flushed: Instant::now() })
     }
 
     /// Writes an event.
@@ -53,9 +55,9 @@ impl<W: Write> McapFile<W> {
     /// If that fails: then nothing more can be written.
     pub fn write(&mut self, delivery: &Delivery) -> io::Result<()> {
         let time_ns = delivery.event.frame.arrived.unix_ns;
-        for (channel, number) in Channel::ALL.into_iter().zip(self.channels) {
+        for &(topic, number) in &self.channels {
             self.out.clear();
-            if self.messages.write(channel, delivery, &mut self.out)? {
+            if self.topics.write(topic, delivery, &mut self.out)? {
                 self.writer.message(number, self.sequence, time_ns, &self.out)?;
             }
         }
@@ -104,12 +106,12 @@ impl Sinks {
     pub fn add_mcap(
         &mut self,
         path: &Path,
-        messages: Messages,
+        detectors: Vec<Messages>,
         about: BTreeMap<String, String>,
     ) -> Result<(), StreamError> {
         let failed = |source| StreamError::Mcap { path: PathBuf::from(path), source };
         let file = File::create_new(path).map_err(failed)?;
-        let file = McapFile::new(BufWriter::new(file), messages, about).map_err(failed)?;
+        let file = McapFile::new(BufWriter::new(file), detectors, about).map_err(failed)?;
         let name = format!("{}", path.display());
         self.run(name.clone(), (Keeps::All, None), DISK_PATIENCE, file).map_err(StreamError::thread(&name))
     }

@@ -12,6 +12,8 @@ pub struct Port {
     pub usb: bool,
     /// What the USB device calls itself, if it does.
     pub product: Option<String>,
+    /// The USB device's serial number, if it has one: it stays whichever socket the cable is in.
+    pub serial: Option<String>,
 }
 
 /// The serial ports of this machine, by name.
@@ -29,9 +31,38 @@ pub fn ports() -> Vec<Port> {
     ports
 }
 
+/// Name of the port whose USB device has this serial number; else of the port itself.
+pub fn named(port: &str) -> String {
+    of_serial(port, ports())
+}
+
+fn of_serial(wanted: &str, ports: Vec<Port>) -> String {
+    let is_name = ports.iter().any(|port| port.name == wanted);
+    let found = ports.into_iter().find(|port| !is_name && port.serial.as_deref() == Some(wanted));
+    found.map_or_else(|| wanted.to_owned(), |port| port.name)
+}
+
 fn port(name: String, kind: SerialPortType) -> Port {
     match kind {
-        SerialPortType::UsbPort(usb) => Port { name, usb: true, product: usb.product },
-        _ => Port { name, usb: false, product: None },
+        SerialPortType::UsbPort(usb) => Port { name, usb: true, product: usb.product, serial: usb.serial_number },
+        _ => Port { name, usb: false, product: None, serial: None },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_is_found_by_its_name_or_by_the_serial_number_of_its_device() {
+        let port = |name: &str, serial: Option<&str>| Port {
+            name: name.to_owned(),
+            usb: true,
+            product: None,
+            serial: serial.map(str::to_owned),
+        };
+        let ports = || vec![port("/dev/ttyUSB0", None), port("/dev/ttyUSB1", Some("0001")), port("COM3", Some("A7"))];
+        let found = ["0001", "A7", "/dev/ttyUSB0", "COM9"].map(|wanted| of_serial(wanted, ports()));
+        assert_eq!(found, ["/dev/ttyUSB1", "COM3", "/dev/ttyUSB0", "COM9"]);
     }
 }

@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     fn probe_of(name: &str, answer: Result<Hello, ProbeError>) -> Probe {
-        Probe { port: Port { name: name.to_owned(), usb: true, product: None }, answer }
+        Probe { port: Port { name: name.to_owned(), usb: true, product: None, serial: None }, answer }
     }
 
     #[test]

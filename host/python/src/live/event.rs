@@ -50,6 +50,18 @@ impl TouchEvent {
         self.event.frame.arrived.unix_ns as f64 * 1e-9
     }
 
+    /// When the middle of the scan was, by this machine's clock (ns since 1970); `None` if the board's clock is not known.
+    #[getter]
+    fn host_time_ns(&self) -> Option<u64> {
+        self.event.frame.scanned().map(|scanned| scanned.unix_ns)
+    }
+
+    /// How far that is from the truth at most (ns).
+    #[getter]
+    fn host_time_error_ns(&self) -> Option<u64> {
+        self.event.frame.scanned().map(|scanned| scanned.error_ns)
+    }
+
     /// Age of the answer when it was ready: since the frame's last byte came (us); `None` of a frame from a file.
     #[getter]
     fn age_us(&self) -> Option<f64> {

@@ -74,7 +74,7 @@ impl Source {
             return Ok(file.clone());
         }
         ensure!(
-            self.board.port.is_some() || self.board.simulate,
+            !self.board.ports.is_empty() || self.board.is_simulated(),
             "give a FILE, or --port PORT for a board, or --simulate: which readings shall the detector be fitted to?"
         );
         let file = out.with_extension("tactomo");

@@ -54,7 +54,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let out = NewFile::never_replacing(&args.out)?;
     ensure!(
-        !args.source.board.simulate,
+        !args.source.board.is_simulated(),
         "the scenes of the simulated board press no known places: give a FILE of presses (`tactomo forward --measured` simulates rows), or --port"
     );
     let what = "press the known places one after the other, each for a second, and lift the tip between them";

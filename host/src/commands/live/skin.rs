@@ -13,7 +13,7 @@ use super::Args;
 /// Options of the program as a whole, which a patch has none of.
 const OF_ALL: [&str; 7] = ["skin", "http-port", "listen", "allow-origin", "no-open", "json", "seconds"];
 /// Arguments of one board, which patches have in place of the command line; `simulated` are those of scenes.
-pub const OF_ONE: [&str; 25] = [
+pub const OF_ONE: [&str; 22] = [
     "port",
     "simulate",
     "baud",
@@ -31,9 +31,6 @@ pub const OF_ONE: [&str; 25] = [
     "no_learning",
     "pointer",
     "scan",
-    "record",
-    "foxglove",
-    "mcap",
     "elf",
     "board",
     "time_factor",
@@ -190,8 +187,8 @@ mod tests {
         let patches = read(text).unwrap();
         let [(thumb, of_thumb), (palm, of_palm)] = &patches[..] else { panic!("two patches") };
         assert_eq!([thumb, palm], ["thumb", "palm"]);
-        assert!(of_thumb.board.simulate && of_thumb.board.scene.fault.len() == 1 && !of_palm.picture.no_learning);
-        assert_eq!(of_palm.board.port.as_deref(), Some("/dev/ttyUSB1"));
+        assert!(of_thumb.board.is_simulated() && of_thumb.board.scene.fault.len() == 1 && !of_palm.picture.no_learning);
+        assert_eq!(of_palm.board.ports, ["/dev/ttyUSB1"]);
         let chosen = of_palm.picture.detector.detector.as_ref().map(|chosen| format!("{chosen:?}"));
         assert!(chosen.is_some_and(|chosen| chosen.contains("skins/palm.toml")));
     }
@@ -200,7 +197,7 @@ mod tests {
     fn options_of_one_board_are_refused_beside_a_skin_and_none_is_ignored() {
         let command = <Options as clap::CommandFactory>::command();
         for option in command.get_arguments().filter_map(clap::Arg::get_long) {
-            let of_streams = option.starts_with("stream");
+            let of_streams = option.starts_with("stream") || ["foxglove", "mcap", "record"].contains(&option);
             if OF_ALL.contains(&option) || of_streams {
                 continue;
             }

@@ -1,5 +1,6 @@
 //! `tactomo recording`: what is in recordings, and pieces and sums of them.
 
+mod folder;
 mod info;
 
 use std::path::{Path, PathBuf};
@@ -41,7 +42,7 @@ enum Command {
         #[arg(value_name = "FILE", required = true)]
         files: Vec<PathBuf>,
     },
-    /// Makes a new recording of a piece of one
+    /// Makes a new recording of a piece of one; of a folder of recordings of several boards, a new folder
     Cut {
         /// The recording
         #[arg(value_name = "FILE")]
@@ -56,7 +57,7 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
-    /// Makes a new recording of several of one detector, one after the other
+    /// Makes a new recording of several of one detector, one after the other; of folders, a new folder
     Merge {
         /// The recordings, in their order
         #[arg(value_name = "FILE", required = true, num_args = 2..)]
@@ -71,16 +72,22 @@ enum Command {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.command {
         Command::Info { file, json } => info::print(file, *json),
-        Command::Check { files } => info::check(files),
+        Command::Check { files } => info::check(&folder::files(files)?),
         Command::Cut { file, from, to, out } => {
             let (from, to) = (from.unwrap_or(0.0), to.unwrap_or(f64::MAX));
             ensure!(from < to, "--from {from} has to be before --to {to}");
             is_new(out)?;
+            if file.is_dir() {
+                return all_made(&folder::cut(file, from, to, out)?);
+            }
             edit::cut(file, from..=to, out)?;
             made(out)
         }
         Command::Merge { files, out } => {
             is_new(out)?;
+            if files.iter().all(|file| file.is_dir()) {
+                return all_made(&folder::merge(files, out)?);
+            }
             edit::merge(files, out)?;
             made(out)
         }
@@ -90,6 +97,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 fn is_new(out: &Path) -> anyhow::Result<()> {
     ensure!(!out.exists(), "{} exists already, and no recording is replaced: give another name", out.display());
     Ok(())
+}
+
+fn all_made(out: &[PathBuf]) -> anyhow::Result<()> {
+    out.iter().try_for_each(|out| made(out))
 }
 
 fn made(out: &Path) -> anyhow::Result<()> {

@@ -1,4 +1,5 @@
-//! What Foxglove and MCAP files get: four channels of JSON, made from an event.
+//! What Foxglove and MCAP files get: four channels of JSON, made from an event. Of several detectors, each has four of its own, such as
+//! `/tactomo/thumb/touch`, and a frame of its own name.
 //!
 //! | topic | schema | what |
 //! |---|---|---|
@@ -14,6 +15,7 @@ mod scene;
 mod schemas;
 
 use std::io;
+use std::sync::Arc;
 
 use serde::Serialize;
 use tactomo_physics::detector::Detector;
@@ -21,9 +23,6 @@ use tactomo_physics::forward::ImageMesh;
 
 use super::feed::Delivery;
 use super::lines::Fields;
-
-/// What all places are relative to: the detector, with x and y from its middle.
-const FRAME: &str = "tactomo";
 
 /// A channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,13 +41,13 @@ impl Channel {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Touch, Self::Contacts, Self::Image, Self::Readings];
 
-    /// Its topic.
-    pub fn topic(self) -> &'static str {
+    /// What its topic ends in.
+    fn name(self) -> &'static str {
         match self {
-            Self::Touch => "/tactomo/touch",
-            Self::Contacts => "/tactomo/contacts",
-            Self::Image => "/tactomo/image",
-            Self::Readings => "/tactomo/readings",
+            Self::Touch => "touch",
+            Self::Contacts => "contacts",
+            Self::Image => "image",
+            Self::Readings => "readings",
         }
     }
 
@@ -74,9 +73,55 @@ impl Channel {
     }
 }
 
-/// Makes the messages of all channels.
+/// A channel of one of several detectors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Topic {
+    /// Number of the detector.
+    detector: usize,
+    /// What of it.
+    pub channel: Channel,
+}
+
+/// Makes the messages of several detectors, or of one.
+#[derive(Clone, Debug)]
+pub struct Topics(Vec<Messages>);
+
+impl Topics {
+    /// Of detectors whose [names](Messages::of_patch) are different.
+    pub fn new(detectors: Vec<Messages>) -> Self {
+        Self(detectors)
+    }
+
+    /// All topics, in an order that stays.
+    pub fn all(&self) -> impl Iterator<Item = Topic> {
+        (0..self.0.len()).flat_map(|detector| Channel::ALL.map(|channel| Topic { detector, channel }))
+    }
+
+    /// What a topic is called.
+    pub fn name(&self, Topic { detector, channel }: Topic) -> String {
+        match self.0.get(detector).map(|messages| &*messages.patch) {
+            None | Some("") => format!("/tactomo/{}", channel.name()),
+            Some(patch) => format!("/tactomo/{patch}/{}", channel.name()),
+        }
+    }
+
+    /// Writes the message of a topic; `false` if the event is of another detector, or has nothing for it.
+    ///
+    /// # Errors
+    /// As of [`Messages::write`].
+    pub fn write(&self, topic: Topic, delivery: &Delivery, out: &mut Vec<u8>) -> io::Result<bool> {
+        match self.0.get(topic.detector).filter(|messages| messages.patch == delivery.patch) {
+            Some(messages) => messages.write(topic.channel, delivery, out),
+            None => Ok(false),
+        }
+    }
+}
+
+/// Makes the messages of a detector.
 #[derive(Clone, Debug)]
 pub struct Messages {
+    /// Its name among several; empty if it is alone.
+    patch: Arc<str>,
     mesh: ImageMesh,
     usual_radius_m: f64,
     /// Corners of what the detector takes up (m).
@@ -86,7 +131,17 @@ pub struct Messages {
 impl Messages {
     /// For a detector with images on such a mesh; contacts whose radius is not known are drawn with the usual one (m).
     pub fn new(detector: &Detector, mesh: ImageMesh, usual_radius_m: f64) -> Self {
-        Self { mesh, usual_radius_m, bounds_m: detector.outline.bounds() }
+        Self { patch: Arc::default(), mesh, usual_radius_m, bounds_m: detector.outline.bounds() }
+    }
+
+    /// The same, of one of several by this name.
+    pub fn of_patch(self, name: &str) -> Self {
+        Self { patch: name.into(), ..self }
+    }
+
+    /// What places are relative to: the detector, with x and y from its middle.
+    fn frame_id(&self) -> &str {
+        if self.patch.is_empty() { "tactomo" } else { &self.patch }
     }
 
     /// Writes the message of a channel; `false` if the event has nothing for it.
@@ -96,6 +151,7 @@ impl Messages {
     pub fn write(&self, channel: Channel, delivery: &Delivery, out: &mut Vec<u8>) -> io::Result<bool> {
         let event = &*delivery.event;
         let at = Stamp::of(event.frame.scanned().map_or(event.frame.arrived.unix_ns, |scanned| scanned.unix_ns));
+        let at = At { frame_id: self.frame_id(), stamp: at };
         match channel {
             Channel::Touch => put(&Fields::default().of(delivery), out),
             Channel::Contacts => put(&scene::update(&event.solution, self.usual_radius_m, at), out),
@@ -115,6 +171,13 @@ impl Messages {
 
 fn put(message: &impl Serialize, out: &mut Vec<u8>) -> io::Result<()> {
     Ok(serde_json::to_writer(out, message)?)
+}
+
+/// When and in which frame places are.
+#[derive(Clone, Copy, Debug)]
+struct At<'a> {
+    frame_id: &'a str,
+    stamp: Stamp,
 }
 
 /// A time, as Foxglove has it.
@@ -231,7 +294,7 @@ mod tests {
             assert_eq!(schema["title"], channel.schema_name());
             for solution in [&solution, &shaped] {
                 let message = message(channel, TouchEvent::of(9, solution.clone())).unwrap();
-                check(&message, &schema, channel.topic());
+                check(&message, &schema, channel.name());
             }
         }
     }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use tactomo_touch::solve::{FoundContact, FoundLine, FoundRing, FoundShape, Solution};
 
-use super::{FRAME, Pose, Stamp, Vector3};
+use super::{At, Pose, Stamp, Vector3};
 
 /// How high discs stand (m).
 const HEIGHT_M: f64 = 1e-3;
@@ -22,9 +22,9 @@ const GREY: Color = Color { r: 0.5, g: 0.5, b: 0.5, a: 0.6 };
 
 /// A `foxglove.SceneUpdate`: what was there goes, and what was found comes.
 #[derive(Debug, Serialize)]
-pub(super) struct SceneUpdate {
+pub(super) struct SceneUpdate<'a> {
     deletions: [Deletion; 1],
-    entities: Vec<Entity>,
+    entities: Vec<Entity<'a>>,
 }
 
 #[derive(Debug, Serialize)]
@@ -37,9 +37,9 @@ struct Deletion {
 
 /// A `foxglove.SceneEntity`. Lists that stay empty are there, since readers count on them.
 #[derive(Debug, Serialize)]
-struct Entity {
+struct Entity<'a> {
     timestamp: Stamp,
-    frame_id: &'static str,
+    frame_id: &'a str,
     id: String,
     lifetime: Stamp,
     frame_locked: bool,
@@ -100,10 +100,14 @@ struct Text {
 }
 
 /// What was found.
-pub(super) fn update(solution: &Solution, usual_radius_m: f64, timestamp: Stamp) -> SceneUpdate {
+pub(super) fn update<'a>(
+    solution: &Solution,
+    usual_radius_m: f64,
+    At { stamp: timestamp, frame_id }: At<'a>,
+) -> SceneUpdate<'a> {
     let entity = |id| Entity {
         timestamp,
-        frame_id: FRAME,
+        frame_id,
         id,
         lifetime: Stamp::of(0),
         frame_locked: true,

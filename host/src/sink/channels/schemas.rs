@@ -184,6 +184,7 @@ pub(super) fn touch() -> Value {
         "tactomo.Touch",
         &[
             ("schema", integer()),
+            ("patch?", text()),
             ("sequence", integer()),
             ("time_s", number()),
             ("arrived_unix_s", number()),

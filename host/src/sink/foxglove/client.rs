@@ -7,7 +7,7 @@ use tokio_tungstenite::tungstenite::Message;
 
 use super::Shared;
 use super::protocol::{self, Asked, Subscription};
-use crate::sink::channels::Channel;
+use crate::sink::channels::Topic;
 use crate::sink::feed::{Delivery, Keeps, Next, Tail};
 use crate::sink::web::{Beat, Pulse, WebSocket};
 
@@ -22,7 +22,7 @@ pub(super) async fn serve(mut socket: WebSocket, shared: &Shared) {
 
 struct App<'a> {
     shared: &'a Shared,
-    subscriptions: Vec<(u32, Channel)>,
+    subscriptions: Vec<(u32, Topic)>,
     /// While something is subscribed to.
     tail: Option<Tail>,
     out: Vec<u8>,
@@ -32,7 +32,7 @@ struct App<'a> {
 impl App<'_> {
     async fn talk(&mut self, socket: &mut WebSocket) -> io::Result<()> {
         self.pulse.send(socket, Message::text(protocol::server_info(&self.shared.session))).await?;
-        self.pulse.send(socket, Message::text(protocol::advertise())).await?;
+        self.pulse.send(socket, Message::text(protocol::advertise(&self.shared.topics))).await?;
         let mut alive = self.shared.taps.clone();
         loop {
             tokio::select! {
@@ -84,19 +84,20 @@ impl App<'_> {
     }
 
     fn subscribe(&mut self, asked: Subscription) -> Result<(), String> {
-        let channel = asked.channel().ok_or_else(|| format!("there is no channel {}", asked.channel_id))?;
-        if self.subscriptions.iter().any(|(id, known)| *id == asked.id || *known == channel) {
+        let topic =
+            asked.topic(&self.shared.topics).ok_or_else(|| format!("there is no channel {}", asked.channel_id))?;
+        if self.subscriptions.iter().any(|(id, known)| *id == asked.id || *known == topic) {
             return Err(format!("subscription {} to channel {} is there already", asked.id, asked.channel_id));
         }
-        self.subscriptions.push((asked.id, channel));
+        self.subscriptions.push((asked.id, topic));
         Ok(())
     }
 
     async fn send(&mut self, socket: &mut WebSocket, delivery: &Delivery) -> io::Result<()> {
         let Self { shared, subscriptions, tail: Some(tail), out, pulse } = self else { return Ok(()) };
-        for (id, channel) in subscriptions {
+        for (id, topic) in subscriptions {
             protocol::begin_data(*id, delivery.event.frame.arrived.unix_ns, out);
-            if shared.messages.write(*channel, delivery, out)? {
+            if shared.topics.write(*topic, delivery, out)? {
                 // Waits here while the app does not read; nobody else waits for it.
                 tail.wait_for(pulse.send(socket, Message::binary(out.clone()))).await?;
             }

@@ -19,7 +19,7 @@ use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
 use super::address::Address;
-use super::channels::Messages;
+use super::channels::{Messages, Topics};
 use super::door::Door;
 use super::feed::Taps;
 use super::running::{PATIENCE, Sinks};
@@ -42,7 +42,7 @@ const SUBPROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 /// What all connections share.
 struct Shared {
     taps: Taps,
-    messages: Messages,
+    topics: Topics,
     /// Tells an app that connects again whether it is the same run.
     session: String,
     room: Arc<Semaphore>,
@@ -57,7 +57,7 @@ impl Sinks {
     pub fn add_foxglove(
         &mut self,
         address: &Address,
-        messages: Messages,
+        detectors: Vec<Messages>,
         door: Door,
     ) -> Result<SocketAddr, StreamError> {
         let refused = StreamError::address("Foxglove", address);
@@ -66,7 +66,7 @@ impl Sinks {
         listener.set_nonblocking(true).map_err(&refused)?;
         let session = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis().to_string();
         let room = Arc::new(Semaphore::new(MOST_APPS as usize));
-        let shared = Arc::new(Shared { taps: self.taps(), messages, session, room, door });
+        let shared = Arc::new(Shared { taps: self.taps(), topics: Topics::new(detectors), session, room, door });
         let name = format!("Foxglove at ws://{at}");
         let work = move |runtime: tokio::runtime::Runtime| {
             if let Err(error) = runtime.block_on(serve(listener, shared)) {

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use serde_json::json;
 
-use crate::sink::channels::Channel;
+use crate::sink::channels::{Topic, Topics};
 
 /// First byte of a message with data.
 const MESSAGE_DATA: u8 = 1;
@@ -39,10 +39,10 @@ pub(super) struct Subscription {
 }
 
 impl Subscription {
-    /// Its channel, if there is one of that number.
-    pub fn channel(self) -> Option<Channel> {
+    /// Its topic, if there is a channel of that number.
+    pub fn topic(self, topics: &Topics) -> Option<Topic> {
         let index = usize::try_from(self.channel_id.checked_sub(1)?).ok()?;
-        Channel::ALL.get(index).copied()
+        topics.all().nth(index)
     }
 }
 
@@ -52,14 +52,15 @@ pub(super) fn server_info(session: &str) -> String {
 }
 
 /// All channels, numbered from 1.
-pub(super) fn advertise() -> String {
-    let channels: Vec<_> = Channel::ALL
-        .into_iter()
+pub(super) fn advertise(topics: &Topics) -> String {
+    let channels: Vec<_> = topics
+        .all()
         .zip(1..)
-        .map(|(channel, id)| {
+        .map(|(topic, id)| {
+            let channel = topic.channel;
             json!({
                 "id": id,
-                "topic": channel.topic(),
+                "topic": topics.name(topic),
                 "encoding": "json",
                 "schemaName": channel.schema_name(),
                 "schema": channel.schema(),
@@ -85,13 +86,19 @@ pub(super) fn begin_data(subscription: u32, log_time_ns: u64, out: &mut Vec<u8>)
 
 #[cfg(test)]
 mod tests {
+    use tactomo_physics::detector::Detector;
+    use tactomo_physics::forward::ImageMesh;
+
     use super::*;
+    use crate::sink::channels::{Channel, Messages};
 
     #[test]
     fn what_an_app_asks_is_understood() {
         let asked = |text| serde_json::from_str::<Asked>(text).ok();
         let subscriptions = vec![Subscription { id: 0, channel_id: 3 }, Subscription { id: 7, channel_id: 5 }];
-        assert_eq!([subscriptions[0].channel(), subscriptions[1].channel()], [Some(Channel::Image), None]);
+        let topics = Topics::new(vec![Messages::new(&Detector::default(), ImageMesh::default(), 1e-3)]);
+        let channel = |index: usize| subscriptions[index].topic(&topics).map(|topic| topic.channel);
+        assert_eq!([channel(0), channel(1)], [Some(Channel::Image), None]);
         let text = r#"{"op":"subscribe","subscriptions":[{"id":0,"channelId":3},{"id":7,"channelId":5}]}"#;
         assert_eq!(asked(text), Some(Asked::Subscribe { subscriptions }));
         let text = r#"{"op":"unsubscribe","subscriptionIds":[0,1]}"#;

@@ -1,0 +1,82 @@
+//! Several detectors, each with its board, shown together: of a skin's file, on ports that are named, or simulated.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+
+use super::{Args, skin};
+use crate::commands::streams::StreamArgs;
+
+/// The skin of a folder of recordings.
+const SKIN: &str = "skin.toml";
+
+/// The detectors to show, each by its name, as if each were shown alone; `None` if it is one.
+///
+/// # Errors
+/// If the skin is none, or they cannot be recorded.
+pub fn detectors(args: &Args) -> anyhow::Result<Option<Vec<(String, Args)>>> {
+    let mut all = match &args.skin {
+        Some(path) => skin::read(&if path.is_dir() { path.join(SKIN) } else { path.clone() })?,
+        None if args.board.boards() > 1 => boards(args)?,
+        None => return Ok(None),
+    };
+    if let Some(folder) = &args.record {
+        record(&mut all, folder)?;
+    }
+    Ok(Some(all))
+}
+
+/// Boards on ports, or simulated: each is asked for what the command line asks of all, and has a scene of its own.
+fn boards(args: &Args) -> anyhow::Result<Vec<(String, Args)>> {
+    let of_one = || Args { streams: StreamArgs::default(), record: None, ..args.clone() };
+    let simulated = |k: u8| {
+        let mut board = of_one();
+        board.board.simulate = Some(1);
+        board.board.scene = board.board.scene.later(u64::from(k));
+        (format!("board-{}", k + 1), board)
+    };
+    let on_port = |port: &String| {
+        let mut board = of_one();
+        board.board.ports = vec![port.clone()];
+        (name_of(port), board)
+    };
+    let ports = args.board.ports.iter().map(on_port);
+    let all: Vec<_> = (0..args.board.simulate.unwrap_or(0)).map(simulated).chain(ports).collect();
+    for (i, (name, _)) in all.iter().enumerate() {
+        let is_new = all[..i].iter().all(|(other, _)| other != name);
+        ensure!(is_new, "two boards would be called {name}: name each port once, or give them names with --skin");
+    }
+    Ok(all)
+}
+
+/// Has each of them recorded in a folder, which can be shown again as it is.
+fn record(all: &mut [(String, Args)], folder: &Path) -> anyhow::Result<()> {
+    fs::create_dir(folder)
+        .with_context(|| format!("cannot make the folder {} for the recordings of all", folder.display()))?;
+    let mut skin = String::new();
+    for (name, args) in all.iter_mut().filter(|(_, args)| args.replay.is_none()) {
+        let file = format!("{name}.tactomo");
+        args.record.get_or_insert_with(|| folder.join(&file));
+        skin += &format!("[[patch]]\nname = \"{name}\"\nreplay = \"{file}\"\n\n");
+    }
+    let path = folder.join(SKIN);
+    fs::write(&path, skin).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// What a board on a port is called: the port's last part, of letters that an address may have.
+fn name_of(port: &str) -> String {
+    let last = port.rsplit(['/', '\\']).next().unwrap_or(port);
+    last.chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boards_are_called_as_their_ports_end() {
+        let names = ["/dev/ttyUSB0", "COM3", r"\\.\COM12", "/dev/serial/by-id/usb-1a86_USB_Serial-if00"].map(name_of);
+        assert_eq!(names, ["ttyUSB0", "COM3", "COM12", "usb-1a86_USB_Serial-if00"]);
+    }
+}

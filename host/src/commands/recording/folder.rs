@@ -1,0 +1,74 @@
+//! Recordings of several boards in a folder, cut and joined as one.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, ensure};
+use tactomo::board::record::{RecordReader, edit};
+
+/// What a recording's file ends in.
+const EXTENSION: &str = "tactomo";
+
+/// The files that are meant: of folders, the recordings in them.
+pub fn files(paths: &[PathBuf]) -> anyhow::Result<Vec<PathBuf>> {
+    let each = paths.iter().map(|path| if path.is_dir() { recordings(path) } else { Ok(vec![path.clone()]) });
+    Ok(each.collect::<anyhow::Result<Vec<_>>>()?.concat())
+}
+
+/// The recordings in a folder, by name.
+fn recordings(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let paths = entries.map(|entry| Ok(entry.with_context(|| format!("cannot read {}", folder.display()))?.path()));
+    let mut files: Vec<_> = paths.collect::<anyhow::Result<_>>()?;
+    files.retain(|file| file.extension().is_some_and(|extension| extension == EXTENSION));
+    files.sort();
+    ensure!(!files.is_empty(), "{} has no recordings", folder.display());
+    Ok(files)
+}
+
+/// Cuts the same piece out of all recordings of a folder: times count from the start of the first that began. Returns the new ones.
+pub fn cut(folder: &Path, from_s: f64, to_s: f64, out: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let files = recordings(folder)?;
+    let starts = files.iter().map(|file| Ok(RecordReader::open(file)?.header().started()));
+    let starts: Vec<Duration> = starts.collect::<anyhow::Result<_>>()?;
+    let first = starts.iter().min().copied().unwrap_or_default();
+    begin(folder, out)?;
+    let pieces = files.iter().zip(starts).map(|(file, start)| {
+        let later_s = (start - first).as_secs_f64();
+        let to = out.join(file.file_name().unwrap_or_default());
+        edit::cut(file, (from_s - later_s).max(0.0)..=to_s - later_s, &to)?;
+        Ok(to)
+    });
+    pieces.collect()
+}
+
+/// Joins the recordings of folders, each with those of its name. Returns the new ones.
+pub fn merge(folders: &[PathBuf], out: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let all = folders.iter().map(|folder| recordings(folder)).collect::<anyhow::Result<Vec<_>>>()?;
+    let names =
+        |files: &[PathBuf]| files.iter().filter_map(|file| Some(file.file_name()?.to_owned())).collect::<Vec<_>>();
+    let Some(first) = folders.first().zip(all.first()) else { return Ok(Vec::new()) };
+    for (folder, files) in folders.iter().zip(&all) {
+        let is_same = names(files) == names(first.1);
+        ensure!(is_same, "{} has recordings of other names than {}", folder.display(), first.0.display());
+    }
+    begin(first.0, out)?;
+    let joined = names(first.1).into_iter().map(|name| {
+        let (parts, to) = (folders.iter().map(|folder| folder.join(&name)).collect::<Vec<_>>(), out.join(&name));
+        edit::merge(&parts, &to)?;
+        Ok(to)
+    });
+    joined.collect()
+}
+
+/// Makes a folder for recordings that are shown together as those of `like` are.
+fn begin(like: &Path, out: &Path) -> anyhow::Result<()> {
+    fs::create_dir(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+    let skin = like.join("skin.toml");
+    if skin.is_file() {
+        let to = out.join("skin.toml");
+        fs::copy(&skin, &to).with_context(|| format!("cannot copy {} to {}", skin.display(), to.display()))?;
+    }
+    Ok(())
+}
