@@ -290,6 +290,35 @@ fn a_stream_of_several_detectors_names_each_and_keeps_the_order_of_its_times() {
 }
 
 #[test]
+fn boards_that_are_recorded_in_a_folder_are_cut_and_shown_again_as_one() {
+    let folder = Folder::new("boards");
+    let [taken, piece, mcap] = ["taken", "piece", "all.mcap"].map(|name| folder.path(name));
+    let args = ["live", "--simulate", "2", "--seconds", "1", "--json", "--record", &taken, "--mcap", &mcap];
+    let output = TACTOMO.run(&args);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let bytes = std::fs::read(&mcap).unwrap();
+    let has = |topic: &str| bytes.windows(topic.len()).any(|at| at == topic.as_bytes());
+    assert!(has("/tactomo/board-1/touch") && has("/tactomo/board-2/readings") && !has("/tactomo/touch"));
+    let again = TACTOMO.run(&args);
+    assert!(again.status.code() == Some(1) && String::from_utf8_lossy(&again.stderr).contains("taken"));
+    let output = TACTOMO.run(&["recording", "cut", &taken, "--from", "0.4", "--out", &piece]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let frames = |folder: &str| -> Vec<u64> {
+        ["board-1", "board-2"]
+            .map(|name| format!("{folder}/{name}.tactomo"))
+            .map(|file| {
+                let info = TACTOMO.json(&["recording", "info", &file, "--json"]);
+                info["frames"].as_u64().unwrap()
+            })
+            .to_vec()
+    };
+    let (all, cut) = (frames(&taken), frames(&piece));
+    assert!(all.iter().zip(&cut).all(|(all, cut)| *cut > 20 && cut < all), "{all:?} {cut:?}");
+    let (names, code, messages) = patches_of(&piece);
+    assert_eq!((names.join(" "), code), ("board-1 board-2".to_owned(), Some(0)), "{messages}");
+}
+
+#[test]
 fn a_patch_that_fails_is_named_and_harms_no_other() {
     let folder = Folder::new("skin");
     let text = "[[patch]]\nname = \"lame\"\nport = \"/dev/null\"\n[[patch]]\nname = \"sound\"\nsimulate = true\n";
