@@ -1,0 +1,345 @@
+//! The table of a detector for [`tactomo_touch_core`]: contacts without a computer.
+//!
+//! Fields are those of the model that solvers invert: means over discs of the usual radius, from the impedances that a light one gives. With one contact,
+//! `Z[e][g] = E[e][g] + A - u_e - u_g` (fields `E` between the electrodes, `u` at the contact, `A` its resistance with its own field), so that `u` and `A`
+//! follow from `Z` in the gauge in which `u` has no mean. Splines are fitted to places all over the detector by least squares.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use tactomo_physics::forward::ForwardError;
+use tactomo_physics::forward::spots::{Spot, SpotFields};
+use tactomo_physics::scene::Contact;
+use tactomo_touch_core::crc::crc32;
+use tactomo_touch_core::spline::{interval, weights};
+use tactomo_touch_core::table::{Head, MAGIC, MAX_ELECTRODES, MAX_SIDE, OTHERS, VERSION, bytes_of};
+
+use crate::solve::{ContactSettings, Problem};
+
+/// Coefficients of each quantity, about.
+const COEFFICIENTS: usize = 1200;
+/// Fewest cells along a side.
+const LEAST_CELLS: usize = 6;
+/// Places along each side of a cell that splines are fitted to.
+const PLACES: usize = 2;
+/// Weight of the squares of second differences of coefficients, over that of a place: it decides where no place does.
+const SMOOTHNESS: f64 = 1e-6;
+/// Conductances of the light discs (sheet conductances): their current is even.
+const LIGHT_SHEETS: [f64; 2] = [1e-4, 1e-3];
+/// Coefficients over distances.
+const KNOTS: usize = 16;
+/// Places whose fields at each other are fitted, about, and every so many pairs that are.
+const PAIRED: usize = 400;
+const PAIR_STRIDE: usize = 5;
+/// Share of the diagonal that is added to it where a fit is not determined.
+const RIDGE: f64 = 1e-9;
+
+/// Why a detector has no table.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompileError {
+    /// Too many electrodes.
+    #[error("{detector}: it has {found} electrodes; tables are for {MAX_ELECTRODES} at most")]
+    Electrodes {
+        /// Its name.
+        detector: String,
+        /// How many it has.
+        found: usize,
+    },
+    /// It is curved.
+    #[error("{detector}: it is curved; tables are for flat detectors")]
+    Curved {
+        /// Its name.
+        detector: String,
+    },
+    /// No model.
+    #[error(transparent)]
+    Model(#[from] ForwardError),
+    /// The fits failed.
+    #[error("{detector}: its fields cannot be fitted by splines: {what}")]
+    Fit {
+        /// Its name.
+        detector: String,
+        /// What went wrong.
+        what: &'static str,
+    },
+}
+
+/// The table of a detector, as it is known and as its board measures it.
+///
+/// # Errors
+/// [`CompileError`] if it is curved, has too many electrodes or no model.
+pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
+    let detector = problem.detector();
+    let n = detector.electrodes.len();
+    if n > MAX_ELECTRODES {
+        return Err(CompileError::Electrodes { detector: detector.name.clone(), found: n });
+    }
+    if detector.surface.is_some() {
+        return Err(CompileError::Curved { detector: detector.name.clone() });
+    }
+    let grid = Grid::of(problem);
+    let quantities = grid.fitted(problem)?;
+    let between = Between::of(problem, &grid)?;
+    Ok(written(problem, &grid, &quantities, &between))
+}
+
+/// Cells that cover a detector.
+struct Grid {
+    low_m: [f64; 2],
+    step_m: [f64; 2],
+    cells: [usize; 2],
+}
+
+impl Grid {
+    fn of(problem: &Problem) -> Self {
+        let [low_m, high_m] = problem.detector().outline.bounds();
+        let size_m = [0, 1].map(|axis| high_m[axis] - low_m[axis]);
+        let step_m = (size_m[0] * size_m[1] / COEFFICIENTS as f64).sqrt();
+        let cells = size_m.map(|size_m| ((size_m / step_m).round() as usize).clamp(LEAST_CELLS, MAX_SIDE - 3));
+        Self { low_m, step_m: [0, 1].map(|axis| size_m[axis] / cells[axis] as f64), cells }
+    }
+
+    fn sides(&self) -> [usize; 2] {
+        self.cells.map(|cells| cells + 3)
+    }
+
+    /// A place by cells from the lowest corner.
+    fn place_m(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [self.low_m[0] + x * self.step_m[0], self.low_m[1] + y * self.step_m[1]]
+    }
+
+    /// Places on the detector, so many along each side of a cell.
+    fn places_m(&self, problem: &Problem, per_cell: usize) -> Vec<[f64; 2]> {
+        let [columns, rows] = self.cells.map(|cells| cells * per_cell);
+        let at = |index: usize| (index as f64 + 0.5) / per_cell as f64;
+        let all = (0..rows).flat_map(|j| (0..columns).map(move |i| [at(i), at(j)]));
+        all.map(|at| self.place_m(at)).filter(|place_m| problem.detector().outline.holds(*place_m)).collect()
+    }
+
+    /// Coefficients with their weights at a place.
+    fn stencil(&self, place_m: [f64; 2]) -> [(usize, f64); 16] {
+        let along = [0, 1].map(|axis| {
+            let position = (place_m[axis] - self.low_m[axis]) / self.step_m[axis];
+            let (cell, t) = interval(position as f32, self.cells[axis]);
+            (cell, weights(t).value.map(f64::from))
+        });
+        let [(i, x), (j, y)] = along;
+        std::array::from_fn(|k| ((j + k / 4) * self.sides()[0] + i + k % 4, x[k % 4] * y[k / 4]))
+    }
+
+    /// Coefficients of all quantities: a column each.
+    fn fitted(&self, problem: &Problem) -> Result<DMatrix<f64>, CompileError> {
+        let places_m = self.places_m(problem, PLACES);
+        let [columns, rows] = self.sides();
+        let count = columns * rows;
+        let quantities = problem.detector().electrodes.len() + OTHERS;
+        let mut matrix = DMatrix::zeros(count, count);
+        let mut right = DMatrix::zeros(count, quantities);
+        let values = values(problem, &places_m)?;
+        for (place_m, values) in places_m.iter().zip(&values) {
+            let stencil = self.stencil(*place_m);
+            for (i, weight) in stencil {
+                stencil.iter().for_each(|(j, other)| matrix[(i, *j)] += weight * other);
+                values.iter().enumerate().for_each(|(q, value)| right[(i, q)] += weight * value);
+            }
+        }
+        let mut smooth = |three: [usize; 3]| {
+            for (i, a) in three.into_iter().zip([1.0, -2.0, 1.0]) {
+                three.into_iter().zip([1.0, -2.0, 1.0]).for_each(|(j, b)| matrix[(i, j)] += SMOOTHNESS * a * b);
+            }
+        };
+        for j in 0..rows {
+            (1..columns - 1).for_each(|i| smooth([i - 1, i, i + 1].map(|i| j * columns + i)));
+        }
+        for i in 0..columns {
+            (1..rows - 1).for_each(|j| smooth([j - 1, j, j + 1].map(|j| j * columns + i)));
+        }
+        let factor = Cholesky::new(matrix).ok_or_else(|| failed(problem, "the places do not determine them"))?;
+        factor.solve_mut(&mut right);
+        Ok(right)
+    }
+}
+
+fn failed(problem: &Problem, what: &'static str) -> CompileError {
+    CompileError::Fit { detector: problem.detector().name.clone(), what }
+}
+
+/// All quantities at some places.
+fn values(problem: &Problem, places_m: &[[f64; 2]]) -> Result<Vec<Vec<f64>>, ForwardError> {
+    let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
+    let pads_ohm = problem.model.electrode_fields_ohm();
+    let conductances_s = LIGHT_SHEETS.map(|sheets| sheets * detector.sheet_conductance_s());
+    let at = |[x_m, y_m]: &[f64; 2]| {
+        let by_contact = |conductance_s: f64| {
+            let contact = Contact::flat(*x_m, *y_m, radius_m, conductance_s);
+            Ok(problem.model.impedance_ohm(&[contact])? - pads_ohm)
+        };
+        let [lighter, firmer] = [by_contact(conductances_s[0])?, by_contact(conductances_s[1])?];
+        let [lighter_ohm, firmer_ohm] = [lighter.mean(), firmer.mean()];
+        // The resistance of the contact is that of its part on the detector.
+        let whole_ohm = conductances_s[0].recip() - conductances_s[1].recip();
+        let share = whole_ohm / (lighter_ohm - firmer_ohm);
+        let own_ohm = firmer_ohm - 1.0 / (share * conductances_s[1]);
+        let fields = (0..pads_ohm.nrows()).map(|e| firmer_ohm - firmer.row(e).mean());
+        Ok(fields.chain([own_ohm, share.clamp(0.0, 1.0)]).collect())
+    };
+    places_m.iter().map(at).collect()
+}
+
+/// Fields between places.
+struct Between {
+    near_m: f64,
+    ln_step: f64,
+    distances: Vec<f64>,
+    /// Lower triangle.
+    walls: Vec<f64>,
+}
+
+impl Between {
+    fn of(problem: &Problem, grid: &Grid) -> Result<Self, CompileError> {
+        let radius_m = problem.usual_radius_m();
+        let fields = problem.model.spots(radius_m).ok_or_else(|| failed(problem, "the model has no small contacts"))?;
+        let places_m = grid.places_m(problem, 1);
+        let stride = places_m.len().div_ceil(PAIRED);
+        let spots: Vec<_> = places_m.iter().step_by(stride).map(|[x, y]| fields.spot([*x, *y, 0.0])).collect();
+        let n = problem.detector().electrodes.len();
+        let means: Vec<_> = spots.iter().map(|spot| spot.electrodes_ohm.iter().sum::<f64>() / n as f64).collect();
+        let [low_m, high_m] = problem.detector().outline.bounds();
+        let far_m = (high_m[0] - low_m[0]).hypot(high_m[1] - low_m[1]);
+        let ln_step = (far_m / radius_m).ln() / (KNOTS - 3) as f64;
+        let scale_ohm = spots.iter().zip(&means).map(|(spot, mean)| largest(&spot.electrodes_ohm, *mean)).fold(0.0, f64::max);
+        let basis = |spot: &Spot, mean: f64| {
+            let fields = spot.electrodes_ohm.iter().map(move |ohm| (ohm - mean) / scale_ohm);
+            fields.chain([1.0]).collect::<Vec<_>>()
+        };
+        let bases: Vec<_> = spots.iter().zip(&means).map(|(spot, mean)| basis(spot, *mean)).collect();
+        let count = KNOTS + (n + 1) * (n + 2) / 2;
+        let (mut matrix, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let pairs = (0..spots.len()).flat_map(|k| (0..k).map(move |l| (k, l)));
+        let mut row = vec![0.0; count];
+        for (k, l) in pairs.step_by(PAIR_STRIDE) {
+            let [a, b] = [spots[k].place_m, spots[l].place_m];
+            let distance_m = (a[0] - b[0]).hypot(a[1] - b[1]);
+            if distance_m < radius_m {
+                continue;
+            }
+            let ohm = fields.between_ohm(&spots[k], &spots[l]) - means[k] - means[l];
+            row.fill(0.0);
+            let (first, t) = interval(((distance_m / radius_m).ln() / ln_step) as f32, KNOTS - 3);
+            weights(t).value.iter().enumerate().for_each(|(i, weight)| row[first + i] = f64::from(*weight));
+            let mut column = KNOTS;
+            for s in 0..=n {
+                for t in 0..=s {
+                    let product = bases[k][s] * bases[l][t] + bases[k][t] * bases[l][s];
+                    row[column] = if s == t { 0.5 * product } else { product };
+                    column += 1;
+                }
+            }
+            add(&mut matrix, &mut right, &row, ohm);
+        }
+        (0..count).for_each(|i| matrix[(i, i)] += RIDGE * (1.0 + matrix[(i, i)]));
+        matrix.fill_upper_triangle_with_lower_triangle();
+        let factor = Cholesky::new(matrix).ok_or_else(|| failed(problem, "those between places"))?;
+        let found = factor.solve(&right);
+        let units = |s: usize| if s == n { 1.0 } else { scale_ohm };
+        let indices = (0..=n).flat_map(|s| (0..=s).map(move |t| (s, t)));
+        let walls = indices.zip(found.iter().skip(KNOTS)).map(|((s, t), q)| q / (units(s) * units(t))).collect();
+        Ok(Self { near_m: radius_m, ln_step, distances: found.iter().take(KNOTS).copied().collect(), walls })
+    }
+}
+
+fn largest(fields_ohm: &[f64], mean: f64) -> f64 {
+    fields_ohm.iter().map(|ohm| (ohm - mean).abs()).fold(0.0, f64::max)
+}
+
+/// Adds an equation to the lower triangle of the normal ones.
+fn add(matrix: &mut DMatrix<f64>, right: &mut DVector<f64>, row: &[f64], value: f64) {
+    for (j, second) in row.iter().enumerate().filter(|(_, second)| **second != 0.0) {
+        let mut column = matrix.column_mut(j);
+        column.iter_mut().zip(row).skip(j).for_each(|(sum, first)| *sum += first * second);
+        right[j] += second * value;
+    }
+}
+
+/// The bytes, in the order that [`tactomo_touch_core::table`] says.
+fn written(problem: &Problem, grid: &Grid, quantities: &DMatrix<f64>, between: &Between) -> Vec<u8> {
+    let detector = problem.detector();
+    let n = detector.electrodes.len();
+    let sides = grid.sides();
+    let length = bytes_of(n, sides, between.distances.len());
+    let mut bytes = Vec::with_capacity(length);
+    bytes.extend(MAGIC);
+    let counts = [usize::from(VERSION), n, sides[0], sides[1], between.distances.len(), 0];
+    counts.iter().for_each(|count| bytes.extend((*count as u16).to_le_bytes()));
+    bytes.extend((length as u32).to_le_bytes());
+    let places = detector.electrodes.iter().flat_map(|pad| pad.place_m());
+    bytes.extend(crc32(&floats(places).collect::<Vec<_>>()).to_le_bytes());
+    bytes.extend(floats(head(problem, grid, between).numbers().map(f64::from)));
+    let pads_ohm = problem.model.electrode_fields_ohm();
+    bytes.extend(floats((0..n).flat_map(|e| (0..=e).map(move |g| pads_ohm[(e, g)]))));
+    bytes.extend(floats(detector.electrodes.iter().flat_map(|pad| [pad.gain, pad.unseen_offset_v])));
+    bytes.extend(floats(between.distances.iter().copied()));
+    bytes.extend(floats(between.walls.iter().copied()));
+    let codes: Vec<_> = quantities.column_iter().map(|column| Code::of(column.as_slice())).collect();
+    bytes.extend(floats(codes.iter().flat_map(|code| [code.zero, code.step])));
+    bytes.extend(mask(problem, grid));
+    for row in quantities.row_iter() {
+        row.iter().zip(&codes).for_each(|(value, code)| bytes.extend(code.of_value(*value).to_le_bytes()));
+    }
+    bytes.extend(crc32(&bytes).to_le_bytes());
+    bytes
+}
+
+fn floats(values: impl IntoIterator<Item = f64>) -> impl Iterator<Item = u8> {
+    values.into_iter().flat_map(|value| (value as f32).to_le_bytes())
+}
+
+fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
+    let (detector, settings) = (problem.detector(), ContactSettings::of(problem));
+    Head {
+        left_m: grid.low_m[0] as f32,
+        bottom_m: grid.low_m[1] as f32,
+        step_x_m: grid.step_m[0] as f32,
+        step_y_m: grid.step_m[1] as f32,
+        radius_m: settings.radius_m as f32,
+        near_m: between.near_m as f32,
+        ln_step: between.ln_step as f32,
+        drive_v: detector.drive_v as f32,
+        on_resistance_ohm: detector.on_resistance_ohm as f32,
+        noise_v: detector.adc.deviation_v() as f32,
+        model_share: settings.model_error as f32,
+        pad_share: settings.pad_error as f32,
+        full_v: (0.995 * detector.adc.full_scale_v.min(detector.drive_v)) as f32,
+        sheet_s: detector.sheet_conductance_s() as f32,
+        top_s_per_m: detector.layers.last().map_or(1.0, |layer| layer.top_s_per_m) as f32,
+        area_m2: problem.jacobian.image_mesh.node_areas_m2.iter().sum::<f64>() as f32,
+    }
+}
+
+/// How a quantity's coefficients are stored.
+struct Code {
+    zero: f64,
+    step: f64,
+}
+
+impl Code {
+    fn of(values: &[f64]) -> Self {
+        let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
+        Self { zero: 0.5 * (low + high), step: ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE)) }
+    }
+
+    fn of_value(&self, value: f64) -> i16 {
+        ((value - self.zero) / self.step).round() as i16
+    }
+}
+
+/// A bit for each cell whose middle is on the detector.
+fn mask(problem: &Problem, grid: &Grid) -> Vec<u8> {
+    let [columns, rows] = grid.cells;
+    let mut bytes = vec![0; (columns * rows).div_ceil(8)];
+    for index in 0..columns * rows {
+        let middle_m = grid.place_m([(index % columns) as f64 + 0.5, (index / columns) as f64 + 0.5]);
+        bytes[index / 8] |= u8::from(problem.detector().outline.holds(middle_m)) << (index % 8);
+    }
+    bytes
+}

@@ -1,0 +1,34 @@
+//! Contacts of a tomographic tactile detector, from a table that it was compiled to: place, conductance and standard errors of up to three.
+//!
+//! For microcontrollers: no operating system, no allocation, `f32`. `tactomo detector compile` writes the [table](table) of any flat detector; it is
+//! read where it lies, in flash.
+//!
+//! - [`table`]: the format, and its reader
+//! - [`spline`]: what its fields are interpolated with
+//! - `circuit`: readings of a few contacts, and their derivatives
+//! - `normal`, `fit`: least squares
+//! - `scan`: where contacts may be
+//! - [`Solver`]: contacts from frame to frame
+
+#![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+mod answer;
+mod circuit;
+pub mod crc;
+mod fit;
+mod frame;
+mod normal;
+mod scan;
+mod solver;
+pub mod spline;
+pub mod table;
+
+pub use self::answer::{Answer, Contact, Flags};
+pub use self::circuit::MAX_CONTACTS;
+pub use self::fit::Work;
+pub use self::frame::{Frame, FrameError, Says};
+pub use self::solver::Solver;
+pub use self::table::{MAX_ELECTRODES, Table, TableError};

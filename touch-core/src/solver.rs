@@ -1,0 +1,293 @@
+//! Contacts from frame to frame.
+//!
+//! What was found last is fitted again. Where that no longer explains a frame, more contacts are looked for beside it, and without it. One more
+//! is believed if it lowers the sum of squares by more than its parameters' price.
+
+use crate::answer::{Answer, Contact, Flags};
+use crate::circuit::{Circuit, Loaded, MAX_CONTACTS};
+use crate::fit::{Fit, Fitter, Scene, Work};
+use crate::frame::{Errors, Frame, FrameError, Says};
+use crate::normal::{PARAMETERS, Vector};
+use crate::scan::{Beside, first};
+use crate::table::Table;
+
+/// Price of a parameter (squared deviations): that of the host's search.
+const PARAMETER_PRICE: f32 = 7.0;
+/// Parameters of a contact that have to be paid: a radius that the readings do not tell says nothing.
+const PAID: f32 = 3.0;
+/// Gain in the sum of squares, in the linear theory, for there being any contact at all: the host's.
+const FIRST_GAIN: f32 = 60.0;
+/// Standard deviations of the sum of squares beyond which readings do not fit: the host's.
+const MISFIT_DEVIATIONS: f32 = 5.0;
+/// What is followed explains a frame as long as its sum of squares is below this times what the search left: the host's.
+const WORSE: f32 = 1.3;
+/// Steps at most where a contact is followed, and where it is searched.
+const FOLLOWING: usize = 4;
+const SEARCHING: usize = 12;
+/// Conductance (sheet conductances) above which more would change nothing.
+const SATURATED_SHEETS: f32 = 100.0;
+/// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
+const PATIENCE: [u32; 2] = [1, 64];
+
+/// Finds contacts in frames, one after the other.
+#[derive(Clone, Debug)]
+pub struct Solver<'t> {
+    table: Table<'t>,
+    circuit: Circuit,
+    scene: Scene,
+    ids: [u32; MAX_CONTACTS],
+    next_id: u32,
+    /// What the last search left of a reading, and the frames that one that did not end well is not repeated for.
+    searched: f32,
+    patience: u32,
+    wait: u32,
+}
+
+impl<'t> Solver<'t> {
+    /// A solver that has seen nothing.
+    pub fn new(table: Table<'t>) -> Self {
+        Self {
+            table,
+            circuit: Circuit::EMPTY,
+            scene: Scene::default(),
+            ids: [0; MAX_CONTACTS],
+            next_id: 0,
+            searched: 0.0,
+            patience: PATIENCE[0],
+            wait: 0,
+        }
+    }
+
+    /// What it solves by.
+    pub fn table(&self) -> &Table<'t> {
+        &self.table
+    }
+
+    /// Forgets the frames before.
+    pub fn reset(&mut self) {
+        *self = Self::new(self.table);
+    }
+
+    /// The contacts of a frame.
+    ///
+    /// # Errors
+    /// [`FrameError`] if it cannot be a frame of the table's detector.
+    pub fn solve(&mut self, frame: &Frame<'_>) -> Result<Answer, FrameError> {
+        frame.check(&self.table)?;
+        let errors = Errors::of(frame, &self.table);
+        let mut work = Work::default();
+        let before = self.scene;
+        let mut found = self.followed(frame, &errors, &mut work);
+        let readings = errors.count as f32;
+        let is_lost = match &found {
+            Some(fit) => fit.normal.cost > (WORSE * self.searched).max(limit(readings - freedom(fit))),
+            None => true,
+        };
+        let mut more = false;
+        if is_lost && self.may_search() {
+            (found, more) = self.search(found, frame, &errors, &mut work);
+            self.searched = found.map_or(0.0, |fit| fit.normal.cost);
+            let fits = found.is_none_or(|fit| !is_misfit(&fit, readings));
+            self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
+            self.wait = if fits { 0 } else { self.patience };
+        }
+        self.scene = found.map_or_else(Scene::default, |fit| fit.scene);
+        self.number(&before);
+        Ok(self.answer(found, more, frame, &errors, work))
+    }
+
+    fn may_search(&mut self) -> bool {
+        let may = self.wait == 0;
+        self.wait = self.wait.saturating_sub(1);
+        may
+    }
+
+    /// What was found last, fitted to this frame, without what is no longer there.
+    fn followed(&mut self, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> Option<Fit> {
+        let mut scene = self.scene;
+        while scene.count > 0 {
+            let fit = self.fitter(frame, errors, work).fit(scene, FOLLOWING)?;
+            let Some(gone) = weakest(&fit) else { return Some(fit) };
+            scene = fit.scene.without(gone);
+        }
+        None
+    }
+
+    fn fitter<'a>(&'a mut self, frame: &'a Frame<'a>, errors: &'a Errors, work: &'a mut Work) -> Fitter<'a, 't> {
+        Fitter { table: &self.table, frame, errors, circuit: &mut self.circuit, work }
+    }
+
+    /// The best explanation that is found, from what was followed or from nothing, and whether there is more than contacts explain.
+    fn search(&mut self, from: Option<Fit>, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Option<Fit>, bool) {
+        let readings = errors.count as f32;
+        let (warm, more) = match from {
+            Some(fit) => self.grown(fit, frame, errors, work),
+            None => return self.searched_anew(frame, errors, work),
+        };
+        if !is_misfit(&warm, readings) {
+            return (Some(warm), more);
+        }
+        let (anew, more_anew) = self.searched_anew(frame, errors, work);
+        match anew {
+            Some(anew) if score(&anew) < score(&warm) => (Some(anew), more_anew),
+            _ => (Some(warm), more),
+        }
+    }
+
+    fn searched_anew(&mut self, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Option<Fit>, bool) {
+        let candidates = first(&self.table, frame, errors, &mut work.first_looks);
+        if candidates[0].gain < FIRST_GAIN {
+            return (None, false);
+        }
+        let mut best: Option<Fit> = None;
+        for candidate in candidates.iter().filter(|candidate| candidate.gain > 0.0) {
+            let start = Scene::default().with(candidate.spot);
+            let fit = self.fitter(frame, errors, work).fit(start, SEARCHING);
+            best = better(best, fit);
+            if best.is_some_and(|best| !is_misfit(&best, errors.count as f32)) {
+                break;
+            }
+        }
+        match best {
+            Some(one) => {
+                let (fit, more) = self.grown(one, frame, errors, work);
+                (Some(fit), more)
+            }
+            None => (None, false),
+        }
+    }
+
+    /// One more contact, and one more, as long as each is worth its price; and whether there would be another.
+    fn grown(&mut self, mut fit: Fit, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Fit, bool) {
+        loop {
+            if !self.circuit.solve(&self.table, fit.scene.spots()) {
+                return (fit, false);
+            }
+            let beside = Beside::new(&self.table, &self.circuit, frame, errors);
+            let candidates = beside.candidates(errors, &mut work.looks);
+            let price = PAID * PARAMETER_PRICE;
+            if candidates[0].gain < price {
+                return (fit, false);
+            }
+            if fit.scene.count == MAX_CONTACTS {
+                return (fit, is_misfit(&fit, errors.count as f32));
+            }
+            let mut best = None;
+            for candidate in candidates.iter().filter(|candidate| candidate.gain > price) {
+                let start = fit.scene.with(candidate.spot);
+                best = better(best, self.fitter(frame, errors, work).fit(start, SEARCHING));
+            }
+            match best.filter(|best| score(best) < score(&fit)) {
+                Some(best) => fit = best,
+                None => return (fit, false),
+            }
+        }
+    }
+
+    /// Gives contacts the numbers of the nearest ones before.
+    fn number(&mut self, before: &Scene) {
+        let old = self.ids;
+        let (mut given, mut taken) = ([false; MAX_CONTACTS], [false; MAX_CONTACTS]);
+        let count = self.scene.count;
+        for _ in 0..count.min(before.count) {
+            let mut nearest = (f32::INFINITY, 0, 0);
+            for k in (0..count).filter(|k| !given[*k]) {
+                for l in (0..before.count).filter(|l| !taken[*l]) {
+                    let [x, y] = [0, 1].map(|d| self.scene.spots[k].at_m[d] - before.spots[l].at_m[d]);
+                    if x * x + y * y < nearest.0 {
+                        nearest = (x * x + y * y, k, l);
+                    }
+                }
+            }
+            let (_, k, l) = nearest;
+            (given[k], taken[l]) = (true, true);
+            self.ids[k] = old[l];
+        }
+        for k in (0..count).filter(|k| !given[*k]) {
+            self.ids[k] = self.next_id;
+            self.next_id = self.next_id.wrapping_add(1);
+        }
+    }
+
+    fn answer(&mut self, found: Option<Fit>, more: bool, frame: &Frame<'_>, errors: &Errors, work: Work) -> Answer {
+        let mut answer = Answer::of(work);
+        answer.flags.raise(Flags::SATURATED, errors.is_full);
+        answer.flags.raise(Flags::MORE, more);
+        let readings = errors.count as f32;
+        let Some(fit) = found.filter(|fit| self.circuit.solve(&self.table, fit.scene.spots())) else {
+            let voltages = (0..frame.volts.len()).filter(|i| frame.says_at(*i) == Says::Voltage);
+            let squares: f32 = voltages.map(|i| frame.volts[i] * frame.volts[i]).sum();
+            answer.residual = libm::sqrtf(squares / errors.variance_v2 / readings.max(1.0));
+            return answer;
+        };
+        answer.flags.raise(Flags::MISFIT, is_misfit(&fit, readings));
+        answer.residual = libm::sqrtf(fit.normal.cost / readings.max(1.0));
+        let covariance = fit.normal.covariance();
+        let firmest_s = SATURATED_SHEETS * self.table.head().sheet_s;
+        for (k, loaded) in self.circuit.loaded.iter().enumerate().take(self.circuit.count) {
+            answer.flags.raise(Flags::SATURATED, loaded.conductance_s > firmest_s);
+            answer.add(self.contact(k, loaded, covariance.as_ref()));
+        }
+        answer
+    }
+
+    fn contact(&self, k: usize, loaded: &Loaded, covariance: Option<&[Vector; PARAMETERS * MAX_CONTACTS]>) -> Contact {
+        let radius_m = self.table.head().radius_m;
+        let first = PARAMETERS * k;
+        let of = |i: usize, j: usize| covariance.map_or(f32::INFINITY, |all| all[first + i][first + j]);
+        let [x, y, log] = [0, 1, 2].map(|i| libm::sqrtf(of(i, i).max(0.0)));
+        let share = self.table_share(loaded);
+        // Of `C = 1 / (share (A - S))`, with what crowds alike.
+        let per_log = loaded.ohm * loaded.conductance_s * share;
+        Contact {
+            id: self.ids[k],
+            x_m: loaded.spot.at_m[0],
+            y_m: loaded.spot.at_m[1],
+            conductance_s: loaded.conductance_s,
+            conductance_sigma_s: loaded.conductance_s * per_log * log,
+            apparent_conductance_s: 1.0 / (share * loaded.ohm),
+            radius_m: radius_m * libm::expf(loaded.spot.ln_radius),
+            sigma_m: [radius_m * x, radius_m * y],
+            correlation: if x * y > 0.0 { of(0, 1) / (x * y) } else { 0.0 },
+        }
+    }
+
+    fn table_share(&self, loaded: &Loaded) -> f32 {
+        loaded.sample.value[self.table.electrodes() + 1].max(0.05)
+    }
+}
+
+fn freedom(fit: &Fit) -> f32 {
+    PAID * fit.scene.count as f32
+}
+
+/// Sum of squares of so many normal numbers beyond which they are not those of noise.
+fn limit(freedom: f32) -> f32 {
+    let freedom = freedom.max(1.0);
+    freedom + MISFIT_DEVIATIONS * libm::sqrtf(2.0 * freedom)
+}
+
+fn is_misfit(fit: &Fit, readings: f32) -> bool {
+    fit.normal.cost > limit(readings - freedom(fit))
+}
+
+/// The sum of squares with the price of contacts: of two explanations the lower one is believed.
+fn score(fit: &Fit) -> f32 {
+    fit.normal.objective() + PARAMETER_PRICE * PAID * fit.scene.count as f32
+}
+
+fn better(a: Option<Fit>, b: Option<Fit>) -> Option<Fit> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if score(&b) < score(&a) { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
+
+/// The contact that the readings speak least for, if that is less than its price: of a light one, whose readings are in proportion to its conductance, the
+/// square of them is that of the derivative by its logarithm.
+fn weakest(fit: &Fit) -> Option<usize> {
+    let covariance = fit.normal.covariance()?;
+    let information = |k: usize| 1.0 / covariance[PARAMETERS * k + 2][PARAMETERS * k + 2];
+    let least = (0..fit.scene.count).min_by(|a, b| information(*a).total_cmp(&information(*b)))?;
+    (information(least) < PAID * PARAMETER_PRICE).then_some(least)
+}

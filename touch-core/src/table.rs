@@ -1,0 +1,488 @@
+//! The table that a detector is compiled to, and how it is read.
+//!
+//! All numbers are little endian; `f32` is IEEE 754. Lengths in m, resistances in ohm, voltages in V. Electrodes are `n`, coefficients of
+//! splines over the detector `nx` by `ny`, of the one over distances `k`.
+//!
+//! | offset | type | what |
+//! |---|---|---|
+//! | 0 | 4 bytes | [`MAGIC`] |
+//! | 4 | u16 | [`VERSION`] |
+//! | 6 | u16 | `n`, 2 to [`MAX_ELECTRODES`] |
+//! | 8 | u16 | `nx`, 4 to [`MAX_SIDE`] |
+//! | 10 | u16 | `ny`, likewise |
+//! | 12 | u16 | `k`, 4 to [`MAX_KNOTS`] |
+//! | 14 | u16 | zero |
+//! | 16 | u32 | bytes of the whole table |
+//! | 20 | u32 | CRC-32 of the electrodes' places, three `f32` each (m): tables of another layout have another |
+//! | 24 | 16 f32 | [`Head`], in the order of its fields |
+//! | 88 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
+//! | | 2 n f32 | of each channel the gain, and what it reads too much though at rest it does not show (V) |
+//! | | k f32 | coefficients of the spline `d` of `N` by distance (ohm), over `ln r` |
+//! | | (n + 1)(n + 2) / 2 f32 | `Q`, symmetric, as the fields above (1/ohm, none, ohm) |
+//! | | (n + 2) x 2 f32 | of each quantity, its value at code 0 and the step of a code |
+//! | | ceil((nx - 3)(ny - 3) / 8) bytes | which cells are on the detector: bit `i % 8` of byte `i / 8`, rows of `y`, that of the lowest `x` first |
+//! | | nx ny (n + 2) i16 | codes of the coefficients: rows of `y`, in them of `x`, for each all quantities |
+//! | last 4 | u32 | CRC-32 (ISO HDLC) of all before |
+//!
+//! Quantities are the fields of the electrodes `u_e(x) = N(e, x)` (ohm) as means over a disc of the usual radius about `x`, the disc's own field
+//! (ohm), and the share of it that is on the detector. Fields are in the gauge in which the electrodes' mean is zero everywhere. A quantity at a
+//! place is a uniform cubic B-spline: the cell `(i, j)` between coefficients `i + 1` and `i + 2` of `x` begins at `left_m + i step_m`.
+//!
+//! Fields between two places are `N(x, y) = d(|x - y|) + b(x)' Q b(y)` with `b = (u, 1)`: a part that is the same everywhere, and one that walls and pads
+//! make, which is smooth.
+
+use crate::crc::crc32;
+use crate::spline::{Weights, interval, weights};
+
+/// First bytes of a table.
+pub const MAGIC: [u8; 4] = *b"TCtb";
+/// Version of the format.
+pub const VERSION: u16 = 1;
+/// Most electrodes.
+pub const MAX_ELECTRODES: usize = 32;
+/// Most coefficients along a side.
+pub const MAX_SIDE: usize = 128;
+/// Most coefficients over distances.
+pub const MAX_KNOTS: usize = 64;
+/// Quantities beside the fields of the electrodes: a disc's own field, and its share on the detector.
+pub const OTHERS: usize = 2;
+
+const HEAD: usize = 88;
+const QUANTITIES: usize = MAX_ELECTRODES + OTHERS;
+
+/// Numbers of a detector and its board.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Head {
+    /// Lowest x of the grid (m).
+    pub left_m: f32,
+    /// Lowest y of the grid (m).
+    pub bottom_m: f32,
+    /// Side of a cell along x (m).
+    pub step_x_m: f32,
+    /// Side of a cell along y (m).
+    pub step_y_m: f32,
+    /// Usual radius of a contact (m).
+    pub radius_m: f32,
+    /// Distance that the spline over distances begins at (m).
+    pub near_m: f32,
+    /// Ways from there through one of its intervals: step of `ln r`.
+    pub ln_step: f32,
+    /// Voltage of the driving layer (V).
+    pub drive_v: f32,
+    /// Resistance of a switch (ohm).
+    pub on_resistance_ohm: f32,
+    /// Standard deviation of a reading by noise and rounding (V).
+    pub noise_v: f32,
+    /// Error of the fields, as a share of the largest reading.
+    pub model_share: f32,
+    /// Error of a pad's own impedance, as a share of it.
+    pub pad_share: f32,
+    /// Readings from here on say nothing (V).
+    pub full_v: f32,
+    /// Conductance of a square of the layer (S).
+    pub sheet_s: f32,
+    /// Conductivity at the top (S/m).
+    pub top_s_per_m: f32,
+    /// Area that contacts may be on (m2).
+    pub area_m2: f32,
+}
+
+/// Why bytes are no table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// They begin with something else.
+    #[error("these bytes are no table of a detector; `tactomo detector compile` writes one")]
+    Magic,
+    /// Another version.
+    #[error("the table has version {found}, this program reads {VERSION}; compile the detector again")]
+    Version {
+        /// Of the table.
+        found: u16,
+    },
+    /// There are more or fewer than the table says, or than its counts need.
+    #[error("the table has {found} bytes where {expected} are needed; it was cut or is damaged")]
+    Length {
+        /// There are.
+        found: usize,
+        /// Needed.
+        expected: usize,
+    },
+    /// Damaged.
+    #[error("the table's checksum is {found:#010x}, that of its bytes {expected:#010x}; it is damaged")]
+    Checksum {
+        /// In the table.
+        found: u32,
+        /// Of the bytes.
+        expected: u32,
+    },
+    /// A count that is out of range.
+    #[error("the table says {found} for {what}, which is not from {least} to {most}")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// In the table.
+        found: usize,
+        /// At least.
+        least: usize,
+        /// At most.
+        most: usize,
+    },
+    /// A number that makes no sense.
+    #[error("the table's {what} makes no sense")]
+    Number {
+        /// Its name.
+        what: &'static str,
+    },
+}
+
+/// A table, borrowed from flash or a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    head: Head,
+    layout: u32,
+    electrodes: usize,
+    sides: [usize; 2],
+    pads: Floats<'a>,
+    channels: Floats<'a>,
+    distances: Floats<'a>,
+    walls: Floats<'a>,
+    codes: Floats<'a>,
+    mask: &'a [u8],
+    coefficients: &'a [u8],
+}
+
+/// Numbers as they are stored.
+#[derive(Clone, Copy, Debug)]
+struct Floats<'a>(&'a [[u8; 4]]);
+
+impl Floats<'_> {
+    fn at(self, index: usize) -> f32 {
+        self.0.get(index).map_or(0.0, |bytes| f32::from_le_bytes(*bytes))
+    }
+
+    /// An element of a symmetric matrix.
+    fn of_pair(self, a: usize, b: usize) -> f32 {
+        let (high, low) = if a < b { (b, a) } else { (a, b) };
+        self.at(high * (high + 1) / 2 + low)
+    }
+
+    fn are_finite(self) -> bool {
+        (0..self.0.len()).all(|index| self.at(index).is_finite())
+    }
+}
+
+/// Takes parts off the front of the bytes that are left.
+struct Parts<'a>(&'a [u8]);
+
+impl<'a> Parts<'a> {
+    fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (part, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(part)
+    }
+
+    fn floats(&mut self, count: usize) -> Option<Floats<'a>> {
+        Some(Floats(self.bytes(4 * count)?.as_chunks().0))
+    }
+}
+
+/// Bytes of a table with such counts.
+pub const fn bytes_of(electrodes: usize, sides: [usize; 2], knots: usize) -> usize {
+    let pairs = electrodes * (electrodes + 1) / 2 + (electrodes + 1) * (electrodes + 2) / 2;
+    let floats = pairs + 2 * electrodes + knots + 2 * (electrodes + OTHERS);
+    let cells = (sides[0] - 3) * (sides[1] - 3);
+    HEAD + 4 * floats + cells.div_ceil(8) + 2 * sides[0] * sides[1] * (electrodes + OTHERS) + 4
+}
+
+/// All quantities at a place.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    /// Values: fields of the electrodes (ohm), the disc's own (ohm), its share.
+    pub value: [f32; QUANTITIES],
+    /// Derivatives by x and y (1/m).
+    pub slope: [[f32; QUANTITIES]; 2],
+    /// Sum of the second derivatives (1/m2).
+    pub bend: [f32; QUANTITIES],
+}
+
+impl Sample {
+    pub const NONE: Self =
+        Self { value: [0.0; QUANTITIES], slope: [[0.0; QUANTITIES]; 2], bend: [0.0; QUANTITIES] };
+}
+
+impl<'a> Table<'a> {
+    /// Reads a table, and checks all that it says of itself.
+    ///
+    /// # Errors
+    /// [`TableError`] if the bytes are no whole, sound table of this version.
+    pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let u16_at = |at: usize| bytes.get(at..at + 2).map_or(0, |two| u16::from_le_bytes([two[0], two[1]]));
+        let u32_at = |at: usize| Floats(bytes.as_chunks().0).at(at / 4).to_bits();
+        if bytes.first_chunk() != Some(&MAGIC) {
+            return Err(TableError::Magic);
+        }
+        if u16_at(4) != VERSION {
+            return Err(TableError::Version { found: u16_at(4) });
+        }
+        let counted = |what, at, least, most| match usize::from(u16_at(at)) {
+            found if (least..=most).contains(&found) => Ok(found),
+            found => Err(TableError::Count { what, found, least, most }),
+        };
+        let electrodes = counted("electrodes", 6, 2, MAX_ELECTRODES)?;
+        let sides = [counted("coefficients along x", 8, 4, MAX_SIDE)?, counted("coefficients along y", 10, 4, MAX_SIDE)?];
+        let knots = counted("coefficients over distances", 12, 4, MAX_KNOTS)?;
+        let expected = bytes_of(electrodes, sides, knots);
+        let found = bytes.len();
+        if found != expected || u32_at(16) as usize != expected {
+            return Err(TableError::Length { found, expected });
+        }
+        let (content, last) = bytes.split_at(expected - 4);
+        let (found, expected_crc) = (u32::from_le_bytes([last[0], last[1], last[2], last[3]]), crc32(content));
+        if found != expected_crc {
+            return Err(TableError::Checksum { found, expected: expected_crc });
+        }
+        let cut = || TableError::Length { found: bytes.len(), expected };
+        let mut parts = Parts(content);
+        parts.bytes(24).ok_or_else(cut)?;
+        let head = Head::read(parts.floats(16).ok_or_else(cut)?)?;
+        let table = Self {
+            head,
+            layout: u32_at(20),
+            electrodes,
+            sides,
+            pads: parts.floats(electrodes * (electrodes + 1) / 2).ok_or_else(cut)?,
+            channels: parts.floats(2 * electrodes).ok_or_else(cut)?,
+            distances: parts.floats(knots).ok_or_else(cut)?,
+            walls: parts.floats((electrodes + 1) * (electrodes + 2) / 2).ok_or_else(cut)?,
+            codes: parts.floats(2 * (electrodes + OTHERS)).ok_or_else(cut)?,
+            mask: parts.bytes(((sides[0] - 3) * (sides[1] - 3)).div_ceil(8)).ok_or_else(cut)?,
+            coefficients: parts.bytes(2 * sides[0] * sides[1] * (electrodes + OTHERS)).ok_or_else(cut)?,
+        };
+        table.check()
+    }
+
+    /// Checks that all numbers are numbers.
+    fn check(self) -> Result<Self, TableError> {
+        let all = [
+            ("fields between electrodes", self.pads),
+            ("gains and offsets", self.channels),
+            ("fields by distance", self.distances),
+            ("fields of walls", self.walls),
+            ("steps of codes", self.codes),
+        ];
+        match all.into_iter().find(|(_, floats)| !floats.are_finite()) {
+            Some((what, _)) => Err(TableError::Number { what }),
+            None => Ok(self),
+        }
+    }
+
+    /// The detector's and the board's numbers.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// What stands for the electrodes' places: the same for all tables of a layout.
+    pub fn layout(&self) -> u32 {
+        self.layout
+    }
+
+    /// How many electrodes.
+    pub fn electrodes(&self) -> usize {
+        self.electrodes
+    }
+
+    /// A voltage less the baseline as its channel should have read it (V): an offset below zero is cut off where there is nothing, so that the smallest
+    /// readings are lifted by what they are at most.
+    pub fn corrected_v(&self, e: usize, volts: f32) -> f32 {
+        let (gain, offset_v) = (self.channels.at(2 * e), self.channels.at(2 * e + 1));
+        (volts - offset_v.max(-volts.max(0.0))) / gain
+    }
+
+    /// Field between two electrodes (ohm).
+    pub(crate) fn pads_ohm(&self, e: usize, g: usize) -> f32 {
+        self.pads.of_pair(e, g)
+    }
+
+    /// Cells along x and y.
+    pub(crate) fn cells(&self) -> [usize; 2] {
+        self.sides.map(|side| side - 3)
+    }
+
+    /// Whether a place is on the detector (m).
+    pub fn holds(&self, x_m: f32, y_m: f32) -> bool {
+        let ([i, j], _) = self.cell(x_m, y_m);
+        let index = j * self.cells()[0] + i;
+        self.mask.get(index / 8).is_some_and(|byte| byte >> (index % 8) & 1 == 1)
+    }
+
+    /// The nearest place of the rectangle that the grid covers (m).
+    pub(crate) fn held(&self, [x_m, y_m]: [f32; 2]) -> [f32; 2] {
+        let [columns, rows] = self.cells();
+        let right_m = self.head.left_m + columns as f32 * self.head.step_x_m;
+        let top_m = self.head.bottom_m + rows as f32 * self.head.step_y_m;
+        [x_m.max(self.head.left_m).min(right_m), y_m.max(self.head.bottom_m).min(top_m)]
+    }
+
+    /// The cell of a place, and the shares of the ways through it.
+    fn cell(&self, x_m: f32, y_m: f32) -> ([usize; 2], [f32; 2]) {
+        let [columns, rows] = self.cells();
+        let (i, x) = interval((x_m - self.head.left_m) / self.head.step_x_m, columns);
+        let (j, y) = interval((y_m - self.head.bottom_m) / self.head.step_y_m, rows);
+        ([i, j], [x, y])
+    }
+
+    /// All codes of a coefficient.
+    fn coefficient(&self, i: usize, j: usize) -> &'a [[u8; 2]] {
+        let count = self.electrodes + OTHERS;
+        let start = 2 * (j * self.sides[0] + i) * count;
+        self.coefficients.get(start..start + 2 * count).map_or(&[], |bytes| bytes.as_chunks().0)
+    }
+
+    /// All quantities at a place (m), with their derivatives.
+    pub(crate) fn sample(&self, x_m: f32, y_m: f32, sample: &mut Sample) {
+        let ([i, j], [x, y]) = self.cell(x_m, y_m);
+        let (along_x, along_y) = (weights(x), weights(y));
+        *sample = Sample::NONE;
+        for row in 0..4 {
+            for column in 0..4 {
+                let [value, slope_x, slope_y, bend] = self.products(&along_x, &along_y, column, row);
+                for (index, code) in self.coefficient(i + column, j + row).iter().enumerate() {
+                    let code = f32::from(i16::from_le_bytes(*code));
+                    sample.value[index] += value * code;
+                    sample.slope[0][index] += slope_x * code;
+                    sample.slope[1][index] += slope_y * code;
+                    sample.bend[index] += bend * code;
+                }
+            }
+        }
+        for index in 0..self.electrodes + OTHERS {
+            let (zero, step) = (self.codes.at(2 * index), self.codes.at(2 * index + 1));
+            sample.value[index] = zero + step * sample.value[index];
+            sample.slope[0][index] *= step;
+            sample.slope[1][index] *= step;
+            sample.bend[index] *= step;
+        }
+    }
+
+    /// Weights of a coefficient in the value, both slopes and the sum of second derivatives.
+    fn products(&self, x: &Weights, y: &Weights, column: usize, row: usize) -> [f32; 4] {
+        let (per_x, per_y) = (1.0 / self.head.step_x_m, 1.0 / self.head.step_y_m);
+        [
+            x.value[column] * y.value[row],
+            x.slope[column] * y.value[row] * per_x,
+            x.value[column] * y.slope[row] * per_y,
+            x.bend[column] * y.value[row] * per_x * per_x + x.value[column] * y.bend[row] * per_y * per_y,
+        ]
+    }
+
+    /// Fields of the electrodes at the middle of a cell, roughly: the mean of the coefficients about it.
+    pub(crate) fn rough(&self, i: usize, j: usize, fields_ohm: &mut [f32; MAX_ELECTRODES]) {
+        let corners = [(1, 1), (2, 1), (1, 2), (2, 2)].map(|(x, y)| self.coefficient(i + x, j + y));
+        for (e, field_ohm) in fields_ohm.iter_mut().enumerate().take(self.electrodes) {
+            let sum: i32 = corners.iter().filter_map(|codes| codes.get(e)).map(|c| i32::from(i16::from_le_bytes(*c))).sum();
+            *field_ohm = self.codes.at(2 * e) + 0.25 * self.codes.at(2 * e + 1) * sum as f32;
+        }
+    }
+
+    /// The middle of a cell (m).
+    pub(crate) fn middle_m(&self, i: usize, j: usize) -> [f32; 2] {
+        let Head { left_m, bottom_m, step_x_m, step_y_m, .. } = self.head;
+        [left_m + (i as f32 + 0.5) * step_x_m, bottom_m + (j as f32 + 0.5) * step_y_m]
+    }
+
+    /// The part of the field between places that goes by their distance (m): its value (ohm), and its derivative by that (ohm/m).
+    pub(crate) fn by_distance_ohm(&self, distance_m: f32) -> (f32, f32) {
+        let Head { near_m, ln_step, .. } = self.head;
+        // Nearer than that there is no second contact.
+        let distance_m = distance_m.max(near_m);
+        let (first, t) = interval(libm::logf(distance_m / near_m) / ln_step, self.distances.0.len() - 3);
+        let weights = weights(t);
+        let sum = |weights: &[f32; 4]| (0..4).map(|k| weights[k] * self.distances.at(first + k)).sum::<f32>();
+        (sum(&weights.value), sum(&weights.slope) / (ln_step * distance_m))
+    }
+
+    /// `Q b` of the fields at a place.
+    pub(crate) fn by_walls(&self, fields_ohm: &[f32], products: &mut [f32; MAX_ELECTRODES + 1]) {
+        let n = self.electrodes;
+        for (row, product) in products.iter_mut().enumerate().take(n + 1) {
+            let sum: f32 = fields_ohm.iter().take(n).enumerate().map(|(s, u)| self.walls.of_pair(row, s) * u).sum();
+            *product = sum + self.walls.of_pair(row, n);
+        }
+    }
+}
+
+impl Head {
+    /// Its numbers in the order in which they are stored.
+    pub fn numbers(&self) -> [f32; 16] {
+        [
+            self.left_m,
+            self.bottom_m,
+            self.step_x_m,
+            self.step_y_m,
+            self.radius_m,
+            self.near_m,
+            self.ln_step,
+            self.drive_v,
+            self.on_resistance_ohm,
+            self.noise_v,
+            self.model_share,
+            self.pad_share,
+            self.full_v,
+            self.sheet_s,
+            self.top_s_per_m,
+            self.area_m2,
+        ]
+    }
+
+    fn read(floats: Floats<'_>) -> Result<Self, TableError> {
+        let mut index = 0;
+        let mut next = || {
+            index += 1;
+            floats.at(index - 1)
+        };
+        let head = Self {
+            left_m: next(),
+            bottom_m: next(),
+            step_x_m: next(),
+            step_y_m: next(),
+            radius_m: next(),
+            near_m: next(),
+            ln_step: next(),
+            drive_v: next(),
+            on_resistance_ohm: next(),
+            noise_v: next(),
+            model_share: next(),
+            pad_share: next(),
+            full_v: next(),
+            sheet_s: next(),
+            top_s_per_m: next(),
+            area_m2: next(),
+        };
+        head.check()
+    }
+
+    fn check(self) -> Result<Self, TableError> {
+        let above = |value: f32| value > 0.0 && value.is_finite();
+        let not_below = |value: f32| value >= 0.0 && value.is_finite();
+        let all = [
+            ("place", self.left_m.is_finite() && self.bottom_m.is_finite()),
+            ("step of the grid", above(self.step_x_m) && above(self.step_y_m)),
+            ("usual radius", above(self.radius_m)),
+            ("distances", above(self.near_m) && above(self.ln_step)),
+            ("drive", above(self.drive_v)),
+            ("on-resistance", not_below(self.on_resistance_ohm)),
+            ("noise", above(self.noise_v)),
+            ("error of the fields", not_below(self.model_share)),
+            ("error of pads", not_below(self.pad_share)),
+            ("full scale", above(self.full_v)),
+            ("sheet conductance", above(self.sheet_s)),
+            ("conductivity", above(self.top_s_per_m)),
+            ("area", above(self.area_m2)),
+        ];
+        match all.iter().find(|(_, sound)| !sound) {
+            Some((what, _)) => Err(TableError::Number { what }),
+            None => Ok(self),
+        }
+    }
+}
