@@ -9,9 +9,11 @@
 //!     [     1'       0 ]    w_kd = dF_k/dx_d - sum over l of dN_kl/dx_d U_l
 //! ```
 //!
-//! `U` are the currents that an electrode's ampere makes at the contacts, `w` the slopes of the potential under them, and `a` (S m2) what moment a slope drives:
+//! `U` are the currents that an electrode's ampere makes at the contacts, `w` the slopes of the potential under them (in the couples' term less `dA_k/dx_d U_k / 2`,
+//! the contact's own field), and `a` (S m2) what moment a slope drives:
 //! `C R^2 / 4` of a light disc whose current is even, `8/3 s R^3` of a perfect one on a deep layer of conductivity `s` (a conducting disc
-//! in a field along it: Jackson, Classical Electrodynamics, 3.13, of which a layer sees one side). The same `w` are the derivatives by a
+//! in a field along it: Landau and Lifshitz, Electrodynamics of Continuous Media, paragraph 4, of which a layer sees one side), `2 pi R^2 s t` on a thin one (a
+//! conducting cylinder across it), and between these about what all in series give. The same `w` are the derivatives by a
 //! contact's place: `dZ = -(w U_k' + U_k w')`, and by its resistance `dZ = A U_k U_k'` in logarithms.
 
 use crate::table::{MAX_ELECTRODES, Sample, Table};
@@ -25,6 +27,8 @@ const EVEN_SPREADING: f32 = 0.270_19;
 const CROWDED_LESS: f32 = 0.074_7;
 /// Largest conductance of a contact (sheet conductances): what is firmer makes no difference.
 const FIRMEST_SHEETS: f32 = 300.0;
+/// Least share of a disc that is on the detector: a quarter has the middle in a corner.
+const LEAST_SHARE: f32 = 0.2;
 
 /// What is fitted of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,15 +49,15 @@ pub(crate) type PerElectrode = [f32; MAX_ELECTRODES];
 pub(crate) struct Loaded {
     pub spot: Spot,
     pub sample: Sample,
-    /// Fields of the electrodes (ohm).
-    pub fields_ohm: PerElectrode,
-    /// Their derivatives by the logarithm of the radius (ohm).
+    /// Derivatives of the electrodes' fields by the logarithm of the radius (ohm).
     pub by_radius_ohm: PerElectrode,
     /// `Q b` of its place.
     walls_ohm: [f32; MAX_ELECTRODES + 1],
     /// Resistance with that of the crowded current (ohm).
     pub ohm: f32,
-    /// Conductance (S).
+    /// Part of it that is on the detector.
+    pub share: f32,
+    /// Conductance (S), with that of the part that is not on the detector.
     pub conductance_s: f32,
     /// Moment of current that a slope of potential drives (S m2).
     pub moment_s_m2: f32,
@@ -67,41 +71,46 @@ impl Loaded {
     const NONE: Self = Self {
         spot: Spot { at_m: [0.0; 2], ln_ohm: 0.0, ln_radius: 0.0 },
         sample: Sample::NONE,
-        fields_ohm: [0.0; MAX_ELECTRODES],
         by_radius_ohm: [0.0; MAX_ELECTRODES],
         walls_ohm: [0.0; MAX_ELECTRODES + 1],
         ohm: 0.0,
+        share: 1.0,
         conductance_s: 0.0,
         moment_s_m2: 0.0,
         currents: [0.0; MAX_ELECTRODES],
         slopes_ohm_per_m: [[0.0; MAX_ELECTRODES]; 2],
     };
 
+    /// Slope of the potential that drives the couple of currents along a direction, for 1 A into an electrode (ohm/m): that with what walls and pads
+    /// do with the contact's own current, half of the slope of its own field.
+    fn driving_ohm_per_m(&self, table: &Table<'_>, d: usize, e: usize) -> f32 {
+        self.slopes_ohm_per_m[d][e] - 0.5 * self.sample.slope[d][table.electrodes()] * self.currents[e]
+    }
+
     /// Puts a contact there.
     fn load(&mut self, table: &Table<'_>, spot: Spot) {
         let (head, n) = (table.head(), table.electrodes());
+        let radius_m = head.radius_m * libm::expf(spot.ln_radius);
+        let [small_m2, wide_m2] = head.radii_m.map(|radius_m| radius_m * radius_m);
+        let per_m2 = 1.0 / (wide_m2 - small_m2);
         self.spot = spot;
-        table.sample(spot.at_m[0], spot.at_m[1], &mut self.sample);
+        table.sample(spot.at_m, per_m2 * (radius_m * radius_m - small_m2), &mut self.sample);
+        self.share = self.sample.value[n + 1].max(LEAST_SHARE).min(1.0);
         self.ohm = libm::expf(spot.ln_ohm);
-        let radii = libm::expf(spot.ln_radius);
-        let even_ohm = EVEN_SPREADING / (head.top_s_per_m * head.radius_m);
-        let (own_ohm, share) = (self.sample.value[n], self.sample.value[n + 1].max(0.05));
-        let own_ohm = own_ohm + even_ohm * (1.0 / radii - 1.0);
+        let even_ohm = EVEN_SPREADING / (head.top_s_per_m * radius_m);
         let least_ohm = 1.0 / (FIRMEST_SHEETS * head.sheet_s);
-        let contact_ohm = |crowded: f32| (self.ohm - own_ohm + CROWDED_LESS * crowded * even_ohm / radii).max(least_ohm);
-        let crowded_of = |contact_ohm: f32| even_ohm / (even_ohm + contact_ohm * radii);
-        let crowded = crowded_of(contact_ohm(crowded_of(contact_ohm(0.5))));
-        let rest_ohm = contact_ohm(crowded);
-        self.conductance_s = 1.0 / (share * rest_ohm);
-        let radius_m = radii * head.radius_m;
-        self.moment_s_m2 =
-            radius_m * radius_m / (4.0 * rest_ohm + 3.0 / (8.0 * head.top_s_per_m * radius_m));
-        // A quarter of the mean square of the current's distance from the middle: R^2 / 8 where it is even, R^2 / 6 where all is crowded.
-        let widened = radii * radii * (1.0 + crowded / 3.0);
-        let per_bend = 0.125 * head.radius_m * head.radius_m;
+        let rest_ohm = |crowded: f32| {
+            (self.ohm - self.sample.value[n] - even_ohm * (1.0 - CROWDED_LESS * crowded)).max(least_ohm)
+        };
+        // Crowded is so much of the current as the layer's resistance has of that of both.
+        let crowded = |rest_ohm: f32| even_ohm / (even_ohm + rest_ohm);
+        let rest_ohm = rest_ohm(crowded(rest_ohm(crowded(rest_ohm(0.5)))));
+        self.conductance_s = 1.0 / (self.share * rest_ohm);
+        let of_layer = 3.0 / (8.0 * head.top_s_per_m * radius_m) + 1.0 / (core::f32::consts::TAU * head.sheet_s);
+        self.moment_s_m2 = radius_m * radius_m / (4.0 * rest_ohm + of_layer);
+        let per_log = 2.0 * per_m2 * radius_m * radius_m;
         for e in 0..n {
-            self.fields_ohm[e] = self.sample.value[e] + per_bend * (widened - 1.0) * self.sample.bend[e];
-            self.by_radius_ohm[e] = 2.0 * per_bend * widened * self.sample.bend[e];
+            self.by_radius_ohm[e] = per_log * self.sample.wider[e];
         }
         table.by_walls(&self.sample.value[..n], &mut self.walls_ohm);
     }
@@ -197,7 +206,7 @@ impl Circuit {
         }
         for e in 0..table.electrodes() {
             let mut right = [0.0; MAX_CONTACTS];
-            (0..count).for_each(|k| right[k] = self.loaded[k].fields_ohm[e]);
+            (0..count).for_each(|k| right[k] = self.loaded[k].sample.value[e]);
             let of_fields = solve(right);
             let constant_ohm = (of_fields.iter().take(count).sum::<f32>() - 1.0) / conductance_s;
             self.constant_ohm[e] = constant_ohm;
@@ -222,8 +231,8 @@ impl Circuit {
         for g in 0..table.electrodes() {
             let mut ohm = table.pads_ohm(g, g) - self.constant_ohm[g] + table.head().on_resistance_ohm;
             for one in &self.loaded[..self.count] {
-                let [x, y] = one.slopes_ohm_per_m.map(|along| along[g]);
-                ohm -= one.fields_ohm[g] * one.currents[g] + one.moment_s_m2 * (x * x + y * y);
+                let [x, y] = [0, 1].map(|d| one.driving_ohm_per_m(table, d, g));
+                ohm -= one.sample.value[g] * one.currents[g] + one.moment_s_m2 * (x * x + y * y);
             }
             if !(ohm > 0.0 && ohm.is_finite()) {
                 return false;
@@ -241,8 +250,11 @@ impl Circuit {
         for (e, volts) in volts.iter_mut().enumerate().take(table.electrodes()) {
             let mut ohm = own_ohm - table.pads_ohm(e, g);
             for one in &self.loaded[..self.count] {
-                let along = |d: usize| one.slopes_ohm_per_m[d][g] * (one.slopes_ohm_per_m[d][g] - one.slopes_ohm_per_m[d][e]);
-                ohm -= (one.fields_ohm[g] - one.fields_ohm[e]) * one.currents[g]
+                let along = |d: usize| {
+                    let here = one.driving_ohm_per_m(table, d, g);
+                    here * (here - one.driving_ohm_per_m(table, d, e))
+                };
+                ohm -= (one.sample.value[g] - one.sample.value[e]) * one.currents[g]
                     + one.moment_s_m2 * (along(0) + along(1));
             }
             *volts = per_ohm * ohm;

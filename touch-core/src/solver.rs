@@ -236,7 +236,7 @@ impl<'t> Solver<'t> {
         let first = PARAMETERS * k;
         let of = |i: usize, j: usize| covariance.map_or(f32::INFINITY, |all| all[first + i][first + j]);
         let [x, y, log] = [0, 1, 2].map(|i| libm::sqrtf(of(i, i).max(0.0)));
-        let share = self.table_share(loaded);
+        let share = loaded.share;
         // Of `C = 1 / (share (A - S))`, with what crowds alike.
         let per_log = loaded.ohm * loaded.conductance_s * share;
         Contact {
@@ -250,10 +250,6 @@ impl<'t> Solver<'t> {
             sigma_m: [radius_m * x, radius_m * y],
             correlation: if x * y > 0.0 { of(0, 1) / (x * y) } else { 0.0 },
         }
-    }
-
-    fn table_share(&self, loaded: &Loaded) -> f32 {
-        loaded.sample.value[self.table.electrodes() + 1].max(0.05)
     }
 }
 

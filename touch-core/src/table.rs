@@ -14,25 +14,26 @@
 //! | 14 | u16 | zero |
 //! | 16 | u32 | bytes of the whole table |
 //! | 20 | u32 | CRC-32 of the electrodes' places, three `f32` each (m): tables of another layout have another |
-//! | 24 | 16 f32 | [`Head`], in the order of its fields |
-//! | 88 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
+//! | 24 | 17 f32 | [`Head`], in the order of its fields |
+//! | 92 | n (n + 1) / 2 f32 | fields between the electrodes `N(e, g)` (ohm): rows `e`, of each those `g` up to `e` |
 //! | | 2 n f32 | of each channel the gain, and what it reads too much though at rest it does not show (V) |
 //! | | k f32 | coefficients of the spline `d` of `N` by distance (ohm), over `ln r` |
 //! | | (n + 1)(n + 2) / 2 f32 | `Q`, symmetric, as the fields above (1/ohm, none, ohm) |
-//! | | (n + 2) x 2 f32 | of each quantity, its value at code 0 and the step of a code |
+//! | | 2 (n + 2) x 2 f32 | of each quantity, its value at code 0 and the step of a code |
 //! | | ceil((nx - 3)(ny - 3) / 8) bytes | which cells are on the detector: bit `i % 8` of byte `i / 8`, rows of `y`, that of the lowest `x` first |
-//! | | nx ny (n + 2) i16 | codes of the coefficients: rows of `y`, in them of `x`, for each all quantities |
+//! | | 2 nx ny (n + 2) i16 | codes of the coefficients: rows of `y`, in them of `x`, for each all quantities |
 //! | last 4 | u32 | CRC-32 (ISO HDLC) of all before |
 //!
-//! Quantities are the fields of the electrodes `u_e(x) = N(e, x)` (ohm) as means over a disc of the usual radius about `x`, the disc's own field
-//! (ohm), and the share of it that is on the detector. Fields are in the gauge in which the electrodes' mean is zero everywhere. A quantity at a
+//! Quantities are the fields of the electrodes `u_e(x) = N(e, x)` (ohm) as means over a small disc about `x`, the disc's own field (ohm) less `8 / (3 pi^2 s R)`
+//! that it has on a deep layer of the top's conductivity `s`, and the share of it that is on the detector; then all of these for a wide disc. They are linear in the
+//! square of the radius. Fields are in the gauge in which the electrodes' mean is zero everywhere. A quantity at a
 //! place is a uniform cubic B-spline: the cell `(i, j)` between coefficients `i + 1` and `i + 2` of `x` begins at `left_m + i step_m`.
 //!
 //! Fields between two places are `N(x, y) = d(|x - y|) + b(x)' Q b(y)` with `b = (u, 1)`: a part that is the same everywhere, and one that walls and pads
 //! make, which is smooth.
 
 use crate::crc::crc32;
-use crate::spline::{Weights, interval, weights};
+use crate::spline::{interval, weights};
 
 /// First bytes of a table.
 pub const MAGIC: [u8; 4] = *b"TCtb";
@@ -47,7 +48,10 @@ pub const MAX_KNOTS: usize = 64;
 /// Quantities beside the fields of the electrodes: a disc's own field, and its share on the detector.
 pub const OTHERS: usize = 2;
 
-const HEAD: usize = 88;
+/// Radii that quantities are stored for.
+pub const RADII: usize = 2;
+
+const HEAD: usize = 92;
 const QUANTITIES: usize = MAX_ELECTRODES + OTHERS;
 
 /// Numbers of a detector and its board.
@@ -63,6 +67,8 @@ pub struct Head {
     pub step_y_m: f32,
     /// Usual radius of a contact (m).
     pub radius_m: f32,
+    /// Radius of the small and of the wide disc (m).
+    pub radii_m: [f32; RADII],
     /// Distance that the spline over distances begins at (m).
     pub near_m: f32,
     /// Ways from there through one of its intervals: step of `ln r`.
@@ -83,8 +89,6 @@ pub struct Head {
     pub sheet_s: f32,
     /// Conductivity at the top (S/m).
     pub top_s_per_m: f32,
-    /// Area that contacts may be on (m2).
-    pub area_m2: f32,
 }
 
 /// Why bytes are no table.
@@ -190,25 +194,26 @@ impl<'a> Parts<'a> {
 /// Bytes of a table with such counts.
 pub const fn bytes_of(electrodes: usize, sides: [usize; 2], knots: usize) -> usize {
     let pairs = electrodes * (electrodes + 1) / 2 + (electrodes + 1) * (electrodes + 2) / 2;
-    let floats = pairs + 2 * electrodes + knots + 2 * (electrodes + OTHERS);
+    let quantities = RADII * (electrodes + OTHERS);
+    let floats = pairs + 2 * electrodes + knots + 2 * quantities;
     let cells = (sides[0] - 3) * (sides[1] - 3);
-    HEAD + 4 * floats + cells.div_ceil(8) + 2 * sides[0] * sides[1] * (electrodes + OTHERS) + 4
+    HEAD + 4 * floats + cells.div_ceil(8) + 2 * sides[0] * sides[1] * quantities + 4
 }
 
-/// All quantities at a place.
+/// All quantities of a disc.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
     /// Values: fields of the electrodes (ohm), the disc's own (ohm), its share.
     pub value: [f32; QUANTITIES],
     /// Derivatives by x and y (1/m).
     pub slope: [[f32; QUANTITIES]; 2],
-    /// Sum of the second derivatives (1/m2).
-    pub bend: [f32; QUANTITIES],
+    /// Those of the wide disc less those of the small one.
+    pub wider: [f32; QUANTITIES],
 }
 
 impl Sample {
     pub const NONE: Self =
-        Self { value: [0.0; QUANTITIES], slope: [[0.0; QUANTITIES]; 2], bend: [0.0; QUANTITIES] };
+        Self { value: [0.0; QUANTITIES], slope: [[0.0; QUANTITIES]; 2], wider: [0.0; QUANTITIES] };
 }
 
 impl<'a> Table<'a> {
@@ -245,7 +250,7 @@ impl<'a> Table<'a> {
         let cut = || TableError::Length { found: bytes.len(), expected };
         let mut parts = Parts(content);
         parts.bytes(24).ok_or_else(cut)?;
-        let head = Head::read(parts.floats(16).ok_or_else(cut)?)?;
+        let head = Head::read(parts.floats(17).ok_or_else(cut)?)?;
         let table = Self {
             head,
             layout: u32_at(20),
@@ -255,9 +260,9 @@ impl<'a> Table<'a> {
             channels: parts.floats(2 * electrodes).ok_or_else(cut)?,
             distances: parts.floats(knots).ok_or_else(cut)?,
             walls: parts.floats((electrodes + 1) * (electrodes + 2) / 2).ok_or_else(cut)?,
-            codes: parts.floats(2 * (electrodes + OTHERS)).ok_or_else(cut)?,
+            codes: parts.floats(2 * RADII * (electrodes + OTHERS)).ok_or_else(cut)?,
             mask: parts.bytes(((sides[0] - 3) * (sides[1] - 3)).div_ceil(8)).ok_or_else(cut)?,
-            coefficients: parts.bytes(2 * sides[0] * sides[1] * (electrodes + OTHERS)).ok_or_else(cut)?,
+            coefficients: parts.bytes(2 * RADII * sides[0] * sides[1] * (electrodes + OTHERS)).ok_or_else(cut)?,
         };
         table.check()
     }
@@ -334,46 +339,40 @@ impl<'a> Table<'a> {
 
     /// All codes of a coefficient.
     fn coefficient(&self, i: usize, j: usize) -> &'a [[u8; 2]] {
-        let count = self.electrodes + OTHERS;
+        let count = RADII * (self.electrodes + OTHERS);
         let start = 2 * (j * self.sides[0] + i) * count;
         self.coefficients.get(start..start + 2 * count).map_or(&[], |bytes| bytes.as_chunks().0)
     }
 
-    /// All quantities at a place (m), with their derivatives.
-    pub(crate) fn sample(&self, x_m: f32, y_m: f32, sample: &mut Sample) {
+    /// All quantities of a disc at a place (m), so far from the small to the wide one, with their derivatives.
+    pub(crate) fn sample(&self, [x_m, y_m]: [f32; 2], wide: f32, sample: &mut Sample) {
+        let count = self.electrodes + OTHERS;
         let ([i, j], [x, y]) = self.cell(x_m, y_m);
         let (along_x, along_y) = (weights(x), weights(y));
+        let per_m = [1.0 / self.head.step_x_m, 1.0 / self.head.step_y_m];
         *sample = Sample::NONE;
         for row in 0..4 {
             for column in 0..4 {
-                let [value, slope_x, slope_y, bend] = self.products(&along_x, &along_y, column, row);
-                for (index, code) in self.coefficient(i + column, j + row).iter().enumerate() {
-                    let code = f32::from(i16::from_le_bytes(*code));
+                let value = along_x.value[column] * along_y.value[row];
+                let slope_x = along_x.slope[column] * along_y.value[row] * per_m[0];
+                let slope_y = along_x.value[column] * along_y.slope[row] * per_m[1];
+                let codes = self.coefficient(i + column, j + row);
+                let (small, large) = codes.split_at(count.min(codes.len()));
+                for (index, (small, large)) in small.iter().zip(large).enumerate() {
+                    let [small, large] = [self.decoded(index, *small), self.decoded(count + index, *large)];
+                    let code = small + wide * (large - small);
                     sample.value[index] += value * code;
                     sample.slope[0][index] += slope_x * code;
                     sample.slope[1][index] += slope_y * code;
-                    sample.bend[index] += bend * code;
+                    sample.wider[index] += value * (large - small);
                 }
             }
         }
-        for index in 0..self.electrodes + OTHERS {
-            let (zero, step) = (self.codes.at(2 * index), self.codes.at(2 * index + 1));
-            sample.value[index] = zero + step * sample.value[index];
-            sample.slope[0][index] *= step;
-            sample.slope[1][index] *= step;
-            sample.bend[index] *= step;
-        }
     }
 
-    /// Weights of a coefficient in the value, both slopes and the sum of second derivatives.
-    fn products(&self, x: &Weights, y: &Weights, column: usize, row: usize) -> [f32; 4] {
-        let (per_x, per_y) = (1.0 / self.head.step_x_m, 1.0 / self.head.step_y_m);
-        [
-            x.value[column] * y.value[row],
-            x.slope[column] * y.value[row] * per_x,
-            x.value[column] * y.slope[row] * per_y,
-            x.bend[column] * y.value[row] * per_x * per_x + x.value[column] * y.bend[row] * per_y * per_y,
-        ]
+    /// The value that a code of a quantity stands for.
+    fn decoded(&self, quantity: usize, code: [u8; 2]) -> f32 {
+        self.codes.at(2 * quantity) + self.codes.at(2 * quantity + 1) * f32::from(i16::from_le_bytes(code))
     }
 
     /// Fields of the electrodes at the middle of a cell, roughly: the mean of the coefficients about it.
@@ -414,13 +413,15 @@ impl<'a> Table<'a> {
 
 impl Head {
     /// Its numbers in the order in which they are stored.
-    pub fn numbers(&self) -> [f32; 16] {
+    pub fn numbers(&self) -> [f32; 17] {
         [
             self.left_m,
             self.bottom_m,
             self.step_x_m,
             self.step_y_m,
             self.radius_m,
+            self.radii_m[0],
+            self.radii_m[1],
             self.near_m,
             self.ln_step,
             self.drive_v,
@@ -431,7 +432,6 @@ impl Head {
             self.full_v,
             self.sheet_s,
             self.top_s_per_m,
-            self.area_m2,
         ]
     }
 
@@ -447,6 +447,7 @@ impl Head {
             step_x_m: next(),
             step_y_m: next(),
             radius_m: next(),
+            radii_m: [next(), next()],
             near_m: next(),
             ln_step: next(),
             drive_v: next(),
@@ -457,7 +458,6 @@ impl Head {
             full_v: next(),
             sheet_s: next(),
             top_s_per_m: next(),
-            area_m2: next(),
         };
         head.check()
     }
@@ -469,6 +469,7 @@ impl Head {
             ("place", self.left_m.is_finite() && self.bottom_m.is_finite()),
             ("step of the grid", above(self.step_x_m) && above(self.step_y_m)),
             ("usual radius", above(self.radius_m)),
+            ("radii", above(self.radii_m[0]) && above(self.radii_m[1] - self.radii_m[0])),
             ("distances", above(self.near_m) && above(self.ln_step)),
             ("drive", above(self.drive_v)),
             ("on-resistance", not_below(self.on_resistance_ohm)),
@@ -478,7 +479,6 @@ impl Head {
             ("full scale", above(self.full_v)),
             ("sheet conductance", above(self.sheet_s)),
             ("conductivity", above(self.top_s_per_m)),
-            ("area", above(self.area_m2)),
         ];
         match all.iter().find(|(_, sound)| !sound) {
             Some((what, _)) => Err(TableError::Number { what }),

@@ -1,17 +1,19 @@
 //! The table of a detector for [`tactomo_touch_core`]: contacts without a computer.
 //!
-//! Fields are those of the model that solvers invert: means over discs of the usual radius, from the impedances that a light one gives. With one contact,
+//! Fields are those of the model that solvers invert: means over discs, from the impedances that a light one gives. With one contact,
 //! `Z[e][g] = E[e][g] + A - u_e - u_g` (fields `E` between the electrodes, `u` at the contact, `A` its resistance with its own field), so that `u` and `A`
-//! follow from `Z` in the gauge in which `u` has no mean. Splines are fitted to places all over the detector by least squares.
+//! follow from `Z` in the gauge in which `u` has no mean. They are found for a small and for a wide disc. Splines are fitted to places all over the detector by least squares.
+
+use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use tactomo_physics::forward::ForwardError;
-use tactomo_physics::forward::spots::{Spot, SpotFields};
+use tactomo_physics::forward::spots::Spot;
 use tactomo_physics::scene::Contact;
 use tactomo_touch_core::crc::crc32;
 use tactomo_touch_core::spline::{interval, weights};
-use tactomo_touch_core::table::{Head, MAGIC, MAX_ELECTRODES, MAX_SIDE, OTHERS, VERSION, bytes_of};
+use tactomo_touch_core::table::{Head, MAGIC, MAX_ELECTRODES, MAX_SIDE, OTHERS, RADII, VERSION, bytes_of};
 
 use crate::solve::{ContactSettings, Problem};
 
@@ -25,6 +27,10 @@ const PLACES: usize = 2;
 const SMOOTHNESS: f64 = 1e-6;
 /// Conductances of the light discs (sheet conductances): their current is even.
 const LIGHT_SHEETS: [f64; 2] = [1e-4, 1e-3];
+/// Radii of the small and of the wide disc, in usual ones.
+const DISCS: [f64; RADII] = [0.6, 2.2];
+/// `8 / (3 pi^2)`: own field of a disc of even current on a deep layer, over `1 / (s R)`.
+const EVEN_SPREADING: f64 = 8.0 / (3.0 * PI * PI);
 /// Coefficients over distances.
 const KNOTS: usize = 16;
 /// Places whose fields at each other are fitted, about, and every so many pairs that are.
@@ -132,7 +138,7 @@ impl Grid {
         let places_m = self.places_m(problem, PLACES);
         let [columns, rows] = self.sides();
         let count = columns * rows;
-        let quantities = problem.detector().electrodes.len() + OTHERS;
+        let quantities = RADII * (problem.detector().electrodes.len() + OTHERS);
         let mut matrix = DMatrix::zeros(count, count);
         let mut right = DMatrix::zeros(count, quantities);
         let values = values(problem, &places_m)?;
@@ -166,24 +172,35 @@ fn failed(problem: &Problem, what: &'static str) -> CompileError {
 
 /// All quantities at some places.
 fn values(problem: &Problem, places_m: &[[f64; 2]]) -> Result<Vec<Vec<f64>>, ForwardError> {
-    let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
+    let of_place = |place_m: &[f64; 2]| {
+        let [small, wide] = DISCS.map(|radii| of_disc(problem, *place_m, radii * problem.usual_radius_m()));
+        Ok([small?, wide?].concat())
+    };
+    places_m.iter().map(of_place).collect()
+}
+
+/// All quantities of a disc.
+fn of_disc(problem: &Problem, [x_m, y_m]: [f64; 2], radius_m: f64) -> Result<Vec<f64>, ForwardError> {
+    let detector = problem.detector();
     let pads_ohm = problem.model.electrode_fields_ohm();
     let conductances_s = LIGHT_SHEETS.map(|sheets| sheets * detector.sheet_conductance_s());
-    let at = |[x_m, y_m]: &[f64; 2]| {
-        let by_contact = |conductance_s: f64| {
-            let contact = Contact::flat(*x_m, *y_m, radius_m, conductance_s);
-            Ok(problem.model.impedance_ohm(&[contact])? - pads_ohm)
-        };
-        let [lighter, firmer] = [by_contact(conductances_s[0])?, by_contact(conductances_s[1])?];
-        let [lighter_ohm, firmer_ohm] = [lighter.mean(), firmer.mean()];
-        // The resistance of the contact is that of its part on the detector.
-        let whole_ohm = conductances_s[0].recip() - conductances_s[1].recip();
-        let share = whole_ohm / (lighter_ohm - firmer_ohm);
-        let own_ohm = firmer_ohm - 1.0 / (share * conductances_s[1]);
-        let fields = (0..pads_ohm.nrows()).map(|e| firmer_ohm - firmer.row(e).mean());
-        Ok(fields.chain([own_ohm, share.clamp(0.0, 1.0)]).collect())
+    let by_contact = |conductance_s: f64| {
+        let contact = Contact::flat(x_m, y_m, radius_m, conductance_s);
+        Ok(problem.model.impedance_ohm(&[contact])? - pads_ohm)
     };
-    places_m.iter().map(at).collect()
+    let [lighter, firmer] = [by_contact(conductances_s[0])?, by_contact(conductances_s[1])?];
+    let [lighter_ohm, firmer_ohm] = [lighter.mean(), firmer.mean()];
+    // The resistance of the contact is that of its part on the detector.
+    let whole_ohm = conductances_s[0].recip() - conductances_s[1].recip();
+    let share = whole_ohm / (lighter_ohm - firmer_ohm);
+    let own_ohm = firmer_ohm - 1.0 / (share * conductances_s[1]);
+    let even_ohm = EVEN_SPREADING / (top_s_per_m(problem) * radius_m);
+    let fields = (0..pads_ohm.nrows()).map(|e| firmer_ohm - firmer.row(e).mean());
+    Ok(fields.chain([own_ohm - even_ohm, share.clamp(0.0, 1.0)]).collect())
+}
+
+fn top_s_per_m(problem: &Problem) -> f64 {
+    problem.detector().layers.last().map_or(1.0, |layer| layer.top_s_per_m)
 }
 
 /// Fields between places.
@@ -302,6 +319,7 @@ fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
         step_x_m: grid.step_m[0] as f32,
         step_y_m: grid.step_m[1] as f32,
         radius_m: settings.radius_m as f32,
+        radii_m: DISCS.map(|radii| (radii * settings.radius_m) as f32),
         near_m: between.near_m as f32,
         ln_step: between.ln_step as f32,
         drive_v: detector.drive_v as f32,
@@ -311,8 +329,7 @@ fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
         pad_share: settings.pad_error as f32,
         full_v: (0.995 * detector.adc.full_scale_v.min(detector.drive_v)) as f32,
         sheet_s: detector.sheet_conductance_s() as f32,
-        top_s_per_m: detector.layers.last().map_or(1.0, |layer| layer.top_s_per_m) as f32,
-        area_m2: problem.jacobian.image_mesh.node_areas_m2.iter().sum::<f64>() as f32,
+        top_s_per_m: top_s_per_m(problem) as f32,
     }
 }
 
