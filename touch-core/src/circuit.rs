@@ -21,12 +21,12 @@ use crate::table::{MAX_ELECTRODES, Sample, Table};
 /// Most contacts.
 pub const MAX_CONTACTS: usize = 3;
 
-/// `8 / (3 pi^2)`: resistance of the crowded current under a disc of even current, over `1 / (s R)`.
-const EVEN_SPREADING: f32 = 0.270_19;
 /// By what share that of a disc of even potential, `1 / (4 s R)`, is less.
 const CROWDED_LESS: f32 = 0.074_7;
 /// Largest conductance of a contact (sheet conductances): what is firmer makes no difference.
 const FIRMEST_SHEETS: f32 = 300.0;
+/// Smallest resistance of a contact with its own field, in those of even current: with less, fields are no longer those of contacts.
+const LEAST_OHM: f32 = 0.8;
 /// Least share of a disc that is on the detector: a quarter has the middle in a corner.
 const LEAST_SHARE: f32 = 0.2;
 
@@ -96,8 +96,8 @@ impl Loaded {
         self.spot = spot;
         table.sample(spot.at_m, per_m2 * (radius_m * radius_m - small_m2), &mut self.sample);
         self.share = self.sample.value[n + 1].max(LEAST_SHARE).min(1.0);
-        self.ohm = libm::expf(spot.ln_ohm);
-        let even_ohm = EVEN_SPREADING / (head.top_s_per_m * radius_m);
+        let even_ohm = head.even_ohm(radius_m);
+        self.ohm = libm::expf(spot.ln_ohm).max(LEAST_OHM * (self.sample.value[n] + even_ohm));
         let least_ohm = 1.0 / (FIRMEST_SHEETS * head.sheet_s);
         let rest_ohm = |crowded: f32| {
             (self.ohm - self.sample.value[n] - even_ohm * (1.0 - CROWDED_LESS * crowded)).max(least_ohm)

@@ -85,6 +85,8 @@ pub(crate) struct Fitter<'a, 't> {
     pub errors: &'a Errors,
     pub circuit: &'a mut Circuit,
     pub work: &'a mut Work,
+    /// Standard deviation of the logarithms of radii.
+    pub radius_deviation: f32,
 }
 
 /// What an answer took.
@@ -105,7 +107,7 @@ impl Fitter<'_, '_> {
             return false;
         }
         self.work.frames[scene.count - 1] += 1;
-        normal.sum_up(self.table, self.circuit, self.frame, self.errors);
+        normal.sum_up(self.table, self.circuit, self.frame, self.errors, self.radius_deviation);
         normal.objective().is_finite()
     }
 

@@ -9,7 +9,9 @@ pub(crate) const PARAMETERS: usize = 4;
 /// Of all contacts.
 pub(crate) const MOST: usize = PARAMETERS * MAX_CONTACTS;
 /// Standard deviation of the logarithm of a radius before anything is read: a factor of two.
-const RADIUS_DEVIATION: f32 = 0.7;
+pub(crate) const ANY_RADIUS: f32 = 0.7;
+/// The same while the number of contacts is not known yet: too few would be made as wide as may be, and lead away from those that are missing.
+pub(crate) const USUAL_RADIUS: f32 = 0.15;
 
 /// A vector over parameters.
 pub(crate) type Vector = [f32; MOST];
@@ -36,7 +38,7 @@ impl Normal {
     ///
     /// An error of a grounded pad's own impedance changes its row by `p`, so that the row's covariance is `v I + p p'`, whose inverse is
     /// `(I - p p' / (v + p'p)) / v` (Sherman and Morrison, 1950).
-    pub fn sum_up(&mut self, table: &Table<'_>, circuit: &Circuit, frame: &Frame<'_>, errors: &Errors) {
+    pub fn sum_up(&mut self, table: &Table<'_>, circuit: &Circuit, frame: &Frame<'_>, errors: &Errors, radius_deviation: f32) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         let (head, n) = (table.head(), table.electrodes());
         let mut volts = [0.0; MAX_ELECTRODES];
@@ -71,7 +73,7 @@ impl Normal {
             }
         }
         self.weigh(1.0 / errors.variance_v2);
-        self.add_known(circuit);
+        self.add_known(circuit, radius_deviation);
     }
 
     fn weigh(&mut self, weight: f32) {
@@ -82,8 +84,8 @@ impl Normal {
         }
     }
 
-    fn add_known(&mut self, circuit: &Circuit) {
-        let weight = 1.0 / (RADIUS_DEVIATION * RADIUS_DEVIATION);
+    fn add_known(&mut self, circuit: &Circuit, radius_deviation: f32) {
+        let weight = 1.0 / (radius_deviation * radius_deviation);
         for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
             let (i, ln_radius) = (PARAMETERS * k + 3, one.spot.ln_radius);
             self.matrix[i][i] += weight;

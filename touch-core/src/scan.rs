@@ -89,7 +89,7 @@ pub(crate) fn first(table: &Table<'_>, frame: &Frame<'_>, errors: &Errors, looks
             continue;
         }
         *looks += 1;
-        table.rough(i, j, &mut fields_ohm);
+        let own_ohm = table.rough(i, j, &mut fields_ohm);
         let (mut along, mut square, mut squares, mut sum) = (of_rest, rest_square, 0.0, 0.0);
         for e in 0..n {
             let field = fields_ohm[e];
@@ -101,7 +101,7 @@ pub(crate) fn first(table: &Table<'_>, frame: &Frame<'_>, errors: &Errors, looks
         square += 2.0 * (n as f32 * squares - sum * sum);
         if along > 0.0 && square > 0.0 {
             let ohm = head.drive_v * square / along - (mean_pad - 2.0 * sum / n as f32);
-            let spot = Spot { at_m, ln_ohm: held_ohm(libm::logf(ohm.max(1e-3 / head.sheet_s)), table), ln_radius: 0.0 };
+            let spot = Spot { at_m, ln_ohm: held_ohm(libm::logf(ohm.max(own_ohm)), table), ln_radius: 0.0 };
             let gain = along * along / (square * errors.variance_v2);
             take(&mut all, Candidate { spot, gain }, APART * head.radius_m);
         }
@@ -174,11 +174,11 @@ impl<'a, 't> Beside<'a, 't> {
                 continue;
             }
             *looks += 1;
-            table.rough(i, j, &mut fields_ohm);
+            let own_ohm = table.rough(i, j, &mut fields_ohm);
             self.circuit.potentials_ohm(table, at_m, &fields_ohm, &mut potentials_ohm);
             let (along, square) = self.look(&potentials_ohm);
             if along > 0.0 && square > 0.0 {
-                let ln_ohm = held_ohm(libm::logf(square / along), table);
+                let ln_ohm = held_ohm(libm::logf((square / along).max(own_ohm)), table);
                 let gain = along * along / (square * errors.variance_v2);
                 take(&mut all, Candidate { spot: Spot { at_m, ln_ohm, ln_radius: 0.0 }, gain }, APART * head.radius_m);
             }

@@ -7,8 +7,8 @@ use crate::answer::{Answer, Contact, Flags};
 use crate::circuit::{Circuit, Loaded, MAX_CONTACTS};
 use crate::fit::{Fit, Fitter, Scene, Work};
 use crate::frame::{Errors, Frame, FrameError, Says};
-use crate::normal::{PARAMETERS, Vector};
-use crate::scan::{Beside, first};
+use crate::normal::{ANY_RADIUS, PARAMETERS, USUAL_RADIUS, Vector};
+use crate::scan::{Beside, CANDIDATES, first};
 use crate::table::Table;
 
 /// Price of a parameter (squared deviations): that of the host's search.
@@ -106,80 +106,84 @@ impl<'t> Solver<'t> {
     fn followed(&mut self, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> Option<Fit> {
         let mut scene = self.scene;
         while scene.count > 0 {
-            let fit = self.fitter(frame, errors, work).fit(scene, FOLLOWING)?;
+            let fit = self.fitter(frame, errors, work, ANY_RADIUS).fit(scene, FOLLOWING)?;
             let Some(gone) = weakest(&fit) else { return Some(fit) };
             scene = fit.scene.without(gone);
         }
         None
     }
 
-    fn fitter<'a>(&'a mut self, frame: &'a Frame<'a>, errors: &'a Errors, work: &'a mut Work) -> Fitter<'a, 't> {
-        Fitter { table: &self.table, frame, errors, circuit: &mut self.circuit, work }
+    fn fitter<'a>(
+        &'a mut self,
+        frame: &'a Frame<'a>,
+        errors: &'a Errors,
+        work: &'a mut Work,
+        radius_deviation: f32,
+    ) -> Fitter<'a, 't> {
+        Fitter { table: &self.table, frame, errors, circuit: &mut self.circuit, work, radius_deviation }
     }
 
     /// The best explanation that is found, from what was followed or from nothing, and whether there is more than contacts explain.
     fn search(&mut self, from: Option<Fit>, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Option<Fit>, bool) {
-        let readings = errors.count as f32;
-        let (warm, more) = match from {
-            Some(fit) => self.grown(fit, frame, errors, work),
-            None => return self.searched_anew(frame, errors, work),
-        };
-        if !is_misfit(&warm, readings) {
-            return (Some(warm), more);
+        let (mut best, mut more) = (from, false);
+        if let Some(from) = from {
+            (best, more) = self.grown(from, frame, errors, work);
         }
-        let (anew, more_anew) = self.searched_anew(frame, errors, work);
-        match anew {
-            Some(anew) if score(&anew) < score(&warm) => (Some(anew), more_anew),
-            _ => (Some(warm), more),
+        if best.is_some_and(|best| !is_misfit(&best, errors.count as f32)) {
+            return (best, more);
         }
-    }
-
-    fn searched_anew(&mut self, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Option<Fit>, bool) {
         let candidates = first(&self.table, frame, errors, &mut work.first_looks);
         if candidates[0].gain < FIRST_GAIN {
-            return (None, false);
+            return (best, more);
         }
-        let mut best: Option<Fit> = None;
-        for candidate in candidates.iter().filter(|candidate| candidate.gain > 0.0) {
-            let start = Scene::default().with(candidate.spot);
-            let fit = self.fitter(frame, errors, work).fit(start, SEARCHING);
-            best = better(best, fit);
-            if best.is_some_and(|best| !is_misfit(&best, errors.count as f32)) {
+        let starts = candidates.map(|candidate| (candidate.gain > 0.0).then(|| Scene::default().with(candidate.spot)));
+        if let Some(one) = self.best_of(&starts, frame, errors, work) {
+            let (anew, more_anew) = self.grown(one, frame, errors, work);
+            let is_better = anew.is_some_and(|anew| best.is_none_or(|best| score(&anew) < score(&best)));
+            if is_better {
+                (best, more) = (anew, more_anew);
+            }
+        }
+        (best, more)
+    }
+
+    /// The best fit of contacts of about the usual radius from some starts.
+    fn best_of(
+        &mut self,
+        starts: &[Option<Scene>; CANDIDATES],
+        frame: &Frame<'_>,
+        errors: &Errors,
+        work: &mut Work,
+    ) -> Option<Fit> {
+        let mut best = None;
+        for start in starts.iter().flatten() {
+            best = better(best, self.fitter(frame, errors, work, USUAL_RADIUS).fit(*start, SEARCHING));
+            if best.is_some_and(|best: Fit| !is_misfit(&best, errors.count as f32)) {
                 break;
             }
         }
-        match best {
-            Some(one) => {
-                let (fit, more) = self.grown(one, frame, errors, work);
-                (Some(fit), more)
-            }
-            None => (None, false),
-        }
+        best
     }
 
-    /// One more contact, and one more, as long as each is worth its price; and whether there would be another.
-    fn grown(&mut self, mut fit: Fit, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Fit, bool) {
+    /// The likeliest number of contacts from some that are found on, one more at a time; and whether there would be another.
+    fn grown(&mut self, from: Fit, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Option<Fit>, bool) {
+        let price = PAID * PARAMETER_PRICE;
+        let (mut at, mut best) = (from, None);
         loop {
-            if !self.circuit.solve(&self.table, fit.scene.spots()) {
-                return (fit, false);
+            best = better(best, self.fitter(frame, errors, work, ANY_RADIUS).fit(at.scene, SEARCHING));
+            if !self.circuit.solve(&self.table, at.scene.spots()) {
+                return (best, false);
             }
             let beside = Beside::new(&self.table, &self.circuit, frame, errors);
             let candidates = beside.candidates(errors, &mut work.looks);
-            let price = PAID * PARAMETER_PRICE;
-            if candidates[0].gain < price {
-                return (fit, false);
+            let is_explained = best.is_some_and(|best| !is_misfit(&best, errors.count as f32));
+            if candidates[0].gain < price || at.scene.count == MAX_CONTACTS {
+                return (best, candidates[0].gain >= price && !is_explained);
             }
-            if fit.scene.count == MAX_CONTACTS {
-                return (fit, is_misfit(&fit, errors.count as f32));
-            }
-            let mut best = None;
-            for candidate in candidates.iter().filter(|candidate| candidate.gain > price) {
-                let start = fit.scene.with(candidate.spot);
-                best = better(best, self.fitter(frame, errors, work).fit(start, SEARCHING));
-            }
-            match best.filter(|best| score(best) < score(&fit)) {
-                Some(best) => fit = best,
-                None => return (fit, false),
+            let starts = candidates.map(|one| (one.gain > price).then(|| at.scene.with(one.spot)));
+            match self.best_of(&starts, frame, errors, work) {
+                Some(more) => at = more,
+                None => return (best, false),
             }
         }
     }

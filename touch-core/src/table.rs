@@ -375,13 +375,16 @@ impl<'a> Table<'a> {
         self.codes.at(2 * quantity) + self.codes.at(2 * quantity + 1) * f32::from(i16::from_le_bytes(code))
     }
 
-    /// Fields of the electrodes at the middle of a cell, roughly: the mean of the coefficients about it.
-    pub(crate) fn rough(&self, i: usize, j: usize, fields_ohm: &mut [f32; MAX_ELECTRODES]) {
+    /// Fields of the electrodes at the middle of a cell, roughly, as means of the coefficients about it; returns the own field of a disc of the usual radius there.
+    pub(crate) fn rough(&self, i: usize, j: usize, fields_ohm: &mut [f32; MAX_ELECTRODES]) -> f32 {
         let corners = [(1, 1), (2, 1), (1, 2), (2, 2)].map(|(x, y)| self.coefficient(i + x, j + y));
-        for (e, field_ohm) in fields_ohm.iter_mut().enumerate().take(self.electrodes) {
-            let sum: i32 = corners.iter().filter_map(|codes| codes.get(e)).map(|c| i32::from(i16::from_le_bytes(*c))).sum();
-            *field_ohm = self.codes.at(2 * e) + 0.25 * self.codes.at(2 * e + 1) * sum as f32;
-        }
+        let mean = |quantity: usize| {
+            let codes = corners.iter().filter_map(|codes| codes.get(quantity));
+            let sum: i32 = codes.map(|code| i32::from(i16::from_le_bytes(*code))).sum();
+            self.codes.at(2 * quantity) + 0.25 * self.codes.at(2 * quantity + 1) * sum as f32
+        };
+        (0..self.electrodes).for_each(|e| fields_ohm[e] = mean(e));
+        mean(self.electrodes) + self.head.even_ohm(self.head.radius_m)
     }
 
     /// The middle of a cell (m).
@@ -411,7 +414,15 @@ impl<'a> Table<'a> {
     }
 }
 
+/// `8 / (3 pi^2)`: resistance of the crowded current under a disc of even current, over `1 / (s R)`.
+const EVEN_SPREADING: f32 = 0.270_19;
+
 impl Head {
+    /// Field of a disc of even current on a deep layer, as a mean over it (ohm).
+    pub(crate) fn even_ohm(&self, radius_m: f32) -> f32 {
+        EVEN_SPREADING / (self.top_s_per_m * radius_m)
+    }
+
     /// Its numbers in the order in which they are stored.
     pub fn numbers(&self) -> [f32; 17] {
         [

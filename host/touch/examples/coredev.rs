@@ -28,7 +28,7 @@ fn main() {
     let [w, h] = det.outline.size_m();
     let mut host = Method::Auto.build(&problem).unwrap();
     let mut core = Solver::new(table);
-    for count in 1..=most {
+    for count in args.get(5).map_or(1, |s| s.parse().unwrap())..=most {
         let (mut ours, mut theirs, mut right, mut right_t) = (vec![], vec![], 0, 0);
         let mut time = std::time::Duration::ZERO;
         for s in 0..scenes {
@@ -68,14 +68,12 @@ fn main() {
     }
 }
 fn matched(contacts: &[Contact], found: &[[f64; 2]]) -> f64 {
-    let mut left = found.to_vec();
-    let mut sum = 0.0;
-    let mut n = 0;
-    for c in contacts {
-        let best = (0..left.len()).min_by(|a, b| { let d = |i: usize| (left[i][0] - c.x_m).hypot(left[i][1] - c.y_m); d(*a).total_cmp(&d(*b)) });
-        if let Some(i) = best { sum += (left[i][0] - c.x_m).hypot(left[i][1] - c.y_m); n += 1; left.remove(i); }
-    }
-    if n == 0 { f64::INFINITY } else { sum / n as f64 }
+    // Pairs nearest first, as many as there are.
+    let mut pairs: Vec<(f64, usize, usize)> = contacts.iter().enumerate().flat_map(|(k, c)| found.iter().enumerate().map(move |(l, f)| ((f[0] - c.x_m).hypot(f[1] - c.y_m), k, l))).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut ks, mut ls, mut sum, mut n) = (vec![], vec![], 0.0, 0);
+    for (d, k, l) in pairs { if !ks.contains(&k) && !ls.contains(&l) { ks.push(k); ls.push(l); sum += d; n += 1; } }
+    if n == 0 { f64::INFINITY } else { sum / f64::from(n) }
 }
 #[allow(dead_code)]
 fn unused(_: Readings, _: Says, _: &dyn ForwardModel) {}
