@@ -20,6 +20,8 @@ pub struct Contact {
     pub apparent_conductance_s: f32,
     /// Radius (m), as far as the readings tell it; else the usual one.
     pub radius_m: f32,
+    /// Standard error of the radius (m).
+    pub radius_sigma_m: f32,
     /// Standard errors of x and y (m).
     pub sigma_m: [f32; 2],
     /// Correlation of the errors of x and y.
@@ -37,15 +39,13 @@ impl Flags {
     pub const MISFIT: Self = Self(2);
     /// Readings are at the end of the converter's range, or contacts conduct so well that more would change nothing.
     pub const SATURATED: Self = Self(4);
-    /// Readings of some electrodes cannot be those of any contacts: a fault of a wire or a channel.
-    pub const FAULT: Self = Self(8);
 
     /// Whether all of some flags are raised.
     pub const fn has(self, flags: Self) -> bool {
         self.0 & flags.0 == flags.0
     }
 
-    /// As bits: 1 more, 2 misfit, 4 saturated, 8 fault.
+    /// As bits: 1 more, 2 misfit, 4 saturated.
     pub const fn bits(self) -> u8 {
         self.0
     }

@@ -28,6 +28,9 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
+    pub const EMPTY: Self =
+        Self { count: 0, spots: [Spot { at_m: [0.0; 2], ln_ohm: 0.0, ln_radius: 0.0 }; MAX_CONTACTS] };
+
     pub fn spots(&self) -> &[Spot] {
         &self.spots[..self.count.min(MAX_CONTACTS)]
     }

@@ -7,7 +7,7 @@ use crate::answer::{Answer, Contact, Flags};
 use crate::circuit::{Circuit, Loaded, MAX_CONTACTS};
 use crate::fit::{Fit, Fitter, Scene, Work};
 use crate::frame::{Errors, Frame, FrameError, Says};
-use crate::normal::{ANY_RADIUS, PARAMETERS, USUAL_RADIUS, Vector};
+use crate::normal::{ANY_RADIUS, MOST, PARAMETERS, USUAL_RADIUS, Vector};
 use crate::scan::{Beside, CANDIDATES, first};
 use crate::table::Table;
 
@@ -29,10 +29,23 @@ const SATURATED_SHEETS: f32 = 100.0;
 /// Frames without a better answer after which one that does not fit is searched again; doubled each time, up to the second.
 const PATIENCE: [u32; 2] = [1, 64];
 
-/// Finds contacts in frames, one after the other.
+/// A frame to be explained.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    table: &'a Table<'a>,
+    frame: &'a Frame<'a>,
+    errors: &'a Errors,
+}
+
+impl Task<'_> {
+    fn readings(&self) -> f32 {
+        self.errors.count as f32
+    }
+}
+
+/// Finds contacts in frames, one after the other: those of one table.
 #[derive(Clone, Debug)]
-pub struct Solver<'t> {
-    table: Table<'t>,
+pub struct Solver {
     circuit: Circuit,
     scene: Scene,
     ids: [u32; MAX_CONTACTS],
@@ -43,13 +56,18 @@ pub struct Solver<'t> {
     wait: u32,
 }
 
-impl<'t> Solver<'t> {
+impl Default for Solver {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Solver {
     /// A solver that has seen nothing.
-    pub fn new(table: Table<'t>) -> Self {
+    pub const fn new() -> Self {
         Self {
-            table,
             circuit: Circuit::EMPTY,
-            scene: Scene::default(),
+            scene: Scene::EMPTY,
             ids: [0; MAX_CONTACTS],
             next_id: 0,
             searched: 0.0,
@@ -58,34 +76,29 @@ impl<'t> Solver<'t> {
         }
     }
 
-    /// What it solves by.
-    pub fn table(&self) -> &Table<'t> {
-        &self.table
-    }
-
     /// Forgets the frames before.
     pub fn reset(&mut self) {
-        *self = Self::new(self.table);
+        *self = Self::new();
     }
 
     /// The contacts of a frame.
     ///
     /// # Errors
     /// [`FrameError`] if it cannot be a frame of the table's detector.
-    pub fn solve(&mut self, frame: &Frame<'_>) -> Result<Answer, FrameError> {
-        frame.check(&self.table)?;
-        let errors = Errors::of(frame, &self.table);
+    pub fn solve(&mut self, table: &Table<'_>, frame: &Frame<'_>) -> Result<Answer, FrameError> {
+        frame.check(table)?;
+        let task = Task { table, frame, errors: &Errors::of(frame, table) };
         let mut work = Work::default();
         let before = self.scene;
-        let mut found = self.followed(frame, &errors, &mut work);
-        let readings = errors.count as f32;
+        let mut found = self.followed(task, &mut work);
+        let readings = task.readings();
         let is_lost = match &found {
             Some(fit) => fit.normal.cost > (WORSE * self.searched).max(limit(readings - freedom(fit))),
             None => true,
         };
         let mut more = false;
         if is_lost && self.may_search() {
-            (found, more) = self.search(found, frame, &errors, &mut work);
+            (found, more) = self.search(found, task, &mut work);
             self.searched = found.map_or(0.0, |fit| fit.normal.cost);
             let fits = found.is_none_or(|fit| !is_misfit(&fit, readings));
             self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
@@ -93,7 +106,7 @@ impl<'t> Solver<'t> {
         }
         self.scene = found.map_or_else(Scene::default, |fit| fit.scene);
         self.number(&before);
-        Ok(self.answer(found, more, frame, &errors, work))
+        Ok(self.answer(found, more, task, work))
     }
 
     fn may_search(&mut self) -> bool {
@@ -103,42 +116,37 @@ impl<'t> Solver<'t> {
     }
 
     /// What was found last, fitted to this frame, without what is no longer there.
-    fn followed(&mut self, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> Option<Fit> {
+    fn followed(&mut self, task: Task<'_>, work: &mut Work) -> Option<Fit> {
         let mut scene = self.scene;
         while scene.count > 0 {
-            let fit = self.fitter(frame, errors, work, ANY_RADIUS).fit(scene, FOLLOWING)?;
+            let fit = self.fit(scene, ANY_RADIUS, FOLLOWING, task, work)?;
             let Some(gone) = weakest(&fit) else { return Some(fit) };
             scene = fit.scene.without(gone);
         }
         None
     }
 
-    fn fitter<'a>(
-        &'a mut self,
-        frame: &'a Frame<'a>,
-        errors: &'a Errors,
-        work: &'a mut Work,
-        radius_deviation: f32,
-    ) -> Fitter<'a, 't> {
-        Fitter { table: &self.table, frame, errors, circuit: &mut self.circuit, work, radius_deviation }
+    fn fit(&mut self, scene: Scene, radius_deviation: f32, steps: usize, task: Task<'_>, work: &mut Work) -> Option<Fit> {
+        let Task { table, frame, errors } = task;
+        Fitter { table, frame, errors, circuit: &mut self.circuit, work, radius_deviation }.fit(scene, steps)
     }
 
     /// The best explanation that is found, from what was followed or from nothing, and whether there is more than contacts explain.
-    fn search(&mut self, from: Option<Fit>, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Option<Fit>, bool) {
+    fn search(&mut self, from: Option<Fit>, task: Task<'_>, work: &mut Work) -> (Option<Fit>, bool) {
         let (mut best, mut more) = (from, false);
         if let Some(from) = from {
-            (best, more) = self.grown(from, frame, errors, work);
+            (best, more) = self.grown(from, task, work);
         }
-        if best.is_some_and(|best| !is_misfit(&best, errors.count as f32)) {
+        if best.is_some_and(|best| !is_misfit(&best, task.readings())) {
             return (best, more);
         }
-        let candidates = first(&self.table, frame, errors, &mut work.first_looks);
+        let candidates = first(task.table, task.frame, task.errors, &mut work.first_looks);
         if candidates[0].gain < FIRST_GAIN {
             return (best, more);
         }
         let starts = candidates.map(|candidate| (candidate.gain > 0.0).then(|| Scene::default().with(candidate.spot)));
-        if let Some(one) = self.best_of(&starts, frame, errors, work) {
-            let (anew, more_anew) = self.grown(one, frame, errors, work);
+        if let Some(one) = self.best_of(&starts, task, work) {
+            let (anew, more_anew) = self.grown(one, task, work);
             let is_better = anew.is_some_and(|anew| best.is_none_or(|best| score(&anew) < score(&best)));
             if is_better {
                 (best, more) = (anew, more_anew);
@@ -151,14 +159,13 @@ impl<'t> Solver<'t> {
     fn best_of(
         &mut self,
         starts: &[Option<Scene>; CANDIDATES],
-        frame: &Frame<'_>,
-        errors: &Errors,
+        task: Task<'_>,
         work: &mut Work,
     ) -> Option<Fit> {
         let mut best = None;
         for start in starts.iter().flatten() {
-            best = better(best, self.fitter(frame, errors, work, USUAL_RADIUS).fit(*start, SEARCHING));
-            if best.is_some_and(|best: Fit| !is_misfit(&best, errors.count as f32)) {
+            best = better(best, self.fit(*start, USUAL_RADIUS, SEARCHING, task, work));
+            if best.is_some_and(|best: Fit| !is_misfit(&best, task.readings())) {
                 break;
             }
         }
@@ -166,22 +173,22 @@ impl<'t> Solver<'t> {
     }
 
     /// The likeliest number of contacts from some that are found on, one more at a time; and whether there would be another.
-    fn grown(&mut self, from: Fit, frame: &Frame<'_>, errors: &Errors, work: &mut Work) -> (Option<Fit>, bool) {
+    fn grown(&mut self, from: Fit, task: Task<'_>, work: &mut Work) -> (Option<Fit>, bool) {
         let price = PAID * PARAMETER_PRICE;
         let (mut at, mut best) = (from, None);
         loop {
-            best = better(best, self.fitter(frame, errors, work, ANY_RADIUS).fit(at.scene, SEARCHING));
-            if !self.circuit.solve(&self.table, at.scene.spots()) {
+            best = better(best, self.fit(at.scene, ANY_RADIUS, SEARCHING, task, work));
+            if !self.circuit.solve(task.table, at.scene.spots()) {
                 return (best, false);
             }
-            let beside = Beside::new(&self.table, &self.circuit, frame, errors);
-            let candidates = beside.candidates(errors, &mut work.looks);
-            let is_explained = best.is_some_and(|best| !is_misfit(&best, errors.count as f32));
+            let beside = Beside::new(task.table, &self.circuit, task.frame, task.errors);
+            let candidates = beside.candidates(task.errors, &mut work.looks);
+            let is_explained = best.is_some_and(|best| !is_misfit(&best, task.readings()));
             if candidates[0].gain < price || at.scene.count == MAX_CONTACTS {
                 return (best, candidates[0].gain >= price && !is_explained);
             }
             let starts = candidates.map(|one| (one.gain > price).then(|| at.scene.with(one.spot)));
-            match self.best_of(&starts, frame, errors, work) {
+            match self.best_of(&starts, task, work) {
                 Some(more) => at = more,
                 None => return (best, false),
             }
@@ -213,12 +220,13 @@ impl<'t> Solver<'t> {
         }
     }
 
-    fn answer(&mut self, found: Option<Fit>, more: bool, frame: &Frame<'_>, errors: &Errors, work: Work) -> Answer {
+    fn answer(&mut self, found: Option<Fit>, more: bool, task: Task<'_>, work: Work) -> Answer {
         let mut answer = Answer::of(work);
-        answer.flags.raise(Flags::SATURATED, errors.is_full);
+        answer.flags.raise(Flags::SATURATED, task.errors.is_full);
         answer.flags.raise(Flags::MORE, more);
-        let readings = errors.count as f32;
-        let Some(fit) = found.filter(|fit| self.circuit.solve(&self.table, fit.scene.spots())) else {
+        let Task { table, frame, errors } = task;
+        let readings = task.readings();
+        let Some(fit) = found.filter(|fit| self.circuit.solve(task.table, fit.scene.spots())) else {
             let voltages = (0..frame.volts.len()).filter(|i| frame.says_at(*i) == Says::Voltage);
             let squares: f32 = voltages.map(|i| frame.volts[i] * frame.volts[i]).sum();
             answer.residual = libm::sqrtf(squares / errors.variance_v2 / readings.max(1.0));
@@ -227,19 +235,18 @@ impl<'t> Solver<'t> {
         answer.flags.raise(Flags::MISFIT, is_misfit(&fit, readings));
         answer.residual = libm::sqrtf(fit.normal.cost / readings.max(1.0));
         let covariance = fit.normal.covariance();
-        let firmest_s = SATURATED_SHEETS * self.table.head().sheet_s;
+        let firmest_s = SATURATED_SHEETS * table.head().sheet_s;
         for (k, loaded) in self.circuit.loaded.iter().enumerate().take(self.circuit.count) {
             answer.flags.raise(Flags::SATURATED, loaded.conductance_s > firmest_s);
-            answer.add(self.contact(k, loaded, covariance.as_ref()));
+            answer.add(self.contact(k, loaded, covariance.as_ref(), table.head().radius_m));
         }
         answer
     }
 
-    fn contact(&self, k: usize, loaded: &Loaded, covariance: Option<&[Vector; PARAMETERS * MAX_CONTACTS]>) -> Contact {
-        let radius_m = self.table.head().radius_m;
+    fn contact(&self, k: usize, loaded: &Loaded, covariance: Option<&[Vector; MOST]>, radius_m: f32) -> Contact {
         let first = PARAMETERS * k;
         let of = |i: usize, j: usize| covariance.map_or(f32::INFINITY, |all| all[first + i][first + j]);
-        let [x, y, log] = [0, 1, 2].map(|i| libm::sqrtf(of(i, i).max(0.0)));
+        let [x, y, log, log_radius] = [0, 1, 2, 3].map(|i| libm::sqrtf(of(i, i).max(0.0)));
         let share = loaded.share;
         // Of `C = 1 / (share (A - S))`, with what crowds alike.
         let per_log = loaded.ohm * loaded.conductance_s * share;
@@ -251,6 +258,7 @@ impl<'t> Solver<'t> {
             conductance_sigma_s: loaded.conductance_s * per_log * log,
             apparent_conductance_s: 1.0 / (share * loaded.ohm),
             radius_m: radius_m * libm::expf(loaded.spot.ln_radius),
+            radius_sigma_m: radius_m * libm::expf(loaded.spot.ln_radius) * log_radius,
             sigma_m: [radius_m * x, radius_m * y],
             correlation: if x * y > 0.0 { of(0, 1) / (x * y) } else { 0.0 },
         }

@@ -222,6 +222,19 @@ impl<'a> Table<'a> {
     /// # Errors
     /// [`TableError`] if the bytes are no whole, sound table of this version.
     pub fn read(bytes: &'a [u8]) -> Result<Self, TableError> {
+        let table = Self::read_again(bytes)?;
+        let (content, last) = bytes.split_last_chunk().unwrap_or((bytes, &[0; 4]));
+        match (u32::from_le_bytes(*last), crc32(content)) {
+            (found, expected) if found == expected => Ok(table),
+            (found, expected) => Err(TableError::Checksum { found, expected }),
+        }
+    }
+
+    /// Reads a table that was read before, without its checksum, which takes as long as some frames.
+    ///
+    /// # Errors
+    /// As for [`read`](Self::read), but for the checksum.
+    pub fn read_again(bytes: &'a [u8]) -> Result<Self, TableError> {
         let u16_at = |at: usize| bytes.get(at..at + 2).map_or(0, |two| u16::from_le_bytes([two[0], two[1]]));
         let u32_at = |at: usize| Floats(bytes.as_chunks().0).at(at / 4).to_bits();
         if bytes.first_chunk() != Some(&MAGIC) {
@@ -242,13 +255,8 @@ impl<'a> Table<'a> {
         if found != expected || u32_at(16) as usize != expected {
             return Err(TableError::Length { found, expected });
         }
-        let (content, last) = bytes.split_at(expected - 4);
-        let (found, expected_crc) = (u32::from_le_bytes([last[0], last[1], last[2], last[3]]), crc32(content));
-        if found != expected_crc {
-            return Err(TableError::Checksum { found, expected: expected_crc });
-        }
         let cut = || TableError::Length { found: bytes.len(), expected };
-        let mut parts = Parts(content);
+        let mut parts = Parts(bytes);
         parts.bytes(24).ok_or_else(cut)?;
         let head = Head::read(parts.floats(17).ok_or_else(cut)?)?;
         let table = Self {
@@ -276,8 +284,10 @@ impl<'a> Table<'a> {
             ("fields of walls", self.walls),
             ("steps of codes", self.codes),
         ];
+        let gains_are_sound = (0..self.electrodes).all(|e| self.channels.at(2 * e) > 0.0);
         match all.into_iter().find(|(_, floats)| !floats.are_finite()) {
             Some((what, _)) => Err(TableError::Number { what }),
+            None if !gains_are_sound => Err(TableError::Number { what: "gains" }),
             None => Ok(self),
         }
     }

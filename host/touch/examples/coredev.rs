@@ -1,8 +1,5 @@
 #![allow(missing_docs, clippy::unwrap_used)]
-mod solve { pub use tactomo_touch::solve::*; }
-#[path = "../src/compile.rs"]
-mod compile;
-use solve::{Method, Problem};
+use tactomo_touch::solve::{self, Method, Problem};
 use tactomo_physics::detector::Detector;
 use tactomo_physics::forward::{ForwardModel, readings_v};
 use tactomo_physics::readings::Readings;
@@ -18,7 +15,7 @@ fn main() {
     let det = Detector::preset(name).unwrap().taken_as_exact();
     let problem = Problem::of(&det).unwrap();
     let t = std::time::Instant::now();
-    let bytes = compile::compile(&problem).unwrap();
+    let bytes = solve::compile(&problem).unwrap();
     println!("compiled {} bytes in {:?}", bytes.len(), t.elapsed());
     let table = Table::read(&bytes).unwrap();
     let finer = finer_model(&det, &[], 0).unwrap();
@@ -27,7 +24,7 @@ fn main() {
     let mut noise = Noise::new(3);
     let [w, h] = det.outline.size_m();
     let mut host = Method::Auto.build(&problem).unwrap();
-    let mut core = Solver::new(table);
+    let mut core = Solver::new();
     for count in args.get(5).map_or(1, |s| s.parse().unwrap())..=most {
         let (mut ours, mut theirs, mut right, mut right_t) = (vec![], vec![], 0, 0);
         let mut time = std::time::Duration::ZERO;
@@ -44,7 +41,7 @@ fn main() {
             let volts: Vec<f32> = readings.volts().iter().map(|v| *v as f32).collect();
             let t = std::time::Instant::now();
             core.reset();
-            let answer = core.solve(&Frame::of_volts(&volts)).unwrap();
+            let answer = core.solve(&table, &Frame::of_volts(&volts)).unwrap();
             time += t.elapsed();
             let found: Vec<[f64; 2]> = answer.contacts().iter().map(|c| [f64::from(c.x_m), f64::from(c.y_m)]).collect();
             let err = matched(&contacts, &found);

@@ -8,14 +8,16 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use tactomo_physics::forward::ForwardError;
+use tactomo_physics::forward::{ForwardError, readings_v};
 use tactomo_physics::forward::spots::Spot;
 use tactomo_physics::scene::Contact;
 use tactomo_touch_core::crc::crc32;
 use tactomo_touch_core::spline::{interval, weights};
 use tactomo_touch_core::table::{Head, MAGIC, MAX_ELECTRODES, MAX_SIDE, OTHERS, RADII, VERSION, bytes_of};
 
-use crate::solve::{ContactSettings, Problem};
+use crate::solve::fit::linear::full_v;
+use crate::solve::fit::target::{PAD_ERROR, model_error};
+use crate::solve::problem::Problem;
 
 /// Coefficients of each quantity, about.
 const COEFFICIENTS: usize = 1200;
@@ -29,6 +31,8 @@ const SMOOTHNESS: f64 = 1e-6;
 const LIGHT_SHEETS: [f64; 2] = [1e-4, 1e-3];
 /// Radii of the small and of the wide disc, in usual ones.
 const DISCS: [f64; RADII] = [0.6, 2.2];
+/// Places that errors of the detector are taken at, as shares of the outline's sides.
+const TRIED: [[f64; 2]; 5] = [[0.5, 0.5], [0.25, 0.3], [0.7, 0.25], [0.3, 0.75], [0.8, 0.7]];
 /// `8 / (3 pi^2)`: own field of a disc of even current on a deep layer, over `1 / (s R)`.
 const EVEN_SPREADING: f64 = 8.0 / (3.0 * PI * PI);
 /// Coefficients over distances.
@@ -312,25 +316,43 @@ fn floats(values: impl IntoIterator<Item = f64>) -> impl Iterator<Item = u8> {
 }
 
 fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
-    let (detector, settings) = (problem.detector(), ContactSettings::of(problem));
+    let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
     Head {
         left_m: grid.low_m[0] as f32,
         bottom_m: grid.low_m[1] as f32,
         step_x_m: grid.step_m[0] as f32,
         step_y_m: grid.step_m[1] as f32,
-        radius_m: settings.radius_m as f32,
-        radii_m: DISCS.map(|radii| (radii * settings.radius_m) as f32),
+        radius_m: radius_m as f32,
+        radii_m: DISCS.map(|radii| (radii * radius_m) as f32),
         near_m: between.near_m as f32,
         ln_step: between.ln_step as f32,
         drive_v: detector.drive_v as f32,
         on_resistance_ohm: detector.on_resistance_ohm as f32,
         noise_v: detector.adc.deviation_v() as f32,
-        model_share: settings.model_error as f32,
-        pad_share: settings.pad_error as f32,
-        full_v: (0.995 * detector.adc.full_scale_v.min(detector.drive_v)) as f32,
+        model_share: model_error(&*problem.model).hypot(detector_share(problem)) as f32,
+        pad_share: PAD_ERROR as f32,
+        full_v: full_v(detector) as f32,
         sheet_s: detector.sheet_conductance_s() as f32,
         top_s_per_m: top_s_per_m(problem) as f32,
     }
+}
+
+/// What readings of contacts are off by as nobody knows the detector exactly: root mean square over readings and contacts at some places, as a share of the largest
+/// reading.
+fn detector_share(problem: &Problem) -> f64 {
+    let Some(nuisance) = problem.nuisance() else { return 0.0 };
+    let (detector, radius_m) = (problem.detector(), problem.usual_radius_m());
+    let [low_m, high_m] = detector.outline.bounds();
+    let at = |share: [f64; 2]| [0, 1].map(|axis| low_m[axis] + share[axis] * (high_m[axis] - low_m[axis]));
+    let places_m = TRIED.map(at).into_iter().filter(|place_m| detector.outline.holds(*place_m));
+    let squares = places_m.filter_map(|[x_m, y_m]| {
+        let contacts = [Contact::flat(x_m, y_m, radius_m, detector.sheet_conductance_s())];
+        let readings = readings_v(&problem.model.impedance_ohm(&contacts).ok()?, detector);
+        let patterns_v = nuisance.patterns_v(&contacts, detector).ok()?;
+        Some(patterns_v.norm_squared() / patterns_v.nrows() as f64 / readings.largest_v().powi(2))
+    });
+    let squares: Vec<_> = squares.collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
 }
 
 /// How a quantity's coefficients are stored.
