@@ -116,6 +116,12 @@ impl Errors {
         errors.variance_v2 = head.noise_v * head.noise_v + model_v * model_v;
         errors
     }
+
+    /// What an error of a grounded pad's own impedance changes in a reading (V).
+    pub fn pad_v(&self, table: &Table<'_>, frame: &Frame<'_>, g: usize, e: usize) -> f32 {
+        let below_v = table.head().drive_v - frame.touch_v(g * table.electrodes() + e);
+        if e == g { 0.0 } else { self.pads[g] * below_v.max(0.0) }
+    }
 }
 
 /// By how much a reading is more than a model's (V), of a bound by as much as that breaks it; `None` if it says nothing of that.

@@ -51,7 +51,7 @@ impl Normal {
                 let Some(left_v) = left_v(frame, index, head.full_v, volts[e]) else { continue };
                 let mut slope = [0.0; MOST];
                 slopes.of_reading(circuit, e, volts[e] / head.drive_v, &mut slope);
-                let by_pad_v = if e == g { 0.0 } else { errors.pads[g] * (head.drive_v - frame.touch_v(index)).max(0.0) };
+                let by_pad_v = errors.pad_v(table, frame, g, e);
                 self.cost += left_v * left_v;
                 left_by_pad += left_v * by_pad_v;
                 pad += by_pad_v * by_pad_v;
@@ -121,7 +121,7 @@ impl Normal {
 }
 
 /// What the derivatives of a row's readings have in common.
-struct RowSlopes {
+pub(crate) struct RowSlopes {
     /// Volts by ohm.
     per_ohm: f32,
     /// Places are in usual radii (m).
@@ -134,7 +134,7 @@ struct RowSlopes {
 }
 
 impl RowSlopes {
-    fn new(circuit: &Circuit, g: usize, drive_v: f32, unit_m: f32) -> Self {
+    pub fn new(circuit: &Circuit, g: usize, drive_v: f32, unit_m: f32) -> Self {
         let mut all = Self {
             per_ohm: -drive_v / circuit.loads_ohm[g],
             unit_m,
@@ -168,20 +168,39 @@ impl RowSlopes {
     }
 }
 
+impl RowSlopes {
+    /// Adds to `products` those of the row's derivatives with some volts, by what of the drive is predicted at each electrode.
+    pub fn add_products(&self, circuit: &Circuit, volts: &[f32], shares: &[f32], products: &mut Vector) {
+        let of_load: f32 = volts.iter().zip(shares).map(|(volts, share)| volts * (1.0 - share)).sum();
+        for (k, one) in circuit.loaded.iter().enumerate().take(circuit.count) {
+            let with = |values: &PerElectrode| volts.iter().zip(values).map(|(a, b)| a * b).sum::<f32>();
+            let current = with(&one.currents);
+            let [x, y] = one.slopes_ohm_per_m.each_ref().map(|slopes| self.unit_m * with(slopes));
+            let (mine, first) = (self.current[k], PARAMETERS * k);
+            let change = |d: usize, with: f32| -(with * mine + current * self.along[k][d]);
+            let changes = [change(0, x), change(1, y), one.ohm * current * mine, change(2, with(&one.by_radius_ohm))];
+            for (i, change) in changes.into_iter().enumerate() {
+                products[first + i] += self.per_ohm * (change - of_load * self.own_ohm[first + i]);
+            }
+        }
+    }
+}
+
 /// What a step of a contact's place along x, along y and of its radius changes in an electrode's field at it (ohm).
 fn along(slopes_ohm_per_m: [&PerElectrode; 2], by_radius_ohm: &PerElectrode, e: usize, unit_m: f32) -> [f32; 3] {
     [unit_m * slopes_ohm_per_m[0][e], unit_m * slopes_ohm_per_m[1][e], by_radius_ohm[e]]
 }
 
 /// Cholesky factor of a damped normal matrix whose diagonal is scaled to one.
-struct Factor {
+pub(crate) struct Factor {
     count: usize,
     rows: [Vector; MOST],
     scale: Vector,
 }
 
 impl Factor {
-    fn of(normal: &Normal, damping: f32) -> Option<Self> {
+    /// Of a normal matrix; `None` where that is not positive definite.
+    pub fn of(normal: &Normal, damping: f32) -> Option<Self> {
         let count = normal.count;
         let mut scale = [0.0; MOST];
         for i in 0..count {
@@ -207,11 +226,21 @@ impl Factor {
         Some(Self { count, rows, scale })
     }
 
-    fn solved(&self, mut right: Vector) -> Vector {
+    /// Square of a vector in the metric of the matrix's inverse.
+    pub fn square(&self, mut right: Vector) -> f32 {
+        self.forward(&mut right);
+        right.iter().take(self.count).map(|value| value * value).sum()
+    }
+
+    fn forward(&self, right: &mut Vector) {
         for i in 0..self.count {
             let sum: f32 = (0..i).map(|j| self.rows[i][j] * right[j]).sum();
             right[i] = (right[i] * self.scale[i] - sum) / self.rows[i][i];
         }
+    }
+
+    fn solved(&self, mut right: Vector) -> Vector {
+        self.forward(&mut right);
         for i in (0..self.count).rev() {
             let sum: f32 = (i + 1..self.count).map(|j| self.rows[j][i] * right[j]).sum();
             right[i] = (right[i] - sum) / self.rows[i][i];

@@ -7,6 +7,7 @@
 use crate::circuit::{Circuit, PerElectrode, Spot};
 use crate::fit::held_ohm;
 use crate::frame::{Errors, Frame, left_v};
+use crate::normal::{Factor, MOST, Normal, RowSlopes};
 use crate::table::{MAX_ELECTRODES, Table};
 
 /// About so many places are looked at.
@@ -14,6 +15,9 @@ const PLACES: usize = 256;
 /// Candidates, and how far they are apart at least, in usual radii.
 pub(crate) const CANDIDATES: usize = 3;
 const APART: f32 = 2.0;
+/// Damping of the normal equations in what contacts that are there could do as well, and share of a pattern that is taken for new at least: the host's.
+const DAMPING: f32 = 1e-3;
+const LEAST_NEW: f32 = 0.02;
 /// Smallest `1 - V / Vcc` that a ratio is taken of.
 const LEAST_GAP: f32 = 1e-3;
 
@@ -125,37 +129,77 @@ fn row_scales(frame: &Frame<'_>, n: usize, drive_v: f32) -> PerElectrode {
 pub(crate) struct Beside<'a, 't> {
     table: &'a Table<'t>,
     circuit: &'a Circuit,
-    /// What is left, but for what errors of pads make (V).
-    left_v: [PerElectrode; MAX_ELECTRODES],
+    factor: Factor,
+    /// One over the variance of a reading (1/V2).
+    weight: f32,
+    rows: [Row; MAX_ELECTRODES],
+}
+
+/// What is left of a row.
+#[derive(Clone, Copy)]
+struct Row {
+    /// What is left, but for what an error of the grounded pad makes (V).
+    left_v: PerElectrode,
     /// Predicted readings, as shares of the drive.
-    shares: [PerElectrode; MAX_ELECTRODES],
+    shares: PerElectrode,
+    /// What an error of the grounded pad makes (V).
+    pad_v: PerElectrode,
+    /// Weight of that (1/V2).
+    less: f32,
+    /// Readings that say something: a bit each.
+    known: u32,
+}
+
+impl Row {
+    const NONE: Self = Self {
+        left_v: [0.0; MAX_ELECTRODES],
+        shares: [0.0; MAX_ELECTRODES],
+        pad_v: [0.0; MAX_ELECTRODES],
+        less: 0.0,
+        known: 0,
+    };
+
+    fn is_known(&self, e: usize) -> bool {
+        self.known >> e & 1 == 1
+    }
+
+    /// Takes what an error of the grounded pad makes off volts.
+    fn without_pad(&self, volts: &mut [f32]) {
+        let product: f32 = volts.iter().zip(&self.pad_v).map(|(volts, pad_v)| volts * pad_v).sum();
+        volts.iter_mut().zip(&self.pad_v).for_each(|(volts, pad_v)| *volts -= self.less * product * pad_v);
+    }
 }
 
 impl<'a, 't> Beside<'a, 't> {
-    /// Of contacts that are fitted.
-    pub fn new(table: &'a Table<'t>, circuit: &'a Circuit, frame: &Frame<'_>, errors: &Errors) -> Self {
+    /// Of contacts that are fitted; `None` if they are not determined.
+    pub fn new(
+        table: &'a Table<'t>,
+        circuit: &'a Circuit,
+        frame: &Frame<'_>,
+        errors: &Errors,
+        normal: &Normal,
+    ) -> Option<Self> {
         let (head, n) = (table.head(), table.electrodes());
-        let none = [[0.0; MAX_ELECTRODES]; MAX_ELECTRODES];
-        let mut all = Self { table, circuit, left_v: none, shares: none };
-        for g in 0..n {
-            let (left, volts) = (&mut all.left_v[g], &mut all.shares[g]);
-            circuit.row_v(table, g, volts);
-            let mut pads = [0.0; MAX_ELECTRODES];
-            let (mut by_pad, mut pad) = (0.0, 0.0);
+        let factor = Factor::of(normal, DAMPING)?;
+        let mut all = Self { table, circuit, factor, weight: 1.0 / errors.variance_v2, rows: [Row::NONE; MAX_ELECTRODES] };
+        for (g, row) in all.rows.iter_mut().enumerate().take(n) {
+            circuit.row_v(table, g, &mut row.shares);
+            let mut pad = 0.0;
             for e in 0..n {
-                let left_v = left_v(frame, g * n + e, head.full_v, volts[e]);
-                if let Some(left_v) = left_v.filter(|_| e != g) {
-                    pads[e] = errors.pads[g] * (head.drive_v - frame.touch_v(g * n + e)).max(0.0);
-                    by_pad += left_v * pads[e];
-                    pad += pads[e] * pads[e];
+                if let Some(left_v) = left_v(frame, g * n + e, head.full_v, row.shares[e]) {
+                    row.left_v[e] = left_v;
+                    row.known |= 1 << e;
+                    row.pad_v[e] = errors.pad_v(table, frame, g, e);
+                    pad += row.pad_v[e] * row.pad_v[e];
                 }
-                left[e] = left_v.unwrap_or_default();
-                volts[e] /= head.drive_v;
+                row.shares[e] /= head.drive_v;
             }
-            let less = by_pad / (errors.variance_v2 + pad);
-            left.iter_mut().zip(pads).for_each(|(left_v, pad_v)| *left_v -= less * pad_v);
+            row.less = 1.0 / (errors.variance_v2 + pad);
+            let mut left_v = row.left_v;
+            row.without_pad(&mut left_v[..n]);
+            row.left_v = left_v;
         }
-        all
+        Some(all)
     }
 
     /// Where one more contact would explain most. Counts the looks.
@@ -186,24 +230,28 @@ impl<'a, 't> Beside<'a, 't> {
         all
     }
 
-    /// Scalar product of what is left with what a siemens at a place would change, and the square of that: with potentials `p` there,
-    /// `Vcc p_g / D_g (p_e - Z[e][g] p_g / D_g)`.
+    /// Scalar product of what is left with what a siemens at a place would change, and the square of that but for what the contacts that there are could do as
+    /// well: with potentials `p` there, a siemens changes `Vcc p_g / D_g (p_e - Z[e][g] p_g / D_g)`.
     fn look(&self, potentials_ohm: &PerElectrode) -> (f32, f32) {
-        let n = self.table.electrodes();
-        let (mut along, mut square) = (0.0, 0.0);
-        for g in 0..n {
+        let (head, n) = (self.table.head(), self.table.electrodes());
+        let (mut along, mut square, mut shared) = (0.0, 0.0, [0.0; MOST]);
+        for (g, row) in self.rows.iter().enumerate().take(n) {
             let own = potentials_ohm[g];
-            let (mut along_row, mut square_row) = (0.0, 0.0);
-            for e in 0..n {
+            let per_ohm = head.drive_v * own / self.circuit.loads_ohm[g];
+            let mut all = [0.0; MAX_ELECTRODES];
+            for e in (0..n).filter(|e| row.is_known(*e)) {
                 // As differences, of which the large constant of a light contact takes no digits.
-                let change = potentials_ohm[e] - own + self.shares[g][e] * own;
-                along_row += change * self.left_v[g][e];
-                square_row += change * change;
+                all[e] = per_ohm * (potentials_ohm[e] - own + row.shares[e] * own);
+                along += all[e] * row.left_v[e];
             }
-            let per_ohm = self.table.head().drive_v * own / self.circuit.loads_ohm[g];
-            along += per_ohm * along_row;
-            square += per_ohm * per_ohm * square_row;
+            let mut new = all;
+            row.without_pad(&mut new[..n]);
+            square += (0..n).map(|e| all[e] * new[e]).sum::<f32>();
+            let slopes = RowSlopes::new(self.circuit, g, head.drive_v, head.radius_m);
+            slopes.add_products(self.circuit, &new[..n], &row.shares, &mut shared);
         }
-        (along, square)
+        let shared = shared.map(|product| self.weight * product);
+        let new = square - self.factor.square(shared) / self.weight;
+        (along, new.max(LEAST_NEW * square))
     }
 }

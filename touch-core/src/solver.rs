@@ -181,7 +181,9 @@ impl Solver {
             if !self.circuit.solve(task.table, at.scene.spots()) {
                 return (best, false);
             }
-            let beside = Beside::new(task.table, &self.circuit, task.frame, task.errors);
+            let Some(beside) = Beside::new(task.table, &self.circuit, task.frame, task.errors, &at.normal) else {
+                return (best, false);
+            };
             let candidates = beside.candidates(task.errors, &mut work.looks);
             let is_explained = best.is_some_and(|best| !is_misfit(&best, task.readings()));
             if candidates[0].gain < price || at.scene.count == MAX_CONTACTS {

@@ -17,6 +17,8 @@ fn main() {
     let t = std::time::Instant::now();
     let bytes = solve::compile(&problem).unwrap();
     println!("compiled {} bytes in {:?}", bytes.len(), t.elapsed());
+    let mut dump = Vec::new();
+    dump.extend((bytes.len() as u32).to_le_bytes()); dump.extend(&bytes);
     let table = Table::read(&bytes).unwrap();
     let finer = finer_model(&det, &[], 0).unwrap();
     let scale = problem.spacing_m() / 0.015;
@@ -39,6 +41,7 @@ fn main() {
             }
             let readings = measured(&readings_v(&finer.impedance_ohm(&contacts).unwrap(), &det), &det.adc, &mut noise);
             let volts: Vec<f32> = readings.volts().iter().map(|v| *v as f32).collect();
+            dump.extend((count as f32).to_le_bytes()); for c in &contacts { for v in [c.x_m, c.y_m, c.radius_m, c.conductance_s / det.sheet_conductance_s()] { dump.extend((v as f32).to_le_bytes()); } } for v in &volts { dump.extend(v.to_le_bytes()); }
             let t = std::time::Instant::now();
             core.reset();
             let answer = core.solve(&table, &Frame::of_volts(&volts)).unwrap();
@@ -53,6 +56,7 @@ fn main() {
                 let sol = host.solve(&readings).unwrap();
                 let f: Vec<[f64; 2]> = sol.contacts.iter().map(|c| [c.x_m, c.y_m]).collect();
                 let e = matched(&contacts, &f);
+                dump.extend((f.len() as f32).to_le_bytes()); dump.extend((e as f32).to_le_bytes());
                 theirs.push(e);
                 if f.len() == count { right_t += 1; }
                 line += &format!(" | auto {} err {:.3} res {:.2}", f.len(), 1e3 * e, sol.residual.unwrap_or(0.0));
@@ -63,6 +67,7 @@ fn main() {
         let q = |mut v: Vec<f64>| { v.sort_by(f64::total_cmp); if v.is_empty() { return String::new() } format!("median {:.3} mean {:.3} p90 {:.3} mm", 1e3 * v[v.len() / 2], 1e3 * v.iter().filter(|x| x.is_finite()).sum::<f64>() / v.len() as f64, 1e3 * v[v.len() * 9 / 10]) };
         println!("{name} {count}: core right {right}/{scenes} {} | auto right {right_t} {} ; {:?} a frame", q(ours), q(theirs), time / scenes as u32);
     }
+    std::fs::write(format!("/tmp/wt/core-dump-{name}.bin"), dump).unwrap();
 }
 fn matched(contacts: &[Contact], found: &[[f64; 2]]) -> f64 {
     // Pairs nearest first, as many as there are.
