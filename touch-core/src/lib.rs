@@ -21,10 +21,14 @@ pub mod crc;
 mod fit;
 mod frame;
 mod normal;
+#[cfg(test)]
+mod samples;
 mod scan;
 mod solver;
 pub mod spline;
 pub mod table;
+#[cfg(test)]
+mod tests;
 
 pub use self::answer::{Answer, Contact, Flags};
 pub use self::circuit::MAX_CONTACTS;

@@ -294,10 +294,14 @@ fn better(a: Option<Fit>, b: Option<Fit>) -> Option<Fit> {
 }
 
 /// The contact that the readings speak least for, if that is less than its price: of a light one, whose readings are in proportion to its conductance, the
-/// square of them is that of the derivative by its logarithm.
+/// square of them is that of the derivative by its logarithm, or what others leave of that.
 fn weakest(fit: &Fit) -> Option<usize> {
-    let covariance = fit.normal.covariance()?;
-    let information = |k: usize| 1.0 / covariance[PARAMETERS * k + 2][PARAMETERS * k + 2];
+    let covariance = fit.normal.covariance();
+    let information = |k: usize| {
+        let strength = PARAMETERS * k + 2;
+        let left = covariance.as_ref().map_or(f32::INFINITY, |all| 1.0 / all[strength][strength]);
+        fit.normal.matrix[strength][strength].min(left)
+    };
     let least = (0..fit.scene.count).min_by(|a, b| information(*a).total_cmp(&information(*b)))?;
     (information(least) < PAID * PARAMETER_PRICE).then_some(least)
 }

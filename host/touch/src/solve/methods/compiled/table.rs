@@ -31,6 +31,9 @@ const SMOOTHNESS: f64 = 1e-6;
 const LIGHT_SHEETS: [f64; 2] = [1e-4, 1e-3];
 /// Radii of the small and of the wide disc, in usual ones.
 const DISCS: [f64; RADII] = [0.6, 2.2];
+/// What readings by a table are off from the model's, as a share of the largest: of 150 random scenes of one to three discs on `square-60` as many have the
+/// right number of contacts with 0.0003, 0.0007 and 0.001 (134, 133 and 131), and with more fewer; wide firm ones alone are split less with more.
+const TABLE_SHARE: f64 = 0.0006;
 /// Places that errors of the detector are taken at, as shares of the outline's sides.
 const TRIED: [[f64; 2]; 5] = [[0.5, 0.5], [0.25, 0.3], [0.7, 0.25], [0.3, 0.75], [0.8, 0.7]];
 /// `8 / (3 pi^2)`: own field of a disc of even current on a deep layer, over `1 / (s R)`.
@@ -329,7 +332,7 @@ fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
         drive_v: detector.drive_v as f32,
         on_resistance_ohm: detector.on_resistance_ohm as f32,
         noise_v: detector.adc.deviation_v() as f32,
-        model_share: model_error(&*problem.model).hypot(detector_share(problem)) as f32,
+        model_share: model_error(&*problem.model).hypot(TABLE_SHARE).hypot(detector_share(problem)) as f32,
         pad_share: PAD_ERROR as f32,
         full_v: full_v(detector) as f32,
         sheet_s: detector.sheet_conductance_s() as f32,
