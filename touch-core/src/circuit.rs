@@ -95,13 +95,12 @@ impl Loaded {
         let per_m2 = 1.0 / (wide_m2 - small_m2);
         self.spot = spot;
         table.sample(spot.at_m, per_m2 * (radius_m * radius_m - small_m2), &mut self.sample);
-        self.share = self.sample.value[n + 1].max(LEAST_SHARE).min(1.0);
+        self.share = self.sample.value[n + 1].clamp(LEAST_SHARE, 1.0);
         let even_ohm = head.even_ohm(radius_m);
         self.ohm = libm::expf(spot.ln_ohm).max(LEAST_OHM * (self.sample.value[n] + even_ohm));
         let least_ohm = 1.0 / (FIRMEST_SHEETS * head.sheet_s);
-        let rest_ohm = |crowded: f32| {
-            (self.ohm - self.sample.value[n] - even_ohm * (1.0 - CROWDED_LESS * crowded)).max(least_ohm)
-        };
+        let rest_ohm =
+            |crowded: f32| (self.ohm - self.sample.value[n] - even_ohm * (1.0 - CROWDED_LESS * crowded)).max(least_ohm);
         // Crowded is so much of the current as the layer's resistance has of that of both.
         let crowded = |rest_ohm: f32| even_ohm / (even_ohm + rest_ohm);
         let rest_ohm = rest_ohm(crowded(rest_ohm(crowded(rest_ohm(0.5)))));
@@ -262,7 +261,13 @@ impl Circuit {
     }
 
     /// Potentials under a place without a contact, for 1 A into each electrode (ohm), from the fields there.
-    pub fn potentials_ohm(&self, table: &Table<'_>, at_m: [f32; 2], fields_ohm: &PerElectrode, all_ohm: &mut PerElectrode) {
+    pub fn potentials_ohm(
+        &self,
+        table: &Table<'_>,
+        at_m: [f32; 2],
+        fields_ohm: &PerElectrode,
+        all_ohm: &mut PerElectrode,
+    ) {
         let n = table.electrodes();
         for e in 0..n {
             all_ohm[e] = fields_ohm[e] - self.constant_ohm[e];

@@ -56,13 +56,13 @@ impl Scene {
         for (spot, step) in moved.spots.iter_mut().zip(step.as_chunks::<PARAMETERS>().0).take(self.count) {
             let [x, y, ln_ohm, ln_radius] = *step;
             let shorter = head.radius_m * (LONGEST_WAY / libm::sqrtf(x * x + y * y).max(1e-9)).min(1.0);
-            let held = |step: f32| step.max(-LONGEST_LOG).min(LONGEST_LOG);
+            let held = |step: f32| step.clamp(-LONGEST_LOG, LONGEST_LOG);
             let to_m = table.held([spot.at_m[0] + shorter * x, spot.at_m[1] + shorter * y]);
             if table.holds(to_m[0], to_m[1]) {
                 spot.at_m = to_m;
             }
             spot.ln_ohm = held_ohm(spot.ln_ohm + held(ln_ohm), table);
-            spot.ln_radius = (spot.ln_radius + held(ln_radius)).max(LN_RADII[0]).min(LN_RADII[1]);
+            spot.ln_radius = (spot.ln_radius + held(ln_radius)).clamp(LN_RADII[0], LN_RADII[1]);
         }
         moved
     }

@@ -11,6 +11,11 @@
 //! - [`Solver`]: contacts from frame to frame
 
 #![no_std]
+#![allow(
+    clippy::needless_range_loop,
+    reason = "an index is that of an electrode, or a parameter, in several arrays at once"
+)]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test that unwraps fails where it should, and says where"))]
 
 #[cfg(test)]
 extern crate std;

@@ -38,7 +38,14 @@ impl Normal {
     ///
     /// An error of a grounded pad's own impedance changes its row by `p`, so that the row's covariance is `v I + p p'`, whose inverse is
     /// `(I - p p' / (v + p'p)) / v` (Sherman and Morrison, 1950).
-    pub fn sum_up(&mut self, table: &Table<'_>, circuit: &Circuit, frame: &Frame<'_>, errors: &Errors, radius_deviation: f32) {
+    pub fn sum_up(
+        &mut self,
+        table: &Table<'_>,
+        circuit: &Circuit,
+        frame: &Frame<'_>,
+        errors: &Errors,
+        radius_deviation: f32,
+    ) {
         *self = Self { count: PARAMETERS * circuit.count, ..Self::EMPTY };
         let (head, n) = (table.head(), table.electrodes());
         let mut volts = [0.0; MAX_ELECTRODES];

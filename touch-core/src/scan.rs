@@ -181,7 +181,8 @@ impl<'a, 't> Beside<'a, 't> {
     ) -> Option<Self> {
         let (head, n) = (table.head(), table.electrodes());
         let factor = Factor::of(normal, DAMPING)?;
-        let mut all = Self { table, circuit, factor, weight: 1.0 / errors.variance_v2, rows: [Row::NONE; MAX_ELECTRODES] };
+        let mut all =
+            Self { table, circuit, factor, weight: 1.0 / errors.variance_v2, rows: [Row::NONE; MAX_ELECTRODES] };
         for (g, row) in all.rows.iter_mut().enumerate().take(n) {
             circuit.row_v(table, g, &mut row.shares);
             let mut pad = 0.0;

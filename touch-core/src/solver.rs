@@ -99,6 +99,7 @@ impl Solver {
         let mut more = false;
         if is_lost && self.may_search() {
             (found, more) = self.search(found, task, &mut work);
+            found = found.and_then(|fit| self.pruned(fit, task, &mut work));
             self.searched = found.map_or(0.0, |fit| fit.normal.cost);
             let fits = found.is_none_or(|fit| !is_misfit(&fit, readings));
             self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
@@ -117,16 +118,26 @@ impl Solver {
 
     /// What was found last, fitted to this frame, without what is no longer there.
     fn followed(&mut self, task: Task<'_>, work: &mut Work) -> Option<Fit> {
-        let mut scene = self.scene;
-        while scene.count > 0 {
-            let fit = self.fit(scene, ANY_RADIUS, FOLLOWING, task, work)?;
-            let Some(gone) = weakest(&fit) else { return Some(fit) };
-            scene = fit.scene.without(gone);
-        }
-        None
+        let fit = self.fit(self.scene, ANY_RADIUS, FOLLOWING, task, work)?;
+        self.pruned(fit, task, work)
     }
 
-    fn fit(&mut self, scene: Scene, radius_deviation: f32, steps: usize, task: Task<'_>, work: &mut Work) -> Option<Fit> {
+    /// A fit without the contacts that the readings do not speak for; `None` if none is left.
+    fn pruned(&mut self, mut fit: Fit, task: Task<'_>, work: &mut Work) -> Option<Fit> {
+        while let Some(gone) = weakest(&fit) {
+            fit = self.fit(fit.scene.without(gone), ANY_RADIUS, SEARCHING, task, work)?;
+        }
+        Some(fit)
+    }
+
+    fn fit(
+        &mut self,
+        scene: Scene,
+        radius_deviation: f32,
+        steps: usize,
+        task: Task<'_>,
+        work: &mut Work,
+    ) -> Option<Fit> {
         let Task { table, frame, errors } = task;
         Fitter { table, frame, errors, circuit: &mut self.circuit, work, radius_deviation }.fit(scene, steps)
     }
@@ -156,12 +167,7 @@ impl Solver {
     }
 
     /// The best fit of contacts of about the usual radius from some starts.
-    fn best_of(
-        &mut self,
-        starts: &[Option<Scene>; CANDIDATES],
-        task: Task<'_>,
-        work: &mut Work,
-    ) -> Option<Fit> {
+    fn best_of(&mut self, starts: &[Option<Scene>; CANDIDATES], task: Task<'_>, work: &mut Work) -> Option<Fit> {
         let mut best = None;
         for start in starts.iter().flatten() {
             best = better(best, self.fit(*start, USUAL_RADIUS, SEARCHING, task, work));

@@ -212,8 +212,7 @@ pub(crate) struct Sample {
 }
 
 impl Sample {
-    pub const NONE: Self =
-        Self { value: [0.0; QUANTITIES], slope: [[0.0; QUANTITIES]; 2], wider: [0.0; QUANTITIES] };
+    pub const NONE: Self = Self { value: [0.0; QUANTITIES], slope: [[0.0; QUANTITIES]; 2], wider: [0.0; QUANTITIES] };
 }
 
 impl<'a> Table<'a> {
@@ -248,7 +247,8 @@ impl<'a> Table<'a> {
             found => Err(TableError::Count { what, found, least, most }),
         };
         let electrodes = counted("electrodes", 6, 2, MAX_ELECTRODES)?;
-        let sides = [counted("coefficients along x", 8, 4, MAX_SIDE)?, counted("coefficients along y", 10, 4, MAX_SIDE)?];
+        let sides =
+            [counted("coefficients along x", 8, 4, MAX_SIDE)?, counted("coefficients along y", 10, 4, MAX_SIDE)?];
         let knots = counted("coefficients over distances", 12, 4, MAX_KNOTS)?;
         let expected = bytes_of(electrodes, sides, knots);
         let found = bytes.len();

@@ -119,7 +119,7 @@ fn up_to_three_contacts_are_found_and_followed() {
         }
         // Nothing is left where nothing touches.
         let left = solver.solve(&table, &Frame::of_volts(&read(&[], 3))).unwrap();
-        assert!(left.contacts().is_empty(), "{left:?}");
+        assert!(left.contacts().is_empty(), "{count} {left:?}");
     }
 }
 

@@ -4,7 +4,9 @@ mod table;
 
 use std::sync::Arc;
 
-use tactomo_touch_core::{Answer, Contact, Flags as CoreFlags, Frame, FrameError, Says as CoreSays, Solver as Core, Table};
+use tactomo_touch_core::{
+    Answer, Contact, Flags as CoreFlags, Frame, FrameError, Says as CoreSays, Solver as Core, Table,
+};
 
 pub use self::table::{CompileError, compile};
 use crate::solve::answer::{Flags, FoundContact, Solution, SolveError, Uncertainty, check_count};

@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use tactomo_physics::forward::{ForwardError, readings_v};
 use tactomo_physics::forward::spots::Spot;
+use tactomo_physics::forward::{ForwardError, readings_v};
 use tactomo_physics::scene::Contact;
 use tactomo_touch_core::crc::crc32;
 use tactomo_touch_core::spline::{interval, weights};
@@ -231,7 +231,8 @@ impl Between {
         let [low_m, high_m] = problem.detector().outline.bounds();
         let far_m = (high_m[0] - low_m[0]).hypot(high_m[1] - low_m[1]);
         let ln_step = (far_m / radius_m).ln() / (KNOTS - 3) as f64;
-        let scale_ohm = spots.iter().zip(&means).map(|(spot, mean)| largest(&spot.electrodes_ohm, *mean)).fold(0.0, f64::max);
+        let scale_ohm =
+            spots.iter().zip(&means).map(|(spot, mean)| largest(&spot.electrodes_ohm, *mean)).fold(0.0, f64::max);
         let basis = |spot: &Spot, mean: f64| {
             let fields = spot.electrodes_ohm.iter().map(move |ohm| (ohm - mean) / scale_ohm);
             fields.chain([1.0]).collect::<Vec<_>>()
