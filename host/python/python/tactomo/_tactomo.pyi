@@ -35,6 +35,7 @@ __all__ = [
 _SolverName: TypeAlias = Literal[
     "auto",
     "contacts",
+    "core",
     "nonlinear",
     "bsbl",
     "tikhonov",

@@ -1,6 +1,8 @@
 //! `core`: the contacts that a board finds by itself, from a table that the detector was compiled to.
 
 mod table;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
