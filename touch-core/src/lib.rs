@@ -25,6 +25,7 @@ mod circuit;
 pub mod crc;
 mod fit;
 mod frame;
+mod head;
 mod normal;
 #[cfg(test)]
 mod samples;
