@@ -32,6 +32,15 @@ pub(crate) struct Linearised {
     pub detector: Similar,
 }
 
+impl Linearised {
+    /// What the readings of a scene are off by in the mean (V), where the detector reads `volts` (V), the described one `described` (V), and
+    /// steps have such patterns (V), a column each.
+    pub fn mean_v(&self, volts: &[f64], described: &[f64], patterns_v: &DMatrix<f64>) -> Vec<f64> {
+        let linear = patterns_v.columns(0, self.steps.len()) * DVector::from_column_slice(&self.steps);
+        volts.iter().zip(described).zip(&linear).map(|((at, before), linear)| at - before - linear).collect()
+    }
+}
+
 /// Mean and covariance of what readings are off by.
 #[derive(Clone, Default)]
 pub(crate) struct ApproximationError {
@@ -138,22 +147,10 @@ impl ApproximationError {
         }
     }
 
-    /// Rows applied to each direction, times its standard deviation: `rows x directions`.
-    pub fn patterns_through(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
-        let variances_v2 = self.directions.variances_v2();
-        let mut all = DMatrix::zeros(rows.nrows(), variances_v2.len());
-        self.directions.each(|i, readings, unit| {
-            let of_unit = rows.columns(readings.start, readings.len()) * DVector::from_column_slice(unit);
-            all.set_column(i, &(variances_v2[i].sqrt() * of_unit));
-        });
-        all
-    }
-
     /// This error, about a detector with such readings of the scene (V).
     pub fn about(self, linearised: &Arc<Linearised>, volts: &[f64]) -> Self {
-        let linear = &self.patterns_v * DVector::from_column_slice(&linearised.steps);
-        let mean_v = volts.iter().zip(&self.made_for).zip(&linear).map(|((at, before), linear)| at - before - linear);
-        Self { mean_v: mean_v.collect(), linearised: Some(Arc::clone(linearised)), ..self }
+        let mean_v = linearised.mean_v(volts, &self.made_for, &self.patterns_v);
+        Self { mean_v, linearised: Some(Arc::clone(linearised)), ..self }
     }
 
     /// Its mean alone.
@@ -161,21 +158,14 @@ impl ApproximationError {
         Self { directions: Directions::default(), ..self.clone() }
     }
 
+    /// Of a mean (V) alone.
+    pub fn of_mean(mean_v: Vec<f64>) -> Self {
+        Self { mean_v, ..Self::default() }
+    }
+
     /// Steps of the detector that are most likely, from residuals times the inverse of their covariance (1/V).
     pub fn steps(&self, pulls: &[f64]) -> Vec<f64> {
         self.patterns_v.tr_mul(&DVector::from_column_slice(pulls)).as_slice().to_vec()
-    }
-
-    /// What readings are most likely off by (V), from residuals times the inverse of their covariance (1/V).
-    pub fn likely_v(&self, pulls: &[f64]) -> Vec<f64> {
-        let mut off_v = self.mean_v.clone();
-        off_v.resize(pulls.len(), 0.0);
-        let variances_v2 = self.directions.variances_v2();
-        self.directions.each(|i, readings, unit| {
-            let along = variances_v2[i] * dot(unit, &pulls[readings.clone()]);
-            off_v[readings].iter_mut().zip(unit).for_each(|(off, unit)| *off += along * unit);
-        });
-        off_v
     }
 
     /// Whether steps of the detector are far from where it was made linear, for readings with noise of `deviation_v`: a change by some share of

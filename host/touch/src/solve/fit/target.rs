@@ -257,16 +257,14 @@ impl Target {
 
     /// Steps of the detector that are most likely where contacts have such readings (V).
     pub(crate) fn steps(&self, volts: &[f64]) -> Vec<f64> {
-        let mut pulls = self.residuals(volts);
-        self.whiten_transposed(&mut pulls);
-        self.error.steps(&pulls)
+        self.error.steps(&self.pulls(volts))
     }
 
-    /// What the readings are most likely off by (V), with contacts that predict `volts`.
-    pub(crate) fn likely_off_v(&self, volts: &[f64]) -> Vec<f64> {
+    /// Residuals times the inverse of their covariance (1/V), where contacts predict `volts`.
+    pub(crate) fn pulls(&self, volts: &[f64]) -> Vec<f64> {
         let mut pulls = self.residuals(volts);
         self.whiten_transposed(&mut pulls);
-        self.error.likely_v(&pulls)
+        pulls
     }
 
     /// Leaves readings that do not count, or are bounds, out of patterns.

@@ -18,6 +18,7 @@ use crate::solve::fit::approximation::{ApproximationError, Linearised};
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
 use tactomo_physics::forward::readings_v;
+use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
 /// How often a fit and what its readings may be off by are brought nearer to each other, at most.
@@ -303,23 +304,29 @@ impl ContactFinder {
         contacts: &[Contact],
         near: Option<&Arc<Linearised>>,
     ) -> Option<(Target, DMatrix<f64>)> {
-        let detector = self.problem.detector();
-        let nuisance = self.problem.nuisance()?;
-        let mut patterns_v = nuisance.patterns_v(contacts, detector).ok()?;
-        let made_for = readings_v(&self.problem.model.impedance_ohm(contacts).ok()?, detector);
-        let of_board = self.errors.patterns_v(&made_for);
-        let columns = patterns_v.ncols();
-        patterns_v = patterns_v.resize_horizontally(columns + of_board.ncols(), 0.0);
-        patterns_v.columns_mut(columns, of_board.ncols()).copy_from(&of_board);
+        let (mut patterns_v, made_for) = self.patterns_v(contacts)?;
         target.mask(&mut patterns_v);
         let least_v = self.errors.least_v(made_for.largest_v());
-        let made_for = made_for.volts().to_vec();
-        let error = ApproximationError::of(&patterns_v, nuisance.directions(), made_for, least_v);
+        let steps = self.problem.nuisance()?.directions();
+        let error = ApproximationError::of(&patterns_v, steps, made_for.volts().to_vec(), least_v);
         let informed = target.with(match near {
-            Some(near) => error.about(near, near.detector.readings_v(contacts, detector).ok()?.volts()),
+            Some(near) => error.about(near, near.detector.readings_v(contacts, self.problem.detector()).ok()?.volts()),
             None => error,
         });
         Some((informed, patterns_v))
+    }
+
+    /// What unknown things of detector and board change in the readings of contacts (V), each by its standard deviation, a column each, and these
+    /// readings; `None` if the detector is known exactly, or contacts make no sense.
+    pub(super) fn patterns_v(&self, contacts: &[Contact]) -> Option<(DMatrix<f64>, Readings)> {
+        let detector = self.problem.detector();
+        let mut patterns_v = self.problem.nuisance()?.patterns_v(contacts, detector).ok()?;
+        let readings = readings_v(&self.problem.model.impedance_ohm(contacts).ok()?, detector);
+        let of_board = self.errors.patterns_v(&readings);
+        let columns = patterns_v.ncols();
+        patterns_v = patterns_v.resize_horizontally(columns + of_board.ncols(), 0.0);
+        patterns_v.columns_mut(columns, of_board.ncols()).copy_from(&of_board);
+        Some((patterns_v, readings))
     }
 
     /// The detector that a fit makes most likely, if it is far from where the target is linear.

@@ -17,6 +17,7 @@ mod marginals;
 #[cfg(test)]
 mod motion_tests;
 mod multiple_models;
+mod off;
 mod on_detector;
 #[cfg(test)]
 mod places_tests;

@@ -106,6 +106,15 @@ fn a_contact_that_glides_is_known_better_than_by_each_frame_and_as_well_as_is_sa
 }
 
 #[test]
+fn the_same_readings_again_tell_no_more() {
+    let mut trial = MotionTrial::new();
+    trial.touch(&[contact(0.007, -0.004, 0.3)]);
+    let frame = trial.frame();
+    let sigmas_m: Vec<_> = (0..20).map(|_| sigma_m(&trial.solver.solve(&frame).unwrap())).collect();
+    assert!(sigmas_m.iter().all(|again_m| (again_m / sigmas_m[0] - 1.0).abs() < 0.01), "{sigmas_m:?}");
+}
+
+#[test]
 fn a_light_contact_is_found_after_some_frames_where_one_is_too_noisy() {
     let mut trial = MotionTrial::new();
     let truth = contact(-0.010, 0.006, 0.003);

@@ -5,6 +5,7 @@
 
 use super::discs::{DiscFit, DiscFitter, Effort};
 use super::multiple_models::{MultipleModels, Rows};
+use super::off::Off;
 use super::systematic_error::SystematicError;
 use super::{ContactFinder, ContactHypothesis};
 use crate::solve::fit::dot::dot;
@@ -35,48 +36,6 @@ pub(super) struct RowState {
     gone: f64,
 }
 
-/// What all readings are off by, of a detector that is not known exactly.
-///
-/// It changes with the contacts: once these have changed the readings by [`stale_share`](policy::stale_share), nothing of what was found is left, and
-/// what has come in its place is unknown but for its size.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Off {
-    /// As it was found (V); none of a detector that is as described.
-    volts: Vec<f64>,
-    /// Readings of the contacts that it was found with (V).
-    found_with: Vec<f64>,
-    /// How much of it is no longer what was found: 0 to 1.
-    changed: f64,
-}
-
-impl Off {
-    fn new(found: &DiscFit, target: &Target) -> Self {
-        if target.error().is_none() {
-            return Self::default();
-        }
-        Self { volts: target.likely_off_v(&found.volts), found_with: found.volts.clone(), changed: 0.0 }
-    }
-
-    /// Takes note of the readings that contacts predict now (V).
-    fn follow(&mut self, volts: &[f64]) {
-        let square = |all: &[f64]| dot(all, all);
-        let change: Vec<_> = self.found_with.iter().zip(volts).map(|(then, now)| now - then).collect();
-        let share = (square(&change) / square(&self.found_with).max(f64::MIN_POSITIVE)).sqrt();
-        self.changed = (share / policy::stale_share()).min(1.0);
-    }
-
-    /// What of it is left (V).
-    fn left_v(&self) -> impl Iterator<Item = f64> {
-        let left = (1.0 - self.changed * self.changed).sqrt();
-        self.volts.iter().map(move |volts| left * volts)
-    }
-
-    /// Standard deviation of what has come in its place, the same for all readings (V).
-    fn new_v(&self) -> f64 {
-        self.changed * (dot(&self.volts, &self.volts) / self.volts.len().max(1) as f64).sqrt()
-    }
-}
-
 /// What has come of a frame.
 pub(super) enum Step {
     /// The contacts, and whether they have to be searched.
@@ -89,11 +48,11 @@ pub(super) enum Step {
 
 impl RowState {
     /// From an explanation by all readings of `target`.
-    pub fn new(found: &ContactHypothesis, target: &Target) -> Self {
+    pub fn new(finder: &ContactFinder, found: &ContactHypothesis, target: &Target) -> Self {
         Self {
             filters: MultipleModels::new(found.fit.normal.clone()),
             systematic_error: SystematicError::new(&found.fit, target),
-            off: Off::new(&found.fit, target),
+            off: finder.off(&found.fit, target),
             unfit: 0,
             gone: 0.0,
         }
@@ -114,16 +73,16 @@ impl RowState {
         &self.off
     }
 
-    /// Whether contacts have changed so much that a whole frame has to tell anew what readings are off by.
-    pub fn is_stale(&self) -> bool {
-        self.off.changed >= 1.0
+    /// Whether contacts that predict such readings (V) have gone so far that a whole frame has to tell anew what readings are off by.
+    pub fn is_stale(&self, volts: &[f64]) -> bool {
+        self.off.is_stale(volts)
     }
 }
 
 impl ContactFinder {
     /// What rows are fitted as, less what all readings are off by; where that is not known yet of a detector, each by itself may be.
     pub(super) fn target_of_rows(&self, rows: &Readings, off: Option<&Off>) -> Target {
-        let Some(off) = off.filter(|off| !off.volts.is_empty()) else {
+        let Some(off) = off.filter(|off| !off.is_nothing()) else {
             return Target::provisional(rows, 1, &self.errors);
         };
         let mut less = rows.clone();
@@ -147,7 +106,10 @@ impl ContactFinder {
         }
         let search = state.unfit >= policy::unfit_frames();
         state.off.follow(&fit.volts);
-        state.systematic_error.add(&fit, target, &self.errors, state.off.changed);
+        if state.off.is_outdated() {
+            state.off = self.off_elsewhere(&state.off, &fit).unwrap_or(state.off);
+        }
+        state.systematic_error.add(&fit, target, &self.errors, &state.off);
         let known = state.filters.information();
         let stays = state.systematic_error.covariance(&fit);
         let covariance = || Some(Cholesky::new(Cholesky::new(known.clone())?.inverse() + stays)?.inverse());

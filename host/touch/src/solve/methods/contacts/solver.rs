@@ -264,7 +264,10 @@ impl ContactTracker {
         if before > 0 && self.last.is_some() && self.recounted_s.is_some() {
             self.doubt.recounted();
         }
-        self.rows = self.last.as_ref().map(|last| Box::new(RowState::new(last, target)));
+        // Where whole frames come, rows may never follow.
+        let by_rows = self.last.as_ref().filter(|_| self.latest.is_some());
+        self.rows = by_rows.map(|last| Box::new(RowState::new(&self.finder, last, target)));
+        self.whole = target.error().filter(|_| self.rows.is_none()).map(|_| target.clone());
         if let Some(mut latest) = self.latest.take() {
             latest.change_model(expected_v.as_deref(), self.expected_v());
             self.latest = Some(latest);

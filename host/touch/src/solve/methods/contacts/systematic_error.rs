@@ -5,16 +5,13 @@
 //! readings. So errors that stay, of the covariance `E`, leave the parameters' covariance `M^-1 A E A^T M^-1` however many rows come. `E`
 //! has the patterns of pads and converters, and of each reading by itself the model's error and rounding.
 //!
-//! Of a detector that is not known exactly, what readings are off by was found with the contacts in all readings, and is taken off rows: they
-//! tell how contacts move from there, not where that was, so that all of that error stays. As contacts go on, what readings are off by changes
-//! with them ([`Off`](super::rows::Off)): to `E` comes that share of what it may be at all.
+//! Of a detector that is not known exactly, what readings are off by was found with the contacts in all readings, and is taken off rows: `E` is of
+//! what is [not known](super::off) of that.
 
 use nalgebra::{Cholesky, DMatrix};
 
-use std::sync::Arc;
-
 use super::discs::{DiscFit, PARAMETERS};
-use crate::solve::fit::approximation::ApproximationError;
+use super::off::Off;
 use crate::solve::fit::target::{Errors, Target};
 use tactomo_physics::readings::Readings;
 
@@ -31,17 +28,8 @@ pub(super) struct SystematicError {
     information: DMatrix<f64>,
     /// `A` (1/V): a row for each parameter.
     pulls: DMatrix<f64>,
-    /// What all readings left, of a detector that is not known exactly.
-    found: Option<Found>,
     covariance: DMatrix<f64>,
     frames: u32,
-}
-
-/// The covariance of contacts as they were found, and what readings may be off by together.
-#[derive(Clone, Debug)]
-struct Found {
-    covariance: DMatrix<f64>,
-    error: Arc<ApproximationError>,
 }
 
 impl SystematicError {
@@ -49,21 +37,16 @@ impl SystematicError {
     pub fn new(fit: &DiscFit, target: &Target) -> Self {
         let units = units(fit);
         let per_m = |normal: &DMatrix<f64>| scaled(normal, |i, j| 1.0 / (units[i] * units[j]));
-        let found = |(error, covariance): (&Arc<ApproximationError>, DMatrix<f64>)| Found {
-            covariance: scaled(&covariance, |i, j| units[i] * units[j]),
-            error: Arc::clone(error),
-        };
         Self {
             information: per_m(&fit.normal),
             pulls: pulls(fit, target, &units),
-            found: target.error().zip(fit.covariance()).map(found),
             covariance: DMatrix::zeros(units.len(), units.len()),
             frames: 0,
         }
     }
 
-    /// Takes the rows of a target into account; of what readings are off by, the share `changed` is no longer what was found.
-    pub fn add(&mut self, fit: &DiscFit, target: &Target, errors: &Errors, changed: f64) {
+    /// Takes the rows of a target into account, less what all readings are `off` by.
+    pub fn add(&mut self, fit: &DiscFit, target: &Target, errors: &Errors, off: &Off) {
         let is_looked_at = self.frames.is_multiple_of(LOOKED_AT);
         self.frames += 1;
         if !is_looked_at {
@@ -75,16 +58,16 @@ impl SystematicError {
         let frames = f64::from(LOOKED_AT);
         self.information = KEPT_SHARE * &self.information + frames * &pulls * slopes;
         self.pulls = KEPT_SHARE * &self.pulls + frames * pulls;
-        if let Some(covariance) = self.reckoned(fit, target, errors, changed) {
+        if let Some(covariance) = self.reckoned(fit, target, errors, off) {
             self.covariance = covariance;
         }
     }
 
-    fn reckoned(&self, fit: &DiscFit, target: &Target, errors: &Errors, changed: f64) -> Option<DMatrix<f64>> {
+    fn reckoned(&self, fit: &DiscFit, target: &Target, errors: &Errors, off: &Off) -> Option<DMatrix<f64>> {
         let gains = Cholesky::new(self.information.clone())?.solve(&self.pulls);
-        if let Some(Found { covariance, error }) = &self.found {
-            let by_patterns = changed * error.patterns_through(&gains);
-            return Some(covariance + &by_patterns * by_patterns.transpose());
+        if !off.is_nothing() {
+            let by_patterns = &gains * &off.patterns_v;
+            return Some(&by_patterns * by_patterns.transpose());
         }
         let n = fit.volts.len().isqrt();
         let by_patterns = &gains * errors.patterns_v(&Readings::from_fn(n, |g, e| fit.volts[g * n + e]));

@@ -64,7 +64,8 @@ impl ContactTracker {
     /// of a reading is off by, and a new contact is seen by all; and once contacts have changed so much that it has to be found anew what readings
     /// are off by. Of nothing, those that see a contact come. None where rows do not tell it, as where contacts are too many to be followed by few.
     pub fn telling_grounds(&self, count: usize) -> Option<Vec<usize>> {
-        let is_stale = self.rows.as_ref().is_some_and(|rows| rows.is_stale());
+        let is_stale =
+            self.rows.as_ref().zip(self.last.as_ref()).is_some_and(|(rows, last)| rows.is_stale(&last.fit.volts));
         match &self.last {
             _ if self.doubt.needs_whole() => None,
             Some(last) if self.moves() && !is_stale => Some(self.finder.telling_grounds(&last.fit, count)),
@@ -88,7 +89,7 @@ impl ContactTracker {
     fn step(&mut self, rows: &Readings, elapsed_s: f64) -> (Target, bool) {
         (self.before, self.smoother) = (self.association.clone(), None);
         if let Some((last, whole)) = self.last.as_ref().zip(self.whole.take()) {
-            self.rows = Some(Box::new(RowState::new(last, &whole)));
+            self.rows = Some(Box::new(RowState::new(&self.finder, last, &whole)));
         }
         let off = self.rows.as_ref().map(|state| state.off());
         let target = self.finder.target_of_rows(rows, off);
@@ -98,13 +99,13 @@ impl ContactTracker {
             let glimpsed = self.finder.glimpsed(&target);
             let search = glimpsed.is_some();
             if let Some(begun) = glimpsed.map(|glimpsed| self.taken_over(&target).unwrap_or(glimpsed)) {
-                self.rows = Some(Box::new(RowState::new(&begun, &target)));
+                self.rows = Some(Box::new(RowState::new(&self.finder, &begun, &target)));
                 self.is_provisional = target.is_provisional();
                 (self.last, self.is_stale, self.is_glimpsed) = (Some(begun), true, true);
             }
             return (target, search);
         };
-        let state = self.rows.take().unwrap_or_else(|| Box::new(RowState::new(&last, &target)));
+        let state = self.rows.take().unwrap_or_else(|| Box::new(RowState::new(&self.finder, &last, &target)));
         match self.finder.step(last.clone(), *state, &target, elapsed_s) {
             Step::Followed(found, state, search) => {
                 (self.last, self.rows, self.is_stale) = (Some(*found), Some(state), false);
