@@ -33,7 +33,7 @@ pub struct Contact {
 pub struct Flags(u8);
 
 impl Flags {
-    /// There is more than [`MAX_CONTACTS`] contacts explain.
+    /// There are more contacts than those that are told: another one would explain much of what they leave.
     pub const MORE: Self = Self(1);
     /// The readings are not those of the contacts, by more than noise and the table's own error.
     pub const MISFIT: Self = Self(2);
