@@ -125,7 +125,8 @@ impl Loaded {
             // Crowded is so much of the current as the layer's resistance has of that of both.
             crowded = self.even_ohm / (self.even_ohm + self.rest_ohm);
         }
-        let (deep, thin) = (3.0 / (8.0 * head.top_s_per_m * self.radius_m), 1.0 / (core::f32::consts::TAU * head.sheet_s));
+        let (deep, thin) =
+            (3.0 / (8.0 * head.top_s_per_m * self.radius_m), 1.0 / (core::f32::consts::TAU * head.sheet_s));
         let of_layer = libm::sqrtf(deep * deep + thin * thin);
         self.moment_s_m2 = self.radius_m * self.radius_m / (4.0 * self.rest_ohm + of_layer);
         self.per_ln_radius = 2.0 * per_m2 * spread_m * spread_m;

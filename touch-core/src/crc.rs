@@ -17,11 +17,35 @@ const NIBBLES: [u32; 16] = {
     all
 };
 
+/// A checksum that bytes are added to.
+#[derive(Clone, Copy, Debug)]
+pub struct Crc(u32);
+
+impl Default for Crc {
+    fn default() -> Self {
+        Self(u32::MAX)
+    }
+}
+
+impl Crc {
+    /// Adds bytes.
+    pub fn add(&mut self, bytes: &[u8]) {
+        let step = |rest: u32, value: u32| rest >> 4 ^ NIBBLES[((rest ^ value) & 15) as usize];
+        let of_byte = |rest, byte: &u8| step(step(rest, u32::from(*byte)), u32::from(*byte >> 4));
+        self.0 = bytes.iter().fold(self.0, of_byte);
+    }
+
+    /// The checksum of all that were added.
+    pub fn sum(self) -> u32 {
+        !self.0
+    }
+}
+
 /// The checksum of some bytes.
 pub fn crc32(bytes: &[u8]) -> u32 {
-    let step = |rest: u32, value: u32| rest >> 4 ^ NIBBLES[((rest ^ value) & 15) as usize];
-    let of_byte = |rest, byte: &u8| step(step(rest, u32::from(*byte)), u32::from(*byte >> 4));
-    !bytes.iter().fold(u32::MAX, of_byte)
+    let mut crc = Crc::default();
+    crc.add(bytes);
+    crc.sum()
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Numbers of a detector and its board in a table.
 
+use core::f64::consts::PI;
+
 use crate::table::{Floats, RADII, TableError};
 
 /// Numbers of a detector and its board.
@@ -39,13 +41,13 @@ pub struct Head {
     pub top_s_per_m: f32,
 }
 
-/// `8 / (3 pi^2)`: resistance of the crowded current under a disc of even current, over `1 / (s R)`.
-const EVEN_SPREADING: f32 = 0.270_19;
+/// `8 / (3 pi^2)`: own field of a disc of even current on a deep layer of conductivity `s`, as a mean over it, over `1 / (s R)`.
+pub const EVEN_SPREADING: f64 = 8.0 / (3.0 * PI * PI);
 
 impl Head {
-    /// Field of a disc of even current on a deep layer, as a mean over it (ohm).
+    /// Own field of a disc of even current on a deep layer (ohm).
     pub(crate) fn even_ohm(&self, radius_m: f32) -> f32 {
-        EVEN_SPREADING / (self.top_s_per_m * radius_m)
+        EVEN_SPREADING as f32 / (self.top_s_per_m * radius_m)
     }
 
     /// Its numbers in the order in which they are stored.

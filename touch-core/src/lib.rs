@@ -3,7 +3,7 @@
 //! For microcontrollers: no operating system, no allocation, `f32`. `tactomo detector compile` writes the [table](table) of any flat detector; it is
 //! read where it lies, in flash.
 //!
-//! - [`table`]: the format, and its reader
+//! - [`table`]: the format, and its reader; [`Contents`] writes it
 //! - [`spline`]: what its fields are interpolated with
 //! - `circuit`: readings of a few contacts, and their derivatives
 //! - `normal`, `fit`: least squares
@@ -22,7 +22,8 @@ extern crate std;
 
 mod answer;
 mod circuit;
-pub mod crc;
+mod contents;
+mod crc;
 mod fit;
 mod frame;
 mod head;
@@ -38,6 +39,7 @@ mod tests;
 
 pub use self::answer::{Answer, Contact, Flags};
 pub use self::circuit::MAX_CONTACTS;
+pub use self::contents::Contents;
 pub use self::fit::Work;
 pub use self::frame::{Frame, FrameError, Says};
 pub use self::solver::Solver;

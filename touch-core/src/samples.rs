@@ -4,8 +4,9 @@ extern crate std;
 
 use std::vec::Vec;
 
+use crate::contents::Contents;
 use crate::crc::crc32;
-use crate::table::{Head, MAGIC, OTHERS, RADII, VERSION, bytes_of};
+use crate::table::{Head, OTHERS, RADII};
 
 /// Electrodes along a side, and their distance (m).
 const SIDE: usize = 4;
@@ -58,26 +59,15 @@ pub(crate) fn table() -> Vec<u8> {
         sheet_s: 1.1e-3,
         top_s_per_m: 0.23,
     };
-    let mut bytes = MAGIC.to_vec();
-    for count in [usize::from(VERSION), n, sides[0], sides[1], KNOTS, 0] {
-        bytes.extend((count as u16).to_le_bytes());
-    }
-    bytes.extend((bytes_of(n, sides, KNOTS) as u32).to_le_bytes());
-    bytes.extend(7u32.to_le_bytes());
-    let mut floats: Vec<f32> = head.numbers().to_vec();
+    let mut pads_ohm = Vec::new();
     for e in 0..n {
-        floats.extend((0..=e).map(|g| if e == g { 1000.0 } else { field_ohm(pads_m()[e], pads_m()[g]) }));
+        pads_ohm.extend((0..=e).map(|g| if e == g { 1000.0 } else { field_ohm(pads_m()[e], pads_m()[g]) }));
     }
-    (0..n).for_each(|_| floats.extend([1.0, 0.0]));
-    floats.extend((0..KNOTS).map(|k| -OHM * ((k as f32 - 1.0) * head.ln_step + (head.near_m / 0.032).ln())));
-    floats.extend((0..(n + 1) * (n + 2) / 2).map(|_| 0.0));
-    // Values at code 0 and steps, of fields and of the rest.
-    for _ in 0..RADII {
-        (0..n).for_each(|_| floats.extend([0.0, 0.05]));
-        floats.extend([100.0, 0.01, 1.0, 0.0]);
-    }
-    bytes.extend(floats.iter().flat_map(|value| value.to_le_bytes()));
-    bytes.extend((0..(CELLS * CELLS).div_ceil(8)).map(|_| 255));
+    let distances_ohm: Vec<_> =
+        (0..KNOTS).map(|k| -OHM * ((k as f32 - 1.0) * head.ln_step + (head.near_m / 0.032).ln())).collect();
+    // Of the fields and of the rest, twice.
+    let codes: Vec<_> = (0..n).map(|_| [0.0, 0.05]).chain([[100.0, 0.01], [1.0, 0.0]]).collect();
+    let mut coefficients = Vec::new();
     for j in 0..sides[1] {
         for i in 0..sides[0] {
             let at = |index: usize, low_m: f32, step_m: f32| low_m + (index as f32 - 1.0) * step_m;
@@ -85,11 +75,24 @@ pub(crate) fn table() -> Vec<u8> {
             for radius in 0..RADII {
                 // A wide disc's fields are flatter.
                 let codes = fields_ohm(at_m).into_iter().map(|ohm| (ohm * (1.0 - 0.1 * radius as f32) / 0.05) as i16);
-                codes.chain([0; OTHERS]).for_each(|code| bytes.extend(code.to_le_bytes()));
+                coefficients.extend(codes.chain([0; OTHERS]));
             }
         }
     }
-    seal(&mut bytes);
+    let mut bytes = Vec::new();
+    let contents = Contents {
+        head,
+        places_m: &pads_m().into_iter().map(|[x_m, y_m]| [x_m, y_m, 0.0]).collect::<Vec<_>>(),
+        sides,
+        pads_ohm: &pads_ohm,
+        channels: &[[1.0, 0.0]; SIDE * SIDE],
+        distances_ohm: &distances_ohm,
+        walls: &[0.0; (SIDE * SIDE + 1) * (SIDE * SIDE + 2) / 2],
+        codes: &codes.repeat(RADII),
+        mask: &[255; (CELLS * CELLS).div_ceil(8)],
+        coefficients: &coefficients,
+    };
+    contents.write(&mut bytes);
     bytes
 }
 

@@ -33,7 +33,7 @@
 //! make, which is smooth.
 
 use crate::crc::crc32;
-pub use crate::head::Head;
+pub use crate::head::{EVEN_SPREADING, Head};
 use crate::spline::{interval, weights};
 
 /// First bytes of a table.

@@ -1,5 +1,6 @@
 //! `core`: the contacts that a board finds by itself, from a table that the detector was compiled to.
 
+mod between;
 mod table;
 #[cfg(test)]
 mod tests;

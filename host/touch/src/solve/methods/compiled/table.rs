@@ -4,17 +4,15 @@
 //! `Z[e][g] = E[e][g] + A - u_e - u_g` (fields `E` between the electrodes, `u` at the contact, `A` its resistance with its own field), so that `u` and `A`
 //! follow from `Z` in the gauge in which `u` has no mean. They are found for a small and for a wide disc. Splines are fitted to places all over the detector by least squares.
 
-use std::f64::consts::PI;
+use nalgebra::{Cholesky, DMatrix};
 
-use nalgebra::{Cholesky, DMatrix, DVector};
-
-use tactomo_physics::forward::spots::Spot;
 use tactomo_physics::forward::{ForwardError, readings_v};
 use tactomo_physics::scene::Contact;
-use tactomo_touch_core::crc::crc32;
+use tactomo_touch_core::Contents;
 use tactomo_touch_core::spline::{interval, weights};
-use tactomo_touch_core::table::{Head, MAGIC, MAX_ELECTRODES, MAX_SIDE, OTHERS, RADII, VERSION, bytes_of};
+use tactomo_touch_core::table::{EVEN_SPREADING, Head, MAX_ELECTRODES, MAX_SIDE, OTHERS, RADII};
 
+use super::between::Between;
 use crate::solve::fit::linear::full_v;
 use crate::solve::fit::target::{PAD_ERROR, model_error};
 use crate::solve::problem::Problem;
@@ -36,22 +34,14 @@ const DISCS: [f64; RADII] = [0.6, 2.2];
 const TABLE_SHARE: f64 = 0.0006;
 /// Places that errors of the detector are taken at, as shares of the outline's sides.
 const TRIED: [[f64; 2]; 5] = [[0.5, 0.5], [0.25, 0.3], [0.7, 0.25], [0.3, 0.75], [0.8, 0.7]];
-/// `8 / (3 pi^2)`: own field of a disc of even current on a deep layer, over `1 / (s R)`.
-const EVEN_SPREADING: f64 = 8.0 / (3.0 * PI * PI);
-/// Coefficients over distances.
-const KNOTS: usize = 16;
-/// Places whose fields at each other are fitted, about, and every so many pairs that are.
-const PAIRED: usize = 400;
-const PAIR_STRIDE: usize = 5;
-/// Share of the diagonal that is added to it where a fit is not determined.
-const RIDGE: f64 = 1e-9;
-
 /// Why a detector has no table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompileError {
     /// Too many electrodes.
-    #[error("{detector}: it has {found} electrodes; tables are for {MAX_ELECTRODES} at most")]
+    #[error(
+        "{detector}: it has {found} electrodes; tables are for {MAX_ELECTRODES} at most; the solvers `auto` and `contacts` take more"
+    )]
     Electrodes {
         /// Its name.
         detector: String,
@@ -59,7 +49,9 @@ pub enum CompileError {
         found: usize,
     },
     /// It is curved.
-    #[error("{detector}: it is curved; tables are for flat detectors")]
+    #[error(
+        "{detector}: it is curved, and tables are for flat detectors; the solvers `auto` and `contacts` work on it"
+    )]
     Curved {
         /// Its name.
         detector: String,
@@ -97,7 +89,7 @@ pub fn compile(problem: &Problem) -> Result<Vec<u8>, CompileError> {
 }
 
 /// Cells that cover a detector.
-struct Grid {
+pub(super) struct Grid {
     low_m: [f64; 2],
     step_m: [f64; 2],
     cells: [usize; 2],
@@ -122,7 +114,7 @@ impl Grid {
     }
 
     /// Places on the detector, so many along each side of a cell.
-    fn places_m(&self, problem: &Problem, per_cell: usize) -> Vec<[f64; 2]> {
+    pub fn places_m(&self, problem: &Problem, per_cell: usize) -> Vec<[f64; 2]> {
         let [columns, rows] = self.cells.map(|cells| cells * per_cell);
         let at = |index: usize| (index as f64 + 0.5) / per_cell as f64;
         let all = (0..rows).flat_map(|j| (0..columns).map(move |i| [at(i), at(j)]));
@@ -173,7 +165,7 @@ impl Grid {
     }
 }
 
-fn failed(problem: &Problem, what: &'static str) -> CompileError {
+pub(super) fn failed(problem: &Problem, what: &'static str) -> CompileError {
     CompileError::Fit { detector: problem.detector().name.clone(), what }
 }
 
@@ -210,113 +202,38 @@ fn top_s_per_m(problem: &Problem) -> f64 {
     problem.detector().layers.last().map_or(1.0, |layer| layer.top_s_per_m)
 }
 
-/// Fields between places.
-struct Between {
-    near_m: f64,
-    ln_step: f64,
-    distances: Vec<f64>,
-    /// Lower triangle.
-    walls: Vec<f64>,
-}
-
-impl Between {
-    fn of(problem: &Problem, grid: &Grid) -> Result<Self, CompileError> {
-        let radius_m = problem.usual_radius_m();
-        let fields = problem.model.spots(radius_m).ok_or_else(|| failed(problem, "the model has no small contacts"))?;
-        let places_m = grid.places_m(problem, 1);
-        let stride = places_m.len().div_ceil(PAIRED);
-        let spots: Vec<_> = places_m.iter().step_by(stride).map(|[x, y]| fields.spot([*x, *y, 0.0])).collect();
-        let n = problem.detector().electrodes.len();
-        let means: Vec<_> = spots.iter().map(|spot| spot.electrodes_ohm.iter().sum::<f64>() / n as f64).collect();
-        let [low_m, high_m] = problem.detector().outline.bounds();
-        let far_m = (high_m[0] - low_m[0]).hypot(high_m[1] - low_m[1]);
-        let ln_step = (far_m / radius_m).ln() / (KNOTS - 3) as f64;
-        let scale_ohm =
-            spots.iter().zip(&means).map(|(spot, mean)| largest(&spot.electrodes_ohm, *mean)).fold(0.0, f64::max);
-        let basis = |spot: &Spot, mean: f64| {
-            let fields = spot.electrodes_ohm.iter().map(move |ohm| (ohm - mean) / scale_ohm);
-            fields.chain([1.0]).collect::<Vec<_>>()
-        };
-        let bases: Vec<_> = spots.iter().zip(&means).map(|(spot, mean)| basis(spot, *mean)).collect();
-        let count = KNOTS + (n + 1) * (n + 2) / 2;
-        let (mut matrix, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let pairs = (0..spots.len()).flat_map(|k| (0..k).map(move |l| (k, l)));
-        let mut row = vec![0.0; count];
-        for (k, l) in pairs.step_by(PAIR_STRIDE) {
-            let [a, b] = [spots[k].place_m, spots[l].place_m];
-            let distance_m = (a[0] - b[0]).hypot(a[1] - b[1]);
-            if distance_m < radius_m {
-                continue;
-            }
-            let ohm = fields.between_ohm(&spots[k], &spots[l]) - means[k] - means[l];
-            row.fill(0.0);
-            let (first, t) = interval(((distance_m / radius_m).ln() / ln_step) as f32, KNOTS - 3);
-            weights(t).value.iter().enumerate().for_each(|(i, weight)| row[first + i] = f64::from(*weight));
-            let mut column = KNOTS;
-            for s in 0..=n {
-                for t in 0..=s {
-                    let product = bases[k][s] * bases[l][t] + bases[k][t] * bases[l][s];
-                    row[column] = if s == t { 0.5 * product } else { product };
-                    column += 1;
-                }
-            }
-            add(&mut matrix, &mut right, &row, ohm);
-        }
-        (0..count).for_each(|i| matrix[(i, i)] += RIDGE * (1.0 + matrix[(i, i)]));
-        matrix.fill_upper_triangle_with_lower_triangle();
-        let factor = Cholesky::new(matrix).ok_or_else(|| failed(problem, "those between places"))?;
-        let found = factor.solve(&right);
-        let units = |s: usize| if s == n { 1.0 } else { scale_ohm };
-        let indices = (0..=n).flat_map(|s| (0..=s).map(move |t| (s, t)));
-        let walls = indices.zip(found.iter().skip(KNOTS)).map(|((s, t), q)| q / (units(s) * units(t))).collect();
-        Ok(Self { near_m: radius_m, ln_step, distances: found.iter().take(KNOTS).copied().collect(), walls })
-    }
-}
-
-fn largest(fields_ohm: &[f64], mean: f64) -> f64 {
-    fields_ohm.iter().map(|ohm| (ohm - mean).abs()).fold(0.0, f64::max)
-}
-
-/// Adds an equation to the lower triangle of the normal ones.
-fn add(matrix: &mut DMatrix<f64>, right: &mut DVector<f64>, row: &[f64], value: f64) {
-    for (j, second) in row.iter().enumerate().filter(|(_, second)| **second != 0.0) {
-        let mut column = matrix.column_mut(j);
-        column.iter_mut().zip(row).skip(j).for_each(|(sum, first)| *sum += first * second);
-        right[j] += second * value;
-    }
-}
-
-/// The bytes, in the order that [`tactomo_touch_core::table`] says.
+/// The bytes.
 fn written(problem: &Problem, grid: &Grid, quantities: &DMatrix<f64>, between: &Between) -> Vec<u8> {
     let detector = problem.detector();
     let n = detector.electrodes.len();
-    let sides = grid.sides();
-    let length = bytes_of(n, sides, between.distances.len());
-    let mut bytes = Vec::with_capacity(length);
-    bytes.extend(MAGIC);
-    let counts = [usize::from(VERSION), n, sides[0], sides[1], between.distances.len(), 0];
-    counts.iter().for_each(|count| bytes.extend((*count as u16).to_le_bytes()));
-    bytes.extend((length as u32).to_le_bytes());
-    let places = detector.electrodes.iter().flat_map(|pad| pad.place_m());
-    bytes.extend(crc32(&floats(places).collect::<Vec<_>>()).to_le_bytes());
-    bytes.extend(floats(head(problem, grid, between).numbers().map(f64::from)));
     let pads_ohm = problem.model.electrode_fields_ohm();
-    bytes.extend(floats((0..n).flat_map(|e| (0..=e).map(move |g| pads_ohm[(e, g)]))));
-    bytes.extend(floats(detector.electrodes.iter().flat_map(|pad| [pad.gain, pad.unseen_offset_v])));
-    bytes.extend(floats(between.distances.iter().copied()));
-    bytes.extend(floats(between.walls.iter().copied()));
     let codes: Vec<_> = quantities.column_iter().map(|column| Code::of(column.as_slice())).collect();
-    bytes.extend(floats(codes.iter().flat_map(|code| [code.zero, code.step])));
-    bytes.extend(mask(problem, grid));
-    for row in quantities.row_iter() {
-        row.iter().zip(&codes).for_each(|(value, code)| bytes.extend(code.of_value(*value).to_le_bytes()));
+    let coefficients = quantities
+        .row_iter()
+        .flat_map(|row| row.iter().zip(&codes).map(|(v, code)| code.of_value(*v)).collect::<Vec<_>>());
+    let mut bytes = Vec::new();
+    Contents {
+        head: head(problem, grid, between),
+        places_m: &detector.electrodes.iter().map(|pad| pad.place_m().map(|m| m as f32)).collect::<Vec<_>>(),
+        sides: grid.sides(),
+        pads_ohm: &floats((0..n).flat_map(|e| (0..=e).map(move |g| pads_ohm[(e, g)]))),
+        channels: &detector
+            .electrodes
+            .iter()
+            .map(|pad| [pad.gain, pad.unseen_offset_v].map(|v| v as f32))
+            .collect::<Vec<_>>(),
+        distances_ohm: &floats(between.distances.iter().copied()),
+        walls: &floats(between.walls.iter().copied()),
+        codes: &codes.iter().map(|code| [code.zero, code.step].map(|v| v as f32)).collect::<Vec<_>>(),
+        mask: &mask(problem, grid),
+        coefficients: &coefficients.collect::<Vec<_>>(),
     }
-    bytes.extend(crc32(&bytes).to_le_bytes());
+    .write(&mut bytes);
     bytes
 }
 
-fn floats(values: impl IntoIterator<Item = f64>) -> impl Iterator<Item = u8> {
-    values.into_iter().flat_map(|value| (value as f32).to_le_bytes())
+fn floats(values: impl IntoIterator<Item = f64>) -> Vec<f32> {
+    values.into_iter().map(|value| value as f32).collect()
 }
 
 fn head(problem: &Problem, grid: &Grid, between: &Between) -> Head {
