@@ -13,8 +13,10 @@
 //! the contact's own field), and `a` (S m2) what moment a slope drives:
 //! `C R^2 / 4` of a light disc whose current is even, `8/3 s R^3` of a perfect one on a deep layer of conductivity `s` (a conducting disc
 //! in a field along it: Landau and Lifshitz, Electrodynamics of Continuous Media, paragraph 4, of which a layer sees one side), `2 pi R^2 s t` on a thin one (a
-//! conducting cylinder across it), and between these about what all in series give. The same `w` are the derivatives by a
-//! contact's place: `dZ = -(w U_k' + U_k w')`, and by its resistance `dZ = A U_k U_k'` in logarithms.
+//! conducting cylinder across it). Between the two of a perfect one it is taken as if squares of their reciprocals added, and of a light and a perfect one as if both
+//! were in series. The same `w` are the derivatives by a contact's place: `dZ = -(w U_k' + U_k w')`, and by its resistance `dZ = A U_k U_k'` in logarithms.
+//!
+//! A current that crowds at the rim has the fields of an even one on a wider disc. What is fitted is the radius of that disc, the spread.
 
 use crate::normal::PARAMETERS;
 use crate::table::{MAX_ELECTRODES, Sample, Table};

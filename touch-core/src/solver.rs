@@ -97,14 +97,13 @@ impl Solver {
         let before = self.scene;
         let mut found = self.followed(task, &mut work);
         let readings = task.readings();
-        let is_lost = match &found {
-            Some(fit) => fit.normal.cost > (WORSE * self.searched).max(limit(readings - freedom(fit))),
-            None => {
-                // What does not fit is gone: nothing to wait for.
-                self.wait = 0;
-                true
-            }
-        };
+        // Nothing is left, or far less unexplained: what did not fit is gone.
+        let has_changed = found.is_none_or(|fit| self.more && WORSE * fit.normal.cost < self.searched);
+        if has_changed {
+            self.wait = 0;
+        }
+        let most = |fit: &Fit| (WORSE * self.searched).max(limit(readings - freedom(fit)));
+        let is_lost = has_changed || found.is_some_and(|fit| fit.normal.cost > most(&fit));
         if is_lost && self.may_search() {
             found = self.search(found, task, &mut work);
             found = found.and_then(|fit| self.pruned(fit, task, &mut work));
@@ -112,8 +111,6 @@ impl Solver {
             let fits = found.is_none_or(|fit| !is_misfit(&fit, readings));
             self.patience = if fits { PATIENCE[0] } else { (2 * self.patience).min(PATIENCE[1]) };
             self.wait = if fits { 0 } else { self.patience };
-        } else if self.more && found.is_none_or(|fit| WORSE * fit.normal.cost < self.searched) {
-            self.look_for_more(found.as_ref(), task, &mut work);
         }
         self.scene = found.map_or_else(Scene::default, |fit| fit.scene);
         self.number(&before);
@@ -155,7 +152,8 @@ impl Solver {
     /// The best explanation that is found, from what was followed or from nothing.
     fn search(&mut self, from: Option<Fit>, task: Task<'_>, work: &mut Work) -> Option<Fit> {
         let best = from.and_then(|from| self.grown(from, task, work));
-        if best.is_some_and(|best| !is_misfit(&best, task.readings())) {
+        // What there was more than is no place to go on from.
+        if !self.more && best.is_some_and(|best| !is_misfit(&best, task.readings())) {
             return best;
         }
         let candidates = first(task.table, task.frame, task.errors, &mut work.first_looks);
