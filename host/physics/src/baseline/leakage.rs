@@ -32,6 +32,7 @@ const EVEN: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub struct Leakage {
     drive_v: f64,
+    sheet_s: f64,
     /// Resistance of the multiplexer (ohm, times a sheet conductance).
     switch: f64,
     /// Electrodes of all that are looked at.
@@ -58,6 +59,7 @@ impl Leakage {
         let level = (&fields * &weights).mean();
         Self {
             drive_v: jacobian.detector.drive_v,
+            sheet_s,
             switch: jacobian.detector.on_resistance_ohm * sheet_s,
             kept: kept.to_vec(),
             electrodes: jacobian.electrodes(),
@@ -100,6 +102,15 @@ impl Leakage {
             touch = &measured + &at_rest - effect;
         }
         self.put(&touch, touch_v);
+    }
+
+    /// What so much more of it (sheet conductances) than in the baseline does to readings (V) of a touched detector with such impedances between
+    /// all its electrodes (ohm).
+    pub fn change_v(&self, impedance_ohm: &DMatrix<f64>, sheets: f64) -> Vec<f64> {
+        let impedance = impedance_ohm.select_rows(&self.kept).select_columns(&self.kept) * self.sheet_s;
+        let mut change_v = vec![0.0; self.electrodes * self.electrodes];
+        self.put(&(self.readings(&self.beside(&impedance, sheets)) - self.readings(&impedance)), &mut change_v);
+        change_v
     }
 
     /// Puts readings of the electrodes that are looked at among those of all (V).
@@ -188,6 +199,10 @@ mod tests {
         }
 
         fn readings(&self, sheets: f64, discs: &[([f64; 2], f64)]) -> Readings {
+            readings_v(&self.impedance_ohm(sheets, discs), self.fine.detector())
+        }
+
+        fn impedance_ohm(&self, sheets: f64, discs: &[([f64; 2], f64)]) -> DMatrix<f64> {
             let (mesh, detector) = (self.fine.image_mesh(), self.fine.detector());
             let sheet_s = detector.sheet_conductance_s();
             let of = |(place_m, sheets): &([f64; 2], f64)| {
@@ -196,7 +211,7 @@ mod tests {
             let mut image_s = mesh.conductances_s(&discs.iter().map(of).collect::<Vec<_>>()).unwrap();
             let area_m2: f64 = mesh.node_areas_m2.iter().sum();
             image_s.iter_mut().zip(&mesh.node_areas_m2).for_each(|(s, m2)| *s += sheets * sheet_s * m2 / area_m2);
-            readings_v(&self.fine.image_impedance_ohm(&image_s).unwrap(), detector)
+            self.fine.image_impedance_ohm(&image_s).unwrap()
         }
 
         /// What leakage leaves of the readings of electrodes (root of the mean square, V): taken off as at rest, and under the touch.
@@ -237,6 +252,22 @@ mod tests {
                     before_v > least_v && after_v < 0.03 * before_v + 2e-5,
                     "{sheets} {discs:?}: {before_v} {after_v}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn what_more_of_it_changes_is_as_the_finer_model_has_it() {
+        let all: Vec<usize> = (0..16).collect();
+        let trial = LeakageTrial::new(&all);
+        for sheets in [0.001, 0.03] {
+            for (discs, most) in [(&LIGHT[..], 0.04), (&FIRM, 0.04), (&SEVERAL, 0.15)] {
+                let [alone, both] = [0.0, sheets].map(|sheets| trial.readings(sheets, discs));
+                let change_v = trial.leakage.change_v(&trial.impedance_ohm(0.0, discs), sheets);
+                let truth: Vec<_> = both.volts().iter().zip(alone.volts()).map(|(both, alone)| both - alone).collect();
+                let off = truth.iter().zip(&change_v).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+                let share = (off / truth.iter().map(|volts| volts * volts).sum::<f64>()).sqrt();
+                assert!(share < most, "{sheets} {discs:?}: off by a share of {share}");
             }
         }
     }

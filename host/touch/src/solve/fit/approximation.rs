@@ -41,6 +41,21 @@ impl Linearised {
     }
 }
 
+/// What readings so far make of a detector.
+#[derive(Clone)]
+pub(crate) struct About {
+    /// The detector near which readings are taken as linear, if not the described one.
+    pub near: Option<Arc<Linearised>>,
+    /// Standard deviation of leakage since the baseline was taken (sheet conductances).
+    pub leakage_sheets: f64,
+}
+
+impl Default for About {
+    fn default() -> Self {
+        Self { near: None, leakage_sheets: policy::leakage_sheets() }
+    }
+}
+
 /// Mean and covariance of what readings are off by.
 #[derive(Clone, Default)]
 pub(crate) struct ApproximationError {
@@ -49,7 +64,9 @@ pub(crate) struct ApproximationError {
     pub(crate) mean_v: Vec<f64>,
     /// Patterns of steps of the detector (V).
     patterns_v: DMatrix<f64>,
-    pub(crate) linearised: Option<Arc<Linearised>>,
+    /// Pattern of leakage (V).
+    leakage_v: Vec<f64>,
+    pub(crate) about: About,
     /// Readings that the patterns are of (V); none if they were made from the readings themselves.
     made_for: Vec<f64>,
 }
@@ -121,7 +138,7 @@ impl ApproximationError {
         units.column_iter_mut().zip(&variances_v2).for_each(|(mut unit, variance_v2)| unit /= variance_v2.sqrt());
         let directions = Directions::Any { transposed: units.transpose(), units, variances_v2 };
         let patterns_v = patterns_v.columns(0, steps).into_owned();
-        Self { directions, mean_v: Vec::new(), patterns_v, linearised: None, made_for }
+        Self { directions, patterns_v, made_for, ..Self::default() }
     }
 
     /// Takes the share `k` of what volts have along each direction away.
@@ -147,10 +164,17 @@ impl ApproximationError {
         }
     }
 
-    /// This error, about a detector with such readings of the scene (V).
-    pub fn about(self, linearised: &Arc<Linearised>, volts: &[f64]) -> Self {
-        let mean_v = linearised.mean_v(volts, &self.made_for, &self.patterns_v);
-        Self { mean_v, linearised: Some(Arc::clone(linearised)), ..self }
+    /// This error about what is known of a detector, of which leakage has such a pattern (V), and which has such readings of the scene (V), if
+    /// that is not the described one.
+    pub fn about(self, about: &About, leakage_v: Vec<f64>, volts: Option<&[f64]>) -> Self {
+        let near = about.near.as_ref().zip(volts);
+        let mean_v = near.map_or_else(Vec::new, |(near, volts)| near.mean_v(volts, &self.made_for, &self.patterns_v));
+        Self { mean_v, leakage_v, about: about.clone(), ..self }
+    }
+
+    /// Pattern of leakage of one standard deviation (V); none of a detector that is known exactly.
+    pub fn leakage_v(&self) -> &[f64] {
+        &self.leakage_v
     }
 
     /// Its mean alone.
@@ -171,7 +195,7 @@ impl ApproximationError {
     /// Whether steps of the detector are far from where it was made linear, for readings with noise of `deviation_v`: a change by some share of
     /// the readings is not linear by about the square of that share.
     pub fn is_far(&self, steps: &[f64], deviation_v: f64) -> bool {
-        let from = self.linearised.as_ref();
+        let from = self.about.near.as_ref();
         let way = DVector::from_fn(steps.len(), |i, _| steps[i] - from.map_or(0.0, |from| from.steps[i]));
         let curved_v = CURVED * deviation_v * (self.made_for.len() as f64).sqrt();
         (&self.patterns_v * way).norm_squared() > curved_v * dot(&self.made_for, &self.made_for).sqrt()

@@ -111,6 +111,14 @@ thresholds! {
     /// Standard error of the logarithm of a radius up to which it is known from the readings: a fifth of it.
     known_radius_deviation: f64 = 0.2;
 
+    // What is known of the baseline.
+
+    /// Leakage that may have come or gone since the baseline was taken (sheet conductances), unless readings show more: that of some minutes at the
+    /// fastest drift which a baseline follows.
+    leakage_sheets: f64 = 1e-4;
+    /// Share of what contacts leave from which leakage explains it, where they leave so much that more contacts would be looked for.
+    leakage_share: f64 = 0.5;
+
     // When a contact goes.
 
     /// Nats by which frames of late have to speak for no contact before it is let go, or for one more that stays. A filter of rows that is as far behind

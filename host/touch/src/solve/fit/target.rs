@@ -103,6 +103,14 @@ impl Errors {
     }
 }
 
+/// What readings say of leakage since the baseline was taken.
+pub(crate) struct LeakageSeen {
+    /// Its likeliest standard deviation (sheet conductances).
+    pub sheets: f64,
+    /// By how much the sum of squares of what is left would fall with any leakage.
+    pub squares: f64,
+}
+
 /// Readings with what their errors are like.
 #[derive(Clone, Debug)]
 pub(crate) struct Target {
@@ -265,6 +273,20 @@ impl Target {
         let mut pulls = self.residuals(volts);
         self.whiten_transposed(&mut pulls);
         pulls
+    }
+
+    /// What readings say of leakage where contacts predict `volts`; `None` of a detector that is known exactly.
+    ///
+    /// With the pattern `p` of one deviation `s`, the residuals `r` and their covariance `S`, which has `p p^T` in it, `a = p^T S^-1 r` and
+    /// `q = p^T S^-1 p`: without `p` in `S` the likeliest leakage would be `s a / q`, with a variance of `s^2 (1 - q) / q`. By the inversion of a
+    /// matrix with a term of rank one (Sherman and Morrison, 1950).
+    pub(crate) fn leakage(&self, volts: &[f64]) -> Option<LeakageSeen> {
+        let pattern_v = self.error.leakage_v();
+        let whitened = if pattern_v.is_empty() { return None } else { self.whitened(pattern_v) };
+        let (pull, known) = (dot(pattern_v, &self.pulls(volts)), dot(&whitened, &whitened).max(f64::MIN_POSITIVE));
+        let variance = (pull / known).powi(2) - (1.0 - known).max(0.0) / known;
+        let sheets = self.error.about.leakage_sheets * variance.max(0.0).sqrt();
+        Some(LeakageSeen { sheets, squares: pull * pull / known })
     }
 
     /// Leaves readings that do not count, or are bounds, out of patterns.

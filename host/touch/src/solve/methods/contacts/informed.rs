@@ -14,15 +14,18 @@ use super::discs::DiscFit;
 use super::search::{COLD, FIRST};
 use super::{Better, ContactFinder, ContactHypothesis};
 use crate::solve::before::adaptive_mean::Mean;
-use crate::solve::fit::approximation::{ApproximationError, Linearised};
+use crate::solve::fit::approximation::{About, ApproximationError, Linearised};
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
+use tactomo_physics::baseline::Leakage;
 use tactomo_physics::forward::readings_v;
 use tactomo_physics::readings::Readings;
 use tactomo_physics::scene::Contact;
 
 /// How often a fit and what its readings may be off by are brought nearer to each other, at most.
 const RENEWALS: usize = 6;
+/// Factor by which leakage's standard deviation is changed at least.
+const LEAKAGE_FACTOR: f64 = 2.0;
 /// How often more contacts are looked for, at most.
 const GROWTHS: usize = 3;
 
@@ -122,8 +125,8 @@ impl ContactFinder {
         error: Option<&Arc<ApproximationError>>,
         mean: &Mean,
     ) -> Option<ContactHypothesis> {
-        let near = error.and_then(|error| error.linearised.as_ref());
-        let target = self.informed(&self.target_to_search(mean).ok()?, &contacts, near)?;
+        let about = error.map_or_else(About::default, |error| error.about.clone());
+        let target = self.informed(&self.target_to_search(mean).ok()?, &contacts, &about)?;
         let hypothesis = ContactHypothesis::of(self.disc_fitter().fit(contacts, &target, FIRST)?, &target);
         Some(self.settled(Informed { hypothesis, target }).hypothesis)
     }
@@ -136,7 +139,7 @@ impl ContactFinder {
         if !self.is_misfit(&fit, &as_before) || fit.contacts.len() >= self.settings.most {
             return None;
         }
-        let target = self.informed(target, &fit.contacts, error.linearised.as_ref())?;
+        let target = self.informed(target, &fit.contacts, &error.about)?;
         let fit = self.disc_fitter().go_on(&fit, &target, COLD)?;
         let more = self.is_misfit(&fit, &target).then(|| self.one_more(&fit, Vec::new(), &target))?.ok()?;
         let is_likelier = self.evidence(&more) > self.evidence(&fit);
@@ -164,7 +167,7 @@ impl ContactFinder {
 
     /// The best single contact, if anything stands out.
     pub(super) fn alone(&self, target: &Target) -> Option<Informed> {
-        let target = self.informed(target, &self.begun(target)?, None)?;
+        let target = self.informed(target, &self.begun(target)?, &About::default())?;
         let one = self.one(&target)?;
         let settled = self.settled(Informed { hypothesis: ContactHypothesis::of(one, &target), target });
         // Places that seemed worse with another detector may now be better.
@@ -176,14 +179,13 @@ impl ContactFinder {
 
     /// An explanation as it is, by what its readings may be off by together.
     fn informed_as_is(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
-        let target = self.informed(target, &from.fit.contacts, None)?;
+        let target = self.informed(target, &from.fit.contacts, &About::default())?;
         let hypothesis = ContactHypothesis { is_begun: true, ..self.judged(from.clone(), &target)? };
         Some(Informed { hypothesis, target })
     }
 
     fn caught_up(&self, from: &ContactHypothesis, target: &Target) -> Option<Informed> {
-        let near = from.error.as_ref().and_then(|error| error.linearised.clone());
-        let target = self.informed(target, &from.fit.contacts, near.as_ref())?;
+        let target = self.informed(target, &from.fit.contacts, &from.about())?;
         let fit = self.disc_fitter().go_on(&from.fit, &target, COLD)?;
         Some(self.settled(Informed { hypothesis: ContactHypothesis::of(fit, &target), target }))
     }
@@ -195,17 +197,14 @@ impl ContactFinder {
             // What contacts are missing for says nothing of the detector.
             let is_hopeless = hypothesis.fit.cost > policy::wrong_mean_square() * target.count() as f64
                 || self.is_misfit(&hypothesis.fit, target) && self.is_widest(hypothesis);
-            if is_hopeless && renewal > 0 {
-                break;
-            }
-            let nearer = if is_hopeless { None } else { self.nearer_detector(&hypothesis.fit, target) };
+            let nearer = self.nearer(&hypothesis.fit, target, is_hopeless);
             let is_settled = target.error().is_none_or(|error| error.is_settled(&hypothesis.fit.volts));
-            if nearer.is_none() && is_settled {
+            if nearer.is_none() && (is_settled || is_hopeless && renewal > 0) {
                 break;
             }
-            let near = nearer.or_else(|| hypothesis.error.as_ref()?.linearised.clone());
+            let about = nearer.unwrap_or_else(|| hypothesis.about());
             let contacts = &hypothesis.fit.contacts;
-            let renewed = self.informed(target, contacts, near.as_ref());
+            let renewed = self.informed(target, contacts, &about);
             let fitted = renewed.and_then(|target| {
                 let fit = self.disc_fitter().fit(contacts.clone(), &target, COLD)?;
                 let error = target.error().cloned();
@@ -288,13 +287,8 @@ impl ContactFinder {
 
     /// The target with what the readings of such contacts may be off by together, linear near a detector or else the described one; `None`
     /// if the detector is known exactly, or contacts make no sense.
-    pub(super) fn informed(
-        &self,
-        target: &Target,
-        contacts: &[Contact],
-        near: Option<&Arc<Linearised>>,
-    ) -> Option<Target> {
-        Some(self.informed_with_patterns(target, contacts, near)?.0)
+    pub(super) fn informed(&self, target: &Target, contacts: &[Contact], about: &About) -> Option<Target> {
+        Some(self.informed_with_patterns(target, contacts, about)?.0)
     }
 
     /// The same with what unknown things change in the readings (V), each by its standard deviation, a column each.
@@ -302,31 +296,54 @@ impl ContactFinder {
         &self,
         target: &Target,
         contacts: &[Contact],
-        near: Option<&Arc<Linearised>>,
+        about: &About,
     ) -> Option<(Target, DMatrix<f64>)> {
-        let (mut patterns_v, made_for) = self.patterns_v(contacts)?;
+        let (mut patterns_v, made_for) = self.patterns_v(contacts, about)?;
         target.mask(&mut patterns_v);
         let least_v = self.errors.least_v(made_for.largest_v());
         let steps = self.problem.nuisance()?.directions();
         let error = ApproximationError::of(&patterns_v, steps, made_for.volts().to_vec(), least_v);
-        let informed = target.with(match near {
-            Some(near) => error.about(near, near.detector.readings_v(contacts, self.problem.detector()).ok()?.volts()),
-            None => error,
-        });
+        let leakage_v = patterns_v.column(patterns_v.ncols() - 1).as_slice().to_vec();
+        let of_near = |near: &Arc<Linearised>| near.detector.readings_v(contacts, self.problem.detector());
+        let volts = about.near.as_ref().map(of_near).transpose().ok()?;
+        let informed = target.with(error.about(about, leakage_v, volts.as_ref().map(Readings::volts)));
         Some((informed, patterns_v))
     }
 
-    /// What unknown things of detector and board change in the readings of contacts (V), each by its standard deviation, a column each, and these
-    /// readings; `None` if the detector is known exactly, or contacts make no sense.
-    pub(super) fn patterns_v(&self, contacts: &[Contact]) -> Option<(DMatrix<f64>, Readings)> {
+    /// What unknown things of detector, board and, last, leakage change in the readings of contacts (V), each by its standard deviation, a column
+    /// each, and these readings; `None` if the detector is known exactly, or contacts make no sense.
+    pub(super) fn patterns_v(&self, contacts: &[Contact], about: &About) -> Option<(DMatrix<f64>, Readings)> {
         let detector = self.problem.detector();
         let mut patterns_v = self.problem.nuisance()?.patterns_v(contacts, detector).ok()?;
-        let readings = readings_v(&self.problem.model.impedance_ohm(contacts).ok()?, detector);
+        let impedance_ohm = self.problem.model.impedance_ohm(contacts).ok()?;
+        let readings = readings_v(&impedance_ohm, detector);
         let of_board = self.errors.patterns_v(&readings);
         let columns = patterns_v.ncols();
-        patterns_v = patterns_v.resize_horizontally(columns + of_board.ncols(), 0.0);
+        patterns_v = patterns_v.resize_horizontally(columns + of_board.ncols() + 1, 0.0);
         patterns_v.columns_mut(columns, of_board.ncols()).copy_from(&of_board);
+        let by_leakage_v = self.leakage().change_v(&impedance_ohm, about.leakage_sheets);
+        patterns_v.column_mut(columns + of_board.ncols()).copy_from_slice(&by_leakage_v);
         Some((patterns_v, readings))
+    }
+
+    fn leakage(&self) -> &Leakage {
+        self.leakage.get_or_init(|| {
+            let electrodes: Vec<_> = (0..self.problem.detector().electrodes.len()).collect();
+            Leakage::new(&self.problem.jacobian, &electrodes)
+        })
+    }
+
+    /// What a fit makes of the detector, if that is far from what the target is about. Contacts that do not explain the readings say nothing
+    /// of it, unless leakage does.
+    fn nearer(&self, fit: &DiscFit, target: &Target, is_hopeless: bool) -> Option<About> {
+        let about = &target.error()?.about;
+        let near = if is_hopeless { None } else { self.nearer_detector(fit, target) };
+        let seen = target.leakage(&fit.volts)?;
+        let says = !is_hopeless || seen.squares > policy::leakage_share() * fit.cost;
+        let sheets = seen.sheets.max(policy::leakage_sheets());
+        let is_other = says && (sheets / about.leakage_sheets).ln().abs() > LEAKAGE_FACTOR.ln();
+        let leakage_sheets = if is_other { sheets } else { about.leakage_sheets };
+        (near.is_some() || is_other).then(|| About { near: near.or_else(|| about.near.clone()), leakage_sheets })
     }
 
     /// The detector that a fit makes most likely, if it is far from where the target is linear.

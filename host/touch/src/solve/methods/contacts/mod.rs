@@ -49,7 +49,7 @@ use self::window::KeyFrame;
 use crate::solve::answer::{Alternative, Calibrated, Flags, FoundContact, Solution, SolveError, Uncertainty, check};
 use crate::solve::before::adaptive_mean;
 use crate::solve::before::adaptive_mean::{AdaptiveMean, Mean};
-use crate::solve::fit::approximation::ApproximationError;
+use crate::solve::fit::approximation::{About, ApproximationError};
 use crate::solve::fit::balance::balance;
 use crate::solve::fit::evidence::{Evidence, misfit_limit};
 use crate::solve::fit::linear::full_v;
@@ -57,6 +57,7 @@ use crate::solve::fit::policy;
 use crate::solve::fit::spots::SpotModel;
 use crate::solve::fit::target::{Errors, PAD_ERROR, Target, model_error};
 use crate::solve::problem::Problem;
+use tactomo_physics::baseline::Leakage;
 use tactomo_physics::forward::spots::SpotFields;
 use tactomo_physics::forward::{ForwardError, ForwardModel};
 use tactomo_physics::readings::{Readings, Says};
@@ -122,6 +123,8 @@ pub(crate) struct ContactFinder {
     widest_m: f64,
     errors: Errors,
     prior: Prior,
+    /// What leakage does; made when it is asked for first.
+    leakage: OnceLock<Leakage>,
     /// The grounds that see a contact come; made when they are asked for first.
     watching: OnceLock<Vec<usize>>,
 }
@@ -168,6 +171,11 @@ impl ContactHypothesis {
     /// What the readings may be off by together, by which it was compared with others.
     pub fn error(&self) -> Option<&Arc<ApproximationError>> {
         self.error.as_ref()
+    }
+
+    /// What it makes of the detector.
+    fn about(&self) -> About {
+        self.error.as_ref().map_or_else(About::default, |error| error.about.clone())
     }
 
     /// How many contacts it has.
@@ -230,6 +238,7 @@ impl ContactFinder {
                 area_m2: problem.jacobian.image_mesh.node_areas_m2.iter().sum(),
                 radius_deviation: settings.radius_deviation,
             },
+            leakage: OnceLock::new(),
             watching: OnceLock::new(),
             rough: problem.model.rough().unwrap_or_else(|| Arc::clone(&problem.model)),
             problem: problem.clone(),

@@ -17,7 +17,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::ContactFinder;
 use super::discs::DiscFit;
-use crate::solve::fit::approximation::{ApproximationError, Linearised};
+use crate::solve::fit::approximation::{About, ApproximationError};
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
@@ -46,7 +46,7 @@ struct Steps {
     mean: DVector<f64>,
     /// Of the steps' information.
     factor: Cholesky<f64, Dyn>,
-    near: Option<Arc<Linearised>>,
+    about: About,
 }
 
 impl std::fmt::Debug for Steps {
@@ -109,8 +109,8 @@ impl ContactFinder {
     }
 
     fn told_off(&self, fit: &DiscFit, target: &Target) -> Option<Off> {
-        let near = target.error()?.linearised.clone();
-        let here = self.patterns_here(fit, near.as_deref())?;
+        let about = target.error()?.about.clone();
+        let here = self.patterns_here(fit, &about)?;
         let plain = target.with(ApproximationError::of_mean(here.mean_v.clone()));
         let mut patterns_v = here.patterns_v.clone();
         plain.mask(&mut patterns_v);
@@ -124,20 +124,20 @@ impl ContactFinder {
         let along = slopes.tr_mul(&patterns_v) / variance_v2;
         let contacts = self.disc_fitter().covariance(fit, &plain)?;
         information -= along.tr_mul(&(contacts * &along));
-        let steps = Arc::new(Steps { mean, factor: Cholesky::new(information)?, near });
+        let steps = Arc::new(Steps { mean, factor: Cholesky::new(information)?, about });
         Some(here.off(steps, fit.volts.clone(), fit.volts.clone()))
     }
 
     /// The same detector with contacts that have gone on; `None` if they make no sense.
     pub(super) fn off_elsewhere(&self, off: &Off, fit: &DiscFit) -> Option<Off> {
         let steps = off.steps.clone()?;
-        let here = self.patterns_here(fit, steps.near.as_deref())?;
+        let here = self.patterns_here(fit, &steps.about)?;
         Some(here.off(steps, fit.volts.clone(), off.found_with.clone()))
     }
 
-    fn patterns_here(&self, fit: &DiscFit, near: Option<&Linearised>) -> Option<Patterns> {
-        let (patterns_v, described) = self.patterns_v(&fit.contacts)?;
-        let mean_v = match near {
+    fn patterns_here(&self, fit: &DiscFit, about: &About) -> Option<Patterns> {
+        let (patterns_v, described) = self.patterns_v(&fit.contacts, about)?;
+        let mean_v = match &about.near {
             Some(near) => {
                 let volts = near.detector.readings_v(&fit.contacts, self.problem.detector()).ok()?;
                 near.mean_v(volts.volts(), described.volts(), &patterns_v)

@@ -8,7 +8,7 @@ use crate::solve::solver::Solver;
 use tactomo_physics::detector::{ConverterErrors, Detector};
 use tactomo_physics::forward::{ForwardModel, Resolution, Slab, readings_v};
 use tactomo_physics::scene::Contact;
-use tactomo_physics::simulate::{Noise, drawn, measured};
+use tactomo_physics::simulate::{Fault, Noise, drawn, finer_model, measured};
 
 static PROBLEM: LazyLock<Problem> = LazyLock::new(|| {
     let slab: Box<dyn ForwardModel> = Box::new(Slab::new(&detector()).unwrap());
@@ -192,6 +192,27 @@ fn as_long_as_nothing_is_known_of_its_errors_a_detector_as_built_invents_little_
     }
     // Of 40 presses.
     assert!(invented[1] <= 10 && 2 * invented[1] < invented[0] && far <= 6, "{invented:?} {far}");
+}
+
+#[test]
+fn leakage_since_the_baseline_is_no_further_contact_and_goes_again() {
+    let described = Detector::preset(Detector::DEFAULT).unwrap();
+    let problem = Problem::of(&described).unwrap();
+    let mut solver = Contacts::new(&problem, ContactSettings::of(&problem)).unwrap();
+    let mut noise = Noise::new(5);
+    for seed in [2, 3] {
+        let built = drawn(&described, seed);
+        for truth in [contact(0.011, -0.006, 2.0), contact(-0.016, 0.013, 0.3)] {
+            for sheets in [0.0, 0.003, 0.03, 0.0] {
+                let faults = [Fault::Leak { sheets }];
+                let model = finer_model(&built, if sheets > 0.0 { &faults } else { &[] }, 1).unwrap();
+                let exact = readings_v(&model.impedance_ohm(&[truth]).unwrap(), &built);
+                let solution = solver.solve(&measured(&exact, &described.adc, &mut noise)).unwrap();
+                let pairs = matched(&[truth], &solution.contacts);
+                assert!(error_m(&pairs[0]) < 1e-3, "{seed} {sheets}: {pairs:?}");
+            }
+        }
+    }
 }
 
 #[test]

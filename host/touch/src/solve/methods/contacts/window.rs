@@ -22,7 +22,7 @@ use self::together::{Motion, Together};
 use super::discs::{DiscFit, Effort, STAYING, Still, place_m};
 use super::search::{COLD, FINALISTS};
 use super::{Certainty, ContactFinder, ContactHypothesis};
-use crate::solve::fit::approximation::Linearised;
+use crate::solve::fit::approximation::About;
 use crate::solve::fit::evidence::misfit_limit;
 use crate::solve::fit::policy;
 use crate::solve::fit::target::Target;
@@ -51,14 +51,13 @@ impl ContactFinder {
         // What a detector or a chip differs by, even what is left of that once it is learned, can make one contact seem two that stay.
         (followed[0].len() > 1).then_some(())?;
         let (middle, spread_m) = middle(&followed);
-        let near = from.error.as_ref().and_then(|error| error.linearised.clone());
-        let (window, still, growing) = self.window_of(keys, near, &middle, spread_m)?;
+        let (window, still, growing) = self.window_of(keys, from.about(), &middle, spread_m)?;
         let (best, by_count) = window.grown(&middle, (still, growing), spread_m)?;
         (best.count() > followed[0].len() && window.fits(&best)).then_some(())?;
         let last = best.at.fits.last()?;
         let contacts = last.contacts.clone();
         let still = Still::about(last, best.staying()?, best.levels());
-        let target = self.informed(target, &contacts, window.near.as_ref()).unwrap_or_else(|| target.clone());
+        let target = self.informed(target, &contacts, &window.about).unwrap_or_else(|| target.clone());
         let fit = self.disc_fitter().fit_still(contacts, Some(Arc::new(still)), &target, COLD)?;
         let certainty = Certainty::of(best.count(), &by_count);
         let keys = from.keys.clone();
@@ -71,12 +70,12 @@ impl ContactFinder {
     fn window_of(
         &self,
         keys: &[KeyFrame],
-        mut near: Option<Arc<Linearised>>,
+        mut about: About,
         middle: &[Contact],
         spread_m: f64,
     ) -> Option<(Window<'_>, Together, Together)> {
         for _ in 0..RENEWALS {
-            let window = Window::new(self, keys, near)?;
+            let window = Window::new(self, keys, about)?;
             let still = window.explained(vec![middle.to_vec(); keys.len()], Motion::Still)?;
             if !window.may_be_more(&still, spread_m) {
                 return None;
@@ -85,7 +84,7 @@ impl ContactFinder {
             if window.fits(&growing) {
                 return Some((window, still, growing));
             }
-            near = Some(window.nearer(&growing)?);
+            about = window.nearer(&growing)?;
         }
         None
     }

@@ -13,7 +13,7 @@ use super::super::ContactFinder;
 use super::super::discs::{DiscFit, DiscFitter};
 use super::KeyFrame;
 use super::together::Together;
-use crate::solve::fit::approximation::Linearised;
+use crate::solve::fit::approximation::{About, Linearised};
 use crate::solve::fit::dot::dot;
 use crate::solve::fit::target::Target;
 use tactomo_physics::forward::Nuisance;
@@ -46,8 +46,7 @@ pub(super) struct Window<'a> {
     pub frames: Vec<Frame>,
     /// What is not known of the detector. It may be [made](crate::solve::problem::Problem::nuisance) meanwhile: for one window it is what it was at its begin.
     nuisance: Option<&'a Nuisance>,
-    /// The detector near which readings are taken as linear, if not the described one.
-    pub near: Option<Arc<Linearised>>,
+    pub about: About,
     /// Information of all frames about steps of the detector, with what is known of these before.
     pub of_detector: DMatrix<f64>,
     /// Inverse of the covariance, between frames, of what each reading by itself is off by.
@@ -79,7 +78,7 @@ impl ContactFinder {
 
 impl<'a> Window<'a> {
     /// Of key frames whose readings are linear near a detector, or else the described one.
-    pub fn new(finder: &'a ContactFinder, keys: &[KeyFrame], near: Option<Arc<Linearised>>) -> Option<Self> {
+    pub fn new(finder: &'a ContactFinder, keys: &[KeyFrame], about: About) -> Option<Self> {
         let nuisance = finder.problem.nuisance();
         let frame = |key: &KeyFrame| {
             finder.check(&key.mean.readings).ok()?;
@@ -87,7 +86,7 @@ impl<'a> Window<'a> {
             let model_v = finder.errors.model * key.mean.readings.largest_v();
             let (alone, mut patterns, steps) = match nuisance {
                 Some(nuisance) => {
-                    let (alone, patterns) = finder.informed_with_patterns(&alone, &key.contacts, near.as_ref())?;
+                    let (alone, patterns) = finder.informed_with_patterns(&alone, &key.contacts, &about)?;
                     (alone, patterns, nuisance.directions())
                 }
                 None => {
@@ -119,7 +118,7 @@ impl<'a> Window<'a> {
             factor,
             finder,
             nuisance,
-            near,
+            about,
             between,
             patterns,
             frames,
@@ -127,7 +126,7 @@ impl<'a> Window<'a> {
     }
 
     /// The detector that an explanation makes likeliest, if it is far from where readings are linear.
-    pub fn nearer(&self, found: &Together) -> Option<Arc<Linearised>> {
+    pub fn nearer(&self, found: &Together) -> Option<About> {
         let nuisance = self.nuisance?;
         let steps = self.factor.solve(&self.pull(&self.residuals(&found.at.fits).0)?);
         let steps = steps.as_slice()[..nuisance.directions()].to_vec();
@@ -135,7 +134,7 @@ impl<'a> Window<'a> {
             |frame: &Frame| frame.alone.error().is_some_and(|error| error.is_far(&steps, frame.target.deviation_v()));
         self.frames.iter().any(is_far).then_some(())?;
         let detector = nuisance.similar(&steps).ok()?;
-        Some(Arc::new(Linearised { steps, detector }))
+        Some(About { near: Some(Arc::new(Linearised { steps, detector })), ..self.about.clone() })
     }
 
     /// Residuals of all frames times what is [between](Self::between) them, and their sum of squares.

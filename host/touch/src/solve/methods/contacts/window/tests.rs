@@ -169,7 +169,7 @@ fn a_window_begun_before_it_was_known_what_is_unknown_of_the_detector_ends_as_it
     let keys: Vec<_> = [0.1, 0.2, 0.3, 0.4].map(key).into();
     // As live does: a thread makes it, and takes about a second.
     problem.make_nuisance_beside();
-    let window = Window::new(&finder, &keys, None).unwrap();
+    let window = Window::new(&finder, &keys, About::default()).unwrap();
     let followed: Vec<_> = keys.iter().map(|key| key.contacts.clone()).collect();
     let growing = window.explained(followed, Motion::Growing(1e-3)).unwrap();
     while problem.nuisance().is_none() {
@@ -193,7 +193,7 @@ fn motion_gains_what_its_score_says_and_nothing_where_contacts_stay() {
             KeyFrame { mean: Mean::of_frame(&frame(&contacts, &mut noise)), contacts }
         };
         let keys: Vec<_> = [0.1, 0.2, 0.3, 0.4].into_iter().enumerate().map(key).collect();
-        let window = Window::new(finder, &keys, None).unwrap();
+        let window = Window::new(finder, &keys, About::default()).unwrap();
         let followed: Vec<_> = keys.iter().map(|key| key.contacts.clone()).collect();
         let still = window.explained(vec![middle(&followed).0; keys.len()], Motion::Still).unwrap();
         let moving = window.explained(followed, growing).unwrap();
