@@ -34,6 +34,7 @@ const DISCS: [f64; RADII] = [0.6, 2.2];
 const TABLE_SHARE: f64 = 0.0006;
 /// Places that errors of the detector are taken at, as shares of the outline's sides.
 const TRIED: [[f64; 2]; 5] = [[0.5, 0.5], [0.25, 0.3], [0.7, 0.25], [0.3, 0.75], [0.8, 0.7]];
+
 /// Why a detector has no table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
