@@ -1,6 +1,6 @@
 //! Contacts of a tomographic tactile detector, from a table that it was compiled to: place, conductance and standard errors of up to three.
 //!
-//! For microcontrollers: no operating system, no allocation, `f32`. `tactomo detector compile` writes the [table](table) of any flat detector; it is
+//! For microcontrollers: no operating system, no allocation, `f32`. `tactomo detector compile` writes the [table] of any flat detector; it is
 //! read where it lies, in flash.
 //!
 //! - [`table`]: the format, and its reader; [`Contents`] writes it
